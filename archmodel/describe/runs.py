@@ -7,7 +7,7 @@ from sqlalchemy import func, select
 from sqlalchemy.orm import InstrumentedAttribute, Session, aliased, joinedload
 
 from archmodel.tables.entities import Entity
-from archmodel.tables.runs import EntityResult, JointResult, Run
+from archmodel.tables.runs import CellResult, EntityResult, JointResult, Run
 from archmodel.tables.surveys import Simplification
 from moma.errors import UsageError
 
@@ -61,6 +61,7 @@ def describe_run(session: Session, number: int, count: int = 5) -> dict[str, Any
     dict
         as in `list_runs`, and: steps, simulated [s], fidelities, headline, cautions, peaks (largest values of the run),
         as_of, author, versions, settings, scene_text;
+        of a run of disks: measures by name, cells at the last instant;
         simplification (mode; how many stones of each shape, and how many outside of the survey's tolerance; the largest
         displacement of a corner and its stone; None where solids are not kept),
         largest_stresses (by stone), and joints by what is worst of them: largest_openings, least_centred
@@ -94,6 +95,8 @@ def describe_run(session: Session, number: int, count: int = 5) -> dict[str, Any
         "errors": {name: getattr(run, name) for name in ERRORS},
         "headline": run.summary.get("headline"),
         "peaks": _peaks(run.summary),
+        "measures": run.summary.get("measures", {}),
+        "cells": _cells(session, number),
         "as_of": run.as_of_id,
         "author": run.entry.author,
         "versions": dict(run.versions),
@@ -179,6 +182,17 @@ def _peaks(summary: Mapping[str, Any]) -> list[dict[str, object]]:
         for name, one in (summary.get("peaks") or {}).items()
         if one is not None
     ]
+
+
+def _cells(session: Session, run: int) -> list[dict[str, object]]:
+    """List the cells of a run of disks at its last instant, in the order of their names."""
+    last = select(func.max(CellResult.step)).where(CellResult.run_id == run).scalar_subquery()
+    statement = (
+        select(*(column for column in CellResult.__table__.columns if column.name != "run_id"))
+        .where(CellResult.run_id == run, CellResult.step == last)
+        .order_by(CellResult.cell)
+    )
+    return [dict(row) for row in session.execute(statement).mappings()]
 
 
 def _simplification(session: Session, run: int) -> dict[str, object] | None:

@@ -51,6 +51,8 @@ def _ended(error: JSONDecodeError) -> bool:
         error.msg.startswith("Invalid \\") and '"' not in rest
     ):
         return True
+    if re.fullmatch(r"\.|[eE][-+]?", rest.strip()):  # of a number
+        return True
     return any(word.startswith(rest.strip()) for word in ("true", "false", "null", "-"))
 
 

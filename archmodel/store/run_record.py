@@ -209,6 +209,7 @@ class RunRecord:
     errors : its error measures
     joints, contacts : at its end; None if they are not kept
     simplifications : of its stones; () if they are not kept
+    cells : of a run of disks, the columns of the rows of each cell by its name: at least step and time; NaN: unknown
     """
 
     scene: str
@@ -226,3 +227,4 @@ class RunRecord:
     joints: JointArrays | None = None
     contacts: ContactArrays | None = None
     simplifications: tuple[SimplificationRecord, ...] = ()
+    cells: Mapping[str, Mapping[str, Array]] = field(default_factory=dict)

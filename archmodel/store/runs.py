@@ -4,7 +4,7 @@ import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
-from itertools import repeat
+from itertools import chain, repeat
 from typing import Any
 
 import numpy as np
@@ -24,11 +24,20 @@ from archmodel.store.run_record import (
 from archmodel.store.stone_rows import storable
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Entry, new_entry
-from archmodel.tables.runs import FIDELITIES, ContactPoint, EntityResult, JointResult, Run
+from archmodel.tables.runs import FIDELITIES, CellResult, ContactPoint, EntityResult, JointResult, Run
 from archmodel.tables.surveys import Simplification
 from moma.errors import DatabaseError
 
-__all__ = ["contact_rows", "joint_rows", "plain", "result_row", "run_row", "simplification_row", "store_run"]
+__all__ = [
+    "cell_rows",
+    "contact_rows",
+    "joint_rows",
+    "plain",
+    "result_row",
+    "run_row",
+    "simplification_row",
+    "store_run",
+]
 
 _CHUNK = 5_000
 """Rows that are Python objects at a time, so that of a million contact points only the arrays are in memory."""
@@ -141,6 +150,23 @@ def contact_rows(contacts: ContactArrays, entities: Ints, run: int, place: str) 
     return _rows(columns | {"status": np.asarray(contacts.status)}, run)
 
 
+def cell_rows(cells: Mapping[str, Mapping[str, Array]], run: int, place: str) -> Iterator[dict[str, Any]]:
+    """Return the rows of the `cell_result` table; as `joint_rows`."""
+    known = [column.name for column in CellResult.__table__.columns if column.name not in ("run_id", "cell")]
+    chains = []
+    for name, given in cells.items():
+        if wrong := sorted(set(given) ^ set(known)):
+            raise DatabaseError(
+                f"cell {name!r} has not the columns of the table: {', '.join(wrong)}", where=place
+            )
+        columns: dict[str, NDArray[Any]] = {"cell": np.full(len(given["step"]), storable(name))}
+        columns["step"] = np.asarray(given["step"], dtype=np.int64)
+        columns["time"] = _all_finite(given["time"], "time", place)
+        columns |= {one: _known(given[one], one, place) for one in known if one not in ("step", "time")}
+        chains.append(_rows(columns, run))
+    return chain.from_iterable(chains)
+
+
 def _rows(columns: Mapping[str, NDArray[Any]], run: int) -> Iterator[dict[str, Any]]:
     """Yield one mapping per row, made a chunk at a time, None where masked; columns must be equally long."""
     names, count = ("run_id", *columns), len(next(iter(columns.values())))
@@ -228,6 +254,7 @@ def store_run(session: Session, run: RunRecord) -> int:
         if run.contacts is not None:
             rows = contact_rows(run.contacts, entities, stored.id, f"{place}, contact points")
             insert_rows(session, ContactPoint, rows)
+        insert_rows(session, CellResult, cell_rows(run.cells, stored.id, f"{place}, cells"))
         return stored.id
 
 

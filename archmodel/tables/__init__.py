@@ -2,7 +2,7 @@
 
 Public: `Entity`, `kind_named`, `kinds`, `own_attributes` (entities); `Structure`, `structure_kinds` (structures);
 `Membership`, `Relation` (relations); `Correction`, `Material`, `Phase`, `Statement` (knowledge); `Measurement`,
-`Simplification`, `Survey` (surveys); `ContactPoint`, `EntityResult`, `JointResult`, `Run` (runs); `Entry`,
-`held_at`, `new_entry` (entries); `StoneAttribute`, `attribute` (base); `RegisteredKind` (registered);
+`Simplification`, `Survey` (surveys); `CellResult`, `ContactPoint`, `EntityResult`, `JointResult`, `Run` (runs);
+`Entry`, `held_at`, `new_entry` (entries); `StoneAttribute`, `attribute` (base); `RegisteredKind` (registered);
 `SCHEMA_VERSION`, `metadata` (layout).
 """

@@ -1,4 +1,4 @@
-"""Simulation runs and their results by entity, by joint and by contact point."""
+"""Simulation runs and their results by entity, by joint, by contact point and by cell of disks."""
 
 from sqlalchemy import ForeignKey, Index
 from sqlalchemy.orm import Mapped, mapped_column, relationship
@@ -7,7 +7,7 @@ from archmodel.tables.base import JSON_TYPE, Base, attribute
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Entry
 
-__all__ = ["FIDELITIES", "ContactPoint", "EntityResult", "JointResult", "Run"]
+__all__ = ["FIDELITIES", "CellResult", "ContactPoint", "EntityResult", "JointResult", "Run"]
 
 FIDELITIES = ("fixed", "rigid", "deformable")
 """Ways to model a stone in a run."""
@@ -180,3 +180,47 @@ class ContactPoint(Base):
     run: Mapped[Run] = relationship()
     candidate: Mapped[Entity] = relationship(foreign_keys=[candidate_id])
     antagonist: Mapped[Entity] = relationship(foreign_keys=[antagonist_id])
+
+
+class CellResult(Base):
+    """One cell of disks at one instant of a run: a group of disks that is followed through it.
+
+    Attributes
+    ----------
+    cell : its name
+    step, time : number of the step, [s]
+    x, y : mean place of its disks [m]
+    lambda_x, lambda_y : standard deviations of x and y over those at the start [-]
+    volume, shear, turned : of the linear map nearest to the motion: change of area [-], ln of the ratio of the
+        principal stretches [-], rotation [°]
+    sigma_xx, sigma_yy, sigma_xy, p, q : mean stress, compression positive; (σ1 + σ2)/2, (σ1 - σ2)/2 [Pa]
+    direction : of σ1 from the x axis [°]
+    anisotropy, fabric_direction : of the directions of contacts [-], [°]
+    coordination, porosity : [-]
+    """
+
+    __tablename__ = "cell_result"
+
+    run_id: Mapped[int] = mapped_column(ForeignKey("run.id"), primary_key=True)
+    cell: Mapped[str] = mapped_column(primary_key=True)
+    step: Mapped[int] = mapped_column(primary_key=True)
+    time: Mapped[float]
+    x: Mapped[float | None]
+    y: Mapped[float | None]
+    lambda_x: Mapped[float | None]
+    lambda_y: Mapped[float | None]
+    volume: Mapped[float | None]
+    shear: Mapped[float | None]
+    turned: Mapped[float | None]
+    sigma_xx: Mapped[float | None]
+    sigma_yy: Mapped[float | None]
+    sigma_xy: Mapped[float | None]
+    p: Mapped[float | None]
+    q: Mapped[float | None]
+    direction: Mapped[float | None]
+    anisotropy: Mapped[float | None]
+    fabric_direction: Mapped[float | None]
+    coordination: Mapped[float | None]
+    porosity: Mapped[float | None]
+
+    run: Mapped[Run] = relationship()

@@ -44,6 +44,7 @@ class Deposit:
     falling_friction : the same while they fall; less makes the sample denser (0.05: 0.845 of the area, 0.4: 0.83)
     seed : of the radii and places
     gravity : downwards [m/s²]
+    large_share : part of the disks that have the largest radius, the others the smallest; None: evenly distributed
     """
 
     length: float
@@ -56,6 +57,7 @@ class Deposit:
     falling_friction: float
     seed: int = 1
     gravity: float = 9.81
+    large_share: float | None = None
 
     def __post_init__(self) -> None:
         for quantity, value, ok, remedy in (
@@ -123,7 +125,11 @@ def _loose(asked: Deposit) -> tuple[Array, Array]:
     rng = np.random.default_rng(asked.seed)
     wide = 2.0 * _LOOSE * asked.largest
     columns = int((asked.length - 0.5 * wide) / wide)
-    mean = np.pi * (asked.smallest**2 + asked.smallest * asked.largest + asked.largest**2) / 3.0
+    small, large, share = asked.smallest, asked.largest, asked.large_share
+    if share is None:
+        mean = np.pi * (small**2 + small * large + large**2) / 3.0
+    else:
+        mean = np.pi * ((1.0 - share) * small**2 + share * large**2)
     needed = _ROOM * _SOLID * asked.length * asked.highest / mean
     if needed > _MOST_DISKS:
         raise SceneError(
@@ -134,7 +140,9 @@ def _loose(asked: Deposit) -> tuple[Array, Array]:
         )
     rows = int(np.ceil(needed / columns))
     row, column = np.indices((rows, columns)).reshape(2, -1)
-    radius = rng.uniform(asked.smallest, asked.largest, len(row))
+    radius = rng.uniform(small, large, len(row))
+    if share is not None:
+        radius = np.where(rng.random(len(row)) < share, large, small)
     free = (0.5 * wide - radius)[:, None]
     pitch = (asked.length - 0.5 * wide) / columns
     place = np.column_stack([pitch * column + 0.5 * wide * (row % 2), wide * row]) + 0.5 * wide

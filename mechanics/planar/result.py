@@ -78,6 +78,7 @@ class PlanarHistory:
     iterations : sweeps
     contacts : contact points that are watched
     penetration : deepest overlap at the end of the step over the width of the smaller disk [-]
+    overlap, mean_overlap : deepest overlap at the end of the step, and their mean over the contacts that touch [m]
     lifted : work against the loads by moving disks apart that overlap too far; mostly potential energy [J]
     """
 
@@ -89,6 +90,8 @@ class PlanarHistory:
     iterations: Ints
     contacts: Ints
     penetration: Array
+    overlap: Array
+    mean_overlap: Array
     lifted: Array
 
 

@@ -200,6 +200,7 @@ class _Log(Carrier):
         model, solution, velocity = self._model, step.solution, step.after.velocity
         self.energy(step)
         self.unconverged += not solution.converged
+        overlap = np.maximum(-step.gap, 0.0)
         self._rows.append(
             (
                 step.after.time,
@@ -210,13 +211,16 @@ class _Log(Carrier):
                 solution.iterations,
                 len(step.contacts),
                 float(np.max(-step.gap / step.contacts.size, initial=0.0)),
+                float(overlap.max(initial=0.0)),
+                float(overlap.sum()) / max(1, int((step.gap <= 0.0).sum())),
                 step.lifted,
             )
         )
 
     def history(self) -> PlanarHistory:
         """Return one array for each quantity."""
-        time, kinetic, speed, balance, eta, iterations, contacts, penetration, lifted = np.array(self._rows).T
+        columns = np.array(self._rows).T
+        time, kinetic, speed, balance, eta, iterations, contacts, penetration, overlap, mean, lifted = columns
         return PlanarHistory(
             time,
             kinetic,
@@ -226,6 +230,8 @@ class _Log(Carrier):
             iterations.astype(np.int64),
             contacts.astype(np.int64),
             penetration,
+            overlap,
+            mean,
             lifted,
         )
 

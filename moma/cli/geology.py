@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from moma.cli.console import reporting, say
-from moma.cli.options import Json, Out, Resume, SceneArgument
+from moma.cli.options import Json, Out, Resume, SceneArgument, StoreDb
 from moma.cli.progress import Interruption, progress_bars
 
 __all__ = ["Experiment", "geology"]
@@ -36,26 +36,30 @@ def geology(
         ),
     ] = None,
     resume: Resume = None,
+    db: StoreDb = None,
     json: Json = False,
 ) -> None:
-    """Deform a sample of disks; write rows of its cells, fields, figures and a summary."""
+    """Deform a sample of disks; write rows of its cells, fields, figures, a summary and a report."""
     from moma.cli.text.formats import as_json
     from pipelines.geology.run import run_geology
 
     folder, stop = out or Path("out") / scene.stem, Interruption()
     with progress_bars() as listener, stop.handled():
-        done = run_geology(scene, experiment.value, folder, samples, stop.listening(listener), stop, resume)
+        done = run_geology(
+            scene, experiment.value, folder, samples, stop.listening(listener), stop, resume, db
+        )
     for warning in done.warnings:
         say(f"warning: {warning}")
     summary = done.summary
     lines = [
+        *(f"caution: {caution}" for caution in summary["cautions"]),
         f"{summary['scene']}: {summary['disks']} disks, {summary['steps']} steps",
         f"  {summary['headline']}",
         *(
             f"  {name}: {'unknown' if value is None else f'{value:.4g}'}"
             for name, value in summary["measures"].items()
         ),
-        f"  results in {done.folder}",
+        f"  results in {done.folder}" + ("" if done.run is None else f", run {done.run} in the database"),
     ]
     print(as_json(summary) if json else "\n".join(lines))
     if summary["outcome"] == "interrupted":

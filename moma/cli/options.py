@@ -24,6 +24,7 @@ __all__ = [
     "SceneArgument",
     "Sigma",
     "Snap",
+    "StoreDb",
     "Support",
     "SurveyFiles",
     "SurveyFormat",
@@ -68,6 +69,16 @@ Db = Annotated[
         metavar="URL",
         envvar="MOMA_DB",
         help="Entity database: sqlite:///FILE, or postgresql://USER@HOST/NAME.",
+    ),
+]
+StoreDb = Annotated[
+    str | None,
+    typer.Option(
+        "--db",
+        metavar="URL",
+        envvar="MOMA_DB",
+        help="Keep the run in this database too; it is made if it is not there. Default: results in files only.",
+        show_default=False,
     ),
 ]
 Profile = Annotated[

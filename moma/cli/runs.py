@@ -30,7 +30,17 @@ _JOINTS = {
     "sliding": "m",
 }
 _PEAKS = {"peak": None, "value": None, "end": None, "unit": None, "time": "s", "stones": None}
+_CELLS = {
+    "cell": None,
+    "lambda_x": "-",
+    "lambda_y": "-",
+    "p": "Pa",
+    "q": "Pa",
+    "porosity": "-",
+    "coordination": "-",
+}
 _TABLES = {
+    "cells": ("cells of disks at the end", _CELLS),
     "peaks": ("largest values during the run, and at its end", _PEAKS),
     "largest_stresses": ("largest Von Mises stresses", _STRESSES),
     "largest_openings": ("joints that have opened most", _JOINTS),

@@ -121,16 +121,15 @@ def _forces(axes: "Axes", fields: Fields, radius: Array, layer: Ints) -> str:
     from matplotlib.collections import LineCollection
 
     _disks(axes, fields, radius, facecolors="#f3efe6")
-    chains = fields.force_chains
-    if not len(chains):
-        return "Force chains: no contact bears"
-    strongest = float(chains[:, 4].max())
-    width = _STRONGEST * chains[:, 4] / strongest
-    axes.add_collection(
-        LineCollection(
-            list(chains[:, :4].reshape(-1, 2, 2)), linewidths=width, colors="#8a3b12", capstyle="round"
-        )
+    pressed, force = fields.force_normal > 0, fields.force_normal
+    if not pressed.any():
+        return "Force chains: no contact is pressed"
+    strongest = float(force.max())
+    width = _STRONGEST * force[pressed] / strongest
+    lines = LineCollection(
+        list(fields.branches[pressed]), linewidths=width, colors="#8a3b12", capstyle="round"
     )
+    axes.add_collection(lines)
     return f"Force chains, strongest {strongest / 1e3:.3g} kN"
 
 

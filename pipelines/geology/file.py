@@ -8,6 +8,7 @@ from typing import Any, cast
 import numpy as np
 
 from mechanics.planar.measures.cells import Cell
+from mechanics.scene.loads.motions import ImposedMotion
 from moma.errors import SceneError
 from pipelines.geology.experiments.biaxial import Biaxial
 from pipelines.geology.experiments.deposition import Deposition
@@ -17,7 +18,7 @@ from pipelines.geology.experiments.fold import Fold
 from pipelines.geology.experiments.repose import Repose
 from pipelines.geology.experiments.wedge import Wedge
 from pipelines.geology.observe import WHOLE
-from pipelines.geology.settings import Material, Recording, Sample, Stepping, Sweeping
+from pipelines.geology.settings import Layer, Material, Recording, Sample, Stepping, Sweeping
 from pipelines.scene.keys import build, keys_of
 from pipelines.toml.lines import key_lines, parse_toml, read_text
 from pipelines.toml.schema import REQUIRED, Document, Key, Kind, check_table, nearest
@@ -62,6 +63,7 @@ class GeologyScene:
     name : title
     kind : of `EXPERIMENTS`
     cells : followed through the run
+    layers : of other materials than `[sample]` and `[contact]` say, from below; () if there are none
     """
 
     document: Document
@@ -75,6 +77,7 @@ class GeologyScene:
     output: Recording
     experiment: Experiment
     cells: tuple[Cell, ...]
+    layers: tuple[Layer, ...] = ()
 
 
 def read_geology(path: str | Path, kind: str) -> GeologyScene:
@@ -91,7 +94,7 @@ def parse_geology(text: str, path: str, kind: str) -> GeologyScene:
     """Check the text of the scene file of an experiment; `path` is for the messages."""
     given = parse_toml(text, path, SceneError, _START)
     document = Document(path, key_lines(text))
-    known = ["scene", *_TABLES, kind, "cells"]
+    known = ["scene", *_TABLES, kind, "cells", "layers"]
     for name in given:
         if name not in known:
             other = (
@@ -109,6 +112,7 @@ def parse_geology(text: str, path: str, kind: str) -> GeologyScene:
         kind=kind,
         experiment=cast(Experiment, _built(document, given, kind, EXPERIMENTS[kind])),
         cells=_cells(document, given.get("cells", [])),
+        layers=_layers(document, given.get("layers", [])),
         **tables,
     )
     _check_cells(scene)
@@ -140,7 +144,7 @@ def _check_motion(scene: GeologyScene) -> None:
     time, smallest = scene.time, scene.sample.smallest
     with scene.document.at(scene.kind):
         setup = scene.experiment.setup(time.step, time.step * time.steps)
-    for motion in setup.loads.motions:
+    for motion in (one for one in setup.loads.motions if isinstance(one, ImposedMotion)):
         way = time.step * float(np.linalg.norm(np.atleast_2d(motion.velocity.value), axis=1).max())
         if way > smallest:
             scene.document.fail(
@@ -165,11 +169,33 @@ def _built(document: Document, given: Mapping[str, Any], name: str, owner: type[
         return build(owner, values)
 
 
-def _cells(document: Document, given: Any) -> tuple[Cell, ...]:
+def _entries(document: Document, given: Any, name: str) -> list[dict[str, Any]]:
     if not isinstance(given, list) or not all(isinstance(one, dict) for one in given):
-        document.fail("'cells' is not an array of tables", "cells", remedy="write [[cells]] before each cell")
+        document.fail(
+            f"{name!r} is not an array of tables", name, remedy=f"write [[{name}]] before each of them"
+        )
+    return given
+
+
+def _layers(document: Document, given: Any) -> tuple[Layer, ...]:
+    layers: list[Layer] = []
+    for number, content in enumerate(_entries(document, given, "layers")):
+        place = ("layers", str(number))
+        values = check_table(document, place, content, keys_of(Layer), f"[[layers]] {number + 1}")
+        layers.append(build(Layer, values))
+        if number and layers[-1].top <= layers[-2].top:
+            document.fail(
+                f"top = {layers[-1].top:g} is not above that of the layer before, {layers[-2].top:g}",
+                *place,
+                "top",
+                remedy="give the layers from below",
+            )
+    return tuple(layers)
+
+
+def _cells(document: Document, given: Any) -> tuple[Cell, ...]:
     cells: dict[str, Cell] = {}
-    for number, content in enumerate(given):
+    for number, content in enumerate(_entries(document, given, "cells")):
         place = ("cells", str(number))
         values = cast(dict[str, Any], check_table(document, place, content, _CELL, f"[[cells]] {number + 1}"))
         if len(values["centre"]) != 2:

@@ -55,8 +55,10 @@ class Fields:
     position, velocity : (nb, 3) of disks, then walls
     pressure : (nd,) mean pressure in the share of each disk, 0 where it has none [Pa]
     volume, shear : (nd,) local deformation since the start (`Deformation`) [-]
-    force_chains : (n, 5) of contacts that bear: the centres of the two disks, or the disk and the point [m], and the
-        normal force [N]
+    bodies : (n, 2) of contacts that transmit a force: candidate and antagonist, numbered as the rows of `position`
+    point, normal : (n, 2) of these [m], and from antagonist to candidate [-]
+    force : (n, 2) mean force over the step on the candidate, in x and y [N]
+    gap : (n,) negative: overlap [m]
     """
 
     step: int
@@ -66,7 +68,29 @@ class Fields:
     pressure: Array
     volume: Array
     shear: Array
-    force_chains: Array
+    bodies: Ints
+    point: Array
+    normal: Array
+    force: Array
+    gap: Array
+
+    @property
+    def force_normal(self) -> Array:
+        """Normal forces (n,), compression positive [N]."""
+        return np.asarray((self.normal * self.force).sum(axis=1))
+
+    @property
+    def force_tangential(self) -> Array:
+        """Tangential forces (n,), along the normal turned by +90° [N]."""
+        return np.asarray(self.normal[:, 0] * self.force[:, 1] - self.normal[:, 1] * self.force[:, 0])
+
+    @property
+    def branches(self) -> Array:
+        """Lines (n, 2, 2) between the centres of two disks, or from a disk to the point on a wall [m]."""
+        first, second = self.bodies.T
+        on_wall = second >= len(self.pressure)
+        far = np.where(on_wall[:, None], self.point, self.position[second, :2])
+        return np.stack([self.position[first, :2], far], axis=1)
 
 
 class Observation:
@@ -163,10 +187,7 @@ class Observation:
         shares, moment = self._measured(instant)
         area = np.where(shares.share > 0, shares.share, np.inf) * self._thickness
         strain = deformation(self._start, place, self._reference)
-        normal = np.einsum("ci,ci->c", contacts.normal, contacts.force)
-        bears = normal > 0
-        first, second = contacts.bodies[bears].T
-        far = np.where((second < count)[:, None], place[np.minimum(second, count - 1)], contacts.point[bears])
+        bears = contacts.force.any(axis=1)
         arrays: dict[str, Any] = {
             "step": instant.step,
             "time": instant.time,
@@ -175,12 +196,14 @@ class Observation:
             "pressure": 0.5 * np.trace(moment, axis1=1, axis2=2) / area,
             "volume": strain.volume,
             "shear": strain.shear,
-            "force_chains": np.column_stack([place[first], far, normal[bears]]),
+            **{
+                name: getattr(contacts, name)[bears] for name in ("bodies", "point", "normal", "force", "gap")
+            },
         }
         path = self._folder / f"fields-{instant.step:08d}.npz"
         fresh = path.with_suffix(".new")
         with fresh.open("wb") as file:
-            np.savez(file, **arrays)
+            np.savez_compressed(file, **arrays)
         fresh.replace(path)
 
     def rows(self, every: int) -> dict[str, dict[str, Array]]:

@@ -1,18 +1,19 @@
-"""Run of a geological scene: sample, motion, rows and fields, figures, summary."""
+"""Run of a geological scene: sample, motion, rows and fields, results, record."""
 
-import csv
-import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
-from importlib.metadata import version
+from itertools import combinations_with_replacement
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mechanics.arrays import Array
+from archmodel.database.session import Database, open_database
+from archmodel.store.run_record import RunRecord
+from archmodel.store.runs import store_run
+from mechanics.arrays import Ints
 from mechanics.dynamics.progress import Listener, Progress, silent
-from mechanics.planar.model import build_planar_model
 from mechanics.planar.result import PlanarResult
 from mechanics.planar.scene import Disk, PlanarScene, PlanarTime
 from mechanics.planar.simulate import PlanarObserver
@@ -20,16 +21,15 @@ from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.law import Law
 from mechanics.scene.laws.lennard_jones import LennardJones
 from mechanics.scene.scene import LawRule, Method, SolverSettings
-from moma.errors import SceneError
-from pipelines.geology.figures import draw_curves, draw_instant
+from moma.errors import DatabaseError, SceneError
 from pipelines.geology.file import GeologyScene, read_geology
-from pipelines.geology.observe import CELL_COLUMNS, WHOLE, Fields, Observation
+from pipelines.geology.observe import Observation, read_rows
+from pipelines.geology.record import geology_record
+from pipelines.geology.results import write_results
 from pipelines.geology.sample import PreparedSample, prepare
-from pipelines.results.folder import RUN_INDEX, UNFINISHED, check_replaceable
-from pipelines.results.summary import as_json
-from pipelines.results.vtu import VERTEX, Grid, cells_of, write_pvd, write_vtu
+from pipelines.geology.settings import Layer
+from pipelines.results.folder import UNFINISHED, check_replaceable
 from pipelines.run.planar import run_planar
-from pipelines.run.record import versions
 from pipelines.run.unfinished import UnfinishedRun
 
 __all__ = ["GeologyReport", "planar_scene", "run_geology"]
@@ -46,20 +46,19 @@ class GeologyReport:
     folder : of the results
     summary : contents of summary.json
     warnings : shown to the user
+    run : number of the run in the database; None: it is in none
     """
 
     folder: Path
     summary: dict[str, Any]
     warnings: tuple[str, ...]
+    run: int | None = None
 
 
 def planar_scene(scene: GeologyScene, sample: PreparedSample) -> PlanarScene:
     """Put the sample between the walls of the experiment."""
     contact, solver, time = scene.contact, scene.solver, scene.time
     setup = scene.experiment.setup(time.step, time.step * time.steps)
-    law: Law = DryJoint(contact.friction)
-    if contact.cohesion > 0:
-        law = LennardJones(contact.friction, contact.cohesion, contact.cohesion_range * scene.sample.smallest)
     codes = tuple(str(number) for number in range(1, len(sample.radius) + 1))
     wall_friction = contact.friction if contact.wall_friction is None else contact.wall_friction
     rules = tuple(
@@ -70,15 +69,19 @@ def planar_scene(scene: GeologyScene, sample: PreparedSample) -> PlanarScene:
         )
         if walls
     )
+    material, layers = _materials(scene, sample)
+    rules = (*_between_layers(scene, layers, material, codes), *rules)
     return PlanarScene(
         scene.name,
         tuple(
-            Disk(code, (float(x), float(y)), float(radius), scene.sample.density)
-            for code, (x, y), radius in zip(codes, sample.centre, sample.radius, strict=True)
+            Disk(code, (float(x), float(y)), float(radius), layers[number].density or scene.sample.density)
+            for code, (x, y), radius, number in zip(
+                codes, sample.centre, sample.radius, material.tolist(), strict=True
+            )
         ),
         setup.walls,
         (0.0, 0.0 if setup.weightless else -time.gravity),
-        law,
+        _law(scene, contact.friction, contact.cohesion),
         rules,
         largest_overlap=solver.largest_overlap,
         time=PlanarTime(time.step, time.theta, time.step * time.steps, stop_at_equilibrium=False),
@@ -94,6 +97,37 @@ def planar_scene(scene: GeologyScene, sample: PreparedSample) -> PlanarScene:
     )
 
 
+def _law(scene: GeologyScene, friction: float, cohesion: float) -> Law:
+    if cohesion > 0:
+        return LennardJones(friction, cohesion, scene.contact.cohesion_range * scene.sample.smallest)
+    return DryJoint(friction)
+
+
+def _materials(scene: GeologyScene, sample: PreparedSample) -> tuple[Ints, tuple[Layer, ...]]:
+    """Return the number of the layer (nd,) of each disk, and the layers; what lies above the last is of the last."""
+    layers = scene.layers or (Layer(np.inf),)
+    number = np.searchsorted([layer.top for layer in layers[:-1]], sample.centre[:, 1])
+    return number.astype(np.int64), layers
+
+
+def _between_layers(
+    scene: GeologyScene, layers: tuple[Layer, ...], material: Ints, codes: tuple[str, ...]
+) -> list[LawRule]:
+    """Return a rule for each pair of layers: the smaller friction, and the smaller cohesion."""
+    if not scene.layers:
+        return []
+    contact, names = scene.contact, np.array(codes)
+    groups = [frozenset(names[material == number].tolist()) for number in range(len(layers))]
+    friction = [contact.friction if one.friction is None else one.friction for one in layers]
+    cohesion = [contact.cohesion if one.cohesion is None else one.cohesion for one in layers]
+    rules = []
+    for one, other in combinations_with_replacement(range(len(layers)), 2):
+        if groups[one] and groups[other]:
+            law = _law(scene, min(friction[one], friction[other]), min(cohesion[one], cohesion[other]))
+            rules.append(LawRule(groups[one], groups[other], law))
+    return rules
+
+
 def run_geology(
     path: str | Path,
     kind: str,
@@ -102,6 +136,7 @@ def run_geology(
     progress: Listener = silent,
     stop: Callable[[], bool] = lambda: False,
     resume: bool | None = None,
+    url: str | None = None,
 ) -> GeologyReport:
     """Run the scene file of an experiment, and write the results into a folder.
 
@@ -114,12 +149,14 @@ def run_geology(
     progress : called at every stage and step
     stop : asked after every step; where it says True, the run ends there as interrupted, with results of what there is
     resume : go on with the unfinished run in the folder, if there is one; False: give it up; None: refuse to run then
+    url : of the database that keeps the run too, made if it is not there; None: none does
 
     Raises
     ------
     UsageError : the folder holds other files or an unfinished run, or the scene is not that of the run to be resumed
     SceneError : with file and line, at the first mistake
     SolverError : if the motion is no longer finite
+    DatabaseError : the database cannot be opened, or not written at the end; the folder is complete then
     """
     folder, scene = Path(folder), read_geology(path, kind)
     check_replaceable(folder)
@@ -131,14 +168,30 @@ def run_geology(
         PlanarObserver(scene.output.fields_every, observation.fields),
     )
     summary: dict[str, Any] = {}
+    number: int | None = None
 
     def write(fresh: Path, result: PlanarResult, archive: UnfinishedRun) -> None:
         progress(Progress("write", 0, 1, "results"))
-        summary.update(_write(fresh, scene, sample, result, observation, archive))
+        summary.update(write_results(fresh, scene, sample, result, observation, archive))
 
-    with scene.document.at(kind):
-        run_planar(planar, folder, resume, scene.output.checkpoint, progress, stop, observers, write)
-    return GeologyReport(folder, summary, tuple(summary["warnings"]))
+    with nullcontext() if url is None else open_database(url) as database:
+        with scene.document.at(kind):
+            result, _ = run_planar(
+                planar, folder, resume, scene.output.checkpoint, progress, stop, observers, write
+            )
+        if database is not None:
+            rows = {name: read_rows(folder / file) for name, file in summary["cells"].items()}
+            number = _stored(database, folder, geology_record(scene, result, summary, rows))
+    return GeologyReport(folder, summary, tuple(summary["warnings"]), number)
+
+
+def _stored(database: Database, folder: Path, record: RunRecord) -> int:
+    try:
+        with database.session() as session:
+            return store_run(session, record)
+    except DatabaseError as error:
+        what = f"the results are in {folder}, but could not be stored: {error.what}"
+        raise DatabaseError(what, where=error.where, remedy=error.remedy) from error
 
 
 def _observation(
@@ -148,108 +201,3 @@ def _observation(
         return Observation(place, scene.cells, sample.centre, sample.radius, planar.thickness)
     except SceneError as error:
         scene.document.fail(f"{error.where}: {error.what}", "cells", remedy=error.remedy)
-
-
-def _write(
-    folder: Path,
-    scene: GeologyScene,
-    sample: PreparedSample,
-    result: PlanarResult,
-    observation: Observation,
-    archive: UnfinishedRun,
-) -> dict[str, Any]:
-    """Write all files of a run into an empty folder; return the summary."""
-    warnings = list(archive.warnings)
-    history, smallest = result.history, float(sample.radius.min())
-    overlap = history.penetration
-    share = result.errors.unconverged_steps / result.steps
-    quality = {
-        "overlap": {"mean": float(overlap.mean()), "max": float(overlap.max())},
-        "natural_map": {
-            "median": float(np.median(history.natural_map)),
-            "max": float(history.natural_map.max()),
-        },
-        "unconverged_steps": result.errors.unconverged_steps,
-    }
-    line = (
-        f"overlap: mean {overlap.mean():.2%}, largest {overlap.max():.2%} of the smaller width; η: median "
-        f"{np.median(history.natural_map):.1e}, largest {history.natural_map.max():.1e}; "
-        f"{share:.0%} of {result.steps} steps above {scene.solver.tolerance:g}"
-    )
-    rows = observation.rows(scene.output.every)
-    cells = {}
-    for number, (name, columns) in enumerate(rows.items()):
-        cells[name] = f"cell-{number:03d}.csv"
-        with (folder / cells[name]).open("w", encoding="utf-8", newline="") as file:
-            writer = csv.writer(file)
-            writer.writerow(CELL_COLUMNS)
-            writer.writerows(zip(*(map(repr, column.tolist()) for column in columns.values()), strict=True))
-    instants = observation.instants(scene.output.fields_every)
-    _write_fields(folder, instants, sample)
-    duration = scene.time.step * scene.time.steps
-    if scene.output.figures:
-        model, _start = build_planar_model(result.scene)
-        phases = [end for _, end in scene.experiment.phases(duration).values()][:-1]
-        draw_curves(folder / "cells.png", rows, phases, line)
-        for fields in instants[-1:]:
-            draw_instant(folder, fields, sample.radius, sample.layer, _ends(model, fields), line)
-    measures = scene.experiment.measures(sample.centre, sample.radius, instants, rows[WHOLE])
-    summary: dict[str, Any] = {
-        "scene": scene.name,
-        "kind": scene.kind,
-        "headline": line,
-        "outcome": str(result.outcome),
-        "disks": len(sample.radius),
-        "smallest_radius": smallest,
-        "sample": sample.digest,
-        "steps": result.steps,
-        "time": {"simulated": result.time, "wall": sum(result.wall_time.values()), **result.wall_time},
-        **quality,
-        "energy": result.errors.energy,
-        "cells": cells,
-        "measures": {name: value if np.isfinite(value) else None for name, value in measures.items()},
-        "versions": dict(versions()),
-        "version": version("moma-masonry"),
-        "resumed": archive.resumed,
-        "warnings": warnings,
-    }
-    (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
-    summary["files"] = sorted([RUN_INDEX, *(entry.name for entry in folder.iterdir())])
-    (folder / RUN_INDEX).write_text(as_json(summary), encoding="utf-8")
-    return summary
-
-
-def _ends(model: Any, fields: Fields) -> Array:
-    from mechanics.planar.model import PlanarState
-
-    position = fields.position
-    return np.asarray(model.ends(PlanarState(fields.time, position[:, :2], position[:, 2], fields.velocity)))
-
-
-def _write_fields(folder: Path, instants: Sequence[Fields], sample: PreparedSample) -> None:
-    """Write the instants for ParaView: a point for each disk."""
-    place = folder / "fields"
-    os.makedirs(place)
-    count, datasets = len(sample.radius), []
-    cells = cells_of(VERTEX, np.arange(count)[:, None].tolist())
-    for fields in instants:
-        name = f"fields/{fields.step:08d}.vtu"
-        grid = Grid(
-            np.column_stack([fields.position[:count, :2], np.zeros(count)]),
-            cells,
-            {
-                "radius": sample.radius,
-                "layer": sample.layer,
-                "velocity": np.column_stack([fields.velocity[:count, :2], np.zeros(count)]),
-                "spin": fields.velocity[:count, 2],
-                "turn": fields.position[:count, 2],
-                "pressure": fields.pressure,
-                "volume": fields.volume,
-                "shear": fields.shear,
-            },
-            {},
-            {"radius": "m", "velocity": "m/s", "spin": "rad/s", "turn": "rad", "pressure": "Pa"},
-        )
-        write_vtu(folder / name, grid)
-        datasets.append((fields.time, name))
-    write_pvd(folder / "fields.pvd", datasets)

@@ -42,7 +42,9 @@ def prepare(scene: GeologyScene, cache: Path, progress: Listener = silent) -> Pr
     x = np.linspace(0.0, own.length, 1001)
     settings = {
         "version": _VERSION,
-        "sample": {name: value for name, value in asdict(asked).items() if name != "layers"},
+        "sample": {
+            name: value for name, value in asdict(asked).items() if name != "layers" and value is not None
+        },
         "friction": scene.contact.friction,
         "gravity": scene.time.gravity,
         "profile": hashlib.sha256(np.append(x, own.top(x)).tobytes()).hexdigest(),
@@ -64,6 +66,7 @@ def prepare(scene: GeologyScene, cache: Path, progress: Listener = silent) -> Pr
                     asked.falling_friction,
                     asked.seed,
                     scene.time.gravity,
+                    asked.large_share,
                 ),
                 progress,
             )

@@ -6,7 +6,7 @@ from typing import Annotated
 from mechanics.stones.settings import Setting
 from moma.errors import SceneError
 
-__all__ = ["Material", "Recording", "Sample", "Stepping", "Sweeping"]
+__all__ = ["Layer", "Material", "Recording", "Sample", "Stepping", "Sweeping"]
 
 
 @dataclass(frozen=True)
@@ -16,6 +16,15 @@ class Sample:
     smallest: Annotated[float, Setting("Smallest radius.", "m", above=0)]
     largest: Annotated[float, Setting("Largest radius.", "m", above=0)]
     density: Annotated[float, Setting("Of the disks.", "kg/m³", above=0)] = 2800.0
+    large_share: Annotated[
+        float | None,
+        Setting(
+            "Part of the disks that have the largest radius, the others the smallest; without it, evenly distributed.",
+            "-",
+            at_least=0,
+            at_most=1,
+        ),
+    ] = None
     falling_friction: Annotated[
         float,
         Setting(
@@ -49,6 +58,24 @@ class Material:
     cohesion_range: Annotated[
         float, Setting("Gap within which it acts, over the smallest radius.", "-", above=0, at_most=1)
     ] = 0.05
+
+
+@dataclass(frozen=True)
+class Layer:
+    """`[[layers]]`: a material, up to a height; disks are of the layer in which their centres lie at the start.
+
+    What is left out is that of `[sample]` and `[contact]`. Between two layers the smaller friction and cohesion hold.
+    """
+
+    top: Annotated[
+        float,
+        Setting("Height up to which it reaches; the last layer reaches up to the surface.", "m", above=0),
+    ]
+    density: Annotated[float | None, Setting("Of its disks.", "kg/m³", above=0)] = None
+    friction: Annotated[float | None, Setting("Between its disks.", "-", at_least=0, at_most=2)] = None
+    cohesion: Annotated[
+        float | None, Setting("Pull γ of each contact between its disks.", "N", at_least=0)
+    ] = None
 
 
 @dataclass(frozen=True)

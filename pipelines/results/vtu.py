@@ -16,6 +16,7 @@ from pipelines.arrays import Array, Ints
 
 __all__ = [
     "CELL_TYPES",
+    "LINE",
     "POLYGON",
     "POLYHEDRON",
     "VERTEX",
@@ -27,7 +28,7 @@ __all__ = [
 ]
 
 # cell types of VTK
-VERTEX, POLYGON, POLYHEDRON = 1, 7, 42
+VERTEX, LINE, POLYGON, POLYHEDRON = 1, 3, 7, 42
 CELL_TYPES: Mapping[Element, int] = {
     Element.TET4: 10,
     Element.TET10: 24,

@@ -31,6 +31,7 @@ from survey.joints.report import ClosingReport, Joint
 
 __all__ = [
     "contact_arrays",
+    "error_measures",
     "joint_arrays",
     "run_record",
     "settings_of",
@@ -73,7 +74,7 @@ def run_record(
         steps=result.steps,
         simulated=result.time,
         wall=summary["time"]["wall"],
-        errors=_errors(result.errors),
+        errors=error_measures(result.errors),
         joints=joint_arrays(
             result.joints,
             assembly.origin,
@@ -176,7 +177,7 @@ def versions() -> Mapping[str, str]:
     return {"moma": version("moma-masonry"), "python": platform.python_version(), **libraries}
 
 
-def _errors(errors: Errors) -> ErrorMeasures:
+def error_measures(errors: Errors) -> ErrorMeasures:
     """Return the error measures; None where one could not be computed."""
     measured = _shared(ErrorMeasures, errors)
     return ErrorMeasures(

@@ -2,15 +2,23 @@
 
 import json
 
+import meshio
 import numpy as np
 import pytest
+from sqlalchemy import select
 
+from archmodel.database.session import open_database
+from archmodel.tables.runs import CellResult
+from mechanics.planar.model import build_planar_model
+from mechanics.planar.scene import Disk, PlanarScene, PlanarTime
+from mechanics.planar.simulate import simulate_planar
 from moma.cli.geology import Experiment
 from moma.errors import SceneError
 from pipelines.geology.file import EXPERIMENTS, parse_geology, read_geology
-from pipelines.geology.observe import CELL_COLUMNS, read_rows
-from pipelines.geology.run import run_geology
-from pipelines.geology.sample import prepare
+from pipelines.geology.observe import CELL_COLUMNS, Fields, read_rows
+from pipelines.geology.results import quality_of
+from pipelines.geology.run import planar_scene, run_geology
+from pipelines.geology.sample import PreparedSample, prepare
 from tests.docs.test_docs import commands
 from tests.moma.commands import answer, fails, prints
 from tests.paths import ROOT
@@ -135,6 +143,64 @@ def test_a_sample_that_cannot_be_made_is_refused_at_its_line(tmp_path, written, 
     assert said in str(caught.value)
 
 
+LAYERED = """
+[[layers]]
+top = 1.0
+density = 3000.0
+friction = 0.1
+cohesion = 50.0
+[[layers]]
+top = 2.0
+[[layers]]
+top = 9.0
+friction = 0.3
+cohesion = 20.0
+"""
+
+
+def test_layers_have_their_density_and_the_contacts_between_two_the_smaller_friction_and_cohesion(tmp_path):
+    scene = parse_geology(SMALL + LAYERED, "fault.toml", "fault")
+    sample = prepare(scene, tmp_path)
+    planar = planar_scene(scene, sample)
+    height = sample.centre[:, 1]
+    assert [disk.density for disk in planar.disks] == np.where(height < 1.0, 3000.0, 2800.0).tolist()
+    layer = np.digitize(height, [1.0, 2.0])
+    model, _ = build_planar_model(planar)
+    some = [int(np.flatnonzero(layer == number)[0]) for number in range(3)]
+    others = [int(np.flatnonzero(layer == number)[1]) for number in range(3)]
+    pairs = np.array([(some[one], others[two]) for one in range(3) for two in range(3)])
+    laws = [model.laws.laws[number] for number in model.laws.of(pairs)]
+    assert [law.friction for law in laws] == [0.1, 0.1, 0.1, 0.1, 0.4, 0.3, 0.1, 0.3, 0.3]
+    assert [getattr(law, "force", 0.0) for law in laws] == [
+        50.0,
+        0.0,
+        20.0,
+        0.0,
+        0.0,
+        0.0,
+        20.0,
+        0.0,
+        20.0,
+    ]
+
+
+def test_layers_that_do_not_follow_each_other_are_refused_at_their_line():
+    text = SMALL + LAYERED.replace("top = 2.0", "top = 0.5")
+    line = text.splitlines().index("top = 0.5") + 1
+    with pytest.raises(
+        SceneError, match=f"^fault.toml:{line}: top = 0.5 is not above that of the layer before, 1"
+    ):
+        parse_geology(text, "fault.toml", "fault")
+
+
+def test_two_sizes_have_their_share(tmp_path):
+    text = SMALL.replace("layers = 3", "layers = 3\nlarge_share = 0.25")
+    radius = prepare(parse_geology(text, "fault.toml", "fault"), tmp_path).radius
+    assert set(radius.tolist()) == {0.2, 0.3}
+    # binomial: 3 standard deviations of some 200 disks
+    assert (radius == 0.3).mean() == pytest.approx(0.25, abs=0.1)
+
+
 def test_a_sample_is_made_once(tmp_path):
     scene = parse_geology(SMALL, "fault.toml", "fault")
     first = prepare(scene, tmp_path)
@@ -163,6 +229,76 @@ def test_a_run_leaves_rows_of_its_cells_fields_and_a_summary(tmp_path):
         "00000015.vtu",
         "00000030.vtu",
     ]
+
+
+def test_a_run_says_first_how_far_it_can_be_trusted(tmp_path):
+    (tmp_path / "fault.toml").write_text(SMALL, encoding="utf-8")
+    lines = prints("geology", "fault", tmp_path / "fault.toml", "--out", tmp_path / "out").splitlines()
+    summary = json.loads((tmp_path / "out/summary.json").read_text(encoding="utf-8"))
+    assert summary["unconverged_steps"] == 30
+    assert lines[0] == "caution: 30 of 30 steps (100%) were left above η = 0.0001"
+    assert "overlap over the smallest radius: mean " in lines[2]
+    assert "γ = 0 N within d_w = 0.01 m" in lines[2]
+    page = (tmp_path / "out/report.html").read_text(encoding="utf-8")
+    assert "Caution: 30 of 30 steps" in page
+    assert "<th>W1</th>" in page
+
+
+def test_overlaps_are_over_the_smallest_radius_and_a_large_one_is_a_caution():
+    scene = parse_geology(SMALL, "fault.toml", "fault")
+    sample = PreparedSample(np.zeros((2, 2)), np.array([0.2, 0.3]), np.zeros(2, dtype=np.int64), "")
+    disks = (Disk("a", (0.0, 0.0), 0.2), Disk("b", (0.49, 0.0), 0.3))
+    time = PlanarTime(1e-3, 1.0, 2e-3, stop_at_equilibrium=False)
+    result = simulate_planar(PlanarScene("two", disks, time=time))
+    quality = quality_of(scene, sample, result)
+    assert quality["overlap"] == pytest.approx({"mean": 0.05, "max": 0.05}, rel=1e-3)
+    assert quality["overlap_over_mean_radius"]["max"] == pytest.approx(0.04, rel=1e-3)
+    assert quality["cautions"] == ["overlaps reach 5.00% of the smallest radius, more than 1%"]
+
+
+def test_a_run_leaves_its_contacts_and_cells_for_paraview_and_its_instants_as_arrays(tmp_path):
+    (tmp_path / "fault.toml").write_text(SMALL, encoding="utf-8")
+    run_geology(tmp_path / "fault.toml", "fault", tmp_path / "out")
+    for name in ("fields", "contacts", "cells"):
+        assert (tmp_path / f"out/{name}.pvd").read_text(encoding="utf-8").count(f'file="{name}/') == 2
+    with np.load(tmp_path / "out/arrays/fields-00000030.npz") as data:
+        fields = Fields(**{name: data[name] for name in data.files})
+    disks = len(fields.pressure)
+    length = np.linalg.norm(fields.branches[:, 1] - fields.branches[:, 0], axis=1)
+    near = np.where(fields.bodies[:, 1] < disks, 0.4, 0.2)
+    assert (length > 0.9 * near).all()
+    assert (length < 1.6 * near).all()
+    size = np.hypot(fields.force_normal, fields.force_tangential)
+    assert size == pytest.approx(np.linalg.norm(fields.force, axis=1))
+    assert (np.abs(fields.force_tangential) <= 0.4 * fields.force_normal * (1 + 1e-6)).all()
+    grid = meshio.read(tmp_path / "out/contacts/00000030.vtu")
+    assert len(grid.cells[0].data) == len(fields.bodies)
+    assert grid.point_data["force_normal"][::2] == pytest.approx(fields.force_normal)
+    cell = meshio.read(tmp_path / "out/cells/00000030.vtu")
+    rows = read_rows(tmp_path / "out/cell-000.csv")
+    assert cell.cell_data["p"][0].tolist() == [rows["p"][-1]]
+    assert np.ptp(cell.points[:, 0]) == pytest.approx(2.0 * rows["lambda_x"][-1], rel=1e-2)
+
+
+def test_a_run_is_kept_in_the_database_with_the_rows_of_its_cells(tmp_path):
+    (tmp_path / "fault.toml").write_text(SMALL, encoding="utf-8")
+    url = f"sqlite:///{tmp_path / 'runs.db'}"
+    said = prints("geology", "fault", tmp_path / "fault.toml", "--out", tmp_path / "out", "--db", url)
+    assert "run 1 in the database" in said
+    run = answer("runs", "1", "--db", url)
+    assert run["settings"]["kind"] == "fault"
+    assert run["settings"]["fault"]["dip"] == 30.0
+    assert list(run["measures"]) == list(answer("runs", "1", "--db", url)["measures"])
+    rows = read_rows(tmp_path / "out/cell-000.csv")
+    assert [one["cell"] for one in run["cells"]] == ["W1", "whole sample"]
+    assert run["cells"][0]["p"] == rows["p"][-1]
+    assert "cells of disks at the end" in prints("runs", "1", "--db", url)
+    with open_database(url) as database, database.session(read_only=True) as session:
+        stored = session.scalars(
+            select(CellResult).where(CellResult.cell == "W1").order_by(CellResult.step)
+        ).all()
+    assert [one.step for one in stored] == [10, 20, 30]
+    assert [one.lambda_x for one in stored] == rows["lambda_x"].tolist()
 
 
 def test_a_run_that_was_stopped_goes_on_with_the_same_bits(tmp_path):
@@ -195,7 +331,8 @@ def test_the_commands_of_the_how_to_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     small_geology(tmp_path / "data/samples/geology")
     asked = commands("docs/howto/geology.md")
-    assert {command[2] for command in asked} == set(EXPERIMENTS)
+    assert {command[2] for command in asked if command[1] == "geology"} == set(EXPERIMENTS)
     for command in asked:
-        assert "results in" in prints(*command[1:])
+        said = prints(*command[1:])
+        assert ("results in" if command[1] == "geology" else "Fault with a tenth of the disks") in said
     assert (tmp_path / "out/geology/fault/cells.png").stat().st_size > 10_000

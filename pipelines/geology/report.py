@@ -1,0 +1,114 @@
+"""report.html of a run of disks: what it measured, how far it can be trusted, its cells, figures and settings."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mechanics.arrays import Array
+from pipelines.geology.file import GeologyScene
+from pipelines.reports.html import kilopascals, percent, picture, ratio, scientific, write_page
+
+__all__ = ["write_report"]
+
+_CAPTIONS = {
+    "layers": "Marker layers, which were level at the start.",
+    "velocity": "Velocities of some of the disks.",
+    "forces": "Normal forces of the contacts that are pressed; the widest line is the strongest.",
+    "shear": "Local shear since the start: the logarithm of the ratio of the principal stretches.",
+    "cells": "The cells with time; dashed lines part the phases of the run.",
+}
+_HEAD = ("Cell", "λx", "λy", "p", "q", "σ1 from x", "Anisotropy", "Coordination", "Porosity")
+_OUTCOMES = {
+    "equilibrium": "At the end all disks rest, in balance.",
+    "moving": "At the end of the run disks still move.",
+    "interrupted": "It was interrupted before its time.",
+}
+
+
+def write_report(
+    path: Path, scene: GeologyScene, summary: Mapping[str, Any], rows: Mapping[str, Mapping[str, Array]]
+) -> None:
+    """Write the page and embed the figures of its folder.
+
+    Parameters
+    ----------
+    path : report.html
+    summary : as in summary.json
+    rows : columns by cell; the table shows the last
+    """
+    figures = [(one, words) for name, words in _CAPTIONS.items() for one in path.parent.glob(f"{name}*.png")]
+    write_page(
+        path,
+        "geology.html",
+        name=summary["scene"],
+        lead=f"{summary['disks']} disks, {summary['steps']} steps, {summary['time']['simulated']:g} s of a "
+        f"{summary['kind']} scene. {_OUTCOMES[summary['outcome']]}",
+        cautions=summary["cautions"],
+        warnings=summary["warnings"],
+        version=summary["version"],
+        measures=[(name, ratio(value)) for name, value in summary["measures"].items()],
+        quality=_quality(summary),
+        head=_HEAD,
+        cells=[_cell(name, columns) for name, columns in rows.items()],
+        figures=[picture(one, words) for one, words in figures],
+        settings=_settings(scene),
+    )
+
+
+def _quality(summary: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    overlap, over_mean, eta = (
+        summary[name] for name in ("overlap", "overlap_over_mean_radius", "natural_map")
+    )
+    return [
+        (
+            "Largest overlap",
+            f"{overlap['max']:.2%}",
+            f"of the smallest radius; {over_mean['max']:.2%} of the mean one",
+        ),
+        (
+            "Mean overlap",
+            f"{overlap['mean']:.3%}",
+            f"of the smallest radius; {over_mean['mean']:.3%} of the mean one",
+        ),
+        ("Residual η, median", scientific(eta["median"]), "of the natural map, over the steps"),
+        ("Residual η, largest", scientific(eta["max"]), f"the tolerance is {summary['tolerance']:g}"),
+        (
+            "Unsolved steps",
+            percent(summary["unconverged_share"]),
+            f"{summary['unconverged_steps']} of {summary['steps']}",
+        ),
+        (
+            "Energy",
+            scientific(summary["energy"]),
+            "that no term of the balance explains, over the largest in play",
+        ),
+    ]
+
+
+def _cell(name: str, columns: Mapping[str, Array]) -> tuple[str, ...]:
+    last = {column: float(values[-1]) for column, values in columns.items()}
+    return (
+        name,
+        ratio(last["lambda_x"]),
+        ratio(last["lambda_y"]),
+        *(kilopascals(last[stress]) if np.isfinite(last[stress]) else "–" for stress in ("p", "q")),
+        f"{last['direction']:.0f}°",
+        *(ratio(last[column]) for column in ("anisotropy", "coordination", "porosity")),
+    )
+
+
+def _settings(scene: GeologyScene) -> list[tuple[str, str]]:
+    tables: Mapping[str, Any] = {
+        "sample": scene.sample,
+        "contact": scene.contact,
+        "time": scene.time,
+        "solver": scene.solver,
+        scene.kind: scene.experiment,
+    }
+    return [
+        (name, ", ".join(f"{key} = {value}" for key, value in asdict(table).items() if value is not None))
+        for name, table in tables.items()
+    ]

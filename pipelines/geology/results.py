@@ -1,0 +1,151 @@
+"""Results of a run of disks: quality, rows, fields, figures, summary and report."""
+
+import csv
+import shutil
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mechanics.arrays import Array
+from mechanics.planar.model import PlanarState, build_planar_model
+from mechanics.planar.result import PlanarResult
+from pipelines.geology.figures import draw_curves, draw_instant
+from pipelines.geology.file import GeologyScene
+from pipelines.geology.observe import CELL_COLUMNS, WHOLE, Fields, Instants, Observation
+from pipelines.geology.paraview import write_series
+from pipelines.geology.report import write_report
+from pipelines.geology.sample import PreparedSample
+from pipelines.results.folder import RUN_INDEX
+from pipelines.results.summary import as_json
+from pipelines.run.record import versions
+from pipelines.run.unfinished import UnfinishedRun
+
+__all__ = ["quality_of", "write_results"]
+
+_MOST_OVERLAP = 0.01  # over the smallest radius, beyond which a run says so first [-]
+_ROUNDING = 1e-3  # of an overlap that is just as large as allowed [-]
+
+
+def quality_of(scene: GeologyScene, sample: PreparedSample, result: PlanarResult) -> dict[str, Any]:
+    """Return how far a run can be trusted, as it stands in summary.json.
+
+    Overlaps are over the smallest radius, and beside that over the mean radius; *mean* is that of the contacts that
+    touch, over all steps.
+    """
+    history, smallest, mean = result.history, float(sample.radius.min()), float(sample.radius.mean())
+    eta, unsolved, steps = history.natural_map, result.errors.unconverged_steps, result.steps
+    overlap = {"mean": float(history.mean_overlap.mean()), "max": float(history.overlap.max())}
+    quality: dict[str, Any] = {
+        "overlap": {name: value / smallest for name, value in overlap.items()},
+        "overlap_over_mean_radius": {name: value / mean for name, value in overlap.items()},
+        "natural_map": {"median": float(np.median(eta)), "max": float(eta.max())},
+        "unconverged_steps": unsolved,
+        "unconverged_share": unsolved / steps,
+        "tolerance": scene.solver.tolerance,
+        "cohesion": {
+            "pull": scene.contact.cohesion,
+            "range": scene.contact.cohesion_range * scene.sample.smallest,
+        },
+    }
+    largest, cautions = quality["overlap"]["max"], []
+    if largest > _MOST_OVERLAP * (1.0 + _ROUNDING):
+        cautions.append(f"overlaps reach {largest:.2%} of the smallest radius, more than {_MOST_OVERLAP:.0%}")
+    if unsolved:
+        cautions.append(
+            f"{unsolved} of {steps} steps ({unsolved / steps:.0%}) were left above η = {scene.solver.tolerance:g}"
+        )
+    quality["cautions"] = cautions
+    quality["headline"] = (
+        f"overlap over the smallest radius: mean {quality['overlap']['mean']:.3%}, largest {largest:.2%} "
+        f"(mean radius: {quality['overlap_over_mean_radius']['mean']:.3%}, "
+        f"{quality['overlap_over_mean_radius']['max']:.2%}); η: median {np.median(eta):.1e}, largest {eta.max():.1e}; "
+        f"{unsolved / steps:.0%} of {steps} steps above {scene.solver.tolerance:g}; "
+        f"γ = {scene.contact.cohesion:g} N within d_w = {quality['cohesion']['range']:.3g} m"
+    )
+    return quality
+
+
+def write_results(
+    folder: Path,
+    scene: GeologyScene,
+    sample: PreparedSample,
+    result: PlanarResult,
+    observation: Observation,
+    archive: UnfinishedRun,
+) -> dict[str, Any]:
+    """Write all files of a run into an empty folder; return the summary."""
+    quality = quality_of(scene, sample, result)
+    rows, instants = observation.rows(scene.output.every), observation.instants(scene.output.fields_every)
+    cells = _write_rows(folder, rows)
+    write_series(folder, instants, sample, scene.cells, rows)
+    (folder / "arrays").mkdir()
+    for path in instants.paths:
+        shutil.copyfile(path, folder / "arrays" / path.name)
+    if scene.output.figures:
+        _draw(folder, scene, sample, result, instants, rows, quality["headline"])
+    measures = scene.experiment.measures(sample.centre, sample.radius, instants, rows[WHOLE])
+    summary: dict[str, Any] = {
+        "scene": scene.name,
+        "kind": scene.kind,
+        **quality,
+        "outcome": str(result.outcome),
+        "disks": len(sample.radius),
+        "smallest_radius": float(sample.radius.min()),
+        "sample": sample.digest,
+        "steps": result.steps,
+        "time": {"simulated": result.time, "wall": sum(result.wall_time.values()), **result.wall_time},
+        "energy": result.errors.energy,
+        "cells": cells,
+        "measures": {name: value if np.isfinite(value) else None for name, value in measures.items()},
+        "versions": dict(versions()),
+        "version": version("moma-masonry"),
+        "resumed": archive.resumed,
+        "warnings": list(archive.warnings),
+    }
+    (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
+    write_report(folder / "report.html", scene, summary, rows)
+    summary["files"] = sorted([RUN_INDEX, *(entry.name for entry in folder.iterdir())])
+    (folder / RUN_INDEX).write_text(as_json(summary), encoding="utf-8")
+    return summary
+
+
+def _write_rows(folder: Path, rows: Mapping[str, Mapping[str, Array]]) -> dict[str, str]:
+    """Write the rows of each cell; return the file of each."""
+    cells = {}
+    for number, (name, columns) in enumerate(rows.items()):
+        cells[name] = f"cell-{number:03d}.csv"
+        with (folder / cells[name]).open("w", encoding="utf-8", newline="") as file:
+            writer = csv.writer(file)
+            writer.writerow(CELL_COLUMNS)
+            writer.writerows(zip(*(map(repr, column.tolist()) for column in columns.values()), strict=True))
+    return cells
+
+
+def _draw(
+    folder: Path,
+    scene: GeologyScene,
+    sample: PreparedSample,
+    result: PlanarResult,
+    instants: Instants,
+    rows: Mapping[str, Mapping[str, Array]],
+    line: str,
+) -> None:
+    """Draw the curves of the cells, and the last instant."""
+    model, _ = build_planar_model(result.scene)
+    phases = scene.experiment.phases(scene.time.step * scene.time.steps)
+    draw_curves(folder / "cells.png", rows, _ends_of(phases), line)
+    for fields in instants[-1:]:
+        draw_instant(folder, fields, sample.radius, sample.layer, model.ends(_state(fields)), line)
+
+
+def _ends_of(phases: Mapping[str, tuple[float, float]]) -> Sequence[float]:
+    """Return the instants at which one phase ends and another begins [s]."""
+    return [end for _, end in phases.values()][:-1]
+
+
+def _state(fields: Fields) -> PlanarState:
+    position = fields.position
+    return PlanarState(fields.time, position[:, :2], position[:, 2], fields.velocity)
