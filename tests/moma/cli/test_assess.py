@@ -1,0 +1,94 @@
+"""`moma assess`: limit loads of two courses of the sample, the loads that a scene or an option names, and mistakes."""
+
+import json
+
+import pytest
+
+from moma import ingest
+from tests.moma.commands import answer, fails, prints
+from tests.paths import ROOT
+from tests.pipelines.scenes import TWO_COURSES, TWO_COURSES_MIXED
+
+
+@pytest.fixture(scope="module")
+def url(tmp_path_factory):
+    url = f"sqlite:///{tmp_path_factory.mktemp('assess') / 'moma.db'}"
+    ingest([ROOT / "data/samples/window/window.moma"], url)
+    return url
+
+
+@pytest.fixture
+def scene(tmp_path):
+    path = tmp_path / "two.toml"
+    path.write_text(TWO_COURSES, encoding="utf-8")
+    return path
+
+
+def test_four_directions_have_bound_candidate_and_mechanism(url, scene, tmp_path):
+    out = tmp_path / "out"
+    told = answer("assess", scene, "--db", url, "--out", out)
+    assert [one["name"] for one in told["loads"]] == [f"horizontal {axis}" for axis in ("x", "-x", "y", "-y")]
+    for one in told["loads"]:
+        assert one["candidate"] <= one["bound"] * 1.003
+        # stones of one course on a fixed one slide, at their friction; beds are level to a hundredth
+        assert one["bound"] <= 0.6 * 1.01
+        assert one["mechanism"]["stones"]
+    least = min(told["loads"], key=lambda one: one["candidate"])
+    assert told["headline"] == least["headline"]
+    assert (out / "scene.toml").read_text(encoding="utf-8") == TWO_COURSES
+    assert json.loads((out / "assessment.json").read_text(encoding="utf-8")) == told
+    assert sorted(told["files"]) == sorted(path.name for path in out.iterdir())
+
+
+def test_the_first_line_says_what_decides_and_the_others_what_it_is(url, scene, tmp_path):
+    text = prints("assess", scene, "--db", url, "--out", tmp_path / "out", "--load", "tilt y")
+    first, *rest = text.splitlines()
+    assert first.startswith("Two courses: tilt y: λ ≤ 0.")
+    assert "a tilt of" in first
+    assert any("rigorous upper bound" in line for line in rest)
+    assert any("moves: W02" in line for line in rest)
+
+
+def test_a_scene_names_its_loads(url, scene, tmp_path):
+    scene.write_text(
+        TWO_COURSES_MIXED
+        + """
+[[assess]]
+type = "tilt"
+axis = [0.0, 1.0, 0.0]
+[[assess]]
+type = "force"
+stone = "W02-02"
+force = [0.0, 0.0, -1000.0]
+""",
+        encoding="utf-8",
+    )
+    told = answer("assess", scene, "--db", url, "--out", tmp_path / "out")
+    tilt, press = told["loads"]
+    along = answer("assess", scene, "--db", url, "--out", tmp_path / "out", "--load", "horizontal x")
+    assert tilt["bound"] == pytest.approx(along["loads"][0]["bound"], rel=1e-6)
+    assert press["outcome"] == "nothing limits it"
+    assert press["bound"] is None
+    assert "1 deformable stones count as rigid" in told["cautions"]
+
+
+@pytest.mark.parametrize("words", ["sideways x", "horizontal", "horizontal up", "force W02-02 1 2"])
+def test_words_that_are_no_load_are_refused(url, scene, tmp_path, words):
+    said = fails(2, "assess", scene, "--db", url, "--out", tmp_path / "out", "--load", words)
+    assert repr(words) in said
+    assert "horizontal x" in said
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_force_on_a_fixed_stone_is_refused(url, scene, tmp_path):
+    said = fails(2, "assess", scene, "--db", url, "--out", tmp_path / "out", "--load", "force W01-01 1 0 0")
+    assert "fixed" in said
+    said = fails(2, "assess", scene, "--db", url, "--out", tmp_path / "out", "--load", "force K99 1 0 0")
+    assert "no such stone" in said
+
+
+def test_results_of_a_run_are_not_replaced(url, scene, tmp_path):
+    folder = tmp_path / "out"
+    folder.mkdir()
+    (folder / "summary.json").write_text('{"files": ["summary.json"]}', encoding="utf-8")
+    assert "results of a run" in fails(2, "assess", scene, "--db", url, "--out", folder)
