@@ -7,6 +7,7 @@ from typing import Annotated
 import numpy as np
 
 from mechanics.arrays import Array
+from mechanics.planar.measures.surface import profile
 from mechanics.planar.measures.trishear import trishear_fit
 from mechanics.planar.scene import Wall
 from mechanics.scene.loads.load import Loads
@@ -20,6 +21,7 @@ from pipelines.geology.observe import Fields
 __all__ = ["Fault"]
 
 _FIRST_PHASE = 0.25  # of the paper's run, 10 of 40 s [-]
+_RISEN = 0.1  # rise of the surface over that of the basement, at the front of the fold [-]
 
 
 @dataclass(frozen=True)
@@ -87,7 +89,11 @@ class Fault:
     def measures(
         self, start: Array, radius: Array, instants: Sequence[Fields], whole: Mapping[str, Array]
     ) -> Mapping[str, float]:
-        """Return the trishear that comes nearest to the motion of the disks, and how near."""
+        """Return the front of the fold, and the trishear that comes nearest to the motion of the disks, and how near.
+
+        The front is the farthest place whose surface has risen by a tenth of the rise of the basement, ahead of where
+        the fault's tip was at the start.
+        """
         last = instants[-1]
         slip = self.speed * last.time
         fit = trishear_fit(
@@ -95,8 +101,24 @@ class Fault:
         )
         return {
             "slip [m]": slip,
+            "front ahead of the tip [m]": self._front(start, last.position[: len(start), :2], radius, slip)
+            - self.tip,
             "trishear: apical angle [°]": 2.0 * float(np.degrees(fit.model.half_angle)),
             "trishear: propagation to slip [-]": fit.model.ratio,
             "trishear: residual over slip [-]": fit.relative,
             "trishear: share of the motion explained [-]": fit.explained,
         }
+
+    def _front(self, start: Array, now: Array, radius: Array, slip: float) -> float:
+        width = 4.0 * radius.mean()
+        edges = np.arange(0.0, self.length + width, width)
+        places = np.arange(0.0, self.length, 0.1 * width)
+        risen = profile(now, radius, places) - profile(start, radius, places)
+        known = np.isfinite(risen)
+        # the mean over two disks: the surface itself is as rough as a disk
+        number = np.digitize(places[known], edges) - 1
+        count = np.bincount(number, minlength=len(edges))
+        with np.errstate(invalid="ignore"):
+            mean = np.bincount(number, risen[known], minlength=len(edges)) / count
+        high = np.flatnonzero(np.nan_to_num(mean) > _RISEN * slip * np.sin(np.radians(self.dip)))
+        return float(edges[high.max(initial=0)] + 0.5 * width)
