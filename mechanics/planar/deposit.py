@@ -25,7 +25,9 @@ _ROOM = 1.25  # height of the box that is filled at first, over what its disks n
 _SOLID = 0.82  # share that settled disks fill, at most
 _GENTLE = 0.15  # slope of what is filled above the profile, half that at which disks flow [-]
 _PLACES = 1001  # places along x at which it is known
-_KEPT = 0.9  # of the velocities after each step, so that disks fall no farther in one than about their radius [-]
+_KEPT = (
+    0.9  # of the velocities after each step, so that disks fall no farther in one than about their radius [-]
+)
 _FALL = 0.05  # step in which a disk falls by this share of the smallest radius from rest
 _SLOW = 2e-3  # mean speed of the disks over √(g r) at which they have come to rest
 _FEWEST, _MOST = 100, 1000  # steps of each of the two stages
@@ -48,6 +50,7 @@ class Deposit:
     seed : of the radii and places
     gravity : downwards [m/s²]
     large_share : part of the disks that have the largest radius, the others the smallest; None: evenly distributed
+    rolling : disks turn
     """
 
     length: float
@@ -61,6 +64,7 @@ class Deposit:
     seed: int = 1
     gravity: float = 9.81
     large_share: float | None = None
+    rolling: bool = True
 
     def __post_init__(self) -> None:
         for quantity, value, ok, remedy in (
@@ -150,15 +154,16 @@ def _loose(asked: Deposit) -> tuple[Array, Array]:
     pitch = (asked.length - 0.5 * wide) / columns
     place = np.column_stack([pitch * column + 0.5 * wide * (row % 2), wide * row]) + 0.5 * wide
     place += rng.uniform(-1.0, 1.0, place.shape) * free
-    needed = place[:, 1] <= wide * rows * _filled(asked, place[:, 0]) / asked.highest
-    return place[needed], radius[needed]
+    low = place[:, 1] <= wide * rows * _filled(asked, place[:, 0]) / asked.highest
+    return place[low], radius[low]
 
 
 def _filled(asked: Deposit, x: Array) -> Array:
     """Return the lowest surface that covers the profile and slopes gently, so that disks stay on it [m]."""
     places = np.linspace(0.0, asked.length, _PLACES)
     away = np.abs(places[:, None] - places)
-    return np.interp(x, places, (asked.top(places) - _GENTLE * away).max(axis=1))
+    height: Array = np.interp(x, places, (asked.top(places) - _GENTLE * away).max(axis=1))
+    return height
 
 
 def _settled(asked: Deposit, centre: Array, radius: Array, friction: float, progress: Listener) -> Array:
@@ -178,6 +183,7 @@ def _settled(asked: Deposit, centre: Array, radius: Array, friction: float, prog
         ),
         gravity=(0.0, -asked.gravity),
         law=DryJoint(friction=friction),
+        rolling=asked.rolling,
         time=PlanarTime(step, 1.0, _MOST * step, stop_at_equilibrium=True),
         solver=SolverSettings(Method.NSGS, max_iterations=_SWEEPS),
     )

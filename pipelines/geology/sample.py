@@ -46,6 +46,7 @@ def prepare(scene: GeologyScene, cache: Path, progress: Listener = silent) -> Pr
             name: value for name, value in asdict(asked).items() if name != "layers" and value is not None
         },
         "friction": scene.contact.friction,
+        "rolling": scene.contact.rolling,
         "gravity": scene.time.gravity,
         "profile": hashlib.sha256(np.append(x, own.top(x)).tobytes()).hexdigest(),
     }
@@ -67,6 +68,7 @@ def prepare(scene: GeologyScene, cache: Path, progress: Listener = silent) -> Pr
                     asked.seed,
                     scene.time.gravity,
                     asked.large_share,
+                    scene.contact.rolling,
                 ),
                 progress,
             )
