@@ -8,7 +8,7 @@ import numpy as np
 
 from mechanics.arrays import Array
 from mechanics.planar.measures.surface import profile
-from mechanics.planar.measures.trishear import trishear_fit
+from mechanics.planar.measures.trishear import Trishear, trishear_fit
 from mechanics.planar.scene import Wall
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.motions import ImposedMotion
@@ -21,6 +21,8 @@ from pipelines.geology.observe import Fields
 __all__ = ["Fault"]
 
 _FIRST_PHASE = 0.25  # of the paper's run, 10 of 40 s [-]
+_APICAL = "trishear: apical angle [°]"
+_RATIO = "trishear: propagation to slip [-]"
 _RISEN = 0.1  # rise of the surface over that of the basement, at the front of the fold [-]
 
 
@@ -86,6 +88,11 @@ class Fault:
         middle = _FIRST_PHASE * duration
         return {"first": (0.0, middle), "second": (middle, duration)}
 
+    def trishear(self, measures: Mapping[str, float]) -> Trishear:
+        """Return the trishear that these measures tell of."""
+        half = 0.5 * float(np.radians(measures[_APICAL]))
+        return Trishear((self.tip, 0.0), float(np.radians(self.dip)), half, measures[_RATIO])
+
     def measures(
         self, start: Array, radius: Array, instants: Sequence[Fields], whole: Mapping[str, Array]
     ) -> Mapping[str, float]:
@@ -103,8 +110,8 @@ class Fault:
             "slip [m]": slip,
             "front ahead of the tip [m]": self._front(start, last.position[: len(start), :2], radius, slip)
             - self.tip,
-            "trishear: apical angle [°]": 2.0 * float(np.degrees(fit.model.half_angle)),
-            "trishear: propagation to slip [-]": fit.model.ratio,
+            _APICAL: 2.0 * float(np.degrees(fit.model.half_angle)),
+            _RATIO: fit.model.ratio,
             "trishear: residual over slip [-]": fit.relative,
             "trishear: share of the motion explained [-]": fit.explained,
         }
