@@ -24,6 +24,7 @@ from benchmarks.report import (
     write_between,
 )
 from mechanics.arrays import Array
+from pipelines.draw.elevations.sheet import new_sheet
 from pipelines.geology.observe import read_rows
 from pipelines.geology.run import run_geology
 
@@ -90,6 +91,7 @@ def main() -> None:
         print_table(rows, table)
         print()
     if options.write:
+        _draw(runs, _ROOT / "docs" / "images" / "geology-cohesion.png")
         about = [f"Measured at {commit()} on {machine()}.", ""]
         write_between("fault", about + table_lines(fault, _FAULT), _PAGE)
         write_between("fold", about + table_lines(fold, _FOLD), _PAGE)
@@ -190,6 +192,26 @@ def _fault_rows(runs: Sequence[Mapping[str, Any]]) -> list[Row]:
             }
         )
     return rows
+
+
+def _draw(runs: Sequence[Mapping[str, Any]], path: Path) -> None:
+    """Draw the front and the residual of the trishear against γ, a point for each run."""
+    group = _chosen(runs, kind="fault", sweeps=_SWEEPS)
+    gamma = [run["gamma"] for run in group]
+    figure = new_sheet((8.0, 3.0))
+    for axes, name, label in zip(
+        figure.subplots(1, 2),
+        ("front ahead of the tip [m]", "trishear: residual over slip [-]"),
+        ("front ahead of the tip [m]", "residual of the trishear over slip [-]"),
+        strict=True,
+    ):
+        axes.plot(gamma, [run["summary"]["measures"][name] for run in group], "o", color="#8a3b12")
+        axes.set_xscale("symlog", linthresh=_GAMMA[1])
+        axes.set_xlabel("γ of the paper [N]", fontsize=8)
+        axes.set_ylabel(label, fontsize=8)
+        axes.tick_params(labelsize=7)
+        axes.grid(alpha=0.3)
+    figure.savefig(path, dpi=110)
 
 
 def _fold_rows(runs: Sequence[Mapping[str, Any]]) -> list[Row]:
