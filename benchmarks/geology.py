@@ -49,7 +49,6 @@ _FAULT: Table = (
     ("angle", "apical angle, °", ""),
     ("ratio", "P/S", ""),
     ("residual", "residual over slip", ""),
-    ("overlap", "overlap, largest", ".2%"),
     ("eta", "η, median", ".1e"),
 )
 _FOLD: Table = (
@@ -187,7 +186,6 @@ def _fault_rows(runs: Sequence[Mapping[str, Any]]) -> list[Row]:
                 "angle": _spread((one["trishear: apical angle [°]"] for one in measures), 0),
                 "ratio": _spread((one["trishear: propagation to slip [-]"] for one in measures), 2),
                 "residual": _spread((one["trishear: residual over slip [-]"] for one in measures), 3),
-                "overlap": max(summary["overlap"]["max"] for summary in summaries),
                 "eta": float(np.median([summary["natural_map"]["median"] for summary in summaries])),
             }
         )

@@ -22,6 +22,7 @@ from pipelines.geology.observe import Fields
 __all__ = ["Wedge"]
 
 _MIDDLE = (0.15, 0.85)  # part of the wedge, along its base, over which its slope is measured [-]
+_WALL = 1  # number of the wall that pushes, after the disks
 _LATE = 0.5  # of the run, whose mean is that of the wall's force [-]
 _RISEN = 2.0  # rise of the surface over the mean radius, at the front of what a push has built [-]
 _ROOM = 1.5  # length of the base over that of the wedge and the push [-]
@@ -100,7 +101,7 @@ class Wedge:
             "thrusts": float(len(thrusts.place)),
             "spacing of thrusts [m]": thrusts.spacing,
             "dip of thrusts [°]": float(np.degrees(np.mean(thrusts.dip))) if len(thrusts.dip) else np.nan,
-            "force on the wall [N/m]": self._wall_force(instants, radius),
+            "force on the wall [N/m]": self._wall_force(instants),
             "local shear, median [-]": float(np.median(last.shear[inner])),
             "local shear, 95 % [-]": float(np.quantile(last.shear[inner], 0.95)),
         }
@@ -110,17 +111,10 @@ class Wedge:
         risen = profile(now, radius, places) - profile(start, radius, places)
         return float(places[np.nan_to_num(risen) > _RISEN * radius.mean()].max(initial=self.push))
 
-    def _wall_force(self, instants: Sequence[Fields], radius: Array) -> float:
+    def _wall_force(self, instants: Sequence[Fields]) -> float:
         """Return the mean over the late instants of the force that disks press on the wall with."""
-        duration, forces = instants[-1].time, []
-        for instant in instants:
-            if instant.time >= _LATE * duration:
-                chains = instant.force_chains
-                wall = self.push * instant.time / duration
-                # between the kick and the end of its step a disk moves by little of its radius
-                near = 0.5 * radius.min()
-                on_wall = (np.abs(chains[:, 2] - wall) < near) & (np.abs(chains[:, 1] - chains[:, 3]) < near)
-                forces.append(float(chains[on_wall, 4].sum()))
+        late = [instant for instant in instants if instant.time >= _LATE * instants[-1].time]
+        forces = [one.force_normal[one.bodies[:, 1] == len(one.pressure) + _WALL].sum() for one in late]
         return float(np.mean(forces))
 
     def _slope(self, place: Array, radius: Array, shift: float, length: float) -> float:

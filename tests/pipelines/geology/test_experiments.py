@@ -28,12 +28,15 @@ height = 4.0
 PLACES = np.array([[1.0, 0.45], [2.0, 0.45], [1.5, 1.2]])
 
 
-def fields(place, chains=None, time=10.0):
-    count = len(place)
-    still = np.zeros((count, 3))
-    chains = np.zeros((0, 5)) if chains is None else chains
+def fields(place, bodies=(), force=(), time=10.0):
+    """An instant at which walls, whose places do not matter, press on disks along x."""
+    count, contacts = len(place), len(bodies)
     position = np.column_stack([place, np.zeros(count)])
-    return Fields(100, time, position, still, *np.zeros((3, count)), chains)
+    along = np.tile([1.0, 0.0], (contacts, 1))
+    force = np.column_stack([np.array(force), np.zeros(contacts)])
+    bodies = np.array(bodies, dtype=np.int64).reshape(-1, 2)
+    still, gap = np.zeros((count, 3)), np.zeros(contacts)
+    return Fields(100, time, position, still, *np.zeros((3, count)), bodies, along, along, force, gap)
 
 
 @pytest.mark.parametrize(("line", "held"), [("", [True, True, False]), ("rough = false", [False] * 3)])
@@ -67,17 +70,10 @@ def test_the_force_on_the_wall_is_of_its_contacts_alone():
     x, y = np.meshgrid(np.arange(0.1, 5.4, 0.2), np.arange(0.1, 2.0, 0.2))
     start = np.column_stack([x.ravel(), y.ravel()])
     start = start[start[:, 1] < 2.0 - np.tan(np.radians(20.0)) * start[:, 0]]
-    # two disks at the wall, which has gone 0.5 m; one on the floor, and one between two disks
-    chains = np.array(
-        [
-            [0.6, 0.1, 0.5, 0.1, 7.0],
-            [0.6, 0.3, 0.5, 0.3, 5.0],
-            [0.6, 0.1, 0.6, 0.0, 100.0],
-            [0.6, 0.1, 0.8, 0.1, 100.0],
-        ]
-    )
-    found = wedge.measures(
-        start, np.full(len(start), 0.1), [fields(start + np.array([0.5, 0.0]), chains)], {}
-    )
+    count = len(start)
+    # walls are the base and then the one that pushes
+    bodies = [(0, count + 1), (3, count + 1), (0, count), (0, 1)]
+    now = fields(start + np.array([0.5, 0.0]), bodies, [7.0, 5.0, 100.0, 100.0])
+    found = wedge.measures(start, np.full(count, 0.1), [now], {})
     assert found["force on the wall [N/m]"] == pytest.approx(12.0)
     assert found["slope [°]"] == pytest.approx(found["slope at the start [°]"])
