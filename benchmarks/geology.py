@@ -92,9 +92,9 @@ def main() -> None:
     if options.write:
         _draw(runs, _ROOT / "docs" / "images" / "geology-cohesion.png")
         about = [f"Measured at {commit()} on {machine()}.", ""]
-        write_between("fault", about + table_lines(fault, _FAULT), _PAGE)
-        write_between("fold", about + table_lines(fold, _FOLD), _PAGE)
-        write_between("sweeps", about + table_lines(swept, _SWEPT), _PAGE)
+        for name, rows, table in (("fault", fault, _FAULT), ("fold", fold, _FOLD), ("sweeps", swept, _SWEPT)):
+            if rows:
+                write_between(name, about + table_lines(rows, table), _PAGE)
 
 
 def _wanted(seeds: Sequence[int], only: Sequence[str]) -> Iterable[tuple[str, float, int, int]]:
