@@ -1,7 +1,7 @@
 """Samples of disks: laid out loosely, let fall into a box, cut to a profile, and left to come to rest."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,6 +23,11 @@ _PLACES = 200  # along the profile, at which the surface is looked at
 _LOOSE = 1.1  # width of the place of each disk at first, over the largest disk's
 _ROOM = 1.25  # height of the box that is filled at first, over what its disks need at rest
 _SOLID = 0.82  # share that settled disks fill, at most
+_GENTLE = 0.15  # slope of what is filled above the profile, half that at which disks flow [-]
+_PLACES = 1001  # places along x at which it is known
+_KEPT = (
+    0.9  # of the velocities after each step, so that disks fall no farther in one than about their radius [-]
+)
 _FALL = 0.05  # step in which a disk falls by this share of the smallest radius from rest
 _SLOW = 2e-3  # mean speed of the disks over √(g r) at which they have come to rest
 _FEWEST, _MOST = 100, 1000  # steps of each of the two stages
@@ -45,6 +50,7 @@ class Deposit:
     seed : of the radii and places
     gravity : downwards [m/s²]
     large_share : part of the disks that have the largest radius, the others the smallest; None: evenly distributed
+    rolling : disks turn
     """
 
     length: float
@@ -58,6 +64,7 @@ class Deposit:
     seed: int = 1
     gravity: float = 9.81
     large_share: float | None = None
+    rolling: bool = True
 
     def __post_init__(self) -> None:
         for quantity, value, ok, remedy in (
@@ -146,7 +153,17 @@ def _loose(asked: Deposit) -> tuple[Array, Array]:
     free = (0.5 * wide - radius)[:, None]
     pitch = (asked.length - 0.5 * wide) / columns
     place = np.column_stack([pitch * column + 0.5 * wide * (row % 2), wide * row]) + 0.5 * wide
-    return place + rng.uniform(-1.0, 1.0, place.shape) * free, radius
+    place += rng.uniform(-1.0, 1.0, place.shape) * free
+    low = place[:, 1] <= wide * rows * _filled(asked, place[:, 0]) / asked.highest
+    return place[low], radius[low]
+
+
+def _filled(asked: Deposit, x: Array) -> Array:
+    """Return the lowest surface that covers the profile and slopes gently, so that disks stay on it [m]."""
+    places = np.linspace(0.0, asked.length, _PLACES)
+    away = np.abs(places[:, None] - places)
+    height: Array = np.interp(x, places, (asked.top(places) - _GENTLE * away).max(axis=1))
+    return height
 
 
 def _settled(asked: Deposit, centre: Array, radius: Array, friction: float, progress: Listener) -> Array:
@@ -166,12 +183,15 @@ def _settled(asked: Deposit, centre: Array, radius: Array, friction: float, prog
         ),
         gravity=(0.0, -asked.gravity),
         law=DryJoint(friction=friction),
+        rolling=asked.rolling,
         time=PlanarTime(step, 1.0, _MOST * step, stop_at_equilibrium=True),
         solver=SolverSettings(Method.NSGS, max_iterations=_SWEEPS),
     )
     run, slow = PlanarRun(scene), _SLOW * np.sqrt(asked.gravity * asked.smallest)
     while not run.done:
         last = run.step()
+        state = run.simulation.state
+        run.simulation.state = replace(state, velocity=_KEPT * state.velocity)
         speed = float(np.hypot(*last.after.velocity[: len(radius), :2].T).mean())
         progress(Progress("step", run.steps, _MOST, f"mean speed {speed:.1e} m/s"))
         if run.steps >= _FEWEST and speed < slow:

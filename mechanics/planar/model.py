@@ -10,6 +10,8 @@ from mechanics.scene.laws.table import LawTable, law_table
 
 __all__ = ["PlanarModel", "PlanarState", "build_planar_model"]
 
+_BLOCKED = 1e9  # of the moment of inertia of disks that do not turn [-]
+
 
 @dataclass(frozen=True)
 class PlanarState:
@@ -83,6 +85,8 @@ def build_planar_model(scene: PlanarScene) -> tuple[PlanarModel, PlanarState]:
     mass = np.append(density * scene.thickness * np.pi * radius**2, of_walls)
     half = 0.5 * (walls[:, 1] - walls[:, 0])
     moment = mass * np.append(0.5 * radius**2, (half**2).sum(axis=1) / 3.0)
+    if not scene.rolling:
+        moment[: len(disks)] *= _BLOCKED
     fixed = np.append([disk.fixed for disk in disks], of_walls == 0.0)
     inertia = np.zeros((len(fixed), 2))
     inertia[~fixed] = np.column_stack([1.0 / mass[~fixed], 1.0 / moment[~fixed]])

@@ -145,6 +145,7 @@ class PlanarScene:
         `max_iterations` are sweeps alone, as slow flows of many disks are run
     min_sweeps : sweeps of each step at least, with the method nsgs
     loads : what acts besides gravity; the plane is z = 0 of their space, moments and turns are about z
+    rolling : disks turn; False: their rotation is blocked, the limit of a strong resistance to rolling
     frame_every : keep a frame of the motion every so many steps; 0 keeps the first and last only
     """
 
@@ -178,6 +179,7 @@ class PlanarScene:
     solver: SolverSettings = field(default_factory=SolverSettings)
     min_sweeps: int = 0
     loads: Loads = field(default_factory=Loads)
+    rolling: bool = True
     frame_every: int = 0
 
     def __post_init__(self) -> None:

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mechanics.arrays import Array, Ints
+from mechanics.planar.measures.trishear import Trishear
 from pipelines.draw.elevations.sheet import new_sheet
 from pipelines.geology.observe import WHOLE, Fields
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["draw_curves", "draw_instant"]
+__all__ = ["draw_curves", "draw_instant", "draw_trishear"]
 
 _WIDE = 10.0  # of a figure [inch]
 _LAYERS = (
@@ -143,6 +144,53 @@ def _shears(axes: "Axes", fields: Fields, radius: Array, layer: Ints) -> str:
     bar = axes.figure.colorbar(disks, ax=axes, fraction=0.02, pad=0.01)
     bar.ax.tick_params(labelsize=7)
     return "Local shear, ln of the ratio of principal stretches since the start"
+
+
+def draw_trishear(
+    folder: Path, fields: Fields, radius: Array, model: Trishear, speed: float, quality: str
+) -> str:
+    """Draw the velocities of the disks above those of a trishear with its triangle now; return the name of the file.
+
+    Parameters
+    ----------
+    folder : for the picture
+    fields : of the instant
+    radius : (nd,)
+    model : the trishear, as it was at the start
+    speed : rate of slip [m/s]
+    quality : a line about overlaps and residuals
+    """
+    place = fields.position[: len(radius), :2]
+    wide, high = _size(fields, radius)
+    figure = new_sheet((wide, 2.0 * high))
+    chosen = np.linspace(0, len(radius) - 1, min(_ARROWS, len(radius))).astype(np.int64)
+    advance = model.ratio * speed * fields.time
+    along = np.array([np.cos(model.dip), np.sin(model.dip)])
+    tip = np.array(model.tip) + advance * along
+    far = 2.0 * float(np.ptp(place[:, 1])) + float(np.ptp(place[:, 0]))
+    turns = (model.dip + model.half_angle, model.dip - model.half_angle)
+    sides = [np.array([tip, tip + far * np.array([np.cos(turn), np.sin(turn)])]) for turn in turns]
+    for axes, velocity, title in zip(
+        figure.subplots(2, 1),
+        (fields.velocity[: len(radius), :2], model.velocity(place, speed, advance)),
+        ("Velocities of the disks", "Velocities of the trishear that comes nearest to their motion"),
+        strict=True,
+    ):
+        _disks(axes, fields, radius, facecolors="#e8e2d6")
+        axes.quiver(
+            *place[chosen].T,
+            *velocity[chosen].T,
+            color="#1f5f8b",
+            width=0.0015,
+            angles="xy",
+            scale=30.0 * speed,
+        )
+        _frame(axes, fields, radius, np.array(sides))
+        axes.set_title(f"{title}, t = {fields.time:g} s", fontsize=9)
+    figure.text(0.01, 0.01, quality, fontsize=6)
+    name = f"trishear-{fields.step:08d}.png"
+    figure.savefig(folder / name, dpi=150)
+    return name
 
 
 def draw_curves(

@@ -17,6 +17,7 @@ _CAPTIONS = {
     "layers": "Marker layers, which were level at the start.",
     "velocity": "Velocities of some of the disks.",
     "forces": "Normal forces of the contacts that are pressed; the widest line is the strongest.",
+    "trishear": "Velocities beside those of the trishear that comes nearest.",
     "shear": "Local shear since the start: the logarithm of the ratio of the principal stretches.",
     "cells": "The cells with time; dashed lines part the phases of the run.",
 }

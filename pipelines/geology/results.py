@@ -12,7 +12,8 @@ import numpy as np
 from mechanics.arrays import Array
 from mechanics.planar.model import PlanarState, build_planar_model
 from mechanics.planar.result import PlanarResult
-from pipelines.geology.figures import draw_curves, draw_instant
+from pipelines.geology.experiments.fault import Fault
+from pipelines.geology.figures import draw_curves, draw_instant, draw_trishear
 from pipelines.geology.file import GeologyScene
 from pipelines.geology.observe import CELL_COLUMNS, WHOLE, Fields, Instants, Observation
 from pipelines.geology.paraview import write_series
@@ -87,6 +88,9 @@ def write_results(
     if scene.output.figures:
         _draw(folder, scene, sample, result, instants, rows, quality["headline"])
     measures = scene.experiment.measures(sample.centre, sample.radius, instants, rows[WHOLE])
+    if scene.output.figures and isinstance(scene.experiment, Fault):
+        trishear, speed = scene.experiment.trishear(measures), scene.experiment.speed
+        draw_trishear(folder, instants[-1], sample.radius, trishear, speed, quality["headline"])
     summary: dict[str, Any] = {
         "scene": scene.name,
         "kind": scene.kind,

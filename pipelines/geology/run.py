@@ -34,6 +34,7 @@ from pipelines.run.unfinished import UnfinishedRun
 
 __all__ = ["GeologyReport", "planar_scene", "run_geology"]
 
+_ON_THE_FLOOR = 0.1  # gap over the smallest radius below which a disk stands on the floor [-]
 _SAMPLES = ".samples"  # folder of prepared samples, beside that of the results
 
 
@@ -74,7 +75,13 @@ def planar_scene(scene: GeologyScene, sample: PreparedSample) -> PlanarScene:
     return PlanarScene(
         scene.name,
         tuple(
-            Disk(code, (float(x), float(y)), float(radius), layers[number].density or scene.sample.density)
+            Disk(
+                code,
+                (float(x), float(y)),
+                float(radius),
+                layers[number].density or scene.sample.density,
+                fixed=setup.rough and float(y - radius) < _ON_THE_FLOOR * scene.sample.smallest,
+            )
             for code, (x, y), radius, number in zip(
                 codes, sample.centre, sample.radius, material.tolist(), strict=True
             )
@@ -94,6 +101,7 @@ def planar_scene(scene: GeologyScene, sample: PreparedSample) -> PlanarScene:
         ),
         min_sweeps=solver.min_iterations,
         loads=setup.loads,
+        rolling=contact.rolling,
     )
 
 

@@ -14,7 +14,7 @@ from pipelines.geology.file import GeologyScene
 
 __all__ = ["PreparedSample", "prepare"]
 
-_VERSION = 1  # of the preparation: a change of its outcome raises it
+_VERSION = 2  # of the preparation: a change of its outcome raises it
 _DIGITS = 16  # of the digest that names a sample
 
 
@@ -46,6 +46,7 @@ def prepare(scene: GeologyScene, cache: Path, progress: Listener = silent) -> Pr
             name: value for name, value in asdict(asked).items() if name != "layers" and value is not None
         },
         "friction": scene.contact.friction,
+        "rolling": scene.contact.rolling,
         "gravity": scene.time.gravity,
         "profile": hashlib.sha256(np.append(x, own.top(x)).tobytes()).hexdigest(),
     }
@@ -67,6 +68,7 @@ def prepare(scene: GeologyScene, cache: Path, progress: Listener = silent) -> Pr
                     asked.seed,
                     scene.time.gravity,
                     asked.large_share,
+                    scene.contact.rolling,
                 ),
                 progress,
             )

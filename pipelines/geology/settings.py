@@ -52,6 +52,9 @@ class Material:
         float | None,
         Setting("Between disks and walls; without it, that between disks.", "-", at_least=0, at_most=2),
     ] = None
+    rolling: Annotated[
+        bool, Setting("Disks turn; false: their rotation is blocked, as by a strong resistance to rolling.")
+    ] = True
     cohesion: Annotated[float, Setting("Pull γ of each contact between disks; 0: none.", "N", at_least=0)] = (
         0.0
     )

@@ -2,5 +2,5 @@
 
 Public: `Tessellation` (tessellation); `Cell`, `members`, `shape_of` (cells); `moments`, `Stress`, `mean_stress`
 (stress); `Fabric`, `fabric_of` (fabric); `Deformation`, `deformation` (strain); `profile`, `slope` (surface);
-`Trishear`, `trishear_fit` (trishear).
+`Trishear`, `trishear_fit` (trishear); `critical_slope` (taper); `Thrusts`, `thrusts_of` (thrusts).
 """

@@ -111,6 +111,8 @@ class History:
         ------
         SceneError : as for the value itself
         """
+        if len(self.time) == 1 and self.outside is Outside.HOLD:
+            return np.asarray(time * self.value[0])
         area: Array = self._antiderivative(time) - self._antiderivative(0.0)
         return area
 

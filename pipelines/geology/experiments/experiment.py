@@ -22,12 +22,14 @@ class Setup:
     loads : motions and forces of walls
     smooth : codes of walls without friction
     weightless : nothing weighs any more once the sample is deposited
+    rough : disks that stand on y = 0 at the start are glued to it
     """
 
     walls: tuple[Wall, ...]
     loads: Loads
     smooth: frozenset[str] = frozenset()
     weightless: bool = False
+    rough: bool = False
 
 
 class Experiment(Protocol):

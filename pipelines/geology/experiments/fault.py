@@ -7,7 +7,8 @@ from typing import Annotated
 import numpy as np
 
 from mechanics.arrays import Array
-from mechanics.planar.measures.trishear import trishear_fit
+from mechanics.planar.measures.surface import profile
+from mechanics.planar.measures.trishear import Trishear, trishear_fit
 from mechanics.planar.scene import Wall
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.motions import ImposedMotion
@@ -20,6 +21,9 @@ from pipelines.geology.observe import Fields
 __all__ = ["Fault"]
 
 _FIRST_PHASE = 0.25  # of the paper's run, 10 of 40 s [-]
+_APICAL = "trishear: apical angle [°]"
+_RATIO = "trishear: propagation to slip [-]"
+_RISEN = 0.1  # rise of the surface over that of the basement, at the front of the fold [-]
 
 
 @dataclass(frozen=True)
@@ -84,10 +88,19 @@ class Fault:
         middle = _FIRST_PHASE * duration
         return {"first": (0.0, middle), "second": (middle, duration)}
 
+    def trishear(self, measures: Mapping[str, float]) -> Trishear:
+        """Return the trishear that these measures tell of."""
+        half = 0.5 * float(np.radians(measures[_APICAL]))
+        return Trishear((self.tip, 0.0), float(np.radians(self.dip)), half, measures[_RATIO])
+
     def measures(
         self, start: Array, radius: Array, instants: Sequence[Fields], whole: Mapping[str, Array]
     ) -> Mapping[str, float]:
-        """Return the trishear that comes nearest to the motion of the disks, and how near."""
+        """Return the front of the fold, and the trishear that comes nearest to the motion of the disks, and how near.
+
+        The front is the farthest place whose surface has risen by a tenth of the rise of the basement, ahead of where
+        the fault's tip was at the start.
+        """
         last = instants[-1]
         slip = self.speed * last.time
         fit = trishear_fit(
@@ -95,8 +108,24 @@ class Fault:
         )
         return {
             "slip [m]": slip,
-            "trishear: apical angle [°]": 2.0 * float(np.degrees(fit.model.half_angle)),
-            "trishear: propagation to slip [-]": fit.model.ratio,
+            "front ahead of the tip [m]": self._front(start, last.position[: len(start), :2], radius, slip)
+            - self.tip,
+            _APICAL: 2.0 * float(np.degrees(fit.model.half_angle)),
+            _RATIO: fit.model.ratio,
             "trishear: residual over slip [-]": fit.relative,
             "trishear: share of the motion explained [-]": fit.explained,
         }
+
+    def _front(self, start: Array, now: Array, radius: Array, slip: float) -> float:
+        width = 4.0 * radius.mean()
+        edges = np.arange(0.0, self.length + width, width)
+        places = np.arange(0.0, self.length, 0.1 * width)
+        risen = profile(now, radius, places) - profile(start, radius, places)
+        known = np.isfinite(risen)
+        # the mean over two disks: the surface itself is as rough as a disk
+        number = np.digitize(places[known], edges) - 1
+        count = np.bincount(number, minlength=len(edges))
+        with np.errstate(invalid="ignore"):
+            mean = np.bincount(number, risen[known], minlength=len(edges)) / count
+        high = np.flatnonzero(np.nan_to_num(mean) > _RISEN * slip * np.sin(np.radians(self.dip)))
+        return float(edges[high.max(initial=0)] + 0.5 * width)

@@ -9,6 +9,7 @@ import numpy as np
 from mechanics.arrays import Array
 from mechanics.planar.measures.surface import profile
 from mechanics.planar.measures.surface import slope as slope_of
+from mechanics.planar.measures.thrusts import thrusts_of
 from mechanics.planar.scene import Wall
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.motions import ImposedMotion
@@ -21,6 +22,9 @@ from pipelines.geology.observe import Fields
 __all__ = ["Wedge"]
 
 _MIDDLE = (0.15, 0.85)  # part of the wedge, along its base, over which its slope is measured [-]
+_WALL = 1  # number of the wall that pushes, after the disks
+_LATE = 0.5  # of the run, whose mean is that of the wall's force [-]
+_RISEN = 2.0  # rise of the surface over the mean radius, at the front of what a push has built [-]
 _ROOM = 1.5  # length of the base over that of the wedge and the push [-]
 
 
@@ -80,18 +84,40 @@ class Wedge:
     def measures(
         self, start: Array, radius: Array, instants: Sequence[Fields], whole: Mapping[str, Array]
     ) -> Mapping[str, float]:
-        """Return the slope of the surface before and after, and the local shear of the disks."""
+        """Return what sandboxes are compared by: slopes, thrusts, and the force on the wall; and the local shear.
+
+        Without a slope at the start, the slope is that of the wedge that the push has built. Thrusts are found in the
+        layer before the wedge.
+        """
         last = instants[-1]
         inner = np.isfinite(last.shear)
+        now = last.position[: len(start), :2]
+        end = self._foot or self._front(start, now, radius) - self.push
+        thrusts = thrusts_of(start, now, last.shear, radius, self.layer)
         return {
-            "slope at the start [°]": self._slope(start, radius, 0.0),
-            "slope [°]": self._slope(last.position[: len(start), :2], radius, self.push),
+            "slope at the start [°]": self._slope(start, radius, 0.0, self._foot or self.length),
+            "slope [°]": self._slope(now, radius, self.push, end),
+            "highest [m]": float((now[:, 1] + radius).max()),
+            "thrusts": float(len(thrusts.place)),
+            "spacing of thrusts [m]": thrusts.spacing,
+            "dip of thrusts [°]": float(np.degrees(np.mean(thrusts.dip))) if len(thrusts.dip) else np.nan,
+            "force on the wall [N/m]": self._wall_force(instants),
             "local shear, median [-]": float(np.median(last.shear[inner])),
             "local shear, 95 % [-]": float(np.quantile(last.shear[inner], 0.95)),
         }
 
-    def _slope(self, place: Array, radius: Array, shift: float) -> float:
+    def _front(self, start: Array, now: Array, radius: Array) -> float:
+        places = np.arange(0.0, self.length, radius.mean())
+        risen = profile(now, radius, places) - profile(start, radius, places)
+        return float(places[np.nan_to_num(risen) > _RISEN * radius.mean()].max(initial=self.push))
+
+    def _wall_force(self, instants: Sequence[Fields]) -> float:
+        """Return the mean over the late instants of the force that disks press on the wall with."""
+        late = [instant for instant in instants if instant.time >= _LATE * instants[-1].time]
+        forces = [one.force_normal[one.bodies[:, 1] == len(one.pressure) + _WALL].sum() for one in late]
+        return float(np.mean(forces))
+
+    def _slope(self, place: Array, radius: Array, shift: float, length: float) -> float:
         low, high = _MIDDLE
-        length = self._foot or self.length
         places = np.arange(shift + low * length, shift + high * length, radius.mean())
         return -float(np.degrees(slope_of(places, profile(place, radius, places))))

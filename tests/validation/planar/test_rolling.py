@@ -59,3 +59,14 @@ def test_a_sliding_disk_begins_to_roll(theta):
     # and goes on so
     after = steps_of(simulation, 500)[-1].after
     np.testing.assert_allclose(after.velocity[0], [4 / 3, 0.0, -40 / 3], atol=1e-9)
+
+
+def test_a_disk_that_cannot_turn_slides_down_an_incline_as_a_block_does():
+    """A block on a slope: a = g (sin α - μ cos α), and rest below tan α = μ; a disk that rolls comes down at once."""
+    angle, friction = np.radians(20.0), 0.2
+    result = run([ball()], gravity=slope(20.0), law=DryJoint(friction), rolling=False)
+    assert result.velocity[0, 0] == pytest.approx(G * (np.sin(angle) - friction * np.cos(angle)), rel=1e-6)
+    assert abs(result.velocity[0, 2]) < 1e-6
+    assert result.errors.energy < 1e-9
+    # its moment of inertia is 10⁹ times that of a disk: it rolls with 2·10⁻⁹ g sin α
+    assert abs(run([ball()], gravity=slope(20.0), law=DryJoint(0.4), rolling=False).velocity[0, 0]) < 1e-8
