@@ -156,11 +156,18 @@ def _least_sum(design, heights, sound):
     for i in range(k):
         weights[i] = 1.0 if sound[i] else 0.0
     for _ in range(10 * _ROUNDS):
-        solution[:4] = np.linalg.solve(*_normal(design, heights, weights, np.int64(4)))
+        _put(solution, np.linalg.solve(*_normal(design, heights, weights, np.int64(4))))
         for i in range(k):
             if sound[i]:
                 weights[i] = 1.0 / max(abs(heights[i] - _value(design[i], solution)), _SHARP)
     return solution
+
+
+@njit(cache=True)
+def _put(target, values):
+    """Write values to the first places of a target; numba compiles a loop much sooner than an assignment."""
+    for k in range(len(values)):
+        target[k] = values[k]
 
 
 @njit(cache=True)
@@ -201,8 +208,8 @@ def _huber(design, heights, sound, unknowns, prior, usual):
         matrix, right = _normal(design, heights, weights, unknowns)
         matrix[3, 3] += prior
         right[3] += prior * usual
-        previous[:] = solution
-        solution[:unknowns] = np.linalg.solve(matrix, right)
+        _put(previous, solution)
+        _put(solution, np.linalg.solve(matrix, right))
         left = _weigh(design, heights, sound, solution, weights)
         if np.abs(solution - previous).max() < 1e-12:
             break
