@@ -61,12 +61,12 @@ class MixedDelassus:
 
     def apply(self, impulse: Array) -> Array:
         """Return W r (nc, 3) [m/s]."""
-        velocity: Array = apply_delassus(impulse, self._sides)[0]
+        velocity: Array = apply_delassus(np.ascontiguousarray(impulse), self._sides)[0]
         return velocity
 
     def rigid_change(self, impulse: Array) -> Array:
         """Return the velocities (nb, 6) that the impulses give to the rigid bodies [m/s, rad/s]."""
-        change: Array = apply_delassus(impulse, self._sides)[1]
+        change: Array = apply_delassus(np.ascontiguousarray(impulse), self._sides)[1]
         return change
 
     @cached_property

@@ -52,6 +52,7 @@ def residual(problem: ContactProblem, impulse: Array) -> Residual:
     if len(impulse) == 0:
         return Residual(0.0, 0.0, np.zeros(0), np.zeros_like(impulse))
     rho = 1.0 / problem.delassus.scale
+    impulse = np.ascontiguousarray(impulse)  # a kernel is compiled once more for views
     u = problem.delassus.apply(impulse)
     u += problem.u_free
     # writes û into u

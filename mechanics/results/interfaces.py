@@ -100,7 +100,8 @@ def find_interfaces(faces: Faces, contacts: Contacts, state: State, known: Ints 
     known : (n, 2) pairs that are kept with or without contacts, numbered first: those of the start
     """
     known = np.zeros((0, 2), dtype=np.int64) if known is None else known
-    point, normal = material_points(contacts, state), contacts.frame[:, 0]
+    # contiguous as its opposite is: a kernel is compiled once more for views
+    point, normal = material_points(contacts, state), np.ascontiguousarray(contacts.frame[:, 0])
     face = np.column_stack(
         [
             facing(faces, contacts.bodies[:, side], point[:, side], -normal if side == 0 else normal)

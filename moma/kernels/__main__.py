@@ -1,7 +1,7 @@
 """Compilation of the usual kernels by ``python -m moma.kernels``, beside an installation.
 
 It needs nothing but numba and SciPy, and may be ended at any moment: what it has compiled stays in the cache.
-The kernels of the first command come first; those of the next one from the far end, since that command begins at the near one.
+The kernels of the first command come first, those of the next from its far end: that command begins at the near one.
 """
 
 import gc

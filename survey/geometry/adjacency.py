@@ -146,6 +146,7 @@ def find_touching(
         return _touching(np.zeros((0, 2), np.int64), np.zeros((0, 8)), np.zeros(3))
     origin = solids.vertices.min(axis=0)
     local = np.ascontiguousarray(solids.vertices - origin)
+    local.flags.writeable = False  # as the solids' own vertices: a kernel is compiled once more for others
     planes = face_planes(local, solids.corners, solids.face_starts)
     solid = (local, solids.corners, solids.face_starts, solids.solid_starts)
     limits = (width, overlap, float(np.cos(np.radians(angle))), share, False)

@@ -156,11 +156,30 @@ def _least_sum(design, heights, sound):
     for i in range(k):
         weights[i] = 1.0 if sound[i] else 0.0
     for _ in range(10 * _ROUNDS):
-        solution[:4] = np.linalg.solve(*_normal(design, heights, weights, np.int64(4)))
+        _solve(*_normal(design, heights, weights, np.int64(4)), solution)
         for i in range(k):
             if sound[i]:
                 weights[i] = 1.0 / max(abs(heights[i] - _value(design[i], solution)), _SHARP)
     return solution
+
+
+@njit(cache=True)
+def _solve(matrix, right, out):
+    """Solve normal equations by elimination, which needs no pivots; both are overwritten.
+
+    numba takes three seconds to compile its call of LAPACK.
+    """
+    n = len(right)
+    for a in range(n):
+        for b in range(a + 1, n):
+            factor = matrix[b, a] / matrix[a, a]
+            right[b] -= factor * right[a]
+            for c in range(a + 1, n):
+                matrix[b, c] -= factor * matrix[a, c]
+    for a in range(n - 1, -1, -1):
+        for b in range(a + 1, n):
+            right[a] -= matrix[a, b] * out[b]
+        out[a] = right[a] / matrix[a, a]
 
 
 @njit(cache=True)
@@ -201,10 +220,14 @@ def _huber(design, heights, sound, unknowns, prior, usual):
         matrix, right = _normal(design, heights, weights, unknowns)
         matrix[3, 3] += prior
         right[3] += prior * usual
-        previous[:] = solution
-        solution[:unknowns] = np.linalg.solve(matrix, right)
+        for c in range(unknowns):
+            previous[c] = solution[c]
+        _solve(matrix, right, solution)
         left = _weigh(design, heights, sound, solution, weights)
-        if np.abs(solution - previous).max() < 1e-12:
+        change = 0.0
+        for c in range(unknowns):
+            change = max(change, abs(solution[c] - previous[c]))
+        if change < 1e-12:
             break
     return solution, left
 

@@ -82,7 +82,8 @@ def _overlap(i, j, low, high):
 def _push(pairs, count, i, j):
     if count == pairs.shape[0]:
         grown = np.empty((2 * count, 2), dtype=np.int64)
-        grown[:count] = pairs
+        for k in range(count):
+            grown[k, 0], grown[k, 1] = pairs[k, 0], pairs[k, 1]
         pairs = grown
     pairs[count, 0], pairs[count, 1] = min(i, j), max(i, j)
     return pairs

@@ -172,7 +172,8 @@ def mortar_shares(interfaces, bodies, meshes, shapes):  # pragma: no cover - com
         if not _bare(p, interfaces, meshes):
             _, _, share, _, _ = _interface(p, interfaces, bodies, meshes, shapes)
             if share.sum() >= interfaces.least[p]:
-                shares[pointer[p] : pointer[p + 1]] = share
+                for n in range(share.shape[0]):
+                    shares[pointer[p] + n] = share[n]
     return pointer, shares
 
 
@@ -231,7 +232,8 @@ def mortar_rows(kept_ptr, kept, interfaces, bodies, meshes, shapes):  # pragma: 
         for n in range(share.shape[0]):
             if root[n] >= 0:
                 joined[root[n]] += share[n]
-                joined_moment[root[n]] += moment[n]
+                for d in range(3):
+                    joined_moment[root[n], d] += moment[n, d]
         for n in range(share.shape[0]):
             if start[n] == start[n + 1] or joined[n] <= 0.0:
                 continue
@@ -239,7 +241,8 @@ def mortar_rows(kept_ptr, kept, interfaces, bodies, meshes, shapes):  # pragma: 
             area, pointer = room(area, count + 1), room(pointer, 2 * count + 3)
             middle = room(middle, 3 * count + 3)
             interface[count], key[count], area[count] = p, candidate.node[n], joined[n]
-            middle[3 * count : 3 * count + 3] = joined_moment[n] / joined[n]
+            for d in range(3):
+                middle[3 * count + d] = joined_moment[n, d] / joined[n]
             scale = 1.0 / joined[n]
             base = end
             for e in range(start[n], start[n + 1]):

@@ -588,7 +588,8 @@ def interface_points(pairs, points, inner, flat, thin, shapes):  # pragma: no co
         face, facing = reference - fptr[owner], incident - fptr[other]
         faces, opposed = fptr[owner + 1] - fptr[owner], fptr[other + 1] - fptr[other]
         for q in range(k):
-            frame[count] = f
+            for d in range(3):
+                write_row(frame[count], d, row(f, d))
             foot = along(along(o, x[q], t1), y[q], t2)
             write_row(nearest, 2 * count, along(foot, z[q], n))
             write_row(nearest, 2 * count + 1, foot)

@@ -232,7 +232,8 @@ def room(array, needed):
     if needed <= array.shape[0]:
         return array
     grown = np.empty(max(needed, 2 * array.shape[0]), dtype=array.dtype)
-    grown[: array.shape[0]] = array
+    for k in range(array.shape[0]):
+        grown[k] = array[k]
     return grown
 
 
@@ -405,7 +406,8 @@ def overlap_integrals(own, other, outlines, outline_size, share, moment):  # pra
         block = mass[count * stride : (count + 1) * stride].reshape(corners, own.kind)
         part[:], middle[:] = 0.0, 0.0
         for e in range(near_ptr[t], near_ptr[t + 1]):
-            polygon[:corners] = mine[:corners]
+            for c in range(corners):
+                polygon[c, 0], polygon[c, 1] = mine[c, 0], mine[c, 1]
             k = corners
             if other.kind > 0:
                 _take_corners(other, near[e], theirs)

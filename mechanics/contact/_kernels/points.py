@@ -42,7 +42,8 @@ def _nearest_facet(point, nodes, facets, count, n, corner, best_corner):
         depth = _depth(corner, count, x, y)
         if depth > best:
             best, facet = depth, t
-            best_corner[:] = corner
+            for k in range(count):
+                best_corner[k, 0], best_corner[k, 1] = corner[k, 0], corner[k, 1]
     height, beside = dot(n, away), min(best, 0.0)
     return facet, np.sqrt(height * height + beside * beside), x, y
 

@@ -181,7 +181,9 @@ def fit_two_planes(u, v, z, root):
                 rival, within, base = other, inner, first
             if rival + (_TILTED if size == 3 else 0.0) < worth:
                 score, least, worth = rival, within, rival + (_TILTED if size == 3 else 0.0)
-                far[:], way[0], way[1] = moved, c, s
+                way[0], way[1] = c, s
+                for i in range(n):
+                    far[i] = moved[i]
                 for k in range(3):
                     plane[k] = second[k] - base[k] if k < size else np.nan
     return score, least, far, way, plane

@@ -304,7 +304,8 @@ def facing_faces(pairs, solid, planes, limits, out_faces, out):
                 if _contact((i, j), (one, two), facing, solid, planes, limits, work, row):
                     if total < out.shape[0]:
                         out_faces[total, 0], out_faces[total, 1] = i, j
-                        out[total] = row
+                        for k in range(8):
+                            out[total, k] = row[k]
                     total += 1
     return total
 

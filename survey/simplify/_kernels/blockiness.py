@@ -30,7 +30,9 @@ def area_vectors(vertices, corners, starts):
     for f in range(len(starts) - 1):
         origin = vertices[corners[starts[f]]]
         for c in range(starts[f] + 1, starts[f + 1] - 1):
-            out[f] += 0.5 * _cross(vertices[corners[c]] - origin, vertices[corners[c + 1]] - origin)
+            turn = _cross(vertices[corners[c]] - origin, vertices[corners[c + 1]] - origin)
+            for k in range(3):
+                out[f, k] += 0.5 * turn[k]
     return out
 
 
@@ -51,7 +53,8 @@ def face_planes(vertices, corners, starts):
     for f in range(len(starts) - 1):
         length = math.sqrt((vectors[f] * vectors[f]).sum())
         if length > 0.0:
-            out[f, :3] = vectors[f] / length
+            for k in range(3):
+                out[f, k] = vectors[f, k] / length
             for c in range(starts[f], starts[f + 1]):
                 out[f, 3] += (out[f, :3] * vertices[corners[c]]).sum() / (starts[f + 1] - starts[f])
     return out
@@ -180,12 +183,9 @@ def common_volume(vertices, corners, starts, planes):
         for c in range(starts[f], starts[f + 1]):
             following = c + 1 if c + 1 < starts[f + 1] else starts[f]
             four = np.empty((4, 3))
-            four[0], four[1], four[2], four[3] = (
-                apex,
-                middle,
-                vertices[corners[c]],
-                vertices[corners[following]],
-            )
+            for k in range(3):
+                four[0, k], four[1, k] = apex[k], middle[k]
+                four[2, k], four[3, k] = vertices[corners[c], k], vertices[corners[following], k]
             total += math.copysign(_clipped(four, planes), _six_volumes(four))
     return total
 
@@ -195,7 +195,7 @@ def _clipped(four, planes):
     """Return the volume of a tetrahedron inside half-spaces: clipped by one plane after another into tetrahedra."""
     waiting = np.empty((2 * len(planes) + 2, 4, 3))
     done = np.zeros(2 * len(planes) + 2, np.int64)
-    waiting[0] = four
+    _put(waiting[0], four)
     count, total = 1, 0.0
     while count:
         count -= 1
@@ -208,9 +208,18 @@ def _clipped(four, planes):
             continue
         pieces = _pieces(sorted_body, heights, inside)
         for k in range(len(pieces)):
-            waiting[count], done[count] = pieces[k], number + 1
+            _put(waiting[count], pieces[k])
+            done[count] = number + 1
             count += 1
     return total
+
+
+@njit(cache=True)
+def _put(target, rows):
+    """Write rows to the first of a target's; numba compiles a loop much sooner than an assignment."""
+    for k in range(len(rows)):
+        for d in range(3):
+            target[k, d] = rows[k, d]
 
 
 @njit(cache=True)
@@ -226,7 +235,8 @@ def _split(body, plane):
         else:
             last -= 1
             place = last
-        out[place], heights[place] = body[i], height
+        out[place, 0], out[place, 1], out[place, 2] = body[i, 0], body[i, 1], body[i, 2]
+        heights[place] = height
     return inside, out, heights
 
 
@@ -235,27 +245,35 @@ def _pieces(body, heights, inside):
     """Return the tetrahedra (np, 4, 3) of the part below a plane; corners below the plane come first in `body`."""
     if inside == 4:
         out = np.empty((1, 4, 3))
-        out[0] = body
+        _put(out[0], body)
         return out
     cut = np.empty((inside, 4 - inside, 3))
     for i in range(inside):
         for j in range(inside, 4):
             share = heights[i] / (heights[i] - heights[j])
-            cut[i, j - inside] = body[i] + share * (body[j] - body[i])
+            for d in range(3):
+                cut[i, j - inside, d] = body[i, d] + share * (body[j, d] - body[i, d])
     if inside == 1:
         out = np.empty((1, 4, 3))
-        out[0, 0], out[0, 1:] = body[0], cut[0]
+        _put(out[0], body[:1])
+        _put(out[0, 1:], cut[0])
         return out
     ends = np.empty((2, 3, 3))  # of a prism
     if inside == 3:
-        ends[0], ends[1] = body[:3], cut[:, 0]
+        for i in range(3):
+            _put(ends[0, i:], body[i : i + 1])
+            _put(ends[1, i:], cut[i])
     else:
-        ends[0, 0], ends[0, 1:] = body[0], cut[0]
-        ends[1, 0], ends[1, 1:] = body[1], cut[1]
+        for i in range(2):
+            _put(ends[i], body[i : i + 1])
+            _put(ends[i, 1:], cut[i])
     out = np.empty((3, 4, 3))
-    out[0, :3], out[0, 3] = ends[0], ends[1, 0]
-    out[1, :2], out[1, 2:] = ends[0, 1:], ends[1, :2]
-    out[2, 0], out[2, 1:] = ends[0, 2], ends[1]
+    _put(out[0], ends[0])
+    _put(out[0, 3:], ends[1, :1])
+    _put(out[1], ends[0, 1:])
+    _put(out[1, 2:], ends[1, :2])
+    _put(out[2], ends[0, 2:])
+    _put(out[2, 1:], ends[1])
     return out
 
 

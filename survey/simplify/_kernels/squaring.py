@@ -47,16 +47,14 @@ def square(flat, worn, limits):
     n = len(flat)
     source = _hull(flat)
     m = len(source)
-    polygon = np.empty((n, 2))
+    polygon, labels = np.empty((n, 2)), np.empty(n, np.int64)
     for k in range(m):
-        polygon[k] = flat[source[k]]
+        polygon[k, 0], polygon[k, 1], labels[k] = flat[source[k], 0], flat[source[k], 1], source[k]
     width = _width(polygon, m) if m > 2 else 0.0
     tolerance = limits[4]
     shift = min(limits[0], max(limits[1] * width, min(tolerance, 0.25 * width)))
     restored = min(limits[2], max(limits[3] * width, shift))
     depth = _deepest(flat, worn, polygon, m, shift, restored)
-    labels = np.empty(n, np.int64)
-    labels[:m] = source
     if depth > 0.0:
         return polygon[:m].copy(), source, width, depth
     little = min(tolerance, limits[1] * width)
@@ -69,7 +67,8 @@ def square(flat, worn, limits):
             first = k
     out, names = np.empty((m, 2)), np.empty(m, np.int64)
     for k in range(m):
-        out[k], names[k] = polygon[(first + k) % m], labels[(first + k) % m]
+        j = (first + k) % m
+        out[k, 0], out[k, 1], names[k] = polygon[j, 0], polygon[j, 1], labels[j]
     return out, names, width, 0.0
 
 
@@ -94,12 +93,19 @@ def _reduce(flat, worn, polygon, source, m, few, bounds):
                 area = _change(polygon, m, k, way, trial, source, labels)
                 if area < smallest and _allowed(flat, worn, trial, labels, m - 1, shift, restored):
                     smallest = area
-                    best[:], best_labels[:] = trial, labels
+                    _put(best, best_labels, trial, labels)
         if smallest == math.inf:
             break
         m -= 1
-        polygon[:], source[:] = best, best_labels
+        _put(polygon, source, best, best_labels)
     return m
+
+
+@njit(cache=True)
+def _put(polygon, source, corners, labels):
+    """Replace a polygon and its sources; in a loop, which numba compiles in a tenth of the time of an assignment."""
+    for k in range(len(corners)):
+        polygon[k, 0], polygon[k, 1], source[k] = corners[k, 0], corners[k, 1], labels[k]
 
 
 @njit(cache=True)

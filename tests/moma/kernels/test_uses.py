@@ -1,6 +1,7 @@
 """The lists of kernels that a first use compiles, against the kernels themselves."""
 
 import inspect
+from collections import Counter
 from importlib import import_module
 
 import numba
@@ -26,10 +27,10 @@ def test_a_listed_kernel_exists_and_takes_the_listed_arguments(use):
             assert len(kind.instance_class._fields) == len(kind.types)
 
 
-def test_no_kernel_is_listed_twice_for_a_command():
-    for command in COMMANDS:
-        listed = kernels_of(command)
-        assert all(use not in listed[:place] for place, use in enumerate(listed))
+def test_the_sample_compiles_each_kernel_for_one_kind_of_arguments():
+    listed = Counter((use.module, use.name) for command in COMMANDS for use in kernels_of(command))
+    # fronts are Fortran's, the blocks of stones C's: a copy of either would cost more than compiling does
+    assert {name for (_, name), times in listed.items() if times > 1} == {"add_into"}
 
 
 def test_kernels_that_python_calls_are_recorded_with_their_types():

@@ -107,10 +107,9 @@ def lay_points(stone, sizes):
 def _add(points, owner, count, x, y, z, of):
     """Append a point; arrays that are full double."""
     if count == len(points):
-        more = np.empty((2 * count, 3))
-        more[:count] = points
-        whose = np.empty(2 * count, dtype=np.int64)
-        whose[:count] = owner
+        more, whose = np.empty((2 * count, 3)), np.empty(2 * count, dtype=np.int64)
+        for k in range(count):
+            more[k, 0], more[k, 1], more[k, 2], whose[k] = points[k, 0], points[k, 1], points[k, 2], owner[k]
         points, owner = more, whose
     points[count, 0], points[count, 1], points[count, 2] = x, y, z
     owner[count] = of
@@ -212,7 +211,7 @@ def _on_face(points, owner, count, stone, face, sizes):
     near, there = np.empty((count, 3)), 0
     for j in range(count):
         if abs(plane[:3] @ points[j] - plane[3]) < _ON_PLANE:
-            near[there] = points[j]
+            near[there, 0], near[there, 1], near[there, 2] = points[j, 0], points[j, 1], points[j, 2]
             there += 1
     first = count
     for step in _steps(sizes):
