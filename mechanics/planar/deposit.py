@@ -19,7 +19,6 @@ __all__ = ["Deposit", "deposit"]
 _NARROWEST = 4.0  # length and height of a sample over the largest radius, at least [-]
 _MOST_DISKS = 2_000_000  # of a sample: more do not fit into the memory of most machines
 _LOW = 2.0  # of the surface below the profile over the width of the largest disk, at most [-]
-_PLACES = 200  # along the profile, at which the surface is looked at
 _LOOSE = 1.1  # width of the place of each disk at first, over the largest disk's
 _ROOM = 1.25  # height of the box that is filled at first, over what its disks need at rest
 _SOLID = 0.82  # share that settled disks fill, at most
