@@ -64,9 +64,16 @@ def quality_of(scene: GeologyScene, sample: PreparedSample, result: PlanarResult
         f"(mean radius: {quality['overlap_over_mean_radius']['mean']:.3%}, "
         f"{quality['overlap_over_mean_radius']['max']:.2%}); η: median {np.median(eta):.1e}, largest {eta.max():.1e}; "
         f"{unsolved / steps:.0%} of {steps} steps above {scene.solver.tolerance:g}; "
-        f"γ = {scene.contact.cohesion:g} N within d_w = {quality['cohesion']['range']:.3g} m"
+        f"γ = {_pulls(scene)} N within d_w = {quality['cohesion']['range']:.3g} m"
     )
     return quality
+
+
+def _pulls(scene: GeologyScene) -> str:
+    """Return the pull γ of the contacts in words; of layers, the least and the largest."""
+    own = scene.contact.cohesion
+    pulls = [own if one.cohesion is None else one.cohesion for one in scene.layers] or [own]
+    return f"{min(pulls):g}" if min(pulls) == max(pulls) else f"{min(pulls):g} to {max(pulls):g}"
 
 
 def write_results(

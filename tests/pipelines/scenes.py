@@ -71,7 +71,7 @@ def small_geology(folder: Path) -> None:
     """Write the shipped geological scenes into a folder, a tenth as large, without cells, for a few steps."""
     folder.mkdir(parents=True)
     small = {"length": 0.1, "deep_length": 0.1, "slope_end": 0.1, "tip": 0.1}
-    small |= {"thickness": 0.5, "deep": 0.5, "width": 0.3, "height": 0.3}
+    small |= {"thickness": 0.5, "top": 0.5, "deep": 0.5, "width": 0.3, "height": 0.3}
     small |= {"strain": 0.01, "push": 0.01}
     for path in (ROOT / "data/samples/geology").glob("*.toml"):
         lines = path.read_text(encoding="utf-8").partition("\n[[cells]]")[0].splitlines()
