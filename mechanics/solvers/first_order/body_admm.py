@@ -101,6 +101,7 @@ class BodyADMM:
             run.iterate()
             run.look()
         impulse, velocity = run.best()
+        run.end()
         left = residual(problem, impulse)
         within = left.within(self.tolerance, self.velocity_tolerance)
         return ContactSolution(impulse, velocity, run.iterations, left.natural_map, within)
@@ -144,8 +145,6 @@ class _Run:
             x, np.empty_like(x), np.empty_like(x), np.zeros(6 * len(bodies.inertia))
         )
         self._factors: kernel.Factors | None = None
-        # by penalty, for stages whose penalties recur
-        self._known: dict[float, kernel.Factors] = {}
         self._memory = _acceleration(0, 0)
         self._until = 0
         self.iterations, self.excess, self._change, self._limit = 0, np.inf, np.inf, 0.0
@@ -193,9 +192,7 @@ class _Run:
             x, z = self._iterate.x, self._iterate.z
             x[:] = z + (x - z) * (soft / self._touching.soft)[:, None]
         self._touching = self._touching._replace(soft=soft)
-        if stage.penalty not in self._known:
-            self._known[stage.penalty] = self._bodies.factors(stage.penalty, self._touching)
-        self._factors = self._known[stage.penalty]
+        self._factors = self._bodies.factors(stage.penalty, self._touching)
 
     def _broken(self) -> tuple[float, float, float]:
         iterate, scale = self._iterate, self._problem.delassus.scale
@@ -215,6 +212,11 @@ class _Run:
         if self.iterations == 0 or excess < self.excess:
             x, z, _, _ = self._iterate
             self.excess, self._best = float(excess), (x.copy(), z.copy(), self._touching.soft)
+
+    def end(self) -> None:
+        """Let go of factors that are too large to be kept."""
+        self._factors = None
+        self._bodies.forget()
 
     def best(self) -> tuple[Array, Array]:
         """Return the impulses and the velocities û (nc, 3) of the best look, local frames."""
@@ -266,10 +268,12 @@ class _Bodies:
         value: Array = kernel.assemble(touching, self._mass, self._panels)
         if not cholesky.factorise(self._panels, value):
             raise SolverError("W is not a number", where="ADMM of bodies", remedy="use another method")
-        found = kernel.Factors(self._panels, value)
-        if len(value) <= _KEPT:
-            self._factors[penalty] = found
-        return found
+        self._factors[penalty] = kernel.Factors(self._panels, value)
+        return self._factors[penalty]
+
+    def forget(self) -> None:
+        """Let go of factors that are too large to be kept from step to step."""
+        self._factors = {key: one for key, one in self._factors.items() if len(one.value) <= _KEPT}
 
 
 def _bodies_of(delassus: Delassus, contacts: RigidContacts) -> _Bodies:

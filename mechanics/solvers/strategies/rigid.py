@@ -82,9 +82,10 @@ _EXACT = 1e-6
 _ENDING = (Stage(1e-3, 60, extrapolated=True),)
 # bodies from which Newton's steps in a motion, which factorise anew each, cost more than iterations with kept factors
 _MANY = 1000
-# their penalties in turn: with the larger one contacts sort themselves out, with the smaller one forces that change
-# steadily, by so much in each iteration, arrive 25 times as soon
-_TURNS = 20 * (Stage(0.5, 100, extrapolated=False), Stage(0.02, 50, extrapolated=False))
+# their penalties in turn: with the larger one contacts sort themselves out, within some 40 iterations; with the smaller
+# one forces that change steadily, by so much in each iteration, arrive 50 times as soon
+_TURN = Stage(0.5, 60, extrapolated=False), Stage(0.01, 60, extrapolated=False)
+_TURNS = (Stage(0.5, 20, extrapolated=False), _TURN[1], *(20 * _TURN))
 # and the one with which the forces of rest are found from nothing: it goes as far as methods for rest do, so that the
 # next steps need none
 _COLD_STAGES = (Stage(1e-3, 300, extrapolated=False),)
