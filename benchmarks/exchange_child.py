@@ -16,7 +16,7 @@ from archmodel.tables.entries import new_entry
 from archmodel.tables.relations import Relation
 from archmodel.tables.surveys import Measurement, Survey
 from benchmarks.memory import peak_bytes
-from pipelines.exchange import export_database, import_database
+from pipelines.ingest.exchange import export_database, import_database
 
 __all__ = ["main"]
 

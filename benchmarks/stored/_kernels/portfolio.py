@@ -11,7 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from benchmarks.stored._kernels.sweeps import add_block, apply
-from mechanics._kernels.vectors import row
+from mechanics.contact._kernels.vectors import row
 from mechanics.problem._kernels import admm_right_side, admm_update, natural_errors, plane_axes, solve_contact
 from mechanics.solvers._kernels.block_fronts import analyse, factorise, solve
 from mechanics.solvers._kernels.body_newton import alart_curnier

@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from mechanics._kernels.vectors import (
+from mechanics.contact._kernels.vectors import (
     along,
     column,
     cross,

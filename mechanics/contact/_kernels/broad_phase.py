@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from mechanics._kernels.vectors import row, write_row
+from mechanics.contact._kernels.vectors import row, write_row
 
 __all__ = ["boxes", "close_pairs", "place", "points_of", "single_points"]
 

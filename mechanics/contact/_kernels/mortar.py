@@ -5,10 +5,10 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from mechanics._kernels.vectors import dot, minus, row
 from mechanics.arrays import Array, Ints
 from mechanics.contact._kernels.facets import corner_count
 from mechanics.contact._kernels.overlap import FlatMesh, flattened, overlap_integrals, room
+from mechanics.contact._kernels.vectors import dot, minus, row
 
 __all__ = ["Bodies", "Interfaces", "mortar_rows", "mortar_shares"]
 

@@ -5,8 +5,18 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from mechanics._kernels.vectors import along, cross, dot, minus, norm, over, row, write_frame, write_row
 from mechanics.arrays import Array, Bools, Ints
+from mechanics.contact._kernels.vectors import (
+    along,
+    cross,
+    dot,
+    minus,
+    norm,
+    over,
+    row,
+    write_frame,
+    write_row,
+)
 
 __all__ = [
     "MAX_CORNERS",

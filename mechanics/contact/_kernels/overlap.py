@@ -5,7 +5,6 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from mechanics._kernels.vectors import column, dot, minus, row
 from mechanics.arrays import Array, Ints
 from mechanics.contact._kernels.facets import (
     QUADRATURE,
@@ -16,6 +15,7 @@ from mechanics.contact._kernels.facets import (
     rule_of,
     shape_functions,
 )
+from mechanics.contact._kernels.vectors import column, dot, minus, row
 
 __all__ = ["FlatMesh", "flattened", "overlap_area", "overlap_integrals", "room"]
 

@@ -3,8 +3,8 @@
 import numpy as np
 from numba import njit
 
-from mechanics._kernels.vectors import cross, dot, minus, norm, over, row
 from mechanics.contact._kernels.facets import corner_count, locate, shape_functions
+from mechanics.contact._kernels.vectors import cross, dot, minus, norm, over, row
 
 __all__ = ["surface_points"]
 

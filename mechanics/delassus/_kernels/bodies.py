@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from mechanics._kernels.vectors import cross, dot, minus, row, write_row
+from mechanics.contact._kernels.vectors import cross, dot, minus, row, write_row
 from mechanics.delassus._kernels.sides import arm, inverse_columns, negative, side_jacobian, times, to_world
 
 __all__ = ["Pattern", "across", "assemble", "corrected", "inverses", "lift", "pushed", "softened"]

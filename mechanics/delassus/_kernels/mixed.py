@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from mechanics._kernels.vectors import dot, minus, row
+from mechanics.contact._kernels.vectors import dot, minus, row
 from mechanics.delassus._kernels.sides import less_dot, negative
 from mechanics.problem._kernels import solve_contact
 

@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from mechanics._kernels.vectors import cross, dot, minus, row, write_row
+from mechanics.contact._kernels.vectors import cross, dot, minus, row, write_row
 from mechanics.delassus._kernels.sides import add_dot, arm, less_dot, negative, to_world
 from mechanics.problem._kernels import LocalCompliance, plane_axes, slip
 

@@ -1,12 +1,12 @@
 """Sides of one contact between rigid bodies, in the geometry row (15,) of `RigidContacts`.
 
-Vectors and velocities are tuples (`mechanics._kernels.vectors`). Sums keep the order in which they are written here, so
-that all kernels find the same bits.
+Vectors and velocities are tuples (`mechanics.contact._kernels.vectors`). Sums keep the order in which they are written
+here, so that all kernels find the same bits.
 """
 
 from numba import njit
 
-from mechanics._kernels.vectors import cross, dot, row
+from mechanics.contact._kernels.vectors import cross, dot, row
 
 __all__ = ["add_dot", "arm", "inverse_columns", "less_dot", "negative", "side_jacobian", "times", "to_world"]
 

@@ -15,7 +15,7 @@ import pytest
 from archmodel.database.session import open_database
 from moma.errors import DatabaseError, ExchangeError
 from pipelines import exchange
-from pipelines.exchange import export_database, import_database
+from pipelines.ingest.exchange import export_database, import_database
 from tests.archmodel.random_databases import everything, fill
 from tests.paths import ROOT
 
@@ -136,7 +136,7 @@ def test_a_killed_import_leaves_no_database_and_the_next_one_works(document: Pat
         "from pathlib import Path\n"
         "import archmodel.exchange.store as storing\n"
         "storing.SectionStore.finish = lambda self: (print('storing', flush=True), time.sleep(60))\n"
-        "from pipelines.exchange import import_database\n"
+        "from pipelines.ingest.exchange import import_database\n"
         "import_database(Path(sys.argv[1]), sys.argv[2])\n"
     )
     with subprocess.Popen(
