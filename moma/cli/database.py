@@ -47,7 +47,7 @@ def migrate(
 
 
 if TYPE_CHECKING:
-    from pipelines.exchange import ExchangeReport
+    from pipelines.ingest.exchange import ExchangeReport
 
 
 Document = Annotated[
@@ -67,7 +67,7 @@ Target = Annotated[
 def export(document: Target, db: Db = DEFAULT_DB, json: Json = False, verbose: Verbose = False) -> None:
     """Export the whole database as one JSON document."""
     from moma.cli.text.formats import as_json
-    from pipelines.exchange import export_database, export_to_stream
+    from pipelines.ingest.exchange import export_database, export_to_stream
 
     if str(document) == "-":
         export_to_stream(db, sys.stdout.buffer)
@@ -80,7 +80,7 @@ def export(document: Target, db: Db = DEFAULT_DB, json: Json = False, verbose: V
 def import_(document: Document, db: Db = DEFAULT_DB, json: Json = False, verbose: Verbose = False) -> None:
     """Create a database from an exported document: completely, or not at all if anything is wrong."""
     from moma.cli.text.formats import as_json
-    from pipelines.exchange import import_database
+    from pipelines.ingest.exchange import import_database
 
     report = import_database(document, db)
     print(as_json(asdict(report)) if json else "\n".join(_lines(report, "into", verbose)))

@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from mechanics._kernels.vectors import cross, dot, row, write_row
+from mechanics.contact._kernels.vectors import cross, dot, row, write_row
 from mechanics.delassus._kernels.sides import inverse_columns
 from mechanics.problem._kernels import onto_cone
 from mechanics.solvers._kernels.body_cholesky import Panels, solve

@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from mechanics._kernels.vectors import dot, row, write_row
+from mechanics.contact._kernels.vectors import dot, row, write_row
 from mechanics.delassus._kernels.sides import add_dot, inverse_columns, negative, side_jacobian, times
 
 __all__ = ["BodyBlocks", "alart_curnier", "body_load", "body_matrix", "contact_step", "inverse_blocks"]
