@@ -74,18 +74,14 @@ def assess_scene(
     SceneError, GeometryError, SolverError : see `assemble` and `mechanics.limit`
     DatabaseError : the database cannot be read
     """
-    folder, scene = Path(folder), read_scene(path)
+    folder, scene, asked = Path(folder), read_scene(path), tuple(map(parse_load, loads))
     check_replaceable(folder, INDEX)
     progress(Progress("blocks", 0, None, "reading the stones"))
     with open_database(url, create=False) as database, database.session(read_only=True) as session:
         models = select_stones(scene, session)
         progress(Progress("blocks", 0, None, f"closing the joints of {len(models)} stones"))
         assembled = assemble_stones(scene, models, select_groups(scene, session, models))
-    named = (
-        tuple(parse_load(words, assembled.origin) for words in loads)
-        if loads
-        else scene_loads(scene, assembled.origin)
-    )
+    named = asked or scene_loads(scene, assembled.origin)
     on = assembly(assembled.scene)
     refuse_unsound(problems_of(scene, assembled, loose_blocks(on.model, on.state)), str(path))
     summary: dict[str, Any] = _summary(assembled, on) | {"loads": []}

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from mechanics.limit.live_loads import Acceleration, LiveLoad, PointForce
-from moma.errors import UsageError
+from moma.errors import SceneError, UsageError
 from pipelines.arrays import Array
 from pipelines.scene.array_tables import Entry
 from pipelines.scene.file import SceneFile
@@ -23,18 +23,17 @@ _USUAL = tuple(f"horizontal {axis}" for axis in _AXES)
 _REMEDY = 'give "horizontal x", "horizontal 30" (degrees from x towards y), "tilt y" or "force CODE FX FY FZ"'
 
 
-def parse_load(words: str, origin: Array) -> tuple[str, LiveLoad]:
-    """Return a load from words, as the option --load has them, with its name; `origin` (3,) of the scene [m].
+def parse_load(words: str) -> tuple[str, LiveLoad]:
+    """Return a load from words, as the option --load has them, with its name.
 
     Raises
     ------
     UsageError : the words are no load
 
-    >>> import numpy as np
-    >>> parse_load("tilt y", np.zeros(3))[1].direction
+    >>> parse_load("tilt y")[1].direction
     (1.0, 0.0, 0.0)
     """
-    kind, *rest = words.split()
+    kind, *rest = words.split() or [""]
     try:
         if kind in ("horizontal", "tilt") and len(rest) == 1:
             direction = _horizontal(rest[0])
@@ -42,15 +41,18 @@ def parse_load(words: str, origin: Array) -> tuple[str, LiveLoad]:
         if kind == "force" and len(rest) == 4:
             x, y, z = map(float, rest[1:])
             return words, PointForce(rest[0], (x, y, z))
-    except ValueError:
+    except (ValueError, SceneError):
         pass
     raise UsageError(f"no such load: {words!r}", where="--load", remedy=_REMEDY)
 
 
 def scene_loads(scene: SceneFile, origin: Array) -> tuple[tuple[str, LiveLoad], ...]:
-    """Return the loads of [[assess]] with their names; those of the four horizontal axes where there are none."""
+    """Return the loads of [[assess]] with their names; those of the four horizontal axes where there are none.
+
+    `origin` (3,) is that of the scene, in the frame of the site [m].
+    """
     if not scene.assess:
-        return tuple(parse_load(words, origin) for words in _USUAL)
+        return tuple(map(parse_load, _USUAL))
     found = []
     for entry in scene.assess:
         with scene.document.at(*entry.path):

@@ -72,7 +72,9 @@ force = [0.0, 0.0, -1000.0]
     assert "1 deformable stones count as rigid" in told["cautions"]
 
 
-@pytest.mark.parametrize("words", ["sideways x", "horizontal", "horizontal up", "force W02-02 1 2"])
+@pytest.mark.parametrize(
+    "words", ["", "sideways x", "horizontal", "horizontal up", "horizontal nan", "force W02-02 1 2"]
+)
 def test_words_that_are_no_load_are_refused(url, scene, tmp_path, words):
     said = fails(2, "assess", scene, "--db", url, "--out", tmp_path / "out", "--load", words)
     assert repr(words) in said
