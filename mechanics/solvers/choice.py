@@ -23,6 +23,8 @@ from moma.errors import SolverError
 __all__ = ["Solver", "Solvers", "choose_planar_solver", "choose_solver", "choose_solvers"]
 
 
+# plain sweeps over disks between two looks at η
+_LOOK = 20
 # largest error of a motion over the largest errors of velocity in its steps, added up [-]
 _ADDS_UP = 8.0
 
@@ -118,5 +120,6 @@ def choose_planar_solver(settings: SolverSettings, min_sweeps: int = 0) -> Solve
     if settings.method == Method.AUTO:
         return Planar(*limits)
     if settings.method == Method.NSGS:
-        return NSGS(*limits, check_every=20, depth=0, min_iterations=min_sweeps)
+        # a look costs two sweeps: none is needed before the sweeps that are made anyway
+        return NSGS(*limits, check_every=max(_LOOK, min_sweeps), depth=0, min_iterations=min_sweeps)
     return choose_solver(settings, deformable=False)
