@@ -35,7 +35,9 @@ def documented(tree):
 
 @pytest.mark.parametrize("room", ROOMS, ids=name)
 def test_a_room_has_few_entries_and_says_what_it_is_for(room):
-    entries = [entry.name for entry in room.iterdir() if entry.name not in UNCOUNTED]
+    # what is left of a room that has moved holds caches alone
+    there = [entry for entry in room.iterdir() if entry.is_file() or any(entry.rglob("*.*[!cib]"))]
+    entries = [entry.name for entry in there if entry.name not in UNCOUNTED]
     assert len(entries) <= ENTRIES, entries
     text = ast.get_docstring(ast.parse((room / "__init__.py").read_text(encoding="utf-8")))
     assert text

@@ -14,7 +14,7 @@ import pytest
 
 from archmodel.database.session import open_database
 from moma.errors import DatabaseError, ExchangeError
-from pipelines import exchange
+from pipelines.ingest import exchange
 from pipelines.ingest.exchange import export_database, import_database
 from tests.archmodel.random_databases import everything, fill
 from tests.paths import ROOT
