@@ -42,7 +42,7 @@ _FALL = 9.81e-3
 
 @dataclass(frozen=True)
 class _Stage:
-    """What is timed, repeatedly.
+    """Work that is timed, repeatedly.
 
     Attributes
     ----------

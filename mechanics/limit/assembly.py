@@ -11,12 +11,13 @@ with friction μ, cohesion k and tensile strength s of each point (mechanics.sce
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import csr_array
+from scipy.sparse import csc_array
 
 from mechanics.arrays import Array, Ints
-from mechanics.contact.contacts import Contacts, gaps, material_points, take
-from mechanics.dynamics.contact_search import detector
+from mechanics.contact.contacts import Contacts, gaps, take
+from mechanics.dynamics.contact_search import Detection, detection, detector
 from mechanics.model.model import Model, build_model
+from mechanics.problem.forms import SparseForm
 from mechanics.scene.laws.law import STATE, Approach
 from mechanics.scene.scene import Fidelity, Scene
 from mechanics.scene.state import State
@@ -37,7 +38,6 @@ class Assembly:
     ----------
     model, state : the stones, all rigid or fixed
     contacts : the contact points (nc) of closed joints
-    point : (nc, 3) their places [m]
     free : (n,) bodies that may move
     lift : (6 n, 3 nc) H, forces at contacts → force [N] and moment about its centre [N m] of each free stone
     dead : (6 n,) weight, and the forces of the scene at its start [N, N m]
@@ -49,9 +49,8 @@ class Assembly:
     model: Model
     state: State
     contacts: Contacts
-    point: Array
     free: Ints
-    lift: "csr_array[np.float64]"
+    lift: "csc_array[np.float64]"
     dead: Array
     friction: Array
     cohesion: Array
@@ -90,33 +89,33 @@ def assembly(scene: Scene) -> Assembly:
             where=scene.name,
             remedy=f"close the joints: gaps up to {_CLOSED:g} of a stone's width count as closed",
         )
-    contacts, gap, size = take(contacts, closed), gap[closed], size[closed]
-    friction, cohesion, tension = _strength(model, contacts, size)
-    sides = material_points(contacts, state)
-    point = 0.5 * (sides[:, 0] + sides[:, 1])
+    found = detection(model, state, take(contacts, closed), ())
+    form = found.operator.form
+    assert isinstance(form, SparseForm)
+    friction, cohesion, tension = _strength(found)
     return Assembly(
         model=model,
         state=state,
-        contacts=contacts,
-        point=point,
+        contacts=found.contacts,
         free=free,
-        lift=_lift(model, state, contacts, point, free),
+        lift=form.lift,
         dead=_dead(model, state, free),
         friction=friction,
         cohesion=cohesion,
         tension=tension,
-        widest=float(gap.max()),
+        widest=float(gap[closed].max()),
     )
 
 
-def _strength(model: Model, contacts: Contacts, size: Array) -> tuple[Array, Array, Array]:
+def _strength(found: Detection) -> tuple[Array, Array, Array]:
     """Return μ, k and s of closed joints, as their laws state them for a step of one second: N for N s."""
+    model, contacts = found.model, found.contacts
     none = np.zeros(len(contacts))
     approach = Approach(
         gap=none,
         speed=none,
         area=contacts.area,
-        size=size,
+        size=np.minimum(*model.surfaces.size[contacts.bodies.T]),
         compliance=none + 1.0,
         step=1.0,
         theta=1.0,
@@ -124,32 +123,8 @@ def _strength(model: Model, contacts: Contacts, size: Array) -> tuple[Array, Arr
         first=True,
         state=np.zeros((len(contacts), STATE)),
     )
-    terms = model.laws.terms(model.laws.of(contacts.bodies), approach)
+    terms = model.laws.terms(found.law, approach)
     return terms.friction, terms.cohesion, terms.adhesion
-
-
-def _lift(
-    model: Model, state: State, contacts: Contacts, point: Array, free: Ints
-) -> "csr_array[np.float64]":
-    count = len(contacts)
-    place = np.full(len(model.mass), -1)
-    place[free] = np.arange(len(free))
-    values, rows, columns = [], [], []
-    for side, sign in ((0, 1.0), (1, -1.0)):
-        body = contacts.bodies[:, side]
-        arm = point - state.centre[body]
-        # columns of a contact: its three directions, world axes
-        force = np.swapaxes(contacts.frame, 1, 2)
-        moment = np.swapaxes(np.cross(arm[:, None], contacts.frame), 1, 2)
-        wrench = sign * np.concatenate([force, moment], axis=1)
-        moves = place[body] >= 0
-        row = 6 * place[body][:, None, None] + np.arange(6)[None, :, None]
-        column = 3 * np.arange(count)[:, None, None] + np.arange(3)[None, None]
-        values.append(wrench[moves].ravel())
-        rows.append(np.broadcast_to(row, wrench.shape)[moves].ravel())
-        columns.append(np.broadcast_to(column, wrench.shape)[moves].ravel())
-    entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
-    return csr_array(entries, shape=(6 * len(free), 3 * count))
 
 
 def _dead(model: Model, state: State, free: Ints) -> Array:

@@ -29,6 +29,7 @@ from scipy.sparse import block_array, csc_array, csr_array, diags_array, vstack
 from mechanics.arrays import Array, Bools
 from mechanics.limit.assembly import Assembly
 from mechanics.limit.live_loads import LiveLoad
+from mechanics.solvers.second_order.cone_program import load_clarabel
 from moma.errors import SolverError
 
 __all__ = ["Flow", "LimitLoad", "limit_load"]
@@ -102,18 +103,24 @@ class LimitLoad:
         return f"{self.load}: λ = {self.multiplier:.4g} ({self.flow} friction, {kind}{left})"
 
 
-def limit_load(on: Assembly, live: LiveLoad, flow: Flow = Flow.ASSOCIATIVE) -> LimitLoad:
+def limit_load(
+    on: Assembly, live: LiveLoad, flow: Flow = Flow.ASSOCIATIVE, bound: LimitLoad | None = None
+) -> LimitLoad:
     """Return the limit load of an assembly with its mechanism.
+
+    A candidate begins with the `bound` of the same load, that of associative friction, which is found where it is None.
 
     Raises
     ------
     SolverError : Clarabel is not installed, or came to no answer
     """
     programme = _Programme(on, live)
-    found = programme.solve(on.friction, on.cohesion, on.tension)
-    if flow is Flow.ASSOCIATIVE or not np.isfinite(found.multiplier):
-        return programme.judged(found, flow, 1, True)
-    return _candidate(on, programme, found)
+    if bound is None:
+        found = programme.solve(on.friction, on.cohesion, on.tension)
+        bound = programme.judged(found, Flow.ASSOCIATIVE, 1, True)
+    if flow is Flow.ASSOCIATIVE or not np.isfinite(bound.multiplier):
+        return replace(bound, flow=flow)
+    return _candidate(on, programme, bound.force)
 
 
 @dataclass(frozen=True)
@@ -125,13 +132,13 @@ class _Answer:
     velocity: Array
 
 
-def _candidate(on: Assembly, programme: "_Programme", first: _Answer) -> LimitLoad:
-    """Iterate the fictitious strength from the forces of associative friction, its slope falling to almost zero.
+def _candidate(on: Assembly, programme: "_Programme", force: Array) -> LimitLoad:
+    """Iterate the fictitious strength from `force` (nc, 3) of associative friction, its slope falling to almost zero.
 
     The strength passes through mixed forces n̄, so that forces that swing between two states come to rest. The
     mechanism is that of the last strength without the charge on clamping, which would open joints a little.
     """
-    slope, held = on.friction, _normal(on, first)
+    slope, held = on.friction, _normal(on, force)
     multipliers: list[float] = []
     ended = False
     while True:
@@ -142,7 +149,7 @@ def _candidate(on: Assembly, programme: "_Programme", first: _Answer) -> LimitLo
         if not np.isfinite(found.multiplier):
             break
         share = _MIXED / (1.0 + max(0, len(multipliers) - _FIRST) / _FIRST)
-        held += share * (_normal(on, found) - held)
+        held += share * (_normal(on, found.force) - held)
         stands = np.ptp(multipliers[-_TIMES:]) <= _STANDS * abs(found.multiplier)
         near = programme.judged(found, Flow.COULOMB, 0, True).beyond <= _BEYOND
         ended = len(multipliers) > _FIRST and bool(stands) and near
@@ -155,15 +162,15 @@ def _candidate(on: Assembly, programme: "_Programme", first: _Answer) -> LimitLo
     return replace(judged, converged=ended)
 
 
-def _normal(on: Assembly, found: _Answer) -> Array:
-    return np.maximum(found.force[:, 0] + on.tension, 0.0)
+def _normal(on: Assembly, force: Array) -> Array:
+    return np.maximum(force[:, 0] + on.tension, 0.0)
 
 
 class _Programme:
     """The cone programme of an assembly and a load, for any strength of its joints.
 
-    Forces are in units of the mean weight of the stones, moments in that times the width of each stone, so that all
-    rows of the balance weigh alike.
+    Forces are in units of the largest load on a stone, moments in that times the width of each stone, so that all rows
+    of the balance weigh alike.
     """
 
     def __init__(self, on: Assembly, live: LiveLoad) -> None:
@@ -185,7 +192,7 @@ class _Programme:
 
     def solve(self, friction: Array, cohesion: Array, tension: Array, clamping: float = 0.0) -> _Answer:
         """Return the answer for μ, k and s (nc,) of the contacts; `clamping`: charge on normal forces."""
-        clarabel = _clarabel()
+        clarabel = load_clarabel("limit load", "pip install clarabel")
         count = len(friction)
         rough = (friction > _SMOOTH) | (cohesion > 0)
         side = np.flatnonzero(~rough | (cohesion > 0))
@@ -269,13 +276,3 @@ class _Programme:
             converged=converged,
             beyond=beyond,
         )
-
-
-def _clarabel() -> Any:
-    try:
-        import clarabel
-    except ImportError as error:
-        raise SolverError(
-            "Clarabel is not installed", where="limit load", remedy="pip install clarabel"
-        ) from error
-    return clarabel

@@ -123,7 +123,7 @@ def _candidate(on: Assembly, live: LiveLoad, bound: LimitLoad) -> LimitLoad | No
     if not np.isfinite(bound.multiplier):
         return None
     try:
-        candidate = limit_load(on, live, Flow.COULOMB)
+        candidate = limit_load(on, live, Flow.COULOMB, bound)
     except SolverError:
         return None
     return candidate if np.isfinite(candidate.multiplier) else None

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -53,23 +54,27 @@ def draw_mechanism(
         ]
     )
     way = _WAY * float(np.ptp(corners, axis=0).max())
-    names = []
+    moved: list[Array] = []
+    pictures: list[dict[str, Any]] = []
     for number, (load, title) in enumerate(zip(loads, titles, strict=True), start=1):
         if not load.velocity.any():
             continue
         velocity = np.zeros((len(blocks), 6))
         velocity[on.free] = load.velocity
         arm = corners - on.state.centre[owner]
-        moved = velocity[owner, :3] + np.cross(velocity[owner, 3:], arm)
-        moved *= way / max(float(np.linalg.norm(moved, axis=1).max()), 1e-300)
-        surface = MechanismSurface(corners, corners + moved, triangles, np.sort(edges, axis=1))
-        name = f"mechanism-{number}.png"
-        picture = {
-            "path": str((folder / name).absolute()),
-            "title": title,
-            "towards": towards.tolist(),
-            "up": (-np.asarray(on.model.gravity(0.0))).tolist(),
-        }
-        draw_apart("pipelines.draw.offscreen.mechanism", surface, [picture])
-        names.append(name)
-    return names
+        ways = velocity[owner, :3] + np.cross(velocity[owner, 3:], arm)
+        ways *= way / max(float(np.linalg.norm(ways, axis=1).max()), 1e-300)
+        pictures.append(
+            {
+                "path": str((folder / f"mechanism-{number}.png").absolute()),
+                "number": len(moved),
+                "title": title,
+                "towards": towards.tolist(),
+                "up": (-np.asarray(on.model.gravity(0.0))).tolist(),
+            }
+        )
+        moved.append(corners + ways)
+    if pictures:
+        surface = MechanismSurface(corners, np.stack(moved), triangles, np.sort(edges, axis=1))
+        draw_apart("pipelines.draw.offscreen.mechanism", surface, pictures)
+    return [Path(one["path"]).name for one in pictures]

@@ -79,6 +79,17 @@ class GeologyScene:
     cells: tuple[Cell, ...]
     layers: tuple[Layer, ...] = ()
 
+    @property
+    def tables(self) -> Mapping[str, Any]:
+        """Tables of settings, by name."""
+        return {
+            "sample": self.sample,
+            "contact": self.contact,
+            "time": self.time,
+            "solver": self.solver,
+            self.kind: self.experiment,
+        }
+
 
 def read_geology(path: str | Path, kind: str) -> GeologyScene:
     """Read and check the scene file of an experiment.

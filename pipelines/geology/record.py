@@ -26,13 +26,6 @@ def geology_record(
     summary : the contents of summary.json
     rows : columns by cell
     """
-    tables: Mapping[str, Any] = {
-        "sample": scene.sample,
-        "contact": scene.contact,
-        "time": scene.time,
-        "solver": scene.solver,
-        scene.kind: scene.experiment,
-    }
     return RunRecord(
         scene=scene.name,
         scene_text=scene.text,
@@ -42,7 +35,7 @@ def geology_record(
         results=(),
         settings={
             "kind": scene.kind,
-            **{name: asdict(table) for name, table in tables.items()},
+            **{name: asdict(table) for name, table in scene.tables.items()},
             "layers": [asdict(layer) for layer in scene.layers],
         },
         steps=result.steps,

@@ -102,14 +102,7 @@ def _cell(name: str, columns: Mapping[str, Array]) -> tuple[str, ...]:
 
 
 def _settings(scene: GeologyScene) -> list[tuple[str, str]]:
-    tables: Mapping[str, Any] = {
-        "sample": scene.sample,
-        "contact": scene.contact,
-        "time": scene.time,
-        "solver": scene.solver,
-        scene.kind: scene.experiment,
-    }
     return [
         (name, ", ".join(f"{key} = {value}" for key, value in asdict(table).items() if value is not None))
-        for name, table in tables.items()
+        for name, table in scene.tables.items()
     ]

@@ -9,9 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from archmodel.database.session import Database, open_database
-from archmodel.store.run_record import RunRecord
-from archmodel.store.runs import store_run
+from archmodel.database.session import open_database
 from mechanics.arrays import Ints
 from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.planar.result import PlanarResult
@@ -21,7 +19,7 @@ from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.law import Law
 from mechanics.scene.laws.lennard_jones import LennardJones
 from mechanics.scene.scene import LawRule, Method, SolverSettings
-from moma.errors import DatabaseError, SceneError
+from moma.errors import SceneError
 from pipelines.geology.file import GeologyScene, read_geology
 from pipelines.geology.observe import Observation, read_rows
 from pipelines.geology.record import geology_record
@@ -30,6 +28,7 @@ from pipelines.geology.sample import PreparedSample, prepare
 from pipelines.geology.settings import Layer
 from pipelines.results.folder import UNFINISHED, check_replaceable
 from pipelines.run.planar import run_planar
+from pipelines.run.record import store_record
 from pipelines.run.unfinished import UnfinishedRun
 
 __all__ = ["GeologyReport", "planar_scene", "run_geology"]
@@ -189,17 +188,8 @@ def run_geology(
             )
         if database is not None:
             rows = {name: read_rows(folder / file) for name, file in summary["cells"].items()}
-            number = _stored(database, folder, geology_record(scene, result, summary, rows))
+            number = store_record(database, folder, geology_record(scene, result, summary, rows))
     return GeologyReport(folder, summary, tuple(summary["warnings"]), number)
-
-
-def _stored(database: Database, folder: Path, record: RunRecord) -> int:
-    try:
-        with database.session() as session:
-            return store_run(session, record)
-    except DatabaseError as error:
-        what = f"the results are in {folder}, but could not be stored: {error.what}"
-        raise DatabaseError(what, where=error.where, remedy=error.remedy) from error
 
 
 def _observation(

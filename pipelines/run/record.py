@@ -7,10 +7,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields, is_dataclass
 from functools import cache
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from archmodel.database.session import Database
 from archmodel.store.run_record import (
     ContactArrays,
     ErrorMeasures,
@@ -19,10 +21,12 @@ from archmodel.store.run_record import (
     SimplificationRecord,
     StoneResult,
 )
+from archmodel.store.runs import store_run
 from archmodel.store.stone_rows import solid_volume
 from mechanics.results.contact_result import ContactResult, JointResult
 from mechanics.results.result import Errors, Result
 from mechanics.scene.scene import Scene
+from moma.errors import DatabaseError
 from pipelines.arrays import Array
 from pipelines.results.joints_csv import normal_and_shear
 from pipelines.run.assemble import Assembly
@@ -36,6 +40,7 @@ __all__ = [
     "run_record",
     "settings_of",
     "simplifications",
+    "store_record",
     "surveyed_widths",
     "versions",
 ]
@@ -198,3 +203,18 @@ def _values(settings: object) -> dict[str, Any]:
         name: value if isinstance(value, bool | int | float | None) else str(value)
         for name, value in asdict(settings).items()
     }
+
+
+def store_record(database: Database, folder: Path, record: RunRecord) -> int:
+    """Store a run whose results are in a folder; return its number.
+
+    Raises
+    ------
+    DatabaseError : it could not be stored; names the folder, which is complete
+    """
+    try:
+        with database.session() as session:
+            return store_run(session, record)
+    except DatabaseError as error:
+        what = f"the results are in {folder}, but could not be stored: {error.what}"
+        raise DatabaseError(what, where=error.where, remedy=error.remedy) from error

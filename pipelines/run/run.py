@@ -10,7 +10,6 @@ from typing import Any
 
 from archmodel.database.session import open_database
 from archmodel.store.run_record import StoneResult
-from archmodel.store.runs import store_run
 from archmodel.tables.entries import latest_entry
 from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.model.model import build_model
@@ -21,7 +20,7 @@ from mechanics.simulate import simulate
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.files import check_mesh_file, write_meshes
 from mechanics.stones.meshing.mesh import VolumeMesh
-from moma.errors import DatabaseError, MissingLibraryError
+from moma.errors import MissingLibraryError
 from pipelines.draw.pictures import draw_pictures, missing
 from pipelines.reports.run import write_report
 from pipelines.results.folder import check_replaceable, replacing
@@ -34,7 +33,7 @@ from pipelines.results.vtkhdf import RESULTS, write_vtkhdf
 from pipelines.run.assemble import Assembly, assemble_stones
 from pipelines.run.inputs import run_inputs
 from pipelines.run.plausibility import corner_warnings, unusual_values
-from pipelines.run.record import run_record, versions
+from pipelines.run.record import run_record, store_record, versions
 from pipelines.run.soundness import caution_of, problems_of, refuse_unsound
 from pipelines.run.unfinished import UnfinishedRun, unfinished_run
 from pipelines.scene.file import SceneFile, read_scene
@@ -152,12 +151,7 @@ def run_scene(
         if meshes is not None:
             write_meshes(meshes, _meshes(result, assembly))
         record = run_record(result, stones, scene, assembly, summary, as_of)
-        try:
-            with database.session() as session:
-                run = store_run(session, record)
-        except DatabaseError as error:
-            what = f"the results are in {folder}, but could not be stored: {error.what}"
-            raise DatabaseError(what, where=error.where, remedy=error.remedy) from error
+        run = store_record(database, folder, record)
         if result.outcome is not Outcome.INTERRUPTED:
             unfinished.remove()
     return RunReport(folder, summary, warnings, run)

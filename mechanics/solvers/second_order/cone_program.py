@@ -24,7 +24,7 @@ from mechanics.solvers.first_order.anderson import Anderson
 from mechanics.solvers.second_order.newton import Newton
 from moma.errors import SolverError
 
-__all__ = ["ConeProgram"]
+__all__ = ["ConeProgram", "load_clarabel"]
 
 
 _NAME = "cone programme"
@@ -123,7 +123,7 @@ class _Programme:
     """
 
     def __init__(self, problem: ContactProblem) -> None:
-        clarabel = _clarabel()
+        clarabel = load_clarabel(_NAME, "pip install clarabel, or use another method")
         self._problem, self.iterations = problem, 0
         pushed = -(problem.u_free[:, 0] + problem.bias)
         # contacts that open may slide far faster than those that have to be stopped
@@ -210,11 +210,15 @@ def _cones(
     return -rows, np.concatenate([right.ravel(), np.zeros(len(side))]), kinds
 
 
-def _clarabel() -> Any:
+def load_clarabel(where: str, remedy: str) -> Any:
+    """Return the module of Clarabel.
+
+    Raises
+    ------
+    SolverError : it is not installed; with the place and the remedy given
+    """
     try:
         import clarabel
     except ImportError as error:
-        raise SolverError(
-            "Clarabel is not installed", where=_NAME, remedy="pip install clarabel, or use another method"
-        ) from error
+        raise SolverError("Clarabel is not installed", where=where, remedy=remedy) from error
     return clarabel

@@ -28,11 +28,12 @@ _NOTE = "As the stones begin to move, exaggerated; glass: where they stand"
 
 @dataclass(frozen=True)
 class MechanismSurface:
-    """Stones where they stand and where the mechanism takes them.
+    """Stones where they stand and where mechanisms take them.
 
     Attributes
     ----------
-    points, moved : (n, 3) corners, before and after [m]
+    points : (n, 3) corners [m]
+    moved : (k, n, 3) the same in each mechanism [m]
     triangles : (nt, 3)
     edges : (ne, 2)
     """
@@ -44,19 +45,20 @@ class MechanismSurface:
 
 
 def draw(surface: MechanismSurface, path: Path, job: dict[str, Any]) -> None:
-    """Draw one picture as PNG; `job` has title, towards (to the viewer) and up."""
+    """Draw one picture as PNG; `job` has the number of the mechanism, title, towards (to the viewer) and up."""
     import pyvista
 
     plotter = new_plotter(pyvista)
-    way = np.linalg.norm(surface.moved - surface.points, axis=1)
+    moved = surface.moved[job["number"]]
+    way = np.linalg.norm(moved - surface.points, axis=1)
     share = way / max(float(way.max()), 1e-300)
-    mesh = mesh_of(pyvista, surface.moved, surface.triangles)
+    mesh = mesh_of(pyvista, moved, surface.triangles)
     mesh.point_data["value"] = share
     add_coloured(plotter, mesh, Colouring(share, "Way over the longest [-]", 1.0, 5, False, _PALETTE))
     add_glass(pyvista, plotter, surface.points, surface.triangles)
-    both = np.concatenate([surface.points, surface.moved])
+    both = np.concatenate([surface.points, moved])
     place_camera(pyvista, plotter, both, np.array(job["towards"]), np.array(job["up"]))
-    add_edges(pyvista, plotter, surface.moved, surface.edges)
+    add_edges(pyvista, plotter, moved, surface.edges)
     save_picture(plotter, path, f"{job['title']}\n{_NOTE}", "")
 
 

@@ -15,6 +15,7 @@ from vtkmodules.vtkIOHDF import vtkHDFReader
 from archmodel.database.session import open_database
 from moma.errors import DatabaseError, UsageError
 from pipelines.results import checkpoints, vtkhdf
+from pipelines.run import record as record_module
 from pipelines.run import run as run_module
 from pipelines.run import unfinished
 from pipelines.run.run import run_scene
@@ -354,7 +355,7 @@ def test_a_run_that_could_not_be_stored_is_stored_by_resuming_it(tmp_path, own_u
         raise DatabaseError("database is locked", where="own.db")
 
     with monkeypatch.context() as patch:
-        patch.setattr(run_module, "store_run", locked)
+        patch.setattr(record_module, "store_run", locked)
         with pytest.raises(DatabaseError, match="could not be stored"):
             run_scene(scene, own_url, out)
     kept = differing(out, out)
