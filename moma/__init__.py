@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from mechanics.scene.scene import Block, Fidelity, Scene
     from mechanics.simulate import simulate
     from mechanics.stones.materials import Material
+    from pipelines.assess.assess import assess
     from pipelines.ingest.ingest import ingest
     from pipelines.record.record import record
     from pipelines.reports.survey.report import report_surveys
@@ -59,6 +60,7 @@ __all__ = [
     "Scene",
     "__version__",
     "assemble",
+    "assess",
     "find",
     "find_rows",
     "history",
@@ -83,6 +85,7 @@ _HOMES = {
     "Result": "mechanics.results.result",
     "Scene": "mechanics.scene.scene",
     "assemble": "pipelines.run.assemble",
+    "assess": "pipelines.assess.assess",
     "find": "archmodel.query.api",
     "find_rows": "archmodel.query.api",
     "history": "archmodel.describe.history",

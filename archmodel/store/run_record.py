@@ -14,6 +14,7 @@ __all__ = [
     "ContactArrays",
     "ErrorMeasures",
     "JointArrays",
+    "MovingStone",
     "RunRecord",
     "SimplificationRecord",
     "StoneResult",
@@ -191,6 +192,23 @@ class SimplificationRecord:
 
 
 @dataclass(frozen=True)
+class MovingStone:
+    """A stone that moves in a mechanism.
+
+    Attributes
+    ----------
+    code : the stone
+    speed : over that of the fastest [-]
+    velocity, spin : (3,) of its centre, the fastest corner of all at 1 [m/s, rad/s]
+    """
+
+    code: str
+    speed: float
+    velocity: tuple[float, float, float]
+    spin: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
 class RunRecord:
     """One simulation run.
 
@@ -198,7 +216,7 @@ class RunRecord:
     ----------
     scene : its name
     scene_text : the scene file as it was run
-    outcome : equilibrium, moving, collapsed, undecided or interrupted
+    outcome : equilibrium, moving, collapsed, undecided, interrupted or assessed
     summary : the contents of summary.json
     versions : of the programs and libraries, by name; at least of "moma"
     results : one per stone of the scene
@@ -209,6 +227,7 @@ class RunRecord:
     errors : its error measures
     joints, contacts : at its end; None if they are not kept
     simplifications : of its stones; () if they are not kept
+    mechanisms : of an assessment, the stones that move by the name of its load
     cells : of a run of disks, the columns of the rows of each cell by its name: at least step and time; NaN: unknown
     """
 
@@ -227,4 +246,5 @@ class RunRecord:
     joints: JointArrays | None = None
     contacts: ContactArrays | None = None
     simplifications: tuple[SimplificationRecord, ...] = ()
+    mechanisms: Mapping[str, tuple[MovingStone, ...]] = field(default_factory=dict)
     cells: Mapping[str, Mapping[str, Array]] = field(default_factory=dict)

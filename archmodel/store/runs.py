@@ -24,7 +24,15 @@ from archmodel.store.run_record import (
 from archmodel.store.stone_rows import storable
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Entry, new_entry
-from archmodel.tables.runs import FIDELITIES, CellResult, ContactPoint, EntityResult, JointResult, Run
+from archmodel.tables.runs import (
+    FIDELITIES,
+    CellResult,
+    ContactPoint,
+    EntityResult,
+    JointResult,
+    MechanismStone,
+    Run,
+)
 from archmodel.tables.surveys import Simplification
 from moma.errors import DatabaseError
 
@@ -44,6 +52,7 @@ _CHUNK = 5_000
 
 _JOINT_NUMBERS = ("area", "force_normal", "force_shear", "gap", "opening", "sliding")
 _JOINT_UNKNOWNS = ("pressure_mean", "pressure_max", "kern", "friction_use", "slipping", "open")
+_MOTION = ("speed", "vx", "vy", "vz", "wx", "wy", "wz")
 _CONTACT_NUMBERS = ("area", "gap", "opening", "slide")
 
 
@@ -254,6 +263,7 @@ def store_run(session: Session, run: RunRecord) -> int:
         if run.contacts is not None:
             rows = contact_rows(run.contacts, entities, stored.id, f"{place}, contact points")
             insert_rows(session, ContactPoint, rows)
+        insert_rows(session, MechanismStone, _moving(session, run, stored.id, place))
         insert_rows(session, CellResult, cell_rows(run.cells, stored.id, f"{place}, cells"))
         return stored.id
 
@@ -272,6 +282,17 @@ def _simplifications(
             raise DatabaseError(f"stone {one.code} has a solid and no result", where=place)
         keys = {"run_id": stored, "entity_id": numbers[one.code]}
         yield keys | simplification_row(one, f"{place}, stone {one.code}")
+
+
+def _moving(session: Session, run: RunRecord, stored: int, place: str) -> Iterator[dict[str, object]]:
+    for load, stones in run.mechanisms.items():
+        entities = _primary_keys(session, [one.code for one in stones], place)
+        for one, entity in zip(stones, entities.tolist(), strict=True):
+            where = f"{place}, {load}, stone {one.code}"
+            numbers = dict(zip(_MOTION, (one.speed, *one.velocity, *one.spin), strict=True))
+            yield {"run_id": stored, "load": storable(load), "entity_id": entity} | {
+                name: _finite(value, name, where) for name, value in numbers.items()
+            }
 
 
 def _refuse_twice(codes: Sequence[str], what: str, place: str) -> None:

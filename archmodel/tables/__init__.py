@@ -2,7 +2,8 @@
 
 Public: `Entity`, `kind_named`, `kinds`, `own_attributes` (entities); `Structure`, `structure_kinds` (structures);
 `Membership`, `Relation` (relations); `Correction`, `Material`, `Phase`, `Statement` (knowledge); `Measurement`,
-`Simplification`, `Survey` (surveys); `CellResult`, `ContactPoint`, `EntityResult`, `JointResult`, `Run` (runs);
+`Simplification`, `Survey` (surveys); `CellResult`, `ContactPoint`, `EntityResult`, `JointResult`, `MechanismStone`,
+`Run` (runs);
 `Entry`, `held_at`, `new_entry` (entries); `StoneAttribute`, `attribute` (base); `RegisteredKind` (registered);
 `SCHEMA_VERSION`, `metadata` (layout).
 """

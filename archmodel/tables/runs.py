@@ -1,4 +1,4 @@
-"""Simulation runs and their results by entity, by joint, by contact point and by cell of disks."""
+"""Runs and their results by entity, by joint, by contact point, by cell of disks, and by mechanism."""
 
 from sqlalchemy import ForeignKey, Index
 from sqlalchemy.orm import Mapped, mapped_column, relationship
@@ -7,7 +7,7 @@ from archmodel.tables.base import JSON_TYPE, Base, attribute
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Entry
 
-__all__ = ["FIDELITIES", "CellResult", "ContactPoint", "EntityResult", "JointResult", "Run"]
+__all__ = ["FIDELITIES", "CellResult", "ContactPoint", "EntityResult", "JointResult", "MechanismStone", "Run"]
 
 FIDELITIES = ("fixed", "rigid", "deformable")
 """Ways to model a stone in a run."""
@@ -19,7 +19,7 @@ class Run(Base):
     Attributes
     ----------
     scene, scene_text : the scene's name, and its file as it was run: all settings
-    outcome : equilibrium, moving, collapsed, undecided or interrupted
+    outcome : equilibrium, moving, collapsed, undecided or interrupted; assessed: limit loads, without steps
     steps, contacts : how many
     simulated, wall : simulated time and time of work [s]
     natural_map, penetration, balance, reaction, energy : the error measures of docs/theory.md §4 [-]
@@ -224,3 +224,31 @@ class CellResult(Base):
     porosity: Mapped[float | None]
 
     run: Mapped[Run] = relationship()
+
+
+class MechanismStone(Base):
+    """One entity that moves in the mechanism of a load of an assessment.
+
+    Attributes
+    ----------
+    load : its name
+    speed : over that of the fastest [-]
+    vx, vy, vz, wx, wy, wz : velocity of its centre, and spin, the fastest corner of all at 1 [m/s, rad/s]
+    """
+
+    __tablename__ = "mechanism_stone"
+    __table_args__ = (Index("ix_mechanism_stone_entity_id", "entity_id"),)
+
+    run_id: Mapped[int] = mapped_column(ForeignKey("run.id"), primary_key=True)
+    load: Mapped[str] = mapped_column(primary_key=True)
+    entity_id: Mapped[int] = mapped_column(ForeignKey("entity.id"), primary_key=True)
+    speed: Mapped[float]
+    vx: Mapped[float]
+    vy: Mapped[float]
+    vz: Mapped[float]
+    wx: Mapped[float]
+    wy: Mapped[float]
+    wz: Mapped[float]
+
+    run: Mapped[Run] = relationship()
+    entity: Mapped[Entity] = relationship()

@@ -1,5 +1,7 @@
-"""Limit analysis of rigid stones: how far a load may grow before they move, and how they would.
+"""Limit analysis of rigid stones: how far a load may grow before they move, how they would, and what holds them.
 
-Public: `Assembly`, `assembly` (assembly); `Acceleration`, `LiveLoad`, `PointForce` (live_loads); `Flow`, `LimitLoad`,
-`limit_load` (limit_load).
+Public: `Assembly`, `Strength`, `assembly` (assembly); `Acceleration`, `LiveLoad`, `PointForce`, `SpreadForce`
+(live_loads); `Flow`, `LimitLoad`, `Mechanism`, `limit_load` (limit_load); `Thrust`, `thrust` (thrust);
+`GeometricSafety`, `geometric_safety` (thickness); `Kinematics`, `kinematics` (kinematic); `Confirmation`, `confirm`
+(confirm); `Joints`, `resultants` (joints).
 """

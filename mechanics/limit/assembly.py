@@ -5,17 +5,20 @@ candidate of each. All stones that are free to move are in balance under a load 
 
     H f + p = 0,     ‖f_T‖ ≤ μ (f_N + s) + k,   f_N + s ≥ 0
 
-with friction μ, cohesion k and tensile strength s of each point (mechanics.scene.laws, docs/theory.md §2).
+with friction μ, cohesion k and tensile strength s of each point (mechanics.scene.laws, docs/theory.md §2). Joints of
+stones whose compressive strength is known may also crush (`mechanics.limit.joints`).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import csc_array
+from scipy.sparse import csc_array, csr_array
 
 from mechanics.arrays import Array, Ints
 from mechanics.contact.contacts import Contacts, gaps, take
 from mechanics.dynamics.contact_search import Detection, detection, detector
+from mechanics.limit.joints import Joints, StressBlocks, find_joints, stress_blocks
 from mechanics.model.model import Model, build_model
 from mechanics.problem.forms import SparseForm
 from mechanics.scene.laws.law import STATE, Approach
@@ -23,11 +26,31 @@ from mechanics.scene.scene import Fidelity, Scene
 from mechanics.scene.state import State
 from moma.errors import SceneError
 
-__all__ = ["Assembly", "assembly"]
+__all__ = ["Assembly", "Strength", "assembly"]
 
 
 # gap up to which a joint counts as closed, over the width of the smaller stone: a thousandth is a survey's error [-]
 _CLOSED = 1e-3
+
+
+@dataclass(frozen=True)
+class Strength:
+    """Strength of contact points.
+
+    Attributes
+    ----------
+    friction : (nc,) μ [-]
+    cohesion, tension : (nc,) k and s [N]
+    """
+
+    friction: Array
+    cohesion: Array
+    tension: Array
+
+    def shear(self, force: Array) -> Array:
+        """Return the shear (nc,) that contacts with forces (nc, 3) can carry [N]."""
+        carried: Array = self.friction * (force[:, 0] + self.tension) + self.cohesion
+        return carried
 
 
 @dataclass(frozen=True)
@@ -41,8 +64,9 @@ class Assembly:
     free : (n,) bodies that may move
     lift : (6 n, 3 nc) H, forces at contacts → force [N] and moment about its centre [N m] of each free stone
     dead : (6 n,) weight, and the forces of the scene at its start [N, N m]
-    friction : (nc,) μ [-]
-    cohesion, tension : (nc,) k and s [N]
+    strength : of the contact points
+    joints : in which the contact points act together
+    crushing : limits of crushing; None where no stone states its compressive strength
     widest : largest gap that counts as closed [m]
     """
 
@@ -52,9 +76,9 @@ class Assembly:
     free: Ints
     lift: "csc_array[np.float64]"
     dead: Array
-    friction: Array
-    cohesion: Array
-    tension: Array
+    strength: Strength
+    joints: Joints
+    crushing: StressBlocks | None
     widest: float
 
     @property
@@ -62,6 +86,29 @@ class Assembly:
         """Weight of all stones that may move [N]."""
         gravity = float(np.linalg.norm(self.model.gravity(0.0)))
         return float(self.model.mass[self.free].sum()) * gravity
+
+    def push(self, bodies: Ints) -> "csr_array[np.float64]":
+        """Return the matrix (3, 3 nc) of the force with which contacts push fixed bodies as a whole."""
+        side = np.isin(self.contacts.bodies, bodies)
+        # the force acts on the candidate, its opposite on the antagonist
+        sign = side[:, 0].astype(float) - side[:, 1]
+        columns = sign[:, None, None] * self.contacts.frame
+        return csr_array(columns.reshape(-1, 3).T)
+
+    def rows(self, codes: Sequence[str], where: str) -> Ints:
+        """Return the bodies with these codes, in order.
+
+        Raises
+        ------
+        SceneError : there is no such stone
+        """
+        known = {block.code: body for body, block in enumerate(self.model.scene.blocks)}
+        for code in codes:
+            if code not in known:
+                raise SceneError(
+                    f"no such stone: {code!r}", where=where, remedy="give the codes of stones of the scene"
+                )
+        return np.array(sorted(known[code] for code in codes), dtype=np.int64)
 
 
 def assembly(scene: Scene) -> Assembly:
@@ -92,7 +139,8 @@ def assembly(scene: Scene) -> Assembly:
     found = detection(model, state, take(contacts, closed), ())
     form = found.operator.form
     assert isinstance(form, SparseForm)
-    friction, cohesion, tension = _strength(found)
+    joints = find_joints(model, state, found.contacts)
+    crushes = [block.material.compressive_strength for block in blocks]
     return Assembly(
         model=model,
         state=state,
@@ -100,15 +148,15 @@ def assembly(scene: Scene) -> Assembly:
         free=free,
         lift=form.lift,
         dead=_dead(model, state, free),
-        friction=friction,
-        cohesion=cohesion,
-        tension=tension,
+        strength=_strength(found),
+        joints=joints,
+        crushing=stress_blocks(joints, np.array([np.inf if one is None else one for one in crushes])),
         widest=float(gap[closed].max()),
     )
 
 
-def _strength(found: Detection) -> tuple[Array, Array, Array]:
-    """Return μ, k and s of closed joints, as their laws state them for a step of one second: N for N s."""
+def _strength(found: Detection) -> Strength:
+    """Return the strength of closed joints, as their laws state it for a step of one second: N for N s."""
     model, contacts = found.model, found.contacts
     none = np.zeros(len(contacts))
     approach = Approach(
@@ -124,7 +172,7 @@ def _strength(found: Detection) -> tuple[Array, Array, Array]:
         state=np.zeros((len(contacts), STATE)),
     )
     terms = model.laws.terms(found.law, approach)
-    return terms.friction, terms.cohesion, terms.adhesion
+    return Strength(terms.friction, terms.cohesion, terms.adhesion)
 
 
 def _dead(model: Model, state: State, free: Ints) -> Array:

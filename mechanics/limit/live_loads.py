@@ -1,15 +1,19 @@
 """Live loads: what is multiplied by λ until the stones move."""
 
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 
-from mechanics.arrays import Array
+from mechanics.arrays import Array, Ints
 from mechanics.limit.assembly import Assembly
+from mechanics.scene.loads.forces import StoneForce
+from mechanics.scene.loads.time_series import History
+from mechanics.scene.scene import Scene
 from moma.errors import SceneError
 
-__all__ = ["Acceleration", "LiveLoad", "PointForce"]
+__all__ = ["Acceleration", "LiveLoad", "PointForce", "SpreadForce"]
 
 
 class LiveLoad(Protocol):
@@ -17,6 +21,9 @@ class LiveLoad(Protocol):
 
     def __call__(self, on: Assembly) -> Array:
         """Return force and moment (6 n,) about their centres of all free stones at λ = 1 [N, N m]."""
+
+    def applied(self, scene: Scene, multiplier: float, on: Assembly) -> Scene:
+        """Return the scene with λ times the load, which acts from the start and stays."""
 
     def __str__(self) -> str:
         """Return a short name with what λ = 1 means."""
@@ -36,12 +43,16 @@ def _unit(direction: tuple[float, float, float], what: str) -> Array:
 class Acceleration:
     """Force on each stone along a direction, λ times its weight: an earthquake's push, or a table tilted by atan λ.
 
+    Downwards on some stones, it is more weight of these.
+
     Attributes
     ----------
     direction : (3,) of any length
+    stones : codes of those on which it acts; none: on all
     """
 
     direction: tuple[float, float, float]
+    stones: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         _unit(self.direction, "acceleration")
@@ -55,13 +66,60 @@ class Acceleration:
                 where=str(self),
                 remedy="give the scene gravity",
             )
-        load = np.zeros((len(on.free), 6))
-        load[:, :3] = on.model.mass[on.free, None] * size * _unit(self.direction, "acceleration")
-        return load.ravel()
+        load = np.zeros((len(on.model.mass), 6))
+        load[:, :3] = on.model.mass[:, None] * size * _unit(self.direction, "acceleration")
+        if self.stones:
+            others = np.ones(len(load), dtype=bool)
+            others[_free(on, self.stones, str(self))] = False
+            load[others] = 0.0
+        return load[on.free].ravel()
+
+    def applied(self, scene: Scene, multiplier: float, on: Assembly) -> Scene:
+        """Return the scene with λ times the load: as a part of gravity where it acts on all stones."""
+        if self.stones:
+            return _with_forces(scene, on, multiplier * self(on))
+        push = multiplier * float(np.linalg.norm(on.model.gravity(0.0))) * _unit(self.direction, "")
+        x, y, z = (np.asarray(scene.gravity) + push).tolist()
+        return replace(scene, gravity=(x, y, z))
 
     def __str__(self) -> str:
         x, y, z = _unit(self.direction, "acceleration")
-        return f"acceleration along ({x:.3g}, {y:.3g}, {z:.3g}), in units of gravity"
+        some = f" of {', '.join(sorted(self.stones))}" if self.stones else ""
+        return f"acceleration{some} along ({x:.3g}, {y:.3g}, {z:.3g}), in units of gravity"
+
+
+@dataclass(frozen=True)
+class SpreadForce:
+    """Force on several stones together, spread over them as their weight is.
+
+    Attributes
+    ----------
+    stones : their codes
+    force : (3,) of all at λ = 1 [N]
+    """
+
+    stones: frozenset[str]
+    force: tuple[float, float, float]
+
+    def __call__(self, on: Assembly) -> Array:
+        """Return the load (6 n,) at λ = 1 [N, N m].
+
+        Raises
+        ------
+        SceneError : there is no such stone, or it is fixed
+        """
+        _unit(self.force, str(self))
+        bodies = _free(on, self.stones, str(self))
+        load = np.zeros((len(on.model.mass), 6))
+        load[bodies, :3] = on.model.mass[bodies, None] / on.model.mass[bodies].sum() * np.asarray(self.force)
+        return load[on.free].ravel()
+
+    def applied(self, scene: Scene, multiplier: float, on: Assembly) -> Scene:
+        """Return the scene with λ times the load."""
+        return _with_forces(scene, on, multiplier * self(on))
+
+    def __str__(self) -> str:
+        return f"force on {', '.join(sorted(self.stones))}, in units of {np.linalg.norm(self.force):g} N"
 
 
 @dataclass(frozen=True)
@@ -86,13 +144,8 @@ class PointForce:
         ------
         SceneError : there is no such stone, or it is fixed
         """
-        codes = [block.code for block in on.model.scene.blocks]
         where = f"force on {self.stone}"
-        if self.stone not in codes:
-            raise SceneError("no such stone", where=where, remedy="give the code of a stone of the scene")
-        body = codes.index(self.stone)
-        if on.model.fixed[body]:
-            raise SceneError("the stone is fixed", where=where, remedy="give a stone that may move")
+        body = int(_free(on, (self.stone,), where)[0])
         _unit(self.force, where)
         load, row = np.zeros((len(on.free), 6)), int(np.searchsorted(on.free, body))
         load[row, :3] = self.force
@@ -100,5 +153,39 @@ class PointForce:
             load[row, 3:] = np.cross(np.asarray(self.point) - on.state.centre[body], self.force)
         return load.ravel()
 
+    def applied(self, scene: Scene, multiplier: float, on: Assembly) -> Scene:
+        """Return the scene with λ times the load."""
+        return _with_forces(scene, on, multiplier * self(on))
+
     def __str__(self) -> str:
         return f"force on {self.stone}, in units of {np.linalg.norm(self.force):g} N"
+
+
+def _free(on: Assembly, codes: Collection[str], where: str) -> Ints:
+    """Return the bodies with these codes, all of which may move.
+
+    Raises
+    ------
+    SceneError : there is no such stone, or it is fixed
+    """
+    bodies = on.rows(sorted(codes), where)
+    for body in bodies[on.model.fixed[bodies]]:
+        raise SceneError(
+            f"{on.model.scene.blocks[body].code} is fixed", where=where, remedy="give stones that may move"
+        )
+    return bodies
+
+
+def _with_forces(scene: Scene, on: Assembly, load: Array) -> Scene:
+    """Return the scene with forces on its stones that are a load (6 n,), each at a place of its stone."""
+    forces: list[StoneForce] = []
+    for body, row in zip(on.free, load.reshape(-1, 6), strict=True):
+        force, moment = row[:3], row[3:]
+        if not force.any():
+            continue
+        # the nearest place at which the force has this moment
+        x, y, z = (np.cross(force, moment) / (force @ force)).tolist()
+        stone = frozenset({on.model.scene.blocks[body].code})
+        forces.append(StoneForce(stone, History.constant(force), (x, y, z)))
+    loads = replace(scene.loads, forces=(*scene.loads.forces, *forces))
+    return replace(scene, loads=loads)

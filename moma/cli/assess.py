@@ -20,10 +20,26 @@ def assess(
         typer.Option(
             "--load",
             metavar="LOAD",
-            help='"horizontal x", "horizontal 30" (degrees from x), "tilt y" or "force CODE FX FY FZ"; also several. '
+            help='"horizontal x", "horizontal 30" (degrees from x), "tilt y", "force CODE FX FY FZ", '
+            '"weight CODE,CODE", "thrust CODE x", "settlement CODE -z" or "thickness"; also several. '
             "Default: [[assess]] of the scene, or horizontal along x, -x, y and -y.",
         ),
     ] = None,
+    code: Annotated[
+        str | None,
+        typer.Option(
+            "--code",
+            metavar="CODE",
+            help="Check mechanisms of accelerations by a code, ntc2008 or ntc2018, for the [site] of the scene.",
+        ),
+    ] = None,
+    confirm: Annotated[
+        bool,
+        typer.Option("--confirm", help="Confirm each candidate by runs: which loads are held, which lost."),
+    ] = False,
+    store: Annotated[
+        bool, typer.Option("--store/--no-store", help="Keep the assessment in the database.")
+    ] = True,
     out: Out = None,
     db: Db = DEFAULT_DB,
     json: Json = False,
@@ -32,11 +48,11 @@ def assess(
     """Find how far a scene is from falling: limit load, bound and candidate, and mechanism of each load."""
     from moma.cli.text.assessments import assessment_lines
     from moma.cli.text.formats import as_json
-    from pipelines.assess.assess import assess_scene
+    from pipelines.assess.assess import assess as answered
 
     folder = out or Path("out") / f"{scene.stem}-assess"
     with progress_bars() as listener:
-        done = assess_scene(scene, db, folder, load or (), listener)
+        done = answered(scene, db, folder, load or (), listener, confirm, code, store)
     for warning in done.warnings:
         say(f"warning: {warning}")
     print(as_json(done.summary) if json else "\n".join(assessment_lines(done, verbose)))

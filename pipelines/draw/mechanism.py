@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from mechanics.limit.assembly import Assembly
-from mechanics.limit.limit_load import LimitLoad
+from mechanics.limit.limit_load import Mechanism
 from mechanics.scene.scene import Block
 from pipelines.arrays import Array
 from pipelines.draw.offscreen.mechanism import MechanismSurface
@@ -24,11 +24,11 @@ def draw_mechanism(
     folder: Path,
     blocks: Sequence[Block],
     on: Assembly,
-    loads: Sequence[LimitLoad],
+    mechanisms: Sequence[Mechanism],
     titles: Sequence[str],
     towards: Array,
 ) -> list[str]:
-    """Draw one picture for each load that has a mechanism, into an existing folder; return the file names.
+    """Draw one picture for each mechanism that moves, into an existing folder; return the file names.
 
     Raises
     ------
@@ -56,13 +56,11 @@ def draw_mechanism(
     way = _WAY * float(np.ptp(corners, axis=0).max())
     moved: list[Array] = []
     pictures: list[dict[str, Any]] = []
-    for number, (load, title) in enumerate(zip(loads, titles, strict=True), start=1):
-        if not load.velocity.any():
+    for number, (one, title) in enumerate(zip(mechanisms, titles, strict=True), start=1):
+        if not one.velocity.any():
             continue
-        velocity = np.zeros((len(blocks), 6))
-        velocity[on.free] = load.velocity
         arm = corners - on.state.centre[owner]
-        ways = velocity[owner, :3] + np.cross(velocity[owner, 3:], arm)
+        ways = one.velocity[owner, :3] + np.cross(one.velocity[owner, 3:], arm)
         ways *= way / max(float(np.linalg.norm(ways, axis=1).max()), 1e-300)
         pictures.append(
             {

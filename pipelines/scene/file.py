@@ -20,7 +20,8 @@ from pipelines.scene.keys import build, typed_values
 from pipelines.scene.laws import BONDS, JointLaw, read_laws
 from pipelines.scene.loads import ASSESS_TYPES, read_loads, read_throws
 from pipelines.scene.settings import Fidelities, MaterialRule, MeshSettings, Output, Selection
-from pipelines.scene.tables import ARRAYS, AUTO, MATERIAL_KEYS, MESH_KEYS, ORTHOTROPY_KEYS, TABLES
+from pipelines.scene.site import Site
+from pipelines.scene.tables import ARRAYS, AUTO, MATERIAL_KEYS, MESH_KEYS, ORTHOTROPY_KEYS, SITE_KEYS, TABLES
 from pipelines.toml.lines import key_lines, parse_toml, read_text
 from pipelines.toml.schema import Document, check_table, nearest
 from survey.joints.settings import JointMode, JointSettings
@@ -43,6 +44,7 @@ class SceneFile:
     laws : of particular joints; the general law is in `contact`
     loads, throws : actions besides gravity, and initial motions
     assess : live loads whose limits are sought
+    site : seismic action for the check by a code; None: not stated
     """
 
     document: Document
@@ -63,6 +65,7 @@ class SceneFile:
     loads: tuple[Entry, ...]
     throws: tuple[Entry, ...]
     assess: tuple[Entry, ...]
+    site: Site | None
 
 
 def read_scene(path: str | Path) -> SceneFile:
@@ -114,6 +117,7 @@ def parse_scene(text: str, path: str) -> SceneFile:
         loads=read_loads(document, given),
         throws=read_throws(document, given),
         assess=read_entries(document, given, "assess", ASSESS_TYPES),
+        site=_site(document, given),
     )
 
 
@@ -123,7 +127,7 @@ def _fidelities(values: dict[str, Any]) -> Fidelities:
 
 
 def _checked_tables(document: Document, given: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    known = [*TABLES, "materials", *ARRAYS]
+    known = [*TABLES, "materials", "site", *ARRAYS]
     for name, content in given.items():
         if name in ARRAYS:
             continue
@@ -133,6 +137,14 @@ def _checked_tables(document: Document, given: Mapping[str, Any]) -> dict[str, d
         if not isinstance(content, dict):
             document.fail(f"{name!r} is not a table", name, remedy=f"write [{name}] on a line of its own")
     return {name: check_table(document, (name,), given.get(name, {}), keys) for name, keys in TABLES.items()}
+
+
+def _site(document: Document, given: Mapping[str, Any]) -> Site | None:
+    if "site" not in given:
+        return None
+    values: dict[str, Any] = check_table(document, ("site",), given["site"], SITE_KEYS)
+    with document.at("site"):
+        return Site(**typed_values(Site, values))
 
 
 def _materials(document: Document, given: Mapping[str, Any]) -> tuple[MaterialRule, ...]:

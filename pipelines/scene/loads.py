@@ -1,6 +1,7 @@
 """Loads and initial motions: from [[loads]] and [[throw]] of a scene file to the loads of the mechanics."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -120,18 +121,35 @@ LOAD_TYPES: Mapping[str, tuple[Key, ...]] = {
     ),
 }
 
+_FIXED = Key("stones", Kind.STONES, "Codes or expressions of the fixed stones on which it acts.")
+
 ASSESS_TYPES: Mapping[str, tuple[Key, ...]] = {
     "horizontal": (
         Key("direction", Kind.VECTOR, "Direction of the push, λ times the weight of each stone.", "-"),
+        replace(_STONES, doc=f"{_STONES.doc[:-1]}; if not given, on all.", default=()),
     ),
     "tilt": (
         Key("axis", Kind.VECTOR, "Axis about which the table turns, right-handed; its tangent is λ.", "-"),
     ),
-    "force": (
-        Key("stone", Kind.TEXT, "Code of the stone on which it acts."),
-        Key("force", Kind.VECTOR, "Force at λ = 1.", "N"),
-        Key("point", Kind.VECTOR, "Where it acts; if not given, at the centre of mass.", "m", None),
+    "weight": (
+        replace(_STONES, doc="Codes or expressions of the stones whose weight grows by λ of itself."),
     ),
+    "force": (
+        replace(
+            _STONES, doc="Codes or expressions of the stones on which it acts, spread as their weight is."
+        ),
+        Key("force", Kind.VECTOR, "Force on all of them at λ = 1.", "N"),
+        Key(
+            "point",
+            Kind.VECTOR,
+            "Where it acts on a single stone; if not given, at the centre of mass.",
+            "m",
+            None,
+        ),
+    ),
+    "thrust": (_FIXED, Key("direction", Kind.VECTOR, "Direction in which the thrust counts.", "-")),
+    "settlement": (_FIXED, Key("direction", Kind.VECTOR, "Direction in which they yield.", "-")),
+    "thickness": (),
 }
 
 THROW_KEYS = (

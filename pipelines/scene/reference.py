@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pipelines.scene.laws import LAW_KEYS, LAW_TYPES
 from pipelines.scene.loads import ASSESS_TYPES, LOAD_TYPES, THROW_KEYS
-from pipelines.scene.tables import MATERIAL_KEYS, MESH_KEYS, ORTHOTROPY_KEYS, TABLES
+from pipelines.scene.tables import MATERIAL_KEYS, MESH_KEYS, ORTHOTROPY_KEYS, SITE_KEYS, TABLES
 from pipelines.toml.schema import REQUIRED, Key
 
 __all__ = ["SECTIONS", "with_tables"]
@@ -17,6 +17,7 @@ _HEADING = re.compile(r'(##|###) `(?:type = "(\w+)"|(\[.+\]))`')
 
 SECTIONS: Mapping[str, tuple[Key, ...]] = {
     **{f"[{name}]": keys for name, keys in TABLES.items()},
+    "[site]": SITE_KEYS,
     "[materials.NAME]": MATERIAL_KEYS,
     "[materials.NAME.orthotropy]": ORTHOTROPY_KEYS,
     "[[meshes]]": MESH_KEYS,

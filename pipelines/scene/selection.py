@@ -62,7 +62,13 @@ def select_groups(scene: SceneFile, session: Session, models: Sequence[StoneMode
     SceneError : at the key whose expression is invalid or names no stone
     """
     records = {model.record.code: model.record for model in models}
-    entries = (*scene.meshes, *(one.entry for one in scene.laws), *scene.loads, *scene.throws)
+    entries = (
+        *scene.meshes,
+        *(one.entry for one in scene.laws),
+        *scene.loads,
+        *scene.throws,
+        *scene.assess,
+    )
     groups: dict[Path, tuple[frozenset[str], ...]] = {
         entry.path: tuple(
             frozenset(_named(scene, session, records, (*entry.path, key), items))

@@ -8,10 +8,11 @@ from mechanics.scene.scene import ContactSettings, Fidelity, SolverSettings, Tim
 from mechanics.stones.materials import Material, Orthotropy
 from pipelines.scene.keys import keys_of
 from pipelines.scene.settings import Fidelities, MaterialRule, MeshSettings, Output, Selection
+from pipelines.scene.site import Site
 from pipelines.toml.schema import Key, Kind
 from survey.joints.settings import JointSettings
 
-__all__ = ["ARRAYS", "AUTO", "MATERIAL_KEYS", "MESH_KEYS", "ORTHOTROPY_KEYS", "TABLES"]
+__all__ = ["ARRAYS", "AUTO", "MATERIAL_KEYS", "MESH_KEYS", "ORTHOTROPY_KEYS", "SITE_KEYS", "TABLES"]
 
 ARRAYS = ("meshes", "laws", "loads", "throw", "assess")
 """Tables of which a scene may have many."""
@@ -45,6 +46,8 @@ TABLES: Mapping[str, tuple[Key, ...]] = {
     "solver": keys_of(SolverSettings),
     "output": keys_of(Output),
 }
+
+SITE_KEYS = keys_of(Site)
 
 MATERIAL_KEYS = (*keys_of(Material), *keys_of(MaterialRule))
 

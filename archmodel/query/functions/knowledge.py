@@ -1,6 +1,6 @@
-"""Query functions on knowledge: marks, observations, documents, corrections, kinds and canonical proportions."""
+"""Query functions on knowledge: marks, observations, documents, corrections, mechanisms, kinds, proportions."""
 
-from sqlalchemy import FromClause, case, exists, null
+from sqlalchemy import FromClause, case, exists, func, null, select
 
 from archmodel.query.attributes import attributes_of, kinds_of
 from archmodel.query.columns import DOCUMENTING
@@ -12,9 +12,10 @@ from archmodel.query.scope import Scope
 from archmodel.query.tokens import Token, complaint
 from archmodel.tables.entities import canon_of, kind_named, kinds
 from archmodel.tables.knowledge import OBSERVATIONS, Correction, Statement
+from archmodel.tables.runs import MechanismStone
 from moma.errors import QueryError, UsageError
 
-__all__ = ["canonical", "corrected", "documented", "has_mark", "is_a", "observed"]
+__all__ = ["canonical", "corrected", "documented", "has_mark", "in_mechanism", "is_a", "observed"]
 
 MAX_SEVERITY = 4
 
@@ -92,6 +93,15 @@ def corrected(scope: Scope, call: Call, ask: Ask) -> Condition:
 def _any_row(scope: Scope, *conditions: Condition) -> Condition:
     """Test for a row that satisfies the conditions, for each entity."""
     return exists().where(*conditions).correlate(scope.entity)
+
+
+def in_mechanism(scope: Scope, call: Call, ask: Ask) -> Condition:
+    """Test for motion in a mechanism of the latest assessment."""
+    rows, all_rows = scope.context.alias(MechanismStone), scope.context.alias(MechanismStone)
+    latest = select(func.max(all_rows.c.run_id)).scalar_subquery()
+    conditions: list[Condition] = [rows.c.entity_id == scope.entity.c.id, rows.c.run_id == latest]
+    conditions += [rows.c.load == load.text for load in tokens(call, 0, 1)]
+    return _any_row(scope, *conditions)
 
 
 def is_a(scope: Scope, call: Call, ask: Ask) -> Condition:

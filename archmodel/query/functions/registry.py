@@ -46,6 +46,7 @@ _SQL: Mapping[str, Sql] = {
     "observed": told.observed,
     "documented": told.documented,
     "corrected": told.corrected,
+    "in_mechanism": told.in_mechanism,
     "is_a": told.is_a,
     "canonical": told.canonical,
 }

@@ -66,6 +66,10 @@ USAGES: Mapping[str, Usages] = {
         ("corrected()", "an attribute of it was corrected"),
         ("corrected(attribute)", "that attribute of it was corrected"),
     ),
+    "in_mechanism": (
+        ("in_mechanism()", "it moves in a mechanism of the latest assessment"),
+        ("in_mechanism(LOAD)", 'it moves in that of the load of that name, as "horizontal x"'),
+    ),
     "is_a": (("is_a(KIND)", "it is of that kind or of a subkind"),),
     "canonical": (
         (

@@ -22,8 +22,28 @@ def assessment_lines(done: "Assessment", verbose: bool) -> list[str]:
         *(f"  {caution}" for caution in summary["cautions"]),
     ]
     for one in summary["loads"]:
-        lines += [f"  {one['headline']}", *_mechanism(one["mechanism"], verbose)]
+        lines += [f"  {one['headline']}", *_code(one.get("code")), *_mechanism(one["mechanism"], verbose)]
+    if done.run is not None:
+        lines.append(f"  run {done.run}")
     return [*lines, *(f"  {done.folder / name}" for name in summary["files"])]
+
+
+def _code(found: dict[str, Any] | None) -> list[str]:
+    """Return the numbers and comparisons of a check by a code, each with its article and formula."""
+    if found is None:
+        return []
+    return [
+        *([f"    CAUTION: {found['caution']}"] if found["caution"] else []),
+        *(
+            f"    {one['symbol']} = {one['value']:.4g} {one['unit']}   {one['formula']}   [{one['article']}]"
+            for one in found["values"]
+        ),
+        *(
+            f"    {'passed' if one['passed'] else 'NOT PASSED'}: {one['name']}: {one['capacity']:.4g} against "
+            f"{one['demand']:.4g} {one['unit']}, ratio {one['ratio']:.2f}   {one['formula']}   [{one['article']}]"
+            for one in found["checks"]
+        ),
+    ]
 
 
 def _mechanism(found: dict[str, Any], verbose: bool) -> list[str]:

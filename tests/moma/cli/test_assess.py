@@ -58,7 +58,7 @@ type = "tilt"
 axis = [0.0, 1.0, 0.0]
 [[assess]]
 type = "force"
-stone = "W02-02"
+stones = ["W02-02"]
 force = [0.0, 0.0, -1000.0]
 """,
         encoding="utf-8",
@@ -94,3 +94,89 @@ def test_results_of_a_run_are_not_replaced(url, scene, tmp_path):
     folder.mkdir()
     (folder / "summary.json").write_text('{"files": ["summary.json"]}', encoding="utf-8")
     assert "results of a run" in fails(2, "assess", scene, "--db", url, "--out", folder)
+
+
+def test_every_kind_of_question_has_an_answer(url, scene, tmp_path):
+    scene.write_text(
+        TWO_COURSES
+        + """
+[[assess]]
+type = "horizontal"
+direction = [0.0, 1.0, 0.0]
+stones = ["course = 2"]
+[[assess]]
+type = "weight"
+stones = ["W02-02"]
+[[assess]]
+type = "force"
+stones = ["W02-02", "W02-03"]
+force = [0.0, 5000.0, 0.0]
+[[assess]]
+type = "thrust"
+stones = ["course = 1"]
+direction = [0.0, 0.0, -1.0]
+[[assess]]
+type = "settlement"
+stones = ["W01-01"]
+direction = [0.0, 0.0, -1.0]
+[[assess]]
+type = "thickness"
+""",
+        encoding="utf-8",
+    )
+    out = tmp_path / "out"
+    push, weight, force, thrust, yields, thin = answer("assess", scene, "--db", url, "--out", out)["loads"]
+    assert 0.3 < push["candidate"] <= push["bound"] * 1.003 < 0.61
+    assert weight["outcome"] == "nothing limits it"
+    assert not weight["mechanism"]["stones"]
+    assert force["candidate"] * 5.0 > 0.3
+    # all of the weight, and nothing else, rests on the base
+    told = json.loads((out / "assessment.json").read_text(encoding="utf-8"))
+    assert thrust["least"] == pytest.approx(told["weight"], rel=1e-6)
+    assert thrust["greatest"] == pytest.approx(told["weight"], rel=1e-6)
+    assert 0.0 <= yields["least"] < yields["greatest"] < told["weight"]
+    assert yields["mechanism"]["stones"][0]["code"] == "W01-01"
+    # courses that stand on points stand however small their joints are
+    assert thin["outcome"] == "nothing limits it"
+    assert thin["factor"] is None
+    lines = (out / "forces-1.csv").read_text(encoding="utf-8").splitlines()
+    assert lines[0].startswith("first,second,x,y,z,force_normal")
+    assert len(lines) > 10
+
+
+def test_an_assessment_is_kept_and_asked_for(url, scene, tmp_path):
+    prints("assess", scene, "--db", url, "--out", tmp_path / "out", "--load", "horizontal y")
+    assert "assessed" in prints("runs", "--db", url)
+    moving = answer("query", "stone", "--db", url, "--where", "in_mechanism()", "--format", "json")
+    told = json.loads((tmp_path / "out" / "assessment.json").read_text(encoding="utf-8"))
+    codes = {stone["code"] for stone in told["loads"][0]["mechanism"]["stones"]}
+    assert {one["code"] for one in moving} == codes
+    none = answer("query", "stone", "--db", url, "--where", 'in_mechanism("tilt x")', "--format", "json")
+    assert none == []
+    before = prints("runs", "--db", url)
+    prints("assess", scene, "--db", url, "--out", tmp_path / "out", "--load", "horizontal y", "--no-store")
+    assert prints("runs", "--db", url) == before
+
+
+def test_a_check_by_a_code_needs_a_site_and_names_article_and_formula(url, scene, tmp_path):
+    said = fails(2, "assess", scene, "--db", url, "--out", tmp_path / "out", "--code", "ntc2008")
+    assert "[site]" in said
+    scene.write_text(TWO_COURSES + "\n[site]\nag = 0.25\nf0 = 2.4\ntc_star = 0.3\n", encoding="utf-8")
+    said = fails(2, "assess", scene, "--db", url, "--out", tmp_path / "out", "--code", "ec9")
+    assert "ntc2008, ntc2018" in said
+    text = prints(
+        "assess", scene, "--db", url, "--out", tmp_path / "out", "--load", "horizontal y", "--code", "ntc2018"
+    )
+    first, *_ = text.splitlines()
+    assert "NTC 2018" in first
+    assert "before you sign" in first
+    assert "a0* ≥ ag S / q, q = 2   [C8.7.1.2.1]" in text
+
+
+def test_runs_confirm_a_candidate(url, scene, tmp_path):
+    (told,) = answer(
+        "assess", scene, "--db", url, "--out", tmp_path / "out", "--load", "horizontal y", "--confirm"
+    )["loads"]
+    assert told["confirmation"]["agrees"]
+    assert told["confirmation"]["held"] < told["candidate"] < told["confirmation"]["lost"]
+    assert "CONFIRMED" in told["headline"]

@@ -1,0 +1,123 @@
+"""Confirmation of a limit load by the dynamics: the load comes at once on stones at rest, and they hold or fall.
+
+*Held*: the run ends in equilibrium, every stone in balance. *Lost*: it ends in a collapse. Between the largest load
+that is held and the least that is lost lies the limit of the dynamics from rest; a load that grows slowly may be held
+up to 6 % further, or less far, as friction without dilatancy has no unique limit.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mechanics.dynamics.outcome import Outcome
+from mechanics.dynamics.progress import Listener, silent
+from mechanics.limit.assembly import Assembly
+from mechanics.limit.live_loads import LiveLoad
+from mechanics.scene.scene import TimeSettings
+from mechanics.simulate import simulate
+
+__all__ = ["Confirmation", "Trial", "confirm"]
+
+
+# load over the candidate of the first two runs, and by how much each further one goes on [-]
+_NEAR, _WIDER = 0.03, 0.06
+# step in which a stone falls by this share of the least width, and steps of a run at most
+_FALL, _STEPS = 2.5e-3, 500
+# move over its width from which a stone that falls has collapsed [-]
+_MOVED = 0.05
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One run.
+
+    Attributes
+    ----------
+    multiplier : λ [-]
+    outcome : of the run
+    steps : of it
+    unsolved : steps of it that were not solved
+    """
+
+    multiplier: float
+    outcome: Outcome
+    steps: int
+    unsolved: int
+
+
+@dataclass(frozen=True)
+class Confirmation:
+    """What the dynamics hold and what they lose.
+
+    Attributes
+    ----------
+    held : largest λ that is held, below every one that is lost; 0: none [-]
+    lost : least λ that is lost; infinite: none [-]
+    trials : the runs, in their order
+    """
+
+    held: float
+    lost: float
+    trials: tuple[Trial, ...]
+
+    def agrees(self, candidate: float) -> bool:
+        """Return True if the limit of the dynamics lies within 3 % of a candidate."""
+        return (
+            self.held >= (1.0 - _NEAR) * candidate - 1e-12 and self.lost <= (1.0 + _NEAR) * candidate + 1e-12
+        )
+
+
+def confirm(
+    on: Assembly,
+    live: LiveLoad,
+    candidate: float,
+    runs: int = 6,
+    progress: Listener = silent,
+    stop: Callable[[], bool] = lambda: False,
+) -> Confirmation:
+    """Return what the dynamics hold and lose around a candidate: first 3 % below and above it, then farther off.
+
+    Parameters
+    ----------
+    on, live : the rigid stones, and the load
+    candidate : λ [-]
+    runs : at most
+    progress, stop : of every run, see `simulate`
+
+    Raises
+    ------
+    SceneError, SolverError : see `simulate`
+    """
+    trials: list[Trial] = []
+    low, high = 1.0 - _NEAR, 1.0 + _NEAR
+    held, lost = 0.0, np.inf
+    while len(trials) < runs and not stop():
+        if held == 0.0 and low > 0.0:
+            share, low = low, low - _WIDER
+        elif np.isinf(lost):
+            share, high = high, high + _WIDER
+        else:
+            break
+        trial = _trial(on, live, share * candidate, progress, stop)
+        trials.append(trial)
+        if trial.outcome is Outcome.EQUILIBRIUM:
+            held = max(held, trial.multiplier)
+        elif trial.outcome is Outcome.COLLAPSED:
+            lost = min(lost, trial.multiplier)
+    return Confirmation(held if held < lost else 0.0, float(lost), tuple(trials))
+
+
+def _trial(
+    on: Assembly,
+    live: LiveLoad,
+    multiplier: float,
+    progress: Listener,
+    stop: Callable[[], bool],
+) -> Trial:
+    width = float(on.model.surfaces.size[on.free].min())
+    step = float(np.sqrt(2.0 * _FALL * width / np.linalg.norm(on.model.gravity(0.0))))
+    time = TimeSettings(step, theta=1.0, duration=_STEPS * step, collapse_displacement=_MOVED)
+    loaded = replace(live.applied(on.model.scene, multiplier, on), time=time)
+    result = simulate(loaded, progress, stop=stop)
+    return Trial(multiplier, result.outcome, result.steps, result.errors.unconverged_steps)

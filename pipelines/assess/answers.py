@@ -1,0 +1,269 @@
+"""Answers of an assessment: the numbers of a question, what they are called, and the mechanism that goes with them."""
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from mechanics.dynamics.outcome import Outcome
+from mechanics.limit.assembly import Assembly
+from mechanics.limit.confirm import Confirmation, confirm
+from mechanics.limit.kinematic import Kinematics, kinematics
+from mechanics.limit.limit_load import Flow, LimitLoad, Mechanism, limit_load
+from mechanics.limit.live_loads import Acceleration, LiveLoad
+from mechanics.limit.thickness import geometric_safety
+from mechanics.limit.thrust import thrust
+from moma.errors import SolverError
+from pipelines.arrays import Array
+from pipelines.assess.codes.check import check_code
+from pipelines.assess.questions import LoadQuestion, Question, Thickness, ThrustQuestion
+from pipelines.scene.site import Site
+
+__all__ = ["FALLS", "Answer", "CodeOf", "Confirm", "answer", "confirmer"]
+
+FALLS = "falls under its own weight"
+"""Outcome of what does not stand at all."""
+
+_MOVES = 0.01  # speed over that of the fastest stone from which a stone belongs to a mechanism [-]
+
+Confirm = Callable[[LiveLoad, float], Confirmation] | None
+"""What confirms a candidate by runs; None: nothing does."""
+
+CodeOf = tuple[str, Site] | None
+"""Code and site of the check; None: there is none."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Answer to a question.
+
+    Attributes
+    ----------
+    told : what assessment.json says of it
+    mechanism : how the stones begin to fall, or follow a support that yields
+    force : (nc, 3) on the candidate of each contact at the limit, local frame; zero where nothing balances [N]
+    """
+
+    told: dict[str, Any]
+    mechanism: Mechanism
+    force: Array
+
+
+def answer(on: Assembly, question: Question, confirming: Confirm, code: CodeOf) -> Answer:
+    """Answer a question about an assembly.
+
+    Parameters
+    ----------
+    confirming : runs that confirm the candidate of a load
+    code : by which mechanisms of accelerations are checked
+
+    Raises
+    ------
+    SceneError, SolverError : see `mechanics.limit`
+    """
+    match question:
+        case LoadQuestion():
+            return _load(on, question, confirming, code)
+        case ThrustQuestion():
+            return _thrust(on, question)
+        case Thickness():
+            return _thickness(on, question)
+
+
+def confirmer(on: Assembly, runs: int, **listeners: Any) -> Confirm:
+    """Return what confirms a candidate by runs of the stones, all rigid."""
+    return lambda live, candidate: confirm(on, live, candidate, runs, **listeners)
+
+
+def _load(on: Assembly, question: LoadQuestion, confirming: Confirm, code: CodeOf) -> Answer:
+    live = question.live
+    bound = limit_load(on, live)
+    candidate = _candidate(on, live, bound)
+    lowest = bound if candidate is None else candidate
+    told: dict[str, Any] = {
+        "name": question.name,
+        "kind": "load",
+        "meaning": str(live),
+        "bound": _number(bound.multiplier),
+        "bound_kind": "associative friction, rigorous upper bound",
+        "candidate": None if candidate is None else _number(candidate.multiplier),
+        "candidate_kind": "Coulomb's friction without dilatancy, candidate: the stones may fall at less",
+        "candidate_converged": None if candidate is None else candidate.converged,
+        "outcome": _outcome(bound.multiplier),
+    }
+    whole = isinstance(live, Acceleration) and not live.stones
+    if whole and np.isfinite(lowest.multiplier):
+        told["tilt"] = float(np.degrees(np.arctan(lowest.multiplier)))
+    if confirming is not None and candidate is not None:
+        told["confirmation"] = _confirmed(confirming(live, candidate.multiplier), candidate.multiplier)
+    if isinstance(live, Acceleration) and np.isfinite(lowest.multiplier):
+        told["kinematics"], checked = _kinematics(on, live, lowest, code if whole else None)
+        if checked:
+            told["code"] = checked
+    told["headline"] = _sentence(told)
+    told["mechanism"] = _moving(on, lowest.mechanism)
+    return Answer(told, lowest.mechanism, lowest.force)
+
+
+def _candidate(on: Assembly, live: LiveLoad, bound: LimitLoad) -> LimitLoad | None:
+    """Return the candidate of Coulomb's friction; None where there is none to be found."""
+    if not np.isfinite(bound.multiplier):
+        return None
+    try:
+        candidate = limit_load(on, live, Flow.COULOMB, bound)
+    except SolverError:
+        return None
+    return candidate if np.isfinite(candidate.multiplier) else None
+
+
+def _confirmed(found: Confirmation, candidate: float) -> dict[str, Any]:
+    return {
+        "held": found.held or None,
+        "lost": _number(found.lost),
+        "agrees": found.agrees(candidate),
+        "runs": [asdict(trial) | {"outcome": str(trial.outcome)} for trial in found.trials],
+        "undecided": sum(
+            trial.outcome not in (Outcome.EQUILIBRIUM, Outcome.COLLAPSED) for trial in found.trials
+        ),
+    }
+
+
+def _kinematics(
+    on: Assembly, live: Acceleration, found: LimitLoad, code: CodeOf
+) -> tuple[dict[str, Any] | None, dict[str, Any] | None]:
+    """Return the equivalent oscillator of a mechanism, and its check by a code."""
+    try:
+        oscillator = kinematics(on, live, found)
+    except SolverError:
+        return None, None
+    told = {
+        "blocks": int(oscillator.block.max()) + 1,
+        "weight": oscillator.weight,
+        "mass": oscillator.mass,
+        "mass_share": oscillator.share,
+        "acceleration": oscillator.acceleration(),
+        "capacity": _number(oscillator.capacity),
+        "curve": {
+            "displacement": oscillator.displacement.tolist(),
+            "multiplier": oscillator.multipliers.tolist(),
+        },
+    }
+    return told, None if code is None else _checked(on, oscillator, *code)
+
+
+def _checked(on: Assembly, oscillator: Kinematics, code: str, site: Site) -> dict[str, Any]:
+    found = check_code(code, site, oscillator, float(np.linalg.norm(on.model.gravity(0.0))))
+    return {
+        "code": found.code,
+        "caution": found.caution,
+        "passed": found.passed,
+        "values": list(found.values),
+        "checks": [asdict(one) | {"ratio": one.ratio, "passed": one.passed} for one in found.checks],
+    }
+
+
+def _thrust(on: Assembly, question: ThrustQuestion) -> Answer:
+    found = thrust(on, question.supports, question.direction)
+    x, y, z = found.direction
+    told: dict[str, Any] = {
+        "name": question.name,
+        "kind": "settlement" if question.settles else "thrust",
+        "meaning": f"push on {', '.join(question.supports)} along ({x:.3g}, {y:.3g}, {z:.3g}) [N]",
+        "least": _number(found.least.value),
+        "greatest": _number(found.greatest.value),
+        "bounds_kind": "over all states of equilibrium: rigorous, whatever the flow",
+        "outcome": _outcome(found.least.value),
+    }
+    told["headline"] = _range(told)
+    told["mechanism"] = _moving(on, found.least.mechanism)
+    return Answer(told, found.least.mechanism, found.least.force)
+
+
+def _thickness(on: Assembly, question: Thickness) -> Answer:
+    found = geometric_safety(on)
+    falls = np.isnan(found.share)
+    told: dict[str, Any] = {
+        "name": question.name,
+        "kind": "thickness",
+        "meaning": "share to which all joints may shrink about their centres, weights unchanged",
+        "factor": _number(found.factor),
+        "share": _number(found.share),
+        "outcome": FALLS if falls else "stands" if found.share else "nothing limits it",
+    }
+    factor = "nothing limits it" if not falls and not found.share else f"{found.factor:.4g}"
+    told["headline"] = (
+        f"{question.name}: {FALLS}" if falls else f"{question.name}: geometric factor of safety {factor}"
+    )
+    told["mechanism"] = _moving(on, found.mechanism)
+    return Answer(told, found.mechanism, found.force)
+
+
+def _moving(on: Assembly, mechanism: Mechanism) -> dict[str, Any]:
+    """Return the stones that move, the fastest first, and how many joints open and slide."""
+    moves = np.flatnonzero(mechanism.speed > _MOVES)
+    return {
+        "stones": [
+            {
+                "code": on.model.scene.blocks[row].code,
+                "velocity": mechanism.velocity[row, :3].tolist(),
+                "spin": mechanism.velocity[row, 3:].tolist(),
+            }
+            for row in moves[np.argsort(-mechanism.speed[moves], kind="stable")]
+        ],
+        "opening_joints": _joints(on, mechanism.opening),
+        "sliding_joints": _joints(on, mechanism.sliding & ~mechanism.opening),
+    }
+
+
+def _joints(on: Assembly, chosen: Any) -> int:
+    return len(np.unique(np.sort(on.contacts.bodies[chosen], axis=1), axis=0))
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _outcome(value: float) -> str:
+    if np.isnan(value):
+        return FALLS
+    return "nothing limits it" if np.isinf(value) else "limited"
+
+
+def _sentence(one: dict[str, Any]) -> str:
+    if one["bound"] is None:
+        return f"{one['name']}: {one['outcome']}"
+    text = f"{one['name']}: λ ≤ {one['bound']:.4g} (bound)"
+    if one["candidate"] is None:
+        return f"{text}, NO CANDIDATE found"
+    stood = "" if one["candidate_converged"] else ", NOT CONVERGED"
+    angle = f", a tilt of {one['tilt']:.3g}°" if "tilt" in one else ""
+    return f"{text}, {one['candidate']:.4g} (candidate{stood}){angle}{_dynamics(one)}{_verdict(one)}"
+
+
+def _dynamics(one: dict[str, Any]) -> str:
+    if "confirmation" not in one:
+        return ""
+    found = one["confirmation"]
+    held = "nothing held" if found["held"] is None else f"held at {found['held']:.4g}"
+    lost = "nothing lost" if found["lost"] is None else f"lost at {found['lost']:.4g}"
+    return f"; by the dynamics {'CONFIRMED' if found['agrees'] else 'NOT CONFIRMED'}: {held}, {lost}"
+
+
+def _verdict(one: dict[str, Any]) -> str:
+    if "code" not in one:
+        return ""
+    found = one["code"]
+    caution = f" ({found['caution']})" if found["caution"] else ""
+    return f"; {found['code']}: {'passed' if found['passed'] else 'NOT PASSED'}{caution}"
+
+
+def _range(one: dict[str, Any]) -> str:
+    if one["outcome"] == FALLS:
+        return f"{one['name']}: {FALLS}"
+    least, greatest = (
+        "without limit" if one[end] is None else f"{1e-3 * one[end]:.4g} kN" for end in ("least", "greatest")
+    )
+    if one["kind"] == "settlement":
+        return f"{one['name']}: the push on the support falls to {least} as it yields"
+    return f"{one['name']}: from {least} to {greatest}"

@@ -1,0 +1,169 @@
+"""Linear and nonlinear kinematic check of a mechanism; every line names its article and its formula."""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mechanics.limit.kinematic import Kinematics
+from moma.errors import UsageError
+from pipelines.scene.site import Site
+
+__all__ = ["CODES", "Check", "CodeCheck", "check_code"]
+
+_FOLDER = Path(__file__).parent
+
+CODES = tuple(sorted(path.stem for path in _FOLDER.glob("*.toml")))
+"""Codes whose rules are known: one file of rules each."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """Comparison of a capacity with a demand.
+
+    Attributes
+    ----------
+    name : what is compared
+    article, formula : of the code
+    capacity, demand : in `unit`
+    """
+
+    name: str
+    article: str
+    formula: str
+    capacity: float
+    demand: float
+    unit: str
+
+    @property
+    def ratio(self) -> float:
+        """Capacity over demand [-]."""
+        return self.capacity / self.demand
+
+    @property
+    def passed(self) -> bool:
+        """True if the capacity is not below the demand."""
+        return self.ratio >= 1.0
+
+
+@dataclass(frozen=True)
+class CodeCheck:
+    """Check of a mechanism after a code.
+
+    Attributes
+    ----------
+    code : its name
+    caution : what is not certain about it; empty: nothing
+    values : numbers on the way, by symbol, with unit, article and formula
+    checks : comparisons; a mechanism passes if the nonlinear ones do, or the linear ones
+    """
+
+    code: str
+    caution: str
+    values: tuple[Mapping[str, Any], ...]
+    checks: tuple[Check, ...]
+
+    @property
+    def passed(self) -> bool:
+        """True if all linear comparisons pass, or all nonlinear ones: the code asks for either."""
+        groups = [[one.passed for one in self.checks if one.name.startswith(kind)] for kind in _KINDS]
+        return any(group and all(group) for group in groups)
+
+
+_KINDS = ("linear", "nonlinear")
+
+
+def check_code(code: str, site: Site, found: Kinematics, gravity: float = 9.81) -> CodeCheck:
+    """Check the mechanism of a limit load.
+
+    Parameters
+    ----------
+    code : one of `CODES`
+    site : seismic action
+    found : kinematic analysis of the mechanism
+    gravity : [m/s²]
+
+    Raises
+    ------
+    UsageError : there is no such code
+    """
+    if code not in CODES:
+        raise UsageError(f"no such code: {code!r}", where="--code", remedy=f"give one of {', '.join(CODES)}")
+    rules = tomllib.loads((_FOLDER / f"{code}.toml").read_text(encoding="utf-8"))
+    article, q = rules["articles"], rules["behaviour"] if site.behaviour is None else site.behaviour
+    capacity = found.acceleration(site.confidence)
+    values = [
+        _value(
+            "α0", found.multiplier, "-", article["oscillator"], "multiplier at which the mechanism begins"
+        ),
+        _value("M*", found.mass, "kg", article["oscillator"], "(Σ P δ)² / (g Σ P δ²)"),
+        _value("e*", found.share, "-", article["oscillator"], "g M* / Σ P"),
+        _value("a0*", capacity, "m/s²", article["oscillator"], f"α0 g / (e* FC), FC = {site.confidence:g}"),
+    ]
+    checks = [
+        Check(
+            "linear, at the ground",
+            article["linear"],
+            f"a0* ≥ ag S / q, q = {q:g}",
+            capacity,
+            site.ag * gravity * site.soil / q,
+            "m/s²",
+        )
+    ]
+    upper = site.height > 0 and site.period is not None
+    if upper:
+        checks.append(
+            Check(
+                "linear, above the ground",
+                article["linear"],
+                f"a0* ≥ Se(T1) ψ(Z) γ / q, ψ = {site.shape:.3g}, γ = {site.participation:.3g}",
+                capacity,
+                site.acceleration(site.period or 0.0, gravity) * site.shape * site.participation / q,
+                "m/s²",
+            )
+        )
+    if np.isfinite(found.capacity):
+        ultimate, secant = rules["ultimate"] * found.capacity, rules["secant"]
+        at = secant * ultimate
+        slowed = capacity * (1.0 - at / found.capacity)
+        period = float(2.0 * np.pi * np.sqrt(at / slowed))
+        where = article["nonlinear"]
+        values += [
+            _value("d0*", found.capacity, "m", where, "displacement at which the multiplier is 0"),
+            _value("du*", ultimate, "m", where, f"{rules['ultimate']:g} d0*"),
+            _value("ds*", at, "m", where, f"{secant:g} du*"),
+            _value("as*", slowed, "m/s²", where, "a0* (1 - ds*/d0*)"),
+            _value("Ts", period, "s", where, "2π √(ds*/as*)"),
+        ]
+        checks.append(
+            Check(
+                "nonlinear, at the ground",
+                where,
+                "du* ≥ SDe(Ts)",
+                ultimate,
+                site.displacement(period, gravity),
+                "m",
+            )
+        )
+        if upper:
+            first = site.period or 0.0
+            share = period / first
+            demand = site.displacement(first, gravity) * site.shape * site.participation * share**2
+            checks.append(
+                Check(
+                    "nonlinear, above the ground",
+                    where,
+                    f"du* ≥ SDe(T1) ψ(Z) γ (Ts/T1)² / √((1 - Ts/T1)² + {rules['coupling']:g} Ts/T1)",
+                    ultimate,
+                    demand / float(np.sqrt((1.0 - share) ** 2 + rules["coupling"] * share)),
+                    "m",
+                )
+            )
+    return CodeCheck(rules["name"], rules["unchecked"], tuple(values), tuple(checks))
+
+
+def _value(symbol: str, value: float, unit: str, article: str, formula: str) -> dict[str, Any]:
+    return {"symbol": symbol, "value": value, "unit": unit, "article": article, "formula": formula}

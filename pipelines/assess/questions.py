@@ -1,0 +1,199 @@
+"""Questions of an assessment: from [[assess]] of a scene file, or from the words of an option."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mechanics.limit.live_loads import Acceleration, LiveLoad, PointForce, SpreadForce
+from moma.errors import SceneError, UsageError
+from pipelines.arrays import Array
+from pipelines.scene.array_tables import Entry
+from pipelines.scene.file import SceneFile
+from pipelines.scene.selection import Groups
+
+__all__ = ["LoadQuestion", "Question", "Thickness", "ThrustQuestion", "parse_question", "scene_questions"]
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class LoadQuestion:
+    """How far a load may grow.
+
+    Attributes
+    ----------
+    name : in results
+    live : the load
+    """
+
+    name: str
+    live: LiveLoad
+
+
+@dataclass(frozen=True)
+class ThrustQuestion:
+    """Between which values the thrust on supports lies.
+
+    Attributes
+    ----------
+    name : in results
+    supports : codes of fixed stones
+    direction : (3,) of any length
+    settles : the supports yield along it, so that the least thrust is what remains
+    """
+
+    name: str
+    supports: tuple[str, ...]
+    direction: Vector
+    settles: bool = False
+
+
+@dataclass(frozen=True)
+class Thickness:
+    """By how much joints may shrink."""
+
+    name: str = "thickness"
+
+
+Question = LoadQuestion | ThrustQuestion | Thickness
+
+_AXES: Mapping[str, Vector] = {
+    "x": (1.0, 0.0, 0.0),
+    "-x": (-1.0, 0.0, 0.0),
+    "y": (0.0, 1.0, 0.0),
+    "-y": (0.0, -1.0, 0.0),
+    "z": (0.0, 0.0, 1.0),
+    "-z": (0.0, 0.0, -1.0),
+}
+_DOWN: Vector = (0.0, 0.0, -1.0)
+_USUAL = tuple(f"horizontal {axis}" for axis in ("x", "-x", "y", "-y"))
+_REMEDY = (
+    'give "horizontal x", "horizontal 30" (degrees from x towards y), "tilt y", "force CODE FX FY FZ", '
+    '"weight CODE,CODE", "thrust CODE,CODE x", "settlement CODE -z" or "thickness"'
+)
+
+
+def parse_question(words: str) -> Question:
+    """Return a question from words, as the option --load has them.
+
+    Raises
+    ------
+    UsageError : the words are no question
+
+    >>> parse_question("tilt y").live.direction
+    (1.0, 0.0, 0.0)
+    >>> parse_question("thrust A1,A2 -x").supports
+    ('A1', 'A2')
+    """
+    try:
+        match words.split():
+            case ["horizontal", way]:
+                return LoadQuestion(words, Acceleration(_horizontal(way)))
+            case ["tilt", axis]:
+                return LoadQuestion(words, Acceleration(_downhill(_horizontal(axis))))
+            case ["force", stone, *numbers] if len(numbers) == 3:
+                x, y, z = map(float, numbers)
+                return LoadQuestion(words, PointForce(stone, (x, y, z)))
+            case ["weight", stones]:
+                return LoadQuestion(words, Acceleration(_DOWN, frozenset(stones.split(","))))
+            case ["thrust" | "settlement" as kind, stones, way] if way in _AXES:
+                return ThrustQuestion(words, tuple(stones.split(",")), _AXES[way], kind == "settlement")
+            case ["thickness"]:
+                return Thickness()
+    except (ValueError, SceneError):
+        pass
+    raise UsageError(f"no such load: {words!r}", where="--load", remedy=_REMEDY)
+
+
+def scene_questions(scene: SceneFile, groups: Groups, origin: Array) -> tuple[Question, ...]:
+    """Return the questions of [[assess]]; the push along the four horizontal axes where there are none.
+
+    Parameters
+    ----------
+    scene, groups : the scene, and the codes of the stones that its tables name
+    origin : (3,) of the scene, in the frame of the site [m]
+    """
+    if not scene.assess:
+        return tuple(map(parse_question, _USUAL))
+    found = []
+    for entry in scene.assess:
+        with scene.document.at(*entry.path):
+            found.append(_TYPES[entry.type](entry, _codes(entry, groups), origin))
+    return tuple(found)
+
+
+def _codes(entry: Entry, groups: Groups) -> frozenset[str]:
+    """Return the codes of the only group of stones that a table names; none without one."""
+    named = groups[entry.path]
+    return named[0] if named else frozenset()
+
+
+def _horizontal(word: str) -> Vector:
+    if word in _AXES and not word.endswith("z"):
+        return _AXES[word]
+    angle = np.radians(float(word))
+    return float(np.cos(angle)), float(np.sin(angle)), 0.0
+
+
+def _downhill(axis: Vector) -> Vector:
+    """Return the direction towards which a table dips that turns about an axis, right-handed."""
+    x, y, z = np.cross(axis, (0.0, 0.0, 1.0)).tolist()
+    return x + 0.0, y + 0.0, z + 0.0
+
+
+def _acceleration(entry: Entry, codes: frozenset[str], origin: Array) -> Question:
+    direction = entry.values["direction"]
+    return LoadQuestion(_named(entry, direction), Acceleration(direction, codes))
+
+
+def _tilt(entry: Entry, codes: frozenset[str], origin: Array) -> Question:
+    axis = entry.values["axis"]
+    return LoadQuestion(_named(entry, axis), Acceleration(_downhill(axis)))
+
+
+def _weight(entry: Entry, codes: frozenset[str], origin: Array) -> Question:
+    return LoadQuestion(f"weight of {_listed(codes)}", Acceleration(_DOWN, codes))
+
+
+def _force(entry: Entry, codes: frozenset[str], origin: Array) -> Question:
+    values, point = entry.values, entry.values["point"]
+    if point is None:
+        return LoadQuestion(f"force on {_listed(codes)}", SpreadForce(codes, values["force"]))
+    if len(codes) > 1:
+        raise SceneError(f"a point of {len(codes)} stones", remedy="name the one on which the point lies")
+    (stone,) = codes
+    x, y, z = (np.asarray(point) - origin).tolist()
+    return LoadQuestion(f"force on {stone}", PointForce(stone, values["force"], (x, y, z)))
+
+
+def _thrust(entry: Entry, codes: frozenset[str], origin: Array) -> Question:
+    name = (
+        f"{entry.type} of {_listed(codes)}" if entry.type == "settlement" else f"thrust on {_listed(codes)}"
+    )
+    return ThrustQuestion(name, tuple(sorted(codes)), entry.values["direction"], entry.type == "settlement")
+
+
+def _thickness(entry: Entry, codes: frozenset[str], origin: Array) -> Question:
+    return Thickness()
+
+
+def _listed(codes: frozenset[str]) -> str:
+    few = sorted(codes)
+    return ", ".join(few) if len(few) <= 3 else f"{few[0]}, {few[1]} and {len(few) - 2} more"
+
+
+def _named(entry: Entry, vector: Any) -> str:
+    return f"{entry.type} ({', '.join(f'{one:g}' for one in vector)})"
+
+
+_TYPES: Mapping[str, Callable[[Entry, frozenset[str], Array], Question]] = {
+    "horizontal": _acceleration,
+    "tilt": _tilt,
+    "weight": _weight,
+    "force": _force,
+    "thrust": _thrust,
+    "settlement": _thrust,
+    "thickness": _thickness,
+}
