@@ -13,13 +13,13 @@ from archmodel.store.run_record import MovingStone, RunRecord
 from archmodel.tables.entries import latest_entry
 from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.limit.assembly import Assembly, assembly
-from mechanics.limit.joints import resultants
+from mechanics.limit.joints import Resultants, resultants
 from mechanics.results.forecast.plan import loose_blocks
 from mechanics.scene.scene import Fidelity
 from moma.errors import MissingLibraryError, UsageError
 from pipelines.assess.answers import FALLS, Answer, CodeOf, answer, confirmer
 from pipelines.assess.questions import parse_question, scene_questions
-from pipelines.draw.mechanism import draw_mechanism
+from pipelines.draw.mechanism import draw_mechanisms
 from pipelines.results.folder import check_replaceable, replacing
 from pipelines.results.summary import as_json
 from pipelines.run.assemble import Assembly as Assembled
@@ -124,17 +124,19 @@ def assess(
     progress(Progress("write", 0, 1, "pictures"))
     warnings: list[str] = []
     with replacing(folder, INDEX) as fresh:
-        summary["files"] = [INDEX, "scene.toml", *_write_forces(fresh, on, assembled, answers)]
+        carried = [_carried(on, one) for one in answers]
+        summary["files"] = [INDEX, "scene.toml", *_write_forces(fresh, on, assembled, carried)]
+        titles = [
+            f"{scene.name}\n{one.told['headline'].split(';')[0].replace('λ ≤', 'multiplier at most')}"
+            for one in answers
+        ]
+        moving = [one.mechanism for one in answers]
         try:
-            summary["files"] += draw_mechanism(
+            summary["files"] += draw_mechanisms(
                 fresh,
                 assembled.scene.blocks,
                 on,
-                [one.mechanism for one in answers],
-                [
-                    f"{scene.name}\n{one.told['headline'].replace('λ ≤', 'multiplier at most')}"
-                    for one in answers
-                ],
+                list(zip(titles, moving, carried, strict=True)),
                 assembled.towards,
             )
         except MissingLibraryError as error:
@@ -196,13 +198,21 @@ def _headline(loads: Sequence[dict[str, Any]]) -> str:
     return str(loads[0]["headline"]) if loads[0]["kind"] != "load" else "nothing limits its loads"
 
 
-def _write_forces(folder: Path, on: Assembly, assembled: Assembled, answers: Sequence[Answer]) -> list[str]:
+def _carried(on: Assembly, found: Answer) -> Resultants | None:
+    """Return the resultants of all joints at a limit; None where nothing balances."""
+    if not found.force.any():
+        return None
+    return resultants(on.joints, on.contacts, found.force, on.strength.shear(found.force))
+
+
+def _write_forces(
+    folder: Path, on: Assembly, assembled: Assembled, carried: Sequence[Resultants | None]
+) -> list[str]:
     """Write the resultants of all joints at each limit, with places in the frame of the site; return file names."""
     codes, names = [block.code for block in on.model.scene.blocks], []
-    for number, one in enumerate(answers, start=1):
-        if not one.force.any():
+    for number, found in enumerate(carried, start=1):
+        if found is None:
             continue
-        found = resultants(on.joints, on.contacts, one.force, on.strength.shear(one.force))
         numbers = np.column_stack(
             [
                 on.joints.section.centroid + assembled.origin,

@@ -1,4 +1,4 @@
-"""Pictures of mechanisms: the stones where they were, and displaced along their velocities."""
+"""Pictures of mechanisms: stones displaced along their velocities, and the resultants of their joints."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from mechanics.limit.assembly import Assembly
+from mechanics.limit.joints import Resultants
 from mechanics.limit.limit_load import Mechanism
 from mechanics.scene.scene import Block
 from pipelines.arrays import Array
@@ -15,20 +16,26 @@ from pipelines.draw.pictures import draw_apart
 from survey.geometry.solids import Solid
 from survey.geometry.watertight import triangulate
 
-__all__ = ["draw_mechanism"]
+__all__ = ["draw_mechanisms"]
 
 _WAY = 0.06  # of the fastest corner over the extent of the scene [-]
 
 
-def draw_mechanism(
+def draw_mechanisms(
     folder: Path,
     blocks: Sequence[Block],
     on: Assembly,
-    mechanisms: Sequence[Mechanism],
-    titles: Sequence[str],
+    limits: Sequence[tuple[str, Mechanism, Resultants | None]],
     towards: Array,
 ) -> list[str]:
-    """Draw one picture for each mechanism that moves, into an existing folder; return the file names.
+    """Draw each mechanism that moves, and the resultants of the joints at its limit; return the file names.
+
+    Parameters
+    ----------
+    folder : of the pictures, which exists
+    blocks, on : the stones
+    limits : title, mechanism and resultants; None: there are none
+    towards : (3,) to the viewer
 
     Raises
     ------
@@ -54,25 +61,39 @@ def draw_mechanism(
         ]
     )
     way = _WAY * float(np.ptp(corners, axis=0).max())
-    moved: list[Array] = []
+    moved, places, forces, kerns = [], [], [], []
     pictures: list[dict[str, Any]] = []
-    for number, (one, title) in enumerate(zip(mechanisms, titles, strict=True), start=1):
-        if not one.velocity.any():
-            continue
-        arm = corners - on.state.centre[owner]
-        ways = one.velocity[owner, :3] + np.cross(one.velocity[owner, 3:], arm)
+    arm = corners - on.state.centre[owner]
+    for number, (title, mechanism, carried) in enumerate(limits, start=1):
+        velocity = mechanism.velocity[owner]
+        ways = velocity[:, :3] + np.cross(velocity[:, 3:], arm)
         ways *= way / max(float(np.linalg.norm(ways, axis=1).max()), 1e-300)
-        pictures.append(
-            {
-                "path": str((folder / f"mechanism-{number}.png").absolute()),
-                "number": len(moved),
-                "title": title,
-                "towards": towards.tolist(),
-                "up": (-np.asarray(on.model.gravity(0.0))).tolist(),
-            }
-        )
+        for name, there in (("mechanism", mechanism.velocity.any()), ("forces", carried is not None)):
+            if there:
+                pictures.append(
+                    {
+                        "path": str((folder / f"{name}-{number}.png").absolute()),
+                        "number": number - 1,
+                        "forces": name == "forces",
+                        "title": title,
+                        "towards": towards.tolist(),
+                        "up": (-np.asarray(on.model.gravity(0.0))).tolist(),
+                    }
+                )
         moved.append(corners + ways)
+        empty = np.full((len(on.joints.bodies), 3), np.nan)
+        places.append(empty if carried is None else carried.place)
+        forces.append(empty if carried is None else carried.force)
+        kerns.append(np.zeros(len(empty), dtype=bool) if carried is None else carried.kern <= 1.0)
     if pictures:
-        surface = MechanismSurface(corners, np.stack(moved), triangles, np.sort(edges, axis=1))
+        surface = MechanismSurface(
+            corners,
+            np.stack(moved),
+            triangles,
+            np.sort(edges, axis=1),
+            np.stack(places),
+            np.stack(forces),
+            np.stack(kerns),
+        )
         draw_apart("pipelines.draw.offscreen.mechanism", surface, pictures)
     return [Path(one["path"]).name for one in pictures]

@@ -7,13 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.arrays import Array, Ints
+from pipelines.arrays import Array, Bools, Ints
+from pipelines.draw.catalogue import PICTURES
 from pipelines.draw.offscreen.jobs import run_job
 from pipelines.draw.offscreen.parts import (
     Colouring,
+    Resultants,
     add_coloured,
     add_edges,
     add_glass,
+    add_resultants,
     mesh_of,
     new_plotter,
     place_camera,
@@ -28,7 +31,7 @@ _NOTE = "As the stones begin to move, exaggerated; glass: where they stand"
 
 @dataclass(frozen=True)
 class MechanismSurface:
-    """Stones where they stand and where mechanisms take them.
+    """Stones where they stand, where mechanisms take them, and the forces in their joints at the limits.
 
     Attributes
     ----------
@@ -36,19 +39,46 @@ class MechanismSurface:
     moved : (k, n, 3) the same in each mechanism [m]
     triangles : (nt, 3)
     edges : (ne, 2)
+    places, forces : (k, nj, 3) resultants of all joints at each limit, see `Resultants`; NaN places without compression
+    in_kern : (k, nj)
     """
 
     points: Array
     moved: Array
     triangles: Ints
     edges: Ints
+    places: Array
+    forces: Array
+    in_kern: Bools
 
 
 def draw(surface: MechanismSurface, path: Path, job: dict[str, Any]) -> None:
-    """Draw one picture as PNG; `job` has the number of the mechanism, title, towards (to the viewer) and up."""
+    """Draw one picture as PNG; `job` has number, whether it shows forces, title, towards (to the viewer) and up."""
     import pyvista
 
     plotter = new_plotter(pyvista)
+    if job["forces"]:
+        _draw_forces(pyvista, plotter, surface, path, job)
+    else:
+        _draw_motion(pyvista, plotter, surface, path, job)
+
+
+def _draw_forces(
+    pyvista: Any, plotter: Any, surface: MechanismSurface, path: Path, job: dict[str, Any]
+) -> None:
+    number = job["number"]
+    pressed = np.isfinite(surface.places[number]).all(axis=1)
+    add_glass(pyvista, plotter, surface.points, surface.triangles)
+    rows = (one[number][pressed] for one in (surface.places, surface.forces, surface.in_kern))
+    add_resultants(pyvista, plotter, surface.points, Resultants(*rows))
+    place_camera(pyvista, plotter, surface.points, np.array(job["towards"]), np.array(job["up"]))
+    add_edges(pyvista, plotter, surface.points, surface.edges)
+    save_picture(plotter, path, f"{job['title']}\nAt the limit", PICTURES["resultants"].note)
+
+
+def _draw_motion(
+    pyvista: Any, plotter: Any, surface: MechanismSurface, path: Path, job: dict[str, Any]
+) -> None:
     moved = surface.moved[job["number"]]
     way = np.linalg.norm(moved - surface.points, axis=1)
     share = way / max(float(way.max()), 1e-300)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.arrays import Array, Ints
+from pipelines.arrays import Array, Bools, Ints
 
 __all__ = [
     "INK",
@@ -16,9 +16,11 @@ __all__ = [
     "OBLIQUELY",
     "PLAIN",
     "Colouring",
+    "Resultants",
     "add_coloured",
     "add_edges",
     "add_glass",
+    "add_resultants",
     "fan_polygons",
     "mesh_of",
     "new_plotter",
@@ -29,6 +31,8 @@ __all__ = [
 ]
 
 
+_INSIDE, _OUTSIDE = "#1f5f8b", "#c4302b"  # resultants within and outside the kern
+_LONGEST = 0.12  # the longest stroke of a resultant, over the wall's diagonal
 _SIZE = (1600, 1300)
 _EDGE = "#3a3733"
 PLAIN, INK = "#c9c6c0", "#222222"
@@ -60,6 +64,22 @@ class Colouring:
     intervals: int
     saturated: bool
     palette: tuple[str, float]
+
+
+@dataclass(frozen=True)
+class Resultants:
+    """Resultants of joints.
+
+    Attributes
+    ----------
+    places : (r, 3) where they meet the pressed joints [m]
+    forces : (r, 3) on one of the two stones [N]
+    in_kern : (r,) whether they are within the kern
+    """
+
+    places: Array
+    forces: Array
+    in_kern: Bools
 
 
 def nice_ceiling(value: float) -> tuple[float, int]:
@@ -120,6 +140,24 @@ def add_edges(pyvista: Any, plotter: Any, points: Array, edges: Ints) -> None:
     lines.points = points + 1e-4 * toward
     lines.lines = np.column_stack([np.full(len(edges), 2), edges]).ravel()
     plotter.add_mesh(lines, color=_EDGE, line_width=2.5, lighting=False)
+
+
+def add_resultants(pyvista: Any, plotter: Any, points: Array, shown: Resultants) -> None:
+    """Add a stroke through each joint of a scene with these points, along its resultant and proportional to it."""
+    force = np.linalg.norm(shown.forces, axis=1)
+    reach = _LONGEST * float(np.linalg.norm(np.ptp(points, axis=0)))
+    half = 0.5 * reach * shown.forces / force.max(initial=1e-300)
+    for rows, colour in ((shown.in_kern, _INSIDE), (~shown.in_kern, _OUTSIDE)):
+        if not rows.any():
+            continue
+        ends = np.stack([shown.places[rows] + sign * half[rows] for sign in (-1, 1)], axis=1)
+        count = len(ends)
+        strokes = pyvista.PolyData()
+        strokes.points = ends.reshape(-1, 3)
+        strokes.lines = np.column_stack([np.full(count, 2), np.arange(2 * count).reshape(-1, 2)]).ravel()
+        plotter.add_mesh(strokes, color=colour, line_width=6.0, lighting=False)
+        heads = pyvista.PolyData(shown.places[rows])
+        plotter.add_mesh(heads, color=colour, point_size=11.0, render_points_as_spheres=True, lighting=False)
 
 
 def _palette(name: str, part: float) -> Any:

@@ -12,9 +12,11 @@ from pipelines.draw.offscreen.parts import (
     LIGHT,
     PLAIN,
     Colouring,
+    Resultants,
     add_coloured,
     add_edges,
     add_glass,
+    add_resultants,
     mesh_of,
     new_plotter,
     nice_ceiling,
@@ -27,8 +29,6 @@ __all__ = ["colouring", "draw"]
 
 
 _FIXED = "#a3a09a"
-_INSIDE, _OUTSIDE = "#1f5f8b", "#c4302b"  # resultants within and outside the kern
-_LONGEST = 0.12  # the longest stroke of a resultant, over the wall's diagonal
 
 
 def colouring(surface: WallSurface, quantity: str, top: float | None) -> Colouring:
@@ -58,7 +58,12 @@ def draw(surface: WallSurface, path: Path, job: dict[str, Any]) -> None:
     plotter = new_plotter(pyvista)
     if job["quantity"] == "resultants":
         add_glass(pyvista, plotter, surface.points, surface.triangles)
-        _add_resultants(pyvista, plotter, surface)
+        add_resultants(
+            pyvista,
+            plotter,
+            surface.points,
+            Resultants(surface.resultant_points, surface.resultants, surface.in_kern),
+        )
     elif job["quantity"] == "pressure":
         add_glass(pyvista, plotter, surface.points, surface.triangles)
         _add_joints(pyvista, plotter, surface, colouring(surface, "pressure", job["top"]))
@@ -85,24 +90,6 @@ def _add_joints(pyvista: Any, plotter: Any, surface: WallSurface, colours: Colou
     mesh = mesh_of(pyvista, surface.joint_points, surface.joint_triangles)
     mesh.cell_data["value"] = colours.values
     add_coloured(plotter, mesh, colours)
-
-
-def _add_resultants(pyvista: Any, plotter: Any, surface: WallSurface) -> None:
-    """Add a stroke through each joint, along its resultant and proportional to it."""
-    force = np.linalg.norm(surface.resultants, axis=1)
-    reach = _LONGEST * float(np.linalg.norm(np.ptp(surface.points, axis=0)))
-    half = 0.5 * reach * surface.resultants / force.max(initial=1e-300)
-    for rows, colour in ((surface.in_kern, _INSIDE), (~surface.in_kern, _OUTSIDE)):
-        if not rows.any():
-            continue
-        ends = np.stack([surface.resultant_points[rows] + sign * half[rows] for sign in (-1, 1)], axis=1)
-        count = len(ends)
-        strokes = pyvista.PolyData()
-        strokes.points = ends.reshape(-1, 3)
-        strokes.lines = np.column_stack([np.full(count, 2), np.arange(2 * count).reshape(-1, 2)]).ravel()
-        plotter.add_mesh(strokes, color=colour, line_width=6.0, lighting=False)
-        heads = pyvista.PolyData(surface.resultant_points[rows])
-        plotter.add_mesh(heads, color=colour, point_size=11.0, render_points_as_spheres=True, lighting=False)
 
 
 if __name__ == "__main__":
