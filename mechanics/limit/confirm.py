@@ -48,7 +48,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class Confirmation:
-    """What the dynamics hold and what they lose.
+    """Loads that the dynamics hold and that they lose.
 
     Attributes
     ----------

@@ -32,7 +32,7 @@ _ENDLESS = ("DualInfeasible", "AlmostDualInfeasible")
 
 
 class Ending(StrEnum):
-    """What an answer says."""
+    """Ending of a programme."""
 
     FOUND = "found"
     NO_BALANCE = "no balance"

@@ -28,7 +28,7 @@ FALLS = "falls under its own weight"
 _MOVES = 0.01  # speed over that of the fastest stone from which a stone belongs to a mechanism [-]
 
 Confirm = Callable[[LiveLoad, float], Confirmation] | None
-"""What confirms a candidate by runs; None: nothing does."""
+"""Confirmation of a candidate by runs; None: there is none."""
 
 CodeOf = tuple[str, Site] | None
 """Code and site of the check; None: there is none."""

@@ -20,7 +20,7 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class LoadQuestion:
-    """How far a load may grow.
+    """Question how far a load may grow.
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class LoadQuestion:
 
 @dataclass(frozen=True)
 class ThrustQuestion:
-    """Between which values the thrust on supports lies.
+    """Question between which values the thrust on supports lies.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class ThrustQuestion:
 
 @dataclass(frozen=True)
 class Thickness:
-    """By how much joints may shrink."""
+    """Question by how much joints may shrink."""
 
     name: str = "thickness"
 
