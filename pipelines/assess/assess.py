@@ -20,6 +20,7 @@ from moma.errors import MissingLibraryError, UsageError
 from pipelines.assess.answers import FALLS, Answer, CodeOf, answer, confirmer
 from pipelines.assess.questions import parse_question, scene_questions
 from pipelines.draw.mechanism import draw_mechanisms
+from pipelines.reports.assessment import write_assessment
 from pipelines.results.folder import check_replaceable, replacing
 from pipelines.results.summary import as_json
 from pipelines.run.assemble import Assembly as Assembled
@@ -29,7 +30,7 @@ from pipelines.run.soundness import problems_of, refuse_unsound
 from pipelines.scene.file import SceneFile, read_scene
 from pipelines.scene.selection import select_groups, select_stones
 
-__all__ = ["INDEX", "JOINT_COLUMNS", "Assessment", "assess"]
+__all__ = ["INDEX", "JOINT_COLUMNS", "REPORT", "Assessment", "assess"]
 
 INDEX = "assessment.json"
 """Index of the results of an assessment."""
@@ -50,6 +51,9 @@ JOINT_COLUMNS = (
     "friction_use",
 )
 """Columns of forces-N.csv: stones, centroid [m], resultant [N], where it meets the joint [m], kern, edge, use [-]."""
+
+REPORT = "report.html"
+"""Page for people."""
 
 _RUNS = 6  # by which a candidate is confirmed, at most
 
@@ -125,7 +129,7 @@ def assess(
     warnings: list[str] = []
     with replacing(folder, INDEX) as fresh:
         carried = [_carried(on, one) for one in answers]
-        summary["files"] = [INDEX, "scene.toml", *_write_forces(fresh, on, assembled, carried)]
+        summary["files"] = [INDEX, REPORT, "scene.toml", *_write_forces(fresh, on, assembled, carried)]
         titles = [
             f"{scene.name}\n{one.told['headline'].split(';')[0].replace('λ ≤', 'multiplier at most')}"
             for one in answers
@@ -141,6 +145,7 @@ def assess(
             )
         except MissingLibraryError as error:
             warnings.append(f"no pictures: {error}")
+        write_assessment(fresh / REPORT, summary)
         (fresh / "scene.toml").write_text(scene.text, encoding="utf-8")
         (fresh / INDEX).write_text(as_json(summary), encoding="utf-8")
     run = None

@@ -1,4 +1,4 @@
 """HTML reports, filled from the templates in `templates`.
 
-Public: `write_report` (run); `write_page`, `picture` (html).
+Public: `write_report` (run); `write_assessment` (assessment); `write_page`, `picture` (html).
 """

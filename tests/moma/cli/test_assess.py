@@ -171,6 +171,9 @@ def test_a_check_by_a_code_needs_a_site_and_names_article_and_formula(url, scene
     assert "NTC 2018" in first
     assert "before you sign" in first
     assert "a0* ≥ ag S / q, q = 2   [C8.7.1.2.1]" in text
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "a0* ≥ ag S / q" in page
+    assert "before you sign" in page.split("<h2>")[0]
 
 
 def test_runs_confirm_a_candidate(url, scene, tmp_path):
