@@ -24,8 +24,12 @@ from benchmarks.report import (
     write_between,
 )
 from mechanics.arrays import Array
+from mechanics.planar.measures.cells import members
+from mechanics.planar.measures.stress import mean_stress, moments
+from mechanics.planar.measures.tessellation import tessellation
 from pipelines.draw.elevations.sheet import new_sheet
-from pipelines.geology.observe import read_rows
+from pipelines.geology.file import read_geology
+from pipelines.geology.observe import Instants, read_rows
 from pipelines.geology.run import run_geology
 
 __all__ = ["main"]
@@ -43,6 +47,7 @@ _FAULT: Table = (
     ("seeds", "seeds", "d"),
     ("pressure", "p of W1, 10 to 40 s, kPa", ""),
     ("over", "over γ = 0", ""),
+    ("pushed", "p of the reactions alone, over γ = 0", ""),
     ("lambda_x", "λx of W1", ""),
     ("lambda_y", "λy of W1", ""),
     ("front", "front ahead of the tip, m", ""),
@@ -133,6 +138,7 @@ def _read(folder: Path) -> dict[str, Any]:
     cells = {name: read_rows(folder / file) for name, file in summary["cells"].items()}
     return {
         "name": folder.name,
+        "folder": folder,
         "kind": kind,
         "gamma": float(gamma),
         "seed": int(seed),
@@ -140,6 +146,31 @@ def _read(folder: Path) -> dict[str, Any]:
         "summary": summary,
         "cells": cells,
     }
+
+
+def _pushing(run: Mapping[str, Any]) -> float:
+    """Return the mean pressure of W1 in the second phase by the reactions r + hγ, without the pulls [Pa]."""
+    folder, cohesion = run["folder"], run["summary"]["cohesion"]
+    with np.load(folder.parent / ".samples" / f"{run['summary']['sample']}.npz") as sample:
+        start, radius = sample["centre"], sample["radius"]
+    scene = read_geology(folder / "scene.toml", run["kind"])
+    group = np.isin(np.arange(len(radius)), members(scene.cells[0], start))
+    instants = Instants(tuple(sorted((folder / "arrays").glob("fields-*.npz"))))
+    found = []
+    for fields in instants:
+        if fields.time < 0.25 * instants[-1].time:
+            continue
+        place = fields.position[:, :2]
+        shares = tessellation(place[: len(radius)], radius)
+        pull = np.where(fields.gap <= cohesion["range"], cohesion["pull"], 0.0) * (
+            fields.bodies[:, 1] < len(radius)
+        )
+        moment = moments(
+            len(radius), place, fields.bodies, fields.point, fields.force + pull[:, None] * fields.normal
+        )
+        inner = group & shares.inside
+        found.append(mean_stress(moment[inner], float(shares.share[inner].sum())).pressure)
+    return float(np.mean(found))
 
 
 def _chosen(runs: Sequence[Mapping[str, Any]], **of: Any) -> list[Mapping[str, Any]]:
@@ -164,6 +195,7 @@ def _fault_rows(runs: Sequence[Mapping[str, Any]]) -> list[Row]:
         run["seed"]: _late(run["cells"]["W1"], "p", 0.25)
         for run in _chosen(runs, kind="fault", gamma=0.0, sweeps=_SWEEPS)
     }
+    pushed = {run["seed"]: _pushing(run) for run in _chosen(runs, kind="fault", gamma=0.0, sweeps=_SWEEPS)}
     for gamma in _GAMMA:
         group = _chosen(runs, kind="fault", gamma=gamma, sweeps=_SWEEPS)
         if not group:
@@ -180,6 +212,10 @@ def _fault_rows(runs: Sequence[Mapping[str, Any]]) -> list[Row]:
                 "seeds": len(group),
                 "pressure": _spread((1e-3 * p for p in pressure), 1),
                 "over": _spread(over, 2),
+                "pushed": _spread(
+                    (_pushing(run) / pushed[run["seed"]] for run in group if run["seed"] in pushed),
+                    2,
+                ),
                 "lambda_x": _spread((cell["lambda_x"][-1] for cell in cells), 2),
                 "lambda_y": _spread((cell["lambda_y"][-1] for cell in cells), 2),
                 "front": _spread((one["front ahead of the tip [m]"] for one in measures), 1),

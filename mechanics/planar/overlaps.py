@@ -6,7 +6,8 @@ and w = W p those of the contacts,
 
     0 ≤ w_N + g + a ⊥ p_N ≥ 0,   ‖p_T‖ ≤ μ p_N,   and p_T opposes w_T, at the limit, while sliding
 
-from p = 0, by sweeps until no overlap -(g + w_N) is above its limit. Velocities and impulses take no part, so no
+by sweeps until no overlap -(g + w_N) is above its limit. Deep piles sink in the same way from step to step, and sweeps
+carry a lift up slowly, so p begins near that of the last correction. Velocities and impulses take no part, so no
 kinetic energy comes of it; disks that are lifted gain potential energy, which is accounted for.
 """
 
@@ -31,6 +32,8 @@ _LEFT = 0.5
 _BEYOND = 0.3
 # of overlaps at the start that are just as large as allowed [-]
 _ROUNDING = 1e-9
+# part of the last correction from which the next one begins: what is no longer needed fades [-]
+_AGAIN = 0.9
 # sweeps between two looks
 _LOOK = 10
 # sweeps of one correction at most; what is left then is left to the next step
@@ -88,13 +91,15 @@ class Overlaps(Carrier):
     allowed : largest overlap [m]; infinite: none is corrected
     """
 
-    CARRIED = ("_gap", "_key")
+    CARRIED = ("_gap", "_key", "_push", "_pushed")
     REBUILT = ("_allowed",)
 
     def __init__(self, allowed: float) -> None:
         self._allowed = allowed
         self._key: Ints = np.zeros(0, dtype=np.int64)
         self._gap: Array = np.zeros(0)
+        self._pushed: Ints = np.zeros(0, dtype=np.int64)
+        self._push: Array = np.zeros((0, 2))
 
     def begin(self, contacts: PlanarContacts) -> None:
         """Take up the overlaps of the start."""
@@ -124,7 +129,8 @@ class Overlaps(Carrier):
         gap, state = end.gap, end.state
         if not (-gap).max(initial=0.0) > (_LEFT + _BEYOND) * self._allowed:
             return end
-        left = np.minimum(self._of_start(contacts.key), -_LEFT * self._allowed)
+        of_start = _recalled(self._key, self._gap, contacts.key)
+        left = np.minimum(of_start, -_LEFT * self._allowed)
         limit = left - _BEYOND * self._allowed
         opening = np.maximum(operator.relative_velocity(state.velocity)[:, 0], 0.0)
         ahead = np.where(terms.bias < 0, gap + step * opening, gap)
@@ -133,19 +139,25 @@ class Overlaps(Carrier):
             return end
         shift, none = np.zeros((len(gap), 2)), np.zeros(len(gap))
         shift[:, 0] = ahead - left
-        sweep, push = operator.gauss_seidel(shift, terms.friction, none), np.zeros((len(gap), 2))
+        sweep = operator.gauss_seidel(shift, terms.friction, none)
+        push = _AGAIN * _recalled(self._pushed, self._push, contacts.key)
         for _ in range(_SWEEPS // _LOOK):
             sweep(push, _LOOK)
             apart = operator.apply(push)[:, 0]
             if (ahead + apart >= limit).all():
                 break
+        order = np.argsort(contacts.key, kind="stable")
+        self._pushed, self._push = contacts.key[order], push[order]
         moved = operator.velocity_change(push)
         place = replace(state, centre=state.centre + moved[:, :2], angle=state.angle + moved[:, 2])
         return Apart(place, gap + apart, moved)
 
-    def _of_start(self, key: Ints) -> Array:
-        """Return the gaps (nc,) at the start of contacts that overlapped then; zero for the others."""
-        if not len(self._key):
-            return np.zeros(len(key))
-        at = np.minimum(np.searchsorted(self._key, key), len(self._key) - 1)
-        return np.where(self._key[at] == key, self._gap[at], 0.0)
+
+def _recalled(known: Ints, values: Array, key: Ints) -> Array:
+    """Return the values of contacts by sorted keys; zero for those that are not known."""
+    found = np.zeros((len(key), *values.shape[1:]))
+    if len(known):
+        at = np.minimum(np.searchsorted(known, key), len(known) - 1)
+        same = known[at] == key
+        found[same] = values[at[same]]
+    return found

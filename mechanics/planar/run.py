@@ -31,6 +31,7 @@ from mechanics.planar.scene import PlanarScene
 from mechanics.planar.simulation import PlanarSimulation, PlanarStep
 from mechanics.results.result import Errors
 from mechanics.scene.laws.status import contact_status
+from mechanics.solvers.choice import Solver
 from moma.errors import SceneError
 
 __all__ = ["PlanarRun"]
@@ -46,6 +47,7 @@ class PlanarRun(Carrier):
     Parameters
     ----------
     scene : it
+    solver : of its steps; None: as the scene's settings choose
 
     Raises
     ------
@@ -75,11 +77,11 @@ class PlanarRun(Carrier):
     CARRIED = ("_log", "_watch", "simulation", "steps")
     REBUILT = ("_clock", "_last", "model", "total")
 
-    def __init__(self, scene: PlanarScene) -> None:
+    def __init__(self, scene: PlanarScene, solver: Solver | None = None) -> None:
         self._clock = Clock()
         self.model, start = build_planar_model(scene)
         refuse_deep(self.model, PlanarDetector(self.model)(start))
-        self.simulation = PlanarSimulation(self.model, start, self._clock)
+        self.simulation = PlanarSimulation(self.model, start, self._clock, solver)
         self._log, self._watch = _Log(self.model, start), PlanarWatch(self.model)
         self.steps, self.total = 0, max(1, round(scene.time.duration / scene.time.step))
         self._last: PlanarStep | None = None

@@ -144,6 +144,8 @@ class PlanarScene:
     time, solver : settings; *auto* sweeps, and goes on with ADMM and Newton where 500 sweeps do not solve a step. Fewer
         `max_iterations` are sweeps alone, as slow flows of many disks are run
     min_sweeps : sweeps of each step at least, with the method nsgs
+    start_iterations : of ADMM, at most, by which the forces of the disks at rest are found before the first step: a
+        limited number of sweeps does not carry the weight of a hundred rows in one step; 0: it begins without forces
     loads : what acts besides gravity; the plane is z = 0 of their space, moments and turns are about z
     rolling : disks turn; False: their rotation is blocked, the limit of a strong resistance to rolling
     frame_every : keep a frame of the motion every so many steps; 0 keeps the first and last only
@@ -178,6 +180,7 @@ class PlanarScene:
     time: PlanarTime = field(default_factory=PlanarTime)
     solver: SolverSettings = field(default_factory=SolverSettings)
     min_sweeps: int = 0
+    start_iterations: int = 0
     loads: Loads = field(default_factory=Loads)
     rolling: bool = True
     frame_every: int = 0
@@ -200,6 +203,12 @@ class PlanarScene:
                 self.min_sweeps == 0
                 or (0 < self.min_sweeps <= self.solver.max_iterations and self.solver.method is Method.NSGS),
                 "give 0, or up to max_iterations with the method nsgs",
+            ),
+            (
+                "start_iterations",
+                self.start_iterations,
+                self.start_iterations >= 0,
+                "give 0 or a number of iterations",
             ),
             ("frame_every", self.frame_every, self.frame_every >= 0, "give 0 or a number of steps"),
         ):

@@ -15,12 +15,17 @@ from mechanics.planar.overlaps import Apart, Overlaps
 from mechanics.planar.stepping import Drive, fly, load_velocity, load_work
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.scene.laws.law import Approach, Terms
-from mechanics.solvers.choice import choose_planar_solver
+from mechanics.solvers.choice import Solver, choose_planar_solver
+from mechanics.solvers.first_order.disk_admm import DiskADMM
 from moma.errors import SolverError
 
 __all__ = ["PlanarSimulation", "PlanarStep"]
 
 
+# η of the forces at rest with which a run may begin
+_AT_REST = 1e-7
+# penalty of the ADMM that finds them: that for disks that settle [-]
+_PENALTY = 0.05
 _LOOKS = 3  # most repetitions of a step that brings together bodies that were not watched
 
 
@@ -94,12 +99,13 @@ class PlanarSimulation(Carrier):
     CARRIED = ("_first", "_memory", "_overlaps", "state")
     REBUILT = ("_detector", "_drive", "_solver", "clock", "model", "start")
 
-    def __init__(self, model: PlanarModel, start: PlanarState, clock: Clock) -> None:
-        solver = model.scene.solver
+    def __init__(
+        self, model: PlanarModel, start: PlanarState, clock: Clock, solver: Solver | None = None
+    ) -> None:
         self.model, self.start, self.state, self.clock = model, start, start, clock
         self._drive = Drive(model, start)
         self._detector = PlanarDetector(model)
-        self._solver = choose_planar_solver(solver, model.scene.min_sweeps)
+        self._solver = solver or choose_planar_solver(model.scene.solver, model.scene.min_sweeps)
         self._memory = Memory(2)
         self._overlaps = Overlaps(model.scene.largest_overlap * float(model.radius.min()))
         self._first = True
@@ -112,6 +118,8 @@ class PlanarSimulation(Carrier):
         SolverError : if the motion is no longer finite
         """
         h, theta, model = self.model.scene.time.step, self.model.scene.time.theta, self.model
+        if self._first and model.scene.start_iterations:
+            self._find_forces()
         with self.clock("advance"):
             kick = self._kick(h, theta)
             loads = load_velocity(model, kick, h)
@@ -144,6 +152,16 @@ class PlanarSimulation(Carrier):
             apart = self._apart(after, solved)
         with self.clock("advance"):
             return self._finish(kick, apart, loads, solved)
+
+    def _find_forces(self) -> None:
+        """Find the forces under which the disks rest at the start, nothing driven, from which the first step begins."""
+        scene = self.model.scene
+        solver = DiskADMM(_AT_REST, np.inf, scene.start_iterations, _PENALTY)
+        contacts = self._detector(self.state)
+        free = self.state.velocity + load_velocity(self.model, self.state, scene.time.step)
+        solved = self._solve(self.state, free, contacts, self._memory, solver)
+        solution = replace(solved.solution, impulse=solved.impulse)
+        self._memory.store(contacts.key, solution, solved.stated.approach.state)
 
     def _overlooked(self, kick: PlanarState, solved: _Solved) -> PlanarContacts | None:
         """Detect with a wider watch; return the contacts if the impulses make unwatched bodies overlap, otherwise None.
@@ -214,26 +232,33 @@ class PlanarSimulation(Carrier):
         inertia, threads = self.model.inertia, self.model.scene.solver.threads
         return PlanarDelassus(contacts.bodies, contacts.normal, contacts.lever, inertia, threads, kick.centre)
 
-    def _solve(self, kick: PlanarState, free: Array, contacts: PlanarContacts, start: Memory) -> _Solved:
+    def _solve(
+        self,
+        kick: PlanarState,
+        free: Array,
+        contacts: PlanarContacts,
+        start: Memory,
+        solver: Solver | None = None,
+    ) -> _Solved:
         """State the problem of these contacts, and solve it from the impulses in `start`."""
         with self.clock("assemble"):
             operator = self._operator(kick, contacts)
             stated = self._state_laws(kick, contacts, operator, free, self._memory.recall(contacts.key)[1])
         with self.clock("solve"):
-            solution = self._solution(stated, start.recall(contacts.key)[0])
+            solution = self._solution(stated, start.recall(contacts.key)[0], solver or self._solver)
         with self.clock("advance"):
             impulse = solution.impulse.copy()
             impulse[:, 0] -= stated.terms.adhesion
             velocity = free + operator.velocity_change(impulse)
         return _Solved(contacts, operator, stated, solution, impulse, velocity)
 
-    def _solution(self, stated: _Stated, start: ContactStart) -> ContactSolution:
+    def _solution(self, stated: _Stated, start: ContactStart, solver: Solver) -> ContactSolution:
         """Solve for the contacts that act; the others have r̃ = 0."""
         problem, acting = stated.problem, stated.acting
         shifted = start.impulse.copy()
         shifted[:, 0] += stated.terms.adhesion
         if acting.all():
-            return self._solver(problem, start=ContactStart(shifted, start.velocity))
+            return solver(problem, start=ContactStart(shifted, start.velocity))
         whole = problem.delassus
         assert isinstance(whole, PlanarDelassus)
         part_of = replace(
@@ -246,7 +271,7 @@ class PlanarSimulation(Carrier):
             problem.friction[acting],
             problem.cohesion[acting],
         )
-        part = self._solver(some, start=ContactStart(shifted[acting], start.velocity[acting]))
+        part = solver(some, start=ContactStart(shifted[acting], start.velocity[acting]))
         impulse, velocity = np.zeros_like(shifted), np.zeros_like(shifted)
         impulse[acting], velocity[acting] = part.impulse, part.velocity
         return replace(part, impulse=impulse, velocity=velocity)

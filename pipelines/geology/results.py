@@ -15,7 +15,7 @@ from mechanics.planar.result import PlanarResult
 from pipelines.geology.experiments.fault import Fault
 from pipelines.geology.figures import draw_curves, draw_instant, draw_trishear
 from pipelines.geology.file import GeologyScene
-from pipelines.geology.observe import CELL_COLUMNS, WHOLE, Fields, Instants, Observation
+from pipelines.geology.observe import CELL_COLUMNS, WHOLE, Fields, Instants
 from pipelines.geology.paraview import write_series
 from pipelines.geology.report import write_report
 from pipelines.geology.sample import PreparedSample
@@ -81,12 +81,12 @@ def write_results(
     scene: GeologyScene,
     sample: PreparedSample,
     result: PlanarResult,
-    observation: Observation,
+    rows: Mapping[str, Mapping[str, Array]],
+    instants: Instants,
     archive: UnfinishedRun,
 ) -> dict[str, Any]:
     """Write all files of a run into an empty folder; return the summary."""
     quality = quality_of(scene, sample, result)
-    rows, instants = observation.rows(scene.output.every), observation.instants(scene.output.fields_every)
     cells = _write_rows(folder, rows)
     write_series(folder, instants, sample, scene.cells, rows)
     (folder / "arrays").mkdir()

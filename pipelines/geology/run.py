@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from archmodel.database.session import open_database
-from mechanics.arrays import Ints
+from mechanics.arrays import Array, Ints
 from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.planar.result import PlanarResult
 from mechanics.planar.scene import Disk, PlanarScene, PlanarTime
@@ -21,7 +21,7 @@ from mechanics.scene.laws.lennard_jones import LennardJones
 from mechanics.scene.scene import LawRule, Method, SolverSettings
 from moma.errors import SceneError
 from pipelines.geology.file import GeologyScene, read_geology
-from pipelines.geology.observe import Observation, read_rows
+from pipelines.geology.observe import Observation
 from pipelines.geology.record import geology_record
 from pipelines.geology.results import write_results
 from pipelines.geology.sample import PreparedSample, prepare
@@ -34,6 +34,7 @@ from pipelines.run.unfinished import UnfinishedRun
 __all__ = ["GeologyReport", "planar_scene", "run_geology"]
 
 _ON_THE_FLOOR = 0.1  # gap over the smallest radius below which a disk stands on the floor [-]
+_START = 2000  # iterations of ADMM, at most, that find the forces of the sample at rest
 _SAMPLES = ".samples"  # folder of prepared samples, beside that of the results
 
 
@@ -99,6 +100,7 @@ def planar_scene(scene: GeologyScene, sample: PreparedSample) -> PlanarScene:
             threads=solver.threads,
         ),
         min_sweeps=solver.min_iterations,
+        start_iterations=_START,
         loads=setup.loads,
         rolling=contact.rolling,
     )
@@ -175,11 +177,14 @@ def run_geology(
         PlanarObserver(scene.output.fields_every, observation.fields),
     )
     summary: dict[str, Any] = {}
+    rows: dict[str, dict[str, Array]] = {}
     number: int | None = None
 
     def write(fresh: Path, result: PlanarResult, archive: UnfinishedRun) -> None:
         progress(Progress("write", 0, 1, "results"))
-        summary.update(write_results(fresh, scene, sample, result, observation, archive))
+        rows.update(observation.rows(scene.output.every))
+        instants = observation.instants(scene.output.fields_every)
+        summary.update(write_results(fresh, scene, sample, result, rows, instants, archive))
 
     with nullcontext() if url is None else open_database(url) as database:
         with scene.document.at(kind):
@@ -187,7 +192,6 @@ def run_geology(
                 planar, folder, resume, scene.output.checkpoint, progress, stop, observers, write
             )
         if database is not None:
-            rows = {name: read_rows(folder / file) for name, file in summary["cells"].items()}
             number = store_record(database, folder, geology_record(scene, result, summary, rows))
     return GeologyReport(folder, summary, tuple(summary["warnings"]), number)
 

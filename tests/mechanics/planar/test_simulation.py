@@ -359,3 +359,17 @@ def test_each_step_makes_the_sweeps_that_are_asked_for_at_least():
     assert (simulate_planar(scene).history.iterations == 60).all()
     with pytest.raises(SceneError, match="min_sweeps = 60"):
         replace(scene, solver=SolverSettings())
+
+
+def test_a_column_begins_with_the_forces_under_which_it_rests():
+    # ten sweeps carry the weight through ten of forty disks in a step
+    disks = tuple(disk(f"d{n}", (0.0, 0.1 + 0.2 * n)) for n in range(40))
+    few = SolverSettings(Method.NSGS, tolerance=1e-12, max_iterations=10)
+    scene = PlanarScene("column", disks, (FLOOR,), time=PlanarTime(1e-3, 1.0, 5e-3, **GOES_ON), solver=few)
+    without = simulate_planar(scene)
+    found = simulate_planar(replace(scene, start_iterations=500))
+    assert without.history.speed.max() > 3 * G * 1e-3
+    assert found.history.speed.max() < 0.01 * without.history.speed.max()
+    assert found.reaction == pytest.approx(found.weight, rel=5e-3)
+    with pytest.raises(SceneError, match="start_iterations = -1"):
+        replace(scene, start_iterations=-1)

@@ -130,7 +130,7 @@ def test_negative_cohesion_is_refused():
         (
             "smallest = 0.2\nlargest = 0.3",
             "smallest = 0.001\nlargest = 0.001",
-            "1.17e+07 disks of 0.001 to 0.001 m",
+            "1.01e+07 disks of 0.001 to 0.001 m",
         ),
     ],
 )
