@@ -68,7 +68,7 @@ def _part(folder: Path, number: int, one: Mapping[str, Any]) -> dict[str, Any]:
         "headline": one["headline"],
         "cautions": [code["caution"]] if code["caution"] else [],
         "code": code["code"],
-        "values": [
+        "numbers": [
             (value["symbol"], f"{value['value']:.4g} {value['unit']}", value["formula"], value["article"])
             for value in code["values"]
         ],
