@@ -1,6 +1,7 @@
-"""Thrust, least thickness and limit loads of arches and walls against closed forms and the reference cases."""
+"""Thrust, least thickness, façades and oscillators: limit states against closed forms and the reference cases."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -88,6 +89,54 @@ def test_panels_have_their_multipliers(stones, courses, friction, value):
     """W08."""
     on = standing(running_bond(bond(stones, courses, halves_first=True), 0.2, 0.1), friction)
     assert limit_load(on, ALONG).multiplier == pytest.approx(value, rel=2e-5)
+
+
+def facade(stones, courses, returns, friction):
+    """A façade of stones 0.08 x 0.04 x 0.028 m along x, with bonded return walls at both ends."""
+    length, thick, high = 0.08, 0.04, 0.028
+    width, deep, blocks = stones * length, returns * length + thick, [ground(half=2.0)]
+    for course in range(courses):
+        whole = course % 2 == 0
+        inset = 0.0 if whole else thick
+        ends = [(0.0, thick), (width - thick, width)]
+        lying = [(a, 0.0, b, thick) for a, b in _row(inset, width - inset, length)]
+        if returns:
+            lying += [(x0, a, x1, b) for a, b in _row(thick - inset, deep, length) for x0, x1 in ends]
+        elif not whole:
+            lying += [(x0, 0.0, x1, thick) for x0, x1 in ends]
+        blocks += [
+            cuboid(f"{course}-{number}", (x0, y0, course * high), (x1, y1, (course + 1) * high))
+            for number, (x0, y0, x1, y1) in enumerate(lying)
+        ]
+    return standing(blocks, friction)
+
+
+def _row(start, end, length):
+    return pairwise([*np.arange(start, end - 1e-9, length), end])
+
+
+FACADES = [
+    (4, 6, 0, 0.7, 0.2381, 0.2381),
+    (6, 10, 0, 0.7, 0.14286, 0.14286),
+    (4, 6, 2, 0.7, 0.59992, 0.68301),
+    (4, 10, 2, 0.7, 0.41715, 0.65024),
+    (6, 10, 3, 0.7, 0.46866, 0.60397),
+]
+
+
+@pytest.mark.parametrize(("stones", "courses", "returns", "friction", "out", "inwards"), FACADES)
+def test_facades_with_returns_have_their_multipliers(stones, courses, returns, friction, out, inwards):
+    """W09, an upper bound in space with exact cones: to the digits given."""
+    on = facade(stones, courses, returns, friction)
+    for way, value in ((-1.0, out), (1.0, inwards)):
+        assert limit_load(on, Acceleration((0.0, way, 0.0))).multiplier == pytest.approx(value, abs=1e-5)
+
+
+@pytest.mark.parametrize(("stones", "courses", "returns", "out"), [(4, 6, 2, 0.4), (4, 10, 2, 0.39076)])
+def test_facades_with_less_friction_bear_less(stones, courses, returns, out):
+    """W09, μ = 0.4."""
+    on = facade(stones, courses, returns, 0.4)
+    assert limit_load(on, Acceleration((0.0, -1.0, 0.0))).multiplier == pytest.approx(out, abs=1e-5)
 
 
 @pytest.mark.parametrize(("count", "height", "value"), [(5, 1.0, 0.2), (10, 0.6, 1 / 6)])
