@@ -3,7 +3,6 @@
 Runs that stand in the folder are not made again. `--write` puts the tables into docs/geology.md.
 """
 
-import argparse
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -17,6 +16,7 @@ from benchmarks.report import (
     commit,
     guarded,
     machine,
+    options_of,
     print_json,
     print_table,
     progress,
@@ -74,14 +74,12 @@ _SWEPT: Table = (
 
 def main() -> None:
     """Make the runs that are not there, and print the tables."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.geology", description=__doc__)
+    parser = options_of("geology", __doc__)
     parser.add_argument("--out", type=Path, default=Path("out/geology-seeds"), help="folder of the runs")
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3, 4, 5])
     parser.add_argument("--only", nargs="+", choices=("fault", "fold"), default=["fault", "fold"])
-    parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--stored", action="store_true", help="make no run, and take those that are there")
     parser.add_argument("--write", action="store_true", help="put the tables into docs/geology.md")
-    parser.add_argument("--json", action="store_true", help="print an array of objects, one for each run")
     options = parser.parse_args()
     if not options.stored:
         for kind, gamma, seed, sweeps in _wanted(options.seeds, options.only):
@@ -178,10 +176,10 @@ def _chosen(runs: Sequence[Mapping[str, Any]], **of: Any) -> list[Mapping[str, A
 
 
 def _spread(values: Iterable[float], digits: int) -> str:
-    """Return mean ± standard deviation."""
+    """Return mean ± standard deviation; of one value, the value."""
     found = np.array(list(values))
-    deviation = found.std(ddof=1) if len(found) > 1 else float("nan")
-    return f"{found.mean():.{digits}f} ± {deviation:.{digits}f}"
+    spread = f" ± {found.std(ddof=1):.{digits}f}" if len(found) > 1 else ""
+    return f"{found.mean():.{digits}f}{spread}"
 
 
 def _late(cell: Mapping[str, Array], column: str, since: float) -> float:
