@@ -3,7 +3,6 @@
 Beside Chipmunk (`pip install pymunk`), where it is installed, with as many iterations of its sequential impulses.
 """
 
-import argparse
 import resource
 import tempfile
 import time
@@ -14,7 +13,17 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
+from benchmarks.report import (
+    Row,
+    Table,
+    environment,
+    guarded,
+    machine,
+    options_of,
+    print_json,
+    print_table,
+    progress,
+)
 from mechanics.arrays import Array
 from mechanics.planar.run import PlanarRun
 from mechanics.planar.scene import Disk, PlanarScene, PlanarTime, Wall
@@ -44,10 +53,8 @@ _TABLE: Table = (
 
 def main() -> None:
     """Print a row for each number of disks."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.disks", description=__doc__)
+    parser = options_of("disks", __doc__)
     parser.add_argument("--disks", nargs="+", type=int, default=[1000, 4000, 15000, 43000, 200000])
-    parser.add_argument("--threads", type=int, default=1)
-    parser.add_argument("--json", action="store_true", help="print an array of objects, one for each row")
     options = parser.parse_args()
     centre, radius, length = _sample()
     _ours(centre, radius, length, 1)

@@ -3,7 +3,6 @@
 Runs that stand in the folder are not made again. `--write` puts the tables into docs/geology.md.
 """
 
-import argparse
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -17,9 +16,11 @@ from benchmarks.report import (
     commit,
     guarded,
     machine,
+    options_of,
     print_json,
     print_table,
     progress,
+    spread,
     table_lines,
     write_between,
 )
@@ -74,14 +75,12 @@ _SWEPT: Table = (
 
 def main() -> None:
     """Make the runs that are not there, and print the tables."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.geology", description=__doc__)
+    parser = options_of("geology", __doc__)
     parser.add_argument("--out", type=Path, default=Path("out/geology-seeds"), help="folder of the runs")
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3, 4, 5])
     parser.add_argument("--only", nargs="+", choices=("fault", "fold"), default=["fault", "fold"])
-    parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--stored", action="store_true", help="make no run, and take those that are there")
     parser.add_argument("--write", action="store_true", help="put the tables into docs/geology.md")
-    parser.add_argument("--json", action="store_true", help="print an array of objects, one for each run")
     options = parser.parse_args()
     if not options.stored:
         for kind, gamma, seed, sweeps in _wanted(options.seeds, options.only):
@@ -177,13 +176,6 @@ def _chosen(runs: Sequence[Mapping[str, Any]], **of: Any) -> list[Mapping[str, A
     return [run for run in runs if all(run[key] == value for key, value in of.items())]
 
 
-def _spread(values: Iterable[float], digits: int) -> str:
-    """Return mean ± standard deviation."""
-    found = np.array(list(values))
-    deviation = found.std(ddof=1) if len(found) > 1 else float("nan")
-    return f"{found.mean():.{digits}f} ± {deviation:.{digits}f}"
-
-
 def _late(cell: Mapping[str, Array], column: str, since: float) -> float:
     late = cell["time"] >= since * cell["time"][-1]
     return float(cell[column][late].mean())
@@ -210,18 +202,18 @@ def _fault_rows(runs: Sequence[Mapping[str, Any]]) -> list[Row]:
             {
                 "gamma": gamma,
                 "seeds": len(group),
-                "pressure": _spread((1e-3 * p for p in pressure), 1),
-                "over": _spread(over, 2),
-                "pushed": _spread(
+                "pressure": spread((1e-3 * p for p in pressure), 1),
+                "over": spread(over, 2),
+                "pushed": spread(
                     (_pushing(run) / pushed[run["seed"]] for run in group if run["seed"] in pushed),
                     2,
                 ),
-                "lambda_x": _spread((cell["lambda_x"][-1] for cell in cells), 2),
-                "lambda_y": _spread((cell["lambda_y"][-1] for cell in cells), 2),
-                "front": _spread((one["front ahead of the tip [m]"] for one in measures), 1),
-                "angle": _spread((one["trishear: apical angle [°]"] for one in measures), 0),
-                "ratio": _spread((one["trishear: propagation to slip [-]"] for one in measures), 2),
-                "residual": _spread((one["trishear: residual over slip [-]"] for one in measures), 3),
+                "lambda_x": spread((cell["lambda_x"][-1] for cell in cells), 2),
+                "lambda_y": spread((cell["lambda_y"][-1] for cell in cells), 2),
+                "front": spread((one["front ahead of the tip [m]"] for one in measures), 1),
+                "angle": spread((one["trishear: apical angle [°]"] for one in measures), 0),
+                "ratio": spread((one["trishear: propagation to slip [-]"] for one in measures), 2),
+                "residual": spread((one["trishear: residual over slip [-]"] for one in measures), 3),
                 "eta": float(np.median([summary["natural_map"]["median"] for summary in summaries])),
             }
         )
@@ -257,10 +249,10 @@ def _fold_rows(runs: Sequence[Mapping[str, Any]]) -> list[Row]:
         rows.append(
             {
                 "cell": name,
-                "lambda_x": _spread((cell["lambda_x"][-1] for cell in cells), 2),
-                "lambda_y": _spread((cell["lambda_y"][-1] for cell in cells), 2),
-                "shear": _spread((cell["shear"][-1] for cell in cells), 2),
-                "pressure": _spread((1e-3 * _late(cell, "p", 0.9) for cell in cells), 1),
+                "lambda_x": spread((cell["lambda_x"][-1] for cell in cells), 2),
+                "lambda_y": spread((cell["lambda_y"][-1] for cell in cells), 2),
+                "shear": spread((cell["shear"][-1] for cell in cells), 2),
+                "pressure": spread((1e-3 * _late(cell, "p", 0.9) for cell in cells), 1),
             }
         )
     return rows

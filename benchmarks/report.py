@@ -1,5 +1,6 @@
 """Output of every benchmark: a table or JSON, and the machine."""
 
+import argparse
 import json
 import os
 import platform
@@ -20,6 +21,7 @@ __all__ = [
     "environment",
     "guarded",
     "machine",
+    "options_of",
     "print_json",
     "print_table",
     "progress",
@@ -109,6 +111,16 @@ def _cell(value: Any, form: str) -> str:
     if value is None or (isinstance(value, float) and value != value):
         return "–"
     return format(value, form)
+
+
+def options_of(name: str, description: str | None) -> argparse.ArgumentParser:
+    """Return the options of a benchmark of disks, to which it adds its own."""
+    parser = argparse.ArgumentParser(prog=f"python -m benchmarks.{name}", description=description)
+    parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument(
+        "--json", action="store_true", help="print an array of objects, one for each row or run"
+    )
+    return parser
 
 
 def machine() -> str:
