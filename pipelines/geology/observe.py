@@ -9,7 +9,7 @@ from typing import Any, overload
 import numpy as np
 
 from mechanics.arrays import Array, Ints
-from mechanics.planar.measures.cells import Cell, members, shape_of
+from mechanics.planar.measures.cells import Cell, layer_members, members, shape_of
 from mechanics.planar.measures.fabric import fabric_of
 from mechanics.planar.measures.strain import deformation
 from mechanics.planar.measures.stress import mean_stress, moments
@@ -103,6 +103,7 @@ class Observation:
     start : (nd, 2) centres at the start [m]
     radius : (nd,) [m]
     thickness : of the slice [m]
+    layer : (nd,) number of the layer of each disk, 0 at the base: layers are followed too; None: they are not
 
     Raises
     ------
@@ -110,11 +111,18 @@ class Observation:
     """
 
     def __init__(
-        self, folder: Path, cells: Sequence[Cell], start: Array, radius: Array, thickness: float
+        self,
+        folder: Path,
+        cells: Sequence[Cell],
+        start: Array,
+        radius: Array,
+        thickness: float,
+        layer: Ints | None = None,
     ) -> None:
         self._folder, self._start, self._radius, self._thickness = folder, start, radius, thickness
         groups: dict[str, Ints] = {cell.name: members(cell, start) for cell in cells}
-        self._groups = groups | {WHOLE: np.arange(len(radius))}
+        layers = {} if layer is None else layer_members(layer)
+        self._groups = layers | groups | {WHOLE: np.arange(len(radius))}
         self._reference = tessellation(start, radius)
         self._last: tuple[PlanarInstant, Tessellation, Array] | None = None
 

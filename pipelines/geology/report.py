@@ -21,7 +21,7 @@ _CAPTIONS = {
     "shear": "Local shear since the start: the logarithm of the ratio of the principal stretches.",
     "cells": "The cells with time; dashed lines part the phases of the run.",
 }
-_HEAD = ("Cell", "λx", "λy", "p", "q", "σ1 from x", "Anisotropy", "Coordination", "Porosity")
+_HEAD = ("Cell", "λx", "λy", "p", "q", "σ1 from x", "Anisotropy", "φ1 from x", "Coordination", "Porosity")
 _OUTCOMES = {
     "equilibrium": "At the end all disks rest, in balance.",
     "moving": "At the end of the run disks still move.",
@@ -96,13 +96,20 @@ def _cell(name: str, columns: Mapping[str, Array]) -> tuple[str, ...]:
         ratio(last["lambda_x"]),
         ratio(last["lambda_y"]),
         *(kilopascals(last[stress]) if np.isfinite(last[stress]) else "–" for stress in ("p", "q")),
-        f"{last['direction']:.0f}°",
-        *(ratio(last[column]) for column in ("anisotropy", "coordination", "porosity")),
+        _degrees(last["direction"]),
+        ratio(last["anisotropy"]),
+        _degrees(last["fabric_direction"]),
+        *(ratio(last[column]) for column in ("coordination", "porosity")),
     )
 
 
+def _degrees(angle: float) -> str:
+    return f"{angle:.0f}°" if np.isfinite(angle) else "–"
+
+
 def _settings(scene: GeologyScene) -> list[tuple[str, str]]:
+    layers = {f"layers, {number} from below": layer for number, layer in enumerate(scene.layers, start=1)}
     return [
         (name, ", ".join(f"{key} = {value}" for key, value in asdict(table).items() if value is not None))
-        for name, table in scene.tables.items()
+        for name, table in {**scene.tables, **layers}.items()
     ]

@@ -27,6 +27,7 @@ from pipelines.run.unfinished import UnfinishedRun
 __all__ = ["quality_of", "write_results"]
 
 _MOST_OVERLAP = 0.01  # over the smallest radius, beyond which a run says so first [-]
+_FABRIC = ("anisotropy", "fabric_direction", "coordination", "porosity")  # columns of a cell
 _ROUNDING = 1e-3  # of an overlap that is just as large as allowed [-]
 
 
@@ -110,6 +111,7 @@ def write_results(
         "time": {"simulated": result.time, "wall": sum(result.wall_time.values()), **result.wall_time},
         "energy": result.errors.energy,
         "cells": cells,
+        "fabric": {name: _fabric(columns) for name, columns in rows.items()},
         "measures": {name: value if np.isfinite(value) else None for name, value in measures.items()},
         "versions": dict(versions()),
         "version": version("moma-masonry"),
@@ -133,6 +135,12 @@ def _write_rows(folder: Path, rows: Mapping[str, Mapping[str, Array]]) -> dict[s
             writer.writerow(CELL_COLUMNS)
             writer.writerows(zip(*(map(repr, column.tolist()) for column in columns.values()), strict=True))
     return cells
+
+
+def _fabric(columns: Mapping[str, Array]) -> dict[str, float | None]:
+    """Return the fabric of a cell at the end, as its columns are called."""
+    last = {name: float(columns[name][-1]) for name in _FABRIC}
+    return {name: value if np.isfinite(value) else None for name, value in last.items()}
 
 
 def _draw(

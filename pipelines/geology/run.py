@@ -196,10 +196,18 @@ def run_geology(
     return GeologyReport(folder, summary, tuple(summary["warnings"]), number)
 
 
+def _followed_layers(scene: GeologyScene, sample: PreparedSample) -> Ints | None:
+    """Return the layers (nd,) of a deposit, whose fabric tells of its preparation; None for other experiments."""
+    if scene.kind != "deposit":
+        return None
+    return _materials(scene, sample)[0] if scene.layers else sample.layer
+
+
 def _observation(
     scene: GeologyScene, sample: PreparedSample, planar: PlanarScene, place: Path
 ) -> Observation:
+    layer = _followed_layers(scene, sample)
     try:
-        return Observation(place, scene.cells, sample.centre, sample.radius, planar.thickness)
+        return Observation(place, scene.cells, sample.centre, sample.radius, planar.thickness, layer)
     except SceneError as error:
         scene.document.fail(f"{error.where}: {error.what}", "cells", remedy=error.remedy)

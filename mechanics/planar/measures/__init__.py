@@ -1,6 +1,6 @@
 """Measures of a sample of disks: cells that follow the material, stress, fabric, strain and surface.
 
-Public: `Tessellation` (tessellation); `Cell`, `members`, `shape_of` (cells); `moments`, `Stress`, `mean_stress`
-(stress); `Fabric`, `fabric_of` (fabric); `Deformation`, `deformation` (strain); `profile`, `slope` (surface);
-`Trishear`, `trishear_fit` (trishear); `critical_slope` (taper); `Thrusts`, `thrusts_of` (thrusts).
+Public: `Tessellation` (tessellation); `Cell`, `layer_members`, `members`, `shape_of` (cells); `moments`,
+`Stress`, `mean_stress` (stress); `Fabric`, `fabric_of` (fabric); `Deformation`, `deformation` (strain); `profile`,
+`slope` (surface); `Trishear`, `trishear_fit` (trishear); `critical_slope` (taper); `Thrusts`, `thrusts_of` (thrusts).
 """

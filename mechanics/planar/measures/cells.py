@@ -7,7 +7,7 @@ import numpy as np
 from mechanics.arrays import Array, Ints
 from moma.errors import SceneError
 
-__all__ = ["Cell", "Shape", "members", "shape_of"]
+__all__ = ["Cell", "Shape", "layer_members", "members", "shape_of"]
 
 _FEWEST = 5  # disks of a cell: fewer have no mean deformation
 
@@ -73,6 +73,22 @@ def members(cell: Cell, centre: Array) -> Ints:
             remedy=f"place it within the sample, with a radius that holds {_FEWEST} or more",
         )
     return found
+
+
+def layer_members(layer: Ints) -> dict[str, Ints]:
+    """Return the disks of each layer by its name, from below; a layer with too few disks is left out.
+
+    Parameters
+    ----------
+    layer : (nd,) number of the layer of each disk, 0 at the base
+
+    >>> {name: len(disks) for name, disks in layer_members(np.array([0] * 20 + [1] * 30 + [2])).items()}
+    {'layer 1': 20, 'layer 2': 30}
+    """
+    count = np.bincount(layer)
+    return {
+        f"layer {number + 1}": np.flatnonzero(layer == number) for number in np.flatnonzero(count >= _FEWEST)
+    }
 
 
 def shape_of(start: Array, now: Array) -> Shape:

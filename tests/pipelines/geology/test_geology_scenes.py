@@ -244,6 +244,58 @@ def test_a_run_says_first_how_far_it_can_be_trusted(tmp_path):
     assert "<th>W1</th>" in page
 
 
+DEPOSIT = """
+[sample]
+smallest = 0.2
+largest = 0.3
+layers = 3
+[time]
+step = 0.01
+steps = 2
+[deposit]
+length = 12.0
+height = 3.0
+[output]
+every = 1
+figures = false
+"""
+
+
+@pytest.mark.parametrize(("tables", "count"), [("", 3), (LAYERED.replace("top = 2.0", "top = 1.5"), 3)])
+def test_a_deposit_tells_the_fabric_of_its_layers(tmp_path, tables, count):
+    (tmp_path / "deposit.toml").write_text(DEPOSIT + tables, encoding="utf-8")
+    url = f"sqlite:///{tmp_path / 'runs.db'}"
+    done = run_geology(tmp_path / "deposit.toml", "deposit", tmp_path / "out", url=url)
+    names = [*(f"layer {number}" for number in range(1, count + 1)), "whole sample"]
+    fabric = done.summary["fabric"]
+    assert list(fabric) == names
+    page = (tmp_path / "out/report.html").read_text(encoding="utf-8")
+    kept = {one["cell"]: one for one in answer("runs", "1", "--db", url)["cells"]}
+    ends = []
+    for name in names:
+        last = {
+            key: values[-1]
+            for key, values in read_rows(tmp_path / "out" / done.summary["cells"][name]).items()
+        }
+        assert fabric[name] == {key: last[key] for key in fabric[name]}
+        assert kept[name]["porosity"] == fabric[name]["porosity"]
+        assert 0.05 < fabric[name]["porosity"] < 0.3
+        assert f"<th>{name}</th>" in page
+        ends.append(last["y"])
+    # from below, the boundaries of the layers between their mean heights
+    tops = [1.0, 1.5 if tables else 2.0]
+    assert ends[0] < tops[0] < ends[1] < tops[1] < ends[2]
+
+
+def test_the_report_tells_the_layers_among_the_settings(tmp_path):
+    (tmp_path / "fault.toml").write_text(SMALL + LAYERED, encoding="utf-8")
+    run_geology(tmp_path / "fault.toml", "fault", tmp_path / "out")
+    page = (tmp_path / "out/report.html").read_text(encoding="utf-8")
+    assert "layers, 1 from below" in page
+    assert "top = 1.0, density = 3000.0, friction = 0.1, cohesion = 50.0" in page
+    assert "top = 9.0, friction = 0.3, cohesion = 20.0" in page
+
+
 def test_overlaps_are_over_the_smallest_radius_and_a_large_one_is_a_caution():
     scene = parse_geology(SMALL, "fault.toml", "fault")
     sample = PreparedSample(np.zeros((2, 2)), np.array([0.2, 0.3]), np.zeros(2, dtype=np.int64), "")
