@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations_with_replacement
 from pathlib import Path
 from typing import Any
@@ -18,8 +18,11 @@ from mechanics.planar.simulate import PlanarObserver
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.law import Law
 from mechanics.scene.laws.lennard_jones import LennardJones
+from mechanics.scene.loads.load import Loads
 from mechanics.scene.scene import LawRule, Method, SolverSettings
 from moma.errors import SceneError
+from pipelines.geology.experiments.experiment import Setup
+from pipelines.geology.experiments.membrane import Membrane
 from pipelines.geology.file import GeologyScene, read_geology
 from pipelines.geology.observe import Observation
 from pipelines.geology.record import geology_record
@@ -101,9 +104,16 @@ def planar_scene(scene: GeologyScene, sample: PreparedSample) -> PlanarScene:
         ),
         min_sweeps=solver.min_iterations,
         start_iterations=_START,
-        loads=setup.loads,
+        loads=_loads(setup, codes, sample),
         rolling=contact.rolling,
     )
+
+
+def _loads(setup: Setup, codes: tuple[str, ...], sample: PreparedSample) -> Loads:
+    if not setup.membrane:
+        return setup.loads
+    membrane = Membrane(frozenset(codes), sample.radius, setup.membrane)
+    return replace(setup.loads, forces=(*setup.loads.forces, membrane))
 
 
 def _law(scene: GeologyScene, friction: float, cohesion: float) -> Law:

@@ -2,5 +2,6 @@
 
 Public: `Tessellation` (tessellation); `Cell`, `layer_members`, `members`, `shape_of` (cells); `moments`,
 `Stress`, `mean_stress` (stress); `Fabric`, `fabric_of` (fabric); `Deformation`, `deformation` (strain); `profile`,
-`slope` (surface); `Trishear`, `trishear_fit` (trishear); `critical_slope` (taper); `Thrusts`, `thrusts_of` (thrusts).
+`slope` (surface); `sides_of` (outline); `Trishear`, `trishear_fit` (trishear); `critical_slope` (taper);
+`Thrusts`, `thrusts_of` (thrusts).
 """

@@ -1,7 +1,8 @@
-"""Biaxial compression between smooth platens: the friction angle of the sample."""
+"""Biaxial compression between smooth platens, or within a membrane: the friction angle of the sample."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Annotated
 
 import numpy as np
@@ -16,20 +17,35 @@ from mechanics.stones.settings import Setting
 from pipelines.geology.experiments.experiment import Setup
 from pipelines.geology.observe import Fields
 
-__all__ = ["Biaxial"]
+__all__ = ["Biaxial", "Sides"]
 
 _LATE = 0.5  # of the run, whose mean is that of large strain [-]
+_PEAK = 0.01  # vertical strain over which the largest ratio is a mean [-]
 _MASS = 0.1  # of a side platen, over that of the sample if it were water [-]
+
+
+class Sides(StrEnum):
+    """What presses on the sides of the sample."""
+
+    RIGID = "rigid"
+    FLEXIBLE = "flexible"
 
 
 @dataclass(frozen=True)
 class Biaxial:
-    """`[biaxial]`: the top sinks at a constant speed, the sides press with a constant pressure; nothing weighs."""
+    """`[biaxial]`: the top sinks at a constant speed, the sides press with a constant pressure; nothing weighs.
+
+    Rigid platens press with a constant force, pressure times `height` at the start; a flexible membrane follows the
+    sides, and presses with a constant pressure.
+    """
 
     width: Annotated[float, Setting("Width of the sample.", "m", above=0)]
     height: Annotated[float, Setting("Height of the sample.", "m", above=0)]
     pressure: Annotated[float, Setting("Of the sides.", "Pa", above=0)]
     strain: Annotated[float, Setting("Vertical strain at the end.", "-", above=0, below=0.9)] = 0.2
+    walls: Annotated[
+        Sides, Setting("Sides: platens that stay straight, or a membrane that follows the disks.")
+    ] = Sides.RIGID
 
     @property
     def length(self) -> float:
@@ -48,9 +64,19 @@ class Biaxial:
     def setup(self, step: float, duration: float) -> Setup:
         """Return the platens; those at the sides have a mass, and press with their force whatever their place."""
         out, mass = 0.5 * self.width, _MASS * 1000.0 * self.width * self.height
+        sink = ImposedMotion(
+            frozenset({"top"}), History.constant([0.0, -self.strain * self.height / duration, 0.0])
+        )
+        floor = Wall("floor", (-out, 0.0), (self.width + out, 0.0))
+        top = Wall("top", (-out, self.height), (self.width + out, self.height))
+        if self.walls is Sides.FLEXIBLE:
+            smooth = frozenset({"floor", "top"})
+            return Setup(
+                (floor, top), Loads(motions=(sink,)), smooth=smooth, weightless=True, membrane=self.pressure
+            )
         walls = (
-            Wall("floor", (-out, 0.0), (self.width + out, 0.0)),
-            Wall("top", (-out, self.height), (self.width + out, self.height)),
+            floor,
+            top,
             Wall("left", (0.0, -out), (0.0, self.height + out), mass),
             Wall("right", (self.width, -out), (self.width, self.height + out), mass),
         )
@@ -60,11 +86,7 @@ class Biaxial:
                 StoneForce(frozenset({code}), History.constant([sign * force, 0.0, 0.0]))
                 for code, sign in (("left", 1.0), ("right", -1.0))
             ),
-            motions=(
-                ImposedMotion(
-                    frozenset({"top"}), History.constant([0.0, -self.strain * self.height / duration, 0.0])
-                ),
-            ),
+            motions=(sink,),
         )
         return Setup(walls, loads, smooth=frozenset(wall.code for wall in walls), weightless=True)
 
@@ -75,12 +97,14 @@ class Biaxial:
     def measures(
         self, start: Array, radius: Array, instants: Sequence[Fields], whole: Mapping[str, Array]
     ) -> Mapping[str, float]:
-        """Return the friction angle at large strain, of the mean stress of the sample."""
+        """Return the friction angle at large strain and at its peak, of the mean stress of the sample."""
         late = whole["time"] >= _LATE * whole["time"][-1]
-        ratio = np.clip(whole["q"][late] / whole["p"][late], 0.0, 1.0)
-        angle = np.degrees(np.arcsin(ratio))
+        ratio = np.clip(whole["q"] / whole["p"], 0.0, 1.0)
+        angle = np.degrees(np.arcsin(ratio[late]))
+        rows = min(len(ratio), max(1, round(_PEAK / self.strain * len(ratio))))
         return {
             "friction angle [°]": float(angle.mean()),
             "its standard deviation [°]": float(angle.std()),
-            "sin φ [-]": float(ratio.mean()),
+            "sin φ [-]": float(ratio[late].mean()),
+            "sin φ, peak [-]": float(np.convolve(ratio, np.full(rows, 1.0 / rows), "valid").max()),
         }

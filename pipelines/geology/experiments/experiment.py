@@ -23,6 +23,7 @@ class Setup:
     smooth : codes of walls without friction
     weightless : nothing weighs any more once the sample is deposited
     rough : disks that stand on y = 0 at the start are glued to it
+    membrane : pressure of a membrane on the sides of the sample; 0: there is none [Pa]
     """
 
     walls: tuple[Wall, ...]
@@ -30,6 +31,7 @@ class Setup:
     smooth: frozenset[str] = frozenset()
     weightless: bool = False
     rough: bool = False
+    membrane: float = 0.0
 
 
 class Experiment(Protocol):

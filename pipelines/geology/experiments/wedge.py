@@ -22,8 +22,11 @@ from pipelines.geology.observe import Fields
 __all__ = ["Wedge"]
 
 _MIDDLE = (0.15, 0.85)  # part of the wedge, along its base, over which its slope is measured [-]
-_WALL = 1  # number of the wall that pushes, after the disks
-_LATE = 0.5  # of the run, whose mean is that of the wall's force [-]
+_BASE, _WALL = 0, 1  # numbers of the base and of the wall that pushes, after the disks
+_LATE = 0.5  # of the run, whose means are those of the forces on wall and base [-]
+_SLIDES = 0.5  # speed over that of the wall, of disks that slide over the base [-]
+_TOE = 2.0  # height of the surface over the mean radius, behind which the wedge ends [-]
+_ALONE = 9  # places of a running mean of the height, one each mean radius
 _RISEN = 2.0  # rise of the surface over the mean radius, at the front of what a push has built [-]
 _ROOM = 1.5  # length of the base over that of the wedge and the push [-]
 
@@ -39,6 +42,9 @@ class Wedge:
         0.0
     )
     layer_length: Annotated[float, Setting("Length of that layer.", "m", at_least=0)] = 0.0
+    box: Annotated[
+        bool, Setting("A wall that stays ends the layer, as in a sandbox; false: it ends freely.")
+    ] = False
 
     def __post_init__(self) -> None:
         if self.layer >= self.height and self.slope > 0:
@@ -47,6 +53,12 @@ class Wedge:
             )
         if self.slope == 0 and self.layer_length == 0:
             raise SceneError("slope = 0 needs a layer", where="wedge", remedy="give layer and layer_length")
+        if self.box and self.push > 0.9 * self.length:
+            raise SceneError(
+                f"push = {self.push:g} m of {self.length:g} m between two walls",
+                where="wedge",
+                remedy="push less",
+            )
 
     @property
     def _foot(self) -> float:
@@ -70,10 +82,15 @@ class Wedge:
 
     def setup(self, step: float, duration: float) -> Setup:
         """Return the base and the wall, which goes its way within the run."""
-        walls = (
+        walls: tuple[Wall, ...] = (
             Wall("base", (-0.1 * self.length, 0.0), (_ROOM * (self.length + self.push), 0.0)),
             Wall("left", (0.0, -0.1 * self.height), (0.0, 3.0 * self.height)),
         )
+        if self.box:
+            walls = (
+                *walls,
+                Wall("right", (self.length, -0.1 * self.height), (self.length, 3.0 * self.height)),
+            )
         speed = History.constant([self.push / duration, 0.0, 0.0])
         return Setup(walls, Loads(motions=(ImposedMotion(frozenset({"left"}), speed),)))
 
@@ -86,36 +103,66 @@ class Wedge:
     ) -> Mapping[str, float]:
         """Return what sandboxes are compared by: slopes, thrusts, and the force on the wall; and the local shear.
 
-        Without a slope at the start, the slope is that of the wedge that the push has built. Thrusts are found in the
-        layer before the wedge.
+        The slope at the end is that of the wedge up to where it ends then: at its toe, at the layer before it, or,
+        without a slope at the start, where what the push has built goes over into the layer. Thrusts are found in the
+        layer.
         """
         last = instants[-1]
         inner = np.isfinite(last.shear)
         now = last.position[: len(start), :2]
-        end = self._foot or self._front(start, now, radius) - self.push
-        thrusts = thrusts_of(start, now, last.shear, radius, self.layer)
+        level = self.layer if self.slope else self.height
+        thrusts = thrusts_of(start, now, last.shear, radius, level)
         return {
             "slope at the start [°]": self._slope(start, radius, 0.0, self._foot or self.length),
-            "slope [°]": self._slope(now, radius, self.push, end),
+            "slope [°]": self._slope(now, radius, self.push, self._end(start, now, radius) - self.push),
             "highest [m]": float((now[:, 1] + radius).max()),
             "thrusts": float(len(thrusts.place)),
             "spacing of thrusts [m]": thrusts.spacing,
             "dip of thrusts [°]": float(np.degrees(np.mean(thrusts.dip))) if len(thrusts.dip) else np.nan,
             "force on the wall [N/m]": self._wall_force(instants),
+            "friction angle of the base [°]": self._basal(instants),
             "local shear, median [-]": float(np.median(last.shear[inner])),
             "local shear, 95 % [-]": float(np.quantile(last.shear[inner], 0.95)),
         }
+
+    def _end(self, start: Array, now: Array, radius: Array) -> float:
+        if not self.slope:
+            return self._front(start, now, radius)
+        return self.push + self._foot if self.layer else self._toe(now, radius)
 
     def _front(self, start: Array, now: Array, radius: Array) -> float:
         places = np.arange(0.0, self.length, radius.mean())
         risen = profile(now, radius, places) - profile(start, radius, places)
         return float(places[np.nan_to_num(risen) > _RISEN * radius.mean()].max(initial=self.push))
 
+    def _toe(self, place: Array, radius: Array) -> float:
+        """Return the place up to which a wedge without a layer before it is higher than a disk."""
+        places = np.arange(0.0, _ROOM * (self.length + self.push), radius.mean())
+        height = np.nan_to_num(profile(place, radius, places))
+        # disks that have left the toe lie alone
+        high = np.convolve(height, np.full(_ALONE, 1.0 / _ALONE), "same") > _TOE * radius.mean()
+        return float(places[high].max(initial=self.push))
+
+    def _basal(self, instants: Sequence[Fields]) -> float:
+        """Return the friction angle of the base where disks slide over it, of the forces in the late instants [°]."""
+        force = np.zeros(2)
+        for one in self._late(instants):
+            count = len(one.pressure)
+            slides = one.velocity[:, 0] > _SLIDES * one.velocity[count + _WALL, 0]
+            force += one.force[(one.bodies[:, 1] == count + _BASE) & slides[one.bodies[:, 0]]].sum(axis=0)
+        return float(np.degrees(np.arctan2(-force[0], force[1]))) if force.any() else np.nan
+
+    @staticmethod
+    def _late(instants: Sequence[Fields]) -> list[Fields]:
+        return [instant for instant in instants if instant.time >= _LATE * instants[-1].time]
+
     def _wall_force(self, instants: Sequence[Fields]) -> float:
         """Return the mean over the late instants of the force that disks press on the wall with."""
-        late = [instant for instant in instants if instant.time >= _LATE * instants[-1].time]
-        forces = [one.force_normal[one.bodies[:, 1] == len(one.pressure) + _WALL].sum() for one in late]
-        return float(np.mean(forces))
+        pressed = [
+            one.force_normal[one.bodies[:, 1] == len(one.pressure) + _WALL].sum()
+            for one in self._late(instants)
+        ]
+        return float(np.mean(pressed))
 
     def _slope(self, place: Array, radius: Array, shift: float, length: float) -> float:
         low, high = _MIDDLE
