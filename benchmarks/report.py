@@ -6,9 +6,10 @@ import os
 import platform
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from statistics import fmean, stdev
 from typing import Any
 
 from moma.errors import MomaError, UsageError
@@ -24,6 +25,7 @@ __all__ = [
     "print_json",
     "print_table",
     "progress",
+    "spread",
     "table_lines",
     "write_between",
 ]
@@ -63,6 +65,13 @@ def table_lines(rows: Sequence[Row], table: Table) -> list[str]:
         for line in cells
     ]
     return [lines[0], "|" + "|".join("-" * (width + 2) for width in widths) + "|", *lines[1:]]
+
+
+def spread(values: Iterable[float], digits: int) -> str:
+    """Mean ± standard deviation; that of one value is unknown."""
+    found = list(values)
+    deviation = stdev(found) if len(found) > 1 else float("nan")
+    return f"{fmean(found):.{digits}f} ± {deviation:.{digits}f}"
 
 
 def write_between(name: str, lines: Sequence[str], path: Path = _ROOT / "benchmarks" / "README.md") -> None:
