@@ -25,7 +25,7 @@ _MASS = 0.1  # of a side platen, over that of the sample if it were water [-]
 
 
 class Sides(StrEnum):
-    """What presses on the sides of the sample."""
+    """Sides of the sample: platens or a membrane."""
 
     RIGID = "rigid"
     FLEXIBLE = "flexible"
