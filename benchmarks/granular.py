@@ -5,6 +5,7 @@ Runs that stand in the folder are not made again. `--write` puts the tables into
 
 import argparse
 import json
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,7 +32,9 @@ from pipelines.geology.run import run_geology
 
 __all__ = ["main"]
 
-_PAGE = Path(__file__).resolve().parents[1] / "docs" / "geology.md"
+_ROOT = Path(__file__).resolve().parents[1]
+_SCENES = _ROOT / "data" / "samples" / "geology"
+_PAGE = _ROOT / "docs" / "geology.md"
 _SEEDS = [1, 2, 3]
 _BASAL = "friction angle of the base [°]"  # measure of a wedge
 _DENSITY = 2600.0  # [kg/m³]
@@ -51,7 +54,6 @@ class _Case:
     group : table in which it has a row
     name, words : of its folders, and of its row
     kind : of experiment
-    radii : smallest and largest [m]
     tables : of the scene
     """
 
@@ -59,72 +61,52 @@ class _Case:
     name: str
     words: str
     kind: str
-    radii: tuple[float, float]
     tables: Tables
 
 
-# radii of the fold of Renouf, Dubois & Alart (2006); as far apart as in most of the literature; and those at the
-# scale of a sandbox
-_FOLD, _GRADED, _SAND, _COARSE = (0.42, 0.56), (0.3, 0.66), (0.0002, 0.00044), (0.0005, 0.0011)
-_DENSE = {"falling_friction": 0.05}
-_BIAXIAL: Tables = {
-    "contact": {"friction": 0.4},
-    "time": {"step": 0.005, "steps": 4000},
-    "biaxial": {"width": 20.0, "height": 40.0, "pressure": 1e6, "strain": 0.4},
-    "output": {"every": 20, "fields_every": 4000},
-}
-_REPOSE: Tables = {
-    "contact": {"friction": 0.4},
-    "time": {"step": 0.01, "steps": 3000},
-    "repose": {"length": 30.0, "height": 30.0},
-    "output": {"every": 100, "fields_every": 3000},
-}
-_TAPER: Tables = {
-    "contact": {"friction": 0.4, "wall_friction": 0.2},
-    "time": {"step": 0.001, "steps": 3500},
-    "wedge": {"height": 0.0156, "slope": 4.0, "push": 0.07},
-    "output": {"every": 100, "fields_every": 200},
-}
-_LAYER: Tables = {
-    "contact": {"friction": 0.4, "wall_friction": 0.15},
-    "time": {"step": 0.001, "steps": 3000},
-    "wedge": {"height": 0.02, "slope": 0.0, "push": 0.08, "layer_length": 0.24},
-    "output": {"every": 100, "fields_every": 200},
-}
+# radii of the fold of Renouf, Dubois & Alart (2006), and as far apart as in most of the literature [m]
+_FOLD, _GRADED = {"smallest": 0.42, "largest": 0.56}, {"smallest": 0.3, "largest": 0.66}
+_DENSE, _LOOSE = {"falling_friction": 0.05}, {"falling_friction": 0.4}
+_ROLLING, _BLOCKED = {"friction": 0.4}, {"rolling": False, "friction": 0.5}
 
 
 def _with(tables: Tables, **more: Mapping[str, Any]) -> Tables:
     return {name: {**tables.get(name, {}), **more.get(name, {})} for name in {**tables, **more}}
 
 
-_BLOCKED = {"rolling": False, "friction": 0.5}
-_CASES = (
-    _Case("friction", "fold", "0.42 to 0.56 m", "biaxial", _FOLD, _BIAXIAL),
-    _Case(
-        "friction", "fold-dense", "0.42 to 0.56 m, dense", "biaxial", _FOLD, _with(_BIAXIAL, sample=_DENSE)
-    ),
-    _Case("friction", "graded", "0.3 to 0.66 m", "biaxial", _GRADED, _BIAXIAL),
-    _Case(
-        "friction",
-        "blocked-dense",
-        "0.42 to 0.56 m, dense, cannot turn, μ = 0.5",
-        "biaxial",
-        _FOLD,
-        _with(_BIAXIAL, sample=_DENSE, contact=_BLOCKED),
-    ),
-    _Case("heaps", "heap-fold", "0.42 to 0.56 m", "repose", _FOLD, _REPOSE),
-    _Case("heaps", "heap-graded", "0.3 to 0.66 m", "repose", _GRADED, _REPOSE),
-    _Case(
-        "heaps",
-        "heap-blocked",
-        "0.42 to 0.56 m, cannot turn, μ = 0.5",
-        "repose",
-        _FOLD,
-        _with(_REPOSE, contact=_BLOCKED),
-    ),
-    _Case("taper", "taper", "wedge of 4° at the start", "wedge", _SAND, _TAPER),
-    _Case("sandbox", "sandbox", "level layer", "wedge", _COARSE, _LAYER),
-)
+def _shipped(name: str) -> Tables:
+    """Return the tables of a shipped scene."""
+    return tomllib.loads((_SCENES / f"{name}.toml").read_text(encoding="utf-8"))
+
+
+def _cases() -> tuple[_Case, ...]:
+    biaxial, heap = (_with(_shipped(name), contact=_ROLLING) for name in ("biaxial", "repose"))
+    stiff = "0.42 to 0.56 m, cannot turn, μ = 0.5"
+    return (
+        _Case("friction", "fold", "0.42 to 0.56 m", "biaxial", _with(biaxial, sample=_FOLD | _LOOSE)),
+        _Case(
+            "friction",
+            "fold-dense",
+            "0.42 to 0.56 m, dense",
+            "biaxial",
+            _with(biaxial, sample=_FOLD | _DENSE),
+        ),
+        _Case("friction", "graded", "0.3 to 0.66 m", "biaxial", _with(biaxial, sample=_GRADED | _LOOSE)),
+        _Case(
+            "friction",
+            "blocked-dense",
+            f"{stiff}, dense",
+            "biaxial",
+            _with(biaxial, sample=_FOLD | _DENSE, contact=_BLOCKED),
+        ),
+        _Case("heaps", "heap-fold", "0.42 to 0.56 m", "repose", _with(heap, sample=_FOLD)),
+        _Case("heaps", "heap-graded", "0.3 to 0.66 m", "repose", _with(heap, sample=_GRADED)),
+        _Case("heaps", "heap-blocked", stiff, "repose", _with(heap, sample=_FOLD, contact=_BLOCKED)),
+        _Case("taper", "taper", "wedge", "wedge", _shipped("taper")),
+        _Case("sandbox", "sandbox", "level layer", "wedge", _shipped("sandbox")),
+    )
+
+
 _FRICTION: Table = (
     ("words", "radii", ""),
     ("seeds", "seeds", "d"),
@@ -180,18 +162,19 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help="put the tables into docs/geology.md")
     parser.add_argument("--json", action="store_true", help="print an array of objects, one for each run")
     options = parser.parse_args()
+    cases = _cases()
     if not options.stored:
         # a seed of all cases before the next one: tables are whole early
         for seed in options.seeds:
-            for case in (case for case in _CASES if case.group in options.only):
+            for case in (case for case in cases if case.group in options.only):
                 _make(options.out, case, seed)
-    runs = {case.name: _read(options.out, case) for case in _CASES}
+    runs = {case.name: _read(options.out, case) for case in cases}
     if options.json:
         print_json([{"case": name, **run["summary"]} for name, group in runs.items() for run in group])
         return
     makers = {"friction": _friction_row, "heaps": _heaps_row, "taper": _taper_row, "sandbox": _sandbox_row}
     for group in options.only:
-        rows = [makers[group](case, runs) for case in _CASES if case.group == group and runs[case.name]]
+        rows = [makers[group](case, runs) for case in cases if case.group == group and runs[case.name]]
         print_table(rows, _TABLES[group])
         print()
         if options.write and rows:
@@ -205,7 +188,7 @@ def _make(out: Path, case: _Case, seed: int) -> None:
         return
     tables = _with(
         case.tables,
-        sample={"smallest": case.radii[0], "largest": case.radii[1], "density": _DENSITY, "seed": seed},
+        sample={"density": _DENSITY, "seed": seed},
         solver={"min_iterations": 100, "max_iterations": 100},
         output={"figures": False},
     )

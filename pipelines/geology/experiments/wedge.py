@@ -110,11 +110,13 @@ class Wedge:
         last = instants[-1]
         inner = np.isfinite(last.shear)
         now = last.position[: len(start), :2]
+        built = self._front(start, now, radius) - self.push
+        reach = self._reach(now, radius, self.push) if self.slope else built
         level = self.layer if self.slope else self.height
         thrusts = thrusts_of(start, now, last.shear, radius, level)
         return {
-            "slope at the start [°]": self._slope(start, radius, 0.0, self._foot or self.length),
-            "slope [°]": self._slope(now, radius, self.push, self._end(start, now, radius) - self.push),
+            "slope at the start [°]": self._slope(start, radius, 0.0, self._reach(start, radius, 0.0)),
+            "slope [°]": self._slope(now, radius, self.push, reach),
             "highest [m]": float((now[:, 1] + radius).max()),
             "thrusts": float(len(thrusts.place)),
             "spacing of thrusts [m]": thrusts.spacing,
@@ -125,10 +127,11 @@ class Wedge:
             "local shear, 95 % [-]": float(np.quantile(last.shear[inner], 0.95)),
         }
 
-    def _end(self, start: Array, now: Array, radius: Array) -> float:
-        if not self.slope:
-            return self._front(start, now, radius)
-        return self.push + self._foot if self.layer else self._toe(now, radius)
+    def _reach(self, place: Array, radius: Array, shift: float) -> float:
+        """Return the length of the wedge from the wall on; without a slope or a toe, that of the start."""
+        if self.slope and not self.layer:
+            return self._toe(place, radius) - shift
+        return self._foot or self.length
 
     def _front(self, start: Array, now: Array, radius: Array) -> float:
         places = np.arange(0.0, self.length, radius.mean())

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+from mechanics.planar.measures.taper import critical_slope
 from pipelines.geology.run import run_geology
+from tests.paths import ROOT
 
 pytestmark = pytest.mark.slow
 
@@ -50,3 +52,31 @@ def test_a_stable_wedge_keeps_its_slope(tmp_path):
     area = 0.5 * 0.03**2 / np.tan(np.radians(20.0))
     weight = 0.8 * 2600.0 * 9.81 * area
     assert found["force on the wall [N/m]"] == pytest.approx(np.tan(np.radians(BASAL)) * weight, rel=0.15)
+
+
+def test_a_wedge_that_is_pushed_takes_its_critical_taper(tmp_path):
+    """Case G6: at β = 0 the slope is that of Dahlen (1984), within 1.5°.
+
+    The internal friction is that of the same disks in biaxial compression at large strain, the basal one that of the
+    forces on the base in the run. The wedge starts below its taper, deforms until it has it, and slides on from there.
+    """
+    shipped = {
+        kind: (ROOT / f"data/samples/geology/{kind}.toml").read_text(encoding="utf-8")
+        for kind in ("taper", "biaxial")
+    }
+    sizes = ("smallest = 0.42", "smallest = 0.3"), ("largest = 0.56", "largest = 0.66")
+    for old, new in (*sizes, ("falling_friction = 0.05", "falling_friction = 0.4")):
+        assert old in shipped["biaxial"]
+        shipped["biaxial"] = shipped["biaxial"].replace(old, new)
+    found = {}
+    for name, kind in (("taper", "wedge"), ("biaxial", "biaxial")):
+        scene = tmp_path / f"{name}.toml"
+        scene.write_text(shipped[name] + "figures = false\n", encoding="utf-8")
+        found[name] = run_geology(scene, kind, tmp_path / name).summary["measures"]
+    internal = np.radians(found["biaxial"]["friction angle [°]"])
+    basal = np.radians(found["taper"]["friction angle of the base [°]"])
+    # the base slides at Coulomb's limit, or disks roll over it at less
+    assert 0.9 * np.arctan(0.2) < basal < 1.02 * np.arctan(0.2)
+    slope = found["taper"]["slope [°]"]
+    assert slope > found["taper"]["slope at the start [°]"] + 1.5
+    assert slope == pytest.approx(np.degrees(critical_slope(internal, basal)), abs=1.5)
