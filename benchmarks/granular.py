@@ -123,7 +123,6 @@ _HEAPS: Table = (
     ("seeds", "seeds", "d"),
     ("disks", "disks", ""),
     ("angle", "angle of repose, °", ""),
-    ("out", "run-out over length", ""),
 )
 _WEDGES: Table = (
     ("seeds", "seeds", "d"),
@@ -253,7 +252,6 @@ def _heaps_row(case: _Case, runs: Mapping[str, Sequence[Mapping[str, Any]]]) -> 
     own = runs[case.name]
     return _row(case, own) | {
         "angle": _measured(own, "angle of repose [°]", 1),
-        "out": _measured(own, "run-out over length [-]", 2),
     }
 
 

@@ -68,10 +68,10 @@ def table_lines(rows: Sequence[Row], table: Table) -> list[str]:
 
 
 def spread(values: Iterable[float], digits: int) -> str:
-    """Mean ± standard deviation; that of one value is unknown."""
+    """Mean ± standard deviation; one value has none."""
     found = list(values)
-    deviation = stdev(found) if len(found) > 1 else float("nan")
-    return f"{fmean(found):.{digits}f} ± {deviation:.{digits}f}"
+    deviation = f" ± {stdev(found):.{digits}f}" if len(found) > 1 else ""
+    return f"{fmean(found):.{digits}f}{deviation}"
 
 
 def write_between(name: str, lines: Sequence[str], path: Path = _ROOT / "benchmarks" / "README.md") -> None:
