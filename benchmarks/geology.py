@@ -20,6 +20,7 @@ from benchmarks.report import (
     print_json,
     print_table,
     progress,
+    spread,
     table_lines,
     write_between,
 )
@@ -175,13 +176,6 @@ def _chosen(runs: Sequence[Mapping[str, Any]], **of: Any) -> list[Mapping[str, A
     return [run for run in runs if all(run[key] == value for key, value in of.items())]
 
 
-def _spread(values: Iterable[float], digits: int) -> str:
-    """Return mean ± standard deviation; of one value, the value."""
-    found = np.array(list(values))
-    spread = f" ± {found.std(ddof=1):.{digits}f}" if len(found) > 1 else ""
-    return f"{found.mean():.{digits}f}{spread}"
-
-
 def _late(cell: Mapping[str, Array], column: str, since: float) -> float:
     late = cell["time"] >= since * cell["time"][-1]
     return float(cell[column][late].mean())
@@ -208,18 +202,18 @@ def _fault_rows(runs: Sequence[Mapping[str, Any]]) -> list[Row]:
             {
                 "gamma": gamma,
                 "seeds": len(group),
-                "pressure": _spread((1e-3 * p for p in pressure), 1),
-                "over": _spread(over, 2),
-                "pushed": _spread(
+                "pressure": spread((1e-3 * p for p in pressure), 1),
+                "over": spread(over, 2),
+                "pushed": spread(
                     (_pushing(run) / pushed[run["seed"]] for run in group if run["seed"] in pushed),
                     2,
                 ),
-                "lambda_x": _spread((cell["lambda_x"][-1] for cell in cells), 2),
-                "lambda_y": _spread((cell["lambda_y"][-1] for cell in cells), 2),
-                "front": _spread((one["front ahead of the tip [m]"] for one in measures), 1),
-                "angle": _spread((one["trishear: apical angle [°]"] for one in measures), 0),
-                "ratio": _spread((one["trishear: propagation to slip [-]"] for one in measures), 2),
-                "residual": _spread((one["trishear: residual over slip [-]"] for one in measures), 3),
+                "lambda_x": spread((cell["lambda_x"][-1] for cell in cells), 2),
+                "lambda_y": spread((cell["lambda_y"][-1] for cell in cells), 2),
+                "front": spread((one["front ahead of the tip [m]"] for one in measures), 1),
+                "angle": spread((one["trishear: apical angle [°]"] for one in measures), 0),
+                "ratio": spread((one["trishear: propagation to slip [-]"] for one in measures), 2),
+                "residual": spread((one["trishear: residual over slip [-]"] for one in measures), 3),
                 "eta": float(np.median([summary["natural_map"]["median"] for summary in summaries])),
             }
         )
@@ -255,10 +249,10 @@ def _fold_rows(runs: Sequence[Mapping[str, Any]]) -> list[Row]:
         rows.append(
             {
                 "cell": name,
-                "lambda_x": _spread((cell["lambda_x"][-1] for cell in cells), 2),
-                "lambda_y": _spread((cell["lambda_y"][-1] for cell in cells), 2),
-                "shear": _spread((cell["shear"][-1] for cell in cells), 2),
-                "pressure": _spread((1e-3 * _late(cell, "p", 0.9) for cell in cells), 1),
+                "lambda_x": spread((cell["lambda_x"][-1] for cell in cells), 2),
+                "lambda_y": spread((cell["lambda_y"][-1] for cell in cells), 2),
+                "shear": spread((cell["shear"][-1] for cell in cells), 2),
+                "pressure": spread((1e-3 * _late(cell, "p", 0.9) for cell in cells), 1),
             }
         )
     return rows
