@@ -42,6 +42,8 @@ _LATE_LOOK = 0.2
 _EARLY = 0.8
 # iterates from which is extrapolated
 _DEPTH = 6
+# distance of x from its cone, over the impulse, beyond which a contact slides: less is rounding [-]
+_BESIDE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -51,12 +53,13 @@ class Stage:
     Attributes
     ----------
     penalty : σ of a contact over the mean diagonal of its W_αα; larger values bear with contacts that open and slide,
-        smaller ones find the forces of stones that stay in touch sooner [-]
+        smaller ones find the forces of stones that stay in touch sooner. Or three of them, for contacts that are open,
+        slide and stick as the stage begins, which cost a factorisation of their own [-]
     iterations : their number
     extrapolated : from the iterates before (Anderson 1965)
     """
 
-    penalty: float
+    penalty: float | tuple[float, float, float]
     iterations: int
     extrapolated: bool
 
@@ -134,7 +137,7 @@ class _Run:
             problem.friction,
             problem.cohesion,
             np.zeros(len(bodies.side)) if problem.adhesion is None else problem.adhesion,
-            bodies.soft(settings.stages[0].penalty),
+            bodies.soft(np.max(settings.stages[0].penalty)),
         )
         self._stages = list(settings.stages)
         self._pace = float(np.abs(problem.u_free).max()) or float(np.abs(problem.bias).max()) or 1.0
@@ -186,13 +189,16 @@ class _Run:
         """Go on with the penalty of a stage; y keeps its velocities."""
         self._until += stage.iterations
         self._memory = _acceleration(_DEPTH if stage.extrapolated else 0, self._iterate.x.size)
-        soft = self._bodies.soft(stage.penalty)
-        if self.iterations:
-            self._broken()
-            x, z = self._iterate.x, self._iterate.z
+        self._broken()
+        x, z = self._iterate.x, self._iterate.z
+        common = stage.penalty if isinstance(stage.penalty, float) else None
+        soft = self._bodies.soft(common or np.array(stage.penalty)[_kinds(x, z)])
+        if not np.array_equal(soft, self._touching.soft):
             x[:] = z + (x - z) * (soft / self._touching.soft)[:, None]
         self._touching = self._touching._replace(soft=soft)
-        self._factors = self._bodies.factors(stage.penalty, self._touching)
+        # those of the stage before make room for them
+        self._factors = None
+        self._factors = self._bodies.factors(common, self._touching)
 
     def _broken(self) -> tuple[float, float, float]:
         iterate, scale = self._iterate, self._problem.delassus.scale
@@ -248,28 +254,29 @@ class _Bodies:
         self._mass: Array = kernel.masses(contacts.inertia, order)
         self._compliance = np.einsum("cii->c", delassus.diagonal) / 3.0
         self.length = float(np.sqrt((self.arm[:, :3] ** 2) @ np.ones(3)).mean())
-        self._factors: dict[float, kernel.Factors] = {}
+        self._factors: dict[float | None, kernel.Factors] = {}
 
-    def soft(self, penalty: float) -> Array:
-        """Return 1/σ (nc,) for a penalty over the mean diagonals of W_αα [kg]."""
+    def soft(self, penalty: float | Array) -> Array:
+        """Return 1/σ (nc,) for a penalty, or one of each contact, over the mean diagonals of W_αα [kg]."""
         soft: Array = 1.0 / (penalty * self._compliance)
         return soft
 
-    def factors(self, penalty: float, touching: kernel.Touching) -> kernel.Factors:
-        """Return the factors of M + H Σ⁻¹ Hᵀ for the σ of `touching`, which follow from the penalty.
+    def factors(self, penalty: float | None, touching: kernel.Touching) -> kernel.Factors:
+        """Return the factors of M + H Σ⁻¹ Hᵀ for the σ of `touching`, kept where these follow from one penalty.
 
         Raises
         ------
         SolverError : if W is not a number
         """
-        known = self._factors.get(penalty)
-        if known is not None:
-            return known
+        if penalty in self._factors:
+            return self._factors[penalty]
         value: Array = kernel.assemble(touching, self._mass, self._panels)
         if not cholesky.factorise(self._panels, value):
             raise SolverError("W is not a number", where="ADMM of bodies", remedy="use another method")
-        self._factors[penalty] = kernel.Factors(self._panels, value)
-        return self._factors[penalty]
+        factors = kernel.Factors(self._panels, value)
+        if penalty is not None:
+            self._factors[penalty] = factors
+        return factors
 
     def forget(self) -> None:
         """Let go of factors that are too large to be kept from step to step."""
@@ -282,6 +289,13 @@ def _bodies_of(delassus: Delassus, contacts: RigidContacts) -> _Bodies:
     if "bodies" not in memo:
         memo["bodies"] = _Bodies(delassus, contacts)
     return memo["bodies"]
+
+
+def _kinds(x: Array, z: Array) -> Ints:
+    """Return whether contacts are open (0), slide (1) or stick (2), from x and z = P_K(x) (nc, 3)."""
+    force, beyond = np.abs(z).max(axis=1), np.abs(x - z).max(axis=1)
+    kinds: Ints = np.where(force == 0.0, 0, np.where(beyond > _BESIDE * force, 1, 2))
+    return kinds
 
 
 def _acceleration(depth: int, size: int) -> kernel.Acceleration:

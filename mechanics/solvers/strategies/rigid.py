@@ -82,10 +82,16 @@ _EXACT = 1e-6
 _ENDING = (Stage(1e-3, 60, extrapolated=True),)
 # bodies from which Newton's steps in a motion, which factorise anew each, cost more than iterations with kept factors
 _MANY = 1000
-# their penalties in turn: with the larger one contacts sort themselves out, within some 40 iterations; with the smaller
-# one forces that change steadily, by so much in each iteration, arrive 50 times as soon
-_TURN = Stage(0.5, 60, extrapolated=False), Stage(0.01, 60, extrapolated=False)
-_TURNS = (Stage(0.5, 20, extrapolated=False), _TURN[1], *(20 * _TURN))
+# their penalties in turn: with the large one contacts sort themselves out. Then forces change steadily, by so much in
+# each iteration, until a contact opens or slips: with a small one of the contacts that stick they arrive 100 times as
+# soon, while those that are open or slide have larger ones, and do not swing
+_SORTED = Stage(1.0, 60, extrapolated=False)
+_DRIFTED = Stage((1.0, 0.1, 0.01), 90, extrapolated=False)
+_TURNS = (
+    replace(_SORTED, iterations=10),
+    replace(_DRIFTED, iterations=60),
+    *(30 * (_SORTED, _DRIFTED)),
+)
 # and the one with which the forces of rest are found from nothing: it goes as far as methods for rest do, so that the
 # next steps need none
 _COLD_STAGES = (Stage(1e-3, 300, extrapolated=False),)
