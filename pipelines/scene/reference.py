@@ -17,7 +17,6 @@ _HEADING = re.compile(r'(##|###) `(?:type = "(\w+)"|(\[.+\]))`')
 
 SECTIONS: Mapping[str, tuple[Key, ...]] = {
     **{f"[{name}]": keys for name, keys in TABLES.items()},
-    "[site]": SITE_KEYS,
     "[materials.NAME]": MATERIAL_KEYS,
     "[materials.NAME.orthotropy]": ORTHOTROPY_KEYS,
     "[[meshes]]": MESH_KEYS,
@@ -26,6 +25,7 @@ SECTIONS: Mapping[str, tuple[Key, ...]] = {
     **{f"[[loads]] {name}": keys for name, keys in LOAD_TYPES.items()},
     "[[throw]]": THROW_KEYS,
     **{f"[[assess]] {name}": keys for name, keys in ASSESS_TYPES.items()},
+    "[site]": SITE_KEYS,
 }
 """Keys by heading of the page; those of a type follow the heading of its array."""
 

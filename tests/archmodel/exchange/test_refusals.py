@@ -107,7 +107,7 @@ WRONG = (
     ("tables", [], r"given:\d+ character \d+: found '\[', expected {"),
     ("unit", {}, r"unknown key 'unit'; did you mean units\?|found section|unknown key"),
     ("tables.relation", DROP, r"found section membership, expected relation; the order is entry, kind, survey"),
-    ("tables.cell_result", DROP, r"\$\.tables\.cell_result: is missing; write \[\] if it is empty"),
+    ("tables.mechanism_stone", DROP, r"\$\.tables\.mechanism_stone: is missing; write \[\] if it is empty"),
     ("tables.statue", [], r"given:\d+ character \d+: unknown key 'statue'; did you mean"),
     ("tables.entity", {}, r"given:\d+ character \d+: found '{', expected \["),
     ("tables.entity", 3, r"found '3', expected \["),
