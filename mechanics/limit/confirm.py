@@ -118,6 +118,6 @@ def _trial(
     width = float(on.model.surfaces.size[on.free].min())
     step = float(np.sqrt(2.0 * _FALL * width / np.linalg.norm(on.model.gravity(0.0))))
     time = TimeSettings(step, theta=1.0, duration=_STEPS * step, collapse_displacement=_MOVED)
-    loaded = replace(live.applied(on.model.scene, multiplier, on), time=time)
+    loaded = replace(live.applied(on, multiplier), time=time)
     result = simulate(loaded, progress, stop=stop)
     return Trial(multiplier, result.outcome, result.steps, result.errors.unconverged_steps)

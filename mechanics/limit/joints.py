@@ -19,6 +19,7 @@ from mechanics.contact.contacts import Contacts, material_points
 from mechanics.model.model import Model
 from mechanics.results.interfaces import find_interfaces, placed_faces
 from mechanics.results.joint_sections import Section, eccentricity, sections
+from mechanics.results.joints import resultants as summed
 from mechanics.scene.state import State
 
 __all__ = ["Joints", "Resultants", "StressBlocks", "find_joints", "resultants", "stress_blocks"]
@@ -97,11 +98,8 @@ def resultants(joints: Joints, contacts: Contacts, force: Array, strength: Array
     """Return the resultants of forces (nc, 3) in local frames, given the shear strength (nc,) of each contact [N]."""
     own, count, section = np.flatnonzero(joints.joint >= 0), len(joints.bodies), joints.section
     joint = joints.joint[own]
-    sign = np.where(contacts.bodies[own, 0] == joints.bodies[joint, 0], 1.0, -1.0)
-    world = sign[:, None] * np.einsum("ci,cij->cj", force[own], contacts.frame[own])
-    total, moment = np.zeros((count, 3)), np.zeros((count, 3))
-    np.add.at(total, joint, world)
-    np.add.at(moment, joint, np.cross(joints.point[own] - section.centroid[joint], world))
+    world = np.einsum("ci,cij->cj", force[own], contacts.frame[own])
+    total, moment = summed(section, joints.bodies, joint, contacts.bodies[own, 0], joints.point[own], world)
     normal = np.einsum("ji,ji->j", total, section.frame[:, 0])
     shear = np.linalg.norm(total - normal[:, None] * section.frame[:, 0], axis=1)
     least = _FREE * float(np.abs(normal).max(initial=0.0))

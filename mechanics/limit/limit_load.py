@@ -144,17 +144,18 @@ def mechanism(on: Assembly, velocity: Array, moving: Array | None = None) -> Mec
     Parameters
     ----------
     velocity : (n, 6) of the free stones
-    moving : (nb, 6) of the fixed ones; None: they stand
+    moving : (nb, 6) of the fixed ones, without spin; None: they stand
     """
-    every = np.zeros((len(on.model.mass), 6)) if moving is None else moving.copy()
-    u = on.lift.T @ velocity.ravel()
-    for body in np.flatnonzero(every.any(axis=1)):
-        u += on.push(np.array([body])).T @ every[body, :3]
+    u = (on.lift.T @ velocity.ravel()).reshape(-1, 3)
+    every = np.zeros((len(on.model.mass), 6))
+    if moving is not None:
+        every, (candidate, antagonist) = moving.copy(), on.contacts.bodies.T
+        u += np.einsum("cij,cj->ci", on.contacts.frame, every[candidate, :3] - every[antagonist, :3])
     every[on.free] = velocity
     turning = 0.5 * on.model.surfaces.size * np.linalg.norm(every[:, 3:], axis=1)
     speed = np.linalg.norm(every[:, :3], axis=1) + turning
     unit = float(speed.max(initial=0.0)) or 1.0
-    u = u.reshape(-1, 3) / unit
+    u /= unit
     return Mechanism(every / unit, speed / unit, u[:, 0] > _STILL, np.linalg.norm(u[:, 1:], axis=1) > _STILL)
 
 

@@ -22,8 +22,8 @@ class LiveLoad(Protocol):
     def __call__(self, on: Assembly) -> Array:
         """Return force and moment (6 n,) about their centres of all free stones at λ = 1 [N, N m]."""
 
-    def applied(self, scene: Scene, multiplier: float, on: Assembly) -> Scene:
-        """Return the scene with λ times the load, which acts from the start and stays."""
+    def applied(self, on: Assembly, multiplier: float) -> Scene:
+        """Return the assembly's scene with λ times the load, which acts from the start and stays."""
 
     def __str__(self) -> str:
         """Return a short name with what λ = 1 means."""
@@ -74,13 +74,13 @@ class Acceleration:
             load[others] = 0.0
         return load[on.free].ravel()
 
-    def applied(self, scene: Scene, multiplier: float, on: Assembly) -> Scene:
+    def applied(self, on: Assembly, multiplier: float) -> Scene:
         """Return the scene with λ times the load: as a part of gravity where it acts on all stones."""
         if self.stones:
-            return _with_forces(scene, on, multiplier * self(on))
+            return _with_forces(on, multiplier * self(on))
         push = multiplier * float(np.linalg.norm(on.model.gravity(0.0))) * _unit(self.direction, "")
-        x, y, z = (np.asarray(scene.gravity) + push).tolist()
-        return replace(scene, gravity=(x, y, z))
+        x, y, z = (np.asarray(on.model.scene.gravity) + push).tolist()
+        return replace(on.model.scene, gravity=(x, y, z))
 
     def __str__(self) -> str:
         x, y, z = _unit(self.direction, "acceleration")
@@ -114,9 +114,9 @@ class SpreadForce:
         load[bodies, :3] = on.model.mass[bodies, None] / on.model.mass[bodies].sum() * np.asarray(self.force)
         return load[on.free].ravel()
 
-    def applied(self, scene: Scene, multiplier: float, on: Assembly) -> Scene:
+    def applied(self, on: Assembly, multiplier: float) -> Scene:
         """Return the scene with λ times the load."""
-        return _with_forces(scene, on, multiplier * self(on))
+        return _with_forces(on, multiplier * self(on))
 
     def __str__(self) -> str:
         return f"force on {', '.join(sorted(self.stones))}, in units of {np.linalg.norm(self.force):g} N"
@@ -153,9 +153,9 @@ class PointForce:
             load[row, 3:] = np.cross(np.asarray(self.point) - on.state.centre[body], self.force)
         return load.ravel()
 
-    def applied(self, scene: Scene, multiplier: float, on: Assembly) -> Scene:
+    def applied(self, on: Assembly, multiplier: float) -> Scene:
         """Return the scene with λ times the load."""
-        return _with_forces(scene, on, multiplier * self(on))
+        return _with_forces(on, multiplier * self(on))
 
     def __str__(self) -> str:
         return f"force on {self.stone}, in units of {np.linalg.norm(self.force):g} N"
@@ -176,9 +176,9 @@ def _free(on: Assembly, codes: Collection[str], where: str) -> Ints:
     return bodies
 
 
-def _with_forces(scene: Scene, on: Assembly, load: Array) -> Scene:
+def _with_forces(on: Assembly, load: Array) -> Scene:
     """Return the scene with forces on its stones that are a load (6 n,), each at a place of its stone."""
-    forces: list[StoneForce] = []
+    scene, forces = on.model.scene, list[StoneForce]()
     for body, row in zip(on.free, load.reshape(-1, 6), strict=True):
         force, moment = row[:3], row[3:]
         if not force.any():

@@ -23,6 +23,7 @@ __all__ = [
     "joint_results",
     "largest_faces",
     "parting",
+    "resultants",
     "starting_joints",
 ]
 
@@ -129,7 +130,9 @@ def joint_results(
     joint = contacts.joint[own]
     away = np.bincount(joint, minlength=count) == 0
     section = _with_parted(sections(faces, face), start, bodies, step.after, np.flatnonzero(away))
-    force, moment = _resultants(section, bodies, contacts, own)
+    force, moment = resultants(
+        section, bodies, joint, contacts.bodies[own, 0], contacts.point[own], contacts.force[own]
+    )
     n, status = section.frame[:, 0], contacts.status[own]
     # a force below the tolerance of the solver counts as none
     least = model.scene.solver.tolerance * float(np.linalg.norm(force, axis=1).max(initial=0.0))
@@ -179,14 +182,26 @@ def _movement(
     )
 
 
-def _resultants(section: Section, bodies: Ints, contacts: ContactResult, own: Ints) -> tuple[Array, Array]:
-    """Return forces (nj, 3) on the first stones, and moments about the centroids [N], [N m]."""
-    joint, count = contacts.joint[own], len(bodies)
-    # forces act on the candidate; in a joint, on the first stone
-    sign = np.where(contacts.bodies[own, 0] == bodies[joint, 0], 1.0, -1.0)
-    force = sign[:, None] * contacts.force[own]
-    return _sums(joint, force, count), _sums(
-        joint, np.cross(contacts.point[own] - section.centroid[joint], force), count
+def resultants(
+    section: Section, bodies: Ints, joint: Ints, candidate: Ints, point: Array, force: Array
+) -> tuple[Array, Array]:
+    """Return the resultants of joints: forces (nj, 3) on the first stones, and moments about the centroids.
+
+    Parameters
+    ----------
+    section, bodies : of the joints; (nj, 2) their stones, the first of which the resultants act on
+    joint, candidate : (n,) the joint of each contact point, and the stone on which its force acts
+    point, force : (n, 3) places [m] and forces, world axes [N]
+
+    Returns
+    -------
+    force, moment : (nj, 3) [N], [N m]
+    """
+    count = len(bodies)
+    sign = np.where(candidate == bodies[joint, 0], 1.0, -1.0)
+    on_first = sign[:, None] * force
+    return _sums(joint, on_first, count), _sums(
+        joint, np.cross(point - section.centroid[joint], on_first), count
     )
 
 
