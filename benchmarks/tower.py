@@ -48,6 +48,7 @@ __all__ = ["main", "tower_scene"]
 _FRICTION = 0.6  # of all joints [-]
 _RECORD = 30.0  # duration of the whole record [s]
 _REST_STEPS = 10  # in which the tower comes to rest
+_COMPILED = 1200  # blocks of a small tower of many bodies, which have kernels of their own
 _GOAL = 1e-5  # natural map that every step is to reach [-]
 _BUILDING: Table = (
     ("blocks", "blocks", "d"),
@@ -126,8 +127,10 @@ def main() -> None:
         velocity_tolerance=options.velocity_tolerance,
         max_iterations=options.iterations,
     )
-    _shaken(tower_scene(40, options.step * 1e-3, 1, SolverSettings()), 1, options.seconds)  # compiles
     sizes = [options.build] if options.build else options.blocks
+    # compiles, what few bodies need and what many do
+    for count in [40, _COMPILED] if max(sizes) > _COMPILED else [40]:
+        _shaken(tower_scene(count, options.step * 1e-3, 1, solver), 1, options.seconds)
     rows = [_measured(size, options, solver) for size in sizes]
     if options.json:
         print_json(rows)
@@ -214,7 +217,10 @@ def _shaken(scene: Scene, steps: int, most: float) -> Row:
         if sum(one[0] for one in shaken) > most:
             break
         shaken.append(_timed(simulation, observe, clock))
-        progress(f"motion: step {count + 1} of {steps}, {shaken[-1][0]:.2f} s, η {shaken[-1][1]:.0e}")
+        progress(
+            f"motion: step {count + 1} of {steps}, {shaken[-1][0]:.2f} s, η {shaken[-1][1]:.0e}, "
+            f"{shaken[-1][3]} iterations"
+        )
     row = {
         "blocks": len(model.mass) - 1,
         "contacts": contacts,

@@ -9,6 +9,7 @@ import numpy as np
 from benchmarks.extremes.stones import box, ground, standing
 from mechanics.scene.laws.cohesive_zone import CohesiveZone
 from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.laws.elastic_joint import ElasticJoint
 from mechanics.scene.laws.lennard_jones import LennardJones
 from mechanics.scene.laws.mortar import MortarJoint
 from mechanics.scene.loads.forces import StoneForce
@@ -27,7 +28,7 @@ _NAN, _INF = float("nan"), float("inf")
 
 
 def refusals() -> Mapping[str, Run]:
-    """What is asked, by name: a function that makes the value and, if it can be made, simulates it."""
+    """Return by the name of what is asked a function that makes the value and, if it can be made, simulates it."""
     return {
         **_materials(),
         **_blocks(),
@@ -158,6 +159,10 @@ def _laws() -> dict[str, Run]:
         "cohesive zone": (
             CohesiveZone,
             {"friction": 0.6, "tension": 1e5, "shear": 1e5, "energy_tension": 10.0, "energy_shear": 10.0},
+        ),
+        "elastic joint": (
+            ElasticJoint,
+            {"friction": 0.6, "normal_stiffness": 1e9, "shear_stiffness": 1e9, "damping_time": 1e-4},
         ),
         "Lennard-Jones": (LennardJones, {"friction": 0.6, "force": 1.0, "distance": 1e-3}),
     }

@@ -182,12 +182,12 @@ class Detector:
 
     def _interfaces(self, pairs: Pairs, placed: Placed) -> tuple[Ints, Array, Array, Array]:
         """Return the contact points of all pairs, as `interface_points` does of some."""
-        inner = self.placement == Placement.INERTIA
+        inner, middle = self.placement == Placement.INERTIA, self.placement == Placement.CENTROID
 
         def part(a: int, b: int) -> tuple[Ints, Array, Array, Array]:
             some = Pairs._make(one[a:b] for one in pairs)
             found, frame, nearest, area = interface_points(
-                some, self.points, inner, FLAT, THIN, placed.shapes
+                some, self.points, inner, middle, FLAT, THIN, placed.shapes
             )
             found[:, 0] += a
             return found, frame, nearest, area

@@ -59,7 +59,7 @@ def schedule(bodies: Ints, moving: Bools) -> Schedule:
     if count < _WORTH_PARTS:
         return Schedule(order, np.append(starts, count), np.array([0, len(starts)]))
     # the order of the bodies, course by course as a rule, takes half the sweeps of any other
-    by_part, part, _ = cut(bodies[order[starts]], moving, 2 if count < _MANY else 4, 1, False)
+    by_part, part, _ = cut(bodies[order[starts]], moving, 2 if count < _MANY else 4, False)
     sizes, starts = sizes[by_part], starts[by_part]
     group = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
     inside = np.arange(count) - np.repeat(group[:-1], sizes)

@@ -18,18 +18,26 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechanics.arrays import Array
-from mechanics.contact.contacts import gaps
+from mechanics.contact.contacts import Contacts, gaps
 from mechanics.delassus.assembly import local_velocity
 from mechanics.delassus.compliant import CompliantDelassus
 from mechanics.dynamics.contact_search import Detection
 from mechanics.dynamics.stepping import Kick
 from mechanics.model.model import Model
 from mechanics.problem.problem import ContactProblem, ContactStart, Delassus, mean_diagonal
-from mechanics.scene.laws.law import REST, Approach, Terms
+from mechanics.scene.laws.law import REST, SPRING, Approach, Springs, Terms
 from mechanics.scene.state import State
 from mechanics.stones.validation import SMALLEST
 
-__all__ = ["JointCompliance", "contact_problem", "shifted", "terms_of", "unshifted"]
+__all__ = [
+    "JointCompliance",
+    "contact_problem",
+    "shifted",
+    "spring_axes",
+    "terms_of",
+    "turned_springs",
+    "unshifted",
+]
 
 
 _TOUCH = 1e-9  # overlap over a body's size that comes from rounding, and is no property of a joint [-]
@@ -121,7 +129,7 @@ def contact_problem(
     """
     contacts, operator, time = found.contacts, found.operator, model.scene.time
     gap = gaps(contacts, predicted)
-    speed = local_velocity(contacts, operator, predicted.velocity, predicted.node_velocity)[:, 0]
+    motion = local_velocity(contacts, operator, predicted.velocity, predicted.node_velocity)
     size = np.minimum(*model.surfaces.size[contacts.bodies.T])
     if begin is not None:
         initial = gaps(contacts, begin)
@@ -133,7 +141,8 @@ def contact_problem(
         internal[:, REST] = np.where(overlaps, initial, internal[:, REST])
     approach = Approach(
         gap=gap,
-        speed=speed,
+        speed=motion[:, 0],
+        slide=motion[:, 1:],
         area=contacts.area,
         size=size,
         compliance=operator.diagonal[:, 0, 0],
@@ -145,6 +154,8 @@ def contact_problem(
         state=internal,
     )
     before = np.zeros((len(gap), 3)) if last is None else last
+    if model.laws.sprung:
+        approach = replace(approach, state=turned_springs(approach.state, spring_axes(contacts, predicted)))
     if not joints.rigid:
         approach = _explained(approach, joints.value, before)
     terms = model.laws.terms(found.law, approach)
@@ -161,7 +172,27 @@ def contact_problem(
         # a motion that has died out is too slow for its squares to be numbers
         u_free, terms = np.zeros_like(u_free), replace(terms, bias=np.zeros_like(terms.bias))
     problem = ContactProblem(operator, u_free, terms.bias, terms.friction, terms.cohesion, terms.adhesion)
+    if terms.springs is not None:
+        problem = _sprung(problem, terms.springs)
     return problem if joints.rigid else _compliant(problem, joints.value, before), approach
+
+
+def spring_axes(contacts: Contacts, state: State) -> Array:
+    """Return the matrices (nc, 3, 3) that turn the stretch of a spring from its own axes into the frame of a contact.
+
+    Which of two faces carries the frame of a joint changes as stones turn by a millionth, and with it the candidate.
+    Its springs are kept as the displacement of the body of the lower number over the other, in its axes.
+    """
+    own = np.where(contacts.bodies[:, 0] < contacts.bodies[:, 1], 1.0, -1.0)
+    axes: Array = own[:, None, None] * (contacts.frame @ state.rotation[contacts.bodies.min(axis=1)])
+    return axes
+
+
+def turned_springs(internal: Array, axes: Array) -> Array:
+    """Return internal variables (nc, STATE) with the stretch of their springs turned by matrices (nc, 3, 3)."""
+    turned = internal.copy()
+    turned[:, SPRING] = np.einsum("cij,cj->ci", axes, internal[:, SPRING])
+    return turned
 
 
 def _explained(approach: Approach, compliance: float, last: Array) -> Approach:
@@ -171,6 +202,15 @@ def _explained(approach: Approach, compliance: float, last: Array) -> Approach:
     strange = approach.gap - state[:, REST] < -deepest
     state[:, REST] = np.where(strange, approach.gap, state[:, REST])
     return replace(approach, state=state)
+
+
+def _sprung(problem: ContactProblem, springs: Springs) -> ContactProblem:
+    """Return the problem of joints with springs of their own: W + E, for the impulses r = r̃ - s n that they feel."""
+    assert problem.adhesion is not None
+    u_free = problem.u_free.copy()
+    u_free[:, 0] -= springs.compliance[:, 0] * problem.adhesion
+    u_free[:, 1:] += springs.shift
+    return replace(problem, delassus=CompliantDelassus(problem.delassus, springs.compliance), u_free=u_free)
 
 
 def _compliant(problem: ContactProblem, compliance: float, last: Array) -> ContactProblem:

@@ -65,7 +65,7 @@ class Simulation(Carrier):
         with self.clock("assemble"):
             self._compliance = compliances(model, self._step, self._theta)
         self._detect = ContactSearch(model, self._compliance, self.clock, fresh_contacts, elastic_scale)
-        chosen = choose_solvers(model.scene.solver, not model.rigid_only, model.scene.time)
+        chosen = choose_solvers(model.scene.solver, not model.rigid_only, model.scene.time, model.laws.sprung)
         self._solvers = chosen if solver is None else Solvers(solver)
         self._joints = JointCompliance()
         self._relax = Relaxation(model)

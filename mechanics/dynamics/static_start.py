@@ -15,6 +15,7 @@ from mechanics.model.model import Model
 from mechanics.scene.scene import TimeSettings
 from mechanics.scene.state import State
 from mechanics.solvers.second_order.interior_point import InteriorPoint
+from mechanics.solvers.strategies.compliant import Compliant
 
 __all__ = ["static_start"]
 
@@ -22,6 +23,8 @@ _LONG = (
     1.0  # time step where stones deform [s]: inertia leaves a structure of 1 Hz less than 1/40 of its motion
 )
 _STEPS = 10  # most such steps; few scenes need more than three
+# the same where joints alone yield: in longer ones the joints that slide slide too far before they are seen again
+_YIELDING, _YIELDING_STEPS = 0.1, 40
 _RELAXED = 1e-2  # shortest time step in which rigid stones settle [s]: they fall by a millimetre in it
 _RELAXED_STEPS = 50  # most of these; joints that are open by a millimetre need some ten
 _NATURAL_MAP = (
@@ -40,12 +43,12 @@ def static_start(
 
     Where stones deform, in steps of 1 s, each from a halt, until every body is in balance: with θ = 1 such a step is
     the static problem (docs/theory.md §2), as M/h² is negligible beside K, but determines the motion that nothing else
-    holds. Between rigid stones a step from rest is the static problem whatever its length, so that the run's own will
-    do, and it is the one with which a run from rest begins. Where that leaves stones in motion, because their joints
-    are open or warped, they settle in a relaxation.
+    holds. Where joints alone do, in steps of 0.1 s. Between rigid stones a step from rest is the static problem
+    whatever its length, so that the run's own will do, and it is the one with which a run from rest begins. Where that
+    leaves stones in motion, because their joints are open or warped, they settle in a relaxation.
     """
     search = _Search(model, halted(start), report)
-    return search.rigid() if model.rigid_only else search.elastic()
+    return search.rigid() if model.rigid_only and not model.laws.sprung else search.elastic()
 
 
 class _Search:
@@ -66,11 +69,13 @@ class _Search:
         """Search in steps that leave no time for inertia."""
         asked = self._model.scene.solver
         eta = max(asked.tolerance, _ROUNDING)
-        solver = InteriorPoint(_NATURAL_MAP * eta, _VELOCITY * asked.velocity_tolerance)
-        search = Simulation(_still(self._model, _LONG), self._start, solver=solver, elastic_scale=True)
-        found = settles = False
-        while self._count < _STEPS and not found and (settles or self._count == 0):
-            self._step(search, _STEPS)
+        joints = self._model.rigid_only
+        (method, step) = (Compliant, _YIELDING) if joints else (InteriorPoint, _LONG)
+        solver = method(_NATURAL_MAP * eta, _VELOCITY * asked.velocity_tolerance)
+        search = Simulation(_still(self._model, step), self._start, solver=solver, elastic_scale=not joints)
+        found, settles, most = False, False, _YIELDING_STEPS if joints else _STEPS
+        while self._count < most and not found and (settles or self._count == 0):
+            self._step(search, most)
             # each step begins at rest, and the loads stay those of the first instant
             search.halt(self._start.time)
             settles = self._settles(search)

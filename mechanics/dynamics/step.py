@@ -8,7 +8,7 @@ import numpy as np
 from mechanics.arrays import Array, Ints
 from mechanics.contact.contacts import Contacts, gaps, joined, take
 from mechanics.delassus.assembly import local_velocity, world_impulse
-from mechanics.dynamics.contact_problem import terms_of, unshifted
+from mechanics.dynamics.contact_problem import spring_axes, terms_of, turned_springs, unshifted
 from mechanics.dynamics.contact_search import Detection
 from mechanics.dynamics.stepping import Kick
 from mechanics.problem.problem import ContactProblem, ContactSolution
@@ -47,14 +47,18 @@ class ContactForces:
 
     def take(self, rows: Ints) -> "ContactForces":
         """Return some of them, in the order of `rows` (n,)."""
-        terms = Terms(*(values[rows] for values in _arrays(self.terms)))
+        bias, friction, cohesion, adhesion = (values[rows] for values in _arrays(self.terms))
+        terms = Terms(bias, friction, cohesion, adhesion)
         return ContactForces(take(self.contacts, rows), terms, *(values[rows] for values in _arrays(self)))
 
     def joined(self, other: "ContactForces") -> "ContactForces":
         """Return these followed by others."""
+        bias, friction, cohesion, adhesion = map(
+            np.concatenate, zip(_arrays(self.terms), _arrays(other.terms), strict=True)
+        )
         return ContactForces(
             joined([self.contacts, other.contacts]),
-            Terms(*map(np.concatenate, zip(_arrays(self.terms), _arrays(other.terms), strict=True))),
+            Terms(bias, friction, cohesion, adhesion),
             *map(np.concatenate, zip(_arrays(self), _arrays(other), strict=True)),
         )
 
@@ -111,6 +115,10 @@ class Step:
         found, problem, solution = self.found, self.problem, self.solution
         contacts, laws = found.contacts, found.model.laws
         impulse = unshifted(problem, solution.impulse)
+        internal = laws.after(found.law, self.approach, solution.impulse, self.relative)
+        if laws.sprung:
+            back = spring_axes(contacts, self.predicted).transpose(0, 2, 1)
+            internal = turned_springs(internal, back)
         return ContactForces(
             contacts=contacts,
             terms=terms_of(problem),
@@ -120,13 +128,18 @@ class Step:
             dual=solution.velocity,
             force=world_impulse(contacts, impulse) / self.duration,
             gap=gaps(contacts, self.after),
-            internal=laws.after(found.law, self.approach, solution.impulse, self.relative),
+            internal=internal,
         )
+
+    @property
+    def gave_way(self) -> Array | None:
+        """Compliance ε (nc, 3) of joints that no law asks for [1/kg]; None where the step was solved without."""
+        return None if self.found.model.laws.sprung else self.problem.delassus.joint_compliance
 
     @cached_property
     def compression(self) -> Array:
-        """ε h r_N = ε h² F (nc,), overlap of the contacts of the problem by the compliance of their joints [m]."""
-        compliance = self.problem.delassus.joint_compliance
+        """ε h r_N = ε h² F (nc,), overlap by the compliance of joints that no law asks for [m]."""
+        compliance = self.gave_way
         if compliance is None:
             return np.zeros(len(self.found.contacts))
         pressed: Array = np.maximum(self.active.impulse[:, 0], 0.0)

@@ -157,7 +157,7 @@ class Watch(Carrier):
     def _see_joints(self, step: Step) -> None:
         """Remember how far compliant joints let stones into each other."""
         compression = step.compression
-        self._compliant += step.problem.delassus.joint_compliance is not None
+        self._compliant += step.gave_way is not None
         self._depth = float(compression.max(initial=0.0))
         if self._depth > self._deepest:
             self._deepest = self._depth

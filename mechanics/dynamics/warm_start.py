@@ -8,7 +8,7 @@ from mechanics.arrays import Array, Bools, Ints
 from mechanics.carried import Carrier
 from mechanics.contact.contacts import PAIR_BIT
 from mechanics.problem.problem import ContactSolution, ContactStart
-from mechanics.scene.laws.law import BOND, REST, STATE
+from mechanics.scene.laws.law import BOND, REST, SPRING, STATE
 
 __all__ = ["Memory"]
 
@@ -16,15 +16,16 @@ __all__ = ["Memory"]
 _AHEAD = (
     0.9  # part of the last change that is expected again [-]: forces without effect must not grow by habit
 )
-_OF_PLACES = [BOND, REST]  # internal variables that belong to places in a joint
+# internal variables that belong to places in a joint
+_OF_PLACES = [BOND, REST, *range(SPRING.start, SPRING.stop)]
 
 
 class Memory(Carrier):
     """Impulses, velocities and internal variables by contact key.
 
-    Bonds, and gaps that count as closed, belong to places in a joint. A face that slides a little, or is cut at another
-    edge, gets contacts with new keys; where any contact has one of the two, these inherit the internal variables of the
-    nearest earlier contact of the pair.
+    Bonds, springs, and gaps that count as closed, belong to places in a joint. A face that slides a little, or is cut
+    at another edge, gets contacts with new keys; where any contact has one of these, they inherit the internal
+    variables of the nearest earlier contact of the pair.
 
     In a motion the forces and velocities of the last two steps are extrapolated to the next one, for contacts of both.
 
@@ -52,8 +53,8 @@ class Memory(Carrier):
     def recall(self, key: Ints, place: Array | None = None) -> tuple[ContactStart, Array]:
         """Return the warm start of the contacts of some keys (nc,), and their internal variables (nc, STATE).
 
-        Both are zero for new contacts, except for the internal variables in joints with bonds or gaps that count as
-        closed if the places (nc, d) [m] are given.
+        Both are zero for new contacts, except for the internal variables in joints with bonds, springs or gaps that
+        count as closed if the places (nc, d) [m] are given.
         """
         if np.array_equal(key, self._key):
             values = self._values

@@ -84,11 +84,20 @@ def choose_solver(settings: SolverSettings, deformable: bool, duration: float = 
     return Auto(*limits, motion_speed=settings.motion_error / (_ADDS_UP * duration))
 
 
-def choose_solvers(settings: SolverSettings, deformable: bool, time: TimeSettings) -> Solvers:
+def choose_solvers(
+    settings: SolverSettings, deformable: bool, time: TimeSettings, sprung: bool = False
+) -> Solvers:
     """Return the solvers of a run: compliant joints are a way out for the automatic choice between rigid stones.
 
-    They are one on the way to a rest alone: where a motion is followed they would decide it.
+    They are one on the way to a rest alone: where a motion is followed they would decide it. Where the laws have
+    springs of their own (`sprung`), joints are compliant in every step.
+
+    Raises
+    ------
+    SolverError : if the method does not solve compliant joints
     """
+    if sprung:
+        return Solvers(_sprung_solver(settings, deformable, time.duration))
     usual = choose_solver(settings, deformable, time.duration)
     if deformable or not isinstance(usual, Auto) or settings.joint_compliance == 0 or not time.relaxation:
         return Solvers(usual)
@@ -99,6 +108,19 @@ def choose_solvers(settings: SolverSettings, deformable: bool, time: TimeSetting
         replace(usual, max_iterations=min(_BRIEF, usual.max_iterations), thorough=False),
         (*((factor, quick) for factor in _SOFTNESS), (_SOFTNESS[-1], replace(quick, thorough=True))),
     )
+
+
+def _sprung_solver(settings: SolverSettings, deformable: bool, duration: float) -> Solver:
+    if settings.method in (Method.NSGS, Method.APGD, Method.CONE):
+        raise SolverError(
+            f"the method {settings.method.value} is for rigid joints",
+            where="solver",
+            remedy='use "auto" where a law has stiffness',
+        )
+    if settings.method is Method.AUTO:
+        limits = settings.tolerance, settings.velocity_tolerance, settings.max_iterations
+        return Compliant(*limits, thorough=True)
+    return choose_solver(settings, deformable, duration)
 
 
 def choose_planar_solver(settings: SolverSettings, min_sweeps: int = 0) -> Solver:

@@ -32,8 +32,9 @@ __all__ = [
 ]
 
 # Contact points are named by numbers below 2²⁷ within a pair of shapes: the kind of the pair, what the point is (a
-# corner of the incident face, a cut by a side of the reference face, or a point inside), and a corner of one shape with
-# a face of the other, or two edges. Shapes have at most a third as many faces as corners of faces, half as many edges.
+# corner of the incident face, a cut by a side of the reference face, a point inside, or the centroid), and a corner
+# of one shape with a face of the other, or two edges. Shapes have at most a third as many faces as corners of faces,
+# half as many edges.
 NAME_BITS = 27
 _KIND_BIT, _WHAT_BIT = 25, 23
 MAX_CORNERS = 5000  # corners over all faces of a shape: 5000 · 5000 / 3 < 2²³
@@ -452,6 +453,18 @@ def _inner_points(points, m, x, y):
 
 
 @njit(cache=True)
+def _share_with_middle(x, y, count, m, share):
+    """Take from the shares of points what a further one at the centroid has, so that all carry the second moments."""
+    carried = 0.0
+    for p in range(count):
+        carried += share[p] * ((x[p] - m.x) ** 2 + (y[p] - m.y) ** 2)
+    part = min(m.area * (m.xx + m.yy) / carried, 1.0) if carried > 0.0 else 1.0
+    for p in range(count):
+        share[p] *= part
+    share[count] = (1.0 - part) * m.area
+
+
+@njit(cache=True)
 def _gyration(m):
     """Return the smaller radius of gyration of a polygon [m]."""
     mean, half = 0.5 * (m.xx + m.yy), 0.5 * (m.xx - m.yy)
@@ -498,8 +511,8 @@ def _room_needed(kind, feature, cptr, points):
         if kind[p] == EDGES:
             total += 1
         elif kind[p] != SEPARATED:
-            # clipping one convex polygon by another gives at most the sum of both
-            corners = max(points, 1)
+            # clipping one convex polygon by another gives at most the sum of both; there may be a point in the middle
+            corners = max(points, 1) + 1
             for f in feature[p]:
                 corners += cptr[f + 1] - cptr[f]
             largest, total = max(largest, corners), total + corners
@@ -507,7 +520,7 @@ def _room_needed(kind, feature, cptr, points):
 
 
 @njit(cache=True, nogil=True)
-def interface_points(pairs, points, inner, flat, thin, shapes):  # pragma: no cover - compiled
+def interface_points(pairs, points, inner, middle, flat, thin, shapes):  # pragma: no cover - compiled
     """Find the contact points of each pair in touch: corners of the overlap of two faces, or the feet of two edges.
 
     Inputs
@@ -516,6 +529,7 @@ def interface_points(pairs, points, inner, flat, thin, shapes):  # pragma: no co
     points : int64, number of points of two faces, more where its edge needs more (`spread`); with one, the centroid of
         the overlap
     inner : bool, points of flat faces lie inside, where they carry the area's second moments
+    middle : bool, flat faces have a further point at the centroid, so that springs in all points bend like the area
     flat : float64, cosine of the angle within which faces lie flat on one another [-]
     thin : float64, flat faces that overlap by less than this part of the smaller one do not touch [-]
     shapes : Polyhedra
@@ -579,7 +593,7 @@ def interface_points(pairs, points, inner, flat, thin, shapes):  # pragma: no co
         m, lies_flat = _moments(x, y, k), -dot(g, n) > flat
         if lies_flat and m.area < thin * min(face_area[reference], face_area[incident]):
             continue
-        near, inside = 0, False
+        near, inside, whole = 0, False, False
         for q in range(k):
             if z[q] <= limit[p]:
                 near += 1
@@ -593,8 +607,16 @@ def interface_points(pairs, points, inner, flat, thin, shapes):  # pragma: no co
         elif near == 0:
             continue
         else:
+            whole, level = middle and lies_flat and near == k, 0.0
+            if whole:
+                gx, gy = _slope(f, g)
+                level = z[0] + gx * (m.x - x[0]) + gy * (m.y - y[0])
             k = _nearest_points(polygon, k, limit[p], points, 2.0 * _RECEDES * _gyration(m), chosen)
             point_areas(x, y, k, m.area, m.x, m.y, share)
+            if whole:
+                _share_with_middle(x, y, k, m, share)
+                x[k], y[k], z[k], label[k] = m.x, m.y, level, 0
+                k += 1
         face, facing = reference - fptr[owner], incident - fptr[other]
         faces, opposed = fptr[owner + 1] - fptr[owner], fptr[other + 1] - fptr[other]
         for q in range(k):
@@ -606,6 +628,8 @@ def interface_points(pairs, points, inner, flat, thin, shapes):  # pragma: no co
             place[count, 0], place[count, 1] = p, 1 if owner == i else 0
             if inside:
                 name = (2 << _WHAT_BIT) + label[q] * faces + face
+            elif whole and q == k - 1:
+                name = (3 << _WHAT_BIT) + face
             elif label[q] >= 0:
                 name = (label[q] - cptr[fptr[other]]) * faces + face
             else:

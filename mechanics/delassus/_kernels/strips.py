@@ -7,19 +7,18 @@ __all__ = ["cut"]
 
 
 @njit(cache=True)
-def cut(bodies, moving, parts, lanes, along):  # pragma: no cover - compiled
-    """Order contacts so that parts of them share no moving body, and neighbours in the order rarely do.
+def cut(bodies, moving, parts, along):  # pragma: no cover - compiled
+    """Order contacts so that parts of them share no moving body, in the order of the bodies or their own.
 
     The bodies are numbered breadth first from one end of each connected assembly (Cuthill & McKee 1969). Their numbers
-    are cut into parts × lanes strips of as many contacts each. Contacts between strips come last. A part takes one
-    contact from each of its strips in turn, so that a processor finds independent work.
+    are cut into strips of as many contacts each, one for each part. Contacts between strips come last.
 
     Inputs
     ------
     bodies : (nc, 2) int64
     moving : (nb,) bool
-    parts, lanes : int64
-    along : bool, whether contacts within a strip follow the numbers of their bodies; otherwise they keep their order
+    parts : int64
+    along : bool, whether contacts within a part follow the numbers of their bodies; otherwise they keep their order
 
     Outputs
     -------
@@ -27,7 +26,7 @@ def cut(bodies, moving, parts, lanes, along):  # pragma: no cover - compiled
     start : (parts + 2,) int64, where each part begins in that order, and the contacts between strips
     rank : (nb,) int64, number of each moving body; -1 of the others
     """
-    nc, strips = bodies.shape[0], parts * lanes
+    nc = bodies.shape[0]
     rank = _breadth_first(bodies, moving)
     # contacts by the later one of their bodies
     later, first = np.empty(nc, dtype=np.int64), np.zeros(rank.shape[0] + 1, dtype=np.int64)
@@ -35,37 +34,23 @@ def cut(bodies, moving, parts, lanes, along):  # pragma: no cover - compiled
         later[c] = max(rank[bodies[c, 0]], rank[bodies[c, 1]], 0)
         first[later[c] + 1] += 1
     first = np.cumsum(first)
-    # strip k holds the bodies whose contacts begin in its share of them all
-    strip = np.minimum(first * strips // max(nc, 1), strips - 1)
+    # part k holds the bodies whose contacts begin in its share of them all
+    part = np.minimum(first * parts // max(nc, 1), parts - 1)
     follow, put = np.arange(nc), first.copy()
-    count = np.zeros(strips + 1, dtype=np.int64)
+    start = np.zeros(parts + 2, dtype=np.int64)
     own = np.empty(nc, dtype=np.int64)
     for c in range(nc):
         if along:
             follow[put[later[c]]] = c
             put[later[c]] += 1
         a, b = rank[bodies[c, 0]], rank[bodies[c, 1]]
-        own[c] = strip[later[c]] if a < 0 or b < 0 or strip[a] == strip[b] else strips
-        count[own[c]] += 1
-    start, begin = np.zeros(parts + 2, dtype=np.int64), np.zeros(strips + 2, dtype=np.int64)
-    begin[1:] = np.cumsum(count)
-    listed, put = np.empty(nc, dtype=np.int64), begin.copy()
+        own[c] = part[later[c]] if a < 0 or b < 0 or part[a] == part[b] else parts
+        start[own[c] + 1] += 1
+    start = np.cumsum(start)
+    order, put = np.empty(nc, dtype=np.int64), start.copy()
     for c in follow:
-        listed[put[own[c]]] = c
+        order[put[own[c]]] = c
         put[own[c]] += 1
-    order, n = np.empty(nc, dtype=np.int64), 0
-    for part in range(parts):
-        longest = 0
-        for k in range(part * lanes, (part + 1) * lanes):
-            longest = max(longest, count[k])
-        for position in range(longest):
-            for k in range(part * lanes, (part + 1) * lanes):
-                if position < count[k]:
-                    order[n] = listed[begin[k] + position]
-                    n += 1
-        start[part + 1] = n
-    order[n:] = listed[n:]
-    start[parts + 1] = nc
     return order, start, rank
 
 

@@ -7,8 +7,9 @@ where z = P_K(x) holds the impulses and û = -σ y the velocities that are dual 
     q = z - y - (u_free + bias n + μ‖û_T‖ n) / σ,     (M + H Σ⁻¹ Hᵀ) v = H q,     r = q - Hᵀ v / σ
     x ← y + ω r + (1 - ω) z
 
-and one pass over the contacts on either side of the solution for v makes it. Contacts of the same two bodies follow
-each other, so the bodies' velocities and sums stay in registers.
+and one pass over the contacts on either side of the solution for v makes it. What is solved for is the change of v,
+from H q - (M + H Σ⁻¹ Hᵀ) v, so that factors of single precision lose nothing: each iteration corrects the last one's
+errors. Contacts of the same two bodies follow each other, so the bodies' velocities and sums stay in registers.
 """
 
 from typing import NamedTuple
@@ -83,10 +84,18 @@ class Iterate(NamedTuple):
 
 
 class Factors(NamedTuple):
-    """Factors of M + H Σ⁻¹ Hᵀ: their pattern, and their values as `factorise` leaves them."""
+    """Factors of M + H Σ⁻¹ Hᵀ.
+
+    Attributes
+    ----------
+    panels : their pattern
+    value : as `factorise` leaves them, of single or double precision
+    mass : (nm, 6, 6) float64, M in the order of elimination [kg], [kg m²]
+    """
 
     panels: Panels
-    value: NDArray[np.float64]
+    value: NDArray[np.floating]
+    mass: NDArray[np.float64]
 
 
 class Acceleration(NamedTuple):
@@ -153,21 +162,21 @@ def _add_product(block, a, b, weight):
 
 
 @njit(cache=True)
-def assemble(touching, mass, panels):  # pragma: no cover - compiled
-    """Return the panels of M + H Σ⁻¹ Hᵀ.
+def assemble(touching, mass, panels, value):  # pragma: no cover - compiled
+    """Write the panels of M + H Σ⁻¹ Hᵀ.
 
     Inputs
     ------
     touching : Touching
     mass : (nm, 6, 6) float64, in the order of elimination [kg], [kg m²]
     panels : Panels
+    value : zeros, of the precision of the factors
 
     Outputs
     -------
-    float64, as `factorise` takes them
+    value : as `factorise` takes it
     """
     body, first, rows, start = panels.body, panels.first, panels.row, panels.start
-    value = np.zeros(start[-1])
     owner = np.empty(mass.shape[0], dtype=np.int64)
     own = mass.copy()
     for s in range(body.shape[0] - 1):
@@ -205,7 +214,6 @@ def assemble(touching, mass, panels):  # pragma: no cover - compiled
         for p in range(6):
             for q in range(6):
                 panel[at + p, at + q] = own[k, p, q]
-    return value
 
 
 @njit(cache=True, inline="always")
@@ -219,17 +227,33 @@ def _onto(x, n, mu, k):
     return shrink * t[0] + height * n[0], shrink * t[1] + height * n[1], shrink * t[2] + height * n[2]
 
 
+@njit(cache=True, inline="always")
+def _speeds(v, k):
+    """Return the six velocities of a body, or zeros of one that does not move."""
+    if k < 0:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    return v[6 * k], v[6 * k + 1], v[6 * k + 2], v[6 * k + 3], v[6 * k + 4], v[6 * k + 5]
+
+
 @njit(cache=True)
-def _push(iterate, load, touching):
-    """Write z and q of an iterate, and H q into `load` (6 nm,)."""
-    x, kept, q = iterate.x, iterate.z, iterate.q
+def _push(iterate, load, touching, mass):
+    """Write z and q of an iterate, and H q - (M + H Σ⁻¹ Hᵀ) v into `load` (6 nm,)."""
+    x, kept, q, v = iterate.x, iterate.z, iterate.q, iterate.velocity
     side, normal, arm, shift = touching.side, touching.normal, touching.arm, touching.shift
     friction, cohesion, soft_of = touching.friction, touching.cohesion, touching.soft
-    load[:] = 0.0
+    for k in range(mass.shape[0]):
+        for p in range(6):
+            total = 0.0
+            for b in range(6):
+                total -= mass[k, p, b] * v[6 * k + b]
+            load[6 * k + p] = total
     nc, c = side.shape[0], 0
     while c < nc:
         i, j = side[c, 0], side[c, 1]
         f0 = f1 = f2 = m0 = m1 = m2 = w0 = w1 = w2 = 0.0
+        one, other = _speeds(v, i), _speeds(v, j)
+        v0, v1, v2 = one[0] - other[0], one[1] - other[1], one[2] - other[2]
+        v3, v4, v5, o3, o4, o5 = one[3], one[4], one[5], other[3], other[4], other[5]
         while c < nc and side[c, 0] == i and side[c, 1] == j:
             n, p, soft = row(normal, c), row(x, c), soft_of[c]
             along = dot(p, n)
@@ -256,10 +280,13 @@ def _push(iterate, load, touching):
             g1 -= shift[c, 1] * soft
             g2 -= shift[c, 2] * soft
             q[c, 0], q[c, 1], q[c, 2] = g0, g1, g2
+            a = arm[c]
+            g0 -= soft * (v0 + v4 * a[2] - v5 * a[1] - o4 * a[5] + o5 * a[4])
+            g1 -= soft * (v1 + v5 * a[0] - v3 * a[2] - o5 * a[3] + o3 * a[5])
+            g2 -= soft * (v2 + v3 * a[1] - v4 * a[0] - o3 * a[4] + o4 * a[3])
             f0 += g0
             f1 += g1
             f2 += g2
-            a = arm[c]
             m0 += a[1] * g2 - a[2] * g1
             m1 += a[2] * g0 - a[0] * g2
             m2 += a[0] * g1 - a[1] * g0
@@ -293,19 +320,14 @@ def _pull(iterate, image, v, over, touching):
     nc, c = side.shape[0], 0
     while c < nc:
         i, j = side[c, 0], side[c, 1]
-        v0 = v1 = v2 = v3 = v4 = v5 = w0 = w1 = w2 = w3 = w4 = w5 = 0.0
-        if i >= 0:
-            of = v[6 * i : 6 * i + 6]
-            v0, v1, v2, v3, v4, v5 = of[0], of[1], of[2], of[3], of[4], of[5]
-        if j >= 0:
-            of = v[6 * j : 6 * j + 6]
-            w0, w1, w2, w3, w4, w5 = of[0], of[1], of[2], of[3], of[4], of[5]
-        v0, v1, v2 = v0 - w0, v1 - w1, v2 - w2
+        one, other = _speeds(v, i), _speeds(v, j)
+        v0, v1, v2 = one[0] - other[0], one[1] - other[1], one[2] - other[2]
+        v3, v4, v5, o3, o4, o5 = one[3], one[4], one[5], other[3], other[4], other[5]
         while c < nc and side[c, 0] == i and side[c, 1] == j:
             a, soft = arm[c], soft_of[c]
-            r0 = q[c, 0] - soft * (v0 + v4 * a[2] - v5 * a[1] - w4 * a[5] + w5 * a[4])
-            r1 = q[c, 1] - soft * (v1 + v5 * a[0] - v3 * a[2] - w5 * a[3] + w3 * a[5])
-            r2 = q[c, 2] - soft * (v2 + v3 * a[1] - v4 * a[0] - w3 * a[4] + w4 * a[3])
+            r0 = q[c, 0] - soft * (v0 + v4 * a[2] - v5 * a[1] - o4 * a[5] + o5 * a[4])
+            r1 = q[c, 1] - soft * (v1 + v5 * a[0] - v3 * a[2] - o5 * a[3] + o3 * a[5])
+            r2 = q[c, 2] - soft * (v2 + v3 * a[1] - v4 * a[0] - o3 * a[4] + o4 * a[3])
             image[c, 0] = x[c, 0] + over * (r0 - z[c, 0])
             image[c, 1] = x[c, 1] + over * (r1 - z[c, 1])
             image[c, 2] = x[c, 2] + over * (r2 - z[c, 2])
@@ -350,13 +372,14 @@ def projected(impulse, friction, cohesion):  # pragma: no cover - compiled
 
 
 @njit(cache=True)
-def _moved(before, after, length):
-    """Return the largest change of the velocity of a body, or of a point `length` from its centre as it turns."""
+def _moved(velocity, step, length):
+    """Add a step to velocities; return the largest of a body, or of a point `length` from its centre as it turns."""
     change = 0.0
-    for k in range(0, before.shape[0], 6):
+    for k in range(0, step.shape[0], 6):
         for a in range(3):
-            change = max(change, abs(after[k + a] - before[k + a]))
-            change = max(change, length * abs(after[k + 3 + a] - before[k + 3 + a]))
+            change = max(change, abs(step[k + a]), length * abs(step[k + 3 + a]))
+    for k in range(step.shape[0]):
+        velocity[k] += step[k]
     return change
 
 
@@ -448,14 +471,17 @@ def advance(iterate, count, limit, over, length, touching, factors, memory):  # 
     highest = 0
     for s in range(panels.body.shape[0] - 1):
         highest = max(highest, panels.first[s + 1] - panels.first[s])
-    image, v, work = np.empty_like(x), np.empty_like(velocity), np.empty(6 * highest)
+    image, load = np.empty_like(x), np.empty_like(velocity)
+    step = np.empty(velocity.shape[0], factors.value.dtype)
+    work = np.empty(6 * highest, factors.value.dtype)
     change = np.inf
     for k in range(count):
-        _push(iterate, v, touching)
-        solve(panels, factors.value, v, work)
-        _pull(iterate, image, v, over, touching)
-        change = _moved(velocity, v, length)
-        velocity[:] = v
+        _push(iterate, load, touching, factors.mass)
+        for i in range(load.shape[0]):
+            step[i] = load[i]
+        solve(panels, factors.value, step, work)
+        change = _moved(velocity, step, length)
+        _pull(iterate, image, velocity, over, touching)
         if memory.image.shape[0] > 1:
             _extrapolate(x.reshape(x.size), image.reshape(x.size), memory)
         else:

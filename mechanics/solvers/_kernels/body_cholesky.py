@@ -7,7 +7,9 @@ share a panel: a dense matrix (6 w, 6 m) for the w bodies of its columns and the
 first w are its own. Its entry (6 i + b, 6 p + a) couples velocity b of its i-th body with velocity a of the p-th of its
 rows, so that loops run along the long side. Panels are made from left to right, each from those before it that reach it
 (George & Liu 1981; Ng & Peyton 1993). At the end the blocks of L are divided by those on its diagonal: D⁻¹ takes their
-place, and no solution waits for a triangle.
+place, and no solution waits for a triangle. Six rows are then laid out one after the other as a solution reads them:
+D⁻¹, and what is to the right of it in tiles of 16 columns, row by row. A solution costs the memory that it reads; so
+factors may be of single precision, where the equation that they solve is one for a correction.
 """
 
 from typing import NamedTuple
@@ -22,6 +24,8 @@ __all__ = ["Panels", "factorise", "panels_of", "postorder", "solve"]
 _ROWS = 48
 # bodies above which a product is faster than line by line
 _FEW = 1
+# columns of a tile: a multiple of what a processor multiplies at once
+_TILE = 16
 
 
 class Panels(NamedTuple):
@@ -250,6 +254,7 @@ def _finish(panel, space):
 
     Rows are finished some at a time; what they take from all others is one product.
     """
+    one = panel.dtype.type(1.0)
     w, n = panel.shape
     for k in range(0, w, _ROWS):
         end = min(k + _ROWS, w)
@@ -257,7 +262,7 @@ def _finish(panel, space):
             pivot, line = panel[b, b], panel[b]
             if not (pivot > 0.0 and np.isfinite(pivot)):
                 return False
-            scale = 1.0 / np.sqrt(pivot)
+            scale = one / np.sqrt(pivot)
             for x in range(b, n):
                 line[x] *= scale
             for d in range(b + 1, end):
@@ -297,33 +302,43 @@ def _subtract_rows(source, which, panel, spot, row, space):
 
 
 @njit(cache=True, fastmath={"contract"})
-def _divide(panel, inverse):
-    """Divide the blocks of a panel by those on its diagonal, which D⁻¹ replaces; `inverse` (6, 6) is overwritten.
+def _divide(panel, n, inverse, spare):
+    """Divide the blocks of a panel by those on its diagonal, which D⁻¹ replaces, and lay it out as it is read.
 
-    In the plane two bodies share a block, and the last of an odd number has its own.
+    In the plane two bodies share a block, and the last of an odd number has its own. `panel` (w n,) is flat; `inverse`
+    (6, 6) and `spare` are overwritten.
     """
-    w, n = panel.shape
+    zero, one = panel.dtype.type(0.0), panel.dtype.type(1.0)
+    w = panel.shape[0] // n
     for k in range(0, w, 6):
         m = min(6, w - k)
+        block, rest = panel[k * n : (k + m) * n].reshape((m, n)), n - k - m
         for b in range(m - 1, -1, -1):
-            line, scale = panel[k + b, k + m :], 1.0 / panel[k + b, k + b]
+            line, scale = block[b, k + m :], one / block[b, k + b]
             for d in range(m):
-                inverse[b, d] = 0.0
+                inverse[b, d] = zero
             inverse[b, b] = scale
-            for x in range(n - k - m):
+            for x in range(rest):
                 line[x] *= scale
             for d in range(b + 1, m):
-                factor, other = panel[k + b, k + d] * scale, panel[k + d, k + m :]
+                factor, other = block[b, k + d] * scale, block[d, k + m :]
                 for c in range(d, m):
                     inverse[b, c] -= factor * inverse[d, c]
-                for x in range(n - k - m):
+                for x in range(rest):
                     line[x] -= factor * other[x]
         for b in range(m):
             for d in range(m):
-                total = 0.0
+                total = zero
                 for c in range(max(b, d), m):
                     total += inverse[b, c] * inverse[d, c]
-                panel[k + b, k + d] = total
+                spare[m * b + d] = total
+        at = m * m
+        for begin in range(k + m, n, _TILE):
+            for b in range(m):
+                for x in range(begin, min(begin + _TILE, n)):
+                    spare[at] = block[b, x]
+                    at += 1
+        panel[k * n : k * n + at] = spare[:at]
 
 
 @njit(cache=True)
@@ -352,9 +367,13 @@ def factorise(panels, value):  # pragma: no cover - compiled
         highest = max(highest, first[s + 1] - first[s])
         widest = max(widest, body[s + 1] - body[s])
         largest = max(largest, (body[s + 1] - body[s]) * (first[s + 1] - first[s]))
-    work, inverse = np.empty(size * highest), np.empty((6, 6))
+    work, inverse = np.empty(size * highest, value.dtype), np.empty((6, 6), value.dtype)
     largest, widest = size * size * largest, size * widest
-    space = _Space(np.empty(largest), np.empty(largest), np.empty(widest * size * highest))
+    space = _Space(
+        np.empty(largest, value.dtype),
+        np.empty(largest, value.dtype),
+        np.empty(widest * size * highest, value.dtype),
+    )
     for s in range(number):
         width, height = body[s + 1] - body[s], first[s + 1] - first[s]
         panel = value[start[s] : start[s + 1]].reshape((size * width, size * height))
@@ -391,9 +410,94 @@ def factorise(panels, value):  # pragma: no cover - compiled
             follower[s] = head[up]
             head[up] = s
     for s in range(number):
-        shape = size * (body[s + 1] - body[s]), size * (first[s + 1] - first[s])
-        _divide(value[start[s] : start[s + 1]].reshape(shape), inverse)
+        _divide(value[start[s] : start[s + 1]], size * (first[s + 1] - first[s]), inverse, space.left)
     return True
+
+
+@njit(cache=True, inline="always")
+def _spread(tile, h, f, rest):
+    """Add what six velocities f contribute by a tile (6, h)."""
+    for i in range(h):
+        rest[i] += (
+            f[0] * tile[i]
+            + f[1] * tile[h + i]
+            + f[2] * tile[2 * h + i]
+            + f[3] * tile[3 * h + i]
+            + f[4] * tile[4 * h + i]
+            + f[5] * tile[5 * h + i]
+        )
+
+
+@njit(cache=True, inline="always")
+def _collect(tile, h, rest, sums):
+    """Return six sums with what a tile (6, h) contributes."""
+    s0, s1, s2, s3, s4, s5 = sums
+    for i in range(h):
+        w = rest[i]
+        s0 += w * tile[i]
+        s1 += w * tile[h + i]
+        s2 += w * tile[2 * h + i]
+        s3 += w * tile[3 * h + i]
+        s4 += w * tile[4 * h + i]
+        s5 += w * tile[5 * h + i]
+    return s0, s1, s2, s3, s4, s5
+
+
+@njit(cache=True, inline="always")
+def _forward(block, x, work):
+    """Take from a block of rows and its velocities x (6,), or (3,), what they contribute to those that follow.
+
+    `work` holds what the rows before contribute, to these velocities first.
+    """
+    m = x.shape[0]
+    rest = work[m:]
+    n = rest.shape[0]
+    if m == 6:
+        whole, tiles = n - n % _TILE, block[36:]
+        f = x[0] - work[0], x[1] - work[1], x[2] - work[2], x[3] - work[3], x[4] - work[4], x[5] - work[5]
+        x[0], x[1], x[2], x[3], x[4], x[5] = f
+        for i in range(0, whole, _TILE):
+            _spread(tiles[6 * i : 6 * (i + _TILE)], _TILE, f, rest[i : i + _TILE])
+        _spread(tiles[6 * whole :], n - whole, f, rest[whole:])
+        return
+    for a in range(3):
+        x[a] -= work[a]
+    for i in range(0, n, _TILE):
+        h, tile, to = min(_TILE, n - i), block[9 + 3 * i :], rest[i:]
+        for k in range(h):
+            to[k] += x[0] * tile[k] + x[1] * tile[h + k] + x[2] * tile[2 * h + k]
+
+
+@njit(cache=True, inline="always")
+def _backward(block, x, work):
+    """Solve for the velocities x (6,), or (3,), of a block of rows, from those that follow; all join in `work`."""
+    m, zero = x.shape[0], block.dtype.type(0.0)
+    rest = work[m:]
+    n = rest.shape[0]
+    if m == 6:
+        whole, tiles = n - n % _TILE, block[36:]
+        sums = zero, zero, zero, zero, zero, zero
+        for i in range(0, whole, _TILE):
+            sums = _collect(tiles[6 * i : 6 * (i + _TILE)], _TILE, rest[i : i + _TILE], sums)
+        sums = _collect(tiles[6 * whole :], n - whole, rest[whole:], sums)
+        t = x[0], x[1], x[2], x[3], x[4], x[5]
+        for a in range(6):
+            d = block[6 * a : 6 * a + 6]
+            x[a] = d[0] * t[0] + d[1] * t[1] + d[2] * t[2] + d[3] * t[3] + d[4] * t[4] + d[5] * t[5] - sums[a]
+            work[a] = x[a]
+        return
+    s0 = s1 = s2 = zero
+    for i in range(0, n, _TILE):
+        h, tile, w = min(_TILE, n - i), block[9 + 3 * i :], rest[i:]
+        for k in range(h):
+            s0 += w[k] * tile[k]
+            s1 += w[k] * tile[h + k]
+            s2 += w[k] * tile[2 * h + k]
+    t, ends = (x[0], x[1], x[2]), (s0, s1, s2)
+    for a in range(3):
+        d = block[3 * a : 3 * a + 3]
+        x[a] = d[0] * t[0] + d[1] * t[1] + d[2] * t[2] - ends[a]
+        work[a] = x[a]
 
 
 @njit(cache=True, fastmath={"contract", "reassoc"})
@@ -404,39 +508,24 @@ def solve(panels, value, x, work):  # pragma: no cover - compiled
     ------
     panels : Panels
     value : as `factorise` leaves it
-    x : (6 nm,) float64, or (3 nm,) in the plane, b, overwritten
-    work : float64, as long as the longest panel at least, overwritten
+    x : (6 nm,), or (3 nm,) in the plane, of the same precision, b, overwritten
+    work : as long as the longest panel at least, alike, overwritten
 
     Outputs
     -------
     x : the solution
     """
     body, first, row, start, size = panels.body, panels.first, panels.row, panels.start, panels.size
-    number = body.shape[0] - 1
+    number, zero = body.shape[0] - 1, value.dtype.type(0.0)
     for s in range(number):
         width, height, at = body[s + 1] - body[s], first[s + 1] - first[s], size * body[s]
         w, n = size * width, size * height
-        panel, whole = value[start[s] : start[s + 1]].reshape((w, n)), w - w % 6
+        panel = value[start[s] : start[s + 1]]
         for i in range(n):
-            work[i] = 0.0
-        for k in range(0, whole, 6):
-            for a in range(6):
-                x[at + k + a] -= work[k + a]
-            x0, x1, x2 = x[at + k], x[at + k + 1], x[at + k + 2]
-            x3, x4, x5 = x[at + k + 3], x[at + k + 4], x[at + k + 5]
-            left, rest = panel[k : k + 6, k + 6 : n], work[k + 6 : n]
-            p0, p1, p2, p3, p4, p5 = left[0], left[1], left[2], left[3], left[4], left[5]
-            for i in range(n - k - 6):
-                rest[i] += x0 * p0[i] + x1 * p1[i] + x2 * p2[i] + x3 * p3[i] + x4 * p4[i] + x5 * p5[i]
-        if whole < w:
-            k = whole
-            for a in range(3):
-                x[at + k + a] -= work[k + a]
-            x0, x1, x2 = x[at + k], x[at + k + 1], x[at + k + 2]
-            left, rest = panel[k : k + 3, k + 3 : n], work[k + 3 : n]
-            p0, p1, p2 = left[0], left[1], left[2]
-            for i in range(n - k - 3):
-                rest[i] += x0 * p0[i] + x1 * p1[i] + x2 * p2[i]
+            work[i] = zero
+        for k in range(0, w, 6):
+            end = min(k + 6, w)
+            _forward(panel[k * n : end * n], x[at + k : at + end], work[k:n])
         for p in range(width, height):
             to, come = size * row[first[s] + p], size * p
             for a in range(3):
@@ -447,7 +536,7 @@ def solve(panels, value, x, work):  # pragma: no cover - compiled
     for s in range(number - 1, -1, -1):
         width, height, at = body[s + 1] - body[s], first[s + 1] - first[s], size * body[s]
         w, n = size * width, size * height
-        panel, whole = value[start[s] : start[s + 1]].reshape((w, n)), w - w % 6
+        panel = value[start[s] : start[s + 1]]
         for p in range(width, height):
             come, to = size * row[first[s] + p], size * p
             for a in range(3):
@@ -455,40 +544,6 @@ def solve(panels, value, x, work):  # pragma: no cover - compiled
             if size == 6:
                 for a in range(3, 6):
                     work[to + a] = x[come + a]
-        if whole < w:
-            k = whole
-            left, rest = panel[k : k + 3, k + 3 : n], work[k + 3 : n]
-            p0, p1, p2 = left[0], left[1], left[2]
-            s0 = s1 = s2 = 0.0
-            for i in range(n - k - 3):
-                s0 += rest[i] * p0[i]
-                s1 += rest[i] * p1[i]
-                s2 += rest[i] * p2[i]
-            t0, t1, t2, ends = x[at + k], x[at + k + 1], x[at + k + 2], (s0, s1, s2)
-            for a in range(3):
-                d = panel[k + a]
-                done = d[k] * t0 + d[k + 1] * t1 + d[k + 2] * t2
-                work[k + a] = done - ends[a]
-                x[at + k + a] = done - ends[a]
-        for k in range(whole - 6, -1, -6):
-            left, rest = panel[k : k + 6, k + 6 : n], work[k + 6 : n]
-            p0, p1, p2, p3, p4, p5 = left[0], left[1], left[2], left[3], left[4], left[5]
-            s0 = s1 = s2 = s3 = s4 = s5 = 0.0
-            for i in range(n - k - 6):
-                w = rest[i]
-                s0 += w * p0[i]
-                s1 += w * p1[i]
-                s2 += w * p2[i]
-                s3 += w * p3[i]
-                s4 += w * p4[i]
-                s5 += w * p5[i]
-            t0, t1, t2 = x[at + k], x[at + k + 1], x[at + k + 2]
-            t3, t4, t5 = x[at + k + 3], x[at + k + 4], x[at + k + 5]
-            sums = s0, s1, s2, s3, s4, s5
-            for a in range(6):
-                d = panel[k + a]
-                done = (
-                    d[k] * t0 + d[k + 1] * t1 + d[k + 2] * t2 + d[k + 3] * t3 + d[k + 4] * t4 + d[k + 5] * t5
-                )
-                work[k + a] = done - sums[a]
-                x[at + k + a] = done - sums[a]
+        for k in range(w - 1 - (w - 1) % 6, -1, -6):
+            end = min(k + 6, w)
+            _backward(panel[k * n : end * n], x[at + k : at + end], work[k:n])

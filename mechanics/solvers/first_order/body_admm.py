@@ -28,7 +28,8 @@ _OVER = 1.6
 _VELOCITIES = 6
 # zeros that a panel of the factors may hold, over its other blocks [-]
 _SPARE = 0.2
-# bodies below which the order of elimination depends on their pairs alone, and is kept while these stay
+# bodies below which the order of elimination depends on their pairs alone, and is kept while these stay, and factors
+# are of double precision: they stay in the fastest memory, and tolerances may be very small
 _FEW = 1000
 # numbers in factors that are kept until contacts are detected again, at most: 32 MB
 _KEPT = 4_000_000
@@ -270,10 +271,12 @@ class _Bodies:
         """
         if penalty in self._factors:
             return self._factors[penalty]
-        value: Array = kernel.assemble(touching, self._mass, self._panels)
+        precision = np.float32 if len(self.inertia) >= _FEW else np.float64
+        value = np.zeros(self._panels.start[-1], dtype=precision)
+        kernel.assemble(touching, self._mass, self._panels, value)
         if not cholesky.factorise(self._panels, value):
             raise SolverError("W is not a number", where="ADMM of bodies", remedy="use another method")
-        factors = kernel.Factors(self._panels, value)
+        factors = kernel.Factors(self._panels, value, self._mass)
         if penalty is not None:
             self._factors[penalty] = factors
         return factors

@@ -20,7 +20,7 @@ _GIVE = 1e-9
 # proximal term α over η and the scale of W [-]
 _PROXIMAL = 0.3
 # η below which α shrinks no more [-]
-_FLOOR = 1e-6
+_FLOOR = 1e-8
 # shortest part of a step [-]
 _SHORTEST = 0.005
 # gain that a step must bring, over what it promises [-]
@@ -54,7 +54,7 @@ class Newton:
         [ W + Θ + α ] Δr = -(ρ D S)⁻¹ Φ,     Θ = (ρ D S)⁻¹ (1 - D)
 
     so contacts that stick, slip or are open sort themselves out, and once they are right it converges within a
-    few steps to rounding. The proximal term α = 0.3 max(η, 10⁻⁶) W̄ (Levenberg 1944; Rockafellar 1976) makes the matrix
+    few steps to rounding. The proximal term α = 0.3 max(η, 10⁻⁸) W̄ (Levenberg 1944; Rockafellar 1976) makes the matrix
     regular where W is not, as between rigid stones with more contacts than freedoms; it shrinks with η, so
     convergence is all but quadratic. The line search wants less of Φ than the worst of the last five iterates had
     (Grippo, Lampariello & Lucidi 1986): Φ has kinks, and steps that are right may pass over them. The best iterate is

@@ -63,6 +63,19 @@ def test_the_stones_eliminated_last_part_the_others_in_two():
     assert sizes.min() > 0.4 * len(place)
 
 
+def test_a_wall_is_cut_where_it_is_narrowest():
+    pairs, place = wall_graph(60, 40)
+    # four courses alone lead over an opening, a third of the way along
+    opening = (place[:, 0] > 6.0) & (place[:, 0] < 6.7) & (place[:, 2] < 3.55)
+    number = np.cumsum(~opening) - 1
+    pairs = number[pairs[~opening[pairs].any(axis=1)]]
+    rank = dissection(pairs, place[~opening])
+    last = place[~opening][np.argsort(rank)[-4:]]
+    assert len(np.unique(last[:, 2])) == 4
+    assert last[:, 2].min() > 3.55
+    assert ((last[:, 0] > 5.6) & (last[:, 0] < 7.1)).all()
+
+
 def test_stones_in_one_place_or_apart_get_an_order_too():
     none = np.zeros((0, 2), dtype=np.int64)
     for pairs in (none, np.column_stack([np.arange(29), np.arange(1, 30)])):

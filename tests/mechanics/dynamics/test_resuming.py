@@ -1,7 +1,7 @@
 """A run that goes on from what it carried takes the same steps, to the last bit."""
 
 from copy import deepcopy
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -13,6 +13,7 @@ from mechanics.dynamics.outcome import Outcome
 from mechanics.model.deformable import Compliance
 from mechanics.scene.laws.bonds import BROKEN
 from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.laws.elastic_joint import ElasticJoint
 from mechanics.scene.laws.law import BOND
 from mechanics.scene.laws.mortar import MortarJoint
 from mechanics.scene.loads.load import Loads
@@ -111,6 +112,14 @@ def shaken():
     )
 
 
+def on_springs():
+    """A stack on a shaken base, whose joints yield, slide and open."""
+    rules = (LawRule(frozenset({"S0"}), frozenset({"S1"}), DryJoint(0.3)),)
+    return replace(
+        shaken(), name="on springs", contact=ContactSettings(ElasticJoint(0.4, 1e8, 5e7, 1e-4), rules)
+    )
+
+
 def sleepers():
     """Stones that fall asleep, and are hit by one that falls."""
     blocks = (ground(), *pillar(2), brick("hit", (0.3, 0.3, 2.06), (0.7, 0.7, 2.4)))
@@ -149,7 +158,10 @@ def yielding():
     return warped(barrel(9, 2))
 
 
-SCENES = {one.__name__: one for one in (shaken, sleepers, soft, relaxed, jammed, yielding, from_equilibrium)}
+SCENES = {
+    one.__name__: one
+    for one in (shaken, on_springs, sleepers, soft, relaxed, jammed, yielding, from_equilibrium)
+}
 
 
 def instants(archive):

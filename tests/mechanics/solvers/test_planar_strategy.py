@@ -66,4 +66,4 @@ def test_iterations_of_all_methods_together_are_at_most_those_allowed():
     solution = first_steps(scene, 1)[0].solution
     assert solution.iterations == 550
     assert not solution.converged
-    assert solution.why.startswith(("admm, balanced penalty: sweeps stood", "sweeps: start"))
+    assert solution.why.startswith(("admm of disks: sweeps stood", "sweeps: start"))

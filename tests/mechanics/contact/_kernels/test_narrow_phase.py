@@ -91,7 +91,7 @@ def points_of(first, second, kind, feature, axis=UP, points=4, inner=False, limi
     pair = kernel.Pairs(
         *map(np.array, ([[0, 1]], [limit], [False], [kind], [feature], [np.asarray(axis, dtype=float)]))
     )
-    return kernel.interface_points(pair, points, inner, FLAT, THIN, packed(first, second))
+    return kernel.interface_points(pair, points, inner, False, FLAT, THIN, packed(first, second))
 
 
 def packed(*stones):

@@ -43,11 +43,12 @@ def test_a_tower_of_many_blocks_comes_to_rest_and_is_followed_by_iterations_of_b
     assert steps[0].solution.why.startswith("admm of bodies: cold start")
 
 
-def test_penalties_by_what_a_contact_does_save_a_third_of_the_iterations(many):
-    # 4,860 here; two penalties in turn for all contacts alike: 7,620 (0.5 and 0.01), 9,547 (0.5 and 0.02, longer turns)
+def test_penalties_by_what_a_contact_does_save_nearly_half_of_the_iterations(many):
+    # 3,914 here; 4,860 with 0.01 of contacts that stick in all turns, which were longer; two penalties in turn for all
+    # contacts alike: 7,620 (0.5 and 0.01), 9,547 (0.5 and 0.02, longer turns)
     moving = shaken(_STRONG, 40)[10:]
     assert all(step.solution.converged for step in moving)
-    assert sum(step.solution.iterations for step in moving) < 6000
+    assert sum(step.solution.iterations for step in moving) < 4500
 
 
 def test_penalties_in_turn_are_those_of_a_stage_with_factors_of_its_own(many):

@@ -7,6 +7,7 @@ import pytest
 
 from benchmarks.generated import running_bond
 from benchmarks.scenes import engine_scene
+from benchmarks.tall import column, first_problem
 from mechanics.contact.contacts import gaps
 from mechanics.delassus.rigid import RigidDelassus
 from mechanics.dynamics.simulation import Simulation
@@ -15,7 +16,8 @@ from mechanics.problem.problem import ContactStart
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.scene import SolverSettings
 from mechanics.solvers.first_order.body_admm import BodyADMM
-from mechanics.solvers.strategies.rigid import Alternating
+from mechanics.solvers.second_order.scaling import equilibrated
+from mechanics.solvers.strategies.rigid import Alternating, _without_self_stress
 
 FREE = 9.81 * 1e-3  # velocity that gravity gives in a step of 1 ms [m/s]
 
@@ -111,3 +113,19 @@ def test_contacts_of_a_wall_that_only_trembles_are_kept_where_its_motion_may_be_
     # nothing slides in truth
     moved = loose[-1].after.centre - loose[0].before.centre
     assert np.abs(moved).max() <= 1e-4
+
+
+def test_forces_that_clamp_are_taken_out_and_all_bodies_feel_the_same():
+    """A column of stones of 1 and 10⁶ in turns, whose contacts press sideways against each other in pairs."""
+    problem = first_problem(column([2400.0, 2.4e9] * 3), friction=0.5)
+    nothing = np.zeros_like(problem.u_free)
+    impulse = Alternating(1e-8, 1e-6)(problem, ContactStart(nothing, nothing)).impulse
+    weight = impulse[:, 0].max()
+    clamped = impulse.copy()
+    clamped[:, 1] += 1e-2 * weight * np.tile([1.0, -1.0, 1.0, -1.0], len(impulse) // 4)
+    even, each = equilibrated(problem)
+    least = _without_self_stress(even, clamped / each[:, None]) * each[:, None]
+    assert np.abs(least[:, 1:]).max() < 1e-6 * weight
+    upper = problem.delassus.body.max(axis=1)
+    carried, wanted = (np.bincount(upper, forces[:, 0])[1:] for forces in (least, impulse))
+    np.testing.assert_allclose(carried, wanted, rtol=1e-5)
