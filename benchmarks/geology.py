@@ -5,6 +5,7 @@ Runs that stand in the folder are not made again. `--write` puts the tables into
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -70,6 +71,8 @@ _SWEPT: Table = (
     ("change", "1,000 sweeps instead of 100: mean change", ".3g"),
     ("spread", "spread over seeds: mean standard deviation", ".3g"),
     ("ratio", "change over spread", ".2f"),
+    ("between", "mean change between two seeds, over spread", ".2f"),
+    ("shift", "change of the mean of the curve, over spread of the means", ".2f"),
 )
 
 
@@ -108,7 +111,7 @@ def _wanted(seeds: Sequence[int], only: Sequence[str]) -> Iterable[tuple[str, fl
             yield from (("fault", gamma, seed, _SWEEPS) for gamma in _GAMMA)
         if "fold" in only:
             yield ("fold", 0.0, seed, _SWEEPS)
-    yield from ((kind, 0.0, seeds[0], _MANY) for kind in ("fault",) if kind in only)
+    yield from ((kind, 0.0, seeds[0], _MANY) for kind in ("fault", "fold") if kind in only)
 
 
 def _make(out: Path, kind: str, gamma: float, seed: int, sweeps: int, threads: int) -> None:
@@ -268,19 +271,20 @@ def _swept_rows(runs: Sequence[Mapping[str, Any]]) -> list[Row]:
             continue
         names = [name for name in many["cells"] if name.startswith("W")]
         for column in ("lambda_x", "lambda_y", "p", "q"):
-            change = [
-                np.abs(many["cells"][name][column] - same[0]["cells"][name][column]).mean() for name in names
-            ]
-            spread = [
-                np.std([run["cells"][name][column] for run in alike], axis=0, ddof=1).mean() for name in names
-            ]
+            curves = {run["seed"]: np.array([run["cells"][name][column] for name in names]) for run in alike}
+            here, asked = curves[many["seed"]], np.array([many["cells"][name][column] for name in names])
+            change, spread = np.abs(asked - here).mean(), np.std([*curves.values()], axis=0, ddof=1).mean()
+            between = np.mean([np.abs(one - other).mean() for one, other in combinations(curves.values(), 2)])
+            means = np.std([curve.mean(axis=1) for curve in curves.values()], axis=0, ddof=1)
             rows.append(
                 {
                     "experiment": many["kind"],
                     "curve": column + (", Pa" if column in "pq" else ""),
-                    "change": float(np.mean(change)),
-                    "spread": float(np.mean(spread)),
-                    "ratio": float(np.mean(change) / np.mean(spread)),
+                    "change": float(change),
+                    "spread": float(spread),
+                    "ratio": float(change / spread),
+                    "between": float(between / spread),
+                    "shift": float(np.mean(np.abs((asked - here).mean(axis=1)) / means)),
                 }
             )
     return rows

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.arrays import Array, Ints
+from mechanics.arrays import Array, Bools, Ints
 from mechanics.planar._kernels.disks import Disks, Watch, find_disks, sort_contacts
 from mechanics.planar._kernels.grid import build_grid
 from mechanics.planar._kernels.walls import EndNeighbours, end_neighbours, find_walls
@@ -59,10 +59,13 @@ class PlanarDetector:
         self._reach = max(law.reach for law in model.laws.laws)
         self._neighbours: EndNeighbours | None = None
 
-    def __call__(self, state: PlanarState, ahead: Array | None = None) -> PlanarContacts:
+    def __call__(
+        self, state: PlanarState, ahead: Array | None = None, asked: Bools | None = None
+    ) -> PlanarContacts:
         """Find the contacts (nc), in an order that depends on the numbers of the bodies alone.
 
-        `ahead` (nd,) widens the watch by a further distance that each disk may approach anything [m].
+        `ahead` (nd,) widens the watch by a further distance that each disk may approach anything [m]. Only contacts of
+        the disks that are `asked` for (nd,) are found, if it is given.
         """
         model, nd = self._model, len(self._model.radius)
         watch = Watch(model.scene.alert_distance, self._reach, model.scene.time.step)
@@ -71,8 +74,9 @@ class PlanarDetector:
         common = np.zeros(2) if len(model.scene.walls) else velocity[:, :2].mean(axis=0)
         pace = np.hypot(velocity[:, 0] - common[0], velocity[:, 1] - common[1])
         ahead = np.zeros(nd) if ahead is None else ahead
+        asked = np.ones(nd, dtype=bool) if asked is None else asked
         extent = model.radius * (1 + watch.alert) + watch.reach + watch.step * pace + ahead
-        disks = Disks(centre, model.radius, velocity, model.fixed[:nd], ahead, extent)
+        disks = Disks(centre, model.radius, velocity, model.fixed[:nd], ahead, extent, asked)
         grid = build_grid(centre, extent)
         names, values = find_disks(disks, watch, grid)
         if len(model.scene.walls):

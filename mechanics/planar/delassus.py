@@ -30,8 +30,6 @@ __all__ = ["PlanarDelassus", "PlanarGaussSeidel"]
 _PART = 10_000
 # parts at most: the contacts between them are swept by one thread
 _PARTS = 4
-# strips of a part, swept in turn: a processor works on as many contacts at once
-_LANES = 4
 
 
 @dataclass(frozen=True)
@@ -89,7 +87,7 @@ class PlanarDelassus:
     def layout(self) -> Layout:
         """Order of the sweeps; it depends on the contacts alone, never on the number of threads."""
         parts = min(max(len(self.bodies) // _PART, 1), _PARTS)
-        order, start, rank = cut(self.bodies, self.inertia[:, 0] > 0, parts, _LANES, True)
+        order, start, rank = cut(self.bodies, self.inertia[:, 0] > 0, parts, True)
         made: Layout = layout_of(order, start, rank, self.bodies, self.inertia)
         return made
 
@@ -125,8 +123,8 @@ class PlanarDelassus:
     def gauss_seidel(self, shift: Array, friction: Array, cohesion: Array) -> "PlanarGaussSeidel":
         """Prepare sweeps on u = W r + shift with Coulomb's μ and the cohesion k, each (nc,)."""
         layout = self.layout
-        record = records(layout, shift, friction, cohesion, self.normal, self.lever, self.diagonal)
-        return PlanarGaussSeidel(layout, record, self.threads)
+        record, other = records(layout, shift, friction, cohesion, self.lever, self.normal, self.diagonal)
+        return PlanarGaussSeidel(layout, record, other, self.threads)
 
 
 @dataclass(frozen=True)
@@ -139,23 +137,25 @@ class PlanarGaussSeidel:
     Attributes
     ----------
     layout : the order
-    record : (nc, 16) what the kernel needs of each contact, in that order
+    record : (ng, 12, 8) what the kernel needs of each contact, in that order
+    other : (ng, 3, 8) and of contacts that are not those of disks; (0, 3, 8) where all are
     threads : that may sweep at once, at most
     """
 
     layout: Layout
     record: Array
+    other: Array
     threads: int = 1
 
     def __call__(self, impulse: Array, sweeps: int) -> None:
         """Sweep `impulse` (nc, 2) in place."""
         threads = min(self.threads, numba.config.NUMBA_NUM_THREADS)
         if threads == 1 or len(self.layout.start) == 3:
-            sweep(sweeps, impulse, self.record, self.layout)
+            sweep(sweeps, impulse, self.record, self.other, self.layout)
             return
         before = numba.get_num_threads()
         numba.set_num_threads(threads)
         try:
-            sweep_parallel(sweeps, impulse, self.record, self.layout)
+            sweep_parallel(sweeps, impulse, self.record, self.other, self.layout)
         finally:
             numba.set_num_threads(before)

@@ -7,6 +7,7 @@ import numpy as np
 from mechanics.arrays import Array, Bools
 from mechanics.planar.scene import PlanarScene
 from mechanics.scene.laws.table import LawTable, law_table
+from moma.errors import SceneError
 
 __all__ = ["PlanarModel", "PlanarState", "build_planar_model"]
 
@@ -110,4 +111,11 @@ def _laws(scene: PlanarScene) -> LawTable:
         )
         for rule in scene.rules
     ]
-    return law_table(scene.law, rules, len(codes))
+    laws = law_table(scene.law, rules, len(codes))
+    if laws.sprung:
+        raise SceneError(
+            "a law with springs",
+            where=scene.name,
+            remedy="joints of stones alone have stiffness; give disks a dry, a mortar or a cohesive law",
+        )
+    return laws

@@ -32,12 +32,13 @@ _LEFT = 0.5
 _BEYOND = 0.3
 # of overlaps at the start that are just as large as allowed [-]
 _ROUNDING = 1e-9
-# part of the last correction from which the next one begins: what is no longer needed fades [-]
-_AGAIN = 0.9
+# part of the last correction from which the next one begins: what is no longer needed fades, and what is needed has to
+# be found again by sweeps, slowly [-]
+_AGAIN = 0.97
 # sweeps between two looks
 _LOOK = 10
 # sweeps of one correction at most; what is left then is left to the next step
-_SWEEPS = 1000
+_SWEEPS = 5000
 
 
 def refuse_deep(model: PlanarModel, contacts: PlanarContacts) -> None:

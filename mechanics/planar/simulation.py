@@ -171,12 +171,14 @@ class PlanarSimulation(Carrier):
         scene, radius, h = self.model.scene, self.model.radius, self.model.scene.time.step
         change = (solved.velocity - kick.velocity)[: len(radius), :2]
         ahead = h * np.hypot(change[:, 0], change[:, 1])
-        if not np.isfinite(ahead).all() or 2.0 * ahead.max() <= scene.alert_distance * radius.min():
+        seen = scene.alert_distance * radius.min()
+        if not np.isfinite(ahead).all() or 2.0 * ahead.max() <= seen:
             return None
-        wider = self._detector(kick, ahead)
-        gap = wider.gap + h * self._operator(kick, wider).relative_velocity(solved.velocity)[:, 0]
-        new = ~np.isin(wider.key, solved.contacts.key)
-        return wider if (gap[new] < 0).any() else None
+        # two disks that both stay within half of what is watched anyway meet nothing else
+        contacts = self._detector(kick, ahead, 2.0 * ahead > seen)
+        new = np.flatnonzero(~_among(contacts.key, solved.contacts.key))
+        unseen = self._operator(kick, contacts, new).relative_velocity(solved.velocity)[:, 0]
+        return self._detector(kick, ahead) if (contacts.gap[new] + h * unseen < 0).any() else None
 
     def _kick(self, h: float, theta: float) -> PlanarState:
         """Return the state at the instant of the kick, with the velocities just before it."""
@@ -204,9 +206,11 @@ class PlanarSimulation(Carrier):
     ) -> _Stated:
         """Ask the laws, and state u = W r̃ + (u_free - W s n) for the contacts that act in this step."""
         time = self.model.scene.time
+        motion = operator.relative_velocity(kick.velocity)
         approach = Approach(
             gap=contacts.gap,
-            speed=operator.relative_velocity(kick.velocity)[:, 0],
+            speed=motion[:, 0],
+            slide=motion[:, 1:],
             area=contacts.area,
             size=contacts.size,
             compliance=operator.diagonal[:, 0, 0],
@@ -228,9 +232,12 @@ class PlanarSimulation(Carrier):
         problem = ContactProblem(operator, u_free, bias, terms.friction, terms.cohesion)
         return _Stated(problem, acting, approach, terms, law)
 
-    def _operator(self, kick: PlanarState, contacts: PlanarContacts) -> PlanarDelassus:
+    def _operator(
+        self, kick: PlanarState, contacts: PlanarContacts, some: Ints | slice = slice(None)
+    ) -> PlanarDelassus:
         inertia, threads = self.model.inertia, self.model.scene.solver.threads
-        return PlanarDelassus(contacts.bodies, contacts.normal, contacts.lever, inertia, threads, kick.centre)
+        bodies, normal, lever = contacts.bodies[some], contacts.normal[some], contacts.lever[some]
+        return PlanarDelassus(bodies, normal, lever, inertia, threads, kick.centre)
 
     def _solve(
         self,
@@ -243,9 +250,12 @@ class PlanarSimulation(Carrier):
         """State the problem of these contacts, and solve it from the impulses in `start`."""
         with self.clock("assemble"):
             operator = self._operator(kick, contacts)
-            stated = self._state_laws(kick, contacts, operator, free, self._memory.recall(contacts.key)[1])
+            first, internal = start.recall(contacts.key)
+            if start is not self._memory:
+                internal = self._memory.recall(contacts.key)[1]
+            stated = self._state_laws(kick, contacts, operator, free, internal)
         with self.clock("solve"):
-            solution = self._solution(stated, start.recall(contacts.key)[0], solver or self._solver)
+            solution = self._solution(stated, first, solver or self._solver)
         with self.clock("advance"):
             impulse = solution.impulse.copy()
             impulse[:, 0] -= stated.terms.adhesion
@@ -309,3 +319,10 @@ class PlanarSimulation(Carrier):
             driven=-float(np.sum(impulse * driving)),
             lifted=0.0 if apart.moved is None else -load_work(model, loads, apart.moved) / time.step,
         )
+
+
+def _among(key: Ints, known: Ints) -> Bools:
+    """Return the keys (n,) that are among others; both are in order, as contacts are."""
+    at = np.minimum(np.searchsorted(known, key), len(known) - 1)
+    same: Bools = known[at] == key if len(known) else np.zeros(len(key), dtype=bool)
+    return same

@@ -14,7 +14,7 @@ from pipelines.geology.file import GeologyScene
 
 __all__ = ["PreparedSample", "prepare"]
 
-_VERSION = 3  # of the preparation: a change of its outcome raises it
+_VERSION = 4  # of the preparation: a change of its outcome raises it
 _DIGITS = 16  # of the digest that names a sample
 
 

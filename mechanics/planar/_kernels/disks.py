@@ -25,6 +25,7 @@ class Disks(NamedTuple):
     fixed : (nd,) bool
     ahead : (nd,) float64, by which the watch of each disk is widened [m]
     extent : (nd,) float64, radius and all that is watched around it [m]
+    asked : (nd,) bool, contacts of which one disk at least is asked for are found
     """
 
     centre: Array
@@ -33,6 +34,7 @@ class Disks(NamedTuple):
     fixed: Bools
     ahead: Array
     extent: Array
+    asked: Bools
 
 
 class Watch(NamedTuple):
@@ -70,7 +72,7 @@ def find_disks(disks, watch, grid):  # pragma: no cover - compiled
     names : (n, 3) int64, bodies and feature
     values : (n, 3) float64, n [-] and gap [m]
     """
-    centre, radius, velocity, fixed, ahead, extent = disks
+    centre, radius, velocity, fixed, ahead, extent, asked = disks
     alert, reach, step = watch
     origin, width, low, count, base, buckets, start, order, level, cell = grid
     names, values = np.empty((64, 3), dtype=np.int64), np.empty((64, 3))
@@ -82,16 +84,17 @@ def find_disks(disks, watch, grid):  # pragma: no cover - compiled
             else:
                 mine_x = np.int64(np.floor((centre[i, 0] - origin[0]) / width[k]))
                 mine_y = np.int64(np.floor((centre[i, 1] - origin[1]) / width[k]))
-            for spot in range(9):
+            # in its own class the five cells from its own on: the others look at it
+            for spot in range(4 if k == level[i] else 0, 9):
                 x, y = mine_x + spot % 3 - 1, mine_y + spot // 3 - 1
                 b = bucket(x, y, k, low, count, base, buckets)
                 if b < 0:
                     continue
                 for e in range(start[b], start[b + 1]):
                     j = order[e]
-                    if (k == level[i] and j <= i) or (fixed[i] and fixed[j]):
+                    if (k == level[i] and spot == 4 and j <= i) or (fixed[i] and fixed[j]):
                         continue
-                    if cell[j, 0] != x or cell[j, 1] != y:
+                    if cell[j, 0] != x or cell[j, 1] != y or not (asked[i] or asked[j]):
                         continue
                     dx, dy = centre[i, 0] - centre[j, 0], centre[i, 1] - centre[j, 1]
                     square, far = dx * dx + dy * dy, extent[i] + extent[j]

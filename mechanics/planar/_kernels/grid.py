@@ -14,6 +14,12 @@ from mechanics.arrays import Array, Ints
 
 __all__ = ["Grid", "bucket", "build_grid", "cells_along"]
 
+# half width over the mean up to which disks are in the class of the mean
+_SIMILAR = 1.25
+# width of a cell over the half width of a disk; a little more than two, so that rounding cannot put two disks in reach
+# two cells apart
+_WIDER = 2.0 * (1.0 + 1e-9)
+
 
 class Grid(NamedTuple):
     """Disks sorted into cells.
@@ -60,20 +66,26 @@ def bucket(cell_x, cell_y, level, low, count, base, buckets):
 
 @njit(cache=True)
 def _size_classes(extent):
-    """Return the class (nd,) of each disk by its half width, and the cell width (nl,) of each class in use."""
+    """Return the class (nd,) of each disk by its half width, and the cell width (nl,) of each class in use.
+
+    One of the classes is made for disks of the mean half width, so that those of similar sizes are in one.
+    """
     nd = extent.shape[0]
-    smallest, largest = np.inf, 0.0
+    smallest, largest, mean = np.inf, 0.0, 0.0
     for i in range(nd):
         smallest, largest = min(smallest, extent[i]), max(largest, extent[i])
-    # a little wider than needed, so that rounding cannot put two disks in reach two cells apart
-    finest = 2.0 * smallest * (1.0 + 1e-9)
+        mean += extent[i] / nd
+    similar = min(_SIMILAR * mean, largest)
+    finest = _WIDER * (similar if np.isfinite(similar) else smallest)
+    while 0.5 * finest >= _WIDER * smallest:
+        finest *= 0.5
     classes = 1
-    while finest * 2.0 ** (classes - 1) < 2.0 * largest:
+    while finest * 2.0 ** (classes - 1) < _WIDER * largest:
         classes += 1
     occupied = np.zeros(classes, dtype=np.int64)
     level = np.zeros(nd, dtype=np.int64)
     for i in range(nd):
-        while finest * 2.0 ** level[i] < 2.0 * extent[i]:
+        while finest * 2.0 ** level[i] < _WIDER * extent[i]:
             level[i] += 1
         occupied[level[i]] = 1
     width = np.empty(occupied.sum())

@@ -4,9 +4,11 @@ With t = n turned by +90°, and the lever ℓ_n = a × n, ℓ_t = a × t of the 
 
     u_N = n·(v_i - v_j) + ℓ_n,i ω_i - ℓ_n,j ω_j,   u_T likewise,   Δv_i = (n Δr_N + t Δr_T)/m_i,   Δω_i = ℓ·Δr/J_i
 
-`inertia` (nb, 2) holds 1/m and 1/J, zero for a body that impulses do not move. A sweep works on `record` (nc, 16), two
-cache lines of a contact, and on `v` (ns, 8), one cache line of a body: vx, vy, ω, 1/m, 1/J. There the bodies that move
-come in the order of the sweep. The others are at rest in it: each part has one row of zeros that stands for them all.
+`inertia` (nb, 2) holds 1/m and 1/J, zero for a body that impulses do not move. A sweep works on groups of eight
+contacts that share no body, one in each lane: `record` (ng, 12, 8), what is known of them, and `v` (ns, 4), a row of
+each body: vx, vy, ω/κ and 1/m with κ = √(m/J), so that with the levers κ ℓ a body has no more than one inertia. There
+the bodies that move come in the order of the sweep. The others are at rest in it: each part has one row of zeros that
+stands for them all, and for those of the lanes that stay empty.
 """
 
 from typing import NamedTuple
@@ -14,6 +16,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
+
+from mechanics.planar._kernels.lanes import LANES, solve_disks
 
 __all__ = [
     "Layout",
@@ -28,22 +32,12 @@ __all__ = [
     "velocity_change",
 ]
 
-# columns of a record: n (2), ℓ_n and ℓ_t of both sides (4), shift (2), μ, k, r (2), 1/W_NN, 1/W_TT, W_NT, and whether
-# the contact is not that of two disks
-_LN_I, _LT_I, _LN_J, _LT_J, _SHIFT, _MU, _K, _R, _INV_NN, _INV_TT, _NT, _OTHER = (
-    2,
-    3,
-    4,
-    5,
-    6,
-    8,
-    9,
-    10,
-    12,
-    13,
-    14,
-    15,
-)
+# columns of a record: n (2), κ ℓ_t of both sides, shift (2), μ, k, r (2), 1/W_NN, 1/W_TT
+_LT_I, _LT_J, _SHIFT, _MU, _K, _R, _INV_NN, _INV_TT, _COLUMNS = 2, 3, 4, 6, 7, 8, 10, 11, 12
+# contacts among which those of a group are looked for
+_AHEAD = 64
+# groups before it whose bodies a group leaves alone where it can: the results of these are still on their way
+_RECENT = 2
 
 
 class Layout(NamedTuple):
@@ -51,17 +45,69 @@ class Layout(NamedTuple):
 
     Attributes
     ----------
-    order : (nc,) int64, contacts in the order of the sweep
-    start : (np+2,) int64, where each part begins there, and the contacts between parts
-    body : (nc, 2) uint32, rows of `inertia` of their bodies, in that order
+    place : (ng, 8) int64, contacts in the order of the sweep, group by group; -1 where a lane stays empty
+    start : (np+2,) int64, group with which each part begins there, and the contacts between parts
+    body : (ng, 2, 8) uint32, rows of `inertia` of their bodies
     inertia : (ns, 2) float64, inverse masses and moments of inertia of the bodies that move, then zeros, one row for
         each part and one for the contacts between them
     """
 
-    order: NDArray[np.int64]
+    place: NDArray[np.int64]
     start: NDArray[np.int64]
     body: NDArray[np.uint32]
     inertia: NDArray[np.float64]
+
+
+@njit(cache=True)
+def _groups(order, start, row, moving):
+    """Deal the contacts of each part, nearly in their order, to groups of eight that share no body.
+
+    A group takes contacts whose bodies have been in none of the last groups, then those whose bodies are not in itself.
+
+    Inputs
+    ------
+    order : (nc,) int64
+    start : (np+2,) int64, where each part begins in it
+    row : (nc, 2) int64, rows of the bodies
+    moving : int64, rows of bodies that move; later ones stand for those that do not
+
+    Outputs
+    -------
+    place : (ng, 8) int64
+    begin : (np+2,) int64, group with which each part begins
+    """
+    nc, parts = order.shape[0], start.shape[0] - 1
+    place = np.full((nc, LANES), -1)
+    begin = np.zeros(parts + 1, dtype=np.int64)
+    last = np.full(moving + parts, -1 - _RECENT)
+    waiting = np.empty(_AHEAD, dtype=np.int64)
+    group = 0
+    for part in range(parts):
+        count, ahead = 0, start[part]
+        while True:
+            while count < _AHEAD and ahead < start[part + 1]:
+                waiting[count] = order[ahead]
+                count += 1
+                ahead += 1
+            if count == 0:
+                break
+            lane = 0
+            for latest in (group - _RECENT, group):
+                kept = 0
+                for w in range(count):
+                    c = waiting[w]
+                    i, j = row[c, 0], row[c, 1]
+                    if lane == LANES or last[i] >= latest or last[j] >= latest:
+                        waiting[kept] = c
+                        kept += 1
+                        continue
+                    place[group, lane] = c
+                    lane += 1
+                    last[i], last[j] = group if i < moving else last[i], group if j < moving else last[j]
+                count = kept
+            group += 1
+        begin[part + 1] = group
+    return place[:group].copy(), begin
 
 
 @njit(cache=True)
@@ -70,8 +116,8 @@ def layout_of(order, start, rank, body, inertia):  # pragma: no cover - compiled
 
     Inputs
     ------
-    order : (nc,) int64
-    start : (np+2,) int64
+    order : (nc,) int64, contacts part by part
+    start : (np+2,) int64, where each part begins there
     rank : (nb,) int64, row of each moving body; -1 of the others
     body : (nc, 2) int64, in the order of the contacts
     inertia : (nb, 2) float64
@@ -81,17 +127,26 @@ def layout_of(order, start, rank, body, inertia):  # pragma: no cover - compiled
     Layout
     """
     moving = rank.max() + 1 if len(rank) else 0
-    own = np.zeros((moving + len(start) - 1, 2))
+    parts = len(start) - 1
+    own = np.zeros((moving + parts, 2))
     for b in range(len(rank)):
         if rank[b] >= 0:
             own[rank[b]] = inertia[b]
-    row = np.empty((len(order), 2), dtype=np.uint32)
-    for part in range(len(start) - 1):
+    row = np.empty((len(order), 2), dtype=np.int64)
+    for part in range(parts):
         for p in range(start[part], start[part + 1]):
             for s in range(2):
-                place = rank[body[order[p], s]]
-                row[p, s] = place if place >= 0 else moving + part
-    return Layout(order, start, row, own)
+                at = rank[body[order[p], s]]
+                row[order[p], s] = at if at >= 0 else moving + part
+    place, begin = _groups(order, start, row, moving)
+    rows = np.empty((place.shape[0], 2, LANES), dtype=np.uint32)
+    for part in range(parts):
+        for g in range(begin[part], begin[part + 1]):
+            for lane in range(LANES):
+                c = place[g, lane]
+                for s in range(2):
+                    rows[g, s, lane] = row[c, s] if c >= 0 else moving + part
+    return Layout(place, begin, rows, own)
 
 
 @njit(cache=True)
@@ -164,22 +219,61 @@ def diagonals(body, lever, inertia):  # pragma: no cover - compiled
 
 
 @njit(cache=True)
-def records(layout, shift, friction, cohesion, normal, lever, diagonal):  # pragma: no cover - compiled
-    """Build the records (nc, 16) of the contacts, in the order of the sweep."""
-    order = layout.order
-    record = np.zeros((len(order), 16))
-    for p in range(len(order)):
-        c, one = order[p], record[p]
-        one[0], one[1] = normal[c, 0], normal[c, 1]
-        for k in range(4):
-            # of a body that does not move none is needed
-            one[_LN_I + k] = lever[c, k] if layout.inertia[layout.body[p, k // 2], 0] > 0.0 else 0.0
-        one[_SHIFT], one[_SHIFT + 1] = shift[c, 0], shift[c, 1]
-        one[_MU], one[_K] = friction[c], cohesion[c]
-        one[_INV_NN], one[_INV_TT] = 1.0 / diagonal[c, 0, 0], 1.0 / diagonal[c, 1, 1]
-        one[_NT] = diagonal[c, 0, 1]
-        one[_OTHER] = one[_LN_I] != 0.0 or one[_LN_J] != 0.0 or one[_NT] != 0.0
-    return record
+def _kappa(inertia):
+    """Return κ = √(m/J) (ns,) of the rows; zero of a body that does not move."""
+    found = np.zeros(inertia.shape[0])
+    for b in range(inertia.shape[0]):
+        if inertia[b, 0] > 0.0:
+            found[b] = np.sqrt(inertia[b, 1] / inertia[b, 0])
+    return found
+
+
+@njit(cache=True)
+def records(layout, shift, friction, cohesion, lever, normal, diagonal):  # pragma: no cover - compiled
+    """Build the records of the contacts.
+
+    Inputs
+    ------
+    layout : Layout
+    shift : (nc, 2) float64 [m/s]
+    friction, cohesion : (nc,) float64
+    lever : (nc, 4) float64 [m]
+    normal : (nc, 2) float64
+    diagonal : (nc, 2, 2) float64, W_αα
+
+    Outputs
+    -------
+    record : (ng, 12, 8) float64
+    other : (ng, 3, 8) float64, κ ℓ_n of both sides and W_NT of groups in which one of them is not zero; (0, 3, 8)
+        without such groups
+    """
+    place, kappa = layout.place, _kappa(layout.inertia)
+    record = np.zeros((place.shape[0], _COLUMNS, LANES))
+    uneven = False
+    for g in range(place.shape[0]):
+        for lane in range(LANES):
+            c = place[g, lane]
+            # of a body that does not move no lever is needed
+            for s in range(2):
+                moves = layout.inertia[layout.body[g, s, lane], 0] > 0.0
+                uneven = uneven or (c >= 0 and moves and lever[c, 2 * s] != 0.0)
+    other = np.zeros((place.shape[0] if uneven else 0, 3, LANES))
+    for g in range(place.shape[0]):
+        one = record[g]
+        for lane in range(LANES):
+            c = place[g, lane]
+            if c < 0:
+                continue
+            ki, kj = kappa[layout.body[g, 0, lane]], kappa[layout.body[g, 1, lane]]
+            one[0, lane], one[1, lane] = normal[c, 0], normal[c, 1]
+            one[_LT_I, lane], one[_LT_J, lane] = ki * lever[c, 1], kj * lever[c, 3]
+            one[_SHIFT, lane], one[_SHIFT + 1, lane] = shift[c, 0], shift[c, 1]
+            one[_MU, lane], one[_K, lane] = friction[c], cohesion[c]
+            one[_INV_NN, lane], one[_INV_TT, lane] = 1.0 / diagonal[c, 0, 0], 1.0 / diagonal[c, 1, 1]
+            if uneven:
+                other[g, 0, lane], other[g, 1, lane] = ki * lever[c, 0], kj * lever[c, 2]
+                other[g, 2, lane] = diagonal[c, 0, 1]
+    return record, other
 
 
 @njit(cache=True)
@@ -213,119 +307,105 @@ def solve_local(nn, nt, tt, bn, bt, mu, k):  # pragma: no cover - compiled
 
 
 @njit(cache=True)
-def _solve_disks(c, record, body, v):
-    """Solve one contact of disks, whose arms run along n, and pass what has changed on to its bodies.
-
-    W_αα is diagonal, so the normal does not feel the tangent.
-    """
-    one, vi, vj = record[c], v[body[c, 0]], v[body[c, 1]]
-    nx, ny, lt_i, lt_j = one[0], one[1], one[_LT_I], one[_LT_J]
-    x, y = vi[0] - vj[0], vi[1] - vj[1]
-    un = one[_SHIFT] + nx * x + ny * y
-    ut = one[_SHIFT + 1] + nx * y - ny * x + lt_i * vi[2] - lt_j * vj[2]
-    old_n, old_t = one[_R], one[_R + 1]
-    n = max(old_n - un * one[_INV_NN], 0.0)
-    limit = one[_MU] * n + one[_K]
-    t = min(max(old_t - ut * one[_INV_TT], -limit), limit)
-    one[_R], one[_R + 1] = n, t
-    dn, dt = n - old_n, t - old_t
-    fx, fy = nx * dn - ny * dt, ny * dn + nx * dt
-    vi[0] += vi[3] * fx
-    vi[1] += vi[3] * fy
-    vi[2] += vi[4] * lt_i * dt
-    vj[0] -= vj[3] * fx
-    vj[1] -= vj[3] * fy
-    vj[2] -= vj[4] * lt_j * dt
-
-
-@njit(cache=True)
-def _solve_any(c, record, body, v):
+def _solve_any(group, lane, record, other, body, v):
     """Solve one contact with its neighbours frozen, and pass what has changed on to its bodies."""
-    one, vi, vj = record[c], v[body[c, 0]], v[body[c, 1]]
-    nx, ny = one[0], one[1]
-    ln_i, lt_i, ln_j, lt_j = one[_LN_I], one[_LT_I], one[_LN_J], one[_LT_J]
+    one, more, vi, vj = record[group], other[group], v[body[group, 0, lane]], v[body[group, 1, lane]]
+    nx, ny = one[0, lane], one[1, lane]
+    ln_i, lt_i, ln_j, lt_j = more[0, lane], one[_LT_I, lane], more[1, lane], one[_LT_J, lane]
     x, y = vi[0] - vj[0], vi[1] - vj[1]
-    un = one[_SHIFT] + nx * x + ny * y + ln_i * vi[2] - ln_j * vj[2]
-    ut = one[_SHIFT + 1] + nx * y - ny * x + lt_i * vi[2] - lt_j * vj[2]
-    old_n, old_t, nt = one[_R], one[_R + 1], one[_NT]
-    nn, tt = 1.0 / one[_INV_NN], 1.0 / one[_INV_TT]
+    un = one[_SHIFT, lane] + nx * x + ny * y + ln_i * vi[2] - ln_j * vj[2]
+    ut = one[_SHIFT + 1, lane] + nx * y - ny * x + lt_i * vi[2] - lt_j * vj[2]
+    old_n, old_t, nt = one[_R, lane], one[_R + 1, lane], more[2, lane]
+    nn, tt = 1.0 / one[_INV_NN, lane], 1.0 / one[_INV_TT, lane]
     bn, bt = un - nn * old_n - nt * old_t, ut - nt * old_n - tt * old_t
-    n, t = solve_local(nn, nt, tt, bn, bt, one[_MU], one[_K])
-    one[_R], one[_R + 1] = n, t
+    n, t = solve_local(nn, nt, tt, bn, bt, one[_MU, lane], one[_K, lane])
+    one[_R, lane], one[_R + 1, lane] = n, t
     dn, dt = n - old_n, t - old_t
     fx, fy = nx * dn - ny * dt, ny * dn + nx * dt
     vi[0] += vi[3] * fx
     vi[1] += vi[3] * fy
-    vi[2] += vi[4] * (ln_i * dn + lt_i * dt)
+    vi[2] += vi[3] * (ln_i * dn + lt_i * dt)
     vj[0] -= vj[3] * fx
     vj[1] -= vj[3] * fy
-    vj[2] -= vj[4] * (ln_j * dn + lt_j * dt)
+    vj[2] -= vj[3] * (ln_j * dn + lt_j * dt)
 
 
 @njit(cache=True)
-def _pass(first, last, record, body, v):
-    """Solve the contacts first:last one after the other."""
-    # unsigned, so that no index is taken to count from the end
-    for c in range(np.uint64(first), np.uint64(last)):
-        if record[c, _OTHER] == 0.0:
-            _solve_disks(c, record, body, v)
-        else:
-            _solve_any(c, record, body, v)
+def _pass(first, last, record, other, layout, v):
+    """Solve the groups first:last one after the other."""
+    body = layout.body
+    if other.shape[0] == 0:
+        for g in range(first, last):
+            solve_disks(record, v, body, g)
+        return
+    for g in range(first, last):
+        for lane in range(LANES):
+            if layout.place[g, lane] >= 0:
+                _solve_any(g, lane, record, other, body, v)
 
 
 @njit(cache=True)
-def _begin(impulse, record, layout):
-    """Put the impulses (nc, 2) into the records, and make the bodies' velocities (ns, 8) that they cause."""
-    body, inertia = layout.body, layout.inertia
-    v = np.zeros((inertia.shape[0], 8))
-    for p in range(record.shape[0]):
-        one, i, j = record[p], body[p, 0], body[p, 1]
-        n, t = impulse[layout.order[p], 0], impulse[layout.order[p], 1]
-        one[_R], one[_R + 1] = n, t
-        x, y = one[0] * n - one[1] * t, one[1] * n + one[0] * t
-        v[i, 0] += x
-        v[i, 1] += y
-        v[i, 2] += one[_LN_I] * n + one[_LT_I] * t
-        v[j, 0] -= x
-        v[j, 1] -= y
-        v[j, 2] -= one[_LN_J] * n + one[_LT_J] * t
+def _begin(impulse, record, other, layout):
+    """Put the impulses (nc, 2) into the records, and make the bodies' velocities (ns, 4) that they cause."""
+    place, body, inertia = layout.place, layout.body, layout.inertia
+    v = np.zeros((inertia.shape[0], 4))
+    for g in range(place.shape[0]):
+        one = record[g]
+        for lane in range(LANES):
+            c = place[g, lane]
+            if c < 0:
+                continue
+            i, j, n, t = body[g, 0, lane], body[g, 1, lane], impulse[c, 0], impulse[c, 1]
+            one[_R, lane], one[_R + 1, lane] = n, t
+            x, y = one[0, lane] * n - one[1, lane] * t, one[1, lane] * n + one[0, lane] * t
+            v[i, 0] += x
+            v[i, 1] += y
+            v[i, 2] += one[_LT_I, lane] * t
+            v[j, 0] -= x
+            v[j, 1] -= y
+            v[j, 2] -= one[_LT_J, lane] * t
+            if other.shape[0]:
+                v[i, 2] += other[g, 0, lane] * n
+                v[j, 2] -= other[g, 1, lane] * n
     for b in range(v.shape[0]):
-        v[b, 3], v[b, 4] = inertia[b, 0], inertia[b, 1]
-        v[b, 0] *= v[b, 3]
-        v[b, 1] *= v[b, 3]
-        v[b, 2] *= v[b, 4]
+        v[b, 3] = inertia[b, 0]
+        for k in range(3):
+            v[b, k] *= v[b, 3]
     return v
 
 
 @njit(cache=True)
 def _end(impulse, record, layout):
-    for p in range(record.shape[0]):
-        impulse[layout.order[p], 0], impulse[layout.order[p], 1] = record[p, _R], record[p, _R + 1]
+    for g in range(record.shape[0]):
+        for lane in range(LANES):
+            c = layout.place[g, lane]
+            if c >= 0:
+                impulse[c, 0], impulse[c, 1] = record[g, _R, lane], record[g, _R + 1, lane]
 
 
 @njit(cache=True)
-def sweep(count, impulse, record, layout):  # pragma: no cover - compiled
-    """Make `count` passes over the records in their order; change `impulse` (nc, 2) in place.
+def sweep(count, impulse, record, other, layout):  # pragma: no cover - compiled
+    """Make `count` passes over the groups in their order; change `impulse` (nc, 2) in place.
 
     Always forwards: a pass that comes back begins with the contact that the one before has just solved, and so takes
     two passes for what one forward pass gains.
     """
-    v = _begin(impulse, record, layout)
+    v = _begin(impulse, record, other, layout)
     for _ in range(count):
-        _pass(0, record.shape[0], record, layout.body, v)
+        _pass(0, record.shape[0], record, other, layout, v)
     _end(impulse, record, layout)
 
 
 @njit(cache=True, parallel=True)
-def sweep_parallel(count, impulse, record, layout):  # pragma: no cover - compiled
+def sweep_parallel(count, impulse, record, other, layout):  # pragma: no cover - compiled
     """Make the passes of `sweep` with all parts at a time, then the contacts between them.
 
     Parts share no row of `v`, so the result has the same bits as that of `sweep`.
     """
-    v = _begin(impulse, record, layout)
+    v = _begin(impulse, record, other, layout)
     start, last = layout.start, layout.start.shape[0] - 2
     for _ in range(count):
         for k in prange(last):
-            _pass(start[k], start[k + 1], record, layout.body, v)
-        _pass(start[last], start[last + 1], record, layout.body, v)
+            _pass(start[k], start[k + 1], record, other, layout, v)
+        _pass(start[last], start[last + 1], record, other, layout, v)
     _end(impulse, record, layout)

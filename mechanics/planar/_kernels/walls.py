@@ -140,7 +140,7 @@ def find_walls(disks, watch, grid, ends, pace, neighbours):  # pragma: no cover 
     -------
     names, values : as of `find_disks`
     """
-    centre, radius, velocity, fixed, ahead, _ = disks
+    centre, radius, velocity, fixed, ahead, _, asked = disks
     alert, reach, step = watch
     width, level = grid.width, grid.level
     nd, nw = centre.shape[0], ends.shape[0]
@@ -166,7 +166,7 @@ def find_walls(disks, watch, grid, ends, pace, neighbours):  # pragma: no cover 
                 near[:found] = of_level[members[k] : members[k + 1]]
             for q in range(found):
                 i = near[q]
-                if fixed[i]:
+                if fixed[i] or not asked[i]:
                     continue
                 x, y = centre[i, 0], centre[i, 1]
                 closing = step * (np.hypot(velocity[i, 0], velocity[i, 1]) + pace[w])

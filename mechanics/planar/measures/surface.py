@@ -4,7 +4,9 @@ import numpy as np
 
 from mechanics.arrays import Array
 
-__all__ = ["profile", "slope"]
+__all__ = ["front", "profile", "rise", "slope"]
+
+_STEPS = 10  # places at which the surface is looked up in each part of its length, over which it is averaged
 
 
 def profile(centre: Array, radius: Array, places: Array) -> Array:
@@ -25,6 +27,37 @@ def profile(centre: Array, radius: Array, places: Array) -> Array:
     top = centre[disk, 1] + np.sqrt(np.maximum(radius[disk] ** 2 - away**2, 0.0))
     np.maximum.at(height, order[place], top)
     return np.where(np.isfinite(height), height, np.nan)
+
+
+def rise(start: Array, now: Array, radius: Array, length: float, width: float) -> tuple[Array, Array]:
+    """Return the middles (n,) of parts of the length, and the mean rise (n,) of the surface in each [m].
+
+    The surface itself is as rough as its disks, and one that has come to lie on the others is no rise.
+
+    Parameters
+    ----------
+    start, now : (nd, 2) centres [m]
+    radius : (nd,) [m]
+    length : from x = 0 on [m]
+    width : of a part [m]
+    """
+    edges = np.arange(0.0, length + width, width)
+    places = np.arange(0.0, length, width / _STEPS)
+    risen = profile(now, radius, places) - profile(start, radius, places)
+    known = np.isfinite(risen)
+    number = np.digitize(places[known], edges) - 1
+    count = np.bincount(number, minlength=len(edges))
+    mean = np.bincount(number, risen[known], minlength=len(edges)) / np.maximum(count, 1)
+    return edges + 0.5 * width, mean
+
+
+def front(middle: Array, risen: Array, least: float) -> float:
+    """Return the farthest place whose rise is larger than `least`; the first one without any [m].
+
+    >>> front(np.array([1.0, 2.0, 3.0]), np.array([0.5, 0.2, 0.05]), 0.1)
+    2.0
+    """
+    return float(middle[np.flatnonzero(risen > least).max(initial=0)])
 
 
 def slope(places: Array, height: Array) -> float:

@@ -1,7 +1,6 @@
 """Thrusts of a layer that is pushed: bands of large local shear, where they are and how they dip."""
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -14,6 +13,12 @@ __all__ = ["Thrusts", "thrusts_of"]
 _COLUMN = 4.0  # width of a column of the layer, over the mean radius [-]
 _SMOOTH = 3  # columns of a running mean
 _PROMINENT = 0.25  # of the largest shear of a column, by which a band exceeds what is beside it [-]
+_MIDDLE = 1.0 / 3.0  # part of the height in which bands are looked for: below, all slides over the base [-]
+# of the layer about the middle of a band in which its dip is measured: length to both sides over the thickness, and
+# part of the height [-]
+_BESIDE, _TALL = 0.6, 0.6
+_SHIFTS = 3  # of its line to both sides, in half columns
+_ANGLES = np.radians(np.arange(10.0, 171.0))  # among which it is looked for
 _FEWEST = 5  # disks of a band whose dip is told
 
 
@@ -23,8 +28,8 @@ class Thrusts:
 
     Attributes
     ----------
-    place : (n,) along the layer at the start [m]
-    dip : angle from the x axis (n,), of disks that the shear weighs; nan of too few [rad]
+    place : (n,) along the layer at the start, at half its height [m]
+    dip : angle from the x axis (n,), of the line of largest shear through the middle; nan of too few disks [rad]
     """
 
     place: Array
@@ -46,10 +51,11 @@ def thrusts_of(start: Array, now: Array, shear: Array, radius: Array, layer: flo
     radius : (nd,) [m]
     layer : thickness; disks that started above are left out [m]
     """
-    inside = np.isfinite(shear) & (start[:, 1] < layer)
-    if not inside.any():
+    known = np.isfinite(shear)
+    middle = known & (np.abs(start[:, 1] - 0.5 * layer) < 0.5 * _MIDDLE * layer)
+    if not middle.any():
         return Thrusts(np.zeros(0), np.zeros(0))
-    x, values = start[inside, 0], shear[inside]
+    x, values = start[middle, 0], shear[middle]
     width = _COLUMN * float(radius.mean())
     column = ((x - x.min()) / width).astype(np.int64)
     count = np.bincount(column)
@@ -58,18 +64,24 @@ def thrusts_of(start: Array, now: Array, shear: Array, radius: Array, layer: flo
     bounded = np.concatenate([[0.0], mean, [0.0]])
     peaks = find_peaks(bounded, prominence=_PROMINENT * mean.max())[0] - 1
     place = x.min() + width * (peaks + 0.5)
-    between = np.concatenate([[-np.inf], 0.5 * (place[1:] + place[:-1]), [np.inf]])
-    high = values > np.quantile(values, 0.75)
     dips = []
-    for low, end in pairwise(between):
-        chosen = high & (x >= low) & (x < end)
-        dips.append(_dip(now[inside][chosen], values[chosen]) if chosen.sum() >= _FEWEST else np.nan)
+    for at in place:
+        near = known & (np.abs(start - [at, 0.5 * layer]) < [_BESIDE * layer, 0.5 * _TALL * layer]).all(
+            axis=1
+        )
+        dips.append(_dip(now[near], shear[near], 0.5 * width) if near.sum() >= _FEWEST else np.nan)
     return Thrusts(place, np.array(dips))
 
 
-def _dip(place: Array, weight: Array) -> float:
-    """Return the angle of the long axis of weighed places from the x axis [rad]."""
-    away = place - np.average(place, axis=0, weights=weight)
-    spread = (away * weight[:, None]).T @ away
-    axis = np.linalg.eigh(spread)[1][:, -1]
-    return float(np.arctan(abs(axis[1] / axis[0]))) if axis[0] else 0.5 * np.pi
+def _dip(place: Array, shear: Array, wide: float) -> float:
+    """Return the angle from the x axis of the strip, through the middle of places, whose shear exceeds the mean most.
+
+    Sums over the root of the number of disks: strips of different lengths compare as the means of random samples do.
+    """
+    x, y = (place - place.mean(axis=0)).T
+    excess, best = shear - shear.mean(), (-np.inf, 0.0)
+    for shift in np.arange(-_SHIFTS, _SHIFTS + 1) * wide:
+        across = np.abs((x - shift)[:, None] * np.sin(_ANGLES) - y[:, None] * np.cos(_ANGLES)) < wide
+        score = (excess[:, None] * across).sum(axis=0) / np.sqrt(np.maximum(across.sum(axis=0), 1))
+        best = max(best, (float(score.max()), float(_ANGLES[np.argmax(score)])))
+    return min(best[1], np.pi - best[1])

@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 
 from mechanics.arrays import Array
-from mechanics.planar.measures.surface import profile
+from mechanics.planar.measures.surface import front, rise
 from mechanics.planar.measures.trishear import Trishear, trishear_fit
 from mechanics.planar.scene import Wall
 from mechanics.scene.loads.load import Loads
@@ -106,26 +106,14 @@ class Fault:
         fit = trishear_fit(
             start, last.position[: len(start), :2], (self.tip, 0.0), float(np.radians(self.dip)), slip
         )
+        # parts of two disks
+        where, risen = rise(start, last.position[: len(start), :2], radius, self.length, 4.0 * radius.mean())
+        ahead = front(where, risen, _RISEN * slip * np.sin(np.radians(self.dip))) - self.tip
         return {
             "slip [m]": slip,
-            "front ahead of the tip [m]": self._front(start, last.position[: len(start), :2], radius, slip)
-            - self.tip,
+            "front ahead of the tip [m]": ahead,
             _APICAL: 2.0 * float(np.degrees(fit.model.half_angle)),
             _RATIO: fit.model.ratio,
             "trishear: residual over slip [-]": fit.relative,
             "trishear: share of the motion explained [-]": fit.explained,
         }
-
-    def _front(self, start: Array, now: Array, radius: Array, slip: float) -> float:
-        width = 4.0 * radius.mean()
-        edges = np.arange(0.0, self.length + width, width)
-        places = np.arange(0.0, self.length, 0.1 * width)
-        risen = profile(now, radius, places) - profile(start, radius, places)
-        known = np.isfinite(risen)
-        # the mean over two disks: the surface itself is as rough as a disk
-        number = np.digitize(places[known], edges) - 1
-        count = np.bincount(number, minlength=len(edges))
-        with np.errstate(invalid="ignore"):
-            mean = np.bincount(number, risen[known], minlength=len(edges)) / count
-        high = np.flatnonzero(np.nan_to_num(mean) > _RISEN * slip * np.sin(np.radians(self.dip)))
-        return float(edges[high.max(initial=0)] + 0.5 * width)

@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 
 from mechanics.arrays import Array
-from mechanics.planar.measures.surface import profile
+from mechanics.planar.measures.surface import front, rise
 from mechanics.planar.scene import Wall
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.motions import ImposedMotion
@@ -18,6 +18,9 @@ from pipelines.geology.experiments.experiment import Setup
 from pipelines.geology.observe import Fields
 
 __all__ = ["Fold"]
+
+_RISEN = 0.1  # rise of the surface over its largest rise, at the front [-]
+_PART = 20.0  # lengths over which it is averaged, over the mean radius [-]
 
 
 @dataclass(frozen=True)
@@ -78,15 +81,15 @@ class Fold:
     ) -> Mapping[str, float]:
         """Return how far the wall went, how high the sample rose, and how far its front has come.
 
-        The front is the farthest place at which the surface stands higher than at the start by two mean radii.
+        The front is the farthest place at which the surface has risen by more than a tenth of its largest rise, and by
+        two mean radii, over lengths of ten disks.
         """
         last = instants[-1]
-        places = np.linspace(0.0, self.length, 1 + int(self.length / (2.0 * radius.mean())))
-        before = profile(start, radius, places)
-        now = profile(last.position[: len(start), :2], radius, places)
-        risen = places[np.nan_to_num(now - before, nan=0.0) > 2.0 * radius.mean()]
+        now, mean = last.position[: len(start), :2], float(radius.mean())
+        where, risen = rise(start, now, radius, self.length, _PART * mean)
+        least = max(_RISEN * float(risen.max()), 2.0 * mean)
         return {
             "shortening [m]": self.speed * last.time,
-            "highest [m]": float(np.nanmax(now)),
-            "front [m]": float(risen.max(initial=0.0)),
+            "highest [m]": float((now[:, 1] + radius).max()),
+            "front [m]": front(where, risen, least) if risen.max() > least else 0.0,
         }

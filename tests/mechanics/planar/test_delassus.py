@@ -125,6 +125,12 @@ def with_loads(seed, count):
     return shift, rng.uniform(0, 0.6, count), rng.uniform(0, 0.2, count) * (rng.random(count) < 0.5)
 
 
+def in_order(operator):
+    """Contacts in the order of the sweeps."""
+    place = operator.layout.place.ravel()
+    return place[place >= 0]
+
+
 @pytest.mark.parametrize("levers", [True, False])
 def test_sweeps_are_those_of_the_dense_twin(levers):
     arrays = random_problem(3, bodies=20, contacts=25, levers=levers)
@@ -135,7 +141,7 @@ def test_sweeps_are_those_of_the_dense_twin(levers):
     friction = np.minimum(friction, 0.9 / np.maximum(coupling, 1e-3))
     r = np.zeros((25, 2))
     operator.gauss_seidel(shift, friction, cohesion)(r, 7)
-    twin = gauss_seidel_twin(arrays, shift, friction, cohesion, operator.layout.order, 7)
+    twin = gauss_seidel_twin(arrays, shift, friction, cohesion, in_order(operator), 7)
     np.testing.assert_allclose(r, twin, atol=1e-9)
     assert (r[:, 0] > 0).any()
     assert (r[:, 0] == 0).any()
@@ -175,6 +181,35 @@ def lattice(side):
     inertia[::7] = 0.0
     moves = (inertia[bodies, 0] > 0).any(axis=1)
     return PlanarDelassus(bodies[moves], normal[moves], lever[moves], inertia)
+
+
+@pytest.mark.parametrize("side", [3, 12, 40])
+def test_groups_hold_every_contact_once_and_share_no_body_that_moves(monkeypatch, side):
+    monkeypatch.setattr(delassus, "_PART", 500)
+    operator = lattice(side)
+    layout, moves = operator.layout, operator.inertia[:, 0] > 0
+    np.testing.assert_array_equal(np.sort(in_order(operator)), np.arange(len(operator.bodies)))
+    for number, group in enumerate(layout.place):
+        bodies = operator.bodies[group[group >= 0]]
+        moving = bodies[moves[bodies]]
+        assert len(set(moving.tolist())) == len(moving)
+        # rows are those of the bodies, and of nothing that moves where a lane stays empty
+        rows = layout.inertia[layout.body[number]]
+        np.testing.assert_array_equal(rows[:, group >= 0], operator.inertia[bodies.T])
+        assert not rows[:, group < 0].any()
+    if side == 40:
+        # few lanes stay empty
+        assert len(layout.place) < 1.1 * len(operator.bodies) / 8
+
+
+def test_a_body_that_all_contacts_share_is_in_a_group_once():
+    # a plate on nine disks: nine groups of one contact
+    below = np.arange(9)
+    bodies = np.column_stack([below, np.full(9, 9)])
+    normal, lever = np.tile([0.0, -1.0], (9, 1)), np.tile([0.0, -1.0, 0.0, 0.0], (9, 1))
+    operator = PlanarDelassus(bodies, normal, lever, np.tile([1.0, 2.0], (10, 1)))
+    assert ((operator.layout.place >= 0).sum(axis=1) == 1).all()
+    assert len(operator.layout.place) == 9
 
 
 def test_any_number_of_threads_gives_the_same_bits():

@@ -8,6 +8,7 @@ import pytest
 from moma.errors import SceneError
 from pipelines.geology.experiments.biaxial import Biaxial
 from pipelines.geology.experiments.fault import Fault
+from pipelines.geology.experiments.fold import Fold
 from pipelines.geology.experiments.wedge import Wedge
 from pipelines.geology.figures import draw_trishear
 from pipelines.geology.file import parse_geology
@@ -41,6 +42,20 @@ def fields(place, bodies=(), force=(), time=10.0):
     bodies = np.array(bodies, dtype=np.int64).reshape(-1, 2)
     still, gap = np.zeros((count + 2, 3)), np.zeros(contacts)
     return Fields(100, time, position, still, *np.zeros((3, count)), bodies, along, along, force, gap)
+
+
+def test_the_front_of_a_fold_is_that_of_its_rise_and_no_single_disk():
+    fold = Fold(length=100.0, deep=10.0, thickness=10.0, deep_length=10.0, slope_end=20.0, speed=1.0)
+    x, y = np.meshgrid(np.arange(0.25, 100.0, 0.5), np.arange(0.25, 10.0, 0.5))
+    start = np.column_stack([x.ravel(), y.ravel()])
+    # 6 m at the wall, and none from 40 m on: a tenth of it at 36 m
+    rise = 6.0 * np.clip(1.0 - start[:, 0] / 40.0, 0.0, 1.0)
+    now = start + np.column_stack([np.zeros(len(start)), rise])
+    # a disk has come to lie on the others, far away
+    now[-3, 1] += 1.0
+    radius = np.full(len(start), 0.25)
+    assert fold.measures(start, radius, [fields(now)], {})["front [m]"] == pytest.approx(36.0, abs=4.0)
+    assert fold.measures(start, radius, [fields(start)], {})["front [m]"] == 0.0
 
 
 @pytest.mark.parametrize(("line", "held"), [("", [True, True, False]), ("rough = false", [False] * 3)])

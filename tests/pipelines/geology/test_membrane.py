@@ -75,10 +75,29 @@ def scene(folder, strain, steps):
     return path
 
 
-def test_a_sample_at_rest_bears_the_pressure_of_its_membrane(tmp_path):
-    done = run_geology(scene(tmp_path, 1e-6, 400), "biaxial", tmp_path / "out")
+def pushed_across(instant, x):
+    """Force that the disks left of x and those right of it push each other apart with."""
+    count, (first, second) = len(instant.pressure), instant.bodies.T
+    left = instant.position[:, 0] < x
+    across = (second < count) & (left[first] != left[second])
+    return (np.where(left[first], -1.0, 1.0) * instant.force[:, 0])[across].sum()
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_sample_at_rest_bears_the_pressure_of_its_membrane(tmp_path, seed):
+    path = scene(tmp_path, 1e-6, 400)
+    path.write_text(path.read_text(encoding="utf-8").replace("[sample]", f"[sample]\nseed = {seed}"))
+    done = run_geology(path, "biaxial", tmp_path / "out")
+    last = Instants(tuple(sorted((tmp_path / "out" / "arrays").iterdir())))[-1]
+    with np.load(next((tmp_path / ".samples").iterdir())) as sample:
+        given = forces(last.position[: len(last.pressure), :2], sample["radius"], PRESSURE)
+    # the mean stress within differs by 4 % from one sample to the next, what crosses a line does not
+    for x in (3.0, 5.0, 7.0):
+        right = last.position[: len(last.pressure), 0] > x
+        assert pushed_across(last, x) == pytest.approx(-given[right, 0].sum(), rel=0.01)
+        assert -given[right, 0].sum() == pytest.approx(PRESSURE * 12.0, rel=0.1)
     rows = read_rows(tmp_path / "out" / done.summary["cells"]["whole sample"])
-    assert rows["sigma_xx"][-10:] == pytest.approx(PRESSURE, rel=0.02)
+    assert rows["sigma_xx"][-10:] == pytest.approx(PRESSURE, rel=0.1)
 
 
 def test_a_run_within_a_membrane_goes_on_with_the_same_bits(tmp_path):
