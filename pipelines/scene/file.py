@@ -195,7 +195,7 @@ def _joints(document: Document, laws: Sequence[JointLaw], values: Mapping[str, A
             'mode = "mortar", but no law says how mortar bonds',
             "joints",
             "mode",
-            remedy='add [[laws]] of type "mortar" or "cohesive_zone"',
+            remedy='add [[laws]] of type "mortar", "cohesive_zone" or "elastic_joint"',
         )
     return settings
 

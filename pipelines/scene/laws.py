@@ -6,6 +6,7 @@ from typing import Any
 
 from mechanics.scene.laws.cohesive_zone import CohesiveZone
 from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.laws.elastic_joint import ElasticJoint
 from mechanics.scene.laws.law import Law
 from mechanics.scene.laws.lennard_jones import LennardJones
 from mechanics.scene.laws.mortar import MortarJoint
@@ -16,13 +17,14 @@ from pipelines.toml.schema import Document, Key, Kind, nearest
 
 __all__ = ["BONDS", "LAW_KEYS", "LAW_TYPES", "JointLaw", "law_rules", "read_laws"]
 
-BONDS = ("mortar", "cohesive_zone")
+BONDS = ("mortar", "cohesive_zone", "elastic_joint")
 """Types of laws that are mortar."""
 
 _CLASSES: Mapping[str, type[Law]] = {
     "dry": DryJoint,
     "mortar": MortarJoint,
     "cohesive_zone": CohesiveZone,
+    "elastic_joint": ElasticJoint,
     "lennard_jones": LennardJones,
 }
 

@@ -9,7 +9,7 @@ from numba import njit
 from survey.arrays import Array, Bools, Ints
 from survey.geometry._kernels.vectors import dot, height_over
 
-__all__ = ["JointCorners", "continuing_faces", "fit_middle_planes"]
+__all__ = ["KNOWN", "JointCorners", "continuing_faces", "fit_middle_planes"]
 
 _ROUNDS = 30
 _HUBER = 1.5
@@ -31,7 +31,10 @@ _WEAR = 0.025
 """Metres: residual of a worn corner beyond which it loses weight, since no wear explains a corner 25 cm off."""
 
 _USUAL = 0.25
-"""Weight of the usual width of joints, used where fewer than three sound corners define one side."""
+"""Weight of the usual width of joints, used where fewer than `KNOWN` sound corners define one side."""
+
+KNOWN = 3
+"""Least number of sound corners of each side of a joint that determine its width without the usual one."""
 
 _OWN = 4
 """Least number of sound corners from which one side has its own plane."""
@@ -92,7 +95,7 @@ def _fit(points, hands, sound, scale, usual, straightness, plane, value):
     for i in range(k):
         number += sound[i]
         above += sound[i] and hands[i] > 0.0
-    prior = _USUAL if usual >= 0.0 and min(above, number - above) < 3 else 0.0
+    prior = _USUAL if usual >= 0.0 and min(above, number - above) < KNOWN else 0.0
     design = np.empty((k, 6))
     for i in range(k):
         x, y, s = points[i, 0] / scale, points[i, 1] / scale, 0.5 * hands[i]

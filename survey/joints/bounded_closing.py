@@ -22,6 +22,7 @@ __all__ = ["Building", "Cut", "as_building", "close_within_bounds"]
 
 _ROUNDS = 10  # rounds in which single joints are left open; then all joints of a stone that moves too far
 _CONVEX = 1e-6  # of a stone's size: height of a corner above a face's plane that is due to rounding
+_CORE = "infill"  # kind of the parts of the core of a wall
 _BOTH_KEPT = "both stones keep their shape"
 _KEPT = "one of the stones keeps its shape, and the other is led by its other joints"
 
@@ -99,7 +100,8 @@ def as_building(stones: Sequence[BlockyStone]) -> Building:
     convex: Bools = height <= _CONVEX * extent
     sound = np.concatenate([_sound(stone) for stone in stones])
     notched = ~convex & np.array([joins_three(solid.faces) for solid in solids])
-    faces = StoneFaces(gathered, planes, sound, ~(convex | notched)[planes.owner])
+    core = np.array([stone.kind == _CORE for stone in stones])
+    faces = StoneFaces(gathered, planes, sound, ~(convex | notched)[planes.owner], core[planes.owner])
     rows = np.column_stack([planes.normals, planes.offsets])
     return Building(tuple(stones), solids, origin, faces, rows, convex, notched)
 

@@ -9,6 +9,7 @@ plane.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -16,7 +17,7 @@ from scipy.sparse.csgraph import connected_components
 
 from survey.arrays import Array, Bools, Ints
 from survey.geometry.adjacency import Polyhedra
-from survey.joints._kernels import JointCorners, continuing_faces, fit_middle_planes
+from survey.joints._kernels import KNOWN, JointCorners, continuing_faces, fit_middle_planes
 from survey.joints.bent_beds import fit_bent_bed
 from survey.joints.facing import FacePlanes, FacingFaces
 from survey.joints.settings import JointSettings
@@ -40,12 +41,14 @@ class StoneFaces:
     planes : of their faces
     sound : (nv,) whether a corner is known from measurement
     kept : (nf,) whether a face has to stay in place
+    core : (nf,) whether a face is of the core of a wall, which nobody has measured
     """
 
     solids: Polyhedra
     planes: FacePlanes
     sound: Bools
     kept: Bools
+    core: Bools
 
     def corners(self, face: int) -> Ints:
         """Return the vertex indices of a face's corners."""
@@ -84,7 +87,8 @@ def contact_planes(faces: StoneFaces, facing: FacingFaces, settings: JointSettin
     """Find the contact plane of each pair of facing faces.
 
     Faces that have to stay in place take no part in the fit. A face whose only joint is with them moves to their
-    plane; one with other joints meets them only if it already lies in their plane.
+    plane; one with other joints meets them only if it already lies in their plane. Nor do those of the core, which
+    follow the stones: a core between stones leaves their joints as they are without it.
 
     Parameters
     ----------
@@ -94,10 +98,15 @@ def contact_planes(faces: StoneFaces, facing: FacingFaces, settings: JointSettin
     """
     found = _Found(faces, facing, [], [], np.full(len(facing), -1))
     kept = faces.kept[facing.faces]
-    movable = np.flatnonzero(~kept.any(axis=1))
-    _add_joints(found, movable, settings)
-    for link in np.flatnonzero(kept.any(axis=1)).tolist():
+    movable, core = ~kept.any(axis=1), faces.core[facing.faces]
+    _add_joints(found, np.flatnonzero(movable & ~core.any(axis=1)), settings)
+    for link in np.flatnonzero(~movable).tolist():
         found.add_kept(link, kept[link])
+    for link in np.flatnonzero(movable & (core[:, 0] != core[:, 1])).tolist():
+        found.add_beside_core(link, int(facing.faces[link, int(core[link, 0])]))
+    inside = np.flatnonzero(movable & core.all(axis=1))
+    alone = [link for link in inside.tolist() if not found.add_in_core(link)]
+    _add_joints(found, np.array(alone, np.int64), settings)
     return found.planes()
 
 
@@ -107,9 +116,10 @@ def _add_joints(found: "_Found", links: Ints, settings: JointSettings) -> None:
     label = _joints(faces, facing, settings)
     count = int(label.max()) + 1 if len(label) else 0
     groups = _gathered(faces, facing, label, count)
-    _, values = _fitted(faces, groups, -1.0, settings)
+    planes, values = _fitted(faces, groups, -1.0, settings)
     usual = float(np.median(values[:, 0])) if count else 0.0
-    planes, values = _fitted(faces, groups, usual, settings)
+    few = np.flatnonzero(_few_known(faces, groups))
+    planes[few], values[few] = _fitted(faces, _some_groups(groups, few), usual, settings)
     few_are_odd = (values[:, 3] <= _FEW) & (values[:, 4] <= _FINE * settings.straightness)
     straight = (values[:, 2] <= settings.straightness) | few_are_odd
     found.add_many(
@@ -177,6 +187,40 @@ class _Found:
             theirs = np.array([*self.normals[number], self.offsets[number]])
             if self._same(plane, theirs, stays) or self._same(plane, -theirs, stays):
                 self.of_link[link] = number
+
+    def add_beside_core(self, link: int, stone: int) -> None:
+        """Add a pair of the face of a stone and one of the core: the plane of that face."""
+        nearest = self._nearest(link, (stone,))
+        if nearest is not None:
+            self.of_link[link] = nearest
+        else:
+            plane = np.array([[*self.faces.planes.normals[stone], self.faces.planes.offsets[stone]]])
+            self.add_many(plane, np.array([link]), np.zeros(1, np.int64))
+        for face in self.facing.faces[link].tolist():
+            self._of_face.setdefault(face, set()).add(int(self.of_link[link]))
+
+    def add_in_core(self, link: int) -> bool:
+        """Add a pair of faces of the core: the plane that one has beside a stone; return False if none has."""
+        one, other = self.facing.faces[link].tolist()
+        nearest = self._nearest(link, (one, other))
+        if nearest is not None:
+            self.of_link[link] = nearest
+        return nearest is not None
+
+    def _nearest(self, link: int, faces: tuple[int, ...]) -> int | None:
+        """Return the plane of these faces that is nearest to the middle of a joint; None if they have none."""
+        planes = set[int]().union(*(self._of_face.get(face, ()) for face in faces))
+        middle = self.facing.centroid[link]
+        return min(planes, key=lambda k: abs(self.normals[k] @ middle - self.offsets[k]), default=None)
+
+    @cached_property
+    def _of_face(self) -> dict[int, set[int]]:
+        """Planes of the joints of each face of a stone."""
+        planes: dict[int, set[int]] = {}
+        for link in np.flatnonzero(self.of_link >= 0).tolist():
+            for face in self.facing.faces[link].tolist():
+                planes.setdefault(face, set()).add(int(self.of_link[link]))
+        return planes
 
     def _same(self, plane: Array, other: Array, face: int) -> bool:
         """Return whether a face also lies in another plane, within rounding."""
@@ -252,6 +296,27 @@ def _gathered(faces: StoneFaces, facing: FacingFaces, label: Ints, count: int) -
     np.add.at(mean, joint, weight[:, None] * faces.planes.normals[face])
     mean /= np.linalg.norm(mean, axis=1)[:, None]
     return _Groups(face, hand, starts, mean)
+
+
+def _few_known(faces: StoneFaces, groups: _Groups) -> Bools:
+    """Return which joints (n,) have fewer sound corners on a side than determine its distance from the other."""
+    if not len(groups.normals):
+        return np.zeros(0, np.bool_)
+    begin = faces.solids.face_starts
+    sound = np.concatenate([[0], np.cumsum(faces.sound[faces.solids.corners])])
+    known = (sound[begin[1:]] - sound[begin[:-1]])[groups.faces]
+    sides = [
+        np.add.reduceat(np.where(groups.hands == hand, known, 0), groups.starts[:-1]) for hand in (1.0, -1.0)
+    ]
+    return np.minimum(*sides) < KNOWN
+
+
+def _some_groups(groups: _Groups, joints: Ints) -> _Groups:
+    """Return the faces of these joints (k,) only."""
+    sizes = np.diff(groups.starts)[joints]
+    starts = np.concatenate([[0], np.cumsum(sizes)])
+    rows = np.repeat(groups.starts[joints] - starts[:-1], sizes) + np.arange(starts[-1])
+    return _Groups(groups.faces[rows], groups.hands[rows], starts, groups.normals[joints])
 
 
 def _fitted(faces: StoneFaces, groups: _Groups, usual: float, settings: JointSettings) -> tuple[Array, Array]:

@@ -48,7 +48,8 @@ class CourseLine:
     facade, zone, course : location
     stones : codes of its stones that have a bed, in order along the wall
     codes : (n,) stone of each corner
-    along : (n,) place of each corner along the facade, to the right of the viewer [m]
+    places : (n, 3) place of each corner [m]
+    along : (n,) the same along the facade, to the right of the viewer [m]
     height : (n,) its z [m]
     sigma : (n,) standard deviation of its z, as measured [m]
     left_out : lower corners that are ignored: worn, or of unknown precision
@@ -75,6 +76,7 @@ class CourseLine:
     course: int
     stones: tuple[str, ...]
     codes: tuple[str, ...]
+    places: Array
     along: Array
     height: Array
     sigma: Array
@@ -153,6 +155,7 @@ class _Course:
     zone: str | None
     course: int
     codes: tuple[str, ...]
+    places: Array
     left_out: int
     bed: BedCorners
     frame_sigma: float
@@ -242,7 +245,7 @@ def _course(stones: Sequence[StoneQuality], facade: Facade, frame_sigma: float) 
         sound = [k for k in lower if k not in stone.worn_corners and known[k]]
         left_out += len(lower) - len(sound)
         along = (stone.outline[sound] - facade.frame.origin) @ facade.frame.axes[0]
-        parts.append(np.column_stack([along, stone.outline[sound, 2], stone.corner_sigma[sound, 2]]))
+        parts.append(np.column_stack([along, stone.corner_sigma[sound, 2], stone.outline[sound]]))
         codes += [stone.code] * len(sound)
     if not codes:
         return None
@@ -253,9 +256,10 @@ def _course(stones: Sequence[StoneQuality], facade: Facade, frame_sigma: float) 
     course = stones[0].course
     assert course is not None
     numbers = np.array([number[code] for code in names], dtype=np.intp)
-    along, height, sigma = (np.ascontiguousarray(column) for column in table[order].T)
+    along, sigma, *_, height = (np.ascontiguousarray(column) for column in table[order].T)
     bed = BedCorners(numbers, along, height, sigma)
-    return _Course(facade.name, stones[0].zone, course, tuple(names), left_out, bed, frame_sigma)
+    places = table[order, 2:]
+    return _Course(facade.name, stones[0].zone, course, tuple(names), places, left_out, bed, frame_sigma)
 
 
 def _line(course: _Course, own: BedScatter | None, pooled: BedScatter | None) -> CourseLine:
@@ -275,6 +279,7 @@ def _line(course: _Course, own: BedScatter | None, pooled: BedScatter | None) ->
         course=course.course,
         stones=tuple(dict.fromkeys(course.codes)),
         codes=course.codes,
+        places=course.places,
         along=bed.along,
         height=bed.height,
         sigma=bed.sigma,

@@ -1,8 +1,9 @@
 """A synthetic building: its true stones with closed joints, and its survey, with open ones."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from random import Random
+from types import MappingProxyType
 
 import numpy as np
 
@@ -11,10 +12,10 @@ from survey.extrusion.depth import depth_for
 from survey.extrusion.extrusion import SurveyedBlock, extrude, prism
 from survey.faces.faces import outline_face
 from survey.geometry.solids import Solid
-from survey.records.survey import OBSERVER, BlockRecord, DepthRule, Station, Survey, SurveyHead
+from survey.records.survey import OBSERVER, DepthRule, Station, Survey, SurveyHead
 from survey.synthetic.bond import PlannedStone
-from survey.synthetic.frame import TrueStone, WallFrame
-from survey.synthetic.measure import HALF_JOINT, SIGMA, measure_stone
+from survey.synthetic.frame import Movement, RigidMotion, TrueStone, WallFrame
+from survey.synthetic.measure import HALF_JOINT, SIGMA, Measured, add_blunders, measure_stone
 from survey.synthetic.shared_faces import TrueJoint, true_joints
 
 __all__ = ["Building", "Draft", "flat_stone", "measured_building", "observer"]
@@ -22,6 +23,7 @@ __all__ = ["Building", "Draft", "flat_stone", "measured_building", "observer"]
 
 SOURCE = "synthetic value, chosen for this building"
 SEEN = "synthetic value, as if measured on a side that can be seen"
+_NONE: Movement = MappingProxyType({})
 DEPTH_SIGMA = 0.03  # standard deviation of a depth by rule [m]
 
 
@@ -56,9 +58,10 @@ class Building:
     ----------
     name : a description
     survey : the measurements of a surveyor
-    solids : the true stones, closed joints, convex; in the order of the survey
-    joints : all true joints
+    solids : the true stones, convex, where they are now; in the order of the survey
+    joints : all true joints, as they were laid
     base : codes of the stones that stand on the ground
+    movement : of the stones since their joints were closed
     """
 
     name: str
@@ -66,6 +69,7 @@ class Building:
     solids: tuple[Solid, ...]
     joints: tuple[TrueJoint, ...]
     base: tuple[str, ...]
+    movement: Movement = field(default_factory=dict)
 
     def blocks(self) -> list[SurveyedBlock]:
         """Make the surveyed stones: fit planes, extrude outlines by their depth."""
@@ -90,6 +94,9 @@ def measured_building(
     stations: Sequence[Station],
     base: Sequence[str],
     rng: Random,
+    *,
+    blunders: int = 0,
+    movement: Movement = _NONE,
 ) -> Building:
     """Measure a building; sides in contact with another stone are surveyed half a joint inside.
 
@@ -101,14 +108,20 @@ def measured_building(
     stations : of the surveyor
     base : codes of the stones on the ground
     rng : random numbers
+    blunders : number of points with a gross error
+    movement : of the stones since they were laid
     """
     joints = true_joints([draft.stone.solid for draft in drafts])
     touched = {(code, face) for joint in joints for code, face in zip(joint.stones, joint.faces, strict=True)}
-    records = tuple(_measured(draft, touched, rng) for draft in drafts)
+    drafts = [_moved(draft, movement.get(draft.stone.plan.code)) for draft in drafts]
+    measured = [_measured(draft, touched, rng) for draft in drafts]
+    measured = add_blunders(measured, [draft.stone.normal for draft in drafts], blunders, rng)
     rules = tuple(DepthRule(kind, depth, DEPTH_SIGMA, SOURCE) for kind, depth in sorted(depths.items()))
     head = SurveyHead(f"{name} (synthetic)", f"{name}.moma", tuple(stations), depth_rules=rules)
     solids = tuple(draft.stone.solid for draft in drafts)
-    return Building(name, Survey(head, records), solids, joints, tuple(base))
+    return Building(
+        name, Survey(head, tuple(one.record for one in measured)), solids, joints, tuple(base), movement
+    )
 
 
 def observer(position: Array) -> Station:
@@ -116,16 +129,23 @@ def observer(position: Array) -> Station:
     return Station(OBSERVER, np.round(position, 4))
 
 
-def _measured(draft: Draft, touched: set[tuple[str, int]], rng: Random) -> BlockRecord:
+def _moved(draft: Draft, motion: RigidMotion | None) -> Draft:
+    if motion is None:
+        return draft
+    return replace(draft, stone=draft.stone.moved(motion), frame=draft.frame.moved(motion))
+
+
+def _measured(draft: Draft, touched: set[tuple[str, int]], rng: Random) -> Measured:
     """Measure one face, and the depth where it is visible."""
     stone, code = draft.stone, draft.stone.plan.code
     touching = {side for i, side in enumerate(draft.side_of) if (code, 2 + i) in touched}
     joint = (0 in touching, 1 in touching, 2 in touching, 3 in touching)
     plan = replace(stone.plan, corners=draft.quad, joint=joint)
-    record = measure_stone(replace(stone, plan=plan), draft.frame, rng).record
-    record = replace(record, zone=draft.zone, station=draft.station)
+    measured = measure_stone(replace(stone, plan=plan), draft.frame, rng)
+    record = replace(measured.record, zone=draft.zone, station=draft.station)
     if not draft.seen_depth:
-        return record
+        return replace(measured, record=record)
     hidden_half = rng.uniform(*HALF_JOINT) if (code, 1) in touched else 0.0
     depth = round(stone.depth - hidden_half + rng.gauss(0.0, SIGMA), 4)
-    return replace(record, depth=depth, depth_sigma=SIGMA, depth_source=SEEN)
+    record = replace(record, depth=depth, depth_sigma=SIGMA, depth_source=SEEN)
+    return replace(measured, record=record)

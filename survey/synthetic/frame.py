@@ -1,7 +1,8 @@
 """Frame of the wall in the site, and the true stones in space."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from random import Random
 
 import numpy as np
@@ -11,7 +12,7 @@ from survey.extrusion.extrusion import prism
 from survey.geometry.solids import Solid
 from survey.synthetic.bond import PlannedStone
 
-__all__ = ["TrueStone", "WallFrame", "build_stone", "wall_frame"]
+__all__ = ["Movement", "RigidMotion", "TrueStone", "WallFrame", "build_stone", "wall_frame"]
 
 
 ORIGIN = (12.4, 38.25, 6.83)  # foot of the window's axis in the local site frame [m]
@@ -19,6 +20,29 @@ AZIMUTH = math.radians(7.0)  # of the wall against the x axis
 BATTER = math.radians(0.3)  # the wall leans back from the observer
 RELIEF = 0.002  # standard deviation of a face's distance from the wall plane [m]
 FACE_TILT = math.radians(0.15)  # standard deviation of each tilt of a face against the wall plane
+
+
+@dataclass(frozen=True)
+class RigidMotion:
+    """Motion of a stone since it was laid, x → rotation x + shift.
+
+    Attributes
+    ----------
+    rotation : (3, 3) [-]
+    shift : (3,) of the origin of the site [m]
+    """
+
+    rotation: Array
+    shift: Array
+
+    def place(self, points: Array) -> Array:
+        """Return the places (n, 3) to which points (n, 3) have moved."""
+        moved: Array = points @ self.rotation.T + self.shift
+        return moved
+
+
+Movement = Mapping[str, RigidMotion]
+"""Motions of stones by code; stones without one have stayed."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +62,10 @@ class WallFrame:
         """Place points (n, 2) of the wall plane, moved out by `out` [m], in the site (n, 3)."""
         placed: Array = self.origin + flat @ self.axes[:2] + out * self.axes[2]
         return placed
+
+    def moved(self, motion: RigidMotion) -> "WallFrame":
+        """Return the frame as it has moved with a stone."""
+        return WallFrame(motion.place(self.origin[None])[0], self.axes @ motion.rotation.T)
 
 
 @dataclass(frozen=True)
@@ -64,6 +92,12 @@ class TrueStone:
         lift = (self.offset - placed @ self.normal) / (frame.axes[2] @ self.normal)
         out: Array = placed + np.outer(lift, frame.axes[2])
         return out
+
+    def moved(self, motion: RigidMotion) -> "TrueStone":
+        """Return the stone where it has moved to."""
+        normal = motion.rotation @ self.normal
+        solid = replace(self.solid, vertices=motion.place(self.solid.vertices))
+        return replace(self, normal=normal, offset=self.offset + float(normal @ motion.shift), solid=solid)
 
 
 def wall_frame() -> WallFrame:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from random import Random
+from types import MappingProxyType
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from survey.synthetic.bond import Line, PlannedStone, upright
 from survey.synthetic.building import Building, Draft, measured_building, observer
 from survey.synthetic.buildings.openings import Arch, Opening, plan_opening
 from survey.synthetic.coursing import CLEARANCES, Bed, Piece, fill_run, planned
-from survey.synthetic.frame import build_stone, wall_frame
+from survey.synthetic.frame import Movement, build_stone, wall_frame
 
 __all__ = ["DEPTHS", "Course", "bed_heights", "plan_courses", "wall"]
 
@@ -46,7 +47,13 @@ class Course:
 
 
 def wall(
-    stones: int, seed: int = 1, *, arch: Arch | None = None, sag: float = 0.0, snecked: float = 0.0
+    stones: int,
+    seed: int = 1,
+    *,
+    arch: Arch | None = None,
+    sag: float = 0.0,
+    snecked: float = 0.0,
+    movement: Movement = MappingProxyType({}),
 ) -> Building:
     """Build a wall of a single leaf and measure its face.
 
@@ -57,6 +64,7 @@ def wall(
     arch : of an opening in its middle; needs about 60 stones
     sag : by which beds sag over 10 m, along a parabola [m]; not together with an arch
     snecked : share of the stones that are two courses high [-]
+    movement : of the stones since they were laid
 
     Returns
     -------
@@ -88,7 +96,7 @@ def wall(
     middle = np.array([[0.0, 0.5 * heights[-1]]])
     station = observer(frame.place(middle, 9.0 + heights[-1])[0])
     name = f"wall of {len(drafts)} stones"
-    return measured_building(name, drafts, DEPTHS, [station], base, rng)
+    return measured_building(name, drafts, DEPTHS, [station], base, rng, movement=movement)
 
 
 def bed_heights(rng: Random, courses: int) -> list[float]:

@@ -14,7 +14,7 @@ from survey.synthetic.frame import TrueStone, WallFrame, build_stone, wall_frame
 from survey.synthetic.measure import SIGMA, Measured, add_blunders, measure_stone
 from survey.synthetic.window_bay.window import plan_window
 
-__all__ = ["SEED", "Sample", "make_sample", "truth_of", "write_sample"]
+__all__ = ["SEED", "Sample", "make_sample", "truth_of", "truth_text", "write_sample"]
 
 SEED = 2000
 BLUNDERS = 12  # points with a gross error
@@ -103,12 +103,13 @@ def write_sample(directory: Path) -> tuple[Path, Path]:
     sample = make_sample()
     survey, truth = directory / "window.moma", directory / "truth.json"
     write_moma(sample.survey, survey)
-    truth.write_text(_dumped(truth_of(sample)), encoding="utf-8", newline="\n")
+    truth.write_text(truth_text(sample), encoding="utf-8", newline="\n")
     return survey, truth
 
 
-def _dumped(truth: dict[str, object]) -> str:
-    """Write JSON with one line for each entry and for each stone."""
+def truth_text(sample: Sample) -> str:
+    """Return the truth as JSON, with one line for each entry and for each stone."""
+    truth = truth_of(sample)
     lines = [f'"{key}": {json.dumps(value)}' for key, value in truth.items() if key != "stones"]
     stones = ",\n".join(json.dumps(stone) for stone in cast(list[object], truth["stones"]))
     return "{\n" + ",\n".join([*lines, f'"stones": [\n{stones}\n]']) + "\n}\n"

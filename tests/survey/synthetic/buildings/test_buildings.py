@@ -10,6 +10,7 @@ from survey.synthetic.buildings.assemblies import angled_pier, hexagonal_dome
 from survey.synthetic.buildings.facings import two_facings
 from survey.synthetic.buildings.openings import Arch
 from survey.synthetic.buildings.quoins import corner
+from survey.synthetic.buildings.tower import THICKNESS, tower_storey
 from survey.synthetic.buildings.vaults import barrel_vault, semicircular_arch
 from survey.synthetic.buildings.walls import wall
 from tests.survey.unseen.statics import area_of, centroid, contacts, near_pairs, overlap_depth
@@ -25,6 +26,7 @@ BUILDINGS = {
     "arch": semicircular_arch,
     "corner": lambda: corner(4, 2.0),
     "facings": lambda: two_facings(3.0, 5).building,
+    "tower": lambda: tower_storey(11, seed=2, blunders=0.0).building,
 }
 
 
@@ -171,3 +173,37 @@ def test_an_angled_pier_is_full() -> None:
     assert volume == pytest.approx(6 * 0.3 * (2.2 * 0.4 + 1.8 * 0.4), rel=1e-12)
     bed = sum(joint.area for joint in made.joints if abs(joint.normal[2]) > 0.9)
     assert bed == pytest.approx(5 * (2.2 * 0.4 + 1.8 * 0.4), rel=1e-9)
+
+
+def test_the_storey_is_bonded_at_its_corners_and_through_its_walls() -> None:
+    storey = tower_storey(12)
+    solids = {solid.code: solid for solid in storey.building.solids}
+    records = {record.code: record for record in storey.building.survey.blocks}
+    quoins = [code for code, record in records.items() if record.kind == "quoin"]
+    # a quoin and a bonder at each of two corners, in each course; the bonder is as deep as the wall
+    assert len(quoins) == 2 * 2 * 12
+    deep = [code for code in quoins if records[code].depth is not None]
+    assert len(deep) == 2 * 12
+    touching = {frozenset(joint.stones) for joint in storey.building.joints}
+    for course in range(1, 13):
+        pairs = [
+            pair
+            for pair in touching
+            if {code[0] for code in pair} in ({"A", "B"}, {"A", "C"})
+            and pair <= set(quoins)
+            and all(code[2:4] == f"{course:02d}" for code in pair)
+        ]
+        assert len(pairs) == 2, course
+    through = [
+        code for code, record in records.items() if record.kind == "header" and record.depth is not None
+    ]
+    assert len(through) >= 2
+    for code in (*through, *deep):
+        assert _depth(solids[code]) == pytest.approx(THICKNESS, abs=1e-9)
+    heights = {record.course: np.ptp(solids[code].vertices[:, 2]) for code, record in records.items()}
+    assert heights[storey.level_break + 1] == pytest.approx(0.15, abs=2e-3)
+    assert min(heights[course] for course in range(1, storey.level_break)) > 0.25
+
+
+def _depth(solid) -> float:
+    return float(np.ptp((solid.vertices - solid.vertices[0]) @ _out(solid)))

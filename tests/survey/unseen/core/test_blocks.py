@@ -15,6 +15,7 @@ from survey.geometry.watertight import check_watertight
 from survey.joints.close import close_joints
 from survey.joints.settings import JointSettings
 from survey.synthetic.buildings.facings import two_facings
+from survey.synthetic.buildings.tower import tower_storey
 from survey.unseen.core.facings import facing_stone
 from survey.unseen.core.propose import propose_infill
 from survey.unseen.core.settings import InfillSettings
@@ -180,3 +181,23 @@ def test_the_core_takes_part_in_closing_the_joints():
     for code in mine:
         beside = {other for joint in joints if code in joint.stones for other in joint.stones} - mine
         assert {other[0] for other in beside} >= {"F", "B"}, code
+
+
+def test_a_core_leaves_the_joints_of_the_stones_as_they_are_without_it():
+    blocks = tower_storey(12).building.blocks()
+    alone = close_joints(blocks)
+    assert alone.report.gaps == ()
+    stones = [facing_stone(block, solid) for block, solid in zip(blocks, alone.solids, strict=True)]
+    core = [surveyed_block(core_record(one)) for one in propose_infill(stones)]
+    closed = close_joints([*blocks, *core])
+    apart = []
+    for one, other in zip(alone.solids, closed.solids, strict=False):
+        face = one.vertices[list(one.faces[0])]
+        apart.append(np.linalg.norm(face[:, None] - other.vertices[None], axis=2).min(axis=1).max())
+    # a worn side with no other joint now has one with the core
+    assert np.mean(np.array(apart) > 1e-9) < 0.01
+    assert max(apart) < 0.005
+    mine = {one.code for one in core}
+    between = [joint for joint in closed.report.joints if not mine & set(joint.stones)]
+    assert not any(joint.left_open for joint in between)
+    assert {gap.stones for gap in closed.report.gaps if not mine & set(gap.stones)} == set()

@@ -1,0 +1,249 @@
+"""Comparison of measured with simulated deformation: a scene is run, and its movement set beside the survey."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from archmodel.database.session import open_database
+from archmodel.store.run_record import StoneResult
+from archmodel.tables.entries import latest_entry
+from mechanics.dynamics.progress import Listener, Progress, silent
+from mechanics.model.model import build_model
+from mechanics.results.forecast.plan import loose_blocks
+from mechanics.results.result import BodyResult, Result
+from mechanics.simulate import simulate
+from pipelines.arrays import Array
+from pipelines.draw.elevations.movement import draw_bed_movement, draw_misfit
+from pipelines.ingest.records import surveyed_block
+from pipelines.results.folder import check_replaceable, replacing
+from pipelines.results.stone_values import stone_results
+from pipelines.results.summary import as_json, summarise
+from pipelines.run.assemble import Assembly, assemble_stones
+from pipelines.run.record import run_record, store_record, versions
+from pipelines.run.soundness import problems_of, refuse_unsound
+from pipelines.scene.file import read_scene
+from pipelines.scene.selection import StoneModel, select_groups, select_stones
+from survey.quality.courses import measure_courses
+from survey.quality.facades import Facade, find_facades
+from survey.quality.movement import (
+    CourseMovement,
+    Misfit,
+    PlumbMovement,
+    StoneMovement,
+    compare_courses,
+    compare_plumb,
+)
+from survey.quality.precision import StoneQuality, appraise
+
+__all__ = ["INDEX", "Comparison", "compare"]
+
+INDEX = "comparison.json"
+"""Index of the results of a comparison."""
+
+_MEASURED = ("points", "photograph")  # provenance of faces whose place is measured
+_WORST = 5.0  # standard deviations at which the colours of a map of misfits end
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A scene beside its survey.
+
+    Attributes
+    ----------
+    folder : of the files
+    summary : contents of comparison.json
+    run : its number in the database
+    """
+
+    folder: Path
+    summary: dict[str, Any]
+    run: int
+
+
+def compare(
+    path: str | Path,
+    url: str,
+    folder: str | Path,
+    progress: Listener = silent,
+    accept_unsound: bool = False,
+    battered: bool = False,
+) -> Comparison:
+    """Run a scene and compare the movement of its stones with their measured departure from level and plumb.
+
+    Parameters
+    ----------
+    path : scene file, with the movement that is to be tested: loads, settlements, …
+    url : of the database
+    folder : of the results; earlier ones there are replaced
+    progress : called at every stage
+    accept_unsound : run a scene that `check_scene` finds unsound all the same
+    battered : walls may have been built leaning: a uniform lean is no movement
+
+    Raises
+    ------
+    UsageError : the folder holds other files
+    UnsoundSceneError : the scene has problems that `check_scene` reports
+    SceneError, GeometryError, MeshError, SolverError : see `assemble` and `mechanics.simulate`
+    DatabaseError : the database cannot be read or written
+    """
+    folder, scene = Path(folder), read_scene(path)
+    check_replaceable(folder, INDEX)
+    progress(Progress("blocks", 0, None, "reading the stones"))
+    with open_database(url, create=False) as database:
+        with database.session(read_only=True) as session:
+            as_of, models = latest_entry(session), select_stones(scene, session)
+            progress(Progress("blocks", 0, None, f"closing the joints of {len(models)} stones"))
+            assembly = assemble_stones(scene, models, select_groups(scene, session, models))
+        built = build_model(assembly.scene, lambda done, total: progress(Progress("mesh", done, total)))
+        problems = problems_of(scene, assembly, loose_blocks(*built))
+        if not accept_unsound:
+            refuse_unsound(problems, str(path))
+        result = simulate(assembly.scene, progress, lambda: False, built)
+        stones, facades = _measured(models)
+        moved = partial(_displacement, {body.code: body for body in result.bodies}, assembly.origin)
+        courses = compare_courses(measure_courses(stones, facades), moved)
+        plumb = compare_plumb(stones, facades, moved, battered)
+        progress(Progress("write", 0, 1, "pictures"))
+        summary = _summary(result, assembly, courses, plumb, battered)
+        with replacing(folder, INDEX) as fresh:
+            _draw(fresh, facades, stones, courses)
+            (fresh / "scene.toml").write_text(scene.text, encoding="utf-8")
+            summary["files"] = sorted([INDEX, *(entry.name for entry in fresh.iterdir())])
+            (fresh / INDEX).write_text(as_json(summary), encoding="utf-8")
+        kept = summarise(result, version=versions()["moma"], seconds=result.wall_time)
+        values = _values(courses, plumb)
+        results = tuple(_with_values(one, values.get(one.code, {})) for one in stone_results(result))
+        run = store_record(database, folder, run_record(result, results, scene, assembly, kept, as_of))
+    progress(Progress("write", 1, 1))
+    return Comparison(folder, summary, run)
+
+
+def _measured(models: Sequence[StoneModel]) -> tuple[tuple[StoneQuality, ...], tuple[Facade, ...]]:
+    """Return the measured stones, and the facades that they make."""
+    records = [model.record for model in models if model.record.provenance in _MEASURED]
+    stones = tuple(appraise(surveyed_block(record)) for record in records)
+    facades = find_facades(
+        np.array([one.normal for one in stones]).reshape(-1, 3),
+        np.array([one.area for one in stones]),
+        np.array([one.outline.mean(axis=0) for one in stones]).reshape(-1, 3),
+    )
+    return stones, facades
+
+
+def _displacement(bodies: Mapping[str, BodyResult], origin: Array, code: str, points: Array) -> Array:
+    """Return the displacement (n, 3) of points of a stone in the frame of the site: affine over its own points [m]."""
+    body = bodies[code]
+    middle = body.reference.mean(axis=0)
+    arms = np.column_stack([np.ones(len(body.reference)), body.reference - middle])
+    field = np.linalg.lstsq(arms, body.displacement, rcond=None)[0]
+    at: Array = np.column_stack([np.ones(len(points)), points - origin - middle]) @ field
+    return at
+
+
+def _summary(
+    result: Result,
+    assembly: Assembly,
+    courses: Sequence[CourseMovement],
+    plumb: Sequence[PlumbMovement],
+    battered: bool,
+) -> dict[str, Any]:
+    walls: dict[tuple[str, str | None], list[Misfit]] = {}
+    for one in courses:
+        walls.setdefault((one.line.facade, one.line.zone or None), []).append(one.misfit)
+    beds = [
+        {"facade": facade, "zone": zone, "quantity": "beds", **_told(_sum(found))}
+        for (facade, zone), found in walls.items()
+    ]
+    faces = [
+        {"facade": one.facade, "zone": one.zone, "quantity": "plumb", **_told(one.misfit)} for one in plumb
+    ]
+    whole = _sum([*(one.misfit for one in courses), *(one.misfit for one in plumb)])
+    leaning = {(one.facade, one.zone): one.courses for one in plumb}
+    return {
+        "scene": result.scene.name,
+        "outcome": str(result.outcome),
+        "cautions": [
+            f"courses are assumed to have been laid level, and faces {'with a batter' if battered else 'plumb'}",
+            *result.cautions,
+            *assembly.remarks,
+        ],
+        **_told(whole),
+        "walls": [*beds, *faces],
+        "courses": [
+            _course(one, leaning.get((one.line.facade, one.line.zone or None), {})) for one in courses
+        ],
+        "versions": dict(versions()),
+    }
+
+
+def _sum(misfits: Sequence[Misfit]) -> Misfit:
+    return Misfit(
+        sum(one.chi2 for one in misfits), sum(one.still for one in misfits), sum(one.dof for one in misfits)
+    )
+
+
+def _told(misfit: Misfit) -> dict[str, Any]:
+    return {"chi2": misfit.chi2, "chi2_still": misfit.still, "dof": misfit.dof}
+
+
+def _course(one: CourseMovement, leaning: Mapping[int, StoneMovement]) -> dict[str, Any]:
+    """Return a course: of its sag, its slope and its lean what was measured, what simulated, and the σ of both."""
+    line = one.line
+    lean = leaning.get(line.course)
+    return {
+        "facade": line.facade,
+        "zone": line.zone or None,
+        "course": line.course,
+        "measured": line.sag,
+        "simulated": one.sag,
+        "sigma": one.sag_sigma,
+        "slope": {"measured": line.slope, "simulated": one.slope, "sigma": one.slope_sigma},
+        "plumb": None
+        if lean is None
+        else {"measured": lean.measured, "simulated": lean.simulated, "sigma": lean.sigma},
+        **_told(one.misfit),
+    }
+
+
+def _values(courses: Sequence[CourseMovement], plumb: Sequence[PlumbMovement]) -> dict[str, dict[str, float]]:
+    """Return the named values of each stone, by its code."""
+    found: dict[str, dict[str, float]] = {}
+    for name, groups in (("sag", courses), ("plumb", plumb)):
+        for group in groups:
+            for code, one in group.stones.items():
+                found.setdefault(code, {}).update(
+                    {
+                        f"{name}_measured": one.measured,
+                        f"{name}_simulated": one.simulated,
+                        f"{name}_sigma": one.sigma,
+                    }
+                )
+    return found
+
+
+def _with_values(result: StoneResult, values: Mapping[str, float]) -> StoneResult:
+    return replace(result, values={**result.values, **values})
+
+
+def _draw(
+    folder: Path, facades: Sequence[Facade], stones: Sequence[StoneQuality], courses: Sequence[CourseMovement]
+) -> None:
+    """Draw of each facade and zone the bed lines, measured and simulated, and the misfit of each stone."""
+    by_code = {stone.code: stone for stone in stones}
+    walls: dict[tuple[str, str], list[CourseMovement]] = {}
+    for one in courses:
+        walls.setdefault((one.line.facade, one.line.zone or ""), []).append(one)
+    frames = {facade.name: facade for facade in facades}
+    for number, ((facade, _), lines) in enumerate(walls.items(), start=1):
+        draw_bed_movement(folder / f"beds-{number}.png", lines)
+        misfit = {
+            code: (one.measured - one.simulated) / one.sigma
+            for line in lines
+            for code, one in line.stones.items()
+        }
+        outlines = [by_code[code].outline for code in misfit]
+        draw_misfit(folder / f"misfit-{number}.png", frames[facade], outlines, list(misfit.values()), _WORST)

@@ -1,0 +1,99 @@
+"""Elevations of measured beside simulated deformation: bed lines of both, and the misfit of each stone."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from pipelines.arrays import Array
+from pipelines.draw.elevations.sheet import (
+    FLAG,
+    INK,
+    PALE,
+    PLAIN,
+    extent,
+    frame_elevation,
+    new_sheet,
+    project,
+    save_sheet,
+    sheet_size,
+)
+from survey.quality.facades import Facade
+from survey.quality.movement import CourseMovement
+
+__all__ = ["draw_bed_movement", "draw_misfit"]
+
+_LARGEST = 0.45  # the largest deviation as drawn, over the distance between courses [-]
+_DIVERGING = "RdBu_r"  # low is blue, high is red: the same for colour-blind readers
+
+
+def draw_bed_movement(path: Path, courses: Sequence[CourseMovement]) -> None:
+    """Draw the bed lines of one wall at their heights: departure from level, measured and simulated, exaggerated.
+
+    Parameters
+    ----------
+    path : PNG
+    courses : of one wall
+    """
+    levels = [float(np.mean(one.line.height)) for one in courses]
+    room = float(np.median(np.diff(sorted(set(levels))))) if len(set(levels)) > 1 else 0.3
+    lines = [(one.line.height - level, one.simulated) for one, level in zip(courses, levels, strict=True)]
+    simulated = [moved - moved.mean() for _, moved in lines]
+    largest = max(
+        float(max(np.abs(measured).max(), np.abs(own).max()))
+        for (measured, _), own in zip(lines, simulated, strict=True)
+    )
+    factor = max(1.0, float(f"{_LARGEST * room / max(largest, 1e-6):.1g}"))
+    figure = new_sheet((10.0, float(np.clip(2.0 + 0.42 * len(courses), 3.5, 24.0))))
+    axes = figure.subplots()
+    for one, level, (measured, _), own in zip(courses, levels, lines, simulated, strict=True):
+        along = one.line.along
+        axes.plot(along[[0, -1]], [level] * 2, color=PALE, linewidth=0.8, zorder=1)
+        axes.errorbar(
+            along, level + factor * measured, factor * one.line.sigma, fmt="o-", markersize=2.0,
+            color=FLAG, ecolor=PALE, linewidth=0.8, elinewidth=0.8, zorder=2,
+        )  # fmt: skip
+        axes.plot(along, level + factor * own, color=PLAIN, linewidth=1.6, zorder=3)
+    line = courses[0].line
+    axes.set_xlabel("along the facade, to the right of the viewer [m]")
+    axes.set_ylabel("height of the bed [m]")
+    axes.set_title(
+        f"Bed lines of {line.facade}{f', {line.zone}' if line.zone else ''}: departure from level drawn {factor:g} "
+        "times as large\norange: measured, bars ± one standard deviation of a corner; blue: simulated",
+        fontsize=10, color=INK,
+    )  # fmt: skip
+    axes.spines[["top", "right"]].set_visible(False)
+    save_sheet(figure, path)
+
+
+def draw_misfit(
+    path: Path, facade: Facade, outlines: Sequence[Array], misfit: Sequence[float], end: float
+) -> None:
+    """Draw stones of a facade, coloured by measured less simulated height of their beds over its σ.
+
+    Parameters
+    ----------
+    path : PNG
+    facade : in whose frame they are drawn
+    outlines : of the stones, each (nv, 3) [m]
+    misfit : of each [-]
+    end : of the colour scale, at either side [-]
+    """
+    from matplotlib.collections import PolyCollection
+
+    polygons = [project(one, facade) for one in outlines]
+    low, high = extent(polygons)
+    figure = new_sheet(sheet_size(high - low))
+    axes = figure.subplots()
+    faces = PolyCollection(
+        polygons,
+        array=np.array(misfit),
+        cmap=_DIVERGING,
+        clim=(-end, end),
+        edgecolors=PALE,
+        linewidths=0.5,
+    )
+    axes.add_collection(faces)
+    figure.colorbar(faces, ax=axes, label="measured less simulated height of the bed, over σ", shrink=0.7)
+    frame_elevation(axes, facade, low, high, f"{facade.name}: what the simulated movement leaves unexplained")
+    save_sheet(figure, path)

@@ -1,0 +1,188 @@
+"""Synthetic surveys to start from, by name, each with its truth."""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from survey.records.survey import Survey
+from survey.synthetic.building import Building
+from survey.synthetic.buildings.facings import two_facings
+from survey.synthetic.buildings.openings import Arch
+from survey.synthetic.buildings.quoins import corner
+from survey.synthetic.buildings.tower import tower_storey
+from survey.synthetic.buildings.vaults import barrel_vault, semicircular_arch
+from survey.synthetic.buildings.walls import wall
+from survey.synthetic.frame import Movement
+from survey.synthetic.window_bay.sample import make_sample, truth_text
+
+__all__ = ["SAMPLES", "Cause", "Sample", "SampleRecipe"]
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A synthetic survey and what is true of it.
+
+    Attributes
+    ----------
+    survey : as a surveyor would hand it in
+    truth : JSON text: the true geometry of every stone
+    knowledge : TOML text: what is known besides the geometry; empty if nothing
+    """
+
+    survey: Survey
+    truth: str
+    knowledge: str = ""
+
+
+@dataclass(frozen=True)
+class Cause:
+    """Settlements of the ground, and the building that they move.
+
+    Attributes
+    ----------
+    settlement : by code of a stone on the ground its displacement upwards [m]
+    build : the building after a movement
+    """
+
+    settlement: Mapping[str, float]
+    build: Callable[[Movement], Building]
+
+    def sample(self, movement: Movement) -> Sample:
+        """Return the sample after a movement, the truth with the causes."""
+        building = self.build(movement)
+        return Sample(building.survey, _truth_of(building, self.settlement))
+
+    def unmoved(self) -> Sample:
+        """Return the sample as it was laid."""
+        return self.sample({})
+
+
+@dataclass(frozen=True)
+class SampleRecipe:
+    """A kind of sample.
+
+    Attributes
+    ----------
+    title : in words
+    fixed : query expression of the stones that stand on the ground
+    make : the generator; the sample is the same each time
+    core : whether a core between two facings has to be proposed before the scene is run
+    cause : of the movement of a building that has moved
+    """
+
+    title: str
+    fixed: str
+    make: Callable[[], Sample]
+    core: bool = False
+    cause: Cause | None = None
+
+
+def _of(build: Callable[[], Building]) -> Callable[[], Sample]:
+    """Return the generator of a sample that is a building."""
+
+    def make() -> Sample:
+        building = build()
+        return Sample(building.survey, _truth_of(building))
+
+    return make
+
+
+def _window() -> Sample:
+    sample = make_sample()
+    return Sample(sample.survey, truth_text(sample))
+
+
+def _tower(courses: int) -> Callable[[], Sample]:
+    """Return the generator of a storey of the tower."""
+
+    def make() -> Sample:
+        storey = tower_storey(courses)
+        knowledge = _PHASES.format(last=storey.level_break)
+        return Sample(storey.building.survey, _truth_of(storey.building), knowledge)
+
+    return make
+
+
+_PHASES = """\
+# What is "known" of the synthetic storey besides its geometry; as invented as the storey.
+
+[record]
+author = "synthetic"
+source = "invented for this sample"
+
+[[phase]]
+name = "1"
+description = "up to the level break"
+
+[[phase]]
+name = "2"
+description = "from the levelling course on, with lower courses"
+
+[[of_phase]]
+phase = "1"
+stones = ["course <= {last}"]
+
+[[of_phase]]
+phase = "2"
+stones = ["course > {last}"]
+text = "another height of the courses, above one that levels them"
+"""
+
+
+def _truth_of(building: Building, settlement: Mapping[str, float] = MappingProxyType({})) -> str:
+    """Return the true stones of a building, one to a line, with what has moved them and how."""
+    stones = [
+        {
+            "code": solid.code,
+            "vertices": (np.round(solid.vertices, 6) + 0.0).tolist(),
+            "faces": [list(face) for face in solid.faces],
+            **_motion_of(building, solid.code),
+        }
+        for solid in building.solids
+    ]
+    lines = ",\n".join(json.dumps(stone) for stone in stones)
+    about = json.dumps(f"true geometry of the synthetic survey {building.survey.head.path}; metres")
+    cause = f'"settlement": {json.dumps(dict(settlement))},\n' if settlement else ""
+    return f'{{\n"about": {about},\n{cause}"stones": [\n{lines}\n]\n}}\n'
+
+
+def _motion_of(building: Building, code: str) -> dict[str, object]:
+    """Return the motion x → rotation x + shift of a stone since it was laid, if it has moved."""
+    motion = building.movement.get(code)
+    if motion is None:
+        return {}
+    return {name: (np.round(getattr(motion, name), 9) + 0.0).tolist() for name in ("rotation", "shift")}
+
+
+_SETTLED = Cause(
+    {"W01-01": -0.030, "W01-02": -0.020, "W01-03": -0.010}, lambda movement: wall(90, movement=movement)
+)
+
+SAMPLES: Mapping[str, SampleRecipe] = MappingProxyType(
+    {
+        "arch": SampleRecipe("Semicircular arch", "kind = springer", _of(semicircular_arch)),
+        "corner": SampleRecipe("Corner of two walls, bonded by quoins", "course = 1", _of(corner)),
+        "facings": SampleRecipe(
+            "Wall of two facings with a core",
+            "course = 1",
+            _of(lambda: two_facings(4.0, 8).building),
+            core=True,
+        ),
+        "settled": SampleRecipe(
+            "Wall whose left corner settled", "course = 1", _SETTLED.unmoved, cause=_SETTLED
+        ),
+        "tower": SampleRecipe("Storey of a tower", "course = 1", _tower(40), core=True),
+        "tower-small": SampleRecipe(
+            "Storey of a tower, of twelve courses", "course = 1", _tower(12), core=True
+        ),
+        "vault": SampleRecipe("Barrel vault", "kind = springer", _of(lambda: barrel_vault(seed=2))),
+        "wall": SampleRecipe(
+            "Wall with an arched opening", "course = 1", _of(lambda: wall(80, arch=Arch.SEGMENTAL))
+        ),
+        "window": SampleRecipe("Window bay", "course = 1", _window),
+    }
+)
+"""All samples by name."""
