@@ -1,5 +1,6 @@
 # make demo   from a survey file to a picture of the stresses, in out/window
 # make test   the tests
+# make tower  a synthetic storey of 2,154 stones with a core, from its survey to a report, in out/tower
 # make clean  remove .venv and out
 #
 # Another interpreter: make demo PYTHON=python3.12
@@ -13,10 +14,10 @@ OUT := out
 KERNELS := $(shell find survey mechanics benchmarks -path "*/_kernels*" -name "*.py")
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test clean
+.PHONY: help demo test tower clean
 
 help:
-	@sed -n 's/^# \{0,1\}//p' Makefile | head -5
+	@sed -n 's/^# \{0,1\}//p' Makefile | head -6
 
 demo: $(VENV)/.kernels $(VENV)/.installed
 	@mkdir -p $(OUT)
@@ -27,6 +28,16 @@ demo: $(VENV)/.kernels $(VENV)/.installed
 	@if test -f $(OUT)/window/von_mises.png; then echo "The picture: $(OUT)/window/von_mises.png"; \
 	  else echo "No picture could be drawn on this machine; the warning above says what to install."; fi
 	@echo "The report:  $(OUT)/window/report.html"
+
+tower: $(VENV)/.kernels $(VENV)/.installed
+	@rm -rf $(OUT)/tower
+	$(MOMA) sample tower --out $(OUT)/tower
+	$(MOMA) ingest $(OUT)/tower/tower.moma --db sqlite:///$(OUT)/tower/tower.db
+	$(MOMA) record $(OUT)/tower/knowledge.toml --db sqlite:///$(OUT)/tower/tower.db
+	$(MOMA) propose infill --record --db sqlite:///$(OUT)/tower/tower.db > $(OUT)/tower/core.txt
+	$(MOMA) run $(OUT)/tower/tower.toml --db sqlite:///$(OUT)/tower/tower.db --out $(OUT)/tower/results
+	@echo
+	@echo "The report:  $(OUT)/tower/results/report.html"
 
 test: $(VENV)/.tests $(VENV)/.kernels
 	$(VENV)/bin/python -m pytest

@@ -6,6 +6,7 @@ import os
 import platform
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterable, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -35,6 +36,9 @@ Row = dict[str, Any]
 Table = Sequence[tuple[str, str, str]]
 
 _ROOT = Path(__file__).resolve().parents[1]
+# time between two lines on an error stream that is no terminal [s], and when the last one was written
+_PAUSE = 10.0
+_said = [time.monotonic()]
 
 
 def print_json(rows: Sequence[Row]) -> None:
@@ -147,8 +151,10 @@ def environment(*packages: str) -> str:
 
 
 def progress(text: str) -> None:
-    """Say on the error stream what is going on, where somebody watches."""
-    if sys.stderr.isatty():
+    """Say on the error stream what is going on: all of it on a terminal, elsewhere a line now and then."""
+    now = time.monotonic()
+    if sys.stderr.isatty() or now >= _said[0] + _PAUSE:
+        _said[0] = now
         print(text, file=sys.stderr, flush=True)
 
 

@@ -9,12 +9,25 @@ import operator
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from sqlalchemy import Boolean, ColumnElement, Double, Integer, and_, literal, not_, or_, select
+from sqlalchemy import Boolean, ColumnElement, Double, Integer, and_, func, literal, not_, or_, select
 from sqlalchemy.orm import Session
 
 from archmodel.query.attributes import ATTRIBUTES, Attribute, attributes_of
 from archmodel.query.functions.registry import FUNCTIONS, STRUCTURE_FUNCTIONS, Function
-from archmodel.query.grammar import All, AnyOf, Call, Comparison, IsNull, Like, Membership, Node, Not, parse
+from archmodel.query.grammar import (
+    All,
+    Amount,
+    AmountComparison,
+    AnyOf,
+    Call,
+    Comparison,
+    IsNull,
+    Like,
+    Membership,
+    Node,
+    Not,
+    parse,
+)
 from archmodel.query.names import meant, run_with_number
 from archmodel.query.scope import Context, Scope, StructureScope
 from archmodel.query.tokens import Token, complaint
@@ -122,6 +135,24 @@ def condition_in(scope: Where, node: Node) -> ColumnElement[bool]:
             attribute, column = _column(scope, name)
             compared: ColumnElement[bool] = _OPERATORS[sign](column, _operand(scope, attribute, value))
             return compared
+        case AmountComparison(left, sign, right):
+            computed: ColumnElement[bool] = _OPERATORS[sign](_amount(scope, left), _amount(scope, right))
+            return computed
+
+
+def _amount(scope: Where, amount: Amount) -> ColumnElement[Any]:
+    """Return a number computed of attributes that are numbers."""
+    total: Any = literal(0.0, Double)
+    for factor, token in amount.terms:
+        part: Any = literal(factor, Double)
+        if token is not None:
+            attribute, column = _column(scope, token)
+            if not attribute.is_number:
+                what = f"{attribute.name} is {_type_of(attribute)}, and cannot be computed with"
+                raise complaint(token, what, "compute with numbers such as depth")
+            part = part * column
+        total = total + part
+    return func.abs(total) if amount.absolute else total
 
 
 def _call(scope: Where, call: Call) -> ColumnElement[bool]:

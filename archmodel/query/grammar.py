@@ -6,19 +6,24 @@
     conjunction = negation { "and" negation }
     negation    = "not" negation | "(" expression ")" | test
     test        = attribute ( "=" | "==" | "!=" | "<" | "<=" | ">" | ">=" ) value
+                | amount ( "=" | … | ">=" ) amount
                 | attribute [ "not" ] "in" "(" value { "," value } ")"
                 | attribute [ "not" ] "like" value
                 | attribute "is" [ "not" ] "null"
                 | function "(" [ argument { "," argument } ] ")" [ "is" [ "not" ] "null" ]
     argument    = value | expression
+    amount      = sum | "abs" "(" sum ")"
+    sum         = term { ( "+" | "-" ) term }
+    term        = number | [ number "*" ] attribute
     attribute   = name [ "@" run ]
     value       = number | word | 'quoted' | "quoted"
 
-A word is anything without blanks, quotes, commas, parentheses and comparison signs, such as ``W05-03``. A
-quote within quotes is doubled. The words of the grammar (and, or, not, in, like, is, null) are the same in
-upper and lower case, and must be quoted to be values.
+The signs + and - stand between blanks, as ``-`` within a word is part of it. A word is anything without blanks,
+quotes, commas, parentheses and comparison signs, such as ``W05-03``. A quote within quotes is doubled. The words of
+the grammar (and, or, not, in, like, is, null) are the same in upper and lower case, and must be quoted to be values.
 """
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -28,6 +33,8 @@ __all__ = [
     "MAX_CALLS",
     "MAX_DEPTH",
     "All",
+    "Amount",
+    "AmountComparison",
     "AnyOf",
     "Call",
     "Comparison",
@@ -51,6 +58,9 @@ OPERATORS = frozenset({"=", "==", "!=", "<", "<=", ">", ">="})
 VALUES = frozenset({"quoted", "word", "number"})
 
 
+_SIGNS = {"+": 1.0, "-": -1.0}
+_PRODUCT = re.compile(r"(?P<factor>[0-9]+(\.[0-9]*)?|\.[0-9]+)\*(?P<name>[A-Za-z_][A-Za-z0-9_]*(@[0-9]+)?)")
+
 _JOINING = "join tests by and, or; put a text with blanks in quotes"
 
 
@@ -61,6 +71,29 @@ class Comparison:
     attribute: Token
     operator: str
     value: Token
+
+
+@dataclass(frozen=True)
+class Amount:
+    """A number computed of attributes: Σ factor · attribute, or its absolute value.
+
+    Attributes
+    ----------
+    terms : factor and attribute of each term; None: the factor alone
+    absolute : whether the sign is left out
+    """
+
+    terms: tuple[tuple[float, Token | None], ...]
+    absolute: bool
+
+
+@dataclass(frozen=True)
+class AmountComparison:
+    """Node: amount operator amount."""
+
+    left: Amount
+    operator: str
+    right: Amount
 
 
 @dataclass(frozen=True)
@@ -115,7 +148,7 @@ class AnyOf:
     operands: "tuple[Node, ...]"
 
 
-Node = Comparison | Membership | Like | Call | IsNull | Not | All | AnyOf
+Node = Comparison | AmountComparison | Membership | Like | Call | IsNull | Not | All | AnyOf
 
 
 def parse(text: str) -> Node:
@@ -141,6 +174,8 @@ def attributes_in(node: Node) -> Iterator[Token]:
             yield attribute
             if value.role == "word":
                 yield value
+        case AmountComparison(left, _, right):
+            yield from (token for _, token in (*left.terms, *right.terms) if token is not None)
         case IsNull(Token() as attribute) | Like(attribute, _) | Membership(attribute, _):
             yield attribute
 
@@ -201,6 +236,9 @@ class _Parser:
         return self.test(depth)
 
     def test(self, depth: int) -> Node:
+        begin = self.index
+        if self.computes():
+            return self.amounts()
         attribute = self.take()
         if attribute.role != "word":
             example = "begin a test with an attribute, e.g. depth > 0.4"
@@ -209,13 +247,58 @@ class _Parser:
             call = self.call(attribute, depth)
             return self.null(call) if self.taken("keyword", "is") else call
         if self.token.role == "sign" and self.token.text in OPERATORS:
-            operator = self.take().text
-            return Comparison(attribute, "=" if operator == "==" else operator, self.value())
+            operator = self.operator()
+            if self.computes():
+                self.index = begin
+                return self.amounts()
+            return Comparison(attribute, operator, self.value())
         if self.taken("keyword", "is"):
             return self.null(attribute)
         negated = self.taken("keyword", "not")
         node = self.membership_or_pattern(attribute)
         return Not(node) if negated else node
+
+    def operator(self) -> str:
+        """Take the sign of a comparison."""
+        sign = self.take()
+        if sign.role != "sign" or sign.text not in OPERATORS:
+            raise complaint(sign, f"{named(sign)} is not a comparison", "write one of = != < <= > >=")
+        return "=" if sign.text == "==" else sign.text
+
+    def computes(self) -> bool:
+        """Return whether a computed number follows: abs(…), a product, or a sum."""
+        word, (following, role) = self.token, self.following
+        if word.role not in ("word", "number"):
+            return False
+        called = word.text.lower() == "abs" and (following, role) == ("(", "sign")
+        summed = role == "word" and following in _SIGNS
+        return called or summed or _PRODUCT.fullmatch(word.text) is not None
+
+    def amounts(self) -> AmountComparison:
+        left = self.amount()
+        return AmountComparison(left, self.operator(), self.amount())
+
+    def amount(self) -> Amount:
+        absolute = self.token.text.lower() == "abs" and self.following == ("(", "sign")
+        if absolute:
+            self.index += 2
+        terms = [self.term(1.0)]
+        while self.token.role == "word" and self.token.text in _SIGNS:
+            terms.append(self.term(_SIGNS[self.take().text]))
+        if absolute:
+            self.close()
+        return Amount(tuple(terms), absolute)
+
+    def term(self, sign: float) -> tuple[float, Token | None]:
+        token = self.take()
+        if token.role == "number":
+            return sign * float(token.text), None
+        if token.role != "word":
+            raise complaint(token, f"{named(token)} is no number", "write a number, an attribute, or 3*depth")
+        if (product := _PRODUCT.fullmatch(token.text)) is None:
+            return sign, token
+        start = token.position + product.start("name")
+        return sign * float(product["factor"]), Token("word", product["name"], start, token.source)
 
     def call(self, function: Token, depth: int) -> Call:
         """Parse the arguments; the parenthesis has been taken."""

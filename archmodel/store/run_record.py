@@ -43,6 +43,12 @@ STONE_VALUES: Mapping[str, tuple[str, str]] = {
     "joint_opening_peak": ("m", "largest opening of its joints during the run"),
     "joint_sliding_peak": ("m", "largest sliding in its joints during the run"),
     "joint_pressure_peak": ("Pa", "largest pressure in its joints during the run"),
+    "sag_measured": ("m", "height of its bed above the mean of its course, as surveyed"),
+    "sag_simulated": ("m", "the same of the movement in the run, by moma compare"),
+    "sag_sigma": ("m", "standard deviation of their difference"),
+    "plumb_measured": ("m", "outward position of its face from the mean of its wall, as surveyed"),
+    "plumb_simulated": ("m", "the same of the movement in the run, by moma compare"),
+    "plumb_sigma": ("m", "standard deviation of their difference"),
     "von_mises_peak": ("Pa", "largest Von Mises stress in the frames of the run"),
 }
 """Unit and meaning of the named values of a stone's result that can be asked for."""

@@ -3,5 +3,5 @@
 Public: `Assembly`, `Strength`, `assembly` (assembly); `Acceleration`, `LiveLoad`, `PointForce`, `SpreadForce`
 (live_loads); `Flow`, `LimitLoad`, `Mechanism`, `limit_load` (limit_load); `Thrust`, `thrust` (thrust);
 `GeometricSafety`, `geometric_safety` (thickness); `Kinematics`, `kinematics` (kinematic); `Confirmation`, `confirm`
-(confirm); `Joints`, `resultants` (joints).
+(confirm); `Pushover`, `pushover` (pushover); `Joints`, `resultants` (joints).
 """

@@ -162,6 +162,7 @@ def _strength(found: Detection) -> Strength:
     approach = Approach(
         gap=none,
         speed=none,
+        slide=np.zeros((len(contacts), 2)),
         area=contacts.area,
         size=np.minimum(*model.surfaces.size[contacts.bodies.T]),
         compliance=none + 1.0,

@@ -13,7 +13,7 @@ from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import Scene
 from moma.errors import SceneError
 
-__all__ = ["Acceleration", "LiveLoad", "PointForce", "SpreadForce"]
+__all__ = ["Acceleration", "LiveLoad", "PointForce", "SpreadForce", "levers"]
 
 
 class LiveLoad(Protocol):
@@ -176,16 +176,21 @@ def _free(on: Assembly, codes: Collection[str], where: str) -> Ints:
     return bodies
 
 
+def levers(load: Array) -> tuple[Ints, Array, Array]:
+    """Return the rows (k,) of a load (n, 6) in which there is a force, it (k, 3), and where it has its moment (k, 3).
+
+    That is the nearest place to the centre of mass; what of the moment is along the force is left out.
+    """
+    pushed = np.flatnonzero(load[:, :3].any(axis=1))
+    force, moment = load[pushed, :3], load[pushed, 3:]
+    return pushed, force, np.cross(force, moment) / np.einsum("ni,ni->n", force, force)[:, None]
+
+
 def _with_forces(on: Assembly, load: Array) -> Scene:
     """Return the scene with forces on its stones that are a load (6 n,), each at a place of its stone."""
     scene, forces = on.model.scene, list[StoneForce]()
-    for body, row in zip(on.free, load.reshape(-1, 6), strict=True):
-        force, moment = row[:3], row[3:]
-        if not force.any():
-            continue
-        # the nearest place at which the force has this moment
-        x, y, z = (np.cross(force, moment) / (force @ force)).tolist()
-        stone = frozenset({on.model.scene.blocks[body].code})
-        forces.append(StoneForce(stone, History.constant(force), (x, y, z)))
+    for row, force, (x, y, z) in zip(*levers(load.reshape(-1, 6)), strict=True):
+        stone = frozenset({scene.blocks[on.free[row]].code})
+        forces.append(StoneForce(stone, History.constant(force), (float(x), float(y), float(z))))
     loads = replace(scene.loads, forces=(*scene.loads.forces, *forces))
     return replace(scene, loads=loads)

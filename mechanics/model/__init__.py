@@ -1,4 +1,5 @@
 """Scene packed into arrays: rigid bodies, deformable ones with their finite elements, contact surfaces.
 
-Public: `Model`, `build_model` (model); `ball` (balls); `Deformable`, `Compliance` (deformable); `RigidInertia` (rigid).
+Public: `Model`, `build_model`, `laws_between` (model); `ball` (balls); `Deformable`, `Compliance` (deformable);
+`RigidInertia` (rigid).
 """

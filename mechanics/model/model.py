@@ -30,7 +30,7 @@ from mechanics.stones.polyhedra import (
 )
 from moma.errors import GeometryError, SceneError
 
-__all__ = ["Model", "Outline", "build_model"]
+__all__ = ["Model", "Outline", "build_model", "laws_between"]
 
 
 _PLANE = 1e-6  # largest height of a corner ahead of a face, over the size of its shape [-]; as for meshes
@@ -140,11 +140,7 @@ def build_model(scene: Scene, progress: Callable[[int, int], None] | None = None
         elastic=np.array([stone is not None for stone in stones]),
         motions=tuple((motion, _indices(scene, motion.stones)) for motion in scene.loads.motions),
         forces=tuple((force, _indices(scene, force.stones)) for force in scene.loads.forces),
-        laws=law_table(
-            scene.contact.law,
-            [(*_groups(scene, rule), rule.law) for rule in scene.contact.rules],
-            len(blocks),
-        ),
+        laws=laws_between(scene),
         inertia=inertia,
         flight=_flight(inertia, stones),
         mass=inertia.mass,
@@ -236,6 +232,17 @@ def _mesh_of(stone: Deformable | None) -> SolidMesh | None:
 def _indices(scene: Scene, codes: frozenset[str]) -> Ints:
     _check_codes(scene, codes, "a load")
     return np.array([b for b, block in enumerate(scene.blocks) if block.code in codes], dtype=np.int64)
+
+
+def laws_between(scene: Scene) -> LawTable:
+    """Return the laws of a scene, and the pairs of bodies between which they hold.
+
+    Raises
+    ------
+    SceneError : a law names a block that is not there
+    """
+    rules = [(*_groups(scene, rule), rule.law) for rule in scene.contact.rules]
+    return law_table(scene.contact.law, rules, len(scene.blocks))
 
 
 def _groups(scene: Scene, rule: LawRule) -> tuple[Bools, Bools]:

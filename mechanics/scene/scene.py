@@ -118,6 +118,7 @@ class Placement(StrEnum):
 
     CORNERS = "corners"
     INERTIA = "inertia"
+    CENTROID = "centroid"
 
 
 @dataclass(frozen=True)
@@ -138,7 +139,9 @@ class ContactSettings:
     law : of all joints without a rule
     rules : laws of particular joints; of two for the same pair, the later holds
     placement : *corners*: on the edge of the common face, so that a stone rocks about its true edge; *inertia*: inside
-        it, where they reproduce its area and second moments exactly, as a uniform pressure does
+        it, where they reproduce its area and second moments exactly, as a uniform pressure does; *centroid*: corners,
+        and a further point at the centroid, which take shares of the area that carry its second moments, so that
+        elastic joints bend like the area and stones still rock about its edge
     """
 
     law: Law = field(default_factory=DryJoint)
@@ -162,7 +165,8 @@ class ContactSettings:
     placement: Annotated[
         Placement,
         Setting(
-            "corners: at the true edge of the common face; inertia: inside it, where they carry its second moments."
+            "corners: at the true edge of the common face; inertia: inside it, where they carry its second moments; "
+            "centroid: corners and centroid, which together bend like the face where joints are elastic."
         ),
     ] = Placement.CORNERS
 

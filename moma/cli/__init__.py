@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from moma.cli.assess import assess
+from moma.cli.assess import assess, compare
 from moma.cli.database import export, import_, migrate
 from moma.cli.entities import query, schema, show
 from moma.cli.geology import geology
@@ -14,7 +14,7 @@ from moma.cli.proposals import propose
 from moma.cli.relations import load_path, relate
 from moma.cli.runs import runs
 from moma.cli.scenes import check, run, trade
-from moma.cli.surveys import ingest, survey_report
+from moma.cli.surveys import ingest, sample, survey_report
 
 __all__ = ["app", "main"]
 
@@ -55,6 +55,7 @@ def _common(
 
 # in the usual order of use
 _COMMANDS = (
+    sample,
     ingest,
     survey_report,
     record,
@@ -67,6 +68,7 @@ _COMMANDS = (
     check,
     run,
     assess,
+    compare,
     trade,
     geology,
     runs,

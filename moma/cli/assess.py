@@ -1,4 +1,4 @@
-"""Command that finds limit loads."""
+"""Commands that ask how far a scene is from falling, and whether it explains what was measured."""
 
 from pathlib import Path
 from typing import Annotated
@@ -6,10 +6,10 @@ from typing import Annotated
 import typer
 
 from moma.cli.console import reporting, say
-from moma.cli.options import DEFAULT_DB, Db, Json, Out, SceneArgument, Verbose
+from moma.cli.options import DEFAULT_DB, AcceptUnsound, Db, Json, Out, SceneArgument, Verbose
 from moma.cli.progress import progress_bars
 
-__all__ = ["assess"]
+__all__ = ["assess", "compare"]
 
 
 @reporting
@@ -37,6 +37,10 @@ def assess(
         bool,
         typer.Option("--confirm", help="Confirm each candidate by runs: which loads are held, which lost."),
     ] = False,
+    pushover: Annotated[
+        bool,
+        typer.Option("--pushover", help="Lead each mechanism to collapse by a run: the capacity curve."),
+    ] = False,
     store: Annotated[
         bool, typer.Option("--store/--no-store", help="Keep the assessment in the database.")
     ] = True,
@@ -52,7 +56,33 @@ def assess(
 
     folder = out or Path("out") / f"{scene.stem}-assess"
     with progress_bars() as listener:
-        done = answered(scene, db, folder, load or (), listener, confirm, code, store)
+        done = answered(scene, db, folder, load or (), listener, confirm, code, store, pushover)
     for warning in done.warnings:
         say(f"warning: {warning}")
     print(as_json(done.summary) if json else "\n".join(assessment_lines(done, verbose)))
+
+
+@reporting
+def compare(
+    scene: SceneArgument,
+    battered: Annotated[
+        bool,
+        typer.Option(
+            "--battered", help="Walls may have been built leaning: a uniform lean of one is no movement."
+        ),
+    ] = False,
+    out: Out = None,
+    accept_unsound: AcceptUnsound = False,
+    db: Db = DEFAULT_DB,
+    json: Json = False,
+    verbose: Verbose = False,
+) -> None:
+    """Run a scene; compare the movement of its courses and faces with their measured departure from level and plumb."""
+    from moma.cli.text.assessments import comparison_lines
+    from moma.cli.text.formats import as_json
+    from pipelines.assess.compare import compare as compared
+
+    folder = out or Path("out") / f"{scene.stem}-compare"
+    with progress_bars() as listener:
+        done = compared(scene, db, folder, listener, accept_unsound, battered)
+    print(as_json(done.summary) if json else "\n".join(comparison_lines(done, verbose)))

@@ -8,6 +8,7 @@ import typer
 
 __all__ = [
     "DEFAULT_DB",
+    "AcceptUnsound",
     "Codes",
     "Db",
     "Format",
@@ -161,5 +162,11 @@ Resume = Annotated[
         "--resume/--restart",
         help="Go on with the unfinished run in the folder, or give it up; without either, it is left alone.",
         show_default=False,
+    ),
+]
+AcceptUnsound = Annotated[
+    bool,
+    typer.Option(
+        "--accept-unsound", help="Run a scene that moma check finds unsound; mark all results accordingly."
     ),
 ]

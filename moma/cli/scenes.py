@@ -7,17 +7,10 @@ from typing import Annotated
 import typer
 
 from moma.cli.console import reporting, say
-from moma.cli.options import DEFAULT_DB, Db, Json, Out, Profile, Resume, SceneArgument, Verbose
+from moma.cli.options import DEFAULT_DB, AcceptUnsound, Db, Json, Out, Profile, Resume, SceneArgument, Verbose
 from moma.cli.progress import Interruption, progress_bars
 
 __all__ = ["check", "run", "trade"]
-
-AcceptUnsound = Annotated[
-    bool,
-    typer.Option(
-        "--accept-unsound", help="Run a scene that moma check finds unsound; mark all results accordingly."
-    ),
-]
 
 
 @reporting

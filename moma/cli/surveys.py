@@ -1,6 +1,7 @@
-"""Commands that read survey files."""
+"""Commands that read survey files, or write one to start from."""
 
 from dataclasses import asdict
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -28,7 +29,43 @@ from moma.cli.options import (
 from moma.cli.progress import progress_bars
 from moma.errors import UsageError
 
-__all__ = ["ingest", "survey_report"]
+__all__ = ["SampleName", "ingest", "sample", "survey_report"]
+
+
+class SampleName(StrEnum):
+    """Names in survey.synthetic.samples, which is not loaded for a help text."""
+
+    ARCH = "arch"
+    CORNER = "corner"
+    FACINGS = "facings"
+    SETTLED = "settled"
+    TOWER = "tower"
+    TOWER_SMALL = "tower-small"
+    VAULT = "vault"
+    WALL = "wall"
+    WINDOW = "window"
+
+
+@reporting
+def sample(
+    kind: Annotated[SampleName, typer.Argument(help="Building that is made up.")],
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="DIR", help="Folder for the files; default: KIND.")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Write a synthetic survey with its truth and a scene that runs, to start from."""
+    from moma.cli.text.formats import as_json
+    from pipelines.scene.sample import write_sample
+
+    written = write_sample(kind.value, out or Path(kind.value))
+    lines = [
+        f"{written.title}: a synthetic survey of {written.stones} stones",
+        *(f"  {path}" for path in written.files),
+        "run it with",
+        *(f"  {command}" for command in written.commands),
+    ]
+    print(as_json(asdict(written)) if json else "\n".join(lines))
 
 
 @reporting

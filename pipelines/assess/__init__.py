@@ -1,4 +1,5 @@
-"""Assessment of a scene: how far it is from falling under each load, and how it would fall.
+"""Questions to a scene: how far it is from falling, and how far its movement explains what was measured.
 
-Public: `Assessment`, `assess` (assess); `Answer`, `answer` (answers); `parse_question`, `scene_questions` (questions).
+Public: `Assessment`, `assess` (assess); `Answer`, `answer` (answers); `parse_question`, `scene_questions` (questions);
+`Comparison`, `compare` (compare).
 """

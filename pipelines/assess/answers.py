@@ -12,6 +12,7 @@ from mechanics.limit.confirm import Confirmation, confirm
 from mechanics.limit.kinematic import Kinematics, kinematics
 from mechanics.limit.limit_load import Flow, LimitLoad, Mechanism, limit_load
 from mechanics.limit.live_loads import Acceleration, LiveLoad
+from mechanics.limit.pushover import Pushover, pushover
 from mechanics.limit.thickness import geometric_safety
 from mechanics.limit.thrust import thrust
 from moma.errors import SolverError
@@ -20,15 +21,19 @@ from pipelines.assess.codes.check import check_code
 from pipelines.assess.questions import LoadQuestion, Question, Thickness, ThrustQuestion
 from pipelines.scene.site import Site
 
-__all__ = ["FALLS", "Answer", "CodeOf", "Confirm", "answer", "confirmer"]
+__all__ = ["FALLS", "Answer", "CodeOf", "Confirm", "Lead", "answer", "confirmer", "leader"]
 
 FALLS = "falls under its own weight"
 """Outcome of what does not stand at all."""
 
+_DROP = 0.8  # share of the peak of a capacity curve at which the way counts as ultimate [-]
 _MOVES = 0.01  # speed over that of the fastest stone from which a stone belongs to a mechanism [-]
 
 Confirm = Callable[[LiveLoad, float], Confirmation] | None
 """Confirmation of a candidate by runs; None: there is none."""
+
+Lead = Callable[[LiveLoad, LimitLoad, float | None], Pushover] | None
+"""Pushover from a limit load, to a way [m] if one is known; None: there is none."""
 
 CodeOf = tuple[str, Site] | None
 """Code and site of the check; None: there is none."""
@@ -43,19 +48,24 @@ class Answer:
     told : what assessment.json says of it
     mechanism : how the stones begin to fall, or follow a support that yields
     force : (nc, 3) on the candidate of each contact at the limit, local frame; zero where nothing balances [N]
+    curve : capacity curve; None: there is none
     """
 
     told: dict[str, Any]
     mechanism: Mechanism
     force: Array
+    curve: Pushover | None = None
 
 
-def answer(on: Assembly, question: Question, confirming: Confirm, code: CodeOf) -> Answer:
+def answer(
+    on: Assembly, question: Question, confirming: Confirm = None, leading: Lead = None, code: CodeOf = None
+) -> Answer:
     """Answer a question about an assembly.
 
     Parameters
     ----------
     confirming : runs that confirm the candidate of a load
+    leading : runs that lead the stones of its mechanism to collapse
     code : by which mechanisms of accelerations are checked
 
     Raises
@@ -64,7 +74,7 @@ def answer(on: Assembly, question: Question, confirming: Confirm, code: CodeOf) 
     """
     match question:
         case LoadQuestion():
-            return _load(on, question, confirming, code)
+            return _load(on, question, confirming, leading, code)
         case ThrustQuestion():
             return _thrust(on, question)
         case Thickness():
@@ -76,7 +86,12 @@ def confirmer(on: Assembly, runs: int, **listeners: Any) -> Confirm:
     return lambda live, candidate: confirm(on, live, candidate, runs, **listeners)
 
 
-def _load(on: Assembly, question: LoadQuestion, confirming: Confirm, code: CodeOf) -> Answer:
+def leader(on: Assembly, **listeners: Any) -> Lead:
+    """Return what leads a mechanism to collapse by runs of the stones, all rigid."""
+    return lambda live, found, reach: pushover(on, live, found, reach, **listeners)
+
+
+def _load(on: Assembly, question: LoadQuestion, confirming: Confirm, leading: Lead, code: CodeOf) -> Answer:
     live = question.live
     bound = limit_load(on, live)
     candidate = _candidate(on, live, bound)
@@ -101,9 +116,46 @@ def _load(on: Assembly, question: LoadQuestion, confirming: Confirm, code: CodeO
         told["kinematics"], checked = _kinematics(on, live, lowest, code if whole else None)
         if checked:
             told["code"] = checked
+    curve = _led(live, lowest, told, leading)
+    if curve is not None:
+        told["pushover"] = _capacity(curve)
     told["headline"] = _sentence(told)
     told["mechanism"] = _moving(on, lowest.mechanism)
-    return Answer(told, lowest.mechanism, lowest.force)
+    return Answer(told, lowest.mechanism, lowest.force, curve)
+
+
+def _led(live: LiveLoad, found: LimitLoad, told: dict[str, Any], leading: Lead) -> Pushover | None:
+    """Return the capacity curve; None where none is asked for, or no mechanism moves along the load."""
+    if leading is None or not np.isfinite(found.multiplier):
+        return None
+    oscillator = told.get("kinematics")
+    try:
+        return leading(live, found, None if oscillator is None else oscillator["capacity"] or None)
+    except SolverError:
+        return None
+
+
+def _capacity(curve: Pushover) -> dict[str, Any]:
+    return {
+        "control": curve.control,
+        "direction": curve.direction.tolist(),
+        "onset": curve.onset,
+        "peak": _number(curve.peak),
+        "dropped": _number(curve.falls_to(_DROP * curve.peak)),
+        "capacity": _number(curve.falls_to(0.0)),
+        "farthest": float(curve.displacement[-1]),
+        "ended": curve.ended,
+        "rate_error": float(np.abs(curve.inertia[curve.calm]).max(initial=0.0)),
+        "hit": int((~curve.calm).sum()),
+        "steps": curve.steps,
+        "unsolved": curve.unsolved,
+        "curve": {
+            "displacement": curve.displacement.tolist(),
+            "multiplier": curve.multiplier.tolist(),
+            "inertia": curve.inertia.tolist(),
+            "calm": curve.calm.tolist(),
+        },
+    }
 
 
 def _candidate(on: Assembly, live: LiveLoad, bound: LimitLoad) -> LimitLoad | None:
@@ -238,7 +290,7 @@ def _sentence(one: dict[str, Any]) -> str:
         return f"{text}, NO CANDIDATE found"
     stood = "" if one["candidate_converged"] else ", NOT CONVERGED"
     angle = f", a tilt of {one['tilt']:.3g}°" if "tilt" in one else ""
-    return f"{text}, {one['candidate']:.4g} (candidate{stood}){angle}{_dynamics(one)}{_verdict(one)}"
+    return f"{text}, {one['candidate']:.4g} (candidate{stood}){angle}{_dynamics(one)}{_collapse(one)}{_verdict(one)}"
 
 
 def _dynamics(one: dict[str, Any]) -> str:
@@ -248,6 +300,25 @@ def _dynamics(one: dict[str, Any]) -> str:
     held = "nothing held" if found["held"] is None else f"held at {found['held']:.4g}"
     lost = "nothing lost" if found["lost"] is None else f"lost at {found['lost']:.4g}"
     return f"; by the dynamics {'CONFIRMED' if found['agrees'] else 'NOT CONFIRMED'}: {held}, {lost}"
+
+
+def _collapse(one: dict[str, Any]) -> str:
+    if "pushover" not in one:
+        return ""
+    found = one["pushover"]
+    doubt = f", {found['unsolved']} of {found['steps']} steps NOT SOLVED" if found["unsolved"] else ""
+    if found["peak"] is None:
+        return (
+            f"; led to collapse: moves at {found['onset']:.4g}, then stones hit one another throughout{doubt}"
+        )
+    ways = [
+        f"{name} after {1e3 * found[key]:.3g} mm"
+        for key, name in (("dropped", "a fifth lost"), ("capacity", "all lost"))
+        if found[key] is not None
+    ]
+    led = ", ".join(ways) or f"less than a fifth lost up to {1e3 * found['farthest']:.3g} mm"
+    moves = f"moves at {found['onset']:.4g}, then bears {found['peak']:.4g}"
+    return f"; led to collapse: {moves}, {led} of {found['control']}{doubt}"
 
 
 def _verdict(one: dict[str, Any]) -> str:

@@ -17,8 +17,9 @@ from mechanics.limit.joints import Resultants, resultants
 from mechanics.results.forecast.plan import loose_blocks
 from mechanics.scene.scene import Fidelity
 from moma.errors import MissingLibraryError, UsageError
-from pipelines.assess.answers import FALLS, Answer, CodeOf, answer, confirmer
+from pipelines.assess.answers import FALLS, Answer, CodeOf, answer, confirmer, leader
 from pipelines.assess.questions import parse_question, scene_questions
+from pipelines.draw.capacity_plot import draw_capacity
 from pipelines.draw.mechanism import draw_mechanisms
 from pipelines.reports.assessment import write_assessment
 from pipelines.results.folder import check_replaceable, replacing
@@ -30,7 +31,7 @@ from pipelines.run.soundness import problems_of, refuse_unsound
 from pipelines.scene.file import SceneFile, read_scene
 from pipelines.scene.selection import select_groups, select_stones
 
-__all__ = ["INDEX", "JOINT_COLUMNS", "REPORT", "Assessment", "assess"]
+__all__ = ["CURVE_COLUMNS", "INDEX", "JOINT_COLUMNS", "REPORT", "Assessment", "assess"]
 
 INDEX = "assessment.json"
 """Index of the results of an assessment."""
@@ -51,6 +52,9 @@ JOINT_COLUMNS = (
     "friction_use",
 )
 """Columns of forces-N.csv: stones, centroid [m], resultant [N], where it meets the joint [m], kern, edge, use [-]."""
+
+CURVE_COLUMNS = ("displacement", "multiplier", "inertia")
+"""Columns of pushover-N.csv: way of the stone that is led [m], λ at rest, and what inertia took of the load [-]."""
 
 REPORT = "report.html"
 """Page for people."""
@@ -85,6 +89,7 @@ def assess(
     confirm: bool = False,
     code: str | None = None,
     store: bool = True,
+    pushover: bool = False,
 ) -> Assessment:
     """Answer how far a scene is from falling, on the stones of a database, and write the answers into a folder.
 
@@ -98,6 +103,7 @@ def assess(
     confirm : candidates are confirmed by runs
     code : by which mechanisms are checked (`pipelines.assess.codes.check.CODES`); needs [site] in the scene
     store : keep the assessment in the database
+    pushover : mechanisms are led to collapse by runs
 
     Raises
     ------
@@ -120,10 +126,11 @@ def assess(
     on = assembly(assembled.scene)
     refuse_unsound(problems_of(scene, assembled, loose_blocks(on.model, on.state)), str(path))
     confirming = confirmer(on, _RUNS, progress=progress) if confirm else None
+    leading = leader(on, progress=progress) if pushover else None
     answers: list[Answer] = []
     for number, question in enumerate(questions):
         progress(Progress("assess", number, len(questions), question.name))
-        answers.append(answer(on, question, confirming, by_code))
+        answers.append(answer(on, question, confirming, leading, by_code))
     summary = _summary(assembled, on, answers)
     progress(Progress("write", 0, 1, "pictures"))
     warnings: list[str] = []
@@ -135,6 +142,7 @@ def assess(
             for one in answers
         ]
         moving = [one.mechanism for one in answers]
+        summary["files"] += _write_curves(fresh, answers, titles)
         try:
             summary["files"] += draw_mechanisms(
                 fresh,
@@ -235,6 +243,20 @@ def _write_forces(
             table.writerow(JOINT_COLUMNS)
             for (a, b), row in zip(on.joints.bodies.tolist(), numbers.tolist(), strict=True):
                 table.writerow([codes[a], codes[b], *("" if np.isnan(v) else f"{v:.7g}" for v in row)])
+    return names
+
+
+def _write_curves(folder: Path, answers: Sequence[Answer], titles: Sequence[str]) -> list[str]:
+    """Write each capacity curve as a table and a picture; return file names."""
+    names = []
+    for number, (one, title) in enumerate(zip(answers, titles, strict=True), start=1):
+        if one.curve is None:
+            continue
+        columns = np.column_stack([one.curve.displacement, one.curve.multiplier, one.curve.inertia])
+        table, picture = f"pushover-{number}.csv", f"pushover-{number}.png"
+        np.savetxt(folder / table, columns, "%.7g", ",", header=",".join(CURVE_COLUMNS), comments="")
+        draw_capacity(folder / picture, title, one.curve, one.told["bound"])
+        names += [table, picture]
     return names
 
 

@@ -16,6 +16,7 @@ from moma.errors import UsageError
 from pipelines.ingest.records import stone_record, surveyed_block
 from pipelines.ingest.relate import relate
 from pipelines.propose.records import core_record, is_known, record_volume
+from survey.joints.close import close_joints
 from survey.unseen.core.facings import facing_stone
 from survey.unseen.core.propose import propose_infill
 from survey.unseen.core.settings import InfillSettings
@@ -151,7 +152,9 @@ def propose_core(
         database.session(read_only=recording is None) as session,
     ):
         records = _stones(session, where)
-        stones = [facing_stone(surveyed_block(record)) for record in records]
+        blocks = [surveyed_block(record) for record in records]
+        closed = close_joints(blocks).solids
+        stones = [facing_stone(block, solid) for block, solid in zip(blocks, closed, strict=True)]
         named = None if facings is None else _named(session, where, facings)
         found = propose_infill(stones, settings, facings=named, taken=_codes(session))
         known = _measured(session, find(session, "infill"))

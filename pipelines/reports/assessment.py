@@ -13,6 +13,7 @@ _VALUES = ("Symbol", "Value", "Formula", "Article")
 _CHECKS = ("Check", "Capacity", "Demand", "Ratio", "Verdict", "Formula", "Article")
 _CAPTIONS = {
     "mechanism": "As the stones begin to move, exaggerated.",
+    "pushover": "What the stones bear as one of them is led to collapse.",
     "forces": "Resultants of the joints at the limit: blue within the kern, red outside.",
 }
 _FEW = 12  # stones of a mechanism that are named

@@ -36,6 +36,7 @@ _INDEXES = (
     "check.json",
     "survey.json",
     "assessment.json",
+    "comparison.json",
 )  # their "files" list the files that MOMA wrote
 _MARK = ".moma-"  # in the names of hidden folders
 _EARLIER = f"{_MARK}earlier"

@@ -4,8 +4,11 @@ from typing import Any
 
 import numpy as np
 
+from mechanics.model.model import laws_between
 from mechanics.results.result import Result
+from mechanics.scene.laws.elastic_joint import ElasticJoint
 from mechanics.scene.scene import Fidelity
+from pipelines.arrays import Bools, Ints
 
 __all__ = ["indeterminacy", "length_tolerance"]
 
@@ -30,20 +33,22 @@ def indeterminacy(result: Result) -> dict[str, Any]:
     """Return whether the forces shown are the only ones in balance.
 
     Between rigid stones forces are known from equilibrium alone, six equations for each stone that moves. Joints
-    transmit six numbers each, contact points three; where these are more, other forces are in balance too.
+    transmit six numbers each, contact points three; where these are more, other forces are in balance too, unless the
+    joints yield elastically.
 
     Returns
     -------
     dict
-        `stones` that are rigid and move, `joints` and `contacts` that carry force, not on deformable stones; `of`:
+        `stones` that are rigid and move, `joints` and `contacts` that carry force, neither elastic nor on deformable
+        stones; `of`:
         "joints", "pressures" or None; `text`, None where the forces are the only ones
     """
     fidelity = np.array([str(body.fidelity) for body in result.bodies])
     stiff = fidelity != str(Fidelity.DEFORMABLE)
     stones = int((fidelity == str(Fidelity.RIGID)).sum())
-    joints = int((result.joints.pressed & stiff[result.joints.bodies].all(axis=1)).sum())
+    joints = int((result.joints.pressed & _rigid(result, result.joints.bodies, stiff)).sum())
     carries = np.any(result.contacts.force != 0.0, axis=1)
-    contacts = int((carries & stiff[result.contacts.bodies].all(axis=1)).sum())
+    contacts = int((carries & _rigid(result, result.contacts.bodies, stiff)).sum())
     of, text = None, None
     if stones and joints > stones:
         of = "joints"
@@ -58,3 +63,13 @@ def indeterminacy(result: Result) -> dict[str, Any]:
             "the resultants of the joints are the only ones in equilibrium"
         )
     return {"stones": stones, "joints": joints, "contacts": contacts, "of": of, "text": text}
+
+
+def _rigid(result: Result, bodies: Ints, stiff: Bools) -> Bools:
+    """Return which pairs of bodies (n, 2) meet without yielding: neither a stone nor their joint deforms."""
+    rigid = np.asarray(stiff[bodies].all(axis=1))
+    table = laws_between(result.scene)
+    if table.sprung:
+        springs = np.array([isinstance(law, ElasticJoint) for law in table.laws])
+        rigid &= ~springs[table.of(bodies)]
+    return rigid

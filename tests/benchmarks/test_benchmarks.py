@@ -10,9 +10,9 @@ import time
 import numpy as np
 import pytest
 
-from benchmarks import fc3d, lmgc90
+from benchmarks import fc3d, lmgc90, report
 from benchmarks.generated import rigid_scenes, running_bond
-from benchmarks.report import commit, table_lines, write_between
+from benchmarks.report import commit, progress, table_lines, write_between
 from benchmarks.scenes import write_scene
 from benchmarks.siconos_child import timed
 from moma.errors import UsageError
@@ -221,3 +221,12 @@ def test_unknown_sizes_of_deformable_walls_are_refused():
     done = run("deformable_scaling", "--stones", 7)
     assert done.returncode == 2
     assert "invalid choice: 7" in done.stderr
+
+
+def test_a_run_whose_output_is_redirected_says_now_and_then_how_far_it_is(capsys, monkeypatch):
+    clock = iter([100.0, 109.0, 110.5, 111.0, 121.0])
+    monkeypatch.setattr(report, "_said", [100.0])
+    monkeypatch.setattr(report.time, "monotonic", lambda: next(clock))
+    for step in range(5):
+        progress(f"step {step}")
+    assert capsys.readouterr().err.split("\n") == ["step 2", "step 4", ""]

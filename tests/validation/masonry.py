@@ -5,12 +5,13 @@ Where a case asks for inset points, the stones are chamfered (`chamfer`), so tha
 """
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
 from mechanics.scene import shapes
-from mechanics.scene.scene import Fidelity
-from mechanics.scene.shapes import box, column, prism, voussoir_arch, wall
+from mechanics.scene.scene import Block, Fidelity
+from mechanics.scene.shapes import BOX_FACES, box, column, prism, voussoir_arch, wall
 from mechanics.stones.materials import Material
 
 DENSITY = 2000.0
@@ -108,6 +109,38 @@ def overhanging_stack(count, part, length=1.0, height=0.2, depth=0.4):
 def drums(count, diameter, height, sides=4):
     """A stack of prisms with `sides` corners on a circle, the first on the x axis; on a fixed one that is as wide."""
     return column(count, diameter, height, sides=sides, material=STONE)
+
+
+def lune(rings, sectors, thickness, eye=0.02):
+    """One of the equal lunes of a hemispherical dome of mean radius 1 m, on a fixed base, between two fixed walls.
+
+    The walls are planes of symmetry: what they push is what the neighbours would. They are named first. `eye` is the
+    half angle that is left open at the top.
+    """
+    half, inner, outer = np.pi / sectors, 1.0 - thickness / 2, 1.0 + thickness / 2
+    latitude = np.linspace(0.0, np.pi / 2 - eye, rings + 1)
+    corners = [(inner, -half), (outer, -half), (outer, half), (inner, half)]
+
+    def ring(angle):
+        radius, around = np.array(corners).T
+        flat = radius * np.cos(angle)
+        return np.column_stack([flat * np.cos(around), flat * np.sin(around), radius * np.sin(angle)])
+
+    walls = []
+    for name, side in (("left", -1.0), ("right", 1.0)):
+        away = np.array([np.cos(half), side * np.sin(half), 0.0])
+        out = np.array([-np.sin(half), side * np.cos(half), 0.0])
+        sheet = np.array([0.0 * away, 1.5 * away, 1.5 * away + [0, 0, 1.5], [0, 0, 1.5]])
+        low, high = (sheet, sheet + 0.1 * out) if side < 0 else (sheet + 0.1 * out, sheet)
+        walls.append(_hexahedron(name, low, high, Fidelity.FIXED))
+    base = _hexahedron("base", ring(0.0) - [0, 0, 0.1], ring(0.0), Fidelity.FIXED)
+    beds = list(map(ring, latitude))
+    return (*walls, base, *(_hexahedron(f"ring {k}", a, b) for k, (a, b) in enumerate(pairwise(beds))))
+
+
+def _hexahedron(code, low, high, fidelity=Fidelity.RIGID):
+    """A stone from four corners below (4, 3) and four above them, both counter-clockwise seen from above."""
+    return Block(code, np.vstack([low, high]), BOX_FACES, STONE, fidelity=fidelity)
 
 
 def tapered_column():

@@ -1,5 +1,5 @@
 """Contact laws: each states its contacts as a shift and a friction cone.
 
-Public: `Law`, `Approach`, `Terms` (law); `DryJoint` (dry_joint); `MortarJoint` (mortar); `CohesiveZone`
-(cohesive_zone); `LennardJones` (lennard_jones); `contact_status` (status).
+Public: `Law`, `Approach`, `Terms`, `Springs` (law); `DryJoint` (dry_joint); `MortarJoint` (mortar); `CohesiveZone`
+(cohesive_zone); `ElasticJoint` (elastic_joint); `LennardJones` (lennard_jones); `contact_status` (status).
 """

@@ -12,12 +12,25 @@ from typing import Protocol
 
 from mechanics.arrays import Array
 
-__all__ = ["BOND", "OPENING", "REST", "SLIDING", "SLIP", "STATE", "Approach", "Law", "Terms"]
+__all__ = [
+    "BOND",
+    "OPENING",
+    "REST",
+    "SLIDING",
+    "SLIP",
+    "SPRING",
+    "STATE",
+    "Approach",
+    "Law",
+    "Springs",
+    "Terms",
+]
 
 
 # columns of the internal variables that a contact carries from step to step
 BOND, SLIDING, OPENING, SLIP, REST = range(5)
-STATE = 5
+SPRING = slice(5, 8)
+STATE = 8
 
 
 @dataclass(frozen=True)
@@ -28,6 +41,7 @@ class Approach:
     ----------
     gap : (n,) signed distance, negative when overlapping [m]
     speed : (n,) u_N before the step, positive when opening [m/s]
+    slide : (n, d - 1) u_T before the step [m/s]
     area : (n,) tributary area; zero at an edge or a corner [m²]
     size : (n,) smallest width of the smaller body; tolerances scale with it [m]
     compliance : (n,) W_NN, change of u_N per unit of normal impulse [1/kg]
@@ -37,11 +51,13 @@ class Approach:
     state : (n, STATE) internal variables, as the law left them in the last step; zeros for new contacts.
         BOND intact fraction (1 whole, between: damaged, 0 never bonded, -1 broken), SLIDING 1 if it slid in the last
         step, OPENING largest opening so far [m], SLIP path of sliding so far [m], REST gap that counts as closed, where
-        stones overlapped or mortar filled a joint as the run began [m]
+        stones overlapped or mortar filled a joint as the run began [m], SPRING three columns, stretch of the springs
+        along the joint: what the candidate has moved over the antagonist in them, local frame, zero across it [m]
     """
 
     gap: Array
     speed: Array
+    slide: Array
     area: Array
     size: Array
     compliance: Array
@@ -50,6 +66,20 @@ class Approach:
     push_out: bool
     first: bool
     state: Array
+
+
+@dataclass(frozen=True)
+class Springs:
+    """Springs between the two sides of contacts: u + E r + shift takes the place of u, in both parts of the law.
+
+    Attributes
+    ----------
+    compliance : (n, 3) diagonal of E, zero where a contact has no springs [1/kg]
+    shift : (n, 2) shift of u_T; that of u_N is the bias [m/s]
+    """
+
+    compliance: Array
+    shift: Array
 
 
 @dataclass(frozen=True)
@@ -62,12 +92,14 @@ class Terms:
     friction : (n,) μ [-]
     cohesion : (n,) k, tangential impulse carried at r̃_N = 0 [N s]
     adhesion : (n,) s, largest tensile impulse; r̃_N = r_N + s [N s]
+    springs : of joints that yield; None where none does
     """
 
     bias: Array
     friction: Array
     cohesion: Array
     adhesion: Array
+    springs: Springs | None = None
 
 
 class Law(Protocol):

@@ -1,13 +1,15 @@
-"""Assessments in words."""
+"""Assessments and comparisons in words."""
 
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pipelines.assess.assess import Assessment
+    from pipelines.assess.compare import Comparison
 
-__all__ = ["assessment_lines"]
+__all__ = ["assessment_lines", "comparison_lines"]
 
 _FEW = 6  # stones of a mechanism that are named without -v
+_COURSES = 5  # courses with the largest misfits that are listed without -v
 
 
 def assessment_lines(done: "Assessment", verbose: bool) -> list[str]:
@@ -56,3 +58,47 @@ def _mechanism(found: dict[str, Any], verbose: bool) -> list[str]:
         f"    moves: {', '.join(named)}{more}; "
         f"{found['opening_joints']} joints open, {found['sliding_joints']} slide"
     ]
+
+
+def comparison_lines(done: "Comparison", verbose: bool) -> list[str]:
+    """Return the lines of a comparison: the whole, each wall, and the courses with the largest misfits."""
+    summary = done.summary
+    courses = sorted(summary["courses"], key=lambda one: -_ratio(one))
+    shown = courses if verbose else courses[:_COURSES]
+    return [
+        f"{summary['scene']}: {_misfit(summary)}",
+        "  χ² near its degrees of freedom: the movement explains what was measured; in brackets, if nothing had moved",
+        *(f"  {caution}" for caution in summary["cautions"]),
+        *(f"  {_wall(one)}, {one['quantity']}: {_misfit(one)}" for one in summary["walls"]),
+        "  courses" + ("" if len(shown) == len(courses) else " that differ most"),
+        *(f"    {_wall(one)}, course {one['course']}: {_misfit(one)}{_shape(one)}" for one in shown),
+        f"  run {done.run}",
+        *(f"  {done.folder / name}" for name in summary["files"]),
+    ]
+
+
+def _wall(one: dict[str, Any]) -> str:
+    return str(one["facade"]) + ("" if one["zone"] is None else f" {one['zone']}")
+
+
+def _ratio(one: dict[str, Any]) -> float:
+    return float(one["chi2"]) / max(int(one["dof"]), 1)
+
+
+def _misfit(one: dict[str, Any]) -> str:
+    return f"χ² {one['chi2']:.4g} of {one['dof']} ({one['chi2_still']:.4g})"
+
+
+def _shape(one: dict[str, Any]) -> str:
+    """Return slope and sag of a course, measured and simulated."""
+    slope = one["slope"]
+    text = (
+        f"; slope {1e3 * slope['measured']:+.1f} ± {1e3 * slope['sigma']:.1f}, "
+        f"simulated {1e3 * slope['simulated']:+.1f} mm/m"
+    )
+    if one["measured"] is None:
+        return text
+    return (
+        f"{text}; mid-span {1e3 * one['measured']:+.1f} ± {1e3 * one['sigma']:.1f}, "
+        f"simulated {1e3 * one['simulated']:+.1f} mm"
+    )

@@ -1,4 +1,5 @@
 import json
+import re
 
 import pytest
 
@@ -261,3 +262,38 @@ def test_a_kind_that_this_program_does_not_declare_is_named(filled: Database) ->
             ask(session, "entity")
     with filled.session(read_only=True) as session, pytest.raises(DatabaseError, match="kind 'gargoyle'"):
         describe(session, "R1")
+
+
+@pytest.mark.parametrize(
+    ("expression", "expected"),
+    [
+        ("depth - 0.1 > 0.3", lambda e: e.depth - 0.1 > 0.3),
+        ("abs(depth - 0.45) < 0.06", lambda e: abs(e.depth - 0.45) < 0.06),
+        ("depth + x > 2*depth - 1.5*z", lambda e: e.depth + e.x > 2 * e.depth - 1.5 * e.z),
+        ("3*x > y + 1 and not z - 0.5*y > 100", lambda e: 3 * e.x > e.y + 1 and not e.z - 0.5 * e.y > 100),
+        ("abs(x - 2*y) > 0.4", lambda e: abs(e.x - 2 * e.y) > 0.4),
+    ],
+)
+def test_numbers_are_computed(filled: Database, expression: str, expected) -> None:
+    with filled.session(read_only=True) as session:
+        stones = find(session, "stone")
+        known = [one.code for one in stones if None not in (one.depth, one.x) and expected(one)]
+        assert 0 < len(known) < len(stones)
+        assert [one.code for one in find(session, "stone", expression)] == known
+
+
+@pytest.mark.parametrize(
+    ("expression", "words"),
+    [
+        ("depth - kind > 0", "kind is a text, and cannot be computed with"),
+        ("abs(depth > 0", "'>' instead of )"),
+        ("depth - 0.1 like 3", "'like' is not a comparison"),
+        ("2*deppth > 1", "unknown attribute 'deppth'"),
+        ("depth + > 1", "'>' is no number"),
+    ],
+)
+def test_what_cannot_be_computed_is_refused_at_its_place(
+    filled: Database, expression: str, words: str
+) -> None:
+    with filled.session(read_only=True) as session, pytest.raises(QueryError, match=re.escape(words)):
+        find(session, "stone", expression)

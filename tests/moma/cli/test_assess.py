@@ -176,6 +176,20 @@ def test_a_check_by_a_code_needs_a_site_and_names_article_and_formula(url, scene
     assert "before you sign" in page.split("<h2>")[0]
 
 
+def test_a_run_leads_a_mechanism_to_collapse(url, scene, tmp_path):
+    out = tmp_path / "out"
+    told = answer("assess", scene, "--db", url, "--out", out, "--load", "horizontal y", "--pushover")
+    (one,) = told["loads"]
+    curve = one["pushover"]
+    assert 0.95 * one["candidate"] < curve["peak"] < 1.01 * one["bound"]
+    assert f"moves at {curve['onset']:.4g}, then bears {curve['peak']:.4g}" in told["headline"]
+    head, *rows = (out / "pushover-1.csv").read_text(encoding="utf-8").splitlines()
+    assert head == "displacement,multiplier,inertia"
+    assert len(rows) == len(curve["curve"]["multiplier"])
+    assert {"pushover-1.csv", "pushover-1.png"} <= set(told["files"])
+    assert "led to collapse" in (out / "report.html").read_text(encoding="utf-8")
+
+
 def test_runs_confirm_a_candidate(url, scene, tmp_path):
     (told,) = answer(
         "assess", scene, "--db", url, "--out", tmp_path / "out", "--load", "horizontal y", "--confirm"

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from mechanics.results.result import JointSeries, Largest, Outcome, Peak, Peaks, Series
-from mechanics.scene.scene import Fidelity
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.laws.elastic_joint import ElasticJoint
+from mechanics.scene.scene import ContactSettings, Fidelity, LawRule
 from moma.cli.text.runs_and_surveys import run_lines
 from pipelines.draw.pictures import _heading, _top
 from pipelines.reports.html import kilonewtons, megapascals, millimetres, percent
@@ -220,6 +222,19 @@ def test_forces_that_are_one_state_of_many_say_so(shaken, tmp_path):
     _, page, text = written(replace(shaken, joints=joints), tmp_path)
     assert "one admissible state of many: 18 unknowns of 3 joints, 12 equations" in text
     assert "one admissible state of many" in page
+
+
+def test_between_elastic_joints_forces_are_unique(shaken):
+    joints = joints_of(((1, 0), (2, 1), (2, 0)), ((0, 0, 1e3),) * 3, (1, 2, 2))
+    springs, codes = ElasticJoint(0.6, 1e9, 1e9), [frozenset({body.code}) for body in shaken.bodies]
+    for contact, count in (
+        (ContactSettings(springs), 0),
+        (ContactSettings(rules=(LawRule(codes[1], codes[0], springs),)), 2),
+        (ContactSettings(springs, (LawRule(codes[0], codes[2], DryJoint()),)), 1),
+    ):
+        found = indeterminacy(replace(shaken, joints=joints, scene=replace(shaken.scene, contact=contact)))
+        assert found["joints"] == count
+        assert found["of"] != "joints"
 
 
 def test_between_elastic_stones_forces_are_unique():

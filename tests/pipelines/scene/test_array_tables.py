@@ -7,6 +7,7 @@ import pytest
 
 from mechanics.scene.laws.cohesive_zone import CohesiveZone
 from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.laws.elastic_joint import ElasticJoint
 from mechanics.scene.laws.lennard_jones import LennardJones
 from mechanics.scene.laws.mortar import MortarJoint
 from mechanics.scene.scene import Block, Fidelity, Placement
@@ -37,12 +38,14 @@ def test_every_law_is_made_of_its_keys():
         + 'dynamic_friction = 0.4\n[[laws]]\ntype = "dry"\nfriction = 0.3\nrestitution = 0.1\n'
         + '[[laws]]\ntype = "cohesive_zone"\nfriction = 0.5\ntension = 3e5\nshear = 4e5\n'
         + "energy_tension = 50\nenergy_shear = 80\n"
+        + '[[laws]]\ntype = "elastic_joint"\nfriction = 0.5\nnormal_stiffness = 1e9\nshear_stiffness = 4e8\n'
         + '[[laws]]\ntype = "lennard_jones"\nfriction = 0.2\nforce = 5\ndistance = 1e-3\n'
     )
     assert [one.law for one in scene.laws] == [
         MortarJoint(0.5, 1e5, 2e5, 0.4),
         DryJoint(0.3, None, 0.1),
         CohesiveZone(0.5, 3e5, 4e5, 50.0, 80.0),
+        ElasticJoint(0.5, 1e9, 4e8),
         LennardJones(0.2, 5.0, 1e-3),
     ]
 

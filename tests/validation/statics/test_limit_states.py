@@ -15,11 +15,18 @@ from mechanics.limit.live_loads import Acceleration, PointForce, SpreadForce
 from mechanics.limit.thickness import geometric_safety
 from mechanics.limit.thrust import thrust
 from mechanics.scene.laws.dry_joint import DryJoint
-from mechanics.scene.scene import ContactSettings, Fidelity, Scene
+from mechanics.scene.scene import ContactSettings, Fidelity, LawRule, Scene
 from mechanics.scene.shapes import bond
 from mechanics.stones.materials import Material
 from moma.errors import SceneError
-from tests.validation.masonry import cuboid, running_bond, semicircular_arch
+from tests.validation.masonry import (
+    buttressed_arch,
+    cuboid,
+    lune,
+    running_bond,
+    semicircular_arch,
+    tapered_column,
+)
 from tests.validation.scenes import ground
 
 ALONG = Acceleration((1.0, 0.0, 0.0))
@@ -69,6 +76,28 @@ def test_the_factor_of_many_voussoirs_has_milankovitch_s_thickness():
     """A01: radial joints, weights at their true centres: t/R = 0.107478 (0.10746 of 200 stones)."""
     found = geometric_safety(standing(semicircular_arch(200, 0.109)))
     assert 0.109 / found.factor == pytest.approx(0.10746, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("rings", "thickness", "friction"), [(32, 0.06, 0.7), (32, 0.045, 0.7), (48, 0.05, 2.0)]
+)
+def test_a_hemispherical_dome_has_heyman_s_least_thickness(rings, thickness, friction):
+    """t/R = 0.042 of lunes that hoops press but do not pull (Heyman 1967); here 0.0427, weights at their centres."""
+    blocks = lune(rings, 64, thickness)
+    walls = frozenset({"left", "right"})
+    smooth = LawRule(walls, frozenset(block.code for block in blocks) - walls, DryJoint(0.0))
+    on = assembly(Scene("dome", blocks, contact=ContactSettings(DryJoint(friction), (smooth,))))
+    found = geometric_safety(on)
+    assert thickness / found.factor == pytest.approx(0.042, rel=0.025)
+    assert thickness / found.factor == pytest.approx(0.0427, rel=3e-3)
+
+
+@pytest.mark.parametrize(
+    ("blocks", "friction", "value"), [(buttressed_arch(), 0.6, 0.11307), (tapered_column(), 0.7, 0.193286)]
+)
+def test_buttresses_and_columns_have_their_published_multipliers(blocks, friction, value):
+    """A08 and T02."""
+    assert limit_load(standing(blocks, friction), ALONG).multiplier == pytest.approx(value, rel=1e-4)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import numpy as np
 from mechanics.scene.laws.law import STATE, Approach, Law
 
 
-def approach(gap, speed=0.0, state=None, **changed):
+def approach(gap, speed=0.0, state=None, slide=0.0, **changed):
     """Contacts as a law sees them; numbers are repeated for each."""
     gap = np.atleast_1d(np.asarray(gap, dtype=float))
     given = {"area": 1.0, "size": 1.0, "compliance": 1.0} | {
@@ -16,7 +16,9 @@ def approach(gap, speed=0.0, state=None, **changed):
     full = {name: np.broadcast_to(np.asarray(value, dtype=float), gap.shape) for name, value in given.items()}
     settings = {"step": 1e-3, "theta": 0.5, "push_out": False, "first": False} | changed
     state = np.zeros((len(gap), STATE)) if state is None else np.array(state, dtype=float)
-    return Approach(gap=gap, speed=np.broadcast_to(float(speed), gap.shape), state=state, **full, **settings)
+    slide = np.broadcast_to(np.asarray(slide, dtype=float), (len(gap), 2))
+    motion = {"speed": np.broadcast_to(float(speed), gap.shape), "slide": slide}
+    return Approach(gap=gap, state=state, **motion, **full, **settings)
 
 
 @dataclass
