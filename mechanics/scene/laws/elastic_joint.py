@@ -9,7 +9,7 @@ from mechanics.arrays import Array, Bools
 from mechanics.scene.laws.bonds import with_bonds
 from mechanics.scene.laws.dry_joint import DryJoint, DynamicFriction, Friction, at_limit
 from mechanics.scene.laws.law import REST, SPRING, Approach, Law, Springs, Terms
-from mechanics.scene.laws.mortar import MortarJoint
+from mechanics.scene.laws.mortar import MortarJoint, held_tension
 from mechanics.stones.settings import Setting, check_settings
 
 __all__ = ["ElasticJoint"]
@@ -60,7 +60,7 @@ class ElasticJoint:
 
     @property
     def _bonded(self) -> bool:
-        return self.shear > 0
+        return self.shear > 0 or held_tension(self.friction, self.tension, self.shear) > 0
 
     @property
     def _strength(self) -> Law:

@@ -46,6 +46,8 @@ class Compliant:
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from `start`."""
+        if len(start.impulse) == 0:
+            return ContactSolution(start.impulse, start.velocity, 0, 0.0, True, "nothing: no contacts")
         if problem.delassus.rigid is None:
             found = Elastic(self.tolerance, self.velocity_tolerance, self.max_iterations)(problem, start)
             return replace(found, why=f"compliant joints, {found.why}")

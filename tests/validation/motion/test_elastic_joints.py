@@ -76,6 +76,18 @@ def test_dashpots_damp_by_pi_f_tau():
     np.testing.assert_allclose(decrement[:3], 2 * np.pi * damping, rtol=0.03)
 
 
+@pytest.mark.parametrize(("friction", "shear"), [(0.0, 0.0), (0.6, 1e6)])
+def test_a_block_hangs_on_springs_as_strong_as_its_weight(friction, shear):
+    """It sinks by m g/(k A) under a ceiling whose tension is 1.1 of its weight, and falls freely at 0.9, for any μ."""
+    way = {}
+    for share in (1.1, 0.9):
+        law = ElasticJoint(friction, STIFF, STIFF, tension=share * MASS * G, shear=shear)
+        up = started(law, slab(), gravity=(0.0, 0.0, G), theta=1.0, step=2e-3)
+        way[share] = track(up, 100)[-1, 2]
+    assert way[1.1] == pytest.approx(MASS * G / STIFF, rel=1e-3)
+    assert way[0.9] == pytest.approx(G * 0.2**2 / 2, rel=0.03)
+
+
 @pytest.mark.parametrize("friction", [0.6, 0.3])
 def test_a_tilted_block_rests_on_stretched_springs_or_slides(friction):
     """Below the limit it shifts by F_T/(k_T A); above, it accelerates as a rigid one does."""
