@@ -10,7 +10,8 @@ from moma.errors import SceneError
 
 __all__ = ["Site"]
 
-_ETA = 1.0  # factor of damping at 5 % [-]
+_USUAL = 5.0  # damping of the code's spectrum [%]
+_LEAST = 0.55  # of the factor of damping η [-]
 _LAST, _LASTED = 1.6, 4.0  # T_D = 1.6 + 4 ag/g [s]
 
 
@@ -61,20 +62,21 @@ class Site:
         """Return γ = 3 N/(2 N + 1) [-]."""
         return 3.0 * self.storeys / (2.0 * self.storeys + 1.0)
 
-    def acceleration(self, period: float, gravity: float) -> float:
-        """Return Se(T) [m/s²]."""
+    def acceleration(self, period: float, gravity: float, damping: float = _USUAL) -> float:
+        """Return Se(T) for a damping [%], with η = √(10/(5 + ξ)) ≥ 0.55 [m/s²]."""
+        eta = max(float(np.sqrt(10.0 / (5.0 + damping))), _LEAST)
         corner = self.cc * self.tc_star
         first, last = corner / 3.0, _LAST + _LASTED * self.ag
-        plateau = self.ag * gravity * self.soil * _ETA * self.f0
+        plateau = self.ag * gravity * self.soil * eta * self.f0
         if period < first:
             part = period / first
-            return plateau * (part + (1.0 - part) / (_ETA * self.f0))
+            return plateau * (part + (1.0 - part) / (eta * self.f0))
         if period < corner:
             return plateau
         if period < last:
             return plateau * corner / period
         return plateau * corner * last / period**2
 
-    def displacement(self, period: float, gravity: float) -> float:
-        """Return SDe(T) = Se(T) (T/2π)² [m]."""
-        return self.acceleration(period, gravity) * float((period / (2.0 * np.pi)) ** 2)
+    def displacement(self, period: float, gravity: float, damping: float = _USUAL) -> float:
+        """Return SDe(T) = Se(T) (T/2π)² for a damping [%] [m]."""
+        return self.acceleration(period, gravity, damping) * float((period / (2.0 * np.pi)) ** 2)

@@ -126,43 +126,52 @@ def check_code(code: str, site: Site, found: Kinematics, gravity: float = 9.81) 
             )
         )
     if np.isfinite(found.capacity):
-        ultimate, secant = rules["ultimate"] * found.capacity, rules["secant"]
-        at = secant * ultimate
-        slowed = capacity * (1.0 - at / found.capacity)
-        period = float(2.0 * np.pi * np.sqrt(at / slowed))
-        where = article["nonlinear"]
+        ultimate, where = rules["ultimate"] * found.capacity, article["nonlinear"]
+        at, slowed, period = _secant(rules, found.capacity, ultimate, capacity)
+        factor, damping = rules["period"], rules["damping"]
         values += [
             _value("d0*", found.capacity, "m", where, "displacement at which the multiplier is 0"),
             _value("du*", ultimate, "m", where, f"{rules['ultimate']:g} d0*"),
-            _value("ds*", at, "m", where, f"{secant:g} du*"),
+            _value("ds*", at, "m", where, f"{rules['secant']:g} du*"),
             _value("as*", slowed, "m/s²", where, "a0* (1 - ds*/d0*)"),
-            _value("Ts", period, "s", where, "2π √(ds*/as*)"),
+            _value("Ts", period, "s", where, f"{factor:g} π √(ds*/as*)"),
         ]
         checks.append(
             Check(
                 "nonlinear, at the ground",
                 where,
-                "du* ≥ SDe(Ts)",
+                f"du* ≥ SDe(Ts), damping {damping:g} %",
                 ultimate,
-                site.displacement(period, gravity),
+                site.displacement(period, gravity, damping),
                 "m",
             )
         )
         if upper:
-            first = site.period or 0.0
-            share = period / first
+            above, first = rules["above"], site.period or 0.0
+            share = _secant(above, found.capacity, ultimate, capacity)[2] / first
             demand = site.displacement(first, gravity) * site.shape * site.participation * share**2
             checks.append(
                 Check(
                     "nonlinear, above the ground",
                     where,
-                    f"du* ≥ SDe(T1) ψ(Z) γ (Ts/T1)² / √((1 - Ts/T1)² + {rules['coupling']:g} Ts/T1)",
+                    f"du* ≥ SDe(T1) ψ(Z) γ (Ts/T1)² / √((1 - Ts/T1)² + {above['coupling']:g} Ts/T1), "
+                    f"Ts = {above['period']:g} π √(ds*/as*) at {above['secant']:g} du*",
                     ultimate,
-                    demand / float(np.sqrt((1.0 - share) ** 2 + rules["coupling"] * share)),
+                    demand / float(np.sqrt((1.0 - share) ** 2 + above["coupling"] * share)),
                     "m",
                 )
             )
-    return CodeCheck(rules["name"], rules["unchecked"], tuple(values), tuple(checks))
+    caution = rules["unchecked"] if upper else ""
+    return CodeCheck(rules["name"], caution, tuple(values), tuple(checks))
+
+
+def _secant(
+    rules: Mapping[str, Any], zero: float, ultimate: float, capacity: float
+) -> tuple[float, float, float]:
+    """Return ds* [m], as* [m/s²] and Ts [s], given d0*, du* and a0*: the capacity falls straight to 0 at d0*."""
+    at = rules["secant"] * ultimate
+    slowed = capacity * (1.0 - at / zero)
+    return at, slowed, float(rules["period"] * np.pi * np.sqrt(at / slowed))
 
 
 def _value(symbol: str, value: float, unit: str, article: str, formula: str) -> dict[str, Any]:

@@ -161,7 +161,8 @@ def test_an_assessment_is_kept_and_asked_for(url, scene, tmp_path):
 def test_a_check_by_a_code_needs_a_site_and_names_article_and_formula(url, scene, tmp_path):
     said = fails(2, "assess", scene, "--db", url, "--out", tmp_path / "out", "--code", "ntc2008")
     assert "[site]" in said
-    scene.write_text(TWO_COURSES + "\n[site]\nag = 0.25\nf0 = 2.4\ntc_star = 0.3\n", encoding="utf-8")
+    site = "\n[site]\nag = 0.25\nf0 = 2.4\ntc_star = 0.3\nheight = 1.0\nbuilding_height = 9.0\nperiod = 0.3\n"
+    scene.write_text(TWO_COURSES + site, encoding="utf-8")
     said = fails(2, "assess", scene, "--db", url, "--out", tmp_path / "out", "--code", "ec9")
     assert "ntc2008, ntc2018" in said
     text = prints(
@@ -169,11 +170,11 @@ def test_a_check_by_a_code_needs_a_site_and_names_article_and_formula(url, scene
     )
     first, *_ = text.splitlines()
     assert "NTC 2018" in first
-    assert "before you sign" in first
-    assert "a0* ≥ ag S / q, q = 2   [C8.7.1.2.1]" in text
+    assert "above the ground its formulas are those of circular 617/2009" in first
+    assert "a0* ≥ ag S / q, q = 2   [C8.7.1.2.1.7]" in text
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "a0* ≥ ag S / q" in page
-    assert "before you sign" in page.split("<h2>")[0]
+    assert "circular 617/2009" in page.split("<h2>")[0]
 
 
 def test_a_run_leads_a_mechanism_to_collapse(url, scene, tmp_path):
