@@ -14,9 +14,11 @@ the programme before,
     ‖f_T‖ ≤ μ n̄ + ψ (f_N - n̄),     ψ → 0,
 
 come to forces that meet Coulomb's law and to a mechanism without opening (Gilbert, Casapulla & Ahmed 2006; Portioli
-et al. 2014). Such a λ is a candidate: the stones may fall at less. Which one comes out is decided by forces with which
-stones clamp one another: a small charge on the sum of the normal forces takes them away, and leads to the lowest
-values that are known (docs/decisions/045-limit-loads.md).
+et al. 2014). A small charge on the sum of the normal forces takes away those with which stones clamp one another, and
+one on the squares of f_N - n̄ keeps each programme near the one before, so that the iteration comes to rest. It begins
+twice: from the forces of the bound, and from the least that carry the dead load. In the plane both come to one λ; in
+space the loads may lie apart by a fifth, and Coulomb's law holds at both. The lower is the candidate: the stones may
+fall at less (docs/decisions/045-limit-loads.md, 061-two-candidates.md).
 """
 
 from dataclasses import dataclass, replace
@@ -33,17 +35,18 @@ __all__ = ["Flow", "LimitLoad", "Mechanism", "limit_load", "mechanism"]
 
 # slope of the fictitious strength over that of the programme before, and over the friction in the end [-]
 _FLATTER, _DILATANCY = 0.3, 1e-3
-# share of the new normal forces in those through which the fictitious strength passes, at first: it falls after _FIRST
-# programmes, so that forces that swing come to rest [-]
-_MIXED = 0.5
 # charge on the sum of all normal forces over the weight, in units of λ: a tenth finds states up to 10 % higher [-]
-_CLAMPING = 3e-3
+_CLAMPING = 1e-2
+# charge on the squares of their changes, over their mean and the weight, in units of λ [-]
+_NEARBY = 0.03
+# programmes from the bound without that charge, which come down far, and share of the new normal forces in theirs [-]
+_FAR, _MIXED = 12, 0.5
 # range of λ over so many programmes at which the candidate stands, relative [-]; from which programme on
-_STANDS, _TIMES, _FIRST = 3e-3, 5, 8
-# programmes of a candidate at most
+_STANDS, _TIMES, _FIRST = 2e-3, 5, 8
+# programmes of each beginning at most
 _MOST = 40
 # friction beyond Coulomb's that a candidate may have, over the strength of all contacts [-]
-_BEYOND = 2e-2
+_BEYOND = 1e-2
 # velocity over the largest below which a contact stays closed [-]
 _STILL = 1e-4
 
@@ -86,6 +89,7 @@ class LimitLoad:
     programmes : cone programmes that were solved
     converged : they came to an end: to the tolerance, or as λ and forces of a candidate stood
     beyond : friction beyond Coulomb's law, over the strength of all contacts [-]
+    highest : largest load of a candidate's beginnings that came to an end; of a bound, itself [-]
     """
 
     flow: Flow
@@ -96,6 +100,7 @@ class LimitLoad:
     programmes: int
     converged: bool
     beyond: float
+    highest: float
 
     @property
     def headline(self) -> str:
@@ -132,6 +137,7 @@ def limit_load(
             programmes=1,
             converged=True,
             beyond=_beyond(on, found.force),
+            highest=found.multiplier,
         )
     if flow is Flow.ASSOCIATIVE or not np.isfinite(bound.multiplier):
         return replace(bound, flow=flow)
@@ -160,27 +166,45 @@ def mechanism(on: Assembly, velocity: Array, moving: Array | None = None) -> Mec
 
 
 def _candidate(on: Assembly, programme: Programme, bound: LimitLoad) -> LimitLoad:
-    """Iterate the fictitious strength from the forces of associative friction, its slope falling to almost zero.
+    """Return the lower of the loads to which the iteration comes from the bound, and from the dead load."""
+    least = np.zeros((len(on.contacts), 3))
+    least[:, 0] = 1.0
+    resting = Programme(on, None, bound.load).solve(on.strength, cost=least / len(least))
+    found = [
+        _iterated(on, programme, bound, force, far)
+        for force, far in ((bound.force, _FAR), (resting.force, 0))
+    ]
+    ended = [one for one in found if one.converged] or [one for one in found if np.isfinite(one.multiplier)]
+    if not ended:
+        return found[0]
+    lowest = min(ended, key=lambda one: one.multiplier)
+    programmes = 1 + sum(one.programmes for one in found)
+    return replace(lowest, highest=max(one.multiplier for one in ended), programmes=programmes)
 
-    The strength passes through mixed forces n̄, so that forces that swing between two states come to rest. The
-    mechanism is that of the last strength without the charge on clamping, which would open joints a little.
+
+def _iterated(on: Assembly, programme: Programme, bound: LimitLoad, begin: Array, far: int) -> LimitLoad:
+    """Iterate the fictitious strength from forces (nc, 3), its slope falling to almost zero.
+
+    The first programmes, `far` of them, go as far as they like; what follows stays near the one before.
+
+    The mechanism is that of the last strength without the charges, which would open joints a little.
     """
     own = on.strength
-    slope, held = own.friction, _normal(own, bound.force)
+    slope, held = own.friction, _normal(own, begin)
     multipliers: list[float] = []
     ended = False
     while True:
         slope = np.maximum(_FLATTER * slope, _DILATANCY * own.friction)
         strength = Strength(slope, own.cohesion + (own.friction - slope) * held, own.tension)
-        found = programme.solve(strength, _CLAMPING)
+        free = len(multipliers) < far
+        found = programme.solve(strength, _CLAMPING, near=None if free else held - own.tension, pull=_NEARBY)
         multipliers.append(found.multiplier)
         if not np.isfinite(found.multiplier):
             break
-        share = _MIXED / (1.0 + max(0, len(multipliers) - _FIRST) / _FIRST)
-        held += share * (_normal(own, found.force) - held)
+        held = held + (_MIXED if free else 1.0) * (_normal(own, found.force) - held)
         stands = np.ptp(multipliers[-_TIMES:]) <= _STANDS * abs(found.multiplier)
         near = _beyond(on, found.force) <= _BEYOND
-        ended = len(multipliers) > _FIRST and bool(stands) and near
+        ended = len(multipliers) > max(_FIRST, far + 1) and bool(stands) and near
         if ended or len(multipliers) == _MOST:
             break
     moving: Answer = programme.solve(strength)
@@ -190,9 +214,10 @@ def _candidate(on: Assembly, programme: Programme, bound: LimitLoad) -> LimitLoa
         multiplier=found.multiplier,
         force=found.force,
         mechanism=mechanism(on, moving.velocity),
-        programmes=len(multipliers) + 2,
+        programmes=len(multipliers) + 1,
         converged=ended,
         beyond=_beyond(on, found.force),
+        highest=found.multiplier,
     )
 
 

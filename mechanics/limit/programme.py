@@ -1,8 +1,9 @@
 """The cone programme of an assembly: forces within the strength of the joints that balance the loads.
 
-    minimise  c·f - λ   over   H f + p + λ q = 0,   λ ≥ 0,   ‖f_T‖ ≤ μ (f_N + s) + k,   f_N + s ≥ 0
+    minimise  c·f - λ + ρ/2 Σ (f_N - n̄)²   over   H f + p + λ q = 0,   λ ≥ 0,   ‖f_T‖ ≤ μ (f_N + s) + k,   f_N + s ≥ 0
 
-without λ where there is no live load q; and, where stones crush, the stress blocks of `mechanics.limit.joints`.
+without λ where there is no live load q, without ρ where no normal forces n̄ are given; and, where stones crush, the
+stress blocks of `mechanics.limit.joints`.
 """
 
 from dataclasses import dataclass, replace
@@ -23,6 +24,8 @@ __all__ = ["Answer", "Ending", "Programme"]
 _SMOOTH = 1e-9
 # tolerances asked of Clarabel [-]
 _GAP, _FEASIBLE = 1e-9, 1e-9
+# those of a programme that is one of many on the way
+_ROUGH = 1e-7
 
 
 # statuses of Clarabel
@@ -108,13 +111,22 @@ class Programme:
         self._balance = csc_array(balance)
         self._weight = max(on.weight, float(np.abs(load).sum()))
 
-    def solve(self, strength: Strength, clamping: float = 0.0, cost: Array | None = None) -> Answer:
+    def solve(
+        self,
+        strength: Strength,
+        clamping: float = 0.0,
+        cost: Array | None = None,
+        near: Array | None = None,
+        pull: float = 0.0,
+    ) -> Answer:
         """Return the answer for a strength of the contacts.
 
         Parameters
         ----------
         clamping : charge on the sum of all normal forces over the weight, in units of λ
         cost : (nc, 3) c of the forces [-]
+        near : (nc,) normal forces near which the new ones stay; the answer is then one of many on a way, and rough [N]
+        pull : charge on the squares of how far they are from these, over their mean and the weight, in units of λ
 
         Raises
         ------
@@ -127,8 +139,14 @@ class Programme:
         objective = np.zeros(count + int(live))
         objective[count:] = -1.0
         objective[:count] += 0.0 if cost is None else cost.ravel()
-        objective[:count:3] += clamping * self._live_unit * self._unit / self._weight
-        status, x, z = self._solved(cones, self._balance, "zero", -self._dead, objective)
+        charge = self._live_unit * self._unit / self._weight
+        objective[:count:3] += clamping * charge
+        squares = np.zeros(len(objective))
+        if near is not None:
+            held = near / self._unit
+            squares[:count:3] = pull * charge / (float(np.abs(held).mean()) or 1.0)
+            objective[:count:3] -= squares[:count:3] * held
+        status, x, z = self._solved(cones, self._balance, "zero", -self._dead, objective, squares)
         velocity, none = (self._row * z[: len(self._row)]).reshape(-1, 6), np.zeros((count // 3, 3))
         if status in _ENDLESS:
             return Answer(Ending.ENDLESS, float("inf"), none, np.zeros_like(velocity))
@@ -169,17 +187,25 @@ class Programme:
         return Answer(Ending.FOUND, float(x[-1]), self._unit * x[:-1].reshape(-1, 3), velocity)
 
     def _solved(
-        self, cones: "_Cones", balance: "csc_array[np.float64]", kind: str, right: Array, objective: Array
+        self,
+        cones: "_Cones",
+        balance: "csc_array[np.float64]",
+        kind: str,
+        right: Array,
+        objective: Array,
+        squares: Array | None = None,
     ) -> tuple[str, Array, Array]:
         """Return status, unknowns and dual variables; the rows of the balance come first."""
         clarabel = load_clarabel("limit load", "pip install clarabel")
         first = clarabel.ZeroConeT if kind == "zero" else clarabel.NonnegativeConeT
         settings = clarabel.DefaultSettings()
         settings.verbose, settings.max_threads = False, 1
-        settings.tol_gap_abs = settings.tol_gap_rel = _GAP
-        settings.tol_feas = _FEASIBLE
+        quadratic = csc_array(diags_array(np.zeros(len(objective)) if squares is None else squares))
+        rough = squares is not None and bool(squares.any())
+        settings.tol_gap_abs = settings.tol_gap_rel = _ROUGH if rough else _GAP
+        settings.tol_feas = _ROUGH if rough else _FEASIBLE
         answer = clarabel.DefaultSolver(
-            csc_array((len(objective), len(objective))),
+            quadratic,
             objective,
             csc_array(vstack([balance, -cones.rows])),
             np.concatenate([right, cones.bound]),

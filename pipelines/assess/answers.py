@@ -27,6 +27,7 @@ FALLS = "falls under its own weight"
 """Outcome of what does not stand at all."""
 
 _DROP = 0.8  # share of the peak of a capacity curve at which the way counts as ultimate [-]
+_ONE = 1.03  # highest over lowest candidate up to which they are one [-]
 _MOVES = 0.01  # speed over that of the fastest stone from which a stone belongs to a mechanism [-]
 
 Confirm = Callable[[LiveLoad, float], Confirmation] | None
@@ -104,6 +105,7 @@ def _load(on: Assembly, question: LoadQuestion, confirming: Confirm, leading: Le
         "bound_kind": "associative friction, rigorous upper bound",
         "candidate": None if candidate is None else _number(candidate.multiplier),
         "candidate_kind": "Coulomb's friction without dilatancy, candidate: the stones may fall at less",
+        "candidate_highest": None if candidate is None else _number(candidate.highest),
         "candidate_converged": None if candidate is None else candidate.converged,
         "outcome": _outcome(bound.multiplier),
     }
@@ -289,6 +291,8 @@ def _sentence(one: dict[str, Any]) -> str:
     if one["candidate"] is None:
         return f"{text}, NO CANDIDATE found"
     stood = "" if one["candidate_converged"] else ", NOT CONVERGED"
+    if one["candidate_highest"] > _ONE * one["candidate"]:
+        stood += f"; other forces of the same friction hold up to {one['candidate_highest']:.4g}"
     angle = f", a tilt of {one['tilt']:.3g}°" if "tilt" in one else ""
     return f"{text}, {one['candidate']:.4g} (candidate{stood}){angle}{_dynamics(one)}{_collapse(one)}{_verdict(one)}"
 

@@ -168,6 +168,22 @@ def test_facades_with_less_friction_bear_less(stones, courses, returns, out):
     assert limit_load(on, Acceleration((0.0, -1.0, 0.0))).multiplier == pytest.approx(out, abs=1e-5)
 
 
+@pytest.mark.parametrize(
+    ("stones", "courses", "friction", "way", "lowest", "highest"),
+    [(4, 6, 0.7, -1.0, 0.473, 0.522), (4, 6, 0.6, -1.0, 0.455, 0.5325), (4, 10, 0.7, -1.0, 0.390, 0.409)],
+)
+def test_states_of_coulomb_friction_lie_apart_in_space(stones, courses, friction, way, lowest, highest):
+    """Both beginnings end in forces that meet Coulomb's law to 1 %; the lower load is the candidate."""
+    on = facade(stones, courses, 2, friction)
+    found = limit_load(on, Acceleration((0.0, way, 0.0)), Flow.COULOMB)
+    assert found.converged
+    assert found.beyond < 0.01
+    assert found.multiplier == pytest.approx(lowest, rel=0.01)
+    assert found.highest == pytest.approx(highest, rel=0.01)
+    left = on.lift @ found.force.ravel() + on.dead + found.multiplier * Acceleration((0.0, way, 0.0))(on)
+    assert np.abs(left).max() < 1e-5 * on.weight
+
+
 @pytest.mark.parametrize(("count", "height", "value"), [(5, 1.0, 0.2), (10, 0.6, 1 / 6)])
 def test_columns_topple_at_their_slenderness(count, height, value):
     """T01."""
