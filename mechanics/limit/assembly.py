@@ -11,6 +11,7 @@ stones whose compressive strength is known may also crush (`mechanics.limit.join
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 
 import numpy as np
 from scipy.sparse import csc_array, csr_array
@@ -105,8 +106,11 @@ class Assembly:
         known = {block.code: body for body, block in enumerate(self.model.scene.blocks)}
         for code in codes:
             if code not in known:
+                near = get_close_matches(code, known, n=3, cutoff=0.4) or sorted(known)[:3]
                 raise SceneError(
-                    f"no such stone: {code!r}", where=where, remedy="give the codes of stones of the scene"
+                    f"no such stone: {code!r}",
+                    where=where,
+                    remedy=f"give the codes of stones of the scene, as {', '.join(near)}",
                 )
         return np.array(sorted(known[code] for code in codes), dtype=np.int64)
 

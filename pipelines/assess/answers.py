@@ -21,7 +21,17 @@ from pipelines.assess.codes.check import check_code
 from pipelines.assess.questions import LoadQuestion, Question, Thickness, ThrustQuestion
 from pipelines.scene.site import Site
 
-__all__ = ["FALLS", "Answer", "CodeOf", "Confirm", "Lead", "answer", "confirmer", "leader"]
+__all__ = [
+    "FALLS",
+    "Answer",
+    "CodeOf",
+    "Confirm",
+    "Lead",
+    "answer",
+    "confirmer",
+    "leader",
+    "refuse_unanswerable",
+]
 
 FALLS = "falls under its own weight"
 """Outcome of what does not stand at all."""
@@ -80,6 +90,22 @@ def answer(
             return _thrust(on, question)
         case Thickness():
             return _thickness(on, question)
+
+
+def refuse_unanswerable(on: Assembly, question: Question) -> None:
+    """Refuse a question about stones that the scene does not have, or that it may not load.
+
+    Raises
+    ------
+    SceneError : the stone is unknown, or fixed where it must be free
+    """
+    match question:
+        case LoadQuestion():
+            question.live(on)
+        case ThrustQuestion():
+            on.rows(question.supports, question.name)
+        case Thickness():
+            pass
 
 
 def confirmer(on: Assembly, runs: int, **listeners: Any) -> Confirm:

@@ -17,7 +17,7 @@ from mechanics.limit.joints import Resultants, resultants
 from mechanics.results.forecast.plan import loose_blocks
 from mechanics.scene.scene import Fidelity
 from moma.errors import MissingLibraryError, UsageError
-from pipelines.assess.answers import FALLS, Answer, CodeOf, answer, confirmer, leader
+from pipelines.assess.answers import FALLS, Answer, CodeOf, answer, confirmer, leader, refuse_unanswerable
 from pipelines.assess.questions import parse_question, scene_questions
 from pipelines.draw.capacity_plot import draw_capacity
 from pipelines.draw.mechanism import draw_mechanisms
@@ -59,6 +59,7 @@ CURVE_COLUMNS = ("displacement", "multiplier", "inertia")
 REPORT = "report.html"
 """Page for people."""
 
+_SOUND_FIRST = "limit loads need sound joints: mend the scene until `moma check` finds nothing"
 _RUNS = 6  # by which a candidate is confirmed, at most
 
 
@@ -124,7 +125,9 @@ def assess(
         assembled = assemble_stones(scene, models, groups)
     questions = asked or scene_questions(scene, groups, assembled.origin)
     on = assembly(assembled.scene)
-    refuse_unsound(problems_of(scene, assembled, loose_blocks(on.model, on.state)), str(path))
+    refuse_unsound(problems_of(scene, assembled, loose_blocks(on.model, on.state)), str(path), _SOUND_FIRST)
+    for question in questions:
+        refuse_unanswerable(on, question)
     confirming = confirmer(on, _RUNS, progress=progress) if confirm else None
     leading = leader(on, progress=progress) if pushover else None
     answers: list[Answer] = []

@@ -38,8 +38,11 @@ def caution_of(problems: Sequence[str]) -> str:
     return f"run although the scene is unsound: {_facts(problems)}"
 
 
-def refuse_unsound(problems: Sequence[str], where: str) -> None:
-    """Refuse to run a scene that has problems.
+_ALL_THE_SAME = "or run it all the same with --accept-unsound, which marks all its results"
+
+
+def refuse_unsound(problems: Sequence[str], where: str, remedy: str = _ALL_THE_SAME) -> None:
+    """Refuse a scene that has problems.
 
     Raises
     ------
@@ -50,7 +53,7 @@ def refuse_unsound(problems: Sequence[str], where: str) -> None:
         raise UnsoundSceneError(
             f"the scene is unsound: {'; '.join(listed)}",
             where=where,
-            remedy="or run it all the same with --accept-unsound, which marks all its results",
+            remedy=remedy,
         )
 
 

@@ -82,11 +82,23 @@ def test_words_that_are_no_load_are_refused(url, scene, tmp_path, words):
     assert not (tmp_path / "out").exists()
 
 
-def test_a_force_on_a_fixed_stone_is_refused(url, scene, tmp_path):
+def test_all_questions_are_looked_at_before_the_first_is_answered(url, scene, tmp_path, monkeypatch):
+    monkeypatch.setattr("pipelines.assess.assess.answer", lambda *_: pytest.fail("a question was answered"))
+    loads = ["--load", "horizontal y", "--load", "force W91-01 0 0 -1"]
+    said = fails(2, "assess", scene, "--db", url, "--out", tmp_path / "out", *loads)
+    assert "no such stone: 'W91-01'; give the codes of stones of the scene, as W01-01" in said
+    assert not (tmp_path / "out").exists()
+
+
+def test_forces_on_fixed_stones_and_unsound_scenes_are_refused(url, scene, tmp_path):
     said = fails(2, "assess", scene, "--db", url, "--out", tmp_path / "out", "--load", "force W01-01 1 0 0")
     assert "fixed" in said
     said = fails(2, "assess", scene, "--db", url, "--out", tmp_path / "out", "--load", "force K99 1 0 0")
     assert "no such stone" in said
+    scene.write_text(TWO_COURSES.replace("2350.0", "2.35"), encoding="utf-8")
+    said = fails(1, "assess", scene, "--db", url, "--out", tmp_path / "out")
+    assert "moma check" in said
+    assert "--accept-unsound" not in said
 
 
 def test_results_of_a_run_are_not_replaced(url, scene, tmp_path):
