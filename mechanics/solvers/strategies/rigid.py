@@ -74,7 +74,6 @@ _SLOW = 1e-2
 _LOOSEST, _LOOSEST_MAP = 0.025, 1e-2
 # velocity tolerance from which a step begins where the last one ended, with extrapolations at once [-]
 _LOOSE = 1e-3
-_LOOSE_STAGES = (Stage(0.1, 150, extrapolated=True), Stage(0.2, 450, extrapolated=True))
 # measures of the residual over their tolerances, up to which forces of the last step are balanced again [-]
 _NEAR = 30.0
 _BALANCING = (Stage(1e-3, 20, extrapolated=True),)
@@ -100,6 +99,8 @@ _TURNS = (
     replace(_SORTED, iterations=80),
     *(50 * (_DRIFTED, _SORTED)),
 )
+# of few bodies: most walls need one penalty, in some 40 iterations; what wedges needs the turns
+_LOOSE_STAGES = (Stage(0.1, 80, extrapolated=True), *_TURNS)
 # and the one with which the forces of rest are found from nothing: it goes as far as methods for rest do, so that the
 # next steps need none
 _COLD_STAGES = (Stage(1e-3, 300, extrapolated=False),)
