@@ -43,6 +43,8 @@ _NEARBY = 0.03
 _FAR, _MIXED = 12, 0.5
 # range of λ over so many programmes at which the candidate stands, relative [-]; from which programme on
 _STANDS, _TIMES, _FIRST = 2e-3, 5, 8
+# programmes in a row at a load that is known, and range about it, after which a beginning ends [-]
+_AGAIN, _SAME = 5, 1e-2
 # programmes of each beginning at most
 _MOST = 40
 # friction beyond Coulomb's that a candidate may have, over the strength of all contacts [-]
@@ -170,10 +172,9 @@ def _candidate(on: Assembly, programme: Programme, bound: LimitLoad) -> LimitLoa
     least = np.zeros((len(on.contacts), 3))
     least[:, 0] = 1.0
     resting = Programme(on, None, bound.load).solve(on.strength, cost=least / len(least))
-    found = [
-        _iterated(on, programme, bound, force, far)
-        for force, far in ((bound.force, _FAR), (resting.force, 0))
-    ]
+    first = _iterated(on, programme, bound, bound.force, _FAR)
+    known = first.multiplier if first.converged else None
+    found = [first, _iterated(on, programme, bound, resting.force, 0, known)]
     ended = [one for one in found if one.converged] or [one for one in found if np.isfinite(one.multiplier)]
     if not ended:
         return found[0]
@@ -182,10 +183,13 @@ def _candidate(on: Assembly, programme: Programme, bound: LimitLoad) -> LimitLoa
     return replace(lowest, highest=max(one.multiplier for one in ended), programmes=programmes)
 
 
-def _iterated(on: Assembly, programme: Programme, bound: LimitLoad, begin: Array, far: int) -> LimitLoad:
+def _iterated(
+    on: Assembly, programme: Programme, bound: LimitLoad, begin: Array, far: int, known: float | None = None
+) -> LimitLoad:
     """Iterate the fictitious strength from forces (nc, 3), its slope falling to almost zero.
 
-    The first programmes, `far` of them, go as far as they like; what follows stays near the one before.
+    The first programmes, `far` of them, go as far as they like; what follows stays near the one before. It ends early,
+    without forces that meet the law, where it stays at a load that is `known`.
 
     The mechanism is that of the last strength without the charges, which would open joints a little.
     """
@@ -205,7 +209,9 @@ def _iterated(on: Assembly, programme: Programme, bound: LimitLoad, begin: Array
         stands = np.ptp(multipliers[-_TIMES:]) <= _STANDS * abs(found.multiplier)
         near = _beyond(on, found.force) <= _BEYOND
         ended = len(multipliers) > max(_FIRST, far + 1) and bool(stands) and near
-        if ended or len(multipliers) == _MOST:
+        last = np.array(multipliers[-_AGAIN:])
+        again = known is not None and len(last) == _AGAIN and np.abs(last - known).max() <= _SAME * known
+        if ended or again or len(multipliers) == _MOST:
             break
     moving: Answer = programme.solve(strength)
     return LimitLoad(
