@@ -161,7 +161,8 @@ def check_code(code: str, site: Site, found: Kinematics, gravity: float = 9.81) 
                     "m",
                 )
             )
-    caution = rules["unchecked"] if upper else ""
+    unchecked = [rules["unchecked"], rules["above"]["unchecked"] if upper else ""]
+    caution = "; ".join(one for one in unchecked if one)
     return CodeCheck(rules["name"], caution, tuple(values), tuple(checks))
 
 

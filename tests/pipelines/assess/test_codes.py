@@ -55,7 +55,8 @@ def test_the_circular_of_2019_has_a_longer_period_and_a_damping_of_8_percent():
     assert nonlinear.article == "C8.7.1.2.1.8"
     assert nonlinear.demand > 1.3 * named(check_code("ntc2008", SITE, overturning()), nonlinear.name).demand
     assert named(found, "linear, at the ground").demand == pytest.approx(0.15 * G / 2.0)
-    assert not found.caution
+    assert "transcription of circular 7/2019" in found.caution
+    assert "above the ground" not in found.caution
 
 
 def test_above_the_ground_both_have_the_formulas_of_2009_and_the_later_says_so():
