@@ -12,7 +12,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from archmodel.arrays import Array, Bools, Ints
-from archmodel.tables.entities import Header, Quoin, RibSegment, Voussoir, kind_of, kinds
+from archmodel.tables.entities import Header, Quoin, RibSegment, Voussoir, WebStone, kind_of, kinds
 from archmodel.tables.relations import RELATIONS
 from moma.errors import UsageError
 
@@ -37,6 +37,7 @@ class RelationSettings:
     bed : a joint whose normal is nearer to the vertical than this is a bed [degrees]
     arch : least slope at which a stone of an arch rests on the next [degrees]
     skewback : least slope at which a stone of an arch rests on one that is none [degrees]
+    web : least slope at which a stone of a web rests on the next, or on a rib [degrees]
     along : two directions nearer to each other than this are one [degrees]
     """
 
@@ -47,6 +48,7 @@ class RelationSettings:
     bed: float = 45.0
     arch: float = 1.0
     skewback: float = 20.0
+    web: float = 5.0
     along: float = 45.0
 
     def __post_init__(self) -> None:
@@ -200,7 +202,10 @@ def _rests(contacts: Contacts, stones: StonesOf, settings: RelationSettings) -> 
     arch = _is_one_of(stones.kinds, Voussoir, RibSegment)
     rise = contacts.normal[:, 2]
     bed = np.abs(rise) >= np.cos(np.radians(settings.bed))
-    within = arch[first] & arch[second] & (np.abs(rise) >= np.sin(np.radians(settings.arch)))
+    web = _is_one_of(stones.kinds, WebStone)
+    shell = (arch | web)[first] & (arch | web)[second] & (web[first] | web[second])
+    least = np.sin(np.radians(np.where(shell, settings.web, settings.arch)))
+    within = (shell | (arch[first] & arch[second])) & (np.abs(rise) >= least)
     upper = np.where(rise > 0.0, arch[first], arch[second])
     lower = np.where(rise > 0.0, arch[second], arch[first])
     foot = upper & ~lower & (np.abs(rise) >= np.sin(np.radians(settings.skewback)))

@@ -19,8 +19,10 @@
     │   │   ├── Voussoir
     │   │   │   ├── Keystone
     │   │   │   └── Springer
-    │   │   └── RibSegment
-    │   │       └── Boss
+    │   │   ├── RibSegment
+    │   │   │   ├── Boss
+    │   │   │   └── RibSpringer
+    │   │   └── WebStone
     │   ├── ColumnPart
     │   │   ├── ColumnBase (base)
     │   │   ├── Shaft
@@ -71,6 +73,7 @@ __all__ = [
     "Mullion",
     "Quoin",
     "RibSegment",
+    "RibSpringer",
     "Rubble",
     "Shaft",
     "Sill",
@@ -80,6 +83,7 @@ __all__ = [
     "Stretcher",
     "Support",
     "Voussoir",
+    "WebStone",
     "canon_of",
     "definition_of",
     "kind_chain",
@@ -278,6 +282,14 @@ class RibSegment(Ashlar):
 
 class Boss(RibSegment):
     """The rib segment where ribs meet at the crown of a vault."""
+
+
+class RibSpringer(RibSegment):
+    """The lowest stone of the ribs at a corner, bonded into the walls: the tas-de-charge, which bears the webs too."""
+
+
+class WebStone(Ashlar):
+    """An ashlar of the web of a vault, the shell between its ribs, laid in a course."""
 
 
 class ColumnPart(Stone):

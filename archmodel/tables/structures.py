@@ -12,6 +12,8 @@
     ├── Arch
     ├── BarrelVault
     ├── RibVault
+    ├── Rib
+    ├── Web
     ├── Buttress
     ├── Column
     ├── Window
@@ -44,12 +46,14 @@ __all__ = [
     "Crenelation",
     "Door",
     "Machicolation",
+    "Rib",
     "RibVault",
     "Storey",
     "Structure",
     "Tower",
     "Wall",
     "WallFacing",
+    "Web",
     "Window",
     "structure_kind_named",
     "structure_kind_of",
@@ -140,6 +144,14 @@ class BarrelVault(Structure):
 
 class RibVault(Structure):
     """A vault of webs carried by ribs."""
+
+
+class Rib(Structure):
+    """An arch of the skeleton of a rib vault, with a curve of its own."""
+
+
+class Web(Structure):
+    """The shell of a rib vault between its ribs, laid in courses: a cell, or severy."""
 
 
 class Buttress(Structure):

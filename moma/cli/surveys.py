@@ -38,6 +38,7 @@ class SampleName(StrEnum):
     ARCH = "arch"
     CORNER = "corner"
     FACINGS = "facings"
+    RIBVAULT = "ribvault"
     SETTLED = "settled"
     TOWER = "tower"
     TOWER_SMALL = "tower-small"

@@ -1,7 +1,7 @@
 """A synthetic survey with a scene that runs, written into a folder for people to start from."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,8 @@ from mechanics.simulate import simulate
 from mechanics.stones.materials import Material
 from moma.errors import UsageError
 from pipelines.arrays import Array
-from survey.formats.native.writer import write_moma
+from survey.formats.native.writer import write_head, write_moma
+from survey.formats.solids.obj_writer import write_obj
 from survey.synthetic.frame import Movement, RigidMotion
 from survey.synthetic.samples import SAMPLES, Cause, SampleRecipe
 
@@ -59,6 +60,7 @@ stones = ["{code}"]
 displacement = [0.0, 0.0, {height}]
 duration = {duration}
 """
+_HEAD = "head.moma"  # header file of closed solids
 _DURATION = 1.0  # of settlements [s]
 _LONGEST = 3.0  # of their simulation [s]
 
@@ -80,7 +82,7 @@ class WrittenSample:
     ----------
     kind, title : the sample
     stones : their number in the survey
-    files : paths of the survey, its truth, the scene, and what is known besides
+    files : paths of the survey, its truth, the scene, what is known besides, and stones that are closed solids
     commands : that take the survey to the results of the scene, in order
     """
 
@@ -92,7 +94,9 @@ class WrittenSample:
 
 
 def write_sample(kind: str, folder: Path) -> WrittenSample:
-    """Write KIND.moma, truth.json, KIND.toml and for some knowledge.toml into a folder, created if necessary.
+    """Write KIND.moma, truth.json and KIND.toml into a folder, created if necessary.
+
+    Some come with knowledge.toml, and with solids.obj and its head.moma.
 
     Parameters
     ----------
@@ -111,19 +115,26 @@ def write_sample(kind: str, folder: Path) -> WrittenSample:
     sample = recipe.make() if cause is None else cause.sample(_movement(cause))
     survey, scene = folder / f"{kind}.moma", folder / f"{kind}.toml"
     knowledge = folder / "knowledge.toml" if sample.knowledge else None
-    commands = tuple(_commands(recipe, survey, knowledge, scene))
+    solids = folder / "solids.obj" if sample.modelled else None
+    commands = tuple(_commands(recipe, survey, solids, knowledge, scene))
     texts = {folder / "truth.json": sample.truth, scene: _scene(recipe, commands)}
     if knowledge is not None:
         texts[knowledge] = sample.knowledge
-    for path in (survey, *texts):
+    extra = () if solids is None else (solids, solids.with_name(_HEAD))
+    for path in (survey, *texts, *extra):
         if path.exists():
             raise UsageError(f"{path} exists", remedy="name another folder: --out DIR")
     folder.mkdir(parents=True, exist_ok=True)
     write_moma(sample.survey, survey)
     for path, text in texts.items():
         path.write_text(text, encoding="utf-8", newline="\n")
-    files = tuple(str(path) for path in (survey, *texts))
-    return WrittenSample(kind, recipe.title, len(sample.survey.blocks), files, commands)
+    if solids is not None:
+        write_obj(sample.modelled, solids)
+        head = sample.survey.head
+        write_head(replace(head, name=f"{head.name}, closed solids"), solids.with_name(_HEAD))
+    files = tuple(str(path) for path in (survey, *texts, *extra))
+    stones = len(sample.survey.blocks) + len(sample.modelled)
+    return WrittenSample(kind, recipe.title, stones, files, commands)
 
 
 def _scene(recipe: SampleRecipe, commands: Sequence[str]) -> str:
@@ -172,9 +183,13 @@ def _motion(before: Array, after: Array) -> RigidMotion:
     return RigidMotion(rotation, second - rotation @ first)
 
 
-def _commands(recipe: SampleRecipe, survey: Path, knowledge: Path | None, scene: Path) -> Iterator[str]:
+def _commands(
+    recipe: SampleRecipe, survey: Path, solids: Path | None, knowledge: Path | None, scene: Path
+) -> Iterator[str]:
     database = f"--db sqlite:///{survey.with_suffix('.db')}"
     yield f"moma ingest {survey} {database}"
+    if solids is not None:
+        yield f"moma ingest {solids} --format solids --header {solids.with_name(_HEAD)} {database}"
     if knowledge is not None:
         yield f"moma record {knowledge} {database}"
     if recipe.core:

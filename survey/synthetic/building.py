@@ -58,7 +58,7 @@ class Building:
     ----------
     name : a description
     survey : the measurements of a surveyor
-    solids : the true stones, convex, where they are now; in the order of the survey
+    solids : the true stones, convex, where they are now; in the order of the survey, then those that it leaves out
     joints : all true joints, as they were laid
     base : codes of the stones that stand on the ground
     movement : of the stones since their joints were closed
@@ -97,6 +97,7 @@ def measured_building(
     *,
     blunders: int = 0,
     movement: Movement = _NONE,
+    others: Sequence[Solid] = (),
 ) -> Building:
     """Measure a building; sides in contact with another stone are surveyed half a joint inside.
 
@@ -110,15 +111,16 @@ def measured_building(
     rng : random numbers
     blunders : number of points with a gross error
     movement : of the stones since they were laid
+    others : true stones that this survey leaves out, after those of the drafts in the building
     """
-    joints = true_joints([draft.stone.solid for draft in drafts])
+    joints = true_joints([*(draft.stone.solid for draft in drafts), *others])
     touched = {(code, face) for joint in joints for code, face in zip(joint.stones, joint.faces, strict=True)}
     drafts = [_moved(draft, movement.get(draft.stone.plan.code)) for draft in drafts]
     measured = [_measured(draft, touched, rng) for draft in drafts]
     measured = add_blunders(measured, [draft.stone.normal for draft in drafts], blunders, rng)
     rules = tuple(DepthRule(kind, depth, DEPTH_SIGMA, SOURCE) for kind, depth in sorted(depths.items()))
     head = SurveyHead(f"{name} (synthetic)", f"{name}.moma", tuple(stations), depth_rules=rules)
-    solids = tuple(draft.stone.solid for draft in drafts)
+    solids = (*(draft.stone.solid for draft in drafts), *others)
     return Building(
         name, Survey(head, tuple(one.record for one in measured)), solids, joints, tuple(base), movement
     )

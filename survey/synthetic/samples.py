@@ -7,11 +7,12 @@ from types import MappingProxyType
 
 import numpy as np
 
-from survey.records.survey import Survey
+from survey.records.survey import SolidRecord, Survey
 from survey.synthetic.building import Building
 from survey.synthetic.buildings.facings import two_facings
 from survey.synthetic.buildings.openings import Arch
 from survey.synthetic.buildings.quoins import corner
+from survey.synthetic.buildings.ribs import WEBS, rib_vault
 from survey.synthetic.buildings.tower import tower_storey
 from survey.synthetic.buildings.vaults import barrel_vault, semicircular_arch
 from survey.synthetic.buildings.walls import wall
@@ -30,11 +31,13 @@ class Sample:
     survey : as a surveyor would hand it in
     truth : JSON text: the true geometry of every stone
     knowledge : TOML text: what is known besides the geometry; empty if nothing
+    modelled : stones that are not in the survey, as closed solids
     """
 
     survey: Survey
     truth: str
     knowledge: str = ""
+    modelled: tuple[SolidRecord, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -132,8 +135,55 @@ text = "another height of the courses, above one that levels them"
 """
 
 
-def _truth_of(building: Building, settlement: Mapping[str, float] = MappingProxyType({})) -> str:
-    """Return the true stones of a building, one to a line, with what has moved them and how."""
+def _rib_vault() -> Sample:
+    vault = rib_vault()
+    axes = {f"R{rib}": (np.round(vault.rib_axis(rib, 3), 6) + 0.0).tolist() for rib in range(1, 5)}
+    parts = [
+        _PART.format(kind="web", code=web, title=f"Web {web}", stones=f"zone = 'web {web}'", ordered="false")
+        for web in WEBS
+    ]
+    count = vault.shape.segments
+    for code, (up, down) in {"D1": (1, 3), "D2": (2, 4)}.items():
+        row = [f"T{up}", *(f"R{up}-{k:02d}" for k in range(1, count + 1)), "B"]
+        row += [*(f"R{down}-{k:02d}" for k in range(count, 0, -1)), f"T{down}"]
+        title = f"Diagonal rib from T{up} to T{down}"
+        parts.append(
+            _PART.format(kind="rib", code=code, title=title, stones='", "'.join(row), ordered="true")
+        )
+    truth = _truth_of(vault.building, axes=axes)
+    return Sample(vault.building.survey, truth, _VAULT + "".join(parts), vault.modelled)
+
+
+_VAULT = """\
+# What is "known" of the synthetic rib vault besides its geometry; as invented as the vault.
+
+[record]
+author = "synthetic"
+source = "invented for this sample"
+
+[[structure]]
+kind = "rib_vault"
+code = "VAULT"
+title = "Rib vault"
+"""
+
+_PART = """
+[[structure]]
+kind = "{kind}"
+code = "{code}"
+title = "{title}"
+parent = "VAULT"
+stones = ["{stones}"]
+ordered = {ordered}
+"""
+
+
+def _truth_of(
+    building: Building,
+    settlement: Mapping[str, float] = MappingProxyType({}),
+    axes: Mapping[str, object] = MappingProxyType({}),
+) -> str:
+    """Return the true stones of a building, one to a line, with what has moved them and how, and the axes of ribs."""
     stones = [
         {
             "code": solid.code,
@@ -146,7 +196,8 @@ def _truth_of(building: Building, settlement: Mapping[str, float] = MappingProxy
     lines = ",\n".join(json.dumps(stone) for stone in stones)
     about = json.dumps(f"true geometry of the synthetic survey {building.survey.head.path}; metres")
     cause = f'"settlement": {json.dumps(dict(settlement))},\n' if settlement else ""
-    return f'{{\n"about": {about},\n{cause}"stones": [\n{lines}\n]\n}}\n'
+    curves = f'"axes": {json.dumps(dict(axes))},\n' if axes else ""
+    return f'{{\n"about": {about},\n{cause}{curves}"stones": [\n{lines}\n]\n}}\n'
 
 
 def _motion_of(building: Building, code: str) -> dict[str, object]:
@@ -171,6 +222,7 @@ SAMPLES: Mapping[str, SampleRecipe] = MappingProxyType(
             _of(lambda: two_facings(4.0, 8).building),
             core=True,
         ),
+        "ribvault": SampleRecipe("Rib vault", "kind = rib_springer", _rib_vault),
         "settled": SampleRecipe(
             "Wall whose left corner settled", "course = 1", _SETTLED.unmoved, cause=_SETTLED
         ),

@@ -17,7 +17,7 @@ from survey.records.survey import (
     SurveyHead,
 )
 
-__all__ = ["MAGIC", "write_moma"]
+__all__ = ["MAGIC", "write_head", "write_moma"]
 
 MAGIC = "moma-survey 1"
 
@@ -47,6 +47,26 @@ def write_moma(survey: Survey, path: Path) -> None:
         lines = [MAGIC, *_head_lines(survey.head), f"sigma {_number(common)}"]
         for block in survey.blocks:
             lines += ["", *_stone_lines(block, common)]
+    except SurveyError as error:
+        raise error.at(str(path)) from error
+    Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+
+
+def write_head(head: SurveyHead, path: Path) -> None:
+    """Write a header file, for formats without a head of their own.
+
+    Parameters
+    ----------
+    head : of the survey
+    path : the file; it is replaced
+
+    Raises
+    ------
+    SurveyError
+        if a name or source has characters that do not fit on a line, or a number cannot be written
+    """
+    try:
+        lines = [MAGIC, *_head_lines(head)]
     except SurveyError as error:
         raise error.at(str(path)) from error
     Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")

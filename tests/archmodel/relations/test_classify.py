@@ -52,6 +52,10 @@ def leaning(degrees, along=0.0):
         (("voussoir", "ashlar"), 69.0, True),  # a skewback
         (("voussoir", "ashlar"), 71.0, False),
         (("ashlar", "voussoir"), 60.0, False),  # the wall beside the extrados
+        (("web_stone", "rib_segment"), 84.0, True),  # a seat
+        (("web_stone", "web_stone"), 84.0, True),
+        (("web_stone", "web_stone"), 86.0, False),  # a head joint, as measured
+        (("rib_segment", "web_stone"), 86.0, False),
     ],
 )
 def test_the_slope_from_which_a_stone_rests_on_the_next(kinds, degrees, rests):

@@ -35,7 +35,9 @@ def test_a_sample_runs_to_equilibrium(kind, tmp_path, monkeypatch):
     survey = (tmp_path / kind / f"{kind}.moma").read_text(encoding="utf-8")
     assert survey.splitlines()[1].endswith("(synthetic)")
     truth = json.loads((tmp_path / kind / "truth.json").read_text(encoding="utf-8"))
-    assert len(truth["stones"]) == written["stones"] == survey.count("\nstone ")
+    solids = tmp_path / kind / "solids.obj"
+    modelled = solids.read_text(encoding="utf-8").count("o ") if solids.exists() else 0
+    assert len(truth["stones"]) == written["stones"] == survey.count("\nstone ") + modelled
 
 
 def test_nothing_is_overwritten(tmp_path):

@@ -1,0 +1,98 @@
+"""The rib vault: convex stones without gaps, webs that rest on seats square to their thrust, a survey that closes."""
+
+import math
+
+import numpy as np
+import pytest
+
+from moma.errors import GeometryError
+from survey.geometry.solids import planes_of_solid
+from survey.geometry.watertight import check_watertight
+from survey.joints.close import close_joints
+from survey.synthetic.buildings.ribs import RibVault, RibVaultShape, rib_vault
+from tests.survey.unseen.statics import near_pairs, overlap_depth
+
+
+@pytest.fixture(scope="module")
+def vault() -> RibVault:
+    return rib_vault()
+
+
+def test_stones_are_convex_and_do_not_overlap(vault: RibVault) -> None:
+    solids = vault.building.solids
+    for solid in solids:
+        check_watertight(solid, convex=True)
+    # eight-fold symmetry: one rib and the stones beside it stand for all
+    some = [one for one in solids if one.code[0] in "NE" or one.code[:2] in ("T1", "R1", "B")]
+    assert max(overlap_depth(some[i], some[j]) for i, j in near_pairs(some)) < 1e-9
+
+
+def test_each_course_ends_on_a_seat_in_the_plane_of_its_bed(vault: RibVault) -> None:
+    """The first stone of a half course rests on the segment below, or on the springer, square to its thrust."""
+    joints = {frozenset(joint.stones): joint for joint in vault.building.joints}
+    for web, right, left in (("N", 1, 4), ("E", 2, 1), ("S", 3, 2), ("W", 4, 3)):
+        for course, bed in enumerate(vault.shape.beds()[:-1], start=1):
+            for half, rib in (("r", right), ("l", left)):
+                below = f"T{rib}" if course == 1 else f"R{rib}-{course - 1:02d}"
+                codes = [
+                    code
+                    for pair in joints
+                    if below in pair
+                    for code in pair - {below}
+                    if code.startswith(f"{web}{course:02d}{half}")
+                ]
+                seats = [joints[frozenset((below, code))] for code in codes]
+                assert seats, (web, course, half)
+                for seat in seats:
+                    assert abs(seat.normal[2]) == pytest.approx(-bed.along[2], abs=1e-12)
+
+
+def test_ribs_have_an_axis_of_their_own(vault: RibVault) -> None:
+    """An arc of a circle in an upright plane, which runs inside the segments."""
+    shape = vault.shape
+    for rib in range(1, 5):
+        axis = vault.rib_axis(rib, 101)
+        radius = shape.radius - shape.drop + 0.5 * shape.height
+        assert np.linalg.norm(axis - vault.foot, axis=1) == pytest.approx(np.full(101, radius), abs=1e-12)
+        flat = axis[:, :2] - vault.foot[:2]
+        assert np.linalg.matrix_rank(flat, tol=1e-9) == 1
+        planes = [planes_of_solid(one) for one in vault.building.solids if one.code.startswith(f"R{rib}-")]
+        for place in axis[1:-1]:
+            # the arc between two joints rises a centimetre above its chord, in a section of 0.34 m
+            assert any((one[:, :3] @ place <= one[:, 3] + 1e-9).all() for one in planes)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_all_joints_of_the_survey_close(seed: int) -> None:
+    vault = rib_vault(seed=seed)
+    closed = close_joints(vault.blocks())
+    true: dict[frozenset[str], float] = {}
+    found: dict[frozenset[str], float] = {}
+    for joint in vault.building.joints:
+        true[frozenset(joint.stones)] = true.get(frozenset(joint.stones), 0.0) + joint.area
+    for link in closed.report.joints:
+        found[frozenset(link.stones)] = found.get(frozenset(link.stones), 0.0) + link.area
+    assert closed.report.gaps == ()
+    assert closed.report.overlaps == ()
+    assert found.keys() == true.keys()
+    assert sum(found.values()) == pytest.approx(sum(true.values()), rel=0.015)
+    between = [pair for pair in true if len({code[0] in "RTB" for code in pair}) == 2]
+    # of each web: seats under two halves and the crown, ends beside the segments and the boss
+    assert len(between) == 4 * (2 * (2 * vault.shape.segments + 1) + 1)
+    assert sum(found[pair] for pair in between) == pytest.approx(
+        sum(true[pair] for pair in between), rel=0.04
+    )
+
+
+def test_shapes_whose_stones_would_lie_in_each_other_are_refused() -> None:
+    with pytest.raises(GeometryError, match=r"webs 0\.3 m thick meet behind ribs 0\.26 m wide"):
+        rib_vault(RibVaultShape(thickness=0.3))
+    with pytest.raises(GeometryError, match=r"ends 1\.86 m from the axis, the wall is at 2 m"):
+        rib_vault(RibVaultShape(springing=math.radians(62.0), thickness=0.1))
+
+
+def test_a_vault_is_the_same_for_the_same_seed(vault: RibVault) -> None:
+    again, other = rib_vault(), rib_vault(seed=2)
+    for a, b in zip(vault.modelled, again.modelled, strict=True):
+        np.testing.assert_array_equal(a.vertices, b.vertices)
+    assert not np.array_equal(vault.modelled[0].vertices, other.modelled[0].vertices)
