@@ -36,7 +36,7 @@ from survey.synthetic.building import Building, Draft, measured_building, observ
 from survey.synthetic.frame import TrueStone, WallFrame
 from survey.synthetic.modelled import modelled_solid
 
-__all__ = ["RibVault", "RibVaultShape", "rib_vault"]
+__all__ = ["WEBS", "Bed", "RibVault", "RibVaultShape", "rib_vault"]
 
 WEBS = "NESW"
 """Names of the webs, by the walls that they meet."""
