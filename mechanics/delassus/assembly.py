@@ -68,7 +68,19 @@ def mixed_delassus(
     own_part = total - _rigid_share(model, state, contacts, kind) if elastic_scale else total
     scale = float(np.einsum("cii->", own_part) / max(3 * len(contacts), 1))
     threads = model.scene.solver.threads
-    return MixedDelassus(body, kind, jacobian, response, slot, yptr, bptr, block, total, scale, threads)
+    mass = _masses(model.inertia, state)
+    return MixedDelassus(
+        body, kind, jacobian, response, slot, yptr, bptr, block, mass, state.centre, total, scale, threads
+    )
+
+
+def _masses(inertia: RigidInertia, state: State) -> Array:
+    """Return masses and inertias (nb, 6, 6) of the rigid bodies that move, world axes; zero for others."""
+    mass = np.zeros((len(inertia.mass), 6, 6))
+    mass[:, [0, 1, 2], [0, 1, 2]] = inertia.mass[:, None]
+    mass[:, 3:, 3:] = state.rotation @ inertia.inertia @ state.rotation.transpose(0, 2, 1)
+    mass[~inertia.moving] = 0.0
+    return mass
 
 
 def _rigid_share(model: Model, state: State, contacts: Contacts, kind: Ints) -> Array:

@@ -9,7 +9,7 @@ from scipy.sparse import coo_array, csc_array
 from mechanics.arrays import Array, Ints
 from mechanics.delassus.multifrontal import Cliques, Fronts, fronts
 
-__all__ = ["CondensedForm"]
+__all__ = ["CondensedForm", "assembled"]
 
 
 class CondensedForm:
@@ -29,14 +29,7 @@ class CondensedForm:
     @property
     def matrix(self) -> "csc_array[np.float64]":
         """W (3 nc, 3 nc) [1/kg]."""
-        row, column, value = [], [], []
-        for contacts, block in zip(self._cliques.contacts, self._cliques.blocks, strict=True):
-            place = (3 * contacts[:, None] + np.arange(3)).ravel()
-            row.append(np.repeat(place, len(place)))
-            column.append(np.tile(place, len(place)))
-            value.append(block.ravel())
-        index, size = (np.concatenate(row), np.concatenate(column)), 3 * len(self._bodies)
-        return csc_array(coo_array((np.concatenate(value), index), shape=(size, size)))
+        return assembled(self._cliques, len(self._bodies))
 
     @cached_property
     def _fronts(self) -> Fronts:
@@ -57,3 +50,15 @@ class CondensedForm:
             solve = self.shifted(np.tile(sigma * np.eye(3), (len(self._bodies), 1, 1)))
             self._relaxed[sigma] = lambda b: solve(sigma * b)
         return self._relaxed[sigma]
+
+
+def assembled(cliques: Cliques, count: int) -> "csc_array[np.float64]":
+    """Return the sum (3 nc, 3 nc) of the blocks between some of `count` contacts [1/kg]."""
+    row, column, value = [], [], []
+    for contacts, block in zip(cliques.contacts, cliques.blocks, strict=True):
+        place = (3 * contacts[:, None] + np.arange(3)).ravel()
+        row.append(np.repeat(place, len(place)))
+        column.append(np.tile(place, len(place)))
+        value.append(block.ravel())
+    index, size = (np.concatenate(row), np.concatenate(column)), 3 * count
+    return csc_array(coo_array((np.concatenate(value), index), shape=(size, size)))

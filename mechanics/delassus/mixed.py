@@ -8,6 +8,7 @@ import numpy as np
 from mechanics.arrays import Array, Ints
 from mechanics.delassus._kernels.mixed import ELASTIC, NONE, RIGID, Sides, apply_delassus, sweep
 from mechanics.delassus.condensed import CondensedForm
+from mechanics.delassus.mixed_form import MixedForm, MixedPattern
 from mechanics.delassus.multifrontal import Cliques
 from mechanics.problem._kernels import Laws, local_factors
 from mechanics.problem.problem import GaussSeidel, ScaledDelassus
@@ -32,6 +33,8 @@ class MixedDelassus:
     yptr : (nb+1,) where each body's elastic velocities begin (three for each side)
     bptr : (nb+1,) where each body's compliance block begins
     block : flat symmetric compliance blocks of the elastic bodies, between their contact sides [1/kg]
+    mass : (nb, 6, 6) of the rigid bodies that move, world axes; zero for others [kg, kg m²]
+    centre : (nb, 3) of the bodies [m]
     diagonal : (nc, 3, 3) W_αα [1/kg]
     scale : reference against which u is measured over r [1/kg]
     threads : that factorise W
@@ -45,6 +48,8 @@ class MixedDelassus:
     yptr: Ints
     bptr: Ints
     block: Array
+    mass: Array
+    centre: Array
     diagonal: Array
     scale: float
     threads: int = 1
@@ -70,31 +75,23 @@ class MixedDelassus:
         return change
 
     @cached_property
-    def cliques(self) -> Cliques:
-        """W as a sum of dense blocks, one for each body that moves, between its contacts."""
-        contacts, blocks = [], []
-        bodies = self.body.ravel()
-        order = np.argsort(bodies, kind="stable")
-        for b, sides in enumerate(
-            np.split(order, np.cumsum(np.bincount(bodies, minlength=len(self.yptr) - 1))[:-1])
-        ):
-            if not len(sides) or self.kind.ravel()[sides[0]] == NONE:
-                continue
-            sign = np.where(sides % 2 == 0, 1.0, -1.0).repeat(3)
-            if self.kind.ravel()[sides[0]] == ELASTIC:
-                # slots ascend with the sides
-                square = self.block[self.bptr[b] : self.bptr[b + 1]].reshape(len(sign), -1)
-            else:
-                square = self.jacobian.reshape(-1, 3, 6)[sides].reshape(-1, 6)
-                square = square @ self.response.reshape(-1, 6, 3)[sides].transpose(1, 0, 2).reshape(6, -1)
-            contacts.append(sides // 2)
-            blocks.append(sign[:, None] * square * sign)
-        return Cliques(tuple(contacts), tuple(blocks))
-
-    @cached_property
-    def form(self) -> CondensedForm:
+    def form(self) -> CondensedForm | MixedForm:
         """W for methods that factorise."""
-        return CondensedForm(self.body, self.cliques, self.threads)
+        pattern = MixedPattern(self.body, self.kind, self.centre)
+        blocks = [self._signed(own) for own in pattern.elastic]
+        if not len(pattern.moving):
+            cliques = Cliques([own // 2 for own in pattern.elastic], blocks)
+            return CondensedForm(self.body, cliques, self.threads)
+        mass = self.mass[pattern.moving]
+        return MixedForm(pattern, self.jacobian, mass, blocks, self.threads)
+
+    def _signed(self, sides: Ints) -> Array:
+        """Return the compliance (3s, 3s) of a deformable body between its sides, which ascend as their slots do."""
+        sign = np.where(sides % 2 == 0, 1.0, -1.0).repeat(3)
+        b = self.body.ravel()[sides[0]]
+        square = self.block[self.bptr[b] : self.bptr[b + 1]].reshape(len(sign), -1)
+        signed: Array = sign[:, None] * square * sign
+        return signed
 
     def scaled(self, unit: Array) -> ScaledDelassus:
         """Return D W D with the units (nc,) of the contacts on the diagonal of D."""

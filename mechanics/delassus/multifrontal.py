@@ -18,9 +18,10 @@ from scipy.linalg.lapack import dgetrf, dgetrs
 
 from mechanics.arrays import Array, Ints
 from mechanics.delassus._kernels.fronts import Layout, add_into, solve
+from mechanics.delassus.elimination import elimination
 from moma.errors import SolverError
 
-__all__ = ["Cliques", "Factors", "Fronts", "fronts"]
+__all__ = ["Cliques", "Factors", "Fronts", "fronts", "fronts_of_graph"]
 
 
 # columns of a front that one thread takes at a time
@@ -38,7 +39,7 @@ class Cliques:
     Attributes
     ----------
     contacts : of each clique, (m,)
-    blocks : of each clique, symmetric (3m, 3m) [1/kg]
+    blocks : of each clique, (3m, 3m), transposed where it is not symmetric [1/kg]
     """
 
     contacts: Sequence[Ints]
@@ -111,7 +112,7 @@ class _Elimination:
 
     def __init__(self, fronts: Fronts, cliques: Cliques, theta: Array) -> None:
         self._fronts, self._theta = fronts, theta
-        # symmetric, so that those by rows are those by columns
+        # by columns, as they are transposed
         self._blocks = [np.asfortranarray(block.T) for block in cliques.blocks]
         self._updates: dict[int, Array] = {}
         self.factor = np.zeros(fronts.size)
@@ -185,11 +186,30 @@ def fronts(pairs: Ints, cliques: Sequence[Ints]) -> Fronts:
     """Analyse the pattern: `pairs` (nc, 2) bodies of each contact, `cliques` the contacts of each body that moves."""
     _, group = np.unique(np.sort(pairs, axis=1), axis=0, return_inverse=True)
     group = group.ravel()
-    count = int(group.max(initial=-1)) + 1
-    size = np.bincount(group, minlength=count)
+    size = np.bincount(group)
+    around = [np.unique(group[contacts]) for contacts in cliques]
+    return _fronts_in_order(group, cliques, *_least_degree(len(size), size, around))
+
+
+def fronts_of_graph(group: Ints, cliques: Sequence[Ints], place: Array) -> Fronts:
+    """Analyse the pattern of many groups (n,) of unknowns, three each, by their graph and their `place` (ng, 3) [m]."""
+    edges = [np.zeros(0, dtype=np.int64)]
+    for own in cliques:
+        groups = np.unique(group[own])
+        one, other = np.triu_indices(len(groups), 1)
+        edges.append(groups[one] * len(place) + groups[other])
+    key = np.unique(np.concatenate(edges))
+    pairs = np.column_stack([key // len(place), key % len(place)])
+    rank = elimination(pairs, np.arange(len(place)), place)
+    return _fronts_in_order(group, cliques, np.argsort(rank), _left_in_fronts(pairs, rank))
+
+
+def _fronts_in_order(group: Ints, cliques: Sequence[Ints], order: Ints, later: list[list[int]]) -> Fronts:
+    """Lay out the fronts of groups (n,) of unknowns, three each, in an order; `later` as of `_least_degree`."""
+    size = np.bincount(group)
+    count = len(size)
     members = np.split(np.argsort(group, kind="stable"), np.cumsum(size)[:-1])
     around = [np.unique(group[contacts]) for contacts in cliques]
-    order, later = _least_degree(count, size, around)
     order, pivots, later = _merged(order, later, size)
     rank = np.empty(count, dtype=np.int64)
     for f in order:
@@ -293,3 +313,18 @@ def _least_degree(count: int, size: Ints, around: Sequence[Ints]) -> tuple[Ints,
     rank = np.empty(count, dtype=np.int64)
     rank[order] = np.arange(count)
     return order, [sorted(adjacent[g], key=rank.__getitem__) for g in range(count)]
+
+
+def _left_in_fronts(pairs: Ints, rank: Ints) -> list[list[int]]:
+    """Return the groups left in each front, in order; `pairs` (m, 2) of groups couple, `rank` (n,) is their order."""
+    order = np.argsort(rank)
+    first = np.where(rank[pairs[:, 0]] < rank[pairs[:, 1]], 0, 1)
+    left: list[set[int]] = [set() for _ in rank]
+    each = np.arange(len(pairs))
+    for g, h in zip(pairs[each, first].tolist(), rank[pairs[each, 1 - first]].tolist(), strict=True):
+        left[g].add(h)
+    for g in order.tolist():
+        if left[g]:
+            least = min(left[g])
+            left[int(order[least])] |= left[g] - {least}
+    return [order[sorted(ranks)].tolist() if ranks else [] for ranks in left]

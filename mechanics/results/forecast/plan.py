@@ -7,8 +7,9 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from mechanics.arrays import Bools, Ints
-from mechanics.delassus.multifrontal import fronts
+from mechanics.arrays import Array, Bools, Ints
+from mechanics.delassus.mixed import ELASTIC, NONE, RIGID
+from mechanics.delassus.mixed_form import mixed_fronts
 from mechanics.dynamics.contact_search import detector
 from mechanics.model.model import Model, build_model
 from mechanics.scene.scene import Fidelity, Scene
@@ -96,7 +97,7 @@ def plan(scene: Scene) -> Plan:
         memory=_memory(model, contacts.bodies),
         meshes=model.meshes,
         loose=tuple(codes[i] for i in _loose(pairs, model.fixed)),
-        amounts=_amounts(model, contacts.bodies),
+        amounts=_amounts(model, contacts.bodies, start.centre),
     )
 
 
@@ -124,7 +125,7 @@ def _loose(pairs: Ints, fixed: Bools) -> Ints:
     return np.flatnonzero(~np.isin(group, group[fixed]))
 
 
-def _amounts(model: Model, bodies: Ints) -> Amounts:
+def _amounts(model: Model, bodies: Ints, centre: Array) -> Amounts:
     """Return the amounts of a model with contacts between `bodies` (nc, 2)."""
     stones, contacts = len(model.mass), len(bodies)
     if model.rigid_only:
@@ -136,17 +137,15 @@ def _amounts(model: Model, bodies: Ints) -> Amounts:
         distinct += nodes
         condensed += 3.0 * min(touched, int(sides[group.bodies].sum())) * nodes ** (4.0 / 3.0)
         blocks += float(((3.0 * sides[group.bodies]) ** 2).sum())
-    front, factor, flops = _factors(model, bodies)
+    front, factor, flops = _factors(model, bodies, centre)
     nodes = int(model.elastic_stones.start[-1])
     return Amounts(stones, contacts, distinct, nodes, condensed, blocks, front, factor, flops)
 
 
-def _factors(model: Model, bodies: Ints) -> tuple[int, float, float]:
+def _factors(model: Model, bodies: Ints, centre: Array) -> tuple[int, float, float]:
     """Return the number of fronts of W + Θ, the numbers in its factors, and the operations to make them."""
-    order = np.argsort(bodies.ravel(), kind="stable")
-    ends = np.cumsum(np.bincount(bodies.ravel(), minlength=len(model.mass)))[:-1]
-    sides = [own for own, fixed in zip(np.split(order, ends), model.fixed, strict=True) if not fixed]
-    pattern = fronts(bodies, [own // 2 for own in sides if len(own)])
+    kind = np.where(model.fixed[bodies], NONE, np.where(model.elastic[bodies], ELASTIC, RIGID))
+    pattern = mixed_fronts(bodies, kind, centre)
     pivots = pattern.layout.width.astype(float)
     others = np.diff(pattern.layout.dptr) - pivots
     flops = 2.0 / 3.0 * pivots**3 + 2.0 * pivots**2 * others + 2.0 * pivots * others**2

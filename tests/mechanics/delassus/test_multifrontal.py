@@ -4,13 +4,15 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.linalg import lu_solve
+from scipy.linalg import block_diag, lu_solve
 from scipy.linalg.lapack import dgetrs
 from threadpoolctl import ThreadpoolController
 
-from mechanics.delassus import multifrontal
+from mechanics.delassus import elimination, multifrontal
 from mechanics.delassus._kernels.fronts import add_into, solve
 from mechanics.delassus.condensed import CondensedForm
+from mechanics.delassus.mixed import ELASTIC
+from mechanics.delassus.mixed_form import mixed_fronts
 from mechanics.delassus.multifrontal import Cliques, fronts
 from mechanics.scene.scene import Fidelity
 from moma.errors import SolverError
@@ -251,8 +253,13 @@ def test_the_relaxed_form_is_that_of_w_over_sigma_plus_one():
     assert form.relaxed(7.0) is form.relaxed(7.0)
 
 
-def test_w_of_stones_is_the_sum_of_its_cliques():
-    """Fixed, rigid and deformable stones, each with each, some of them candidate here and antagonist there."""
+@pytest.mark.parametrize("many", [1000, 1])
+def test_systems_of_fixed_rigid_and_deformable_stones_are_those_of_w(monkeypatch, many):
+    """Fixed, rigid and deformable stones, each with each, some of them candidate here and antagonist there.
+
+    By least degree, and by dissection.
+    """
+    monkeypatch.setattr(elimination, "_MANY", many)
     stones = (
         ground((-1, -1, -0.4), (2, 2, 0)),
         brick("soft", (0, 0, 0), (0.7, 0.5, 0.4), SOFT, mesh_size=0.5),
@@ -263,15 +270,34 @@ def test_w_of_stones_is_the_sum_of_its_cliques():
     one = posed(scene(*(moved(stone, TURN) for stone in stones)))
     w_hat, transpose = dense_operator(one.model, one.state, one.contacts, one.compliance)
     expected, count = transpose @ w_hat @ transpose.T, len(one.contacts)
-    w = dense(count, one.operator.cliques, np.zeros((count, 3, 3)))
-    assert len(one.operator.cliques.blocks) == 4
-    np.testing.assert_allclose(w, expected, atol=1e-9 * np.abs(expected).max())
+    form = one.operator.form
+    np.testing.assert_allclose(form.matrix.toarray(), expected, atol=1e-9 * np.abs(expected).max())
     rng = np.random.default_rng(0)
-    theta = np.abs(expected).max() * (rng.normal(size=(count, 3, 3)) + 6.0 * np.eye(3))
     b = rng.normal(size=3 * count)
-    x = one.operator.form.shifted(theta)(b)
-    matrix = dense(count, one.operator.cliques, theta)
-    np.testing.assert_allclose(x, np.linalg.solve(matrix, b), atol=1e-9 * np.abs(x).max())
+    for size in (1.0, 1e-6):
+        theta = size * np.abs(expected).max() * (rng.normal(size=(count, 3, 3)) + 6.0 * np.eye(3))
+        x = form.shifted(theta)(b)
+        matrix = expected + block_diag(*theta)
+        # that of the dense system as far as its conditioning allows
+        np.testing.assert_allclose(matrix @ x, b, atol=1e-9)
+    sigma = 0.1 * np.abs(expected).max()
+    x = form.relaxed(sigma)(b)
+    np.testing.assert_allclose(expected @ x / sigma + x, b, atol=1e-9)
+
+
+def test_rigid_stones_have_six_unknowns_whatever_touches_them():
+    """A deformable stone on a column of rigid ones: four contacts a joint, of which one joint is soft."""
+    kinds = [Fidelity.FIXED, *3 * [Fidelity.RIGID], SOFT]
+    stones = (
+        brick(str(k), (0, 0, 0.3 * k), (0.5, 0.4, 0.3 * k + 0.3), kind, mesh_size=0.5)
+        for k, kind in enumerate(kinds)
+    )
+    one = posed(scene(*stones))
+    operator = one.operator
+    own = mixed_fronts(operator.body, operator.kind, operator.centre)
+    soft = int((operator.kind == ELASTIC).any(axis=1).sum())
+    assert own.layout.width.sum() == 3 * soft + 6 * 3
+    assert soft < len(one.contacts)
 
 
 # --- the kernels ---
