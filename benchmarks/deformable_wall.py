@@ -141,7 +141,7 @@ def _run(scene: Scene, steps: int, warm_up: int) -> Row:
         wall.append(time.perf_counter() - started[0])
         cpu.append(time.process_time() - started[1])
         solutions.append(step.solution)
-    support = support_reaction(model, step.contacts, step.force, step.after.time)
+    support = support_reaction(model, step.contacts, step.force, step.kick.load, step.after.time)
     eta = np.array([one.natural_map for one in solutions])
     iterations = np.array([one.iterations for one in solutions])
     balance = imbalance(model, step.after, step.contacts, step.force, step.kick.load)

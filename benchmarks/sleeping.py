@@ -128,7 +128,7 @@ def _run(scene: Scene) -> _Run:
             places.append(step.after.centre)
         observed += time.process_time() - before
     seconds = time.process_time() - begun - observed
-    support = support_reaction(model, step.contacts, step.force, step.after.time)
+    support = support_reaction(model, step.contacts, step.force, step.kick.load, step.after.time)
     return _Run(
         seconds,
         asleep,

@@ -239,7 +239,7 @@ def _result(
     log: _Log, last: Step, verdict: Verdict, rest_time: float, clock: Clock, static: StaticStart | None
 ) -> Result:
     model, observer, energy, history = log.model, log.observer, log.energy, log.history()
-    support = support_reaction(model, last.contacts, last.force, last.after.time)
+    support = support_reaction(model, last.contacts, last.force, last.kick.load, last.after.time)
     with clock("stress"):
         bodies = observer.bodies(last.after, log.balance)
         contacts, joints = observer.contacts_and_joints(last)

@@ -37,7 +37,7 @@ class Errors:
     natural_map : η, largest over the last five steps, in which an equilibrium must last [-]
     penetration : deepest overlap over the smallest block's size, largest of the run [-]
     balance : unbalanced force of a block over its weight, largest over the blocks [-]
-    reaction : |vertical support reaction - weight| over weight [-]
+    reaction : |vertical support reaction - weight and vertical loads| over weight [-]
     energy : energy that no term of the balance explains, over the reference energy, whole run [-]
     unconverged_steps : steps whose solution is above the tolerance of the solver
     """

@@ -35,7 +35,7 @@ QUANTITIES: Mapping[str, str] = {
     "natural_map": "η, how far contacts are from their laws",
     "penetration": "deepest overlap over the smallest stone's size",
     "balance": "unbalanced force of a stone over its weight",
-    "reaction": "vertical reaction of all supports against the weight",
+    "reaction": "vertical reaction of all supports against weight and loads",
     "energy": "energy that no term of the balance explains",
 }
 """Quantities and their meanings. The last five have a true value of zero: they are errors themselves."""

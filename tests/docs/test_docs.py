@@ -42,6 +42,9 @@ def place(tmp_path):
         "[materials", 'where = ["course <= 3"]\n\n[materials', 1
     )
     (sample / "window.toml").write_text(quick, encoding="utf-8")
+    thrust = (ROOT / SCENE).with_name("thrust.toml").read_text(encoding="utf-8")
+    rigid = thrust.replace('default = "deformable"', 'default = "rigid"')
+    (sample / "thrust.toml").write_text(rigid, encoding="utf-8")
     small_geology(tmp_path / "data/samples/geology")
     return tmp_path
 

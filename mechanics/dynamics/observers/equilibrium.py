@@ -31,15 +31,17 @@ class Support:
     ----------
     reaction : contact force of all fixed bodies against gravity [N]
     weight : of all bodies that are not fixed [N]
+    borne : their weight and what other loads press along gravity [N]
     """
 
     reaction: float
     weight: float
+    borne: float
 
     @property
     def error(self) -> float:
-        """|reaction - weight| / weight [-]; zero without weight."""
-        return abs(self.reaction - self.weight) / self.weight if self.weight > 0 else 0.0
+        """|reaction - borne| / weight [-]; zero without weight."""
+        return abs(self.reaction - self.borne) / self.weight if self.weight > 0 else 0.0
 
 
 def imbalance(
@@ -91,13 +93,18 @@ def wrenches(state: State, body: Ints, point: Array, force: Array, count: int) -
     return np.column_stack([np.bincount(body, column, count) for column in wrench.T]).astype(np.float64)
 
 
-def support_reaction(model: Model, contacts: Contacts, force: Array, time: float) -> Support:
-    """Return the sum of the contact forces (nc, 3) [N] of fixed bodies, along -gravity (along z without gravity)."""
+def support_reaction(model: Model, contacts: Contacts, force: Array, load: Array, time: float) -> Support:
+    """Return the sum of the contact forces (nc, 3) [N] of fixed bodies, along -gravity (along z without gravity).
+
+    `load` (nb, 6) are forces and moments on rigid bodies, weight included.
+    """
     gravity = model.gravity(time)
     g = float(np.linalg.norm(gravity))
     up = -gravity / g if g > 0 else np.array([0.0, 0.0, 1.0])
     sign = model.fixed[contacts.bodies[:, 1]].astype(float) - model.fixed[contacts.bodies[:, 0]]
-    return Support(float(sign @ (force @ up)), float(model.mass[~model.fixed].sum() * g))
+    weight = model.mass * g
+    borne = np.where(model.elastic, weight, -load[:, :3] @ up)
+    return Support(float(sign @ (force @ up)), *(float(one[~model.fixed].sum()) for one in (weight, borne)))
 
 
 def settlement(model: Model, start: State, state: State) -> Array:

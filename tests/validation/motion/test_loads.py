@@ -80,6 +80,13 @@ def test_two_springers_part_by_the_distance():
     assert result.errors.reaction < 1e-6
 
 
+def test_supports_bear_the_weight_and_what_presses_on_it():
+    down = StoneForce(BLOCK, History.constant((0.0, 0.0, -500.0)))
+    result = simulate(scene(ground(), low_block(), loads=Loads(forces=(down,)), theta=1.0, step=0.01))
+    assert result.reaction == pytest.approx(result.weight + 500.0, rel=1e-6)
+    assert result.errors.reaction < 1e-6
+
+
 def slides_at(simulation, angle, steps):
     """The angle [°] at which the block has moved by 0.1 mm along the table."""
     for _ in range(steps):
