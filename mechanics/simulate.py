@@ -1,32 +1,31 @@
-"""Run a scene from its start to its outcome, with its history and error measures."""
+"""Run a scene, or a building in stages, from its start to its outcome, with its history and error measures."""
 
-from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import fields
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
-from mechanics.arrays import Array
-from mechanics.carried import Carried, Carrier, Checkpointing, Rows
-from mechanics.dynamics.energy_balance import EnergyBalance
-from mechanics.dynamics.observers.energy import kinetic_energy
-from mechanics.dynamics.observers.equilibrium import settlement, speed, support_reaction
+from mechanics.carried import Carried, Carrier, Checkpointing
+from mechanics.dynamics.handover import Beginning, Handover, of_run
 from mechanics.dynamics.outcome import Outcome, StaticStart
 from mechanics.dynamics.progress import Clock, Listener, Progress, silent
 from mechanics.dynamics.simulation import Simulation
 from mechanics.dynamics.static_start import static_start
 from mechanics.dynamics.step import Step
-from mechanics.dynamics.stopping import LASTING, Verdict, Watch, balance_of, lasts
+from mechanics.dynamics.stopping import LASTING, Watch, lasts
+from mechanics.dynamics.warm_start import Memory
 from mechanics.model.model import Model, build_model
-from mechanics.results.peaks import PeakTracker
-from mechanics.results.postprocess import Observer
-from mechanics.results.result import BodyResult, Energies, Errors, Frame, History, Result
-from mechanics.scene.scene import Scene, Start
+from mechanics.results.log import Log, result_of, stage_result
+from mechanics.results.result import BodyResult, Frame, Result
+from mechanics.results.stages import StageResult
+from mechanics.scene.laws.law import REST
+from mechanics.scene.scene import Fidelity, Scene, Start
+from mechanics.scene.stages import Stage, check_stages, whole_scene
 from mechanics.scene.state import State
 
-__all__ = ["Archive", "simulate"]
+__all__ = ["Archive", "simulate", "simulate_stages"]
 
 
 class Archive(Checkpointing, Protocol):
@@ -76,35 +75,70 @@ def simulate(
     """
     # dense products of stones are small, and those of several threads would not be the same to the last bit
     with ThreadpoolController().limit(limits=1, user_api="blas"):
-        return _simulate(scene, progress, stop, built, archive)
+        clock = Clock()
+        if built is None:
+            with clock("mesh"):
+                built = build_model(scene, lambda done, total: progress(Progress("mesh", done, total)))
+        return _simulate(built[0], of_run(built[1]), clock, progress, stop, archive)[0]
+
+
+def simulate_stages(
+    stages: Sequence[Stage],
+    progress: Listener = silent,
+    stop: Callable[[], bool] = lambda: False,
+    whole: tuple[Model, State] | None = None,
+    archive: Archive | None = None,
+) -> Result:
+    """Build in stages, each run until it rests; return the result of the last, or of the first that does not rest.
+
+    A stage begins at rest where the one before has ended, with its contact forces, internal variables and broken bonds.
+    Stones that are new are laid where they are drawn. Where those on which they are laid have moved, mortar fills the
+    gap, and what is in the way is cut off. Loads and motions of supports are those of the stage, and begin with it.
+    A stage that does not come to equilibrium is the last.
+
+    Parameters
+    ----------
+    stages : of building, in their order
+    progress, stop, archive : as `simulate` takes them
+    whole : what `build_model` made of `whole_scene(stages)`, if it is known
+
+    Raises
+    ------
+    SceneError, GeometryError, MeshError, SolverError : as `simulate`
+    """
+    check_stages(stages)
+    with ThreadpoolController().limit(limits=1, user_api="blas"):
+        if whole is None and any(one.fidelity is Fidelity.DEFORMABLE for one in whole_scene(stages).blocks):
+            whole = build_model(
+                whole_scene(stages), lambda done, total: progress(Progress("mesh", done, total))
+            )
+        return _Building(stages, whole, archive).built(progress, stop)
 
 
 def _simulate(
-    scene: Scene,
+    model: Model,
+    begin: Beginning,
+    clock: Clock,
     report: Listener,
     stop: Callable[[], bool],
-    built: tuple[Model, State] | None,
     archive: Archive | None,
-) -> Result:
-    clock, settings = Clock(), scene.time
-    if built is None:
-        with clock("mesh"):
-            built = build_model(scene, lambda done, total: report(Progress("mesh", done, total)))
-    model, start = built
+) -> tuple[Result, "_Run"]:
+    scene, settings = model.scene, model.scene.time
     earlier = None if archive is None else archive.earlier()
-    run = _Run(model, start, clock)
+    run = _Run(model, begin, clock)
     if earlier is not None:
         run.restore(earlier)
-    elif settings.start == Start.EQUILIBRIUM:
+    elif settings.start == Start.EQUILIBRIUM and begin.memory is None:
         run.begin_in_equilibrium(report)
     log, watch = run.log, run.watch
     if archive is not None:
-        archive.begin(log.observer.bodies(start, np.zeros(len(model.mass))), log.frames)
-    total = max(1, round(settings.duration / settings.step))
+        archive.begin(log.observer.bodies(begin.state, np.zeros(len(model.mass))), log.frames)
+    total = _steps(scene)
     report(Progress("step", run.steps, total))
     for count in range(run.steps + 1, total + 1):
         run.steps = count
         step = run.simulation.step()
+        run.bed = run.bed if count > 1 else _thickest(step, begin)
         with clock("observe"):
             balance = log(step)
             outcome = watch(step, balance)
@@ -132,10 +166,10 @@ def _simulate(
         if last:
             break
     verdict = watch.verdict(outcome, step.after, run.static)
-    return _result(log, step, verdict, watch.rest_time, clock, run.static)
+    return result_of(log, step, verdict, watch.rest_time, clock, run.static), run
 
 
-def _keep_frame(log: "_Log", step: Step, clock: Clock, archive: Archive | None) -> None:
+def _keep_frame(log: "Log", step: Step, clock: Clock, archive: Archive | None) -> None:
     with clock("stress"):
         log.frames.append(log.observer.frame(step))
         if archive is not None:
@@ -145,14 +179,14 @@ def _keep_frame(log: "_Log", step: Step, clock: Clock, archive: Archive | None) 
 class _Run(Carrier):
     """A run in progress: the simulation, and what is known of its steps so far."""
 
-    CARRIED = ("log", "static", "steps", "watch")
+    CARRIED = ("bed", "log", "static", "steps", "watch")
     REBUILT = ("clock", "simulation")
 
-    def __init__(self, model: Model, start: State, clock: Clock) -> None:
-        self.clock, self.steps = clock, 0
+    def __init__(self, model: Model, begin: Beginning, clock: Clock) -> None:
+        self.clock, self.steps, self.bed = clock, 0, 0.0
         self.static: StaticStart | None = None
-        self.simulation = Simulation(model, start, clock)
-        self.log, self.watch = _Log(model, start, start), Watch(model, start)
+        self.simulation = Simulation(model, begin, clock)
+        self.log, self.watch = Log(model, begin.drawn, begin.state), Watch(model, begin.state)
 
     def begin_in_equilibrium(self, report: Listener) -> None:
         """Begin where all stones bear the loads of the first instant, if there is such a state."""
@@ -162,7 +196,7 @@ class _Run(Carrier):
             self.static, search = static_start(simulation.model, simulation.start, report)
         if self.static.found:
             simulation.take_over(search)
-            self.log = _Log(simulation.model, simulation.start, simulation.state)
+            self.log = Log(simulation.model, simulation.start, simulation.state)
 
     def carried(self) -> dict[str, Any]:
         """Return what a resumed run must know."""
@@ -177,100 +211,145 @@ class _Run(Carrier):
             self.clock.seconds[stage] = self.clock.seconds.get(stage, 0.0) + seconds
 
 
-class _Log(Carrier):
-    """Record of a run: what the observers find in each step, and its frames."""
+def _thickest(step: Step, begin: Beginning) -> float:
+    """Return the bed between standing and new stones that differs most from the drawing [m]."""
+    bodies = step.contacts.bodies
+    joined = begin.standing[bodies[:, 0]] != begin.standing[bodies[:, 1]]
+    beds = step.internal[joined, REST]
+    return float(beds[np.abs(beds).argmax()]) if len(beds) else 0.0
 
-    CARRIED = ("_rows", "balance", "energy", "frames", "observer", "peaks", "solvers", "unconverged")
-    REBUILT = ("_start", "model")
 
-    def __init__(self, model: Model, start: State, first: State) -> None:
-        self.model, self._start = model, start
-        self.observer = Observer(model, start)
-        self.frames = Rows([self.observer.first_frame(first)])
-        self.peaks = PeakTracker(model, start)
-        self.balance = np.zeros(len(model.mass))
-        self.energy = EnergyBalance(model, first)
-        self.unconverged = 0
-        self.solvers: Counter[str] = Counter()
-        self._rows: Rows[tuple[float, ...]] = Rows()
+@dataclass
+class _Building:
+    """A building in stages, as far as it is built.
 
-    def restore(self, carried: Carried) -> None:
-        """Take over the record of another run of the same scene."""
-        super().restore(carried)
-        self.solvers = Counter(self.solvers)
-        if self.observer.joints is not None:
-            self.peaks.begin(self.observer.joints)
+    Attributes
+    ----------
+    stages, whole : as `simulate_stages` takes them
+    archive : of the run; None: nothing is kept
+    ends : of the stages so far
+    seconds : wall seconds by stage of the work
+    """
 
-    def __call__(self, step: Step) -> Array:
-        """Account for one step, and return the imbalance of each body (nb,)."""
-        model, solution = self.model, step.solution
-        if not self._rows:
-            self.peaks.begin(self.observer.begin(step))
-        self.peaks(step)
-        self.energy(step)
-        self.unconverged += not solution.converged
-        if solution.why:
-            self.solvers[solution.why] += 1
-        self.balance = balance = balance_of(model, step)
-        self._rows.append(  # in the order of History
-            (
-                step.after.time,
-                kinetic_energy(model, step.after),
-                float(speed(model, step.after).max()),
-                float(balance.max()),
-                solution.natural_map,
-                solution.iterations,
-                len(step.gap),
-                float(np.max(-step.gap, initial=0.0)),
-                float(settlement(model, self._start, step.after)[~model.fixed].max(initial=0.0)),
-            )
+    stages: Sequence[Stage]
+    whole: tuple[Model, State] | None
+    archive: Archive | None
+    ends: tuple[StageResult, ...] = ()
+    before: Handover | None = None
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    def built(self, report: Listener, stop: Callable[[], bool]) -> Result:
+        """Build on, until a stage does not come to rest."""
+        earlier = self._resumed()
+        for number in range(len(self.ends), len(self.stages)):
+            result = self._stage(number, report, stop, earlier)
+            earlier = None
+            if result.outcome is not Outcome.EQUILIBRIUM:
+                break
+        return replace(result, stages=self.ends, cautions=self._cautions(), wall_time=self.seconds)
+
+    def _stage(
+        self, number: int, report: Listener, stop: Callable[[], bool], earlier: Carried | None
+    ) -> Result:
+        stage, clock = self.stages[number], Clock()
+        report(Progress("blocks", 0, None, f"stage {number + 1} of {len(self.stages)}: {stage.name}"))
+        with clock("mesh"):
+            model, drawn = build_model(stage.scene, meshed=self.whole)
+        begin = of_run(drawn) if self.before is None else self.before.to(model, drawn)
+        archive = None if self.archive is None else _StageArchive(self.archive, self, number, earlier)
+        result, run = _simulate(model, begin, clock, report, stop, archive)
+        codes = {block.code for block in stage.scene.blocks}
+        stood = set() if self.before is None else {one.code for one in self.before.model.scene.blocks}
+        end = stage_result(
+            result, stage.name, len(codes - stood), len(stood - codes), self._held(stage), run.bed
         )
-        return balance
+        self.ends = (*self.ends, end)
+        for work, seconds in result.wall_time.items():
+            self.seconds[work] = self.seconds.get(work, 0.0) + seconds
+        self.before = run.simulation.handed_over()
+        return result
 
-    def history(self) -> History:
-        """Return one array for each quantity."""
-        names = (field.name for field in fields(History))
-        columns = dict(zip(names, np.array(self._rows).T, strict=True))
-        counts = {name: columns.pop(name).astype(np.int64) for name in ("iterations", "contacts")}
-        return History(**columns, **counts)
+    def _held(self, stage: Stage) -> int:
+        """Return the number of stones that are fixed in a stage and free in another."""
+        free = {one.code for one in whole_scene(self.stages).blocks if one.fidelity is not Fidelity.FIXED}
+        return sum(one.fidelity is Fidelity.FIXED and one.code in free for one in stage.scene.blocks)
+
+    def _cautions(self) -> tuple[str, ...]:
+        """Return the cautions of the last stage, after what it has left unbuilt; then those of the others."""
+        count, last = len(self.stages), self.ends[-1]
+        left = count - len(self.ends)
+        unbuilt = (f"{left} of {count} stages were not built, as stage {last.name!r} did not come to rest",)
+        earlier = (f"in stage {one.name!r}, {caution}" for one in self.ends[:-1] for caution in one.cautions)
+        return (*(unbuilt if left else ()), *last.cautions, *earlier)
+
+    def carried(self) -> dict[str, Any]:
+        """Return what the next stage must know of those before."""
+        kept = {"ends": self.ends, "seconds": dict(self.seconds)}
+        if self.before is None:
+            return kept
+        return kept | {"state": self.before.state, "memory": self.before.memory.carried()}
+
+    def _resumed(self) -> Carried | None:
+        """Go on where another run of the same stages stood; return what its stage carried, None if it had not begun."""
+        found = None if self.archive is None else self.archive.earlier()
+        if found is None:
+            return None
+        self.ends, self.seconds = tuple(found["ends"]), dict(found["seconds"])
+        number = len(self.ends)
+        if number:
+            model, drawn = build_model(self.stages[number - 1].scene, meshed=self.whole)
+            memory = Memory()
+            memory.restore(found["memory"])
+            self.before = Handover(model, drawn, found["state"], memory)
+        own: Carried | None = found.get(f"run {number}")
+        return own
 
 
-def _result(
-    log: _Log, last: Step, verdict: Verdict, rest_time: float, clock: Clock, static: StaticStart | None
-) -> Result:
-    model, observer, energy, history = log.model, log.observer, log.energy, log.history()
-    support = support_reaction(model, last.contacts, last.force, last.kick.load, last.after.time)
-    with clock("stress"):
-        bodies = observer.bodies(last.after, log.balance)
-        contacts, joints = observer.contacts_and_joints(last)
-    errors = Errors(
-        natural_map=float(history.natural_map[-LASTING:].max()),
-        penetration=float(history.penetration.max()) / float(model.surfaces.size.min()),
-        balance=float(history.balance[-1]),
-        reaction=support.error,
-        energy=energy.error,
-        unconverged_steps=log.unconverged,
-    )
-    return Result(
-        scene=model.scene,
-        outcome=verdict.outcome,
-        steps=len(history.time),
-        time=last.after.time,
-        bodies=bodies,
-        contacts=contacts,
-        joints=joints,
-        errors=errors,
-        energies=Energies(energy.external, energy.contact, energy.scheme),
-        rest_time=rest_time if verdict.outcome is Outcome.EQUILIBRIUM else None,
-        reaction=support.reaction,
-        weight=support.weight,
-        frames=tuple(log.frames),
-        history=history,
-        wall_time=dict(clock.seconds),
-        static=static,
-        solvers=dict(log.solvers.most_common()),
-        reason=verdict.reason,
-        cautions=verdict.cautions,
-        peaks=log.peaks.peaks(log.frames, joints, last.after),
-        series=log.peaks.series(),
-    )
+class _StageArchive:
+    """Archive of one stage, within that of the whole building; frames are kept of the last stage.
+
+    Parameters
+    ----------
+    archive : of the building
+    building : the stages before
+    number : of the stage, from 0
+    run : what the run of the stage carried when it was stopped; None: it begins
+    """
+
+    def __init__(self, archive: Archive, building: _Building, number: int, run: Carried | None) -> None:
+        self._archive, self._before, self._number, self._run = archive, building.carried(), number, run
+        self._shown = number == len(building.stages) - 1
+        longest = max(_steps(stage.scene) for stage in building.stages)
+        every = max(archive.every, 1)
+        # checkpoints are known by their step: those of a stage come after those of the one before
+        self._offset = number * every * -(-longest // every)
+        if number and archive.every and run is None:
+            archive.checkpoint(self._offset, self._before)
+
+    @property
+    def every(self) -> int:
+        """Number of steps between two checkpoints."""
+        return self._archive.every
+
+    def earlier(self) -> Carried | None:
+        """Return what the stage carried."""
+        return self._run
+
+    def checkpoint(self, step: int, carried: Carried) -> None:
+        """Keep what the stage carries, beside the stages before."""
+        # lists that grow have names of their own in each stage
+        self._archive.checkpoint(self._offset + step, self._before | {f"run {self._number}": carried})
+
+    def begin(self, bodies: tuple[BodyResult, ...], frames: Sequence[Frame]) -> None:
+        """Take the stones of the last stage."""
+        if self._shown:
+            self._archive.begin(bodies, frames)
+
+    def frame(self) -> None:
+        """Note that there is a further frame of the last stage."""
+        if self._shown:
+            self._archive.frame()
+
+
+def _steps(scene: Scene) -> int:
+    return max(1, round(scene.time.duration / scene.time.step))

@@ -22,6 +22,7 @@ from mechanics.contact.contacts import Contacts, gaps
 from mechanics.delassus.assembly import local_velocity
 from mechanics.delassus.compliant import CompliantDelassus
 from mechanics.dynamics.contact_search import Detection
+from mechanics.dynamics.handover import Beginning
 from mechanics.dynamics.stepping import Kick
 from mechanics.model.model import Model
 from mechanics.problem.problem import ContactProblem, ContactStart, Delassus, mean_diagonal
@@ -103,14 +104,15 @@ def contact_problem(
     found: Detection,
     free: Kick,
     internal: Array,
-    begin: State | None,
+    begin: Beginning | None,
     joints: JointCompliance = _RIGID,
     last: Array | None = None,
 ) -> tuple[ContactProblem, Approach]:
     """State the problem u = W r̃ + (u_free - W s n), (u, r̃) in the shift and cone of its law, for r̃ = r + s n.
 
-    Stones that overlap as the run begins touch: survey and rounding leave such joints, and nothing moves because of
-    them. The gap of that instant counts as closed from then on, so that only what overlaps deeper later is corrected.
+    Stones that overlap as they meet, when the run or a stage of building begins, touch: survey and rounding leave such
+    joints, and nothing moves because of them. The gap of that instant counts as closed from then on, so that only what
+    overlaps deeper later is corrected. So do the beds of stones that are laid on others which have moved.
 
     Parameters
     ----------
@@ -118,7 +120,7 @@ def contact_problem(
     found : their contacts
     free : velocities without contact impulses
     internal : (nc, STATE) internal variables of the laws
-    begin : the state in which the run begins, in its first step; None in later ones
+    begin : how the run begins, in its first step; None in later ones
     joints : their compliance; the joints of this step are compliant where rigid ones are not to be tried
     last : (nc, 3) r of the last step, zero for new contacts, from which compliant joints go on; None: zero [N s]
 
@@ -132,13 +134,16 @@ def contact_problem(
     motion = local_velocity(contacts, operator, predicted.velocity, predicted.node_velocity)
     size = np.minimum(*model.surfaces.size[contacts.bodies.T])
     if begin is not None:
-        initial = gaps(contacts, begin)
+        initial, meets = gaps(contacts, begin.state), begin.meets(contacts.bodies)
+        closed = begin.closed(initial, gaps(contacts, begin.drawn))
         elastic = model.elastic[contacts.bodies].any(axis=1)
         # a ball dents a meshed face by what the mesh does not see of it
         round_ = model.surfaces.radius[model.surfaces.sptr[:-1]][contacts.bodies].any(axis=1)
-        overlaps = (initial < -_TOUCH * size) & ~(round_ & elastic)
+        kept = meets & (np.abs(closed) > _TOUCH * size) & ~(round_ & elastic)
         internal = internal.copy()
-        internal[:, REST] = np.where(overlaps, initial, internal[:, REST])
+        internal[:, REST] = np.where(kept, closed, internal[:, REST])
+    else:
+        meets = np.zeros(len(gap), dtype=bool)
     approach = Approach(
         gap=gap,
         speed=motion[:, 0],
@@ -150,7 +155,7 @@ def contact_problem(
         theta=time.theta,
         # a compliant joint answers to its overlap; rigid ones between two such steps keep it
         push_out=time.relaxation if joints.value == 0 else not joints.rigid,
-        first=begin is not None,
+        first=meets,
         state=internal,
     )
     before = np.zeros((len(gap), 3)) if last is None else last

@@ -54,8 +54,8 @@ class Detection:
     operator: RigidDelassus | MixedDelassus
 
 
-def detector(model: Model) -> Detector:
-    """Return the contact detector of a scene."""
+def detector(model: Model, bed: float = 0.0) -> Detector:
+    """Return the contact detector of a scene; gaps up to `bed` are watched, whatever the size of the stones [m]."""
     settings = model.scene.contact
     return Detector(
         model.surfaces,
@@ -63,7 +63,7 @@ def detector(model: Model) -> Detector:
         settings.alert_distance,
         settings.points,
         settings.placement,
-        max(law.reach for law in model.laws.laws),
+        max(bed, *(law.reach for law in model.laws.laws)),
         model.scene.solver.threads,
     )
 
@@ -98,6 +98,7 @@ class ContactSearch:
     clock : takes the time of each stage
     every_step : detect whenever asked
     elastic_scale : as `mixed_delassus` takes it
+    bed : as `detector` takes it
     """
 
     def __init__(
@@ -107,8 +108,9 @@ class ContactSearch:
         clock: Clock,
         every_step: bool = False,
         elastic_scale: bool = False,
+        bed: float = 0.0,
     ) -> None:
-        self._detector, self._compliance, self._clock = detector(model), compliance, clock
+        self._detector, self._compliance, self._clock = detector(model, bed), compliance, clock
         self._every_step, self._elastic_scale = every_step, elastic_scale
         self._last: Detection | None = None
 

@@ -10,10 +10,11 @@ from mechanics.arrays import Array, Bools
 from mechanics.carried import Carried, Carrier
 from mechanics.dynamics.contact_problem import JointCompliance, contact_problem, shifted, unshifted
 from mechanics.dynamics.contact_search import ContactSearch, Detection
+from mechanics.dynamics.handover import Beginning, Handover, of_run
 from mechanics.dynamics.observers.energy import kinetic_energy
 from mechanics.dynamics.progress import Clock
-from mechanics.dynamics.relaxation import Relaxation, halted
-from mechanics.dynamics.sleeping import Sleepers
+from mechanics.dynamics.rest.relaxation import Relaxation, halted
+from mechanics.dynamics.rest.sleeping import Sleepers
 from mechanics.dynamics.step import Step
 from mechanics.dynamics.stepping import Kick, advance, compliances, free_kick, kicked, predict
 from mechanics.dynamics.warm_start import Memory
@@ -26,8 +27,8 @@ from moma.errors import SolverError
 
 __all__ = ["Simulation"]
 
-# predicted state, contacts, free motion, internal variables, and the state in which the run begins
-_Given = tuple[State, Detection, Kick, Array, State | None]
+# predicted state, contacts, free motion, internal variables, and how the run begins
+_Given = tuple[State, Detection, Kick, Array, Beginning | None]
 _Solved = tuple[ContactProblem, Approach, ContactSolution]
 
 
@@ -36,7 +37,7 @@ class Simulation(Carrier):
 
     Parameters
     ----------
-    model, start : as `build_model` makes them
+    model, start : as `build_model` makes them, or the beginning of a stage of building
     clock : takes the time of each stage
     solver : of the contact problems; None: that of the scene
     elastic_scale : measure how well they are solved against the elastic part of W alone (`mixed_delassus`)
@@ -49,31 +50,35 @@ class Simulation(Carrier):
     """
 
     CARRIED = ("_first", "_freed", "_joints", "_memory", "_relax", "_sleepers", "cold", "state")
-    REBUILT = ("_compliance", "_detect", "_solvers", "_step", "_theta", "clock", "model", "start")
+    REBUILT = (
+        "_begin", "_compliance", "_detect", "_solvers", "_step", "_theta", "clock", "model", "start",
+    )  # fmt: skip
 
     def __init__(
         self,
         model: Model,
-        start: State,
+        start: State | Beginning,
         clock: Clock | None = None,
         solver: Solver | None = None,
         elastic_scale: bool = False,
         fresh_contacts: bool = False,
     ) -> None:
-        self.model, self.start, self.state, self.clock = model, start, start, clock or Clock()
+        self._begin = begin = of_run(start) if isinstance(start, State) else start
+        self.model, self.start, self.state, self.clock = model, begin.state, begin.state, clock or Clock()
         self._step, self._theta = model.scene.time.step, model.scene.time.theta
         with self.clock("assemble"):
             self._compliance = compliances(model, self._step, self._theta)
-        self._detect = ContactSearch(model, self._compliance, self.clock, fresh_contacts, elastic_scale)
+        bed = begin.bed(model)
+        self._detect = ContactSearch(model, self._compliance, self.clock, fresh_contacts, elastic_scale, bed)
         chosen = choose_solvers(model.scene.solver, not model.rigid_only, model.scene.time, model.laws.sprung)
         self._solvers = chosen if solver is None else Solvers(solver)
         self._joints = JointCompliance()
         self._relax = Relaxation(model)
-        self._memory = Memory(follows=not model.scene.time.relaxation)
-        self._sleepers = Sleepers(model, start, self._memory)
+        self._memory = begin.memory or Memory(follows=not model.scene.time.relaxation)
+        self._sleepers = Sleepers(model, self.start, self._memory)
         self._first = True
         self._freed = False
-        self.cold = True
+        self.cold = begin.memory is None
 
     @property
     def asleep(self) -> Bools:
@@ -102,6 +107,11 @@ class Simulation(Carrier):
         self.cold = other.cold and pace == 1.0
         self._sleepers = Sleepers(self.model, self.state, self._memory)
         self._first = False
+
+    def handed_over(self) -> Handover:
+        """Return what the next stage of building takes over from this one, with all bodies at rest."""
+        self._sleepers.wake_all(self.state)
+        return Handover(self.model, self._begin.drawn, halted(self.state), self._memory)
 
     def released(self) -> "Simulation":
         """Return a simulation that goes on from here, neither halted any more nor knowing a force between rigid stones.
@@ -169,7 +179,7 @@ class Simulation(Carrier):
             with clock("assemble"):
                 warm, internal = self._memory.recall(found.contacts.key, found.place)
                 free = sleepers.hold(free_kick(model, start, predicted, self._compliance, h, theta))
-            given = predicted, found, free, internal, before if self._first else None
+            given = predicted, found, free, internal, self._begin if self._first else None
             problem, approach, solution = self._solved(given, warm)
             with clock("advance"):
                 r = unshifted(problem, solution.impulse)

@@ -7,7 +7,7 @@ from mechanics.arrays import Array
 from mechanics.dynamics.observers.equilibrium import displacement, imbalance
 from mechanics.dynamics.outcome import StaticStart
 from mechanics.dynamics.progress import Progress
-from mechanics.dynamics.relaxation import halted
+from mechanics.dynamics.rest.relaxation import halted
 from mechanics.dynamics.simulation import Simulation
 from mechanics.dynamics.step import Step
 from mechanics.dynamics.stopping import rests

@@ -14,7 +14,7 @@ from mechanics.dynamics.observers.equilibrium import (
     tilt,
 )
 from mechanics.dynamics.outcome import Outcome, StaticStart
-from mechanics.dynamics.relaxation import relaxation_caution
+from mechanics.dynamics.rest.relaxation import relaxation_caution
 from mechanics.dynamics.simulation import Simulation
 from mechanics.dynamics.step import Step
 from mechanics.model.model import Model

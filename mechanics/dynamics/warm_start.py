@@ -1,5 +1,6 @@
 """Warm start: impulses, velocities and internal variables of the contacts that persist from step to step."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -123,6 +124,15 @@ class Memory(Carrier):
         other._key, other._place, other._values = self._key, self._place, self._values.copy()
         other._values[:, :d] *= factor
         other._values[:, d : 2 * d] = 0.0
+        return other
+
+    def renamed(self, names: Callable[[Ints], Ints]) -> "Memory":
+        """Return the memory of the same contacts under other keys; those whose new key is negative are forgotten."""
+        key = names(self._key)
+        kept = np.flatnonzero(key >= 0)
+        other = Memory(self._dimension, self.follows)
+        other._key, other._values = key[kept], self._values[kept]
+        other._place = None if self._place is None else self._place[kept]
         return other
 
 

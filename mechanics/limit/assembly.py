@@ -173,7 +173,7 @@ def _strength(found: Detection) -> Strength:
         step=1.0,
         theta=1.0,
         push_out=False,
-        first=True,
+        first=np.ones(len(contacts), dtype=bool),
         state=np.zeros((len(contacts), STATE)),
     )
     terms = model.laws.terms(found.law, approach)

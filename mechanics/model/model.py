@@ -109,8 +109,14 @@ class Model:
         return slice(int(start[body]), int(start[body + 1]))
 
 
-def build_model(scene: Scene, progress: Callable[[int, int], None] | None = None) -> tuple[Model, State]:
+def build_model(
+    scene: Scene,
+    progress: Callable[[int, int], None] | None = None,
+    meshed: tuple[Model, State] | None = None,
+) -> tuple[Model, State]:
     """Mesh the deformable stones and pack all bodies; return the model and the state at the start of the scene.
+
+    Stones that deform in `meshed`, built before, keep the mesh that they have there.
 
     Raises
     ------
@@ -123,10 +129,11 @@ def build_model(scene: Scene, progress: Callable[[int, int], None] | None = None
     volume, centroid, unit_inertia = _mass_properties(blocks)
     stones: list[Deformable | None] = []
     centres = centroid.copy()
+    known = {} if meshed is None else _known(*meshed)
     workshop = StoneWorkshop(blocks, scene.contact.alert_distance, scene.time.lumped_mass)
     for index, block in enumerate(blocks):
         if block.fidelity is Fidelity.DEFORMABLE:
-            stone, centres[index] = workshop(index)
+            stone, centres[index] = known.get(block.code) or workshop(index)
             stones.append(stone)
         else:
             stones.append(None)
@@ -154,6 +161,15 @@ def build_model(scene: Scene, progress: Callable[[int, int], None] | None = None
     _check_shapes(model)
     _check_loads(model)
     return model, _start(model, centres)
+
+
+def _known(model: Model, start: State) -> dict[str, tuple[Deformable, Array]]:
+    """Return the finite elements and the centre (3,) of the deformable stones of a model, by code."""
+    return {
+        block.code: (stone, start.centre[body])
+        for body, (block, stone) in enumerate(zip(model.scene.blocks, model.stones, strict=True))
+        if stone is not None
+    }
 
 
 def _flight(inertia: RigidInertia, stones: list[Deformable | None]) -> RigidInertia:

@@ -217,7 +217,7 @@ class PlanarSimulation(Carrier):
             step=time.step,
             theta=time.theta,
             push_out=False,
-            first=self._first,
+            first=np.full(len(contacts.gap), self._first),
             state=internal,
         )
         law = self.model.laws.of(contacts.bodies)

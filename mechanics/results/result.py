@@ -7,6 +7,7 @@ from typing import NamedTuple
 from mechanics.arrays import Array, Ints
 from mechanics.dynamics.outcome import Outcome, StaticStart
 from mechanics.results.contact_result import ContactResult, JointResult
+from mechanics.results.stages import StageResult
 from mechanics.results.stress_values import StressValues
 from mechanics.scene.scene import Fidelity, Scene
 from mechanics.stones.meshing.elements import Element
@@ -284,6 +285,7 @@ class Result:
     solvers : number of steps by chosen method and reason, most frequent first
     peaks : largest values of the whole run
     series : motion of the stones of `Scene.series`; None without any
+    stages : of a building in stages, those that were built; all else is of the last one
     """
 
     scene: Scene
@@ -307,3 +309,4 @@ class Result:
     cautions: tuple[str, ...] = ()
     peaks: Peaks | None = None
     series: Series | None = None
+    stages: tuple[StageResult, ...] = ()

@@ -12,6 +12,7 @@ from mechanics.contact.contacts import material_points
 from mechanics.contact.detection import Detector
 from mechanics.dynamics.contact_problem import contact_problem
 from mechanics.dynamics.contact_search import Detection, detection
+from mechanics.dynamics.handover import of_run
 from mechanics.dynamics.stepping import compliances, free_kick
 from mechanics.model.model import Model, build_model
 from mechanics.problem._kernels import local_factors, solve_contact
@@ -247,7 +248,7 @@ def posed(one, step=2e-3, theta=1.0):
     compliance = compliances(model, step, theta)
     found = detection(model, state, contacts, compliance)
     free = free_kick(model, state, state, compliance, step, theta)
-    problem, _ = contact_problem(model, state, found, free, np.zeros((len(contacts), STATE)), state)
+    problem, _ = contact_problem(model, state, found, free, np.zeros((len(contacts), STATE)), of_run(state))
     return Posed(model, state, found, compliance, problem)
 
 

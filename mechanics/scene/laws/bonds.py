@@ -1,4 +1,4 @@
-"""Mortar bonds between stones, made in joints that are closed in the first step."""
+"""Mortar bonds between stones, made in joints that are closed as their stones meet."""
 
 from dataclasses import replace
 
@@ -16,20 +16,22 @@ _FILLED = 1e-2  # largest gap or overlap that mortar fills, over a body's size [
 
 
 def with_bonds(contacts: Approach) -> Approach:
-    """Return the contacts with the bonds that are made in the first step.
+    """Return the contacts with the bonds that are made in the first step of the run, or of a stage of building.
 
-    A bond keeps the gap at the start of the run as REST: that gap counts as closed, even after the bond has broken, as
-    the mortar remains in the joint.
+    A bond keeps the gap of that instant as REST: that gap counts as closed, even after the bond has broken, as the
+    mortar remains in the joint. A bed that mortar makes up (REST above zero before there is a bond) is filled, however
+    wide it is.
     """
-    if not contacts.first:
+    if not contacts.first.any():
         return contacts
     state = contacts.state.copy()
     # the gap before the flight to the predicted configuration
     gap = contacts.gap - contacts.step * (1 - contacts.theta) * contacts.speed
-    closed = (np.abs(gap) <= _FILLED * contacts.size) & (contacts.area > 0)
+    filled = (np.abs(gap) <= _FILLED * contacts.size) | (state[:, REST] > 0)
+    closed = contacts.first & filled & (contacts.area > 0)
     state[closed, BOND] = WHOLE
     state[closed, REST] = gap[closed]
-    return replace(contacts, state=state, first=False)
+    return replace(contacts, state=state, first=np.zeros_like(contacts.first))
 
 
 def bonded(contacts: Approach) -> Bools:

@@ -10,7 +10,7 @@ A new law is one class with the members of `Law`.
 from dataclasses import dataclass
 from typing import Protocol
 
-from mechanics.arrays import Array
+from mechanics.arrays import Array, Bools
 
 __all__ = [
     "BOND",
@@ -47,11 +47,11 @@ class Approach:
     compliance : (n,) W_NN, change of u_N per unit of normal impulse [1/kg]
     step, theta : h [s] and θ; the gap is gap + h θ u_N at the end of the step, and gap + h u_N at the next kick
     push_out : overlaps are pushed out (relaxation) instead of only kept from growing
-    first : first step of the run, in which bonds are made
+    first : (n,) contacts of stones that meet as the run, or a stage of building, begins: bonds are made in them
     state : (n, STATE) internal variables, as the law left them in the last step; zeros for new contacts.
         BOND intact fraction (1 whole, between: damaged, 0 never bonded, -1 broken), SLIDING 1 if it slid in the last
         step, OPENING largest opening so far [m], SLIP path of sliding so far [m], REST gap that counts as closed, where
-        stones overlapped or mortar filled a joint as the run began [m], SPRING three columns, stretch of the springs
+        stones overlapped or mortar filled a joint as they met [m], SPRING three columns, stretch of the springs
         along the joint: what the candidate has moved over the antagonist in them, local frame, zero across it [m]
     """
 
@@ -64,7 +64,7 @@ class Approach:
     step: float
     theta: float
     push_out: bool
-    first: bool
+    first: Bools
     state: Array
 
 

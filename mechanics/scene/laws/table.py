@@ -11,7 +11,7 @@ from mechanics.scene.laws.law import Approach, Law, Springs, Terms
 
 __all__ = ["LawTable", "law_table"]
 
-_PER_CONTACT = ("gap", "speed", "slide", "area", "size", "compliance", "state")
+_PER_CONTACT = ("gap", "speed", "slide", "area", "size", "compliance", "state", "first")
 _NUMBERS = ("bias", "friction", "cohesion", "adhesion")
 
 
@@ -88,5 +88,4 @@ def _some(contacts: Approach, rows: Ints) -> Approach:
         step=contacts.step,
         theta=contacts.theta,
         push_out=contacts.push_out,
-        first=contacts.first,
     )

@@ -12,6 +12,7 @@ from mechanics.delassus.assembly import local_velocity, world_impulse
 from mechanics.delassus.mixed import ELASTIC, NONE, RIGID
 from mechanics.dynamics.contact_problem import contact_problem
 from mechanics.dynamics.contact_search import detection
+from mechanics.dynamics.handover import of_run
 from mechanics.dynamics.stepping import advance, compliances, free_kick, kicked, predict
 from mechanics.model.model import build_model
 from mechanics.scene.laws.law import STATE
@@ -118,7 +119,7 @@ def test_velocity_after_a_step_is_w_r_plus_u_free(step):
     contacts, state = step.contacts, step.state
     free = step.free(state)
     internal = np.zeros((len(contacts), STATE))
-    problem, _ = contact_problem(step.model, state, step.found, free, internal, state)
+    problem, _ = contact_problem(step.model, state, step.found, free, internal, of_run(state))
     r = np.random.default_rng(2).normal(size=(len(contacts), 3))
     kick = step.kick(free, r)
     found = local_velocity(contacts, step.operator, kick.velocity, kick.node_velocity)

@@ -248,7 +248,7 @@ def test_every_attribute_that_changes_is_carried(name, monkeypatch):
             value for key, value in vars(one).items() if isinstance(value, Carrier) and key not in seen
         ]
         carriers = [value for value in carriers if type(value).__name__ not in seen]
-    expected = {"_Run", "_Log", "Watch", "Simulation", "Memory", "Sleepers", "Relaxation", "EnergyBalance"}
+    expected = {"_Run", "Log", "Watch", "Simulation", "Memory", "Sleepers", "Relaxation", "EnergyBalance"}
     assert expected | {"Observer", "PeakTracker"} <= set(seen)
     simulation = made[0].simulation
     for keeper in (simulation._detect, *simulation._compliance):

@@ -70,7 +70,7 @@ def mixed_contacts():
 
 
 def only(contacts, row):
-    names = ("gap", "speed", "area", "size", "compliance", "state")
+    names = ("gap", "speed", "area", "size", "compliance", "state", "first")
     return replace(contacts, **{name: getattr(contacts, name)[row : row + 1] for name in names})
 
 

@@ -81,6 +81,10 @@ class Sleepers(Carrier):
         if not self._supports_rest:
             self._wake(self.asleep, predicted)
 
+    def wake_all(self, state: State) -> None:
+        """Wake all stones; the memory takes up the forces that they kept."""
+        self._wake(self.asleep, state)
+
     def hold(self, free: Kick) -> Kick:
         """Return a free motion in which sleeping stones stay at rest."""
         if not self.asleep.any():

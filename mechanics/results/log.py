@@ -1,0 +1,171 @@
+"""Record of a run, step by step, and the results that it and its stages end in."""
+
+from collections import Counter
+from dataclasses import fields
+
+import numpy as np
+
+from mechanics.arrays import Array
+from mechanics.carried import Carried, Carrier, Rows
+from mechanics.dynamics.energy_balance import EnergyBalance
+from mechanics.dynamics.observers.energy import kinetic_energy
+from mechanics.dynamics.observers.equilibrium import settlement, speed, support_reaction
+from mechanics.dynamics.outcome import Outcome, StaticStart
+from mechanics.dynamics.progress import Clock
+from mechanics.dynamics.step import Step
+from mechanics.dynamics.stopping import LASTING, Verdict, balance_of
+from mechanics.model.model import Model
+from mechanics.results.peaks import PeakTracker
+from mechanics.results.postprocess import Observer
+from mechanics.results.result import Energies, Errors, History, Result
+from mechanics.results.stages import StageResult
+from mechanics.scene.scene import Fidelity
+from mechanics.scene.state import State
+
+__all__ = ["Log", "result_of", "stage_result"]
+
+
+class Log(Carrier):
+    """Record of a run: what the observers find in each step, and its frames.
+
+    Parameters
+    ----------
+    model : the scene
+    start : its stones before they carry load, from where displacements count
+    first : the state in which the run begins
+    """
+
+    CARRIED = ("_rows", "balance", "energy", "frames", "observer", "peaks", "solvers", "unconverged")
+    REBUILT = ("_start", "model")
+
+    def __init__(self, model: Model, start: State, first: State) -> None:
+        self.model, self._start = model, start
+        self.observer = Observer(model, start)
+        self.frames = Rows([self.observer.first_frame(first)])
+        self.peaks = PeakTracker(model, start)
+        self.balance = np.zeros(len(model.mass))
+        self.energy = EnergyBalance(model, first)
+        self.unconverged = 0
+        self.solvers: Counter[str] = Counter()
+        self._rows: Rows[tuple[float, ...]] = Rows()
+
+    def restore(self, carried: Carried) -> None:
+        """Take over the record of another run of the same scene."""
+        super().restore(carried)
+        self.solvers = Counter(self.solvers)
+        if self.observer.joints is not None:
+            self.peaks.begin(self.observer.joints)
+
+    def __call__(self, step: Step) -> Array:
+        """Account for one step, and return the imbalance of each body (nb,)."""
+        model, solution = self.model, step.solution
+        if not self._rows:
+            self.peaks.begin(self.observer.begin(step))
+        self.peaks(step)
+        self.energy(step)
+        self.unconverged += not solution.converged
+        if solution.why:
+            self.solvers[solution.why] += 1
+        self.balance = balance = balance_of(model, step)
+        self._rows.append(  # in the order of History
+            (
+                step.after.time,
+                kinetic_energy(model, step.after),
+                float(speed(model, step.after).max()),
+                float(balance.max()),
+                solution.natural_map,
+                solution.iterations,
+                len(step.gap),
+                float(np.max(-step.gap, initial=0.0)),
+                float(settlement(model, self._start, step.after)[~model.fixed].max(initial=0.0)),
+            )
+        )
+        return balance
+
+    def history(self) -> History:
+        """Return one array for each quantity."""
+        names = (field.name for field in fields(History))
+        columns = dict(zip(names, np.array(self._rows).T, strict=True))
+        counts = {name: columns.pop(name).astype(np.int64) for name in ("iterations", "contacts")}
+        return History(**columns, **counts)
+
+
+def result_of(
+    log: Log, last: Step, verdict: Verdict, rest_time: float, clock: Clock, static: StaticStart | None
+) -> Result:
+    """Return the result of a run from its record, its last step and its verdict."""
+    model, observer, energy, history = log.model, log.observer, log.energy, log.history()
+    support = support_reaction(model, last.contacts, last.force, last.after.time)
+    with clock("stress"):
+        bodies = observer.bodies(last.after, log.balance)
+        contacts, joints = observer.contacts_and_joints(last)
+    errors = Errors(
+        natural_map=float(history.natural_map[-LASTING:].max()),
+        penetration=float(history.penetration.max()) / float(model.surfaces.size.min()),
+        balance=float(history.balance[-1]),
+        reaction=support.error,
+        energy=energy.error,
+        unconverged_steps=log.unconverged,
+    )
+    return Result(
+        scene=model.scene,
+        outcome=verdict.outcome,
+        steps=len(history.time),
+        time=last.after.time,
+        bodies=bodies,
+        contacts=contacts,
+        joints=joints,
+        errors=errors,
+        energies=Energies(energy.external, energy.contact, energy.scheme),
+        rest_time=rest_time if verdict.outcome is Outcome.EQUILIBRIUM else None,
+        reaction=support.reaction,
+        weight=support.weight,
+        frames=tuple(log.frames),
+        history=history,
+        wall_time=dict(clock.seconds),
+        static=static,
+        solvers=dict(log.solvers.most_common()),
+        reason=verdict.reason,
+        cautions=verdict.cautions,
+        peaks=log.peaks.peaks(log.frames, joints, last.after),
+        series=log.peaks.series(),
+    )
+
+
+def stage_result(result: Result, name: str, laid: int, removed: int, held: int, bed: float) -> StageResult:
+    """Return the stage that a result ends, with what `StageResult` says of its stones and its thickest bed."""
+    supports = [body.fidelity is Fidelity.FIXED for body in result.bodies]
+    free = [body for body in result.bodies if body.fidelity is not Fidelity.FIXED]
+    moved = [float(np.linalg.norm(body.displacement, axis=1).max()) for body in free]
+    most = int(np.argmax(moved)) if moved else -1
+    return StageResult(
+        name=name,
+        outcome=str(result.outcome),
+        reason=result.reason,
+        cautions=result.cautions,
+        steps=result.steps,
+        time=result.time,
+        stones=len(result.bodies),
+        laid=laid,
+        removed=removed,
+        held=held,
+        natural_map=result.errors.natural_map,
+        balance=result.errors.balance,
+        reaction_error=result.errors.reaction,
+        weight=result.weight,
+        reaction=result.reaction,
+        displacement=moved[most] if moved else 0.0,
+        moved=free[most].code if moved else "",
+        bed=bed,
+        supports=tuple(body.code for body, one in zip(result.bodies, supports, strict=True) if one),
+        forces=_forces(result)[supports],
+    )
+
+
+def _forces(result: Result) -> Array:
+    """Return the sum (nb, 3) of the forces of each body on the others at the end of a run [N]."""
+    total = np.zeros((len(result.bodies), 3))
+    # forces act on the first stone of a contact
+    for side, sign in ((1, 1.0), (0, -1.0)):
+        np.add.at(total, result.contacts.bodies[:, side], sign * result.contacts.force)
+    return total
