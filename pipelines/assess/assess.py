@@ -30,6 +30,7 @@ from pipelines.run.record import store_record, versions
 from pipelines.run.soundness import problems_of, refuse_unsound
 from pipelines.scene.file import SceneFile, read_scene
 from pipelines.scene.selection import select_groups, select_stones
+from pipelines.scene.stages import refuse_stages
 
 __all__ = ["CURVE_COLUMNS", "INDEX", "JOINT_COLUMNS", "REPORT", "Assessment", "assess"]
 
@@ -114,6 +115,7 @@ def assess(
     DatabaseError : the database cannot be read or written
     """
     folder, scene, asked = Path(folder), read_scene(path), tuple(map(parse_question, loads))
+    refuse_stages(scene.stages, scene.document, "moma assess")
     check_replaceable(folder, INDEX)
     by_code = _code_of(scene, code, str(path))
     progress(Progress("blocks", 0, None, "reading the stones"))

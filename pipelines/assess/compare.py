@@ -27,6 +27,7 @@ from pipelines.run.record import run_record, store_record, versions
 from pipelines.run.soundness import problems_of, refuse_unsound
 from pipelines.scene.file import read_scene
 from pipelines.scene.selection import StoneModel, select_groups, select_stones
+from pipelines.scene.stages import refuse_stages
 from survey.quality.courses import measure_courses
 from survey.quality.facades import Facade, find_facades
 from survey.quality.movement import (
@@ -91,6 +92,7 @@ def compare(
     DatabaseError : the database cannot be read or written
     """
     folder, scene = Path(folder), read_scene(path)
+    refuse_stages(scene.stages, scene.document, "moma compare")
     check_replaceable(folder, INDEX)
     progress(Progress("blocks", 0, None, "reading the stones"))
     with open_database(url, create=False) as database:

@@ -86,6 +86,12 @@ _STRESS_ERROR = (
     "Estimated from the jumps of the stress between finite elements; a finer mesh makes it smaller."
 )
 
+_STAGES = (
+    "Each stage began at rest where the one before had ended, with its forces. Displacements count from where stones "
+    "were laid, all other numbers of this page are of the last stage. Beds are the mortar that makes up for movements "
+    "before a stone was laid; negative: cut off it."
+)
+
 _MOST = 10  # stones and joints of a table
 _SEEN = 1e-6  # over the width of a joint: a smaller movement is rounding
 
@@ -134,6 +140,7 @@ def write_report(
         errors=[(name, _error(key, result, summary), words) for key, name, words in _ERRORS],
         profile=_profile(summary["profile"]),
         sections=[
+            _stages(summary),
             _stressed(stones, summary["tolerance"]["length"]),
             _pulled(stones),
             _uncertain(stones),
@@ -238,6 +245,29 @@ def _profile(profile: Mapping[str, Any] | None) -> dict[str, Any] | None:
             for one in profile["expected"].values()
         ],
     }
+
+
+def _stages(summary: Mapping[str, Any]) -> _Section:
+    """List the stages of building."""
+    rows = [
+        (
+            one["name"],
+            one["outcome"],
+            str(one["stones"]),
+            ", ".join(f"{one[name]} {name}" for name in ("laid", "removed", "held") if one[name]),
+            kilonewtons(one["weight"]),
+            kilonewtons(one["reaction"]),
+            f"{millimetres(one['displacement']['max'])} ({one['displacement']['stone'] or 'none moves'})",
+            f"{1e3 * one['bed']:+.1f} mm" if one["bed"] else "",
+            scientific(one["errors"]["balance"]),
+        )
+        for one in summary["stages"]
+    ]
+    head = (
+        "Stage", "Outcome", "Stones", "Of these", "Weight", "Reaction", "Largest displacement", "Thickest bed",
+        "Balance",
+    )  # fmt: skip
+    return _Section("Stages of building", head, rows, _STAGES)
 
 
 def _stressed(stones: Sequence[StoneResult], least: float) -> _Section:

@@ -30,6 +30,7 @@ from mechanics.planar.model import PlanarState
 from mechanics.planar.result import PlanarFrame
 from mechanics.results.contact_result import ContactResult
 from mechanics.results.result import Frame, Largest
+from mechanics.results.stages import StageResult
 from mechanics.scene.laws.law import Terms
 from mechanics.scene.state import State
 
@@ -46,6 +47,7 @@ _RECORDS = {
         Largest,
         PlanarFrame,
         PlanarState,
+        StageResult,
         State,
         StaticStart,
         Terms,

@@ -11,6 +11,7 @@ import numpy as np
 from mechanics.results.contact_result import JointResult
 from mechanics.results.joints import SLIVER
 from mechanics.results.result import Result
+from mechanics.results.stages import StageResult
 from mechanics.scene.scene import Fidelity
 from pipelines.results.peaks import peak_records
 from pipelines.results.quantities import quantities
@@ -73,6 +74,7 @@ def summarise(
         "peaks": peaks,
         "tolerance": {"length": length_tolerance(result)},
         "admissible": indeterminacy(result),
+        "stages": [_stage(one) for one in result.stages],
         "profile": profile,
         "version": version,
     }
@@ -81,8 +83,23 @@ def summarise(
 
 def headline(result: Result) -> str:
     """Return the outcome with its reason and its first caution: the first line that a person reads of a run."""
-    said = ": ".join(filter(None, (f"{result.outcome} after {result.time:.4g} s", result.reason)))
+    of = f" of stage {len(result.stages)}, {result.stages[-1].name!r}" if result.stages else ""
+    said = ": ".join(filter(None, (f"{result.outcome} after {result.time:.4g} s{of}", result.reason)))
     return "; but ".join(filter(None, (said, *result.cautions[:1])))
+
+
+def _stage(stage: StageResult) -> dict[str, Any]:
+    """Return the numbers of one stage of building."""
+    own = asdict(stage)
+    names, forces, moved = own.pop("supports"), own.pop("forces"), own.pop("moved")
+    measured = {"natural_map": "natural_map", "balance": "balance", "reaction": "reaction_error"}
+    own["errors"] = {name: _finite(own.pop(field)) for name, field in measured.items()}
+    own["cautions"] = list(own["cautions"])
+    own["displacement"] = {"max": own["displacement"], "stone": moved or None}
+    own["supports"] = [
+        {"stone": name, "force": force} for name, force in zip(names, forces.tolist(), strict=True)
+    ]
+    return own
 
 
 def as_json(value: Mapping[str, Any] | list[Any]) -> str:

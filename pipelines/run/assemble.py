@@ -6,7 +6,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from sqlalchemy.orm import Session
 
-from mechanics.scene.scene import Block, Fidelity, Part, Scene
+from mechanics.scene.scene import Block, Fidelity, LawRule, Part, Scene
+from mechanics.scene.stages import Stage
 from pipelines.arrays import Array
 from pipelines.draw.catalogue import PICTURES
 from pipelines.ingest.records import surveyed_block
@@ -19,6 +20,7 @@ from pipelines.scene.laws import law_rules
 from pipelines.scene.loads import FORCES, build_loads, thrown
 from pipelines.scene.selection import SERIES, STRESS, Groups, StoneModel, select_groups, select_stones
 from pipelines.scene.settings import MeshSettings
+from pipelines.scene.stages import ACTS_IN, StandingStones, standing_stones
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.solids import Solid
 from survey.geometry.stone_parts import stone_parts
@@ -44,6 +46,7 @@ class Assembly:
     origin : (3,) of the scene, in the frame of the site [m]
     remarks : keys of the scene without effect, limits of its stresses, and stones whose warped faces were made plane
     inputs : what went into the run, lines of text by title, for its report
+    stages : of building, for `mechanics.simulate_stages`; the loads are theirs, and `scene` has none. None: one scene
     """
 
     scene: Scene
@@ -55,6 +58,7 @@ class Assembly:
     origin: Array
     remarks: tuple[str, ...] = ()
     inputs: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    stages: tuple[Stage, ...] = ()
 
 
 def assemble(scene: SceneFile, session: Session) -> Assembly:
@@ -81,8 +85,9 @@ def assemble_stones(scene: SceneFile, models: tuple[StoneModel, ...], groups: Gr
         _block(model, chosen[solid.code], solid, meshes.get(solid.code, scene.mesh))
         for model, solid in zip(models, closed.solids, strict=True)
     )
+    whole = _scene(scene, blocks, groups, origin)
     return Assembly(
-        scene=_scene(scene, blocks, groups, origin),
+        scene=whole,
         models=models,
         modelled=chosen,
         simplified=closed.simplified,
@@ -90,6 +95,7 @@ def assemble_stones(scene: SceneFile, models: tuple[StoneModel, ...], groups: Gr
         towards=_facing(stones),
         origin=origin,
         remarks=(*remarks(scene, groups, chosen), *remarks_on_stones(closed.simplified)),
+        stages=_stages(scene, whole, groups, origin),
     )
 
 
@@ -108,10 +114,10 @@ def wishes_of(scene: SceneFile, models: Sequence[StoneModel], groups: Groups) ->
 
 
 def _scene(scene: SceneFile, blocks: Sequence[Block], groups: Groups, origin: Array) -> Scene:
-    """Return the scene of the blocks, with the laws and loads of the file."""
+    """Return the scene of the blocks, with the laws and loads of the file; loads of a building in stages are theirs."""
     document, by_code = scene.document, {block.code: block for block in blocks}
     materials = {block.code: block.material.name for block in blocks}
-    loads = [entry_about(entry, origin) for entry in scene.loads]
+    loads = [entry_about(entry, origin) for entry in scene.loads if not scene.stages]
     velocity = thrown(document, scene.throws, groups, by_code)
     return Scene(
         name=scene.name,
@@ -126,6 +132,38 @@ def _scene(scene: SceneFile, blocks: Sequence[Block], groups: Groups, origin: Ar
         loads=build_loads(document, loads, groups, by_code),
         frame_every=scene.output.frame_every,
         series=tuple(block.code for block in blocks if block.code in groups[SERIES][0]),
+    )
+
+
+def _stages(scene: SceneFile, whole: Scene, groups: Groups, origin: Array) -> tuple[Stage, ...]:
+    """Return the stages of building."""
+    if not scene.stages:
+        return ()
+    fixed = frozenset(block.code for block in whole.blocks if block.fidelity is Fidelity.FIXED)
+    codes = [block.code for block in whole.blocks]
+    stages = standing_stones(scene.document, scene.stages, groups, codes, fixed, scene.loads)
+    return tuple(Stage(one.name, _stage(scene, whole, groups, origin, one)) for one in stages)
+
+
+def _stage(scene: SceneFile, whole: Scene, groups: Groups, origin: Array, stones: StandingStones) -> Scene:
+    """Return the scene of one stage: its stones, the laws between them, and its loads."""
+    blocks = tuple(
+        replace(block, fidelity=Fidelity.FIXED) if block.code in stones.held else block
+        for block in whole.blocks
+        if block.code in stones.standing
+    )
+    own = {path: tuple(codes & stones.standing for codes in of) for path, of in groups.items()}
+    acting = [entry_about(one, origin) for one in scene.loads if stones.name in one.values[ACTS_IN.name]]
+    rules = (
+        LawRule(one.first & stones.standing, one.second & stones.standing, one.law)
+        for one in whole.contact.rules
+    )
+    return replace(
+        whole,
+        blocks=blocks,
+        contact=replace(whole.contact, rules=tuple(one for one in rules if one.first and one.second)),
+        loads=build_loads(scene.document, acting, own, {block.code: block for block in blocks}),
+        series=tuple(code for code in whole.series if code in stones.standing),
     )
 
 

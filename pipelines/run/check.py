@@ -31,9 +31,10 @@ from pipelines.run.closing_check import (
     simplification_report,
 )
 from pipelines.run.fidelity import Modelled, modelled
+from pipelines.run.inputs import stage_lines
 from pipelines.run.plausibility import corner_warnings, impossible_values, unusual_values
 from pipelines.run.run import USUAL
-from pipelines.run.soundness import unsound_stones, unsupported
+from pipelines.run.soundness import unsound_stones, unsupported, unsupported_stages
 from pipelines.scene.array_tables import describe
 from pipelines.scene.file import SceneFile, read_scene
 from pipelines.scene.selection import Groups, StoneModel, select_groups, select_stones
@@ -172,11 +173,13 @@ def _report(
         ),
         laws=tuple(describe(one.entry, groups) for one in scene.laws),
         loads=tuple(describe(entry, groups) for entry in (*scene.loads, *scene.throws)),
+        stages=() if assembly is None else stage_lines(scene, assembly),
         problems=problems,
         warnings=(
             *unusual_values(scene, models),
             *corner_warnings(models),
             *(() if assembly is None else assembly.remarks),
+            *(() if assembly is None else unsupported_stages(scene, assembly)),
         ),
     )
 

@@ -102,7 +102,7 @@ class Cost:
 
 @dataclass(frozen=True)
 class CheckReport:
-    """Plan of a scene, which is sound if there are no problems. Laws and loads are described in words.
+    """Plan of a scene, which is sound if there are no problems. Laws, loads and stages are described in words.
 
     Attributes
     ----------
@@ -126,6 +126,7 @@ class CheckReport:
     cost: Cost | None
     laws: tuple[str, ...]
     loads: tuple[str, ...]
+    stages: tuple[str, ...]
     problems: tuple[str, ...]
     files: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()

@@ -16,8 +16,9 @@ from pipelines.run.record import settings_of
 from pipelines.scene.array_tables import describe
 from pipelines.scene.file import SceneFile
 from pipelines.scene.selection import Groups
+from pipelines.scene.stages import ACTS_IN
 
-__all__ = ["closing_lines", "run_inputs"]
+__all__ = ["closing_lines", "run_inputs", "stage_lines"]
 
 _MOST = 4  # surveys, gaps and overlaps that are named
 
@@ -48,10 +49,24 @@ def run_inputs(
             f"gravity ({', '.join(f'{one:z.4g}' for one in built.gravity)}) m/s²",
             *(describe(entry, groups) for entry in (*scene.loads, *scene.throws)),
         ),
+        "Stages": stage_lines(scene, assembly),
         "Joints of the survey": closing_lines(joints_report(assembly.closing, assembly.origin)),
         "Time": (_named(settings_of(scene, built)["time"]),),
         "Solver": (_named(settings_of(scene, built)["solver"]),),
     }
+
+
+def stage_lines(scene: SceneFile, assembly: Assembly) -> tuple[str, ...]:
+    """Describe the stages of building: how many stones stand in each and are held, and the loads that act in it."""
+    lines = []
+    for stage in assembly.stages:
+        blocks = stage.scene.blocks
+        own = {one.code for one in assembly.scene.blocks if one.fidelity is Fidelity.FIXED}
+        held = sum(one.fidelity is Fidelity.FIXED and one.code not in own for one in blocks)
+        acting = [one.type for one in scene.loads if stage.name in one.values[ACTS_IN.name]]
+        said = [f"{len(blocks)} stones", *([f"{held} held"] if held else []), *acting]
+        lines.append(f"{stage.name}: {', '.join(said)}")
+    return tuple(lines)
 
 
 def closing_lines(report: JointsReport) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ from mechanics.model.model import build_model
 from mechanics.results.forecast.plan import loose_blocks
 from mechanics.results.result import Outcome, Result
 from mechanics.scene.scene import Fidelity
-from mechanics.simulate import simulate
+from mechanics.simulate import simulate, simulate_stages
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.files import check_mesh_file, write_meshes
 from mechanics.stones.meshing.mesh import VolumeMesh
@@ -34,7 +34,7 @@ from pipelines.run.assemble import Assembly, assemble_stones
 from pipelines.run.inputs import run_inputs
 from pipelines.run.plausibility import corner_warnings, unusual_values
 from pipelines.run.record import run_record, store_record, versions
-from pipelines.run.soundness import caution_of, problems_of, refuse_unsound
+from pipelines.run.soundness import caution_of, problems_of, refuse_unsound, unsupported_stages
 from pipelines.run.unfinished import UnfinishedRun, unfinished_run
 from pipelines.scene.file import SceneFile, read_scene
 from pipelines.scene.fingerprint import fingerprint
@@ -118,7 +118,12 @@ def run_scene(
             assembly = assemble_stones(scene, models, groups)
             assembly = replace(
                 assembly,
-                remarks=(*assembly.remarks, *unusual_values(scene, models), *corner_warnings(models)),
+                remarks=(
+                    *assembly.remarks,
+                    *unusual_values(scene, models),
+                    *corner_warnings(models),
+                    *unsupported_stages(scene, assembly),
+                ),
                 inputs=run_inputs(scene, assembly, groups, session),
             )
         if meshes is not None:
@@ -131,14 +136,20 @@ def run_scene(
         if not accept_unsound:
             refuse_unsound(problems, str(path))
         steps = max(1, round(assembly.scene.time.duration / assembly.scene.time.step))
+        last = assembly.stages[-1].scene if assembly.stages else assembly.scene
+        # steps of a stage count from the next checkpoint after those of the stages before
+        steps += (len(assembly.stages) - 1) * (steps + scene.output.checkpoint) if assembly.stages else 0
         unfinished.open(
-            assembly.scene.blocks,
-            fingerprint(assembly.scene, *built, models),
+            last.blocks,
+            fingerprint(assembly.scene, *built, models, assembly.stages),
             versions(),
             steps,
             bool(resume),
         )
-        result = simulate(assembly.scene, progress, stop, built, unfinished)
+        if assembly.stages:
+            result = simulate_stages(assembly.stages, progress, stop, built, unfinished)
+        else:
+            result = simulate(assembly.scene, progress, stop, built, unfinished)
         if problems:
             result = replace(result, cautions=(caution_of(problems), *result.cautions))
         seconds |= result.wall_time

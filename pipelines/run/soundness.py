@@ -1,7 +1,11 @@
 """Problems of a scene that make its result worthless; `moma check` lists them, and `moma run` refuses them."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
+from mechanics.model.model import build_model
+from mechanics.results.forecast.plan import loose_blocks
+from mechanics.scene.loads.load import Loads
 from mechanics.scene.scene import Fidelity, Scene
 from moma.errors import GeometryError, UnsoundSceneError
 from pipelines.run.assemble import Assembly
@@ -11,7 +15,9 @@ from survey.geometry.solids import Solid
 from survey.geometry.watertight import check_watertight, doubtful_solids
 from survey.joints.settings import JointMode
 
-__all__ = ["caution_of", "problems_of", "refuse_unsound", "unsound_stones", "unsupported"]
+__all__ = [
+    "caution_of", "problems_of", "refuse_unsound", "unsound_stones", "unsupported", "unsupported_stages",
+]  # fmt: skip
 
 _DEEP = 0.005  # overlap [m]; less is survey noise, which the contacts absorb
 _NAMED = 6  # most stones, or pairs of stones, that one problem names
@@ -142,6 +148,24 @@ def unsupported(scene: Scene, loose: Sequence[str]) -> list[str]:
     if not falling:
         return []
     return [f"no chain of touching stones ties these to a fixed one: {_some(falling)}; they will fall"]
+
+
+def unsupported_stages(scene: SceneFile, assembly: Assembly) -> list[str]:
+    """Return a remark for each stage of building in which nothing ties stones to a fixed or held one, with its line."""
+    remarks = []
+    for entry, stage in zip(scene.stages, assembly.stages, strict=True):
+        # what touches does not depend on meshes
+        blocks = tuple(
+            replace(one, fidelity=Fidelity.RIGID) if one.fidelity is Fidelity.DEFORMABLE else one
+            for one in stage.scene.blocks
+        )
+        loose = loose_blocks(*build_model(replace(stage.scene, blocks=blocks, loads=Loads())))
+        if loose:
+            remarks.append(
+                f"{scene.document.where(*entry.path)}: in stage {stage.name!r} no chain of touching stones ties these "
+                f"to a fixed or held one: {_some(loose)}; they will fall, unless what has moved lies beneath them"
+            )
+    return remarks
 
 
 def _some(codes: Sequence[str]) -> str:

@@ -21,6 +21,7 @@ from pipelines.scene.laws import BONDS, JointLaw, read_laws
 from pipelines.scene.loads import ASSESS_TYPES, read_loads, read_throws
 from pipelines.scene.settings import Fidelities, MaterialRule, MeshSettings, Output, Selection
 from pipelines.scene.site import Site
+from pipelines.scene.stages import read_stages
 from pipelines.scene.tables import ARRAYS, AUTO, MATERIAL_KEYS, MESH_KEYS, ORTHOTROPY_KEYS, SITE_KEYS, TABLES
 from pipelines.toml.lines import key_lines, parse_toml, read_text
 from pipelines.toml.schema import Document, check_table, nearest
@@ -43,6 +44,7 @@ class SceneFile:
     meshes : finite elements of particular groups of stones
     laws : of particular joints; the general law is in `contact`
     loads, throws : actions besides gravity, and initial motions
+    stages : of building; none: all stones stand from the beginning
     assess : live loads whose limits are sought
     site : seismic action for the check by a code; None: not stated
     """
@@ -64,6 +66,7 @@ class SceneFile:
     laws: tuple[JointLaw, ...]
     loads: tuple[Entry, ...]
     throws: tuple[Entry, ...]
+    stages: tuple[Entry, ...]
     assess: tuple[Entry, ...]
     site: Site | None
 
@@ -98,6 +101,7 @@ def parse_scene(text: str, path: str) -> SceneFile:
     document = Document(path, key_lines(text))
     tables = _checked_tables(document, given)
     laws = read_laws(document, given)
+    loads, throws = read_loads(document, given), read_throws(document, given)
     return SceneFile(
         document=document,
         text=text,
@@ -114,8 +118,9 @@ def parse_scene(text: str, path: str) -> SceneFile:
         solver=build(SolverSettings, tables["solver"]),
         output=_output(document, tables["output"]),
         laws=laws,
-        loads=read_loads(document, given),
-        throws=read_throws(document, given),
+        loads=loads,
+        throws=throws,
+        stages=read_stages(document, given, loads, throws),
         assess=read_entries(document, given, "assess", ASSESS_TYPES),
         site=_site(document, given),
     )

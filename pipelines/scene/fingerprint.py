@@ -10,6 +10,7 @@ import numpy as np
 from mechanics.model.model import Model
 from mechanics.planar.scene import PlanarScene
 from mechanics.scene.scene import Scene
+from mechanics.scene.stages import Stage
 from mechanics.scene.state import State
 from pipelines.scene.selection import StoneModel
 
@@ -22,9 +23,13 @@ _FREE = ("name", "solver.threads", "time.duration")  # settings that change no b
 
 
 def fingerprint(
-    scene: Scene, model: Model, start: State, stones: Sequence[StoneModel] = ()
+    scene: Scene,
+    model: Model,
+    start: State,
+    stones: Sequence[StoneModel] = (),
+    stages: Sequence[Stage] = (),
 ) -> dict[str, str]:
-    """Return a text for each setting, load and stone of a scene as it was built, and for its mesh.
+    """Return a text for each setting, load, stone and stage of a scene as it was built, and for its mesh.
 
     The solids of the `stones` in the database come first: where one changes, all others may be built otherwise.
 
@@ -41,6 +46,11 @@ def fingerprint(
     for block in scene.blocks:
         values = ((one.name, getattr(block, one.name)) for one in fields(block) if one.name != "code")
         found |= {f"{_STONE}{block.code}: {name}": _digest(value) for name, value in values}
+    for number, stage in enumerate(stages, 1):
+        standing = [(block.code, str(block.fidelity)) for block in stage.scene.blocks]
+        what = {"name": stage.name, "stones": _digest(standing), "loads": stage.scene.loads}
+        what["duration"] = stage.scene.time.duration
+        found |= dict(_parts(what, f"stage {number}"))
     built = (
         start.centre,
         start.node,

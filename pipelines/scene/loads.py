@@ -19,11 +19,13 @@ from mechanics.scene.scene import Block, Fidelity
 from mechanics.stones.polyhedra import mass_properties
 from pipelines.scene.array_tables import Entry, file_beside, read_entries
 from pipelines.scene.keys import keys_of
+from pipelines.scene.stages import ACTS_IN
 from pipelines.toml.schema import Document, Key, Kind
 
 __all__ = [
     "ASSESS_TYPES",
     "FORCES",
+    "LOAD_KEYS",
     "LOAD_TYPES",
     "THROW_KEYS",
     "build_loads",
@@ -121,6 +123,9 @@ LOAD_TYPES: Mapping[str, tuple[Key, ...]] = {
     ),
 }
 
+LOAD_KEYS = (ACTS_IN,)
+"""Keys of every load."""
+
 _FIXED = Key("stones", Kind.STONES, "Codes or expressions of the fixed stones on which it acts.")
 
 ASSESS_TYPES: Mapping[str, tuple[Key, ...]] = {
@@ -161,7 +166,7 @@ THROW_KEYS = (
 
 def read_loads(document: Document, given: Mapping[str, Any]) -> tuple[Entry, ...]:
     """Check all loads and read their records; their stones are still expressions."""
-    entries = read_entries(document, given, "loads", LOAD_TYPES)
+    entries = read_entries(document, given, "loads", LOAD_TYPES, LOAD_KEYS)
     for entry in entries:
         if entry.type == "tilt" and (entry.values["rate"] is None) == (entry.values["angle"] is None):
             document.fail("a tilt by rate or by angle", *entry.path, remedy="give either 'rate' or 'angle'")

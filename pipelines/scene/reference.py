@@ -6,7 +6,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from pipelines.scene.laws import LAW_KEYS, LAW_TYPES
-from pipelines.scene.loads import ASSESS_TYPES, LOAD_TYPES, THROW_KEYS
+from pipelines.scene.loads import ASSESS_TYPES, LOAD_KEYS, LOAD_TYPES, THROW_KEYS
+from pipelines.scene.stages import STAGE_KEYS
 from pipelines.scene.tables import MATERIAL_KEYS, MESH_KEYS, ORTHOTROPY_KEYS, SITE_KEYS, TABLES
 from pipelines.toml.schema import REQUIRED, Key
 
@@ -22,8 +23,10 @@ SECTIONS: Mapping[str, tuple[Key, ...]] = {
     "[[meshes]]": MESH_KEYS,
     "[[laws]]": LAW_KEYS,
     **{f"[[laws]] {name}": keys for name, keys in LAW_TYPES.items()},
+    "[[loads]]": LOAD_KEYS,
     **{f"[[loads]] {name}": keys for name, keys in LOAD_TYPES.items()},
     "[[throw]]": THROW_KEYS,
+    "[[stages]]": STAGE_KEYS,
     **{f"[[assess]] {name}": keys for name, keys in ASSESS_TYPES.items()},
     "[site]": SITE_KEYS,
 }

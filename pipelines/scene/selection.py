@@ -55,7 +55,7 @@ def select_stones(scene: SceneFile, session: Session) -> tuple[StoneModel, ...]:
 
 
 def select_groups(scene: SceneFile, session: Session, models: Sequence[StoneModel]) -> Groups:
-    """Return the selected stones that the meshes, laws, loads and throws of a scene name, and those of its outputs.
+    """Return the selected stones that the arrays of a scene name, and those of its outputs.
 
     Raises
     ------
@@ -67,6 +67,7 @@ def select_groups(scene: SceneFile, session: Session, models: Sequence[StoneMode
         *(one.entry for one in scene.laws),
         *scene.loads,
         *scene.throws,
+        *scene.stages,
         *scene.assess,
     )
     groups: dict[Path, tuple[frozenset[str], ...]] = {

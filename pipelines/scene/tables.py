@@ -14,7 +14,7 @@ from survey.joints.settings import JointSettings
 
 __all__ = ["ARRAYS", "AUTO", "MATERIAL_KEYS", "MESH_KEYS", "ORTHOTROPY_KEYS", "SITE_KEYS", "TABLES"]
 
-ARRAYS = ("meshes", "laws", "loads", "throw", "assess")
+ARRAYS = ("meshes", "laws", "loads", "throw", "stages", "assess")
 """Tables of which a scene may have many."""
 
 AUTO = "auto"

@@ -15,6 +15,7 @@ from pipelines.results.quantities import QUANTITIES
 from pipelines.run.assemble import assemble
 from pipelines.run.soundness import caution_of, problems_of, refuse_unsound
 from pipelines.scene.file import read_scene
+from pipelines.scene.stages import refuse_stages
 from pipelines.toml.schema import nearest
 from pipelines.tradeoff.grid import grid
 from pipelines.tradeoff.report import Goal, study_record, write_study
@@ -95,6 +96,7 @@ def run_trade(
     SceneError, GeometryError, DatabaseError : see `pipelines.run.assemble`
     """
     scene = read_scene(path)
+    refuse_stages(scene.stages, scene.document, "moma trade")
     progress(Progress("blocks", 0, None, "reading the stones and closing their joints"))
     with open_database(url, create=False) as database, database.session(read_only=True) as session:
         assembly = assemble(scene, session)

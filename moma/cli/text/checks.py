@@ -44,6 +44,7 @@ def check_lines(report: "CheckReport", verbose: bool, explain: bool = False) -> 
     if report.mesh_quality is not None:
         lines += _mesh_lines(report.mesh_quality)
     lines += [f"  law {one}" for one in report.laws] + [f"  load {one}" for one in report.loads]
+    lines += [f"  stage {one}" for one in report.stages]
     if report.simplification is not None:
         lines += _simplification_lines(report.simplification, verbose)
     if report.joints is not None:

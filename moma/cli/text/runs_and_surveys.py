@@ -111,6 +111,7 @@ def run_lines(report: "RunReport", verbose: bool) -> list[str]:
             f"  began in static equilibrium: {static['steps']} steps of the search, balance {static['balance']:.1e}, "
             f"natural_map {static['natural_map']:.1e}"
         )
+    lines += [_stage_line(number, one) for number, one in enumerate(summary["stages"], 1)]
     lines += _joint_lines(summary)
     lines += _profile_lines(summary["profile"])
     errors = {name: value for name, value in summary["errors"].items() if value is not None}
@@ -121,6 +122,19 @@ def run_lines(report: "RunReport", verbose: bool) -> list[str]:
     pictures = [name for name in summary["files"] if name.endswith(".png")]
     shown = (*pictures, "report.html", "results.vtkhdf", "results.pvd", "summary.json")
     return [*lines, *(f"  {report.folder / name}" for name in shown if name in summary["files"])]
+
+
+def _stage_line(number: int, stage: dict[str, Any]) -> str:
+    """Describe one stage of building."""
+    counts = [f"{stage[name]} {name}" for name in ("laid", "removed", "held") if stage[name]]
+    counted = f" ({', '.join(counts)})" if counts else ""
+    bed = f", beds up to {1e3 * stage['bed']:+.1f} mm" if stage["bed"] else ""
+    return (
+        f"  stage {number}, {stage['name']}: {stage['outcome']} after {stage['time']:.4g} s, {stage['stones']} stones"
+        f"{counted}, weight {stage['weight'] / 1e3:z.2f} kN, reaction "
+        f"{stage['reaction'] / 1e3:z.2f} kN, displacement {1e3 * stage['displacement']['max']:.2f} mm{bed}, "
+        f"balance {stage['errors']['balance']:.1e}"
+    )
 
 
 def _displacement(summary: dict[str, Any]) -> str:

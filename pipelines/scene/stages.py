@@ -1,0 +1,173 @@
+"""Stages of building: from [[stages]] of a scene file to the stones that stand and are held in each."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from moma.errors import UsageError
+from pipelines.scene.array_tables import Entry, read_entries
+from pipelines.toml.lines import Path
+from pipelines.toml.schema import Document, Key, Kind, nearest
+
+__all__ = ["ACTS_IN", "STAGE_KEYS", "StandingStones", "read_stages", "refuse_stages", "standing_stones"]
+
+Codes = frozenset[str]
+
+STAGE_KEYS = (
+    Key("name", Kind.TEXT, "Name, by which loads refer to it."),
+    Key(
+        "lay",
+        Kind.STONES,
+        "Codes or expressions of the stones that are laid in it. Fixed stones that no stage lays stand from the first.",
+        default=(),
+    ),
+    Key(
+        "remove",
+        Kind.STONES,
+        "Codes or expressions of the stones that are taken away before it: a centring that was laid.",
+        default=(),
+    ),
+    Key(
+        "hold",
+        Kind.STONES,
+        "Codes or expressions of the stones that a rigid centring holds in it: they do not move.",
+        default=(),
+    ),
+)
+
+ACTS_IN = Key(
+    "stages",
+    Kind.TEXTS,
+    "Names of the stages in which it acts, from the beginning of each; needed in a scene with `[[stages]]`, "
+    "and only there.",
+    default=(),
+)
+"""Key of every load."""
+
+
+@dataclass(frozen=True)
+class StandingStones:
+    """Stones that stand in a stage, and those of them that its centring holds, by code."""
+
+    entry: Entry
+    standing: Codes
+    held: Codes
+
+    @property
+    def name(self) -> str:
+        """Name of the stage."""
+        return str(self.entry.values["name"])
+
+
+def read_stages(
+    document: Document, given: Mapping[str, Any], loads: Iterable[Entry], throws: Sequence[Entry]
+) -> tuple[Entry, ...]:
+    """Check all stages, and the names by which loads refer to them; their stones are still expressions."""
+    stages = read_entries(document, given, "stages", {"stage": STAGE_KEYS})
+    names: list[str] = []
+    for entry in stages:
+        if entry.values["name"] in names:
+            document.fail(
+                f"two stages named {entry.values['name']!r}", *entry.path, "name", remedy="give each its own"
+            )
+        names.append(entry.values["name"])
+    for load in loads:
+        _check_load(document, load, names)
+    if stages and throws:
+        what = "stones that begin in motion, in a building in stages"
+        document.fail(what, *throws[0].path, remedy="leave out [[throw]], or [[stages]]")
+    return stages
+
+
+def _check_load(document: Document, load: Entry, names: Sequence[str]) -> None:
+    asked = load.values[ACTS_IN.name]
+    if names and not asked:
+        document.fail(
+            "a load that does not say in which stages it acts",
+            *load.path,
+            remedy=f"give stages, e.g. [{names[-1]!r}]",
+        )
+    if asked and not names:
+        document.fail("stages of a load, in a scene without", *load.path, "stages", remedy="add [[stages]]")
+    for name in asked:
+        if name not in names:
+            document.fail(f"no stage {name!r}", *load.path, "stages", remedy=nearest(name, names))
+
+
+def standing_stones(
+    document: Document,
+    stages: Sequence[Entry],
+    groups: Mapping[Path, Sequence[Codes]],
+    codes: Iterable[str],
+    fixed: Codes,
+    loads: Iterable[Entry],
+) -> tuple[StandingStones, ...]:
+    """Return the stones that stand in each stage; `fixed` ones that no stage lays stand in the first.
+
+    Parameters
+    ----------
+    document, stages, loads : of the scene
+    groups : the stones that its tables name
+    codes, fixed : of its stones, and of those that never move
+
+    Raises
+    ------
+    SceneError : a stage lays what stands, removes or holds what does not, or nothing happens in it; a stone is never
+        laid; a load acts on stones that do not stand
+    """
+    loads = tuple(loads)
+    laid = frozenset[str]().union(*(groups[entry.path][0] for entry in stages))
+    standing, held, found = fixed - laid, frozenset[str](), list[StandingStones]()
+    for entry in stages:
+        name, (lay, remove, hold) = entry.values["name"], groups[entry.path]
+        for key, wrong, what, remedy in (
+            ("remove", remove - standing, "is removed before it is laid", "lay it in an earlier stage"),
+            ("lay", lay & (standing - remove), "is laid, but stands already", "lay it once"),
+            (
+                "hold",
+                hold - ((standing - remove) | lay),
+                "is held, but does not stand",
+                "lay it first, or with it",
+            ),
+        ):
+            if wrong:
+                document.fail(f"stone {min(wrong)} {what} in stage {name!r}", *entry.path, key, remedy=remedy)
+        now = (standing - remove) | lay
+        acting = [load for load in loads if name in load.values[ACTS_IN.name]]
+        if (now, hold) == (standing, held) and not acting and found:
+            document.fail(
+                f"nothing happens in stage {name!r}",
+                *entry.path,
+                remedy="lay, remove, hold or release stones in it, or let a load act",
+            )
+        if not now:
+            document.fail(f"no stone stands in stage {name!r}", *entry.path, remedy="give lay")
+        for load in acting:
+            for (key, _), stones in zip(load.groups, groups[load.path], strict=True):
+                if not stones & now:
+                    what = f"none of its stones stands in stage {name!r}"
+                    document.fail(what, *load.path, key, remedy="let it act in a later stage")
+        standing, held = now, hold
+        found.append(StandingStones(entry, standing, held))
+    if never := set(codes) - laid - fixed:
+        document.fail(
+            f"{len(never)} stones are never laid, e.g. {min(never)}",
+            *stages[-1].path,
+            remedy="lay them in a stage, or leave them out by exclude in [select]",
+        )
+    return tuple(found)
+
+
+def refuse_stages(stages: Sequence[Entry], document: Document, command: str) -> None:
+    """Refuse a scene with stages in a command that knows none.
+
+    Raises
+    ------
+    UsageError : with file and line
+    """
+    if stages:
+        raise UsageError(
+            f"{command} knows no stages of building",
+            where=document.where(*stages[0].path),
+            remedy="leave [[stages]] out of a copy of the scene, or run it with: moma run",
+        )
