@@ -60,7 +60,7 @@ def describe_run(session: Session, number: int, count: int = 5) -> dict[str, Any
     -------
     dict
         as in `list_runs`, and: steps, simulated [s], fidelities, headline, cautions, peaks (largest values of the run),
-        as_of, author, versions, settings, scene_text;
+        stages of building as in summary.json, as_of, author, versions, settings, scene_text;
         of a run of disks: measures by name, cells at the last instant;
         simplification (mode; how many stones of each shape, and how many outside of the survey's tolerance; the largest
         displacement of a corner and its stone; None where solids are not kept),
@@ -95,6 +95,7 @@ def describe_run(session: Session, number: int, count: int = 5) -> dict[str, Any
         "errors": {name: getattr(run, name) for name in ERRORS},
         "headline": run.summary.get("headline"),
         "peaks": _peaks(run.summary),
+        "stages": run.summary.get("stages", []),
         "measures": run.summary.get("measures", {}),
         "cells": _cells(session, number),
         "as_of": run.as_of_id,

@@ -39,7 +39,15 @@ _CELLS = {
     "porosity": "-",
     "coordination": "-",
 }
+_STAGES = {
+    **dict.fromkeys(("name", "outcome", "stones", "laid", "removed", "held")),
+    "weight": "N",
+    "reaction": "N",
+    "bed": "m",
+    "time": "s",
+}
 _TABLES = {
+    "stages": ("stages of building", _STAGES),
     "cells": ("cells of disks at the end", _CELLS),
     "peaks": ("largest values during the run, and at its end", _PEAKS),
     "largest_stresses": ("largest Von Mises stresses", _STRESSES),

@@ -67,6 +67,8 @@ def run_record(
     summary : the contents of summary.json
     as_of : the last entry in the database when the stones were read
     """
+    # of a building in stages, those of the last
+    standing = {block.code for block in result.scene.blocks}
     return RunRecord(
         scene=scene.name,
         scene_text=scene.text,
@@ -86,7 +88,7 @@ def run_record(
             surveyed_widths(result.joints, [block.code for block in result.scene.blocks], assembly.closing),
         ),
         contacts=contact_arrays(result.contacts, assembly.origin),
-        simplifications=simplifications(assembly),
+        simplifications=tuple(one for one in simplifications(assembly) if one.code in standing),
     )
 
 

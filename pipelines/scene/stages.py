@@ -30,7 +30,7 @@ STAGE_KEYS = (
     Key(
         "hold",
         Kind.STONES,
-        "Codes or expressions of the stones that a rigid centring holds in it: they do not move.",
+        "Codes or expressions of the stones that a rigid centring holds in it, if they stand: they do not move.",
         default=(),
     ),
 )
@@ -112,34 +112,29 @@ def standing_stones(
 
     Raises
     ------
-    SceneError : a stage lays what stands, removes or holds what does not, or nothing happens in it; a stone is never
-        laid; a load acts on stones that do not stand
+    SceneError : a stage lays what stands, removes what does not, or holds only what does not; a stone is never laid; a
+        load acts on stones of which none stands
     """
     loads = tuple(loads)
     laid = frozenset[str]().union(*(groups[entry.path][0] for entry in stages))
-    standing, held, found = fixed - laid, frozenset[str](), list[StandingStones]()
+    standing, found = fixed - laid, list[StandingStones]()
     for entry in stages:
         name, (lay, remove, hold) = entry.values["name"], groups[entry.path]
+        now = (standing - remove) | lay
         for key, wrong, what, remedy in (
             ("remove", remove - standing, "is removed before it is laid", "lay it in an earlier stage"),
             ("lay", lay & (standing - remove), "is laid, but stands already", "lay it once"),
             (
                 "hold",
-                hold - ((standing - remove) | lay),
+                hold if not hold & now else None,
                 "is held, but does not stand",
                 "lay it first, or with it",
             ),
         ):
             if wrong:
                 document.fail(f"stone {min(wrong)} {what} in stage {name!r}", *entry.path, key, remedy=remedy)
-        now = (standing - remove) | lay
+        hold &= now
         acting = [load for load in loads if name in load.values[ACTS_IN.name]]
-        if (now, hold) == (standing, held) and not acting and found:
-            document.fail(
-                f"nothing happens in stage {name!r}",
-                *entry.path,
-                remedy="lay, remove, hold or release stones in it, or let a load act",
-            )
         if not now:
             document.fail(f"no stone stands in stage {name!r}", *entry.path, remedy="give lay")
         for load in acting:
@@ -147,8 +142,8 @@ def standing_stones(
                 if not stones & now:
                     what = f"none of its stones stands in stage {name!r}"
                     document.fail(what, *load.path, key, remedy="let it act in a later stage")
-        standing, held = now, hold
-        found.append(StandingStones(entry, standing, held))
+        standing = now
+        found.append(StandingStones(entry, standing, hold))
     if never := set(codes) - laid - fixed:
         document.fail(
             f"{len(never)} stones are never laid, e.g. {min(never)}",
