@@ -102,6 +102,17 @@ def simulate_stages(
     progress, stop, archive : as `simulate` takes them
     whole : what `build_model` made of `whole_scene(stages)`, if it is known
 
+    A second block is laid on one that stands:
+
+    >>> from mechanics.scene.shapes import column
+    >>> ground, *drums = column(2, diameter=1.0, height=0.5)
+    >>> built = simulate_stages([
+    ...     Stage("first", Scene("low", (ground, drums[0]))),
+    ...     Stage("second", Scene("high", (ground, *drums))),
+    ... ])
+    >>> [(stage.name, stage.outcome, round(stage.reaction / stage.weight, 6)) for stage in built.stages]
+    [('first', 'equilibrium', 1.0), ('second', 'equilibrium', 1.0)]
+
     Raises
     ------
     SceneError, GeometryError, MeshError, SolverError : as `simulate`
@@ -278,7 +289,8 @@ class _Building:
         """Return the cautions of the last stage, after what it has left unbuilt; then those of the others."""
         count, last = len(self.stages), self.ends[-1]
         left = count - len(self.ends)
-        unbuilt = (f"{left} of {count} stages were not built, as stage {last.name!r} did not come to rest",)
+        why = "was interrupted" if last.outcome == Outcome.INTERRUPTED else "did not come to rest"
+        unbuilt = (f"{left} of {count} stages were not built, as stage {last.name!r} {why}",)
         earlier = (f"in stage {one.name!r}, {caution}" for one in self.ends[:-1] for caution in one.cautions)
         return (*(unbuilt if left else ()), *last.cautions, *earlier)
 

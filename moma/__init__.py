@@ -38,7 +38,8 @@ if TYPE_CHECKING:
     from archmodel.relations.graph import load_path
     from mechanics.results.result import Result
     from mechanics.scene.scene import Block, Fidelity, Scene
-    from mechanics.simulate import simulate
+    from mechanics.scene.stages import Stage
+    from mechanics.simulate import simulate, simulate_stages
     from mechanics.stones.materials import Material
     from pipelines.assess.assess import assess
     from pipelines.ingest.ingest import ingest
@@ -58,6 +59,7 @@ __all__ = [
     "ReadingOptions",
     "Result",
     "Scene",
+    "Stage",
     "__version__",
     "assemble",
     "assess",
@@ -73,6 +75,7 @@ __all__ = [
     "report_surveys",
     "run_scene",
     "simulate",
+    "simulate_stages",
     "survey_stones",
     "trace",
 ]
@@ -84,6 +87,7 @@ _HOMES = {
     "ReadingOptions": "survey.formats.reading",
     "Result": "mechanics.results.result",
     "Scene": "mechanics.scene.scene",
+    "Stage": "mechanics.scene.stages",
     "assemble": "pipelines.run.assemble",
     "assess": "pipelines.assess.assess",
     "find": "archmodel.query.api",
@@ -98,6 +102,7 @@ _HOMES = {
     "report_surveys": "pipelines.reports.survey.report",
     "run_scene": "pipelines.run.run",
     "simulate": "mechanics.simulate",
+    "simulate_stages": "mechanics.simulate",
     "survey_stones": "survey.stones",
     "trace": "archmodel.describe.trace",
 }
