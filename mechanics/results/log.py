@@ -95,7 +95,7 @@ def result_of(
 ) -> Result:
     """Return the result of a run from its record, its last step and its verdict."""
     model, observer, energy, history = log.model, log.observer, log.energy, log.history()
-    support = support_reaction(model, last.contacts, last.force, last.after.time)
+    support = support_reaction(model, last.contacts, last.force, last.kick.load, last.after.time)
     with clock("stress"):
         bodies = observer.bodies(last.after, log.balance)
         contacts, joints = observer.contacts_and_joints(last)

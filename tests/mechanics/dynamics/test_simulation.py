@@ -220,7 +220,7 @@ def test_a_resting_stone_is_in_balance_and_the_ground_carries_its_weight(fidelit
     balance = imbalance(model, last.after, last.contacts, last.force, last.kick.load)
     assert balance[0] == 0.0
     assert balance[1] < 1e-6
-    support = support_reaction(model, last.contacts, last.force, last.after.time)
+    support = support_reaction(model, last.contacts, last.force, last.kick.load, last.after.time)
     assert support.weight == pytest.approx(2000 * 0.8 * 0.5 * 0.4 * G, rel=1e-10)
     assert support.error < 1e-6
 
@@ -229,7 +229,7 @@ def test_a_stone_in_the_air_is_out_of_balance_by_its_weight():
     model, _, steps = run(scene(ground(), brick("a", (0, 0, 2), (1, 1, 3)), step=1e-3), 1)
     last = steps[-1]
     assert imbalance(model, last.after, last.contacts, last.force, last.kick.load).tolist() == [0.0, 1.0]
-    assert support_reaction(model, last.contacts, last.force, last.after.time).error == 1.0
+    assert support_reaction(model, last.contacts, last.force, last.kick.load, last.after.time).error == 1.0
 
 
 def test_displacement_and_speed_are_those_of_the_farthest_corner():

@@ -54,7 +54,7 @@ def test_a_stack_falls_asleep_and_bears_its_weight():
     assert len(step.contacts) == 16
     assert not step.after.velocity.any()
     model = simulation.model
-    assert support_reaction(model, step.contacts, step.force, step.after.time).error < 1e-4
+    assert support_reaction(model, step.contacts, step.force, step.kick.load, step.after.time).error < 1e-4
     whole = imbalance(model, step.after, step.contacts, step.force, step.kick.load)
     light = imbalance(
         model, step.after, step.active.contacts, step.active.force, step.kick.load, step.resting

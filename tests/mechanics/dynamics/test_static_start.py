@@ -85,7 +85,7 @@ def test_the_ground_carries_the_weight_from_the_first_step_on(name):
     (model, *_), steps = continued(name)
     weight = 2000.0 * 0.4 * 0.3 * 0.3 * G * len(COLUMNS[name])
     for step in steps:
-        support = support_reaction(model, step.contacts, step.force, step.after.time)
+        support = support_reaction(model, step.contacts, step.force, step.kick.load, step.after.time)
         assert support.weight == pytest.approx(weight, rel=1e-12)
         assert support.reaction == pytest.approx(weight, rel=1e-7)
 
@@ -174,7 +174,7 @@ def test_a_stone_a_little_above_the_ground_is_set_down(fidelity):
     np.testing.assert_allclose(sunk, [0, 0, gap], atol=1e-5)
     step = simulation.step()
     assert speed(model, step.after).max() < 1e-8
-    assert support_reaction(model, step.contacts, step.force, step.after.time).error < 1e-6
+    assert support_reaction(model, step.contacts, step.force, step.kick.load, step.after.time).error < 1e-6
 
 
 @pytest.mark.parametrize("fidelity", [SOFT, HARD])
@@ -281,7 +281,7 @@ def test_frictionless_contacts_serve():
     model, _, static, _, simulation = searched(one)
     assert static.found
     step = simulation.step()
-    assert support_reaction(model, step.contacts, step.force, 0.0).error < 1e-7
+    assert support_reaction(model, step.contacts, step.force, step.kick.load, 0.0).error < 1e-7
 
 
 # --- what is remembered ---
