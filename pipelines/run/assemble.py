@@ -13,7 +13,7 @@ from pipelines.draw.catalogue import PICTURES
 from pipelines.ingest.records import surveyed_block
 from pipelines.run.fidelity import Modelled, Wishes, modelled, neighbours
 from pipelines.run.local_frame import entry_about, local_origin, stone_about
-from pipelines.run.remarks import remarks, remarks_on_stones
+from pipelines.run.remarks import remarks, remarks_on_laws, remarks_on_stones
 from pipelines.scene.file import SceneFile
 from pipelines.scene.keys import typed_values
 from pipelines.scene.laws import law_rules
@@ -44,7 +44,7 @@ class Assembly:
     closing : report on their joints
     towards : (3,) mean normal of the faces, from the wall to the observer [-]
     origin : (3,) of the scene, in the frame of the site [m]
-    remarks : keys of the scene without effect, limits of its stresses, and stones whose warped faces were made plane
+    remarks : keys and laws without effect, limits of the stresses, and stones whose warped faces were made plane
     inputs : what went into the run, lines of text by title, for its report
     stages : of building, for `mechanics.simulate_stages`; the loads are theirs, and `scene` has none. None: one scene
     """
@@ -94,7 +94,11 @@ def assemble_stones(scene: SceneFile, models: tuple[StoneModel, ...], groups: Gr
         closing=closed.report,
         towards=_facing(stones),
         origin=origin,
-        remarks=(*remarks(scene, groups, chosen), *remarks_on_stones(closed.simplified)),
+        remarks=(
+            *remarks(scene, groups, chosen),
+            *remarks_on_laws(scene, whole.contact.rules, closed.report),
+            *remarks_on_stones(closed.simplified),
+        ),
         stages=_stages(scene, whole, groups, origin),
     )
 

@@ -1,15 +1,18 @@
-"""Remarks for the author of a scene: keys without effect, and limits of its stresses."""
+"""Remarks for the author of a scene: keys and laws without effect, and limits of its stresses."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from mechanics.scene.scene import Fidelity
+from mechanics.scene.laws.mortar import held_tension
+from mechanics.scene.scene import Fidelity, LawRule
 from pipelines.run.fidelity import Modelled
 from pipelines.scene.file import SceneFile
 from pipelines.scene.selection import STRESS, Groups
 from survey.geometry.solids import volume_of
+from survey.joints.report import ClosingReport
+from survey.joints.settings import JointMode
 from survey.simplify.simplify import BlockyStone
 
-__all__ = ["remarks", "remarks_on_stones"]
+__all__ = ["remarks", "remarks_on_laws", "remarks_on_stones"]
 
 _MEASURED = ("points", "photograph")  # sources of faces that were measured, not imported with a solid
 _STRESS = 'ask for their stress by stress in [output], or give default = "deformable" in [bodies]'
@@ -31,6 +34,50 @@ def remarks(scene: SceneFile, groups: Groups, modelled: Mapping[str, Modelled]) 
         *_of_ring(scene, modelled),
         *_of_surroundings(scene, modelled),
     )
+
+
+def remarks_on_laws(scene: SceneFile, rules: Sequence[LawRule], closing: ClosingReport) -> tuple[str, ...]:
+    """Return the laws that hold in no joint, and those that hold less tension than they state, with their places.
+
+    Parameters
+    ----------
+    scene : as its author wrote it
+    rules : its laws, in their order, between groups of stones
+    closing : the joints; none are known where stones stay as surveyed
+    """
+    where, found = scene.document.where, list[str]()
+    for one in scene.laws:
+        values = one.entry.values
+        if not values.get("tension") or not one.law.friction:
+            continue
+        held = held_tension(one.law.friction, values["tension"], values["shear"])
+        if held < values["tension"]:
+            enough = one.law.friction * values["tension"]
+            found.append(
+                f"{where(*one.entry.path, 'tension')}: of tension = {values['tension']:g} Pa no more than "
+                f"shear/friction = {held:.4g} Pa is held; a shear of {enough:.4g} Pa would hold all of it"
+            )
+    if closing.mode is JointMode.AS_SURVEYED:
+        return tuple(found)
+    holding = [0] * len(rules)
+    joints = [0] * len(rules)
+    for joint in closing.joints:
+        one, other = joint.stones
+        meant = [n for n, rule in enumerate(rules) if _lies_between(rule, one, other)]
+        for number in meant:
+            joints[number] += 1
+        if meant:
+            holding[meant[-1]] += 1
+    for law, met, held in zip(scene.laws, joints, holding, strict=True):
+        if not held:
+            reason = "later laws hold in all of them" if met else "it holds only where they come to meet"
+            joined = f"{met} joints lie between its stones" if met else "no joint lies between its stones"
+            found.append(f"{where(*law.entry.path)}: [[laws]] has no effect: {joined}; {reason}")
+    return tuple(found)
+
+
+def _lies_between(rule: LawRule, one: str, other: str) -> bool:
+    return (one in rule.first and other in rule.second) or (other in rule.first and one in rule.second)
 
 
 def remarks_on_stones(stones: Sequence[BlockyStone]) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from mechanics.arrays import Array, Bools
 from mechanics.scene.laws.bonds import with_bonds
 from mechanics.scene.laws.dry_joint import DryJoint, DynamicFriction, Friction, at_limit
 from mechanics.scene.laws.law import REST, SPRING, Approach, Law, Springs, Terms
-from mechanics.scene.laws.mortar import MortarJoint, held_tension
+from mechanics.scene.laws.mortar import MortarJoint, check_tension
 from mechanics.stones.settings import Setting, check_settings
 
 __all__ = ["ElasticJoint"]
@@ -51,6 +51,7 @@ class ElasticJoint:
 
     def __post_init__(self) -> None:
         check_settings("elastic joint", self)
+        check_tension("elastic joint", self.friction, self.tension, self.shear)
         _ = self._strength  # checks the dynamic friction
 
     @property
@@ -60,7 +61,7 @@ class ElasticJoint:
 
     @property
     def _bonded(self) -> bool:
-        return self.shear > 0 or held_tension(self.friction, self.tension, self.shear) > 0
+        return self.shear > 0 or self.tension > 0
 
     @property
     def _strength(self) -> Law:

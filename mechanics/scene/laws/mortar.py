@@ -10,8 +10,9 @@ from mechanics.scene.laws.bonds import BROKEN, bonded, with_bonds
 from mechanics.scene.laws.dry_joint import DryJoint, DynamicFriction, Friction, at_limit, slid
 from mechanics.scene.laws.law import BOND, REST, SLIDING, SLIP, Approach, Terms
 from mechanics.stones.settings import Setting, check_settings
+from moma.errors import SceneError
 
-__all__ = ["MortarJoint", "held_tension"]
+__all__ = ["MortarJoint", "check_tension", "held_tension"]
 
 
 # a bond at its limit has broken
@@ -22,6 +23,27 @@ _CREPT = 1e-3  # in shear, when it has crept by this part [-], or slides faster 
 def held_tension(friction: float, tension: float, shear: float) -> float:
     """Return the tension that a joint carries [Pa]: `tension`, cut at the apex c_t/μ of its Mohr–Coulomb cone."""
     return min(tension, shear / friction) if friction > 0 else tension
+
+
+def check_tension(where: str, friction: float, tension: float, shear: float) -> None:
+    """Refuse a tension of which nothing is held: with friction and without shear strength the cone ends at zero.
+
+    Raises
+    ------
+    SceneError : naming the place, the strengths and a remedy
+
+    >>> check_tension("mortar joint", 0.5, 1e5, 0.0)
+    Traceback (most recent call last):
+    moma.errors.SceneError: mortar joint: tension = 100000.0 holds nothing with friction = 0.5 and shear = 0; give a \
+shear strength, of 50000 Pa or more to hold all of it, or tension = 0 for a dry joint
+    """
+    if tension > 0 and held_tension(friction, tension, shear) == 0:
+        raise SceneError(
+            f"tension = {tension!r} holds nothing with friction = {friction:g} and shear = 0",
+            where=where,
+            remedy=f"give a shear strength, of {friction * tension:.6g} Pa or more to hold all of it, or tension = 0 "
+            "for a dry joint",
+        )
 
 
 @dataclass(frozen=True)
@@ -40,6 +62,7 @@ class MortarJoint:
 
     def __post_init__(self) -> None:
         check_settings("mortar joint", self)
+        check_tension("mortar joint", self.friction, self.tension, self.shear)
         _ = self._dry  # checks the dynamic friction
 
     @property

@@ -215,6 +215,36 @@ def test_keys_without_effect_are_named_with_their_line(session, text, line, said
     assert found[0].startswith(f"scene.toml:{line}: ")
 
 
+MORTAR = '[[laws]]\ntype = "mortar"\nfriction = 0.5\ntension = 2e4\nshear = 2e4\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "said"),
+    [
+        (LOW + MORTAR, None, None),
+        (LOW + MORTAR.replace("shear = 2e4", "shear = 4e3"), 17, "no more than shear/friction = 8000 Pa is held"),
+        (LOW + MORTAR.replace("friction = 0.5", "friction = 0").replace("r = 2e4", "r = 0"), None, None),
+        (
+            LOW + MORTAR + 'between = [["course = 1"], ["course = 4"]]\n',
+            14,
+            "[[laws]] has no effect: no joint lies between its stones",
+        ),
+        (LOW + MORTAR + 'between = [["course = 1"], ["course = 2"]]\n' + MORTAR, 14, "later laws hold in all of them"),
+        (LOW + MORTAR + MORTAR + 'between = [["course = 1"], ["course = 2"]]\n', None, None),
+        (LOW + "[joints]\nmode = 'as-surveyed'\n" + MORTAR + 'between = [["W01-01"], ["W04-01"]]\n', None, None),
+    ],
+)  # fmt: skip
+def test_laws_without_effect_and_tension_beyond_the_cone_are_named_with_their_line(session, text, line, said):
+    remarks = assemble(parse_scene(text, "scene.toml"), session).remarks
+    found = [one for one in remarks if "[mesh]" not in one]
+    if said is None:
+        assert found == []
+        return
+    (remark,) = found
+    assert remark.startswith(f"scene.toml:{line}: ")
+    assert said in remark
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

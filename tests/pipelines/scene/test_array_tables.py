@@ -22,6 +22,7 @@ from tests.pipelines.scenes import TWO_COURSES, assembled, fails_at_line
 
 STONE = "[materials.stone]\ndensity = 2000\nyoung = 1e10\npoisson = 0.2\n"
 MORTAR = '[[laws]]\ntype = "mortar"\nfriction = 0.5\ntension = 1e5\nshear = 2e5\n'
+SPRINGS = '[[laws]]\ntype = "elastic_joint"\nfriction = 0.5\nnormal_stiffness = 1e9\nshear_stiffness = 4e8\n'
 SETTLEMENT = '[[loads]]\ntype = "settlement"\nstones = ["S1"]\ndisplacement = [0, 0, -0.02]\nduration = 5\n'
 
 FORCE = "[[loads]]\ntype = 'force'\nstones = ['S']\n"
@@ -38,7 +39,7 @@ def test_every_law_is_made_of_its_keys():
         + 'dynamic_friction = 0.4\n[[laws]]\ntype = "dry"\nfriction = 0.3\nrestitution = 0.1\n'
         + '[[laws]]\ntype = "cohesive_zone"\nfriction = 0.5\ntension = 3e5\nshear = 4e5\n'
         + "energy_tension = 50\nenergy_shear = 80\n"
-        + '[[laws]]\ntype = "elastic_joint"\nfriction = 0.5\nnormal_stiffness = 1e9\nshear_stiffness = 4e8\n'
+        + SPRINGS
         + '[[laws]]\ntype = "lennard_jones"\nfriction = 0.2\nforce = 5\ndistance = 1e-3\n'
     )
     assert [one.law for one in scene.laws] == [
@@ -115,6 +116,16 @@ def test_the_general_law_and_the_contact_points_are_those_of_the_contact_table()
             MORTAR + "dynamic_friction = 0.6\n",
             1,
             "dynamic_friction = 0.6; give from 0 up to the static friction, 0.5",
+        ),
+        (
+            MORTAR.replace("2e5", "0"),
+            1,
+            "tension = 100000.0 holds nothing with friction = 0.5 and shear = 0; give a shear strength, of 50000 Pa",
+        ),
+        (
+            SPRINGS + "tension = 2e4\n",
+            1,
+            "tension = 20000.0 holds nothing with friction = 0.5 and shear = 0; give a shear strength, of 10000 Pa",
         ),
         (MORTAR + "materials = ['stone']\n", 6, "1 materials; give two names"),
         (MORTAR + "materials = ['stone', 'ston']\n", 6, "unknown material 'ston'; did you mean 'stone'?"),
