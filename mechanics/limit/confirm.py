@@ -3,6 +3,11 @@
 *Held*: the run ends in equilibrium, every stone in balance. *Lost*: it ends in a collapse. Between the largest load
 that is held and the least that is lost lies the limit of the dynamics from rest; a load that grows slowly may be held
 up to 6 % further, or less far, as friction without dilatancy has no unique limit.
+
+How alike the mechanism of a candidate and the collapse of the dynamics are says the cosine between the velocities v of
+the one and the displacements d of the other, of the centres of all stones, weighted by mass:
+
+    Σ m v·d / √(Σ m v² · Σ m d²)
 """
 
 from collections.abc import Callable
@@ -10,14 +15,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mechanics.arrays import Array, Bools
 from mechanics.dynamics.outcome import Outcome
 from mechanics.dynamics.progress import Listener, silent
 from mechanics.limit.assembly import Assembly
+from mechanics.limit.limit_load import Mechanism
 from mechanics.limit.live_loads import LiveLoad
 from mechanics.scene.scene import TimeSettings
 from mechanics.simulate import simulate
 
-__all__ = ["Confirmation", "Trial", "confirm"]
+__all__ = ["Confirmation", "Likeness", "Trial", "confirm", "likeness"]
 
 
 # load over the candidate of the first two runs, and by how much each further one goes on [-]
@@ -26,6 +33,8 @@ _NEAR, _WIDER = 0.03, 0.06
 _FALL, _STEPS = 2.5e-3, 500
 # move over its width from which a stone that falls has collapsed [-]
 _MOVED = 0.05
+# way over that of the stone that moves farthest from which a stone belongs to a collapse [-]
+_BELONGS = 0.1
 
 
 @dataclass(frozen=True)
@@ -38,12 +47,14 @@ class Trial:
     outcome : of the run
     steps : of it
     unsolved : steps of it that were not solved
+    displacement : (nb, 3) of the centres of the stones' corners at its end [m]
     """
 
     multiplier: float
     outcome: Outcome
     steps: int
     unsolved: int
+    displacement: Array
 
 
 @dataclass(frozen=True)
@@ -61,11 +72,56 @@ class Confirmation:
     lost: float
     trials: tuple[Trial, ...]
 
+    @property
+    def collapse(self) -> Trial | None:
+        """Run of the least load that is lost; None where none is."""
+        return next((one for one in self.trials if one.multiplier == self.lost), None)
+
     def agrees(self, candidate: float) -> bool:
         """Return True if the limit of the dynamics lies within 3 % of a candidate."""
         return (
             self.held >= (1.0 - _NEAR) * candidate - 1e-12 and self.lost <= (1.0 + _NEAR) * candidate + 1e-12
         )
+
+
+@dataclass(frozen=True)
+class Likeness:
+    """Comparison of the mechanism of a candidate with the collapse of the dynamics.
+
+    Attributes
+    ----------
+    cosine : between velocities and displacements, weighted by mass [-]
+    mechanism, collapse : share of the mass that moves in each, with more than a tenth of the largest motion [-]
+    common : mass that moves in both, over the mass that moves in either [-]
+    """
+
+    cosine: float
+    mechanism: float
+    collapse: float
+    common: float
+
+
+def likeness(on: Assembly, mechanism: Mechanism, displacement: Array) -> Likeness:
+    """Return how alike a mechanism and the displacements (nb, 3) of a collapse [m] are."""
+    mass, centre = on.model.mass[on.free], on.state.centre[on.free]
+    corners = [on.model.scene.blocks[body].vertices.mean(axis=0) for body in on.free]
+    velocity = mechanism.velocity[on.free]
+    moves = velocity[:, :3] + np.cross(velocity[:, 3:], np.array(corners) - centre)
+    falls = displacement[on.free]
+    both = float(np.sqrt((mass @ (moves**2).sum(axis=1)) * (mass @ (falls**2).sum(axis=1))))
+    one, other = _belongs(moves), _belongs(falls)
+    return Likeness(
+        cosine=float(mass @ (moves * falls).sum(axis=1)) / (both or 1.0),
+        mechanism=float(mass[one].sum() / mass.sum()),
+        collapse=float(mass[other].sum() / mass.sum()),
+        common=float(mass[one & other].sum() / (mass[one | other].sum() or 1.0)),
+    )
+
+
+def _belongs(motion: Array) -> Bools:
+    size = np.linalg.norm(motion, axis=1)
+    moves: Bools = size > _BELONGS * size.max(initial=0.0)
+    return moves
 
 
 def confirm(
@@ -120,4 +176,5 @@ def _trial(
     time = TimeSettings(step, theta=1.0, duration=_STEPS * step, collapse_displacement=_MOVED)
     loaded = replace(live.applied(on, multiplier), time=time)
     result = simulate(loaded, progress, stop=stop)
-    return Trial(multiplier, result.outcome, result.steps, result.errors.unconverged_steps)
+    displacement = np.array([body.displacement.mean(axis=0) for body in result.bodies])
+    return Trial(multiplier, result.outcome, result.steps, result.errors.unconverged_steps, displacement)

@@ -167,31 +167,52 @@ def mechanism(on: Assembly, velocity: Array, moving: Array | None = None) -> Mec
     return Mechanism(every / unit, speed / unit, u[:, 0] > _STILL, np.linalg.norm(u[:, 1:], axis=1) > _STILL)
 
 
+@dataclass(frozen=True)
+class _Ending:
+    """Where an iteration ended: λ, forces (nc, 3) [N] and strength of its last programme; as in `LimitLoad`."""
+
+    multiplier: float
+    force: Array
+    strength: Strength
+    programmes: int
+    converged: bool
+    beyond: float
+
+
 def _candidate(on: Assembly, programme: Programme, bound: LimitLoad) -> LimitLoad:
-    """Return the lower of the loads to which the iteration comes from the bound, and from the dead load."""
+    """Return the lower of the loads to which the iteration comes from the bound, and from the dead load.
+
+    Its mechanism is that of the last strength without the charges, which would open joints a little.
+    """
     least = np.zeros((len(on.contacts), 3))
     least[:, 0] = 1.0
     resting = Programme(on, None, bound.load).solve(on.strength, cost=least / len(least))
-    first = _iterated(on, programme, bound, bound.force, _FAR)
+    first = _iterated(on, programme, bound.force, _FAR)
     known = first.multiplier if first.converged else None
-    found = [first, _iterated(on, programme, bound, resting.force, 0, known)]
+    found = [first, _iterated(on, programme, resting.force, 0, known)]
     ended = [one for one in found if one.converged] or [one for one in found if np.isfinite(one.multiplier)]
-    if not ended:
-        return found[0]
-    lowest = min(ended, key=lambda one: one.multiplier)
-    programmes = 1 + sum(one.programmes for one in found)
-    return replace(lowest, highest=max(one.multiplier for one in ended), programmes=programmes)
+    lowest = min(ended or found[:1], key=lambda one: one.multiplier)
+    moving: Answer = programme.solve(lowest.strength)
+    return LimitLoad(
+        flow=Flow.COULOMB,
+        load=bound.load,
+        multiplier=lowest.multiplier,
+        force=lowest.force,
+        mechanism=mechanism(on, moving.velocity),
+        programmes=2 + sum(one.programmes for one in found),
+        converged=lowest.converged,
+        beyond=lowest.beyond,
+        highest=max(one.multiplier for one in ended or [lowest]),
+    )
 
 
 def _iterated(
-    on: Assembly, programme: Programme, bound: LimitLoad, begin: Array, far: int, known: float | None = None
-) -> LimitLoad:
+    on: Assembly, programme: Programme, begin: Array, far: int, known: float | None = None
+) -> "_Ending":
     """Iterate the fictitious strength from forces (nc, 3), its slope falling to almost zero.
 
     The first programmes, `far` of them, go as far as they like; what follows stays near the one before. It ends early,
     without forces that meet the law, where it stays at a load that is `known`.
-
-    The mechanism is that of the last strength without the charges, which would open joints a little.
     """
     own = on.strength
     slope, held = own.friction, _normal(own, begin)
@@ -213,18 +234,7 @@ def _iterated(
         again = known is not None and len(last) == _AGAIN and np.abs(last - known).max() <= _SAME * known
         if ended or again or len(multipliers) == _MOST:
             break
-    moving: Answer = programme.solve(strength)
-    return LimitLoad(
-        flow=Flow.COULOMB,
-        load=bound.load,
-        multiplier=found.multiplier,
-        force=found.force,
-        mechanism=mechanism(on, moving.velocity),
-        programmes=len(multipliers) + 1,
-        converged=ended,
-        beyond=_beyond(on, found.force),
-        highest=found.multiplier,
-    )
+    return _Ending(found.multiplier, found.force, strength, len(multipliers), ended, _beyond(on, found.force))
 
 
 def _normal(strength: Strength, force: Array) -> Array:

@@ -24,8 +24,8 @@ __all__ = ["Answer", "Ending", "Programme"]
 _SMOOTH = 1e-9
 # tolerances asked of Clarabel [-]
 _GAP, _FEASIBLE = 1e-9, 1e-9
-# those of a programme that is one of many on the way
-_ROUGH = 1e-7
+# that of a programme that is one of many on the way, solved without scaling and refinement: in half the time
+_ROUGH = 1e-6
 
 
 # statuses of Clarabel
@@ -123,9 +123,10 @@ class Programme:
 
         Parameters
         ----------
-        clamping : charge on the sum of all normal forces over the weight, in units of λ
+        clamping : charge on the sum of all normal forces over the weight, in units of λ; with one, the answer is one of
+            many on a way, and rough
         cost : (nc, 3) c of the forces [-]
-        near : (nc,) normal forces near which the new ones stay; the answer is then one of many on a way, and rough [N]
+        near : (nc,) normal forces near which the new ones stay [N]
         pull : charge on the squares of how far they are from these, over their mean and the weight, in units of λ
 
         Raises
@@ -146,7 +147,9 @@ class Programme:
             held = near / self._unit
             squares[:count:3] = pull * charge / (float(np.abs(held).mean()) or 1.0)
             objective[:count:3] -= squares[:count:3] * held
-        status, x, z = self._solved(cones, self._balance, "zero", -self._dead, objective, squares)
+        status, x, z = self._solved(
+            cones, self._balance, "zero", -self._dead, objective, squares, clamping > 0
+        )
         velocity, none = (self._row * z[: len(self._row)]).reshape(-1, 6), np.zeros((count // 3, 3))
         if status in _ENDLESS:
             return Answer(Ending.ENDLESS, float("inf"), none, np.zeros_like(velocity))
@@ -194,16 +197,20 @@ class Programme:
         right: Array,
         objective: Array,
         squares: Array | None = None,
+        rough: bool = False,
     ) -> tuple[str, Array, Array]:
-        """Return status, unknowns and dual variables; the rows of the balance come first."""
+        """Return status, unknowns and dual variables; the rows of the balance come first.
+
+        What cannot be solved roughly is solved with care.
+        """
         clarabel = load_clarabel("limit load", "pip install clarabel")
         first = clarabel.ZeroConeT if kind == "zero" else clarabel.NonnegativeConeT
         settings = clarabel.DefaultSettings()
         settings.verbose, settings.max_threads = False, 1
-        quadratic = csc_array(diags_array(np.zeros(len(objective)) if squares is None else squares))
-        rough = squares is not None and bool(squares.any())
+        settings.equilibrate_enable = settings.iterative_refinement_enable = not rough
         settings.tol_gap_abs = settings.tol_gap_rel = _ROUGH if rough else _GAP
         settings.tol_feas = _ROUGH if rough else _FEASIBLE
+        quadratic = csc_array(diags_array(np.zeros(len(objective)) if squares is None else squares))
         answer = clarabel.DefaultSolver(
             quadratic,
             objective,
@@ -218,6 +225,8 @@ class Programme:
             settings,
         ).solve()
         status = str(answer.status)
+        if rough and status != _SOLVED[0]:
+            return self._solved(cones, balance, kind, right, objective, squares)
         if status not in _SOLVED + _NO_BALANCE + _ENDLESS:
             raise SolverError(
                 f"Clarabel came to no answer: {status}",

@@ -8,7 +8,7 @@ import numpy as np
 
 from mechanics.dynamics.outcome import Outcome
 from mechanics.limit.assembly import Assembly
-from mechanics.limit.confirm import Confirmation, confirm
+from mechanics.limit.confirm import Confirmation, confirm, likeness
 from mechanics.limit.kinematic import Kinematics, kinematics
 from mechanics.limit.limit_load import Flow, LimitLoad, Mechanism, limit_load
 from mechanics.limit.live_loads import Acceleration, LiveLoad
@@ -38,6 +38,7 @@ FALLS = "falls under its own weight"
 
 _DROP = 0.8  # share of the peak of a capacity curve at which the way counts as ultimate [-]
 _ONE = 1.03  # highest over lowest candidate up to which they are one [-]
+_ALIKE = 0.9  # cosine between mechanism and collapse from which they are one [-]
 _MOVES = 0.01  # speed over that of the fastest stone from which a stone belongs to a mechanism [-]
 
 Confirm = Callable[[LiveLoad, float], Confirmation] | None
@@ -139,7 +140,7 @@ def _load(on: Assembly, question: LoadQuestion, confirming: Confirm, leading: Le
     if whole and np.isfinite(lowest.multiplier):
         told["tilt"] = float(np.degrees(np.arctan(lowest.multiplier)))
     if confirming is not None and candidate is not None:
-        told["confirmation"] = _confirmed(confirming(live, candidate.multiplier), candidate.multiplier)
+        told["confirmation"] = _confirmed(on, confirming(live, candidate.multiplier), candidate)
     if isinstance(live, Acceleration) and np.isfinite(lowest.multiplier):
         told["kinematics"], checked = _kinematics(on, live, lowest, code if whole else None)
         if checked:
@@ -197,12 +198,23 @@ def _candidate(on: Assembly, live: LiveLoad, bound: LimitLoad) -> LimitLoad | No
     return candidate if np.isfinite(candidate.multiplier) else None
 
 
-def _confirmed(found: Confirmation, candidate: float) -> dict[str, Any]:
+def _confirmed(on: Assembly, found: Confirmation, candidate: LimitLoad) -> dict[str, Any]:
+    fallen = found.collapse
+    alike = None if fallen is None else likeness(on, candidate.mechanism, fallen.displacement)
     return {
         "held": found.held or None,
         "lost": _number(found.lost),
-        "agrees": found.agrees(candidate),
-        "runs": [asdict(trial) | {"outcome": str(trial.outcome)} for trial in found.trials],
+        "agrees": found.agrees(candidate.multiplier),
+        "likeness": None if alike is None else asdict(alike),
+        "runs": [
+            {
+                "multiplier": trial.multiplier,
+                "outcome": str(trial.outcome),
+                "steps": trial.steps,
+                "unsolved": trial.unsolved,
+            }
+            for trial in found.trials
+        ],
         "undecided": sum(
             trial.outcome not in (Outcome.EQUILIBRIUM, Outcome.COLLAPSED) for trial in found.trials
         ),
@@ -329,7 +341,11 @@ def _dynamics(one: dict[str, Any]) -> str:
     found = one["confirmation"]
     held = "nothing held" if found["held"] is None else f"held at {found['held']:.4g}"
     lost = "nothing lost" if found["lost"] is None else f"lost at {found['lost']:.4g}"
-    return f"; by the dynamics {'CONFIRMED' if found['agrees'] else 'NOT CONFIRMED'}: {held}, {lost}"
+    text = f"; by the dynamics {'CONFIRMED' if found['agrees'] else 'NOT CONFIRMED'}: {held}, {lost}"
+    if found["likeness"] is None:
+        return text
+    cosine = found["likeness"]["cosine"]
+    return f"{text}, falling {'as' if cosine >= _ALIKE else 'NOT AS'} the mechanism (cosine {cosine:.2f})"
 
 
 def _collapse(one: dict[str, Any]) -> str:

@@ -62,8 +62,7 @@ def remarks_on_laws(scene: SceneFile, rules: Sequence[LawRule], closing: Closing
     holding = [0] * len(rules)
     joints = [0] * len(rules)
     for joint in closing.joints:
-        one, other = joint.stones
-        meant = [n for n, rule in enumerate(rules) if _lies_between(rule, one, other)]
+        meant = [n for n, rule in enumerate(rules) if _lies_between(rule, *joint.stones)]
         for number in meant:
             joints[number] += 1
         if meant:

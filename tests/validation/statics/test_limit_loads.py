@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from benchmarks.limit_scenes import FRICTION, WALLS
 from mechanics.limit.assembly import assembly
 from mechanics.limit.limit_load import Flow, limit_load
 from mechanics.limit.live_loads import Acceleration, PointForce
@@ -15,38 +16,6 @@ from tests.validation.scenes import ground
 from tests.validation.statics.limit_analysis import multiplier
 
 ALONG = Acceleration((1.0, 0.0, 0.0))
-STONE = (0.4, 0.175)
-FRICTION = 0.65
-
-
-def _courses(names, order):
-    return [names[name] for name in order.split()]
-
-
-_WINDOW = "Wu We Wu We Wu"
-_W03 = {"Fe": [1] * 4, "Fu": [0.5, 1, 1, 1, 0.5], "We": [1, 0.5, -1, 0.5, 1], "Wu": [0.5, 1, -1, 1, 0.5]}
-_W04 = {
-    "Fe": [0.5, 1, 1, 1, 1, 0.5],
-    "Fu": [1] * 5,
-    "Wu": [1, -1, 1, -1, 1],
-    "We": [0.5, 0.5, -1, 0.5, 0.5, -1, 0.5, 0.5],
-}
-_W05 = {"Fe": [0.5, 1, 1, 0.5], "Fu": [1] * 3, "Wu": [1, -1, 1], "We": [0.5, 0.5, -1, 0.5, 0.5]}
-_W06 = {
-    "Fe": [0.5, *[1] * 6, 0.5],
-    "Fu": [1] * 7,
-    "Wu": [0.5, 1, -1, 1, 1, -1, 1, 0.5],
-    "We": [1, 0.5, -1, 0.5, 1, 0.5, -1, 0.5, 1],
-}
-# courses, stones, associative and non-associative λ (Ferris & Tin-Loi 2001, Gilbert et al. 2006, via HybriDFEM)
-WALLS = {
-    "W01": (bond(5, 6, halves_first=True), 33, 0.64286, 0.64),
-    "W02": (bond(5, 10, halves_first=True), 55, 0.58, 0.563),
-    "W03": (_courses(_W03, f"Fe Fu Fe {_WINDOW} Fe Fu Fe"), 46, 0.40369, 0.356),
-    "W04": (_courses(_W04, f"Fe Fu Fe {_WINDOW} Fe Fu Fe"), 55, 0.33195, 0.264),
-    "W05": (_courses(_W05, f"Fe Fu Fe {_WINDOW} Fe Fu Fe {_WINDOW} Fe Fu Fe"), 61, 0.23964, 0.215),
-    "W06": (_courses(_W06, f"Fe Fu Fe Fu {_WINDOW} Fu Fe Fu {_WINDOW} Fu Fe Fu Fe"), 146, 0.34782, 0.297),
-}
 
 
 def standing(blocks, law=None):
@@ -55,14 +24,14 @@ def standing(blocks, law=None):
 
 @pytest.mark.parametrize("name", WALLS)
 def test_walls_have_their_published_loads(name):
-    courses, stones, associative, published = WALLS[name]
-    on = standing(running_bond(courses, *STONE))
-    assert len(on.free) == stones
+    one = WALLS[name]
+    on = standing(one.blocks())
+    assert len(on.free) == one.stones
     bound = limit_load(on, ALONG)
-    assert bound.multiplier == pytest.approx(associative, rel=3e-5)
+    assert bound.multiplier == pytest.approx(one.bound, rel=3e-5)
     candidate = limit_load(on, ALONG, Flow.COULOMB)
     assert candidate.converged
-    assert candidate.multiplier == pytest.approx(published, rel=1e-2)
+    assert candidate.multiplier == pytest.approx(one.candidate, rel=1e-2)
     assert candidate.multiplier < bound.multiplier
 
 
@@ -99,8 +68,7 @@ def test_bonded_stones_bear_what_their_mortar_does():
 
 def test_the_mechanism_balances_the_power_of_all_loads():
     """Dry joints dissipate nothing where flow is associative: dead and live load do no work together."""
-    courses, *_ = WALLS["W03"]
-    on = standing(running_bond(courses, *STONE))
+    on = standing(WALLS["W03"].blocks())
     found = limit_load(on, ALONG)
     power = found.mechanism.velocity[on.free].ravel() @ (on.dead + found.multiplier * ALONG(on))
     assert abs(power) < 1e-6 * (found.mechanism.velocity[on.free].ravel() @ ALONG(on))
@@ -109,8 +77,7 @@ def test_the_mechanism_balances_the_power_of_all_loads():
 
 
 def test_a_candidate_slides_without_opening():
-    courses, *_ = WALLS["W01"]
-    on = standing(running_bond(courses, *STONE))
+    on = standing(WALLS["W01"].blocks())
     found = limit_load(on, ALONG, Flow.COULOMB)
     u = (on.lift.T @ found.mechanism.velocity[on.free].ravel()).reshape(-1, 3)
     bears = found.force[:, 0] > 1e-3 * on.weight / len(on.free)

@@ -1,11 +1,11 @@
 """Thrust, least thickness, façades and oscillators: limit states against closed forms and the reference cases."""
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
 
+from benchmarks.limit_scenes import FACADES
 from mechanics.limit.assembly import assembly
 from mechanics.limit.confirm import confirm
 from mechanics.limit.joints import resultants
@@ -120,67 +120,30 @@ def test_panels_have_their_multipliers(stones, courses, friction, value):
     assert limit_load(on, ALONG).multiplier == pytest.approx(value, rel=2e-5)
 
 
-def facade(stones, courses, returns, friction):
-    """A façade of stones 0.08 x 0.04 x 0.028 m along x, with bonded return walls at both ends."""
-    length, thick, high = 0.08, 0.04, 0.028
-    width, deep, blocks = stones * length, returns * length + thick, [ground(half=2.0)]
-    for course in range(courses):
-        whole = course % 2 == 0
-        inset = 0.0 if whole else thick
-        ends = [(0.0, thick), (width - thick, width)]
-        lying = [(a, 0.0, b, thick) for a, b in _row(inset, width - inset, length)]
-        if returns:
-            lying += [(x0, a, x1, b) for a, b in _row(thick - inset, deep, length) for x0, x1 in ends]
-        elif not whole:
-            lying += [(x0, 0.0, x1, thick) for x0, x1 in ends]
-        blocks += [
-            cuboid(f"{course}-{number}", (x0, y0, course * high), (x1, y1, (course + 1) * high))
-            for number, (x0, y0, x1, y1) in enumerate(lying)
-        ]
-    return standing(blocks, friction)
-
-
-def _row(start, end, length):
-    return pairwise([*np.arange(start, end - 1e-9, length), end])
-
-
-FACADES = [
-    (4, 6, 0, 0.7, 0.2381, 0.2381),
-    (6, 10, 0, 0.7, 0.14286, 0.14286),
-    (4, 6, 2, 0.7, 0.59992, 0.68301),
-    (4, 10, 2, 0.7, 0.41715, 0.65024),
-    (6, 10, 3, 0.7, 0.46866, 0.60397),
-]
-
-
-@pytest.mark.parametrize(("stones", "courses", "returns", "friction", "out", "inwards"), FACADES)
-def test_facades_with_returns_have_their_multipliers(stones, courses, returns, friction, out, inwards):
+@pytest.mark.parametrize("name", [name for name, one in FACADES.items() if one.bound is not None])
+def test_facades_with_returns_have_their_multipliers(name):
     """W09, an upper bound in space with exact cones: to the digits given."""
-    on = facade(stones, courses, returns, friction)
-    for way, value in ((-1.0, out), (1.0, inwards)):
-        assert limit_load(on, Acceleration((0.0, way, 0.0))).multiplier == pytest.approx(value, abs=1e-5)
-
-
-@pytest.mark.parametrize(("stones", "courses", "returns", "out"), [(4, 6, 2, 0.4), (4, 10, 2, 0.39076)])
-def test_facades_with_less_friction_bear_less(stones, courses, returns, out):
-    """W09, μ = 0.4."""
-    on = facade(stones, courses, returns, 0.4)
-    assert limit_load(on, Acceleration((0.0, -1.0, 0.0))).multiplier == pytest.approx(out, abs=1e-5)
+    one = FACADES[name]
+    assert limit_load(one.assembly(), one.live).multiplier == pytest.approx(one.bound, abs=1e-5)
 
 
 @pytest.mark.parametrize(
-    ("stones", "courses", "friction", "way", "lowest", "highest"),
-    [(4, 6, 0.7, -1.0, 0.473, 0.522), (4, 6, 0.6, -1.0, 0.455, 0.5325), (4, 10, 0.7, -1.0, 0.390, 0.409)],
+    ("name", "lowest"),
+    [("4 × 6, 2, 0.7, out", 0.473), ("4 × 6, 2, 0.6, out", 0.455), ("4 × 10, 2, 0.7, out", 0.390)],
 )
-def test_states_of_coulomb_friction_lie_apart_in_space(stones, courses, friction, way, lowest, highest):
-    """Both beginnings end in forces that meet Coulomb's law to 1 %; the lower load is the candidate."""
-    on = facade(stones, courses, 2, friction)
-    found = limit_load(on, Acceleration((0.0, way, 0.0)), Flow.COULOMB)
+def test_states_of_coulomb_friction_lie_apart_in_space(name, lowest):
+    """Both beginnings end in forces that meet Coulomb's law to 1 %; the lower load is the candidate.
+
+    Where the higher ends depends on rounding: from 0.51 to 0.54 for the first façade.
+    """
+    one = FACADES[name]
+    on = one.assembly()
+    found = limit_load(on, one.live, Flow.COULOMB)
     assert found.converged
     assert found.beyond < 0.01
     assert found.multiplier == pytest.approx(lowest, rel=0.01)
-    assert found.highest == pytest.approx(highest, rel=0.01)
-    left = on.lift @ found.force.ravel() + on.dead + found.multiplier * Acceleration((0.0, way, 0.0))(on)
+    assert 1.03 * found.multiplier < found.highest < limit_load(on, one.live).multiplier
+    left = on.lift @ found.force.ravel() + on.dead + found.multiplier * one.live(on)
     assert np.abs(left).max() < 1e-5 * on.weight
 
 

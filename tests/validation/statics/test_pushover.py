@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from benchmarks.limit_scenes import WALLS
 from mechanics.limit.assembly import assembly
 from mechanics.limit.kinematic import kinematics
 from mechanics.limit.limit_load import Flow, limit_load
@@ -14,9 +15,9 @@ from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import ContactSettings, Scene
 from moma.errors import SolverError
-from tests.validation.masonry import cuboid, running_bond
+from tests.validation.masonry import cuboid
 from tests.validation.scenes import G, ground
-from tests.validation.statics.test_limit_loads import ALONG, STONE, WALLS, standing
+from tests.validation.statics.test_limit_loads import ALONG, standing
 
 WIDE, HIGH = 0.3, 3.0
 
@@ -78,9 +79,9 @@ def test_loads_that_grow_with_time_stay_as_they_are_at_the_start():
 
 
 def test_a_published_wall_bears_its_limit_load_and_less_from_then_on():
-    courses, _, associative, published = WALLS["W03"]
-    _, found, curve = led(running_bond(courses, *STONE), reach=0.1, points=25)
-    assert 0.97 * published < curve.peak < 1.01 * associative
+    wall_03 = WALLS["W03"]
+    _, found, curve = led(wall_03.blocks(), reach=0.1, points=25)
+    assert 0.97 * wall_03.candidate < curve.peak < 1.01 * wall_03.bound
     assert curve.peak == pytest.approx(found.multiplier, rel=0.02)
     calm = curve.multiplier[curve.calm]
     assert calm[-1] < 0.9 * calm[0]
