@@ -22,7 +22,7 @@ def assess(
             metavar="LOAD",
             help='"horizontal x", "horizontal 30" (degrees from x), "tilt y", "force CODE FX FY FZ", '
             '"weight CODE,CODE", "thrust CODE x", "settlement CODE -z" or "thickness"; also several. '
-            "Default: [[assess]] of the scene, or horizontal along x, -x, y and -y.",
+            "Default: [[assess]] of the scene, which may ask more, or horizontal along x, -x, y and -y.",
         ),
     ] = None,
     code: Annotated[
@@ -37,13 +37,6 @@ def assess(
         bool,
         typer.Option("--confirm", help="Confirm each candidate by runs: which loads are held, which lost."),
     ] = False,
-    pushover: Annotated[
-        bool,
-        typer.Option("--pushover", help="Lead each mechanism to collapse by a run: the capacity curve."),
-    ] = False,
-    store: Annotated[
-        bool, typer.Option("--store/--no-store", help="Keep the assessment in the database.")
-    ] = True,
     out: Out = None,
     db: Db = DEFAULT_DB,
     json: Json = False,
@@ -56,7 +49,7 @@ def assess(
 
     folder = out or Path("out") / f"{scene.stem}-assess"
     with progress_bars() as listener:
-        done = answered(scene, db, folder, load or (), listener, confirm, code, store, pushover)
+        done = answered(scene, db, folder, load or (), listener, confirm, code)
     for warning in done.warnings:
         say(f"warning: {warning}")
     print(as_json(done.summary) if json else "\n".join(assessment_lines(done, verbose)))

@@ -24,7 +24,6 @@ from pipelines.scene.site import Site
 __all__ = [
     "FALLS",
     "Answer",
-    "CodeOf",
     "Confirm",
     "Lead",
     "answer",
@@ -41,14 +40,11 @@ _ONE = 1.03  # highest over lowest candidate up to which they are one [-]
 _ALIKE = 0.9  # cosine between mechanism and collapse from which they are one [-]
 _MOVES = 0.01  # speed over that of the fastest stone from which a stone belongs to a mechanism [-]
 
-Confirm = Callable[[LiveLoad, float], Confirmation] | None
-"""Confirmation of a candidate by runs; None: there is none."""
+Confirm = Callable[[LiveLoad, float], Confirmation]
+"""Confirmation of a candidate by runs."""
 
-Lead = Callable[[LiveLoad, LimitLoad, float | None], Pushover] | None
-"""Pushover from a limit load, to a way [m] if one is known; None: there is none."""
-
-CodeOf = tuple[str, Site] | None
-"""Code and site of the check; None: there is none."""
+Lead = Callable[[LiveLoad, LimitLoad, float | None], Pushover]
+"""Pushover from a limit load, to a way [m] if one is known."""
 
 
 @dataclass(frozen=True)
@@ -69,16 +65,14 @@ class Answer:
     curve: Pushover | None = None
 
 
-def answer(
-    on: Assembly, question: Question, confirming: Confirm = None, leading: Lead = None, code: CodeOf = None
-) -> Answer:
+def answer(on: Assembly, question: Question, confirming: Confirm, leading: Lead, site: Site | None) -> Answer:
     """Answer a question about an assembly.
 
     Parameters
     ----------
-    confirming : runs that confirm the candidate of a load
-    leading : runs that lead the stones of its mechanism to collapse
-    code : by which mechanisms of accelerations are checked
+    confirming : runs that confirm the candidate of a load, if the question asks for them
+    leading : runs that lead the stones of its mechanism to collapse, if the question asks for them
+    site : of the check by a code; None: no question asks for one
 
     Raises
     ------
@@ -86,7 +80,7 @@ def answer(
     """
     match question:
         case LoadQuestion():
-            return _load(on, question, confirming, leading, code)
+            return _load(on, question, confirming, leading, site)
         case ThrustQuestion():
             return _thrust(on, question)
         case Thickness():
@@ -119,7 +113,9 @@ def leader(on: Assembly, **listeners: Any) -> Lead:
     return lambda live, found, reach: pushover(on, live, found, reach, **listeners)
 
 
-def _load(on: Assembly, question: LoadQuestion, confirming: Confirm, leading: Lead, code: CodeOf) -> Answer:
+def _load(
+    on: Assembly, question: LoadQuestion, confirming: Confirm, leading: Lead, site: Site | None
+) -> Answer:
     live = question.live
     bound = limit_load(on, live)
     candidate = _candidate(on, live, bound)
@@ -136,16 +132,16 @@ def _load(on: Assembly, question: LoadQuestion, confirming: Confirm, leading: Le
         "candidate_converged": None if candidate is None else candidate.converged,
         "outcome": _outcome(bound.multiplier),
     }
-    whole = isinstance(live, Acceleration) and not live.stones
-    if whole and np.isfinite(lowest.multiplier):
+    if question.whole and np.isfinite(lowest.multiplier):
         told["tilt"] = float(np.degrees(np.arctan(lowest.multiplier)))
-    if confirming is not None and candidate is not None:
+    if question.confirm and candidate is not None:
         told["confirmation"] = _confirmed(on, confirming(live, candidate.multiplier), candidate)
     if isinstance(live, Acceleration) and np.isfinite(lowest.multiplier):
-        told["kinematics"], checked = _kinematics(on, live, lowest, code if whole else None)
+        code = None if question.code is None or site is None else (question.code, site)
+        told["kinematics"], checked = _kinematics(on, live, lowest, code)
         if checked:
             told["code"] = checked
-    curve = _led(live, lowest, told, leading)
+    curve = _led(live, lowest, told, leading) if question.pushover else None
     if curve is not None:
         told["pushover"] = _capacity(curve)
     told["headline"] = _sentence(told)
@@ -154,8 +150,8 @@ def _load(on: Assembly, question: LoadQuestion, confirming: Confirm, leading: Le
 
 
 def _led(live: LiveLoad, found: LimitLoad, told: dict[str, Any], leading: Lead) -> Pushover | None:
-    """Return the capacity curve; None where none is asked for, or no mechanism moves along the load."""
-    if leading is None or not np.isfinite(found.multiplier):
+    """Return the capacity curve; None where no mechanism moves along the load."""
+    if not np.isfinite(found.multiplier):
         return None
     oscillator = told.get("kinematics")
     try:
@@ -222,7 +218,7 @@ def _confirmed(on: Assembly, found: Confirmation, candidate: LimitLoad) -> dict[
 
 
 def _kinematics(
-    on: Assembly, live: Acceleration, found: LimitLoad, code: CodeOf
+    on: Assembly, live: Acceleration, found: LimitLoad, code: tuple[str, Site] | None
 ) -> tuple[dict[str, Any] | None, dict[str, Any] | None]:
     """Return the equivalent oscillator of a mechanism, and its check by a code."""
     try:

@@ -2,7 +2,7 @@
 
 import csv
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +17,9 @@ from mechanics.limit.joints import Resultants, resultants
 from mechanics.results.forecast.plan import loose_blocks
 from mechanics.scene.scene import Fidelity
 from moma.errors import MissingLibraryError, UsageError
-from pipelines.assess.answers import FALLS, Answer, CodeOf, answer, confirmer, leader, refuse_unanswerable
-from pipelines.assess.questions import parse_question, scene_questions
+from pipelines.assess.answers import FALLS, Answer, answer, confirmer, leader, refuse_unanswerable
+from pipelines.assess.codes.check import CODES
+from pipelines.assess.questions import LoadQuestion, Question, parse_question, scene_questions
 from pipelines.draw.capacity_plot import draw_capacity
 from pipelines.draw.mechanism import draw_mechanisms
 from pipelines.reports.assessment import write_assessment
@@ -72,13 +73,13 @@ class Assessment:
     ----------
     folder : of the files
     summary : contents of assessment.json
-    run : its number in the database; None: not kept there
+    run : its number in the database
     warnings : requests that were not met
     """
 
     folder: Path
     summary: dict[str, Any]
-    run: int | None
+    run: int
     warnings: tuple[str, ...]
 
 
@@ -90,10 +91,8 @@ def assess(
     progress: Listener = silent,
     confirm: bool = False,
     code: str | None = None,
-    store: bool = True,
-    pushover: bool = False,
 ) -> Assessment:
-    """Answer how far a scene is from falling, on the stones of a database, and write the answers into a folder.
+    """Answer how far a scene is from falling, on the stones of a database; keep the answers there and in a folder.
 
     Parameters
     ----------
@@ -102,10 +101,9 @@ def assess(
     folder : of the results; earlier ones there are replaced
     loads : in words (`parse_question`); none: those of the scene's [[assess]], or horizontal along x, -x, y, -y
     progress : called at every stage
-    confirm : candidates are confirmed by runs
-    code : by which mechanisms are checked (`pipelines.assess.codes.check.CODES`); needs [site] in the scene
-    store : keep the assessment in the database
-    pushover : mechanisms are led to collapse by runs
+    confirm : candidates of all loads are confirmed by runs, also of those that do not ask for it
+    code : by which mechanisms of pushes on all stones are checked (`pipelines.assess.codes.check.CODES`), where their
+        question names no other; needs [site] in the scene
 
     Raises
     ------
@@ -117,7 +115,8 @@ def assess(
     folder, scene, asked = Path(folder), read_scene(path), tuple(map(parse_question, loads))
     refuse_stages(scene.stages, scene.document, "moma assess")
     check_replaceable(folder, INDEX)
-    by_code = _code_of(scene, code, str(path))
+    if code is not None:
+        _refuse_code(code, scene)
     progress(Progress("blocks", 0, None, "reading the stones"))
     with open_database(url, create=False) as database, database.session(read_only=True) as session:
         as_of = latest_entry(session)
@@ -125,17 +124,18 @@ def assess(
         progress(Progress("blocks", 0, None, f"closing the joints of {len(models)} stones"))
         groups = select_groups(scene, session, models)
         assembled = assemble_stones(scene, models, groups)
-    questions = asked or scene_questions(scene, groups, assembled.origin)
+    questions = [
+        _asked(one, confirm, code) for one in asked or scene_questions(scene, groups, assembled.origin)
+    ]
     on = assembly(assembled.scene)
     refuse_unsound(problems_of(scene, assembled, loose_blocks(on.model, on.state)), str(path), _SOUND_FIRST)
     for question in questions:
         refuse_unanswerable(on, question)
-    confirming = confirmer(on, _RUNS, progress=progress) if confirm else None
-    leading = leader(on, progress=progress) if pushover else None
+    confirming, leading = confirmer(on, _RUNS, progress=progress), leader(on, progress=progress)
     answers: list[Answer] = []
     for number, question in enumerate(questions):
         progress(Progress("assess", number, len(questions), question.name))
-        answers.append(answer(on, question, confirming, leading, by_code))
+        answers.append(answer(on, question, confirming, leading, scene.site))
     summary = _summary(assembled, on, answers)
     progress(Progress("write", 0, 1, "pictures"))
     warnings: list[str] = []
@@ -161,24 +161,30 @@ def assess(
         write_assessment(fresh / REPORT, summary)
         (fresh / "scene.toml").write_text(scene.text, encoding="utf-8")
         (fresh / INDEX).write_text(as_json(summary), encoding="utf-8")
-    run = None
-    if store:
-        with open_database(url, create=False) as database:
-            run = store_record(database, folder, _record(scene, on, answers, summary, as_of))
+    with open_database(url, create=False) as database:
+        run = store_record(database, folder, _record(scene, on, answers, summary, as_of))
     progress(Progress("write", 1, 1))
     return Assessment(folder, summary, run, tuple(warnings))
 
 
-def _code_of(scene: SceneFile, code: str | None, path: str) -> CodeOf:
-    if code is None:
-        return None
+def _asked(question: Question, confirm: bool, code: str | None) -> Question:
+    """Return a question with what the options ask of all loads."""
+    if not isinstance(question, LoadQuestion):
+        return question
+    by = code if question.whole and question.code is None else question.code
+    return replace(question, confirm=question.confirm or confirm, code=by)
+
+
+def _refuse_code(code: str, scene: SceneFile) -> None:
+    """Refuse a code of the option --code that is not known, or cannot be followed without [site]."""
+    if code not in CODES:
+        raise UsageError(f"no such code: {code!r}", where="--code", remedy=f"give one of {', '.join(CODES)}")
     if scene.site is None:
         raise UsageError(
             "a check by a code needs the seismic action",
-            where=path,
+            where=scene.document.path,
             remedy="add a table [site] (docs/scene.md)",
         )
-    return code, scene.site
 
 
 def _summary(assembled: Assembled, on: Assembly, answers: Sequence[Answer]) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """Questions of an assessment: from [[assess]] of a scene file, or from the words of an option."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -9,6 +9,7 @@ import numpy as np
 from mechanics.limit.live_loads import Acceleration, LiveLoad, PointForce, SpreadForce
 from moma.errors import SceneError, UsageError
 from pipelines.arrays import Array
+from pipelines.assess.codes.check import CODES
 from pipelines.scene.array_tables import Entry
 from pipelines.scene.file import SceneFile
 from pipelines.scene.selection import Groups
@@ -26,10 +27,21 @@ class LoadQuestion:
     ----------
     name : in results
     live : the load
+    confirm : its candidate is confirmed by runs
+    pushover : its mechanism is led to collapse by a run
+    code : by which its mechanism is checked; None: by none
     """
 
     name: str
     live: LiveLoad
+    confirm: bool = False
+    pushover: bool = False
+    code: str | None = None
+
+    @property
+    def whole(self) -> bool:
+        """True for a push on all stones, whose mechanism codes can check."""
+        return isinstance(self.live, Acceleration) and not self.live.stones
 
 
 @dataclass(frozen=True)
@@ -67,6 +79,7 @@ _AXES: Mapping[str, Vector] = {
     "z": (0.0, 0.0, 1.0),
     "-z": (0.0, 0.0, -1.0),
 }
+_OWN = ("confirm", "pushover", "code")
 _DOWN: Vector = (0.0, 0.0, -1.0)
 _USUAL = tuple(f"horizontal {axis}" for axis in ("x", "-x", "y", "-y"))
 _REMEDY = (
@@ -120,8 +133,26 @@ def scene_questions(scene: SceneFile, groups: Groups, origin: Array) -> tuple[Qu
     found = []
     for entry in scene.assess:
         with scene.document.at(*entry.path):
-            found.append(_TYPES[entry.type](entry, _codes(entry, groups), origin))
+            question = _TYPES[entry.type](entry, _codes(entry, groups), origin)
+        if isinstance(question, LoadQuestion):
+            question = replace(question, **{key: entry.values[key] for key in _OWN if key in entry.values})
+            if question.code is not None:
+                _refuse_code(scene, entry, question)
+        found.append(question)
     return tuple(found)
+
+
+def _refuse_code(scene: SceneFile, entry: Entry, question: LoadQuestion) -> None:
+    """Refuse a check by a code that cannot be made."""
+    what, remedy = "", ""
+    if question.code not in CODES:
+        what, remedy = f"no such code: {question.code!r}", f"give one of {', '.join(CODES)}"
+    elif not question.whole:
+        what, remedy = "a check by a code of a push on some stones", "leave out code, or stones"
+    elif scene.site is None:
+        what, remedy = "a check by a code needs the seismic action", "add a table [site] (docs/scene.md)"
+    if what:
+        scene.document.fail(what, *entry.path, "code", remedy=remedy)
 
 
 def _codes(entry: Entry, groups: Groups) -> frozenset[str]:

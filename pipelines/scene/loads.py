@@ -128,16 +128,42 @@ LOAD_KEYS = (ACTS_IN,)
 
 _FIXED = Key("stones", Kind.STONES, "Codes or expressions of the fixed stones on which it acts.")
 
+_RUNS = (
+    Key(
+        "confirm",
+        Kind.BOOLEAN,
+        "Confirm the candidate by runs, as `--confirm` does for all loads.",
+        default=False,
+    ),
+    Key(
+        "pushover",
+        Kind.BOOLEAN,
+        "Lead the mechanism to collapse by a run: the capacity curve.",
+        default=False,
+    ),
+)
+_CODE = Key(
+    "code",
+    Kind.TEXT,
+    "Check the mechanism by this code, for the place of `[site]`, as `--code` does for all pushes on all stones.",
+    default=None,
+)
+
 ASSESS_TYPES: Mapping[str, tuple[Key, ...]] = {
     "horizontal": (
         Key("direction", Kind.VECTOR, "Direction of the push, λ times the weight of each stone.", "-"),
         replace(_STONES, doc=f"{_STONES.doc[:-1]}; if not given, on all.", default=()),
+        *_RUNS,
+        _CODE,
     ),
     "tilt": (
         Key("axis", Kind.VECTOR, "Axis about which the table turns, right-handed; its tangent is λ.", "-"),
+        *_RUNS,
+        _CODE,
     ),
     "weight": (
         replace(_STONES, doc="Codes or expressions of the stones whose weight grows by λ of itself."),
+        *_RUNS,
     ),
     "force": (
         replace(
@@ -151,6 +177,7 @@ ASSESS_TYPES: Mapping[str, tuple[Key, ...]] = {
             "m",
             None,
         ),
+        *_RUNS,
     ),
     "thrust": (_FIXED, Key("direction", Kind.VECTOR, "Direction in which the thrust counts.", "-")),
     "settlement": (_FIXED, Key("direction", Kind.VECTOR, "Direction in which they yield.", "-")),

@@ -25,9 +25,7 @@ def assessment_lines(done: "Assessment", verbose: bool) -> list[str]:
     ]
     for one in summary["loads"]:
         lines += [f"  {one['headline']}", *_code(one.get("code")), *_mechanism(one["mechanism"], verbose)]
-    if done.run is not None:
-        lines.append(f"  run {done.run}")
-    return [*lines, *(f"  {done.folder / name}" for name in summary["files"])]
+    return [*lines, f"  run {done.run}", *(f"  {done.folder / name}" for name in summary["files"])]
 
 
 def _code(found: dict[str, Any] | None) -> list[str]:

@@ -165,9 +165,6 @@ def test_an_assessment_is_kept_and_asked_for(url, scene, tmp_path):
     assert {one["code"] for one in moving} == codes
     none = answer("query", "stone", "--db", url, "--where", 'in_mechanism("tilt x")', "--format", "json")
     assert none == []
-    before = prints("runs", "--db", url)
-    prints("assess", scene, "--db", url, "--out", tmp_path / "out", "--load", "horizontal y", "--no-store")
-    assert prints("runs", "--db", url) == before
 
 
 def test_a_check_by_a_code_needs_a_site_and_names_article_and_formula(url, scene, tmp_path):
@@ -189,9 +186,48 @@ def test_a_check_by_a_code_needs_a_site_and_names_article_and_formula(url, scene
     assert "circular 617/2009" in page.split("<h2>")[0]
 
 
+PUSH = '[[assess]]\ntype = "horizontal"\ndirection = [0.0, 1.0, 0.0]\n'
+SITE = "[site]\nag = 0.25\nf0 = 2.4\ntc_star = 0.3\n"
+
+
+def test_questions_of_a_scene_ask_for_runs_and_codes_each_for_itself(url, scene, tmp_path):
+    asked = f'{PUSH}code = "ntc2018"\n{PUSH}stones = ["W02-02", "W02-03"]\n'
+    scene.write_text(TWO_COURSES + SITE + asked, encoding="utf-8")
+    told = answer("assess", scene, "--db", url, "--out", tmp_path / "out")
+    assert [one.get("code", {}).get("code", "") for one in told["loads"]] == ["NTC 2018, circular 7/2019", ""]
+    told = answer("assess", scene, "--db", url, "--out", tmp_path / "out", "--code", "ntc2008")
+    assert told["loads"][0]["code"]["code"].startswith("NTC 2018")
+    assert "code" not in told["loads"][1]
+    assert not any(key in one for one in told["loads"] for key in ("confirmation", "pushover"))
+
+
+@pytest.mark.parametrize(
+    ("site", "given", "said"),
+    [
+        (SITE, 'code = "ec9"\n', "no such code: 'ec9'; give one of ntc2008, ntc2018"),
+        ("", 'code = "ntc2018"\n', "needs the seismic action; add a table [site]"),
+        (
+            SITE,
+            'stones = ["W02-02"]\ncode = "ntc2018"\n',
+            "of a push on some stones; leave out code, or stones",
+        ),
+    ],
+)
+def test_checks_by_a_code_that_cannot_be_made_are_refused_with_their_line(
+    url, scene, tmp_path, site, given, said
+):
+    text = TWO_COURSES + site + PUSH + given
+    scene.write_text(text, encoding="utf-8")
+    line = text[: text.index("code = ")].count("\n") + 1
+    message = fails(2, "assess", scene, "--db", url, "--out", tmp_path / "out")
+    assert f"two.toml:{line}: " in message
+    assert said in message
+
+
 def test_a_run_leads_a_mechanism_to_collapse(url, scene, tmp_path):
     out = tmp_path / "out"
-    told = answer("assess", scene, "--db", url, "--out", out, "--load", "horizontal y", "--pushover")
+    scene.write_text(f"{TWO_COURSES}{PUSH}pushover = true\n", encoding="utf-8")
+    told = answer("assess", scene, "--db", url, "--out", out)
     (one,) = told["loads"]
     curve = one["pushover"]
     assert 0.95 * one["candidate"] < curve["peak"] < 1.01 * one["bound"]
@@ -210,3 +246,6 @@ def test_runs_confirm_a_candidate(url, scene, tmp_path):
     assert told["confirmation"]["agrees"]
     assert told["confirmation"]["held"] < told["candidate"] < told["confirmation"]["lost"]
     assert "CONFIRMED" in told["headline"]
+    alike = told["confirmation"]["likeness"]
+    assert f"the mechanism (cosine {alike['cosine']:.2f})" in told["headline"]
+    assert 0.0 < alike["common"] <= 1.0
