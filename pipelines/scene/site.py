@@ -8,11 +8,16 @@ import numpy as np
 from mechanics.stones.settings import Setting, check_settings
 from moma.errors import SceneError
 
-__all__ = ["Site"]
+__all__ = ["Site", "damping_factor"]
 
 _USUAL = 5.0  # damping of the code's spectrum [%]
 _LEAST = 0.55  # of the factor of damping η [-]
 _LAST, _LASTED = 1.6, 4.0  # T_D = 1.6 + 4 ag/g [s]
+
+
+def damping_factor(damping: float) -> float:
+    """Return η = √(10/(5 + ξ)) ≥ 0.55 for a damping ξ [%]."""
+    return max(float(np.sqrt(10.0 / (5.0 + damping))), _LEAST)
 
 
 @dataclass(frozen=True)
@@ -42,6 +47,10 @@ class Site:
         Setting("First period T1 of the building; needed where `height` is not 0.", "s", above=0),
     ] = None
     storeys: Annotated[int, Setting("Storeys N, for γ = 3 N/(2 N + 1).", at_least=1)] = 1
+    damping: Annotated[
+        float,
+        Setting("Equivalent damping ξ1 of the building, for floor spectra.", "%", at_least=1, at_most=50),
+    ] = _USUAL
 
     def __post_init__(self) -> None:
         check_settings("site", self)
@@ -64,7 +73,7 @@ class Site:
 
     def acceleration(self, period: float, gravity: float, damping: float = _USUAL) -> float:
         """Return Se(T) for a damping [%], with η = √(10/(5 + ξ)) ≥ 0.55 [m/s²]."""
-        eta = max(float(np.sqrt(10.0 / (5.0 + damping))), _LEAST)
+        eta = damping_factor(damping)
         corner = self.cc * self.tc_star
         first, last = corner / 3.0, _LAST + _LASTED * self.ag
         plateau = self.ag * gravity * self.soil * eta * self.f0

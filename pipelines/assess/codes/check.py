@@ -10,6 +10,7 @@ import numpy as np
 
 from mechanics.limit.kinematic import Kinematics
 from moma.errors import UsageError
+from pipelines.assess.codes.floor import floor_acceleration, floor_displacement
 from pipelines.scene.site import Site
 
 __all__ = ["CODES", "Check", "CodeCheck", "check_code"]
@@ -114,17 +115,9 @@ def check_code(code: str, site: Site, found: Kinematics, gravity: float = 9.81) 
         )
     ]
     upper = site.height > 0 and site.period is not None
+    floor = rules.get("floor")
     if upper:
-        checks.append(
-            Check(
-                "linear, above the ground",
-                article["linear"],
-                f"a0* ≥ Se(T1) ψ(Z) γ / q, ψ = {site.shape:.3g}, γ = {site.participation:.3g}",
-                capacity,
-                site.acceleration(site.period or 0.0, gravity) * site.shape * site.participation / q,
-                "m/s²",
-            )
-        )
+        checks.append(_linear_above(site, article, capacity, q, gravity, floor is not None))
     if np.isfinite(found.capacity):
         ultimate, where = rules["ultimate"] * found.capacity, article["nonlinear"]
         at, slowed, period = _secant(rules, found.capacity, ultimate, capacity)
@@ -146,7 +139,18 @@ def check_code(code: str, site: Site, found: Kinematics, gravity: float = 9.81) 
                 "m",
             )
         )
-        if upper:
+        if upper and floor is not None:
+            checks.append(
+                Check(
+                    "nonlinear, above the ground",
+                    f"{where}, {article['floor']}",
+                    f"du* ≥ SeZ(Ts) Ts²/4π², damping {damping:g} %, ξ1 = {site.damping:g} %",
+                    ultimate,
+                    floor_displacement(site, period, damping, gravity, floor),
+                    "m",
+                )
+            )
+        elif upper:
             above, first = rules["above"], site.period or 0.0
             share = _secant(above, found.capacity, ultimate, capacity)[2] / first
             demand = site.displacement(first, gravity) * site.shape * site.participation * share**2
@@ -161,9 +165,24 @@ def check_code(code: str, site: Site, found: Kinematics, gravity: float = 9.81) 
                     "m",
                 )
             )
-    unchecked = [rules["unchecked"], rules["above"]["unchecked"] if upper else ""]
+    unchecked = [rules["unchecked"], floor["unchecked"] if upper and floor is not None else ""]
     caution = "; ".join(one for one in unchecked if one)
     return CodeCheck(rules["name"], caution, tuple(values), tuple(checks))
+
+
+def _linear_above(
+    site: Site, article: Mapping[str, str], capacity: float, q: float, gravity: float, floor: bool
+) -> Check:
+    """Return the linear check of a mechanism above the ground, by the floor spectrum or without one."""
+    shares = f"ψ = {site.shape:.3g}, γ = {site.participation:.3g}"
+    if floor:
+        where = f"{article['linear']}, {article['floor']}"
+        formula = f"a0* ≥ aZ / q, aZ = Se(T1, ξ1) ψ(Z) γ √(1 + 0.0004 ξ1²), {shares}, ξ1 = {site.damping:g} %"
+        demand = floor_acceleration(site, gravity)
+    else:
+        where, formula = article["linear"], f"a0* ≥ Se(T1) ψ(Z) γ / q, {shares}"
+        demand = site.acceleration(site.period or 0.0, gravity) * site.shape * site.participation
+    return Check("linear, above the ground", where, formula, capacity, demand / q, "m/s²")
 
 
 def _secant(

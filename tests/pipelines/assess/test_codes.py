@@ -7,6 +7,7 @@ import pytest
 
 from mechanics.limit.kinematic import Kinematics
 from pipelines.assess.codes.check import check_code
+from pipelines.assess.codes.floor import floor_acceleration, floor_displacement, floor_spectrum
 from pipelines.scene.site import Site
 
 G = 9.81
@@ -59,14 +60,50 @@ def test_the_circular_of_2019_has_a_longer_period_and_a_damping_of_8_percent():
     assert "above the ground" not in found.caution
 
 
-def test_above_the_ground_both_have_the_formulas_of_2009_and_the_later_says_so():
-    high = replace(SITE, height=6.0, building_height=12.0, period=0.4, storeys=3)
-    early, late = (check_code(code, high, overturning()) for code in ("ntc2008", "ntc2018"))
-    name = "nonlinear, above the ground"
-    assert named(late, name).demand == pytest.approx(named(early, name).demand)
-    assert "circular 617/2009" in late.caution
-    assert not early.caution
-    share = values(early)["Ts"] / 0.4
+HIGH = replace(SITE, height=6.0, building_height=12.0, period=0.4, storeys=3)
+RULES = {"first": 0.8, "last": 1.1, "peak": 1.1, "rise": 1.6, "fall": 1.2}
+
+
+def test_above_the_ground_the_circular_of_2009_couples_the_periods():
+    found = check_code("ntc2008", HIGH, overturning())
+    assert not found.caution
+    share = values(found)["Ts"] / 0.4
     spectral = 0.15 * G * 2.5 * 0.35 / 0.4 * (0.4 / (2 * np.pi)) ** 2
     demand = spectral * 0.5 * 9 / 7 * share**2 / np.sqrt((1 - share) ** 2 + 0.02 * share)
-    assert named(early, name).demand == pytest.approx(demand)
+    assert named(found, "nonlinear, above the ground").demand == pytest.approx(demand)
+
+
+def test_above_the_ground_the_circular_of_2019_has_floor_spectra():
+    """By hand: Se(T1) 3.2189, aZ 3.2189 · 9/14 · √1.01 = 2.0796 m/s²; f = 4.9193 · 0.87706 = 4.3145;
+    Ts 1.6851 s: x = 2.8298^1.2 = 3.484, SeZ = 8.9726/(1 + 3.3145 x) = 0.7151 m/s² above Se 0.670, times Ts²/4π².
+    """
+    found = check_code("ntc2018", HIGH, overturning())
+    assert named(found, "linear, above the ground").demand == pytest.approx(2.0796 / 2, rel=1e-4)
+    nonlinear = named(found, "nonlinear, above the ground")
+    assert nonlinear.demand == pytest.approx(0.7151 * 1.6851**2 / (4 * np.pi**2), rel=1e-3)
+    assert nonlinear.article == "C8.7.1.2.1.8, C7.2.3"
+    assert "transcription of circular 7/2019" in found.caution
+    assert "ξ1 as a ratio" in found.caution
+
+
+def test_a_floor_spectrum_begins_at_the_acceleration_of_the_floor_and_peaks_at_the_period_of_the_building():
+    """A rigid mechanism feels aZ; between 0.8 and 1.1 T1 it resonates; a slow one feels the ground."""
+    rigid = floor_acceleration(HIGH, G)
+    assert floor_spectrum(HIGH, 0.0, 5.0, G, RULES) == pytest.approx(rigid)
+    for period in (0.32, 0.4, 0.44):
+        assert floor_spectrum(HIGH, period, 5.0, G, RULES) == pytest.approx(1.1 / np.sqrt(0.05) * rigid)
+    # by hand: 1 + 3.9193 · 0.5^1.6, and 1 + 3.9193 · 1^1.2
+    assert floor_spectrum(HIGH, 0.16, 5.0, G, RULES) == pytest.approx(4.91935 * rigid / 2.29290, rel=1e-4)
+    assert floor_spectrum(HIGH, 0.88, 5.0, G, RULES) == pytest.approx(rigid)
+    low = replace(HIGH, height=0.5)
+    assert floor_spectrum(low, 1.0, 5.0, G, RULES) == low.acceleration(1.0, G)
+    assert floor_spectrum(low, 0.3, 5.0, G, RULES) < low.acceleration(0.3, G)
+
+
+def test_the_displacement_at_a_height_is_no_less_than_at_resonance_for_longer_periods():
+    """[C8.7.1.12]: SeZ(T1) (1.1 T1)²/4π² for all T > 1.1 T1, and more as soon as the spectrum gives more."""
+    peak = 1.1 / np.sqrt(0.05) * np.sqrt(10 / 13) * floor_acceleration(HIGH, G)
+    least = peak * (1.1 * 0.4 / (2 * np.pi)) ** 2
+    assert floor_displacement(HIGH, 0.44, 8.0, G, RULES) == pytest.approx(least)
+    assert floor_displacement(HIGH, 0.6, 8.0, G, RULES) == pytest.approx(least)
+    assert floor_displacement(HIGH, 0.4, 8.0, G, RULES) < least < floor_displacement(HIGH, 3.0, 8.0, G, RULES)
