@@ -33,7 +33,7 @@ def place(tmp_path):
     sample.mkdir(parents=True)
     (sample / "window.moma").symlink_to(ROOT / "data/samples/window/window.moma")
     (tmp_path / "docs/howto").mkdir(parents=True)
-    for folder in ("survey", "query"):
+    for folder in ("survey", "query", "assess"):
         (tmp_path / "docs/howto" / folder).symlink_to(ROOT / "docs/howto" / folder)
     (sample / "knowledge.toml").symlink_to(ROOT / "data/samples/window/knowledge.toml")
     text = (ROOT / SCENE).read_text(encoding="utf-8")
