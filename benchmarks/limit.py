@@ -91,7 +91,8 @@ def main() -> None:
         if name not in WALLS and name not in FACADES:
             known = "; ".join([*WALLS, *FACADES])
             raise UsageError(f"no such case: {name!r}", where="--only", remedy=f"give some of {known}")
-    rows = [_kept(options.out, name) for name in options.only]
+    under = commit()  # of the code as it was read, whatever changes while it runs
+    rows = [_kept(options.out, name, under) for name in options.only]
     if options.json:
         print_json(rows)
         return
@@ -114,13 +115,13 @@ def _page(rows: Sequence[Row]) -> list[str]:
     return lines
 
 
-def _kept(folder: Path, name: str) -> Row:
+def _kept(folder: Path, name: str, under: str) -> Row:
     """Return what was measured of a case; measure it if nothing was."""
     path = folder / f"{name.replace(' ', '').replace(',', '-')}.json"
     if not path.exists():
         progress(f"limit: {name}")
         measured("warm-up", _WARM)
-        row = measured(name, WALLS[name] if name in WALLS else FACADES[name])
+        row = measured(name, WALLS[name] if name in WALLS else FACADES[name]) | {"commit": under}
         folder.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps(row, indent=1, ensure_ascii=False), encoding="utf-8")
     kept: Row = json.loads(path.read_text(encoding="utf-8"))
@@ -161,7 +162,6 @@ def measured(name: str, case: LimitCase) -> Row:
         "candidate_s": iterated - bounded,
         "dynamics_s": done - iterated,
         "machine": machine(),
-        "commit": commit(),
         "versions": environment("clarabel", "numpy", "numba"),
     }
 
