@@ -169,7 +169,7 @@ def mechanism(on: Assembly, velocity: Array, moving: Array | None = None) -> Mec
 
 @dataclass(frozen=True)
 class _Ending:
-    """Where an iteration ended: λ, forces (nc, 3) [N] and strength of its last programme; as in `LimitLoad`."""
+    """End of an iteration: λ, forces (nc, 3) [N] and strength of its last programme; as in `LimitLoad`."""
 
     multiplier: float
     force: Array

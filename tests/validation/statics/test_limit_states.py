@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.limit_scenes import FACADES
 from mechanics.limit.assembly import assembly
-from mechanics.limit.confirm import confirm
+from mechanics.limit.confirm import confirm, likeness
 from mechanics.limit.joints import resultants
 from mechanics.limit.kinematic import kinematics
 from mechanics.limit.limit_load import Flow, limit_load
@@ -243,6 +243,28 @@ def test_the_dynamics_hold_and_lose_what_the_programme_says(live):
     assert len(found.trials) == 2
     assert found.agrees(candidate.multiplier)
     assert found.held == pytest.approx(0.97 * candidate.multiplier)
+
+
+def test_a_collapse_is_like_a_mechanism_as_its_stones_move_alike():
+    """Two equal stones, of which the slender one topples: alike, reversed, and half of it as both move as far."""
+    on = standing(
+        [ground(), cuboid("S", (0, 0, 0), (0.5, 0.8, 2.0)), cuboid("T", (2, 0, 0), (4.0, 0.8, 0.5))]
+    )
+    mechanism = limit_load(on, ALONG, Flow.COULOMB).mechanism
+    (slender, broad) = on.rows(["S", "T"], "")
+    alike = np.zeros((3, 3))
+    alike[slender] = mechanism.velocity[slender, :3]
+    both = alike.copy()
+    both[broad] = np.linalg.norm(alike[slender]) * np.array([0.0, 1.0, 0.0])
+    for displacement, cosine, collapse, common in (
+        (1e-3 * alike, 1.0, 0.5, 1.0),
+        (-alike, -1.0, 0.5, 1.0),
+        (both, np.sqrt(0.5), 1.0, 0.5),
+    ):
+        found = likeness(on, mechanism, displacement)
+        assert found.cosine == pytest.approx(cosine, rel=1e-6)
+        assert (found.mechanism, found.collapse) == pytest.approx((0.5, collapse))
+        assert found.common == pytest.approx(common)
 
 
 def test_a_wrong_candidate_is_not_confirmed():
