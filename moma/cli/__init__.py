@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from moma.cli.assess import assess, compare
+from moma.cli.assess import assess, compare, diagnose
 from moma.cli.database import export, import_, migrate
 from moma.cli.entities import query, schema, show
 from moma.cli.geology import geology
@@ -69,6 +69,7 @@ _COMMANDS = (
     run,
     assess,
     compare,
+    diagnose,
     trade,
     geology,
     runs,

@@ -1,4 +1,4 @@
-"""Commands that ask how far a scene is from falling, and whether it explains what was measured."""
+"""Commands that ask how far a scene is from falling, and what explains the movement that was measured."""
 
 from pathlib import Path
 from typing import Annotated
@@ -9,7 +9,7 @@ from moma.cli.console import reporting, say
 from moma.cli.options import DEFAULT_DB, AcceptUnsound, Db, Json, Out, SceneArgument, Verbose
 from moma.cli.progress import progress_bars
 
-__all__ = ["assess", "compare"]
+__all__ = ["assess", "compare", "diagnose"]
 
 
 @reporting
@@ -79,3 +79,29 @@ def compare(
     with progress_bars() as listener:
         done = compared(scene, db, folder, listener, accept_unsound, battered)
     print(as_json(done.summary) if json else "\n".join(comparison_lines(done, verbose)))
+
+
+@reporting
+def diagnose(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="DIAGNOSIS.toml", help="File with [[hypotheses]]; also a scene that has them."
+        ),
+    ],
+    jobs: Annotated[int, typer.Option("--jobs", metavar="N", min=1, help="Runs at a time.")] = 1,
+    out: Out = None,
+    accept_unsound: AcceptUnsound = False,
+    db: Db = DEFAULT_DB,
+    json: Json = False,
+    verbose: Verbose = False,
+) -> None:
+    """Find which of several causes explains the measured deformation, by how much of each, and when it acted."""
+    from moma.cli.text.diagnoses import diagnosis_lines
+    from moma.cli.text.formats import as_json
+    from pipelines.assess.diagnosis.diagnose import diagnose as diagnosed
+
+    folder = out or Path("out") / f"{file.stem}-diagnose"
+    with progress_bars() as listener:
+        done = diagnosed(file, db, folder, listener, jobs, accept_unsound)
+    print(as_json(done.summary) if json else "\n".join(diagnosis_lines(done, db, verbose)))

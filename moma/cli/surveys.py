@@ -40,6 +40,8 @@ class SampleName(StrEnum):
     FACINGS = "facings"
     RIBVAULT = "ribvault"
     SETTLED = "settled"
+    SETTLED_PHASES = "settled-phases"
+    SETTLED_SMALL = "settled-small"
     TOWER = "tower"
     TOWER_SMALL = "tower-small"
     VAULT = "vault"

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +13,9 @@ from archmodel.tables.entries import latest_entry
 from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.model.model import build_model
 from mechanics.results.forecast.plan import loose_blocks
-from mechanics.results.result import BodyResult, Result
+from mechanics.results.result import Result
 from mechanics.simulate import simulate
-from pipelines.arrays import Array
+from pipelines.assess.motions import stone_motions
 from pipelines.draw.elevations.movement import draw_bed_movement, draw_misfit
 from pipelines.ingest.records import surveyed_block
 from pipelines.results.folder import check_replaceable, replacing
@@ -40,7 +39,7 @@ from survey.quality.movement import (
 )
 from survey.quality.precision import StoneQuality, appraise
 
-__all__ = ["INDEX", "Comparison", "compare"]
+__all__ = ["INDEX", "Comparison", "compare", "facades_of", "measured_stones"]
 
 INDEX = "comparison.json"
 """Index of the results of a comparison."""
@@ -105,8 +104,8 @@ def compare(
         if not accept_unsound:
             refuse_unsound(problems, str(path))
         result = simulate(assembly.scene, progress, lambda: False, built)
-        stones, facades = _measured(models)
-        moved = partial(_displacement, {body.code: body for body in result.bodies}, assembly.origin)
+        stones, facades = measured_stones(models)
+        moved = stone_motions(result.bodies, assembly.origin).displacement
         courses = compare_courses(measure_courses(stones, facades), moved)
         plumb = compare_plumb(stones, facades, moved, battered)
         progress(Progress("write", 0, 1, "pictures"))
@@ -124,26 +123,20 @@ def compare(
     return Comparison(folder, summary, run)
 
 
-def _measured(models: Sequence[StoneModel]) -> tuple[tuple[StoneQuality, ...], tuple[Facade, ...]]:
+def measured_stones(models: Sequence[StoneModel]) -> tuple[tuple[StoneQuality, ...], tuple[Facade, ...]]:
     """Return the measured stones, and the facades that they make."""
     records = [model.record for model in models if model.record.provenance in _MEASURED]
     stones = tuple(appraise(surveyed_block(record)) for record in records)
-    facades = find_facades(
+    return stones, facades_of(stones)
+
+
+def facades_of(stones: Sequence[StoneQuality]) -> tuple[Facade, ...]:
+    """Return the facades that measured stones make."""
+    return find_facades(
         np.array([one.normal for one in stones]).reshape(-1, 3),
         np.array([one.area for one in stones]),
         np.array([one.outline.mean(axis=0) for one in stones]).reshape(-1, 3),
     )
-    return stones, facades
-
-
-def _displacement(bodies: Mapping[str, BodyResult], origin: Array, code: str, points: Array) -> Array:
-    """Return the displacement (n, 3) of points of a stone in the frame of the site: affine over its own points [m]."""
-    body = bodies[code]
-    middle = body.reference.mean(axis=0)
-    arms = np.column_stack([np.ones(len(body.reference)), body.reference - middle])
-    field = np.linalg.lstsq(arms, body.displacement, rcond=None)[0]
-    at: Array = np.column_stack([np.ones(len(points)), points - origin - middle]) @ field
-    return at
 
 
 def _summary(

@@ -37,6 +37,7 @@ _INDEXES = (
     "survey.json",
     "assessment.json",
     "comparison.json",
+    "diagnosis.json",
 )  # their "files" list the files that MOMA wrote
 _MARK = ".moma-"  # in the names of hidden folders
 _EARLIER = f"{_MARK}earlier"

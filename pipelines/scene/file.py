@@ -27,7 +27,10 @@ from pipelines.toml.lines import key_lines, parse_toml, read_text
 from pipelines.toml.schema import Document, check_table, nearest
 from survey.joints.settings import JointMode, JointSettings
 
-__all__ = ["SceneFile", "parse_scene", "read_scene"]
+__all__ = ["BESIDE", "SceneFile", "parse_scene", "read_scene"]
+
+BESIDE = ("diagnosis", "hypotheses")
+"""Tables that may stand in a scene file and are read by `moma diagnose` alone."""
 
 
 @dataclass(frozen=True)
@@ -132,9 +135,9 @@ def _fidelities(values: dict[str, Any]) -> Fidelities:
 
 
 def _checked_tables(document: Document, given: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    known = [*TABLES, "materials", "site", *ARRAYS]
+    known = [*TABLES, "materials", "site", *ARRAYS, *BESIDE]
     for name, content in given.items():
-        if name in ARRAYS:
+        if name in (*ARRAYS, *BESIDE):
             continue
         if name not in known:
             what = f"unknown table [{name}]" if isinstance(content, dict | list) else f"unknown key {name!r}"

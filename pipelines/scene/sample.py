@@ -1,6 +1,6 @@
 """A synthetic survey with a scene that runs, written into a folder for people to start from."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,10 +15,11 @@ from moma.errors import UsageError
 from pipelines.arrays import Array
 from survey.formats.native.writer import write_head, write_moma
 from survey.formats.solids.obj_writer import write_obj
-from survey.synthetic.frame import Movement, RigidMotion
+from survey.synthetic.building import Building
+from survey.synthetic.frame import Movement, RigidMotion, wall_frame
 from survey.synthetic.samples import SAMPLES, Cause, SampleRecipe
 
-__all__ = ["WrittenSample", "write_sample"]
+__all__ = ["WrittenSample", "true_movement", "write_sample"]
 
 _SCENE = """\
 # {title}: synthetic, no such building exists. Every key is explained in docs/scene.md.
@@ -44,7 +45,7 @@ friction = 0.6
 
 [time]
 start = "equilibrium"  # found at once; the steps then show that it lasts
-step = 0.005       # s
+step = {step}{pad}# s
 theta = 1.0
 duration = {duration}     # s
 relaxation = true  # only where it comes to rest is asked for
@@ -61,8 +62,78 @@ displacement = [0.0, 0.0, {height}]
 duration = {duration}
 """
 _HEAD = "head.moma"  # header file of closed solids
-_DURATION = 1.0  # of settlements [s]
-_LONGEST = 3.0  # of their simulation [s]
+_DURATION = 1.0  # of settlements in the simulation of the truth [s]
+_LONGEST = 3.0  # of that simulation, and of the scene [s]
+
+_DIAGNOSIS = """\
+# What has moved the wall? Four answers, each with an amount that is not known. Explained in docs/howto/diagnose.md.
+{commands}
+[diagnosis]
+scene = "{kind}.toml"
+without = ["loads"]  # the scene knows the cause; a diagnosis is to find it
+battered = true
+{phases}
+[[hypotheses]]
+name = "the left corner settled"
+
+[[hypotheses.unknowns]]
+name = "settlement"
+unit = "m"
+start = 0.010
+low = 0.0
+high = 0.060
+{left}
+[[hypotheses]]
+name = "the right corner settled"
+
+[[hypotheses.unknowns]]
+name = "settlement"
+unit = "m"
+start = 0.010
+low = 0.0
+high = 0.060
+{right}
+[[hypotheses]]
+name = "the base tilted"
+
+[[hypotheses.unknowns]]
+name = "tilt"
+unit = "degrees"
+start = 0.1
+low = -1.0
+high = 1.0
+
+[[hypotheses.scene.loads]]
+type = "motion"
+stones = ["{fixed}"]
+spin = {{ time = [0.0, {duration}, {after}], value = ["= tilt / {duration}", "= tilt / {duration}", 0.0] }}
+axis = [{axis[0]:.6f}, {axis[1]:.6f}, 0.0]
+pivot = [{pivot[0]:.3f}, {pivot[1]:.3f}, {pivot[2]:.3f}]
+
+[[hypotheses]]
+name = "a load stood on the upper left corner"
+
+[[hypotheses.unknowns]]
+name = "load"
+unit = "N"
+start = 5000.0
+low = 0.0
+high = 50000.0
+
+[[hypotheses.scene.loads]]
+type = "force"
+stones = ["{top}"]
+force = [0.0, 0.0, "= -load"]
+"""
+
+_SETTLING = """
+[[hypotheses.scene.loads]]
+type = "settlement"
+stones = ["{code}"]
+displacement = [0.0, 0.0, "= -settlement * {share:.4g}"]
+duration = {duration}
+"""
+_INSTANT = 1e-6  # in which the tilt of the base ends [s]
 
 _CORE = """
 # Mortar and small stones between the facings.
@@ -96,12 +167,12 @@ class WrittenSample:
 def write_sample(kind: str, folder: Path) -> WrittenSample:
     """Write KIND.moma, truth.json and KIND.toml into a folder, created if necessary.
 
-    Some come with knowledge.toml, and with solids.obj and its head.moma.
+    Some come with knowledge.toml, with solids.obj and its head.moma, or with diagnosis.toml.
 
     Parameters
     ----------
     kind : name of the sample
-    folder : in which none of these files exists
+    folder : in which none of these files exists; created if necessary
 
     Raises
     ------
@@ -112,12 +183,15 @@ def write_sample(kind: str, folder: Path) -> WrittenSample:
         raise UsageError(f"no sample {kind!r}", remedy=f"the samples are {', '.join(SAMPLES)}")
     recipe = SAMPLES[kind]
     cause = recipe.cause
-    sample = recipe.make() if cause is None else cause.sample(_movement(cause))
+    sample = recipe.make() if cause is None else cause.sample(true_movement(cause))
     survey, scene = folder / f"{kind}.moma", folder / f"{kind}.toml"
     knowledge = folder / "knowledge.toml" if sample.knowledge else None
     solids = folder / "solids.obj" if sample.modelled else None
-    commands = tuple(_commands(recipe, survey, solids, knowledge, scene))
+    diagnosis = None if cause is None else folder / "diagnosis.toml"
+    commands = tuple(_commands(recipe, survey, solids, knowledge, scene, diagnosis))
     texts = {folder / "truth.json": sample.truth, scene: _scene(recipe, commands)}
+    if diagnosis is not None and cause is not None:
+        texts[diagnosis] = _diagnosis(kind, recipe.fixed, cause, commands)
     if knowledge is not None:
         texts[knowledge] = sample.knowledge
     extra = () if solids is None else (solids, solids.with_name(_HEAD))
@@ -138,27 +212,65 @@ def write_sample(kind: str, folder: Path) -> WrittenSample:
 
 
 def _scene(recipe: SampleRecipe, commands: Sequence[str]) -> str:
+    step = 0.005 if recipe.cause is None else recipe.cause.step
     return _SCENE.format(
         title=recipe.title,
-        commands="".join(f"#   {command}\n" for command in commands),
+        commands=_listed(commands),
         core=_CORE if recipe.core else "",
         fixed=recipe.fixed,
+        step=step,
+        pad=" " * (12 - len(str(step))),
         duration=1.0 if recipe.cause is None else _LONGEST,
         loads="" if recipe.cause is None else "".join(_loads(recipe.cause)),
     )
 
 
+def _listed(commands: Sequence[str]) -> str:
+    return "".join(f"#   {command}\n" for command in commands)
+
+
+def _diagnosis(kind: str, fixed: str, cause: Cause, commands: Sequence[str]) -> str:
+    """Return hypotheses on the movement of a wall: the true one, the other corner, a tilt, and a load."""
+    building = cause.build({}, None)
+    most = min(cause.settlement.values())
+    shares = [height / most for height in cause.settlement.values()]
+    facing = wall_frame().axes[2]
+    return _DIAGNOSIS.format(
+        commands=_listed(commands),
+        kind=kind,
+        phases="" if cause.stood is None else 'phases = ["1", "2"]  # the oldest first\n',
+        left="".join(_settling(cause, cause.settlement, shares)),
+        right="".join(_settling(cause, reversed(building.base), shares)),
+        fixed=fixed,
+        duration=cause.duration,
+        after=cause.duration + _INSTANT,
+        axis=facing,
+        pivot=building.solids[0].vertices[0],
+        top=next(one.code for one in building.survey.blocks if one.course == _top(building)),
+    )
+
+
+def _settling(cause: Cause, codes: Iterable[str], shares: Sequence[float]) -> Iterator[str]:
+    for code, share in zip(codes, shares, strict=False):
+        yield _SETTLING.format(code=code, share=share, duration=cause.duration)
+
+
+def _top(building: Building) -> int:
+    return max(one.course or 0 for one in building.survey.blocks)
+
+
 def _loads(cause: Cause) -> Iterator[str]:
     yield "\n# What moved it: the same as in the truth.\n"
     for code, height in cause.settlement.items():
-        yield _SETTLEMENT.format(code=code, height=height, duration=_DURATION)
+        yield _SETTLEMENT.format(code=code, height=height, duration=cause.duration)
 
 
-def _movement(cause: Cause) -> Movement:
+def true_movement(cause: Cause) -> Movement:
     """Simulate how the true stones of a building move when the ground beneath some settles."""
-    building = cause.build({})
+    building = cause.build({}, None)
     limestone = Material("limestone", density=2350.0, young=12e9, poisson=0.2)
     middle = building.solids[0].vertices[0]
+    course = {one.code: one.course or 0 for one in building.survey.blocks}
     blocks = tuple(
         Block(
             one.code,
@@ -168,6 +280,7 @@ def _movement(cause: Cause) -> Movement:
             Fidelity.FIXED if one.code in building.base else Fidelity.RIGID,
         )
         for one in building.solids
+        if cause.stood is None or course[one.code] <= cause.stood
     )
     motions = [settlement([code], (0.0, 0.0, z), _DURATION) for code, z in cause.settlement.items()]
     time = TimeSettings(step=0.005, duration=_LONGEST, relaxation=True, start=Start.EQUILIBRIUM)
@@ -184,7 +297,12 @@ def _motion(before: Array, after: Array) -> RigidMotion:
 
 
 def _commands(
-    recipe: SampleRecipe, survey: Path, solids: Path | None, knowledge: Path | None, scene: Path
+    recipe: SampleRecipe,
+    survey: Path,
+    solids: Path | None,
+    knowledge: Path | None,
+    scene: Path,
+    diagnosis: Path | None,
 ) -> Iterator[str]:
     database = f"--db sqlite:///{survey.with_suffix('.db')}"
     yield f"moma ingest {survey} {database}"
@@ -195,5 +313,7 @@ def _commands(
     if recipe.core:
         yield f"moma propose infill --record {database}"
     yield f"moma run {scene} {database} --out {scene.parent / 'results'}"
-    if recipe.cause is not None:
+    if recipe.cause is not None and recipe.cause.stood is None:
         yield f"moma compare {scene} --battered {database} --out {scene.parent / 'comparison'}"
+    if diagnosis is not None:
+        yield f"moma diagnose {diagnosis} {database} --out {scene.parent / 'diagnosis'}"

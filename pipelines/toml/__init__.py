@@ -1,4 +1,5 @@
 """Validated TOML with line numbers in errors.
 
-Public: `Key`, `Kind`, `Document`, `check_table`, `nearest` (schema); `read_text`, `parse_toml`, `key_lines` (lines).
+Public: `Key`, `Kind`, `Document`, `check_table`, `nearest` (schema); `read_text`, `parse_toml`, `key_lines` (lines);
+`toml_text` (writer).
 """

@@ -47,16 +47,24 @@ class Cause:
     Attributes
     ----------
     settlement : by code of a stone on the ground its displacement upwards [m]
-    build : the building after a movement
+    build : the building after a movement; the same is measured again with the seed that may be given
+    duration : of the settlements in the scene [s]
+    step : of the scene [s]
+    stood : last course that stood when the ground settled; those above were laid later, level, in a phase of their
+        own; None: all stood
     """
 
     settlement: Mapping[str, float]
-    build: Callable[[Movement], Building]
+    build: Callable[[Movement, int | None], Building]
+    duration: float = 1.0
+    step: float = 0.005
+    stood: int | None = None
 
     def sample(self, movement: Movement) -> Sample:
         """Return the sample after a movement, the truth with the causes."""
-        building = self.build(movement)
-        return Sample(building.survey, _truth_of(building, self.settlement))
+        building = self.build(movement, None)
+        knowledge = "" if self.stood is None else _PHASES.format(last=self.stood)
+        return Sample(building.survey, _truth_of(building, self.settlement), knowledge)
 
     def unmoved(self) -> Sample:
         """Return the sample as it was laid."""
@@ -110,7 +118,7 @@ def _tower(courses: int) -> Callable[[], Sample]:
 
 
 _PHASES = """\
-# What is "known" of the synthetic storey besides its geometry; as invented as the storey.
+# What is "known" of the synthetic building besides its geometry; as invented as the building.
 
 [record]
 author = "synthetic"
@@ -208,9 +216,20 @@ def _motion_of(building: Building, code: str) -> dict[str, object]:
     return {name: (np.round(getattr(motion, name), 9) + 0.0).tolist() for name in ("rotation", "shift")}
 
 
-_SETTLED = Cause(
-    {"W01-01": -0.030, "W01-02": -0.020, "W01-03": -0.010}, lambda movement: wall(90, movement=movement)
-)
+def _moved_wall(stones: int) -> Callable[[Movement, int | None], Building]:
+    """Return the generator of a wall that has moved."""
+
+    def build(movement: Movement, measured: int | None) -> Building:
+        return wall(stones, movement=movement, measured=measured)
+
+    return build
+
+
+_SETTLED = Cause({"W01-01": -0.030, "W01-02": -0.020, "W01-03": -0.010}, _moved_wall(90))
+
+_SMALL = {"W01-01": -0.030, "W01-02": -0.015}
+_SETTLED_SMALL = Cause(_SMALL, _moved_wall(30), 0.5, 0.02)
+_SETTLED_PHASES = Cause({"W01-01": -0.020, "W01-02": -0.010}, _moved_wall(42), 0.5, 0.02, stood=3)
 
 SAMPLES: Mapping[str, SampleRecipe] = MappingProxyType(
     {
@@ -225,6 +244,15 @@ SAMPLES: Mapping[str, SampleRecipe] = MappingProxyType(
         "ribvault": SampleRecipe("Rib vault", "kind = rib_springer", _rib_vault),
         "settled": SampleRecipe(
             "Wall whose left corner settled", "course = 1", _SETTLED.unmoved, cause=_SETTLED
+        ),
+        "settled-phases": SampleRecipe(
+            "Wall whose left corner settled before its upper courses were laid",
+            "course = 1",
+            _SETTLED_PHASES.unmoved,
+            cause=_SETTLED_PHASES,
+        ),
+        "settled-small": SampleRecipe(
+            "Small wall whose left corner settled", "course = 1", _SETTLED_SMALL.unmoved, cause=_SETTLED_SMALL
         ),
         "tower": SampleRecipe("Storey of a tower", "course = 1", _tower(40), core=True),
         "tower-small": SampleRecipe(

@@ -54,6 +54,7 @@ def wall(
     sag: float = 0.0,
     snecked: float = 0.0,
     movement: Movement = MappingProxyType({}),
+    measured: int | None = None,
 ) -> Building:
     """Build a wall of a single leaf and measure its face.
 
@@ -65,6 +66,7 @@ def wall(
     sag : by which beds sag over 10 m, along a parabola [m]; not together with an arch
     snecked : share of the stones that are two courses high [-]
     movement : of the stones since they were laid
+    measured : seed of the joints, wear and noise alone, so that the same stones are measured again; None: as `seed`
 
     Returns
     -------
@@ -96,6 +98,7 @@ def wall(
     middle = np.array([[0.0, 0.5 * heights[-1]]])
     station = observer(frame.place(middle, 9.0 + heights[-1])[0])
     name = f"wall of {len(drafts)} stones"
+    rng = rng if measured is None else Random(measured)
     return measured_building(name, drafts, DEPTHS, [station], base, rng, movement=movement)
 
 

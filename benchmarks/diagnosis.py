@@ -1,0 +1,222 @@
+"""Diagnosis of synthetic walls whose cause is known: `python -m benchmarks.diagnosis [--draws 100] [--whole 10]`.
+
+The moved stones of a sample are measured again and again: each time with other joints, wear and noise. The runs of each
+hypothesis are made once, on the stones of the sample, for a row of amplitudes; motions between two are interpolated.
+A few whole diagnoses, each with runs on the stones of its own survey, tell whether that matters.
+"""
+
+import argparse
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
+from pipelines.assess.compare import facades_of
+from pipelines.assess.diagnosis.file import DiagnosisFile, read_diagnosis
+from pipelines.assess.diagnosis.measurements import Measurements, measure, measurements
+from pipelines.assess.diagnosis.ranking import Ranking, verdict
+from pipelines.assess.diagnosis.search import Case, Fitted, Place, cases_of, check_case, fit_cases, runs_of
+from pipelines.assess.diagnosis.trials import Tried, run_trial
+from pipelines.assess.motions import Motions
+from pipelines.ingest.ingest import ingest
+from pipelines.record.record import record
+from pipelines.scene.sample import true_movement, write_sample
+from survey.formats.native.writer import write_moma
+from survey.quality.precision import appraise
+from survey.synthetic.building import Building
+from survey.synthetic.samples import SAMPLES
+
+__all__ = ["Laboratory", "laboratory", "main", "outcome"]
+
+TRUE = "the left corner settled"
+"""Name of the true hypothesis of the samples."""
+
+_GRID = 24  # intervals of the range of an unknown, at whose ends runs are made
+_KINDS = ("settled-small", "settled-phases")
+_TABLE: Table = (
+    ("sample", "sample", ""),
+    ("runs", "runs", ""),
+    ("draws", "draws", "d"),
+    ("first", "true cause first", "d"),
+    ("explains", "and explains", "d"),
+    ("covered", "truth within its 95 %", "d"),
+    ("mean", "mean settlement mm", ".2f"),
+    ("scatter", "its scatter mm", ".2f"),
+    ("half", "half interval mm", ".2f"),
+    ("none", "without the true cause: none explains", "d"),
+    ("dated", "dated right", "d"),
+)
+
+
+@dataclass(frozen=True)
+class Laboratory:
+    """A sample that can be measured again.
+
+    Attributes
+    ----------
+    file, cases : its diagnosis
+    url : of a database with its stones
+    phases : of the stones by code, if it has any
+    moved : the true building, measured with a seed
+    settlement : the truth [m]
+    stood : the phases that stood when the ground settled; empty if there are none
+    """
+
+    file: DiagnosisFile
+    cases: tuple[Case, ...]
+    url: str
+    phases: dict[str, str]
+    moved: Callable[[int], Building]
+    settlement: float
+    stood: tuple[str, ...]
+
+    def survey(self, seed: int) -> Measurements:
+        """Measure the building again."""
+        stones = [appraise(block) for block in self.moved(seed).blocks()]
+        return measure(self.file, stones, facades_of(stones), self.phases)
+
+
+def laboratory(kind: str, folder: Path) -> Laboratory:
+    """Write a sample and take it into a database."""
+    write_sample(kind, folder)
+    url = f"sqlite:///{folder / 'stones.db'}"
+    ingest([folder / f"{kind}.moma"], url)
+    knowledge = folder / "knowledge.toml"
+    if knowledge.exists():
+        record([knowledge], url)
+    file = read_diagnosis(folder / "diagnosis.toml")
+    found, cause = measurements(file, url), SAMPLES[kind].cause
+    assert cause is not None
+    cases = cases_of(file, found.phases)
+    possible = tuple(one for one in cases if not check_case(file, one, url, False))
+    moved = partial(cause.build, true_movement(cause))
+    truth = -min(cause.settlement.values())
+    return Laboratory(file, possible, url, dict(found.phases), moved, truth, file.phases[:1])
+
+
+class Interpolated:
+    """Motions of the stones of one survey, interpolated between runs at the ends of intervals.
+
+    Parameters
+    ----------
+    place : the sample
+    """
+
+    def __init__(self, place: Laboratory) -> None:
+        self._run = runs_of(place.file, place.url, lambda trials: [run_trial(one) for one in trials])
+        self._known: dict[tuple[str, tuple[str, ...], float], Tried] = {}
+
+    def __call__(self, places: Sequence[Place]) -> list[Tried]:
+        """Return the answers to cases of one unknown."""
+        return [self._at(case, x) for case, (x,) in places]
+
+    def _at(self, case: Case, x: float) -> Tried:
+        (unknown,) = case.hypothesis.unknowns
+        step = (unknown.high - unknown.low) / _GRID
+        before = min(int((x - unknown.low) / step), _GRID - 1)
+        share = (x - unknown.low) / step - before
+        ends = [self._end(case, unknown.low + k * step) for k in (before, before + 1)]
+        first, second = (one.motions for one in ends)
+        if first is None or second is None:
+            return ends[0] if first is None else ends[1]
+        field = {code: (1.0 - share) * one + share * second.field[code] for code, one in first.field.items()}
+        return Tried(Motions(first.middle, field), "", 0.0)
+
+    def _end(self, case: Case, x: float) -> Tried:
+        key = (case.hypothesis.name, case.stood, round(x, 12))
+        if key not in self._known:
+            (self._known[key],) = self._run([(case, (x,))])
+            progress(f"{len(self._known)} runs, the last of {case.hypothesis.name}")
+        return self._known[key]
+
+
+def outcome(place: Laboratory, done: Fitted) -> Row:
+    """Return what a diagnosis has found, beside the truth."""
+    best = done.ranking.hypotheses[0]
+    row: Row = {"first": best.name == TRUE, "explains": best.name == TRUE and best.explains}
+    true = next(one for one in done.ranking.hypotheses if one.name == TRUE and one.stood == place.stood)
+    (amount,) = true.estimates
+    row["covered"] = amount.low <= place.settlement <= amount.high
+    row["mean"], row["half"] = 1e3 * amount.value, 1e3 * (amount.high - amount.value)
+    wrong = tuple(one for one in done.ranking.hypotheses if one.name != TRUE)
+    row["none"] = verdict(Ranking(wrong, done.ranking.still)).startswith("NONE OF THESE")
+    rivals = [one for one in done.ranking.rivals if one.stood != best.stood]
+    row["dated"] = best.explains and best.stood == place.stood and not rivals if place.stood else None
+    return row
+
+
+def _summed(kind: str, runs: str, rows: Sequence[Row]) -> Row:
+    values = [row["mean"] for row in rows]
+    counts = {name: sum(row[name] for row in rows) for name in ("first", "explains", "covered", "none")}
+    dated = None if rows[0]["dated"] is None else sum(row["dated"] for row in rows)
+    return {
+        "sample": kind,
+        "runs": runs,
+        "draws": len(rows),
+        **counts,
+        "mean": float(np.mean(values)),
+        "scatter": float(np.std(values, ddof=1)) if len(values) > 1 else None,
+        "half": float(np.mean([row["half"] for row in rows])),
+        "dated": dated,
+    }
+
+
+def drawn(place: Laboratory, draws: int) -> list[Row]:
+    """Diagnose the sample measured many times, with the runs of one survey."""
+    runs = Interpolated(place)
+    rows = []
+    for seed in range(draws):
+        rows.append(outcome(place, fit_cases(place.cases, place.survey(seed).deformation, runs)))
+        progress(f"draw {seed + 1} of {draws}")
+    return rows
+
+
+def whole(place: Laboratory, draws: int, folder: Path) -> list[Row]:
+    """Diagnose the sample measured a few times, each with runs of its own stones."""
+    rows = []
+    for seed in range(draws):
+        url = f"sqlite:///{folder / f'{seed}.db'}"
+        path = folder / f"{seed}.moma"
+        write_moma(place.moved(seed).survey, path)
+        ingest([path], url)
+        if place.phases:
+            record([folder / "knowledge.toml"], url)
+        runs = runs_of(place.file, url, lambda trials: [run_trial(one) for one in trials])
+        found = measurements(place.file, url)
+        rows.append(outcome(place, fit_cases(place.cases, found.deformation, runs)))
+        progress(f"whole diagnosis {seed + 1} of {draws}")
+    return rows
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.diagnosis", description=__doc__)
+    parser.add_argument("--draws", type=int, default=100, help="surveys with the runs of one")
+    parser.add_argument("--whole", type=int, default=10, help="surveys with runs of their own")
+    parser.add_argument("--samples", nargs="+", choices=_KINDS, default=list(_KINDS))
+    parser.add_argument("--json", action="store_true", help="print an array of objects, one for each row")
+    options = parser.parse_args()
+    rows = []
+    for kind in options.samples:
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name) / kind
+            place = laboratory(kind, folder)
+            for runs, count, found in (
+                ("of one survey", options.draws, partial(drawn, place)),
+                ("of each survey", options.whole, partial(whole, place, folder=folder)),
+            ):
+                if count:
+                    rows.append(_summed(kind, runs, found(draws=count)))
+    if options.json:
+        print_json(rows)
+        return
+    print(f"{machine()}, {environment('numpy', 'numba')}\n")
+    print_table(rows, _TABLE)
+
+
+if __name__ == "__main__":
+    guarded(main)

@@ -1,0 +1,307 @@
+"""Files of a diagnosis: hypotheses on what has moved a building, each a change of a scene with unknown amplitudes."""
+
+import ast
+import operator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from moma.errors import SceneError
+from pipelines.scene.file import BESIDE
+from pipelines.toml.lines import key_lines, parse_toml, read_text
+from pipelines.toml.schema import Document, Key, Kind, check_table, nearest
+
+__all__ = [
+    "DIAGNOSIS_KEYS",
+    "HYPOTHESIS_KEYS",
+    "UNKNOWN_KEYS",
+    "DiagnosisFile",
+    "Hypothesis",
+    "Unknown",
+    "read_diagnosis",
+]
+
+DIAGNOSIS_KEYS = (
+    Key(
+        "scene", Kind.TEXT, "Scene file, beside this one; if not given, the scene is this file.", default=None
+    ),
+    Key("without", Kind.TEXTS, "Tables of that scene that are left out, such as loads.", default=()),
+    Key(
+        "battered",
+        Kind.BOOLEAN,
+        "Walls may have been built leaning, each by an angle of its own.",
+        default=False,
+    ),
+    Key(
+        "level_tolerance",
+        Kind.NUMBER,
+        "Standard deviation of the slope with which courses were laid.",
+        "-",
+        0.0,
+        at_least=0,
+        below=0.1,
+    ),
+    Key(
+        "phases",
+        Kind.TEXTS,
+        "Names of building phases, the oldest first; with two or more the movement is dated against them.",
+        default=(),
+    ),
+)
+
+HYPOTHESIS_KEYS = (
+    Key("name", Kind.TEXT, "The hypothesis in words."),
+    Key(
+        "scene",
+        Kind.TABLE,
+        "Keys of the scene that it changes; arrays such as `loads` are added to those of the scene. A text that begins "
+        "with `=` is a formula of the unknowns: numbers, + - * / and brackets.",
+    ),
+)
+
+UNKNOWN_KEYS = (
+    Key("name", Kind.TEXT, "As it stands in formulas."),
+    Key("unit", Kind.TEXT, "Of its values, for reports."),
+    Key("start", Kind.NUMBER, "Value with which the search begins."),
+    Key("low", Kind.NUMBER, "Least value."),
+    Key("high", Kind.NUMBER, "Largest value."),
+    Key(
+        "step",
+        Kind.NUMBER,
+        "Change by which derivatives are taken; if not given, a twentieth of the range.",
+        default=None,
+        above=0,
+    ),
+)
+
+_OPERATORS: Mapping[type[ast.operator], Callable[[float, float], float]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+}
+_SHARE = 0.05  # of its range by which an unknown is changed for a derivative [-]
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """An amplitude to be estimated.
+
+    Attributes
+    ----------
+    name, unit : for formulas and reports
+    start, low, high : first value and bounds
+    step : change for derivatives, positive
+    """
+
+    name: str
+    unit: str
+    start: float
+    low: float
+    high: float
+    step: float
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A change of a scene with unknown amplitudes.
+
+    Attributes
+    ----------
+    name : in words
+    path : its position in the file, for messages
+    unknowns : in the order of the amplitudes
+    change : of the scene, with formulas
+    """
+
+    name: str
+    path: tuple[str, ...]
+    unknowns: tuple[Unknown, ...]
+    change: Mapping[str, Any]
+
+    def scene(self, base: Mapping[str, Any], amplitudes: tuple[float, ...]) -> dict[str, Any]:
+        """Return the contents of the scene file with these amplitudes."""
+        values = dict(zip((one.name for one in self.unknowns), amplitudes, strict=True))
+        return _merged(base, _filled(self.change, values))
+
+
+@dataclass(frozen=True)
+class DiagnosisFile:
+    """A diagnosis as its author wrote it, checked.
+
+    Attributes
+    ----------
+    document : file and lines, for messages
+    scene_path : of the scene, for files beside it
+    base : contents of the scene file without what is left out
+    battered, level_tolerance : how walls and courses were laid
+    phases : names, the oldest first
+    hypotheses : one or more
+    """
+
+    document: Document
+    scene_path: str
+    base: Mapping[str, Any]
+    battered: bool
+    level_tolerance: float
+    phases: tuple[str, ...]
+    hypotheses: tuple[Hypothesis, ...]
+
+
+def read_diagnosis(path: str | Path) -> DiagnosisFile:
+    """Read and check the file of a diagnosis.
+
+    Raises
+    ------
+    SceneError : with file and line, at the first mistake
+    """
+    text = read_text(path, SceneError, missing="no such file")
+    given = parse_toml(text, str(path), SceneError, "see docs/howto/diagnose.md for one to start from")
+    document = Document(str(path), key_lines(text))
+    head: dict[str, Any] = check_table(document, ("diagnosis",), given.get("diagnosis", {}), DIAGNOSIS_KEYS)
+    if head["scene"] is None:
+        scene_path, base = str(path), {name: one for name, one in given.items() if name not in BESIDE}
+    else:
+        beside = Path(path).parent / head["scene"]
+        with document.at("diagnosis", "scene"):
+            inner = read_text(beside, SceneError, missing="no such scene file")
+        scene_path, base = str(beside), parse_toml(inner, str(beside), SceneError, "see docs/scene.md")
+        for name in given:
+            if name not in BESIDE:
+                what = f"unknown table [{name}] beside a scene in another file"
+                document.fail(what, name, remedy="write it into the scene, or under [hypotheses.scene]")
+    for name in head["without"]:
+        if name not in base:
+            document.fail(
+                f"without: the scene has no {name!r}", "diagnosis", "without", remedy=nearest(name, base)
+            )
+    return DiagnosisFile(
+        document,
+        scene_path,
+        {name: one for name, one in base.items() if name not in (*BESIDE, *head["without"])},
+        head["battered"],
+        head["level_tolerance"],
+        _distinct(document, head["phases"]),
+        tuple(_hypotheses(document, given)),
+    )
+
+
+def _distinct(document: Document, phases: tuple[str, ...]) -> tuple[str, ...]:
+    if len(phases) == 1 or len(set(phases)) < len(phases):
+        what = f"phases = {list(phases)} are not several different ones"
+        document.fail(what, "diagnosis", "phases", remedy="name two or more, the oldest first, or none")
+    return phases
+
+
+def _hypotheses(document: Document, given: Mapping[str, Any]) -> Iterator[Hypothesis]:
+    tables = given.get("hypotheses", [])
+    if not isinstance(tables, list) or not tables or not all(isinstance(one, dict) for one in tables):
+        document.fail("no hypothesis", "hypotheses", remedy="write [[hypotheses]] above each")
+    names: set[str] = set()
+    for index, table in enumerate(tables):
+        path = ("hypotheses", str(index))
+        plain = {key: value for key, value in table.items() if key != "unknowns"}
+        values: dict[str, Any] = check_table(document, path, plain, HYPOTHESIS_KEYS, "[[hypotheses]]")
+        if values["name"] in names:
+            document.fail(f"two hypotheses {values['name']!r}", *path, "name", remedy="name each differently")
+        names.add(values["name"])
+        unknowns = tuple(_unknowns(document, path, table.get("unknowns", [])))
+        _check_formulas(document, path, values["scene"], [one.name for one in unknowns])
+        yield Hypothesis(values["name"], path, unknowns, values["scene"])
+
+
+def _unknowns(document: Document, path: tuple[str, ...], tables: Any) -> Iterator[Unknown]:
+    if not isinstance(tables, list) or not all(isinstance(one, dict) for one in tables):
+        what = "'unknowns' is not a list of tables"
+        document.fail(what, *path, "unknowns", remedy="write [[hypotheses.unknowns]] above each")
+    for index, table in enumerate(tables):
+        own = (*path, "unknowns", str(index))
+        values: dict[str, Any] = check_table(document, own, table, UNKNOWN_KEYS, "[[hypotheses.unknowns]]")
+        if not values["name"].isidentifier():
+            what = f"name = {values['name']!r} is no name for a formula"
+            document.fail(what, *own, "name", remedy="use letters, digits and _")
+        if not values["low"] <= values["start"] <= values["high"] or values["low"] == values["high"]:
+            what = "start = {start:g} is not between low = {low:g} and high = {high:g}".format(**values)
+            document.fail(what, *own, "start", remedy="give low < high, and a start between them")
+        span = values["high"] - values["low"]
+        values["step"] = values["step"] or _SHARE * span
+        if values["step"] > 0.5 * span:
+            what = f"step = {values['step']:g} is more than half of the range of {values['name']}"
+            document.fail(what, *own, "step", remedy="give less, or leave it out")
+        yield Unknown(**values)
+
+
+def _check_formulas(document: Document, path: tuple[str, ...], change: Any, names: list[str]) -> None:
+    """Refuse formulas that cannot be read, and unknowns that stand in none."""
+    used: set[str] = set()
+    for text in _formulas(change):
+        try:
+            tree = ast.parse(text[1:].strip(), mode="eval")
+            # with values that no formula divides by
+            _value(tree.body, dict.fromkeys(names, 0.7310585))
+        except (SyntaxError, ValueError, ZeroDivisionError) as fault:
+            why = fault if isinstance(fault, ValueError) else "not a formula"
+            remedy = f"use numbers, + - * / ( ) and {', '.join(names) or 'no names'}"
+            document.fail(f"{text!r}: {why}", *path, "scene", remedy=remedy)
+        used |= {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+    for index, name in enumerate(names):
+        if name not in used or names.count(name) > 1:
+            what = f"unknown {name!r} stands in no formula" if name not in used else f"two unknowns {name!r}"
+            remedy = (
+                "keep one" if name in used else f'write "= {name}" where it belongs in [hypotheses.scene]'
+            )
+            document.fail(what, *path, "unknowns", str(index), "name", remedy=remedy)
+
+
+def _formulas(change: Any) -> Iterator[str]:
+    if isinstance(change, str) and change.startswith("="):
+        yield change
+    elif isinstance(change, Mapping):
+        for one in change.values():
+            yield from _formulas(one)
+    elif isinstance(change, list):
+        for one in change:
+            yield from _formulas(one)
+
+
+def _filled(change: Any, values: Mapping[str, float]) -> Any:
+    """Return a change with numbers in place of formulas."""
+    if isinstance(change, str) and change.startswith("="):
+        return _value(ast.parse(change[1:].strip(), mode="eval").body, values)
+    if isinstance(change, Mapping):
+        return {key: _filled(one, values) for key, one in change.items()}
+    return [_filled(one, values) for one in change] if isinstance(change, list) else change
+
+
+def _value(node: ast.expr, values: Mapping[str, float]) -> float:
+    match node:
+        case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
+            return float(number)
+        case ast.Name(id=name) if name in values:
+            return values[name]
+        case ast.Name(id=name):
+            raise ValueError(f"{name!r} is none of its unknowns")
+        case ast.UnaryOp(op=ast.USub(), operand=inner):
+            return -_value(inner, values)
+        case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
+            return _OPERATORS[type(op)](_value(left, values), _value(right, values))
+    raise ValueError("not a formula")
+
+
+def _merged(base: Mapping[str, Any], change: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a table with a change: tables are merged, arrays of tables added, other values replaced."""
+    merged = dict(base)
+    for key, value in change.items():
+        old = merged.get(key)
+        if isinstance(old, Mapping) and isinstance(value, Mapping):
+            merged[key] = _merged(old, value)
+        elif _is_array(old) and _is_array(value):
+            merged[key] = [*old, *value]  # type: ignore[misc]
+        else:
+            merged[key] = value
+    return merged
+
+
+def _is_array(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(one, Mapping) for one in value)

@@ -1,0 +1,103 @@
+"""Measurements of a diagnosis: the deformation of the stones in the database, by phases if it is to be dated."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from archmodel.database.session import open_database
+from archmodel.query.api import find_rows
+from pipelines.assess.compare import measured_stones
+from pipelines.assess.diagnosis.file import DiagnosisFile
+from pipelines.scene.file import read_scene
+from pipelines.scene.selection import select_stones
+from survey.quality.deformation import Built, Deformation, measure_deformation
+from survey.quality.facades import Facade
+from survey.quality.precision import StoneQuality
+
+__all__ = ["Measurements", "measure", "measurements"]
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """The survey as a diagnosis sees it.
+
+    Attributes
+    ----------
+    stones : measured; if the movement is to be dated, the zone of each names its phase
+    facades : of the stones
+    deformation : their departure from level and plumb
+    phases : of each stone by code; empty if the movement is not to be dated
+    resting : codes of stones that rest on those of an earlier phase
+    """
+
+    stones: tuple[StoneQuality, ...]
+    facades: tuple[Facade, ...]
+    deformation: Deformation
+    phases: Mapping[str, str]
+    resting: frozenset[str]
+
+
+def measurements(file: DiagnosisFile, url: str) -> Measurements:
+    """Return the measurements of the stones of a scene.
+
+    Raises
+    ------
+    SceneError : the scene has a mistake, or a stone is of none of the phases
+    DatabaseError : the database cannot be read
+    """
+    scene = read_scene(file.scene_path)
+    with open_database(url, create=False) as database, database.session(read_only=True) as session:
+        stones, facades = measured_stones(select_stones(scene, session))
+        rows = find_rows(session, "entity", (), columns=("code", "phase")) if file.phases else ()
+    known = {str(row["code"]): row["phase"] for row in rows}
+    phases = {stone.code: known.get(stone.code) for stone in stones} if file.phases else {}
+    for code, phase in phases.items():
+        if phase not in file.phases:
+            what = (
+                f"stone {code} is of {'no phase' if phase is None else f'phase {phase}, which is not listed'}"
+            )
+            file.document.fail(what, "diagnosis", "phases", remedy="record its phase, or leave 'phases' out")
+    return measure(file, stones, facades, {code: str(phase) for code, phase in phases.items()})
+
+
+def measure(
+    file: DiagnosisFile,
+    stones: Sequence[StoneQuality],
+    facades: tuple[Facade, ...],
+    phases: Mapping[str, str],
+) -> Measurements:
+    """Return the measurements of given stones, with their phases by code, if any."""
+    resting = frozenset(_resting(stones, facades, phases, file.phases)) if phases else frozenset[str]()
+    parted = tuple(
+        replace(stone, zone=f"{stone.zone or ''} phase {phases[stone.code]}".strip()) if phases else stone
+        for stone in stones
+    )
+    built = Built(file.level_tolerance, file.battered)
+    return Measurements(
+        parted, facades, measure_deformation(parted, facades, built, resting), phases, resting
+    )
+
+
+def _resting(
+    stones: Sequence[StoneQuality],
+    facades: Sequence[Facade],
+    phases: Mapping[str, str],
+    order: Sequence[str],
+) -> Iterator[str]:
+    """Yield the stones above stones of an earlier phase in the course below: their beds may follow older work."""
+    for facade in facades:
+        members = [stones[i] for i in facade.members.tolist() if stones[i].course is not None]
+        along = {
+            stone.code: (stone.outline - facade.frame.origin) @ facade.frame.axes[0] for stone in members
+        }
+        for stone in members:
+            own = along[stone.code]
+            below = (
+                one for one in members if one.course == (stone.course or 0) - 1 and one.zone == stone.zone
+            )
+            if any(
+                order.index(phases[one.code]) < order.index(phases[stone.code])
+                and along[one.code].min() < own.max()
+                and own.min() < along[one.code].max()
+                for one in below
+            ):
+                yield stone.code

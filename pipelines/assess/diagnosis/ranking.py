@@ -1,0 +1,198 @@
+"""Rank of hypotheses by what they leave unexplained and the number of their unknowns; the verdict in one line."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import fdtrc, stdtrit
+
+from pipelines.assess.diagnosis.file import Unknown
+from pipelines.assess.diagnosis.fit import Fit
+
+__all__ = ["STILL", "Estimate", "Ranked", "Ranking", "estimates", "rank", "verdict"]
+
+STILL = "nothing has moved"
+"""Name of the hypothesis without a run, to which all others are compared."""
+
+_EXPLAINS = 0.01  # probability of so large a χ² by chance, below which a hypothesis does not explain
+_APART = (
+    6.0  # difference of AICc from which two hypotheses are told apart: a relative likelihood of a twentieth
+)
+_CORRELATED = 0.95  # correlation of two amplitudes beyond which they are not told apart
+_QUANTILE = 0.975  # of two-sided 95 % intervals
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """An amplitude.
+
+    Attributes
+    ----------
+    name, unit : of the unknown
+    value : that explains best
+    low, high : ends of its 95 % interval; infinite if it is not determined
+    at_bound : whether the value lies at a bound of the search
+    """
+
+    name: str
+    unit: str
+    value: float
+    low: float
+    high: float
+    at_bound: bool
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """A hypothesis with its place in the list.
+
+    Attributes
+    ----------
+    name : in words
+    stood : phases that stood when it acted; empty if it is not dated
+    fit : its amplitudes and residuals
+    dof : degrees of freedom
+    probability : of so large a χ² by chance if the hypothesis is true
+    aicc : χ² + 2 k with the correction for few values
+    estimates : its amplitudes
+    remarks : cautions about its amplitudes and runs
+    """
+
+    name: str
+    stood: tuple[str, ...]
+    fit: Fit
+    dof: int
+    probability: float
+    aicc: float
+    estimates: tuple[Estimate, ...]
+    remarks: tuple[str, ...]
+
+    @property
+    def explains(self) -> bool:
+        """Whether what it leaves may be chance."""
+        return self.probability >= _EXPLAINS
+
+    @property
+    def title(self) -> str:
+        """Name, with its date."""
+        return (
+            f"{self.name}, when {' and '.join(f'phase {one}' for one in self.stood)} stood"
+            if self.stood
+            else self.name
+        )
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """All hypotheses, the best first, and the stillness beside them.
+
+    Attributes
+    ----------
+    hypotheses : those with a run
+    still : nothing has moved
+    """
+
+    hypotheses: tuple[Ranked, ...]
+    still: Ranked
+
+    @property
+    def rivals(self) -> tuple[Ranked, ...]:
+        """Others that are not told apart from the best."""
+        best = self.hypotheses[0]
+        return tuple(one for one in self.hypotheses[1:] if one.aicc - best.aicc < _APART)
+
+
+def rank(
+    name: str, stood: tuple[str, ...], unknowns: Sequence[Unknown], found: Fit, dof: int, steps: int
+) -> Ranked:
+    """Return a hypothesis with its measures.
+
+    Parameters
+    ----------
+    name, stood : see `Ranked`
+    unknowns : of the hypothesis
+    found : its best amplitudes
+    dof : of the measurements, before amplitudes are estimated
+    steps : number of steps at head joints from which the scatter of beds is known; 0: it is taken as exact
+    """
+    count = len(unknowns)
+    left = max(dof - count, 1)
+    if not len(found.residuals):
+        return Ranked(name, stood, found, left, 0.0, math.inf, (), (f"not run: {found.trouble}",))
+    ratio = found.chi2 / left
+    probability = float(fdtrc(left, steps or 1e9, ratio))
+    aicc = found.chi2 + 2.0 * count + 2.0 * count * (count + 1) / max(dof - count - 1, 1)
+    own = tuple(estimates(unknowns, found, left))
+    return Ranked(name, stood, found, left, probability, aicc, own, tuple(_remarks(unknowns, found, own)))
+
+
+def estimates(unknowns: Sequence[Unknown], found: Fit, dof: int) -> Iterator[Estimate]:
+    """Yield the amplitudes with intervals of Student's t, widened where the residuals are larger than expected."""
+    wide = float(stdtrit(dof, _QUANTILE)) * max(1.0, math.sqrt(found.chi2 / dof))
+    blind = np.abs(np.array(found.undetermined).reshape(len(found.undetermined), len(unknowns))).max(
+        axis=0, initial=0.0
+    )
+    for k, (one, value) in enumerate(zip(unknowns, found.amplitudes, strict=True)):
+        variance = found.covariance[k, k]
+        # a part of a direction that nothing feels may be as large as the bounds allow
+        known = blind[k] < 0.1 and math.isfinite(variance)
+        half = wide * math.sqrt(variance) if known else math.inf
+        near = 1e-6 * (one.high - one.low)
+        bound = min(value - one.low, one.high - value) <= near
+        yield Estimate(one.name, one.unit, value, value - half, value + half, bound)
+
+
+def _remarks(unknowns: Sequence[Unknown], found: Fit, own: Sequence[Estimate]) -> Iterator[str]:
+    names = [one.name for one in unknowns]
+    if found.trouble:
+        yield found.trouble
+    for one in own:
+        if one.at_bound:
+            yield f"{one.name} lies at a bound of its range"
+    for direction in found.undetermined:
+        parts = [
+            f"{part:+.2f} {name}" for part, name in zip(direction, names, strict=True) if abs(part) > 0.1
+        ]
+        told = " ".join(parts) if len(parts) > 1 else parts[0].split()[1]
+        yield f"not determined, as it moves nothing that was measured: {told}"
+    sigma = np.sqrt(np.diag(found.covariance))
+    for i in range(len(names)):
+        for k in range(i):
+            correlation = found.covariance[i, k] / (sigma[i] * sigma[k]) if sigma[i] * sigma[k] > 0.0 else 0.0
+            if abs(correlation) > _CORRELATED:
+                yield f"{names[k]} and {names[i]} cannot be told apart: their correlation is {correlation:+.3f}"
+
+
+def verdict(ranking: Ranking) -> str:
+    """Return the verdict in one line, with its caution."""
+    best, still = ranking.hypotheses[0], ranking.still
+    chi2 = f"χ² {best.fit.chi2:.4g} of {best.dof}, {still.fit.chi2:.4g} of {still.dof} if nothing had moved"
+    if still.explains and still.aicc - best.aicc < _APART:
+        return (
+            f"no movement is needed to explain what was measured: χ² {still.fit.chi2:.4g} of {still.dof} without any; "
+            "CAUTION: movements that are small against the scatter of beds are not seen"
+        )
+    if not best.explains:
+        return (
+            f"NONE OF THESE EXPLAINS what was measured; the best of them is {best.title!r} ({chi2}); "
+            "CAUTION: its amounts are no estimates of anything"
+        )
+    rivals = [one for one in ranking.rivals if one.name != best.name]
+    names = " and ".join(repr(one.name) for one in rivals)
+    caution = (
+        f"CAUTION: it cannot be told apart from {names}"
+        if rivals
+        else "CAUTION: a cause that is not in the list may move the stones alike"
+    )
+    amounts = "; ".join(told(one) for one in best.estimates)
+    return f"{best.title!r} explains what was measured ({chi2}){f': {amounts}' if amounts else ''}; {caution}"
+
+
+def told(one: Estimate) -> str:
+    """Return an amplitude with its interval in words."""
+    if not math.isfinite(one.low):
+        return f"{one.name} is not determined"
+    half = one.high - one.value
+    digits = max(0, 1 - math.floor(math.log10(half))) if half > 0.0 else 6
+    return f"{one.name} = {one.value:.{digits}f} ± {half:.{digits}f} {one.unit} (95 %)"

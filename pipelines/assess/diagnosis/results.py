@@ -1,0 +1,176 @@
+"""Files of a diagnosis: JSON, tables, elevations of measured beside simulated bed lines, and the best scene."""
+
+import csv
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pipelines.assess.diagnosis.dating import Dating
+from pipelines.assess.diagnosis.file import DiagnosisFile
+from pipelines.assess.diagnosis.measurements import Measurements
+from pipelines.assess.diagnosis.ranking import Ranked, verdict
+from pipelines.assess.diagnosis.search import Case, Fitted
+from pipelines.assess.motions import Motions
+from pipelines.draw.elevations.movement import draw_bed_movement
+from pipelines.results.summary import as_json
+from pipelines.run.record import versions
+from survey.quality.courses import measure_courses
+from survey.quality.movement import CourseMovement, compare_courses
+
+__all__ = ["INDEX", "write_diagnosis"]
+
+_HYPOTHESIS = "rank hypothesis stood chi2 dof probability aicc amplitude unit value low high"  # columns
+
+INDEX = "diagnosis.json"
+"""Index of the results of a diagnosis."""
+
+
+def write_diagnosis(
+    folder: Path,
+    file: DiagnosisFile,
+    cases: tuple[Case, ...],
+    found: Measurements,
+    done: Fitted,
+    dating: Dating | None,
+    cautions: tuple[str, ...],
+) -> dict[str, Any]:
+    """Write all files into an empty folder; return the contents of diagnosis.json.
+
+    Parameters
+    ----------
+    folder : that is empty
+    file, cases : what was asked, and the hypotheses at all times
+    found, done : the survey, and the fits
+    dating : None if it is not dated
+    cautions : cases that were not tried, each with its reason
+    """
+    best = done.ranking.hypotheses[0]
+    motions = done.motions[best.name, best.stood]
+    courses = compare_courses(measure_courses(found.stones, found.facades), motions.displacement)
+    _write_hypotheses(folder / "hypotheses.csv", done)
+    _write_stones(folder / "stones.csv", courses)
+    _draw(folder, courses)
+    case = next(one for one in cases if (one.hypothesis.name, one.stood) == (best.name, best.stood))
+    scene = f"# {best.title}: the amplitudes that explain best\n{case.text(file, best.fit.amplitudes)}"
+    (folder / "best.toml").write_text(scene, encoding="utf-8")
+    summary = _summary(file, found, done, dating)
+    summary["cautions"] += cautions
+    summary["files"] = sorted([INDEX, *(entry.name for entry in folder.iterdir())])
+    (folder / INDEX).write_text(as_json(summary), encoding="utf-8")
+    return summary
+
+
+def _summary(file: DiagnosisFile, found: Measurements, done: Fitted, dating: Dating | None) -> dict[str, Any]:
+    ranking, deformation = done.ranking, found.deformation
+    laid = "with a batter" if file.battered else "plumb"
+    tolerance = f"level within {1e3 * file.level_tolerance:g} mm/m" if file.level_tolerance else "level"
+    return {
+        "verdict": verdict(ranking),
+        "dating": None
+        if dating is None
+        else {
+            "verdict": dating.verdict,
+            "shares": [{"phase": one.phase, "value": one.value, "sigma": one.sigma} for one in dating.shares],
+            "evidence": list(dating.evidence),
+        },
+        "cautions": [
+            f"courses are assumed to have been laid {tolerance}, and faces {laid}",
+            "each run begins with the stones as they are now, and its movement alone is compared",
+        ],
+        "hypotheses": [_told(one, ranking.hypotheses[0]) for one in (*ranking.hypotheses, ranking.still)],
+        "not_told_apart": [one.title for one in ranking.rivals],
+        "scatter": {name: {"beds": value} for name, value in deformation.scatter.items()},
+        "steps": deformation.steps,
+        "groups": _groups(found, done),
+        "runs": done.runs,
+        "cpu": done.cpu,
+        "versions": dict(versions()),
+    }
+
+
+def _told(one: Ranked, best: Ranked) -> dict[str, Any]:
+    return {
+        "name": one.name,
+        "stood": list(one.stood),
+        "chi2": one.fit.chi2 if len(one.fit.residuals) else None,
+        "dof": one.dof,
+        "probability": one.probability,
+        "explains": one.explains,
+        "aicc": _finite(one.aicc),
+        "behind": _finite(one.aicc - best.aicc),
+        "amplitudes": [
+            {
+                "name": own.name,
+                "unit": own.unit,
+                "value": own.value,
+                "low": _finite(own.low),
+                "high": _finite(own.high),
+                "at_bound": own.at_bound,
+            }
+            for own in one.estimates
+        ],
+        "covariance": [[_finite(value) for value in row] for row in one.fit.covariance.tolist()],
+        "remarks": list(one.remarks),
+        "turns": one.fit.turns,
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _groups(found: Measurements, done: Fitted) -> list[dict[str, Any]]:
+    """Return χ² of each course and wall: of the best hypothesis, and if nothing had moved."""
+    best = done.ranking.hypotheses[0]
+    still, motions = Motions({}, {}), done.motions[best.name, best.stood]
+    return [
+        {
+            "facade": one.facade,
+            "zone": one.zone,
+            "quantity": one.quantity,
+            "course": one.course,
+            **{
+                name: _square(one.residuals(by.displacement))
+                for name, by in (("chi2", motions), ("chi2_still", still))
+            },
+            "dof": one.dof,
+        }
+        for one in found.deformation.groups
+    ]
+
+
+def _square(residuals: Any) -> float:
+    return float(residuals @ residuals)
+
+
+def _write_hypotheses(path: Path, done: Fitted) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file)
+        table.writerow(_HYPOTHESIS.split())
+        for number, one in enumerate((*done.ranking.hypotheses, done.ranking.still), start=1):
+            head = [number, one.name, " ".join(one.stood), one.fit.chi2, one.dof, one.probability, one.aicc]
+            for own in one.estimates:
+                table.writerow([*head, own.name, own.unit, own.value, own.low, own.high])
+            if not one.estimates:
+                table.writerow([*head, "", "", "", "", ""])
+
+
+def _write_stones(path: Path, courses: tuple[CourseMovement, ...]) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file)
+        table.writerow(["stone", "facade", "course", "sag_measured", "sag_simulated", "sag_sigma"])
+        for line in courses:
+            for code, one in line.stones.items():
+                table.writerow(
+                    [code, line.line.facade, line.line.course, one.measured, one.simulated, one.sigma]
+                )
+
+
+def _draw(folder: Path, courses: tuple[CourseMovement, ...]) -> None:
+    """Draw the bed lines of each wall, measured and simulated by the best hypothesis."""
+    walls: Mapping[str, list[CourseMovement]] = {}
+    for one in courses:
+        walls.setdefault(one.line.facade, []).append(one)  # type: ignore[attr-defined]
+    for number, lines in enumerate(walls.values(), start=1):
+        draw_bed_movement(folder / f"beds-{number}.png", lines)

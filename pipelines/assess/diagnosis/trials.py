@@ -1,0 +1,97 @@
+"""Runs of a diagnosis: scenes in, motions of their stones out, here or in processes beside this one.
+
+`Runner` is all that a cluster has to serve: scenes are self-contained texts, and may be run in any order.
+"""
+
+import ctypes
+import multiprocessing
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from archmodel.database.session import open_database
+from mechanics.results.result import Outcome
+from mechanics.simulate import simulate
+from moma.errors import MomaError
+from pipelines.assess.motions import Motions, stone_motions
+from pipelines.run.assemble import assemble
+from pipelines.scene.file import parse_scene
+
+__all__ = ["Runner", "Trial", "Tried", "run_trial", "runner"]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A scene to be run.
+
+    Attributes
+    ----------
+    text, path : of the scene file; the path is for messages and for files beside it
+    url : of the database with its stones
+    """
+
+    text: str
+    path: str
+    url: str
+
+
+@dataclass(frozen=True)
+class Tried:
+    """Answer to a trial.
+
+    Attributes
+    ----------
+    motions : of the stones; None if the run failed
+    fault : reason of the failure, or of mistrust: the run did not come to rest; empty if there is none
+    cpu : time of the processor [s]
+    """
+
+    motions: Motions | None
+    fault: str
+    cpu: float
+
+
+Runner = Callable[[Sequence[Trial]], Sequence[Tried]]
+"""Function that runs scenes, independent of each other, and returns the answers in their order."""
+
+
+def run_trial(trial: Trial) -> Tried:
+    """Run one scene."""
+    begun = time.process_time()
+    try:
+        scene = parse_scene(trial.text, trial.path)
+        with open_database(trial.url, create=False) as database, database.session(read_only=True) as session:
+            assembly = assemble(scene, session)
+        result = simulate(assembly.scene)
+    except MomaError as error:
+        return Tried(None, " ".join(str(error).split()), time.process_time() - begun)
+    cpu = time.process_time() - begun
+    if result.outcome is Outcome.COLLAPSED:
+        return Tried(None, "the run ended in collapse", cpu)
+    fault = "" if result.outcome is Outcome.EQUILIBRIUM else f"its run did not come to rest: {result.outcome}"
+    return Tried(stone_motions(result.bodies, assembly.origin), fault, cpu)
+
+
+@contextmanager
+def runner(jobs: int) -> Iterator[Runner]:
+    """Yield a function that runs scenes, with so many at a time, each in a process of its own if more than one."""
+    if jobs == 1:
+        yield lambda trials: [run_trial(one) for one in trials]
+        return
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(jobs, context, _end_with_parent, (os.getpid(),)) as pool:
+        yield lambda trials: list(pool.map(run_trial, trials))
+
+
+def _end_with_parent(parent: int) -> None:
+    """End this process as soon as its parent has ended, for whatever reason; Ctrl-C reaches the parent alone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if sys.platform.startswith("linux"):
+        ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
+        if os.getppid() != parent:
+            os._exit(1)
