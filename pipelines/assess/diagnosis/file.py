@@ -235,7 +235,7 @@ def _unknowns(document: Document, path: tuple[str, ...], tables: Any) -> Iterato
 def _check_formulas(document: Document, path: tuple[str, ...], change: Any, names: list[str]) -> None:
     """Refuse formulas that cannot be read, and unknowns that stand in none."""
     used: set[str] = set()
-    for text in _formulas(change):
+    for place, text in _formulas(change, (*path, "scene")):
         try:
             tree = ast.parse(text[1:].strip(), mode="eval")
             # with values that no formula divides by
@@ -243,7 +243,7 @@ def _check_formulas(document: Document, path: tuple[str, ...], change: Any, name
         except (SyntaxError, ValueError, ZeroDivisionError) as fault:
             why = fault if isinstance(fault, ValueError) else "not a formula"
             remedy = f"use numbers, + - * / ( ) and {', '.join(names) or 'no names'}"
-            document.fail(f"{text!r}: {why}", *path, "scene", remedy=remedy)
+            document.fail(f"{text!r}: {why}", *place, remedy=remedy)
         used |= {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
     for index, name in enumerate(names):
         if name not in used or names.count(name) > 1:
@@ -254,15 +254,16 @@ def _check_formulas(document: Document, path: tuple[str, ...], change: Any, name
             document.fail(what, *path, "unknowns", str(index), "name", remedy=remedy)
 
 
-def _formulas(change: Any) -> Iterator[str]:
+def _formulas(change: Any, path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], str]]:
+    """Yield the formulas of a change with their places."""
     if isinstance(change, str) and change.startswith("="):
-        yield change
+        yield path, change
     elif isinstance(change, Mapping):
-        for one in change.values():
-            yield from _formulas(one)
+        for name, one in change.items():
+            yield from _formulas(one, (*path, name))
     elif isinstance(change, list):
-        for one in change:
-            yield from _formulas(one)
+        for index, one in enumerate(change):
+            yield from _formulas(one, (*path, str(index)))
 
 
 def _filled(change: Any, values: Mapping[str, float]) -> Any:

@@ -1,0 +1,337 @@
+"""Diagnosis: its file, the search, the rank, and the date, on walls whose movement is a formula."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from moma.errors import SceneError
+from pipelines.assess.compare import facades_of
+from pipelines.assess.diagnosis.dating import date_movement
+from pipelines.assess.diagnosis.file import Unknown, read_diagnosis
+from pipelines.assess.diagnosis.fit import Fit, fit
+from pipelines.assess.diagnosis.measurements import measure
+from pipelines.assess.diagnosis.ranking import STILL, Ranking, rank, verdict
+from pipelines.assess.diagnosis.search import cases_of, fit_cases, runs_of
+from pipelines.assess.diagnosis.trials import Tried, runner
+from pipelines.assess.motions import Motions
+from pipelines.scene.file import parse_scene
+from pipelines.toml.lines import parse_toml
+from pipelines.toml.writer import toml_text
+from survey.quality.precision import appraise
+from survey.synthetic.buildings.walls import wall
+from survey.synthetic.frame import RigidMotion
+
+SCENE = """
+[scene]
+name = "a wall, \\"old\\""
+[materials.limestone]
+density = 2350.0
+young = 12e9
+poisson = 0.2
+[[loads]]
+type = "gravity_ramp"
+duration = 0.1
+"""
+
+HYPOTHESES = """
+[diagnosis]
+battered = true
+[[hypotheses]]
+name = "turned"
+[[hypotheses.unknowns]]
+name = "angle"
+unit = "mm/m"
+start = 0.0
+low = -20.0
+high = 20.0
+[hypotheses.scene.time]
+step = 0.02
+[[hypotheses.scene.loads]]
+type = "settlement"
+stones = ["W01-01"]
+displacement = [0.0, 0.0, "= -(angle + 1) / 2e3"]
+duration = 1.0
+[[hypotheses]]
+name = "sheared"
+[[hypotheses.unknowns]]
+name = "slip"
+unit = "mm/m"
+start = 0.0
+low = -20.0
+high = 20.0
+[hypotheses.scene.contact]
+friction = "= 0.6 + slip * 0"
+"""
+
+
+def written(tmp_path, text):
+    path = tmp_path / "wall.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_a_hypothesis_changes_a_scene(tmp_path):
+    file = read_diagnosis(written(tmp_path, SCENE + HYPOTHESES))
+    turned, sheared = file.hypotheses
+    text = toml_text(turned.scene(file.base, (9.0,)))
+    scene = parse_scene(text, "wall.toml")
+    assert scene.name == 'a wall, "old"'
+    assert scene.time.step == 0.02
+    assert [one.type for one in scene.loads] == ["gravity_ramp", "settlement"]
+    assert scene.loads[1].values["displacement"] == pytest.approx((0.0, 0.0, -0.005))
+    assert parse_toml(text, "", SceneError, "")["materials"] == file.base["materials"]
+    assert parse_scene(toml_text(sheared.scene(file.base, (3.0,))), "").contact.law.friction == 0.6
+    # a scene with hypotheses is a scene all the same
+    assert parse_scene(SCENE + HYPOTHESES, "wall.toml").name == scene.name
+
+
+FORMULA = '"= -(angle + 1) / 2e3"'
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "said"),
+    [
+        (FORMULA, '"= -(angel + 1)"', "displacement", "'angel' is none of its unknowns"),
+        (FORMULA, '"= angle ** 2"', "displacement", "not a formula"),
+        (FORMULA, '"= angle /"', "displacement", "not a formula"),
+        (FORMULA, "0.0", 'name = "angle"', "unknown 'angle' stands in no formula"),
+        ("start = 0.0", "start = 30.0", "start", "is not between low = -20 and high = 20"),
+        ('name = "sheared"', 'name = "turned"', 'second name = "turned"', "two hypotheses 'turned'"),
+        ("battered = true", 'phases = ["1"]', "phases", "are not several"),
+        ("battered = true", 'without = ["load"]', "without", "did you mean 'loads'?"),
+        ("battered = true", "batered = true", "batered", "did you mean 'battered'?"),
+        ('unit = "mm/m"', "", "[[hypotheses.unknowns]]", "has no 'unit'"),
+    ],
+)
+def test_mistakes_are_named_with_their_line(tmp_path, old, new, line, said):
+    text = SCENE + HYPOTHESES.replace(old, new, 1)
+    path = written(tmp_path, text)
+    with pytest.raises(SceneError) as raised:
+        read_diagnosis(path)
+    assert said in str(raised.value)
+    there = [k for k, one in enumerate(text.splitlines(), 1) if one.startswith(line.removeprefix("second "))]
+    assert raised.value.where == f"{path}:{there[line.startswith('second')]}"
+
+
+def searched(unknowns, residuals):
+    """The fit to residuals that are a function of the amplitudes, and the places it asked for."""
+    search, places = fit(unknowns), []
+    asked = next(search)
+    while True:
+        places += asked
+        try:
+            asked = search.send([residuals(*place) for place in asked])
+        except StopIteration as end:
+            return end.value, places
+
+
+def unknown(name, start=0.0, low=-1.0, high=1.0, step=0.01):
+    return Unknown(name, "m", start, low, high, step)
+
+
+def test_amplitudes_that_act_together_nonlinearly_are_found():
+    data = np.random.default_rng(1).normal(size=30)
+    place = np.linspace(0.0, 1.0, 30)
+
+    def residuals(a, b):
+        return data + 50.0 * (np.sin(3.0 * (a - 0.4) * place) + (b + 0.2) * place**2)
+
+    found, places = searched([unknown("a"), unknown("b")], residuals)
+    # within 4 σ of the truth, and no better place beside it
+    sigma = np.sqrt(np.diag(found.covariance))
+    assert np.abs(np.array(found.amplitudes) - [0.4, -0.2]).max() < 4.0 * sigma.max()
+    assert found.trouble == ""
+    for shift in np.vstack([np.diag(sigma), -np.diag(sigma)]):
+        beside = residuals(*(np.array(found.amplitudes) + shift))
+        assert beside @ beside > found.chi2
+    assert np.abs(np.array(places)).max() <= 1.0
+
+
+def test_bounds_hold_and_what_moves_nothing_is_not_determined():
+    place = np.arange(1.0, 21.0)
+
+    def residuals(a, b):
+        return 10.0 * (a - 3.0) * place
+
+    found, places = searched([unknown("a"), unknown("b", start=0.5)], residuals)
+    assert found.amplitudes == pytest.approx((1.0, 0.5))
+    assert np.abs(np.array(places)).max() <= 1.0
+    assert np.abs(found.undetermined) == pytest.approx(np.array([[0.0, 1.0]]))
+    told = rank("x", (), [unknown("a"), unknown("b")], found, 20, 0)
+    assert told.estimates[0].at_bound
+    assert told.estimates[1].low == -np.inf
+    assert any(remark.endswith("that was measured: b") for remark in told.remarks)
+
+
+def test_amplitudes_that_do_the_same_cannot_be_told_apart():
+    place = np.linspace(0.0, 1.0, 40)
+
+    def residuals(a, b):
+        return 20.0 * ((a - 0.3) + (b + 0.1) * (1.0 + 0.2 * place))
+
+    unknowns = [unknown("a"), unknown("b")]
+    told = rank("x", (), unknowns, searched(unknowns, residuals)[0], 40, 0)
+    assert any("a and b cannot be told apart" in remark for remark in told.remarks)
+
+
+def test_runs_that_fail_are_told():
+    failed, _ = searched([unknown("a")], lambda a: "the run ended in collapse")
+    told = rank("x", (), [unknown("a")], failed, 20, 0)
+    assert told.aicc == np.inf
+    assert told.remarks == ("not run: the run ended in collapse",)
+    # one that fails only far away costs a shorter step
+    place = np.ones(10)
+    found, _ = searched(
+        [unknown("a", start=0.9)], lambda a: "collapse" if a < 0.3 else 10.0 * (a**3 - 0.1) * place
+    )
+    assert found.amplitudes[0] == pytest.approx(0.1 ** (1 / 3), abs=0.01)
+
+
+def still_of(chi2, dof):
+    return rank(STILL, (), (), Fit((), np.full(1, chi2**0.5), np.zeros((0, 0)), (), 0), dof, 0)
+
+
+def hypothesis(name, chi2, dof=50):
+    found = Fit((0.03,), np.full(1, chi2**0.5), np.array([[1e-6]]), (), 3)
+    return rank(name, (), [unknown("settlement")], found, dof, 0)
+
+
+def test_the_first_line_gives_the_verdict_with_its_caution():
+    ranking = Ranking(
+        (hypothesis("a", 45.0), hypothesis("b", 49.0), hypothesis("c", 90.0)), still_of(900.0, 50)
+    )
+    assert verdict(ranking).startswith(
+        "'a' explains what was measured (χ² 45 of 49, 900 of 50 if nothing had moved)"
+    )
+    assert "settlement = 0.0300 ± 0.0020 m (95 %)" in verdict(ranking)
+    assert verdict(ranking).endswith("CAUTION: it cannot be told apart from 'b'")
+    alone = replace(ranking, hypotheses=(hypothesis("a", 45.0),))
+    assert verdict(alone).endswith("CAUTION: a cause that is not in the list may move the stones alike")
+    wrong = replace(ranking, hypotheses=(hypothesis("c", 90.0),))
+    assert verdict(wrong).startswith("NONE OF THESE EXPLAINS what was measured; the best of them is 'c'")
+    level = replace(ranking, still=still_of(46.0, 50))
+    assert verdict(level).startswith("no movement is needed")
+
+
+def turning(angle, slip, pivot, along, codes):
+    """Motions of stones that turn in the plane of the wall and slip over each other [mm/m]."""
+    up = np.array([0.0, 0.0, 1.0])
+    gradient = 1e-3 * (angle * (np.outer(along, up) - np.outer(up, along)) + slip * np.outer(up, along))
+    field = np.vstack([-pivot @ gradient, gradient])
+    return Motions(dict.fromkeys(codes, np.zeros(3)), dict.fromkeys(codes, field))
+
+
+def laid():
+    return wall(60, seed=3)
+
+
+def turned_wall(movement, seed):
+    return wall(60, seed=3, movement=movement, measured=seed)
+
+
+@pytest.fixture(scope="module")
+def truth():
+    """A wall of which courses 1 to 3, or all, have turned by 6 mm/m; its plane and the codes of its courses."""
+    building = laid()
+    first = building.solids[0].vertices
+    along = (first[1] - first[0]) * [1.0, 1.0, 0.0]
+    along /= np.linalg.norm(along)
+    axis = np.cross([0.0, 0.0, 1.0], along)
+    cross = np.array([(0, -axis[2], axis[1]), (axis[2], 0, -axis[0]), (-axis[1], axis[0], 0)])
+    rotation = np.eye(3) - 6e-3 * cross
+    motion = RigidMotion(rotation, first[0] - rotation @ first[0])
+    course = {one.code: one.course for one in building.survey.blocks}
+    return first[0], along, course, motion
+
+
+def answers(truth):
+    """Runs without a simulation: hypotheses act on the stones that stood."""
+    pivot, along, course, _ = truth
+
+    def runs(places):
+        found = []
+        for case, (x,) in places:
+            codes = [code for code in course if code not in case.later]
+            amounts = (x, 0.0) if case.hypothesis.name == "turned" else (0.0, x)
+            found.append(Tried(turning(*amounts, pivot, along, codes), "", 0.0))
+        return found
+
+    return runs
+
+
+def surveyed(file, building, phases=None):
+    stones = [appraise(block) for block in building.blocks()]
+    return measure(file, stones, facades_of(stones), phases or {})
+
+
+def test_the_true_cause_is_ranked_first_and_its_amount_within_its_interval(truth, tmp_path):
+    file = read_diagnosis(written(tmp_path, SCENE + HYPOTHESES))
+    cases = cases_of(file, {})
+    _, _, course, motion = truth
+    covered = []
+    for seed in range(12):
+        found = surveyed(file, turned_wall(dict.fromkeys(course, motion), seed))
+        done = fit_cases(cases, found.deformation, answers(truth))
+        best, other = done.ranking.hypotheses
+        assert best.name == "turned"
+        assert best.explains
+        assert not other.explains
+        (amount,) = best.estimates
+        covered.append(amount.low <= 6.0 <= amount.high)
+        assert amount.high - amount.low < 2.0
+        wrong = Ranking((other,), done.ranking.still)
+        assert verdict(wrong).startswith("NONE OF THESE EXPLAINS")
+    # of 12 at 95 % three or more fail in one of fifty
+    assert sum(covered) >= 10
+    unmoved = surveyed(file, laid())
+    done = fit_cases(cases, unmoved.deformation, answers(truth))
+    assert verdict(done.ranking).startswith("no movement is needed")
+
+
+@pytest.mark.parametrize("last", [3, 99])
+def test_a_movement_is_dated_by_the_phase_that_was_laid_level_over_it(truth, tmp_path, last):
+    text = HYPOTHESES.replace("battered = true", 'battered = true\nphases = ["old", "new"]')
+    file = read_diagnosis(written(tmp_path, SCENE + text))
+    pivot, along, course, motion = truth
+    phases = {code: "old" if number <= 3 else "new" for code, number in course.items()}
+    moved = {code: motion for code, number in course.items() if number <= last}
+    found = surveyed(file, turned_wall(moved, 5), phases)
+    assert {course[code] for code in found.resting} == {4}
+    done = fit_cases(cases_of(file, phases), found.deformation, answers(truth))
+    best = done.ranking.hypotheses[0]
+    whole = turning(best.fit.amplitudes[0], 0.0, pivot, along, list(course))
+    dating = date_movement(file, done.ranking, found, whole)
+    old, new = dating.shares
+    assert old.value == pytest.approx(1.0, abs=4.0 * old.sigma)
+    if last == 3:
+        assert dating.verdict.startswith("the movement is younger than phase old and older than phase new")
+        assert new.value == pytest.approx(0.0, abs=4.0 * new.sigma)
+    else:
+        assert dating.verdict.startswith("the movement is younger than phase new (")
+        assert new.value == pytest.approx(1.0, abs=4.0 * new.sigma)
+    told = "\n".join(dating.evidence)
+    assert "W04-01" in told
+    assert "of phase new rest on stones of an earlier phase" in told
+    assert "course 3: W03-" in told
+    # beds on older work are not told
+    assert not any("course 4:" in line for line in dating.evidence)
+
+
+def test_one_interface_runs_scenes_here_or_elsewhere(truth, tmp_path):
+    file = read_diagnosis(written(tmp_path, SCENE + HYPOTHESES))
+    case = cases_of(file, {})[0]
+    asked = []
+
+    def elsewhere(trials):
+        asked.extend(trials)
+        return [Tried(None, "no cluster today", 0.0) for _ in trials]
+
+    (answer,) = runs_of(file, "sqlite:///none.db", elsewhere)([(case, (1.0,))])
+    assert answer.fault == "no cluster today"
+    assert parse_scene(asked[0].text, "").loads[1].values["displacement"] == pytest.approx((0, 0, -1e-3))
+    # a run that fails is an answer, not an end of all
+    with runner(1) as here:
+        (failed,) = here(asked)
+    assert failed.motions is None
+    assert "none.db" in failed.fault
