@@ -70,7 +70,7 @@ class Ranked:
 
     @property
     def explains(self) -> bool:
-        """Whether what it leaves may be chance."""
+        """True if what it leaves may be chance."""
         return self.probability >= _EXPLAINS
 
     @property
