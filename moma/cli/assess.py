@@ -104,4 +104,4 @@ def diagnose(
     folder = out or Path("out") / f"{file.stem}-diagnose"
     with progress_bars() as listener:
         done = diagnosed(file, db, folder, listener, jobs, accept_unsound)
-    print(as_json(done.summary) if json else "\n".join(diagnosis_lines(done, db, verbose)))
+    print(as_json(done.summary) if json else "\n".join(diagnosis_lines(done, verbose)))

@@ -8,7 +8,7 @@ if TYPE_CHECKING:
 __all__ = ["diagnosis_lines"]
 
 
-def diagnosis_lines(done: "Diagnosis", db: str, verbose: bool) -> list[str]:
+def diagnosis_lines(done: "Diagnosis", verbose: bool) -> list[str]:
     """Return the lines of a diagnosis: its verdict, the date with its evidence, and the hypotheses in their order."""
     summary = done.summary
     dating = summary["dating"]
@@ -26,7 +26,7 @@ def diagnosis_lines(done: "Diagnosis", db: str, verbose: bool) -> list[str]:
         *(_groups(summary["groups"]) if verbose else ()),
         f"  {summary['runs']} runs, {summary['cpu']:.0f} s of the processor",
         "  look closer, and keep the best in the database: "
-        f"moma compare {done.folder / 'best.toml'}{battered} --db {db}",
+        f"moma compare {done.folder / 'best.toml'}{battered}",
         *(f"  {done.folder / name}" for name in summary["files"]),
     ]
 

@@ -77,6 +77,8 @@ def _verdict(file: DiagnosisFile, ranking: Ranking, best: Ranked) -> str:
     if rivals:
         return f"not dated: {best.title!r} and {rivals[0].title!r} explain what was measured about as well"
     others = [one for one in ranking.hypotheses if one.name == best.name and one.stood != best.stood]
+    if not others:
+        return f"not dated: {best.name!r} could be tried at one time only"
     margin = min(one.aicc for one in others) - best.aicc
     last, later = best.stood[-1], file.phases[len(best.stood) :]
     when = f"younger than phase {last}" + (f" and older than phase {later[0]}" if later else "")

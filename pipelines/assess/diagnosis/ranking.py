@@ -173,6 +173,8 @@ def verdict(ranking: Ranking) -> str:
             f"no movement is needed to explain what was measured: χ² {still.fit.chi2:.4g} of {still.dof} without any; "
             "CAUTION: movements that are small against the scatter of beds are not seen"
         )
+    if not len(best.fit.residuals):
+        return f"NONE OF THESE could be run; of {best.title!r}: {best.fit.trouble}; CAUTION: nothing is excluded by that"
     if not best.explains:
         return (
             f"NONE OF THESE EXPLAINS what was measured; the best of them is {best.title!r} ({chi2}); "

@@ -9,7 +9,7 @@ from moma.cli.surveys import SampleName
 from survey.synthetic.samples import SAMPLES
 from tests.moma.commands import answer, fails, invoke, prints
 
-LARGE = {"settled-phases", "settled-small", "tower"}
+LARGE = {"settled", "settled-phases", "settled-small", "tower"}
 
 
 def test_the_names_are_those_of_the_samples():

@@ -13,7 +13,7 @@ from pipelines.assess.diagnosis.fit import Fit, fit
 from pipelines.assess.diagnosis.measurements import measure
 from pipelines.assess.diagnosis.ranking import STILL, Ranking, rank, verdict
 from pipelines.assess.diagnosis.search import cases_of, fit_cases, runs_of
-from pipelines.assess.diagnosis.trials import Tried, runner
+from pipelines.assess.diagnosis.trials import Trial, Tried, runner
 from pipelines.assess.motions import Motions
 from pipelines.scene.file import parse_scene
 from pipelines.toml.lines import parse_toml
@@ -210,6 +210,11 @@ def test_the_first_line_gives_the_verdict_with_its_caution():
     assert verdict(alone).endswith("CAUTION: a cause that is not in the list may move the stones alike")
     wrong = replace(ranking, hypotheses=(hypothesis("c", 90.0),))
     assert verdict(wrong).startswith("NONE OF THESE EXPLAINS what was measured; the best of them is 'c'")
+    failed = rank(
+        "d", (), (), Fit((), np.zeros(0), np.zeros((0, 0)), (), 1, "the run ended in collapse"), 50, 0
+    )
+    nothing = replace(ranking, hypotheses=(failed,))
+    assert verdict(nothing).startswith("NONE OF THESE could be run; of 'd': the run ended in collapse")
     level = replace(ranking, still=still_of(46.0, 50))
     assert verdict(level).startswith("no movement is needed")
 
@@ -335,3 +340,11 @@ def test_one_interface_runs_scenes_here_or_elsewhere(truth, tmp_path):
         (failed,) = here(asked)
     assert failed.motions is None
     assert "none.db" in failed.fault
+
+
+@pytest.mark.slow
+def test_runs_in_processes_of_their_own_answer_in_order():
+    trials = [Trial(f"[scene]\nname = {k}\n", f"scene {k}", "sqlite:///none.db") for k in range(5)]
+    with runner(2) as beside:
+        faults = [one.fault for one in beside(trials)]
+    assert [fault.split(":")[0] for fault in faults] == [f"scene {k}" for k in range(5)]
