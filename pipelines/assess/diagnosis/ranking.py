@@ -174,7 +174,7 @@ def verdict(ranking: Ranking) -> str:
             "CAUTION: movements that are small against the scatter of beds are not seen"
         )
     if not len(best.fit.residuals):
-        return f"NONE OF THESE could be run; of {best.title!r}: {best.fit.trouble}; CAUTION: nothing is excluded by that"
+        return f"NONE OF THESE could be run; of {best.title!r}: {best.fit.trouble}; CAUTION: that excludes nothing"
     if not best.explains:
         return (
             f"NONE OF THESE EXPLAINS what was measured; the best of them is {best.title!r} ({chi2}); "
