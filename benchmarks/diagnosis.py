@@ -30,7 +30,7 @@ from survey.quality.precision import appraise
 from survey.synthetic.building import Building
 from survey.synthetic.samples import SAMPLES
 
-__all__ = ["Laboratory", "laboratory", "main", "outcome"]
+__all__ = ["Laboratory", "drawn", "laboratory", "main", "outcome"]
 
 TRUE = "the left corner settled"
 """Name of the true hypothesis of the samples."""
