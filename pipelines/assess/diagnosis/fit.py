@@ -61,8 +61,9 @@ def fit(unknowns: Sequence[Unknown]) -> Ask:
     ...     try:
     ...         asked = search.send([np.array([10.0 * x[0] - 3.0, 10.0 * x[0] - 3.2, 0.5]) for x in asked])
     ...     except StopIteration as end:
+    ...         found = end.value
     ...         break
-    >>> round(end.value.amplitudes[0], 6), round(float(end.value.covariance[0, 0]), 6)
+    >>> round(found.amplitudes[0], 6), round(float(found.covariance[0, 0]), 6)
     (0.31, 0.005)
     """
     low, high, step = (np.array([getattr(one, name) for one in unknowns]) for name in ("low", "high", "step"))

@@ -10,7 +10,7 @@ from scipy.special import fdtrc, stdtrit
 from pipelines.assess.diagnosis.file import Unknown
 from pipelines.assess.diagnosis.fit import Fit
 
-__all__ = ["STILL", "Estimate", "Ranked", "Ranking", "estimates", "rank", "verdict"]
+__all__ = ["STILL", "Estimate", "Ranked", "Ranking", "estimates", "rank", "told", "verdict"]
 
 STILL = "nothing has moved"
 """Name of the hypothesis without a run, to which all others are compared."""
