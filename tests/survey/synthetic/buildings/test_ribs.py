@@ -47,6 +47,13 @@ def test_each_course_ends_on_a_seat_in_the_plane_of_its_bed(vault: RibVault) -> 
                     assert abs(seat.normal[2]) == pytest.approx(-bed.along[2], abs=1e-12)
 
 
+def test_bed_joint_of_the_rib_and_end_of_the_course_meet_in_one_line() -> None:
+    """The line in which bed and joint meet is upright over the end of the course, and square to the web."""
+    for bed in RibVaultShape().beds():
+        line = np.cross(bed.along, bed.joint)
+        assert line / np.linalg.norm(line) == pytest.approx(bed.up * np.sign(line @ bed.up), abs=1e-12)
+
+
 def test_ribs_have_an_axis_of_their_own(vault: RibVault) -> None:
     """An arc of a circle in an upright plane, which runs inside the segments."""
     shape = vault.shape
