@@ -266,11 +266,15 @@ def test_records_are_read_filtered_and_corrected_as_asked(tmp_path):
 def test_the_examples_of_the_documentation_are_valid():
     documented = (ROOT / "docs/scene.md").read_text(encoding="utf-8")
     examples = re.findall(r"^```toml\n(.*?)^```$", documented, re.MULTILINE | re.DOTALL)
-    assert len(examples) == 6
+    assert len(examples) == 7
     assert "[materials.sandstone.orthotropy]" in examples[1]
     material = (
         "[materials.sandstone]\ndensity = 2200\nyoung = 1e10\npoisson = 0.2\nstones = ['kind = sill']\n"
     )
+    # every load of a scene with stages names them, so that example stands alone
+    (staged,) = (one for one in examples if "[[stages]]" in one)
+    assert len(parse_scene(f"{material}\n{staged}", "scene.toml").stages) == 5
+    examples.remove(staged)
     scene = parse_scene("\n".join([material, *examples]), "scene.toml")
     assert scene.materials[0].material.orthotropy is not None
     assert (len(scene.meshes), len(scene.laws), len(scene.loads)) == (3, 2, 2)
