@@ -64,7 +64,7 @@ def test_joints_are_counted_and_remaining_gaps_and_overlaps_have_site_coordinate
 def test_zero_is_never_negative():
     gaps = (Gap(("A", "B"), -2e-5, 0.1, np.array([-1e-5, 0.0, 0.0]), "bent"),)
     told = joints_report(ClosingReport(JointMode.CLOSE, (), {}, {}, (), gaps, ()), np.zeros(3))
-    report = CheckReport("s", {}, {"deformable": 0}, 0, (), (), (), None, None, told, None, (), (), ())
+    report = CheckReport("s", {}, {"deformable": 0}, 0, (), (), (), None, None, told, None, (), (), (), ())
     lines = "\n".join(check_lines(report, verbose=False))
     assert "open by 0.0 mm over 0.100 m² at (0.000, 0.000, 0.000)" in lines
 

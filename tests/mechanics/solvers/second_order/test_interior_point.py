@@ -226,6 +226,7 @@ def test_it_does_not_depend_on_units(name):
             w,
             response=w.response / mass,
             block=w.block / mass,
+            mass=w.mass * mass,
             diagonal=w.diagonal / mass,
             scale=w.scale / mass,
         )
