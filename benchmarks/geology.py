@@ -97,7 +97,8 @@ def main() -> None:
         print_table(rows, table)
         print()
     if options.write:
-        _draw(runs, _ROOT / "docs" / "images" / "geology-cohesion.png")
+        if fault:
+            _draw(runs, _ROOT / "docs" / "images" / "geology-cohesion.png")
         about = [f"Measured at {commit()} on {machine()}.", ""]
         for name, rows, table in (("fault", fault, _FAULT), ("fold", fold, _FOLD), ("sweeps", swept, _SWEPT)):
             if rows:
