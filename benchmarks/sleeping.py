@@ -1,4 +1,4 @@
-"""What sleep saves, and what it changes: `python -m benchmarks.sleeping [--only NAME …] [--json]`."""
+"""Time that sleep saves, and what it changes: `python -m benchmarks.sleeping [--only NAME …] [--json]`."""
 
 import argparse
 import time
@@ -91,7 +91,7 @@ def _compared(name: str, sleeps: Sequence[float]) -> list[Row]:
                 "scene": name,
                 "stones": len(scene.blocks),
                 "contacts": run.contacts,
-                "steps": round(scene.time.duration / scene.time.step),
+                "steps": scene.time.steps,
                 "sleep": sleep,
                 "seconds": run.seconds,
                 "faster": awake.seconds / run.seconds,
@@ -111,7 +111,7 @@ def _compared(name: str, sleeps: Sequence[float]) -> list[Row]:
 def _run(scene: Scene) -> _Run:
     model, start = build_model(scene)
     simulation, energy = Simulation(model, start), EnergyBalance(model, start)
-    total = max(1, round(scene.time.duration / scene.time.step))
+    total = scene.time.steps
     places, asleep, balance, unconverged = [start.centre], 0.0, 0.0, 0
     begun, observed = time.process_time(), 0.0
     for count in range(1, total + 1):

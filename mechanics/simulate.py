@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import chain
 from typing import Any, Protocol
 
 import numpy as np
@@ -119,10 +121,9 @@ def simulate_stages(
     """
     check_stages(stages)
     with ThreadpoolController().limit(limits=1, user_api="blas"):
-        if whole is None and any(one.fidelity is Fidelity.DEFORMABLE for one in whole_scene(stages).blocks):
-            whole = build_model(
-                whole_scene(stages), lambda done, total: progress(Progress("mesh", done, total))
-            )
+        scene = whole_scene(stages)
+        if whole is None and any(one.fidelity is Fidelity.DEFORMABLE for one in scene.blocks):
+            whole = build_model(scene, lambda done, total: progress(Progress("mesh", done, total)))
         return _Building(stages, whole, archive).built(progress, stop)
 
 
@@ -144,7 +145,7 @@ def _simulate(
     log, watch = run.log, run.watch
     if archive is not None:
         archive.begin(log.observer.bodies(begin.state, np.zeros(len(model.mass))), log.frames)
-    total = _steps(scene)
+    total = scene.time.steps
     report(Progress("step", run.steps, total))
     for count in range(run.steps + 1, total + 1):
         run.steps = count
@@ -282,8 +283,13 @@ class _Building:
 
     def _held(self, stage: Stage) -> int:
         """Return the number of stones that are fixed in a stage and free in another."""
-        free = {one.code for one in whole_scene(self.stages).blocks if one.fidelity is not Fidelity.FIXED}
-        return sum(one.fidelity is Fidelity.FIXED and one.code in free for one in stage.scene.blocks)
+        return sum(one.fidelity is Fidelity.FIXED and one.code in self._free for one in stage.scene.blocks)
+
+    @cached_property
+    def _free(self) -> set[str]:
+        """Codes of the stones that are free in some stage."""
+        blocks = chain.from_iterable(stage.scene.blocks for stage in self.stages)
+        return {one.code for one in blocks if one.fidelity is not Fidelity.FIXED}
 
     def _cautions(self) -> tuple[str, ...]:
         """Return the cautions of the last stage, after what it has left unbuilt; then those of the others."""
@@ -331,7 +337,7 @@ class _StageArchive:
     def __init__(self, archive: Archive, building: _Building, number: int, run: Carried | None) -> None:
         self._archive, self._before, self._number, self._run = archive, building.carried(), number, run
         self._shown = number == len(building.stages) - 1
-        longest = max(_steps(stage.scene) for stage in building.stages)
+        longest = max(stage.scene.time.steps for stage in building.stages)
         every = max(archive.every, 1)
         # checkpoints are known by their step: those of a stage come after those of the one before
         self._offset = number * every * -(-longest // every)
@@ -361,7 +367,3 @@ class _StageArchive:
         """Note that there is a further frame of the last stage."""
         if self._shown:
             self._archive.frame()
-
-
-def _steps(scene: Scene) -> int:
-    return max(1, round(scene.time.duration / scene.time.step))

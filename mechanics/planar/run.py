@@ -83,7 +83,7 @@ class PlanarRun(Carrier):
         refuse_deep(self.model, PlanarDetector(self.model)(start))
         self.simulation = PlanarSimulation(self.model, start, self._clock, solver)
         self._log, self._watch = _Log(self.model, start), PlanarWatch(self.model)
-        self.steps, self.total = 0, max(1, round(scene.time.duration / scene.time.step))
+        self.steps, self.total = 0, scene.time.steps
         self._last: PlanarStep | None = None
 
     @property

@@ -125,6 +125,11 @@ class PlanarTime:
             if not ok:
                 raise SceneError(f"{quantity} = {value!r}", where="time", remedy=remedy)
 
+    @property
+    def steps(self) -> int:
+        """Largest number of steps, 1 at least."""
+        return max(1, round(self.duration / self.step))
+
 
 @dataclass(frozen=True)
 class PlanarScene:

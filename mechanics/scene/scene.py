@@ -243,6 +243,11 @@ class TimeSettings:
     def __post_init__(self) -> None:
         check_settings("time", self)
 
+    @property
+    def steps(self) -> int:
+        """Largest number of steps, 1 at least."""
+        return max(1, round(self.duration / self.step))
+
 
 class Method(StrEnum):
     """Solver of the contact problem of a step."""

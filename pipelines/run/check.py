@@ -232,7 +232,7 @@ def _cost(needs: Plan, scene: Scene, pictures: int) -> Cost:
         contacts=needs.contacts,
         unknowns=needs.unknowns,
         memory=needs.memory,
-        steps=max(1, round(scene.time.duration / scene.time.step)),
+        steps=scene.time.steps,
         step=scene.time.step,
         seconds=(low, likely, high),
         longest=beside + expected.longest,

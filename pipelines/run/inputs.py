@@ -59,9 +59,9 @@ def run_inputs(
 def stage_lines(scene: SceneFile, assembly: Assembly) -> tuple[str, ...]:
     """Describe the stages of building: how many stones stand in each and are held, and the loads that act in it."""
     lines = []
+    own = {one.code for one in assembly.scene.blocks if one.fidelity is Fidelity.FIXED}
     for stage in assembly.stages:
         blocks = stage.scene.blocks
-        own = {one.code for one in assembly.scene.blocks if one.fidelity is Fidelity.FIXED}
         held = sum(one.fidelity is Fidelity.FIXED and one.code not in own for one in blocks)
         acting = [one.type for one in scene.loads if stage.name in one.values[ACTS_IN.name]]
         said = [f"{len(blocks)} stones", *([f"{held} held"] if held else []), *acting]

@@ -50,7 +50,7 @@ def run_planar(
     SceneError : if a motion leaves the plane
     SolverError : if the motion is no longer finite
     """
-    steps = max(1, round(scene.time.duration / scene.time.step))
+    steps = scene.time.steps
     output = Output(checkpoint=every, paraview=ParaView.PVD)
     with unfinished_run(folder, output, resume, progress) as archive:
         archive.open((), planar_fingerprint(scene), versions(), steps, bool(resume))

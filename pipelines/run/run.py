@@ -135,7 +135,7 @@ def run_scene(
             problems = problems_of(scene, assembly, loose_blocks(*built))
         if not accept_unsound:
             refuse_unsound(problems, str(path))
-        steps = max(1, round(assembly.scene.time.duration / assembly.scene.time.step))
+        steps = assembly.scene.time.steps
         last = assembly.stages[-1].scene if assembly.stages else assembly.scene
         # steps of a stage count from the next checkpoint after those of the stages before
         steps += (len(assembly.stages) - 1) * (steps + scene.output.checkpoint) if assembly.stages else 0

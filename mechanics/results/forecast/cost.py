@@ -88,7 +88,7 @@ def expected_cost(plan: Plan, scene: Scene, slowness: float = 1.0) -> ExpectedCo
         low, likely, high = low + seconds / rate.below, likely + seconds, high + seconds * rate.above
     one = slowness * step(work)
     by_stage["steps"] = steps[1] * one
-    total = max(1, round(time_.duration / time_.step))
+    total = time_.steps
     moving = high + total * slowness * RATES[kind, "moving"](work)
     unknown = "" if steps[0] == steps[2] else _UNKNOWN[_pace(time_)]
     if unknown:
@@ -138,7 +138,7 @@ def _pace(time_: TimeSettings) -> str:
 
 def _steps(time_: TimeSettings, until: float) -> tuple[int, int, int]:
     """Return the least, likely and largest number of steps, with loads that change `until` some time [s]."""
-    total = max(1, round(time_.duration / time_.step))
+    total = time_.steps
     if not time_.stop_at_equilibrium:
         return total, total, total
     first = total if until >= time_.duration else int(np.ceil(until / time_.step))
