@@ -13,7 +13,7 @@ from mechanics.model.model import Model
 from mechanics.model.rigid import RigidInertia, inverse_inertia_world
 from mechanics.scene.state import State
 
-__all__ = ["local_velocity", "mixed_delassus", "rigid_delassus", "world_impulse"]
+__all__ = ["local_velocity", "mixed_delassus", "rigid_delassus", "side_kinds", "world_impulse"]
 
 
 def rigid_delassus(model: Model, state: State, contacts: Contacts, schedule: Schedule) -> RigidDelassus:
@@ -36,6 +36,12 @@ def rigid_delassus(model: Model, state: State, contacts: Contacts, schedule: Sch
     )
 
 
+def side_kinds(model: Model, bodies: Ints) -> Ints:
+    """Return NONE (fixed), RIGID or ELASTIC (nc, 2) of the sides of contacts between `bodies` (nc, 2)."""
+    kind = np.where(model.fixed[bodies], NONE, np.where(model.elastic[bodies], ELASTIC, RIGID))
+    return kind.astype(np.int64)
+
+
 def mixed_delassus(
     model: Model,
     state: State,
@@ -49,7 +55,7 @@ def mixed_delassus(
     friction holds a stone back, W is nearly all rigid motion, and forces inside the joints would not count.
     """
     body = contacts.bodies
-    kind = np.where(model.fixed[body], NONE, np.where(model.elastic[body], ELASTIC, RIGID)).astype(np.int64)
+    kind = side_kinds(model, body)
     count, slot, sides = _slots(body, kind, len(model.mass))
     yptr = np.concatenate([[0], np.cumsum(3 * count)]).astype(np.int64)
     bptr = np.concatenate([[0], np.cumsum((3 * count) ** 2)]).astype(np.int64)

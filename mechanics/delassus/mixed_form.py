@@ -173,13 +173,18 @@ class MixedForm:
         factors = pattern.fronts.factorise(cliques, padded, self._threads)
         return _Factors(pattern, self._across, self._mass, self._elastic, theta, inverse, factors)
 
+    @cached_property
+    def _paired(self) -> Array:
+        """Rows (nh, 3, 12) of A of the hard contacts, bodies of a pair in the order of their places."""
+        pattern = self._pattern
+        across = self._jacobian[pattern.hard].transpose(0, 2, 1, 3)
+        turn = np.argsort(pattern.place[pattern.hard], axis=1, kind="stable")
+        return np.take_along_axis(across, turn[:, None, :, None], axis=2).reshape(-1, 3, 12)
+
     def _joints(self, inverse: Array) -> Iterable[Array]:
         """Return -A_hᵀ Θ_h⁻¹ A_h of each pair of rigid bodies, transposed."""
         pattern = self._pattern
-        across = self._jacobian[pattern.hard].transpose(0, 2, 1, 3)
-        # bodies of a pair in the order of their places
-        turn = np.argsort(pattern.place[pattern.hard], axis=1, kind="stable")
-        across = np.take_along_axis(across, turn[:, None, :, None], axis=2).reshape(-1, 3, 12)
+        across = self._paired
         stiff = across.transpose(0, 2, 1) @ (inverse @ across)
         order = np.argsort(pattern.pair, kind="stable")
         first = np.searchsorted(pattern.pair[order], np.arange(len(pattern.pairs)))

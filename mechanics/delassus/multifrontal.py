@@ -188,28 +188,32 @@ def fronts(pairs: Ints, cliques: Sequence[Ints]) -> Fronts:
     group = group.ravel()
     size = np.bincount(group)
     around = [np.unique(group[contacts]) for contacts in cliques]
-    return _fronts_in_order(group, cliques, *_least_degree(len(size), size, around))
+    return _fronts_in_order(group, cliques, around, *_least_degree(len(size), size, around))
 
 
 def fronts_of_graph(group: Ints, cliques: Sequence[Ints], place: Array) -> Fronts:
     """Analyse the pattern of many groups (n,) of unknowns, three each, by their graph and their `place` (ng, 3) [m]."""
     edges = [np.zeros(0, dtype=np.int64)]
-    for own in cliques:
-        groups = np.unique(group[own])
+    around = [np.unique(group[own]) for own in cliques]
+    for groups in around:
         one, other = np.triu_indices(len(groups), 1)
         edges.append(groups[one] * len(place) + groups[other])
     key = np.unique(np.concatenate(edges))
     pairs = np.column_stack([key // len(place), key % len(place)])
     rank = elimination(pairs, np.arange(len(place)), place)
-    return _fronts_in_order(group, cliques, np.argsort(rank), _left_in_fronts(pairs, rank))
+    return _fronts_in_order(group, cliques, around, np.argsort(rank), _left_in_fronts(pairs, rank))
 
 
-def _fronts_in_order(group: Ints, cliques: Sequence[Ints], order: Ints, later: list[list[int]]) -> Fronts:
-    """Lay out the fronts of groups (n,) of unknowns, three each, in an order; `later` as of `_least_degree`."""
+def _fronts_in_order(
+    group: Ints, cliques: Sequence[Ints], around: Sequence[Ints], order: Ints, later: list[list[int]]
+) -> Fronts:
+    """Lay out the fronts of groups (n,) of unknowns, three each, in an order.
+
+    `around` has the groups of each clique; `later` as of `_least_degree`.
+    """
     size = np.bincount(group)
     count = len(size)
     members = np.split(np.argsort(group, kind="stable"), np.cumsum(size)[:-1])
-    around = [np.unique(group[contacts]) for contacts in cliques]
     order, pivots, later = _merged(order, later, size)
     rank = np.empty(count, dtype=np.int64)
     for f in order:

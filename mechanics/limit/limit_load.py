@@ -208,7 +208,7 @@ def _candidate(on: Assembly, programme: Programme, bound: LimitLoad) -> LimitLoa
 
 def _iterated(
     on: Assembly, programme: Programme, begin: Array, far: int, known: float | None = None
-) -> "_Ending":
+) -> _Ending:
     """Iterate the fictitious strength from forces (nc, 3), its slope falling to almost zero.
 
     The first programmes, `far` of them, go as far as they like; what follows stays near the one before. It ends early,

@@ -8,7 +8,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from mechanics.arrays import Array, Bools, Ints
-from mechanics.delassus.mixed import ELASTIC, NONE, RIGID
+from mechanics.delassus.assembly import side_kinds
 from mechanics.delassus.mixed_form import mixed_fronts
 from mechanics.dynamics.contact_search import detector
 from mechanics.model.model import Model, build_model
@@ -144,8 +144,7 @@ def _amounts(model: Model, bodies: Ints, centre: Array) -> Amounts:
 
 def _factors(model: Model, bodies: Ints, centre: Array) -> tuple[int, float, float]:
     """Return the number of fronts of W + Θ, the numbers in its factors, and the operations to make them."""
-    kind = np.where(model.fixed[bodies], NONE, np.where(model.elastic[bodies], ELASTIC, RIGID))
-    pattern = mixed_fronts(bodies, kind, centre)
+    pattern = mixed_fronts(bodies, side_kinds(model, bodies), centre)
     pivots = pattern.layout.width.astype(float)
     others = np.diff(pattern.layout.dptr) - pivots
     flops = 2.0 / 3.0 * pivots**3 + 2.0 * pivots**2 * others + 2.0 * pivots * others**2
