@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-__all__ = ["toml_text"]
+__all__ = ["is_table_array", "toml_text"]
 
 
 def toml_text(tables: Mapping[str, Any]) -> str:
@@ -27,7 +27,7 @@ def toml_text(tables: Mapping[str, Any]) -> str:
 def _lines(tables: Mapping[str, Any]) -> Iterator[str]:
     # values before tables, as those after a header would belong to it
     for name, one in tables.items():
-        if not isinstance(one, Mapping) and not _is_array(one):
+        if not isinstance(one, Mapping) and not is_table_array(one):
             yield f"{_key(name)} = {_value(one)}"
     for name, one in tables.items():
         if isinstance(one, Mapping) and all(isinstance(inner, Mapping) for inner in one.values()) and one:
@@ -35,7 +35,7 @@ def _lines(tables: Mapping[str, Any]) -> Iterator[str]:
                 yield from _table(f"[{_key(name)}.{_key(inner)}]", content)
         elif isinstance(one, Mapping):
             yield from _table(f"[{_key(name)}]", one)
-        elif _is_array(one):
+        elif is_table_array(one):
             for content in one:
                 yield from _table(f"[[{_key(name)}]]", content)
 
@@ -63,5 +63,6 @@ def _key(name: str) -> str:
     return name if plain.isascii() and plain.isalnum() else json.dumps(name, ensure_ascii=False)
 
 
-def _is_array(value: Any) -> bool:
+def is_table_array(value: Any) -> bool:
+    """Return whether a value is what [[name]] gives: tables in a list, one at least."""
     return isinstance(value, list) and bool(value) and all(isinstance(one, Mapping) for one in value)

@@ -11,6 +11,7 @@ from moma.errors import SceneError
 from pipelines.scene.file import BESIDE
 from pipelines.toml.lines import key_lines, parse_toml, read_text
 from pipelines.toml.schema import Document, Key, Kind, check_table, nearest
+from pipelines.toml.writer import is_table_array
 
 __all__ = [
     "DIAGNOSIS_KEYS",
@@ -297,12 +298,8 @@ def _merged(base: Mapping[str, Any], change: Mapping[str, Any]) -> dict[str, Any
         old = merged.get(key)
         if isinstance(old, Mapping) and isinstance(value, Mapping):
             merged[key] = _merged(old, value)
-        elif _is_array(old) and _is_array(value):
+        elif is_table_array(old) and is_table_array(value):
             merged[key] = [*old, *value]  # type: ignore[misc]
         else:
             merged[key] = value
     return merged
-
-
-def _is_array(value: Any) -> bool:
-    return isinstance(value, list) and bool(value) and all(isinstance(one, Mapping) for one in value)

@@ -10,7 +10,7 @@ from scipy.special import fdtrc, stdtrit
 from pipelines.assess.diagnosis.file import Unknown
 from pipelines.assess.diagnosis.fit import Fit
 
-__all__ = ["STILL", "Estimate", "Ranked", "Ranking", "estimates", "rank", "told", "verdict"]
+__all__ = ["STILL", "Estimate", "Ranked", "Ranking", "estimates", "rank", "verdict"]
 
 STILL = "nothing has moved"
 """Name of the hypothesis without a run, to which all others are compared."""
@@ -187,11 +187,11 @@ def verdict(ranking: Ranking) -> str:
         if rivals
         else "CAUTION: a cause that is not in the list may move the stones alike"
     )
-    amounts = "; ".join(told(one) for one in best.estimates)
+    amounts = "; ".join(_amount(one) for one in best.estimates)
     return f"{best.title!r} explains what was measured ({chi2}){f': {amounts}' if amounts else ''}; {caution}"
 
 
-def told(one: Estimate) -> str:
+def _amount(one: Estimate) -> str:
     """Return an amplitude with its interval in words."""
     if not math.isfinite(one.low):
         return f"{one.name} is not determined"

@@ -2,7 +2,6 @@
 
 import csv
 import math
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -169,8 +168,8 @@ def _write_stones(path: Path, courses: tuple[CourseMovement, ...]) -> None:
 
 def _draw(folder: Path, courses: tuple[CourseMovement, ...]) -> None:
     """Draw the bed lines of each wall, measured and simulated by the best hypothesis."""
-    walls: Mapping[str, list[CourseMovement]] = {}
+    walls: dict[str, list[CourseMovement]] = {}
     for one in courses:
-        walls.setdefault(one.line.facade, []).append(one)  # type: ignore[attr-defined]
+        walls.setdefault(one.line.facade, []).append(one)
     for number, lines in enumerate(walls.values(), start=1):
         draw_bed_movement(folder / f"beds-{number}.png", lines)

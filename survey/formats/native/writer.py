@@ -1,7 +1,7 @@
 """Writer of the native survey format, the inverse of `survey.formats.native.reader`."""
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from moma.errors import SurveyError
@@ -43,13 +43,7 @@ def write_moma(survey: Survey, path: Path) -> None:
         )
     counts = Counter(block.sigma for block in survey.blocks if block.sigmas is None) or Counter([0.003])
     common = max(sorted(counts), key=counts.__getitem__)
-    try:
-        lines = [MAGIC, *_head_lines(survey.head), f"sigma {_number(common)}"]
-        for block in survey.blocks:
-            lines += ["", *_stone_lines(block, common)]
-    except SurveyError as error:
-        raise error.at(str(path)) from error
-    Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+    _write(Path(path), _survey_lines(survey, common))
 
 
 def write_head(head: SurveyHead, path: Path) -> None:
@@ -65,28 +59,39 @@ def write_head(head: SurveyHead, path: Path) -> None:
     SurveyError
         if a name or source has characters that do not fit on a line, or a number cannot be written
     """
+    _write(Path(path), _head_lines(head))
+
+
+def _write(path: Path, lines: Iterable[str]) -> None:
     try:
-        lines = [MAGIC, *_head_lines(head)]
+        text = "\n".join([MAGIC, *lines]) + "\n"
     except SurveyError as error:
         raise error.at(str(path)) from error
-    Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+    path.write_text(text, encoding="utf-8", newline="\n")
 
 
-def _head_lines(head: SurveyHead) -> list[str]:
-    lines = [f"name {_text(head.name)}"]
+def _survey_lines(survey: Survey, common_sigma: float) -> Iterator[str]:
+    yield from _head_lines(survey.head)
+    yield f"sigma {_number(common_sigma)}"
+    for block in survey.blocks:
+        yield ""
+        yield from _stone_lines(block, common_sigma)
+
+
+def _head_lines(head: SurveyHead) -> Iterator[str]:
+    yield f"name {_text(head.name)}"
     for station in head.stations:
         word = OBSERVER if station.name == OBSERVER else f"station {_name(station.name)}"
-        lines.append(f"{word} {_row(station.position)}")
-    lines += [_control_line(one) for one in head.control]
+        yield f"{word} {_row(station.position)}"
+    yield from map(_control_line, head.control)
     for photograph in head.photographs:
-        lines += _photograph_lines(photograph)
-    lines += [_rule_line(rule) for rule in head.depth_rules]
+        yield from _photograph_lines(photograph)
+    yield from map(_rule_line, head.depth_rules)
     for one in head.canons:
         size = f"{_number(one.length)} {_number(one.height)} sigma {_number(one.sigma)}"
-        lines.append(f"canon {one.kind} {size} source {_text(one.source)}")
+        yield f"canon {one.kind} {size} source {_text(one.source)}"
     if head.extrusion.direction is not None or head.extrusion.tail != 1.0:
-        lines.append(_extrusion_line(head.extrusion))
-    return lines
+        yield _extrusion_line(head.extrusion)
 
 
 def _control_line(one: ControlPoint) -> str:
