@@ -2,37 +2,26 @@
 
 import json
 import re
-import shlex
 
 import pytest
 
-from tests.moma.commands import answer, prints
-from tests.paths import ROOT
+from tests.docs.pages import blocks, ran
+from tests.moma.commands import answer
 
-PAGE = (ROOT / "docs/howto/compare.md").read_text(encoding="utf-8")
-
-
-def blocks(language):
-    return re.findall(rf"^```{language}\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
+PAGE = "docs/howto/compare.md"
 
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory):
     """A folder in which the commands of the page have run, and what each has printed."""
-    folder, said = tmp_path_factory.mktemp("compare"), {}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(folder)
-        patch.delenv("MOMA_DB", raising=False)
-        for line in "".join(blocks("bash")).splitlines():
-            words = shlex.split(line)[1:]
-            if words[0] != "query":
-                said[line] = prints(*words)
-    return folder, said
+    folder = tmp_path_factory.mktemp("compare")
+    lines = "".join(blocks(PAGE, "bash")).splitlines()
+    return folder, ran(folder, "\n".join(line for line in lines if not line.startswith("moma query")))
 
 
 def test_the_true_cause_explains_the_survey_and_stillness_does_not(place):
     folder, said = place
-    (headline,) = blocks("text")
+    (headline,) = blocks(PAGE, "text")
     printed = next(text for line, text in said.items() if line.startswith("moma compare")).splitlines()[0]
     number = re.compile(r"χ² ([\d.]+) of (\d+) \((\d+)\)")
     shown, found = number.search(headline), number.search(printed)

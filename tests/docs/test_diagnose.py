@@ -2,42 +2,27 @@
 
 import json
 import re
-import shlex
 
 import pytest
 
 from pipelines.assess.diagnosis.file import DIAGNOSIS_KEYS, HYPOTHESIS_KEYS, UNKNOWN_KEYS, read_diagnosis
-from tests.moma.commands import answer, prints
+from tests.docs.pages import blocks, ran
+from tests.moma.commands import answer
 from tests.paths import ROOT
 
-PAGE = (ROOT / "docs/howto/diagnose.md").read_text(encoding="utf-8")
-
-
-def blocks(language):
-    return re.findall(rf"^```{language}\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
-
-
-def ran(folder, commands):
-    """What each command prints, by its line."""
-    said = {}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(folder)
-        patch.delenv("MOMA_DB", raising=False)
-        for line in commands.splitlines():
-            said[line] = prints(*shlex.split(line)[1:])
-    return said
+PAGE = "docs/howto/diagnose.md"
 
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory):
     """A folder in which the commands of the page have run, and what each has printed."""
     folder = tmp_path_factory.mktemp("diagnose")
-    return folder, ran(folder, "".join(blocks("bash")))
+    return folder, ran(folder, "".join(blocks(PAGE, "bash")))
 
 
 def test_the_true_cause_is_found_with_its_amount(place):
     folder, said = place
-    (headline,) = blocks("text")
+    (headline,) = blocks(PAGE, "text")
     printed = next(text for line, text in said.items() if line.startswith("moma diagnose"))
     number = re.compile(
         r"^'(.*)' explains .* \(χ² ([\d.]+) of (\d+), ([\d.]+) of .* settlement = ([\d.]+) ± ([\d.]+) m"
@@ -77,11 +62,15 @@ def test_the_best_scene_goes_into_the_database(place):
 
 
 def test_the_tables_list_all_keys_and_the_example_can_be_read(tmp_path):
-    rows = [re.split(r" ?\| ?", line)[1:5] for line in PAGE.splitlines() if line.startswith("| `")]
+    rows = [
+        re.split(r" ?\| ?", line)[1:5]
+        for line in (ROOT / PAGE).read_text(encoding="utf-8").splitlines()
+        if line.startswith("| `")
+    ]
     listed = [(row[0].strip("`"), row[1], row[3]) for row in rows if len(row) == 4 and row[3]]
     for key in (*DIAGNOSIS_KEYS, *HYPOTHESIS_KEYS, *UNKNOWN_KEYS):
         assert (key.name, key.unit, key.doc) in listed
-    (example,) = blocks("toml")
+    (example,) = blocks(PAGE, "toml")
     (tmp_path / "settled-small.toml").write_text("[[loads]]\n", encoding="utf-8")
     (tmp_path / "diagnosis.toml").write_text(example, encoding="utf-8")
     file = read_diagnosis(tmp_path / "diagnosis.toml")
@@ -92,7 +81,7 @@ def test_the_tables_list_all_keys_and_the_example_can_be_read(tmp_path):
 
 @pytest.mark.slow
 def test_a_movement_is_dated(tmp_path):
-    (commands,) = blocks("console")
+    (commands,) = blocks(PAGE, "console")
     *_, printed = ran(tmp_path, commands).values()
     lines = printed.splitlines()
     assert lines[0].startswith("'the left corner settled, when phase 1 stood' explains what was measured")

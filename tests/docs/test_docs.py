@@ -8,16 +8,12 @@ import sys
 
 import pytest
 
+from tests.docs.pages import blocks
 from tests.paths import ROOT
 from tests.pipelines.scenes import small_geology
 
 PAGES = ("README.md", "docs/howto/first-run.md", "docs/howto/survey.md")
 SCENE = "data/samples/window/window.toml"
-
-
-def blocks(page, language):
-    text = (ROOT / page).read_text(encoding="utf-8")
-    return re.findall(rf"^```{language}\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
 
 
 def commands(page):

@@ -2,31 +2,20 @@
 
 import json
 import re
-import shlex
 
 import pytest
 
-from tests.moma.commands import prints
-from tests.paths import ROOT
+from tests.docs.pages import blocks, ran
 
 pytestmark = pytest.mark.slow
-PAGE = (ROOT / "docs/howto/rib-vault.md").read_text(encoding="utf-8")
-
-
-def blocks(language):
-    return re.findall(rf"^```{language}\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
+PAGE = "docs/howto/rib-vault.md"
 
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory):
     """A folder in which the commands of the page have run, and what each has printed."""
-    folder, said = tmp_path_factory.mktemp("ribvault"), {}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(folder)
-        patch.delenv("MOMA_DB", raising=False)
-        for line in "".join(blocks("bash")).splitlines():
-            said[line] = prints(*shlex.split(line)[1:])
-    return folder, said
+    folder = tmp_path_factory.mktemp("ribvault")
+    return folder, ran(folder, "".join(blocks(PAGE, "bash")))
 
 
 def after(said, start):
@@ -35,7 +24,7 @@ def after(said, start):
 
 def test_all_joints_close_and_the_vault_rests(place):
     folder, said = place
-    (line,) = blocks("text")
+    (line,) = blocks(PAGE, "text")
     assert line in after(said, "moma check")
     summary = json.loads((folder / "out/ribvault-run/summary.json").read_text(encoding="utf-8"))
     assert summary["outcome"] == "equilibrium"
