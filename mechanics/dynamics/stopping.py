@@ -19,6 +19,7 @@ from mechanics.dynamics.simulation import Simulation
 from mechanics.dynamics.step import Step
 from mechanics.model.model import Model
 from mechanics.problem.residual import residual
+from mechanics.scene.laws.law import BOND
 from mechanics.scene.state import State
 
 __all__ = ["LASTING", "MOVED", "Verdict", "Watch", "balance_of", "lasts", "rests"]
@@ -32,6 +33,7 @@ _TOPPLED = np.pi / 4  # tilt from which a stone at rest away from its place has 
 _LEANS = np.radians(10.0)  # tilt from which one that has sunk by half a collapse has toppled [rad]
 _DOUBT = 0.5  # velocity that unsolved steps may have added, over that of a proven motion [-]
 _RELEASED = 50  # most steps in which a rest must show that it lasts without its forces
+_UNFILLED = 0.01  # area of joints that mortar does not fill, over that which it was to fill, that is told [-]
 _STAYS = 1e-3  # displacement over the width within which a released stone stays where it rested [-]
 
 
@@ -67,7 +69,7 @@ class Watch(Carrier):
 
     CARRIED = (
         "_compliant", "_culprit", "_deepest", "_depth", "_doubt", "_fastest", "_pair", "_quiet", "_speed", "_steps",
-        "_still", "_sunk", "_unsolved", "_worst_error", "rest_time",
+        "_still", "_sunk", "_unbonded", "_unsolved", "_worst_error", "rest_time",
     )  # fmt: skip
     REBUILT = ("_model", "_start")
 
@@ -78,6 +80,7 @@ class Watch(Carrier):
         self._still = False
         self._culprit, self._sunk, self._speed = 0, 0.0, 0.0
         self._compliant, self._deepest, self._depth, self._pair = 0, 0.0, 0.0, (0, 0)
+        self._unbonded: tuple[str, ...] = ()
         self.rest_time = 0.0
 
     def __call__(self, step: Step, balance: Array) -> Outcome:
@@ -89,6 +92,8 @@ class Watch(Carrier):
         self._doubt += error
         self._worst_error = max(self._worst_error, error)
         self._see_joints(step)
+        if self._steps == 1:
+            self._unbonded = _unbonded(model, step)
         seen = seen_from_supports(model, self._start, state)
         speeds = np.where(model.fixed, 0.0, speed(model, seen))
         pace = speeds / _fall(model, state)
@@ -125,7 +130,7 @@ class Watch(Carrier):
         """Return the outcome in words, from that of the last step, its state, and the static start."""
         if outcome is Outcome.MOVING and (self._still or self._doubt > _DOUBT * self._fastest):
             outcome = Outcome.UNDECIDED
-        cautions = self._gave_way()
+        cautions = [*self._gave_way(), *self._unbonded]
         if outcome is Outcome.EQUILIBRIUM:
             cautions += self._moved(state)
             if self._doubt > _DOUBT * self._fastest:
@@ -245,6 +250,22 @@ def lasts(simulation: Simulation) -> bool:
 def rests(model: Model, state: State, balance: Array) -> bool:
     """Return whether all bodies are in balance (nb,) and slow, where no support is driven."""
     return _rests(model, balance, np.where(model.fixed, 0.0, speed(model, state)) / _fall(model, state))
+
+
+def _unbonded(model: Model, step: Step) -> tuple[str, ...]:
+    """Return a caution on mortar that was to hold joints, but fills too little of them in the first step."""
+    contacts, internal = step.contacts, step.internal
+    meant = model.laws.makes_bonds(model.laws.of(contacts.bodies)) & (contacts.area > 0)
+    wide = np.flatnonzero(meant & (internal[:, BOND] == 0))
+    share = float(contacts.area[wide].sum() / (contacts.area[meant].sum() or 1.0))
+    if share < _UNFILLED:
+        return ()
+    gap = np.abs(step.gap[wide])
+    one, other = (model.scene.blocks[body].code for body in sorted(contacts.bodies[wide[gap.argmax()]]))
+    return (
+        f"mortar does not hold {_percent(share)} of the area of its joints, where gaps or overlaps exceed a hundredth "
+        f"of the smaller stone's width ({one} and {other}: {_short(float(gap.max()))})",
+    )
 
 
 def _rests(model: Model, balance: Array, pace: Array) -> bool:

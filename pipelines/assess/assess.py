@@ -136,7 +136,8 @@ def assess(
     for number, question in enumerate(questions):
         progress(Progress("assess", number, len(questions), question.name))
         answers.append(answer(on, question, confirming, leading, scene.site))
-    summary = _summary(assembled, on, answers)
+    unchecked = [one.name for one in questions if code and isinstance(one, LoadQuestion) and one.code is None]
+    summary = _summary(assembled, on, answers, unchecked)
     progress(Progress("write", 0, 1, "pictures"))
     warnings: list[str] = []
     with replacing(folder, INDEX) as fresh:
@@ -187,7 +188,10 @@ def _refuse_code(code: str, scene: SceneFile) -> None:
         )
 
 
-def _summary(assembled: Assembled, on: Assembly, answers: Sequence[Answer]) -> dict[str, Any]:
+def _summary(
+    assembled: Assembled, on: Assembly, answers: Sequence[Answer], unchecked: Sequence[str]
+) -> dict[str, Any]:
+    """Return all answers; `unchecked` are the loads that the code of the option --code does not take."""
     soft = sum(block.fidelity is Fidelity.DEFORMABLE for block in assembled.scene.blocks)
     crushing = (
         "stones are rigid and do not crush" if on.crushing is None else "stones crush at their strength"
@@ -196,6 +200,11 @@ def _summary(assembled: Assembled, on: Assembly, answers: Sequence[Answer]) -> d
         f"{crushing}; joints keep their geometry until the mechanism moves",
         *([f"{soft} deformable stones count as rigid"] if soft else []),
         *([f"gaps of up to {1e3 * on.widest:.2g} mm count as closed"] if on.widest > 1e-6 else []),
+        *(
+            [f"not checked by the code, which takes pushes on all stones: {', '.join(unchecked)}"]
+            if unchecked
+            else []
+        ),
     ]
     told = [one.told for one in answers]
     return {

@@ -60,19 +60,20 @@ class ElasticJoint:
         return 0.0
 
     @property
-    def _bonded(self) -> bool:
+    def bonded(self) -> bool:
+        """True for mortar, which holds tension or shear without pressure."""
         return self.shear > 0 or self.tension > 0
 
     @property
     def _strength(self) -> Law:
-        if self._bonded:
+        if self.bonded:
             return MortarJoint(self.friction, self.tension, self.shear, self.dynamic_friction)
         return DryJoint(self.friction, self.dynamic_friction)
 
     def terms(self, contacts: Approach) -> Terms:
         """Return the strength of the joint, with its springs."""
         strength = self._strength.terms(contacts)
-        contacts = with_bonds(contacts) if self._bonded else contacts
+        contacts = with_bonds(contacts) if self.bonded else contacts
         step, theta, has = contacts.step, contacts.theta, contacts.area > 0
         begin = contacts.gap - contacts.state[:, REST] - step * (1.0 - theta) * contacts.speed
         compliance, shift = np.zeros((len(has), 3)), np.zeros((len(has), 2))

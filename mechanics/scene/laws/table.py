@@ -6,8 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechanics.arrays import Array, Bools, Ints
+from mechanics.scene.laws.cohesive_zone import CohesiveZone
 from mechanics.scene.laws.elastic_joint import ElasticJoint
 from mechanics.scene.laws.law import Approach, Law, Springs, Terms
+from mechanics.scene.laws.mortar import MortarJoint
 
 __all__ = ["LawTable", "law_table"]
 
@@ -32,6 +34,14 @@ class LawTable:
     def sprung(self) -> bool:
         """True where a law has springs, so that joints yield."""
         return any(isinstance(law, ElasticJoint) for law in self.laws)
+
+    def makes_bonds(self, law: Ints) -> Bools:
+        """Return the contacts (n,) whose law bonds stones that meet at the start."""
+        bonds = [
+            one.bonded if isinstance(one, ElasticJoint) else isinstance(one, MortarJoint | CohesiveZone)
+            for one in self.laws
+        ]
+        return np.array(bonds)[law]
 
     def of(self, bodies: Ints) -> Ints:
         """Return the index of the law of each contact between bodies (nc, 2); of two rules, the later holds."""

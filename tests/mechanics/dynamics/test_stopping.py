@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mechanics.dynamics.outcome import Outcome
+from mechanics.scene.laws.mortar import MortarJoint
 from mechanics.scene.scene import SolverSettings, Start
 from mechanics.scene.shapes import box
 from mechanics.simulate import simulate
@@ -142,3 +143,14 @@ def test_a_wedge_that_friction_holds_rests_and_lasts():
         result = simulate(scene(*sides, replace(wedge, vertices=corners), step=2e-3, relaxation=relaxation))
         assert result.outcome is Outcome.EQUILIBRIUM
         assert not result.cautions
+
+
+@pytest.mark.parametrize(("gap", "held"), [(0.004, True), (0.006, False)])
+def test_mortar_that_is_too_wide_to_hold_is_told(gap, held):
+    """The bed under the second of two stones 0.5 m wide is not filled where it is wider than 5 mm."""
+    stones = brick("A", (0, 0, 0), (1, 0.5, 1)), brick("B", (0, 0, 1 + gap), (1, 0.5, 2))
+    one = scene(ground(), *stones, step=1e-4, duration=5e-4)
+    one = replace(one, contact=replace(one.contact, law=MortarJoint(0.6, 1e5, 2e5)))
+    expected = "mortar does not hold 50 % of the area of its joints, where gaps or overlaps exceed a hundredth of the "
+    told = [caution for caution in simulate(one).cautions if "mortar" in caution]
+    assert told == ([] if held else [f"{expected}smaller stone's width (A and B: 6 mm)"])
