@@ -31,6 +31,11 @@ class Motions:
         at: Array = np.column_stack([np.ones(len(points)), points - self.middle[code]]) @ self.field[code]
         return at
 
+    def since(self, earlier: "Motions") -> "Motions":
+        """Return the motions since an earlier state of the same stones; those that took no part in it count whole."""
+        field = {code: one - earlier.field.get(code, 0.0) for code, one in self.field.items()}
+        return Motions(self.middle, field)
+
 
 def stone_motions(bodies: Iterable[BodyResult], origin: Array) -> Motions:
     """Return the motions of the stones of a run; `origin` (3,) of the scene in the frame of the site [m]."""

@@ -44,6 +44,13 @@ DIAGNOSIS_KEYS = (
         below=0.1,
     ),
     Key(
+        "from_rest",
+        Kind.BOOLEAN,
+        "Movements count from where the scene rests without any cause, not from the survey: for joints that yield "
+        "under the weight alone.",
+        default=False,
+    ),
+    Key(
         "phases",
         Kind.TEXTS,
         "Names of building phases, the oldest first; with two or more the movement is dated against them.",
@@ -137,6 +144,7 @@ class DiagnosisFile:
     scene_path : of the scene, for files beside it
     base : contents of the scene file without what is left out
     battered, level_tolerance : how walls and courses were laid
+    from_rest : whether movements count from where the scene rests without any cause
     phases : names, the oldest first
     hypotheses : one or more
     """
@@ -146,6 +154,7 @@ class DiagnosisFile:
     base: Mapping[str, Any]
     battered: bool
     level_tolerance: float
+    from_rest: bool
     phases: tuple[str, ...]
     hypotheses: tuple[Hypothesis, ...]
 
@@ -183,6 +192,7 @@ def read_diagnosis(path: str | Path) -> DiagnosisFile:
         {name: one for name, one in base.items() if name not in (*BESIDE, *head["without"])},
         head["battered"],
         head["level_tolerance"],
+        head["from_rest"],
         _distinct(document, head["phases"]),
         tuple(_hypotheses(document, given)),
     )

@@ -5,6 +5,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+from pipelines.assess.diagnosis.best import write_best
 from pipelines.assess.diagnosis.dating import Dating
 from pipelines.assess.diagnosis.file import DiagnosisFile
 from pipelines.assess.diagnosis.measurements import Measurements
@@ -51,8 +52,7 @@ def write_diagnosis(
     _write_stones(folder / "stones.csv", courses)
     _draw(folder, courses)
     case = next(one for one in cases if (one.hypothesis.name, one.stood) == (best.name, best.stood))
-    scene = f"# {best.title}: the amplitudes that explain best\n{case.text(file, best.fit.amplitudes)}"
-    (folder / "best.toml").write_text(scene, encoding="utf-8")
+    write_best(folder, file, case, best)
     summary = _summary(file, found, done, dating)
     summary["cautions"] += cautions
     summary["files"] = sorted([INDEX, *(entry.name for entry in folder.iterdir())])
@@ -75,7 +75,8 @@ def _summary(file: DiagnosisFile, found: Measurements, done: Fitted, dating: Dat
         },
         "cautions": [
             f"courses are assumed to have been laid {tolerance}, and faces {laid}",
-            "each run begins with the stones as they are now, and its movement alone is compared",
+            "each run begins with the stones as they are now, and its movement alone is compared"
+            + ", counted from where the scene rests without any cause" * file.from_rest,
         ],
         "hypotheses": [_told(one, ranking.hypotheses[0]) for one in (*ranking.hypotheses, ranking.still)],
         "not_told_apart": [one.title for one in ranking.rivals],

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from pipelines.arrays import Array
 from pipelines.assess.diagnosis.file import DiagnosisFile, Hypothesis
 from pipelines.assess.diagnosis.fit import Ask, Fit, fit
 from pipelines.assess.diagnosis.ranking import STILL, Ranking, rank
-from pipelines.assess.diagnosis.trials import Runner, Trial, Tried
+from pipelines.assess.diagnosis.trials import Runner, Trial, Tried, since_rest
 from pipelines.assess.motions import Motions
 from pipelines.run.assemble import assemble
 from pipelines.run.soundness import problems_of, refuse_unsound
@@ -42,13 +43,13 @@ class Case:
     stood: tuple[str, ...] = ()
     later: tuple[str, ...] = ()
 
+    def scene(self, file: DiagnosisFile, amplitudes: tuple[float, ...]) -> dict[str, Any]:
+        """Return the contents of the scene file with these amplitudes."""
+        return _without(self.hypothesis.scene(file.base, amplitudes), self.later)
+
     def text(self, file: DiagnosisFile, amplitudes: tuple[float, ...]) -> str:
         """Return the scene with these amplitudes as TOML."""
-        scene = self.hypothesis.scene(file.base, amplitudes)
-        if self.later:
-            own = scene.get("select", {})
-            scene["select"] = {**own, "exclude": [*own.get("exclude", []), *self.later]}
-        return toml_text(scene)
+        return toml_text(self.scene(file, amplitudes))
 
     @property
     def start(self) -> tuple[float, ...]:
@@ -109,7 +110,8 @@ def check_case(file: DiagnosisFile, case: Case, url: str, accept_unsound: bool) 
     """
     name = f"the scene with hypothesis {case.hypothesis.name!r}"
     try:
-        scene = parse_scene(case.text(file, case.start), name)
+        # files that the scene names lie beside the scene of the diagnosis
+        scene = parse_scene(case.text(file, case.start), file.scene_path)
         with open_database(url, create=False) as database, database.session(read_only=True) as session:
             assembly = assemble(scene, session)
     except SceneError as error:
@@ -123,8 +125,32 @@ def check_case(file: DiagnosisFile, case: Case, url: str, accept_unsound: bool) 
 
 
 def runs_of(file: DiagnosisFile, url: str, run: Runner) -> Runs:
-    """Return a function that makes the runs of cases by running their scenes."""
-    return lambda places: run([Trial(case.text(file, x), file.scene_path, url) for case, x in places])
+    """Return a function that makes the runs of cases by running their scenes.
+
+    If movements count from rest, the scene without any cause is run too, once for each set of stones that stood.
+    """
+    rest: dict[tuple[str, ...], Tried] = {}
+
+    def made(places: Sequence[Place]) -> list[Tried]:
+        trials = [Trial(case.text(file, x), file.scene_path, url) for case, x in places]
+        if not file.from_rest:
+            return list(run(trials))
+        fresh = [later for later in dict.fromkeys(case.later for case, _ in places) if later not in rest]
+        first = [Trial(toml_text(_without(file.base, later)), file.scene_path, url) for later in fresh]
+        answers = run([*first, *trials])
+        rest.update(zip(fresh, answers, strict=False))
+        return [
+            since_rest(one, rest[case.later])
+            for (case, _), one in zip(places, answers[len(fresh) :], strict=True)
+        ]
+
+    return made
+
+
+def _without(scene: Mapping[str, Any], later: tuple[str, ...]) -> dict[str, Any]:
+    """Return the contents of a scene file without stones that did not stand yet."""
+    own = scene.get("select", {})
+    return dict(scene) | ({"select": {**own, "exclude": [*own.get("exclude", []), *later]}} if later else {})
 
 
 def fit_cases(

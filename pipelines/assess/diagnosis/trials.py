@@ -16,13 +16,13 @@ from dataclasses import dataclass
 
 from archmodel.database.session import open_database
 from mechanics.results.result import Outcome
-from mechanics.simulate import simulate
+from mechanics.simulate import simulate, simulate_stages
 from moma.errors import MomaError
 from pipelines.assess.motions import Motions, stone_motions
 from pipelines.run.assemble import assemble
 from pipelines.scene.file import parse_scene
 
-__all__ = ["Runner", "Trial", "Tried", "run_trial", "runner"]
+__all__ = ["Runner", "Trial", "Tried", "run_trial", "runner", "since_rest"]
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def run_trial(trial: Trial) -> Tried:
         scene = parse_scene(trial.text, trial.path)
         with open_database(trial.url, create=False) as database, database.session(read_only=True) as session:
             assembly = assemble(scene, session)
-        result = simulate(assembly.scene)
+        result = simulate_stages(assembly.stages) if assembly.stages else simulate(assembly.scene)
     except MomaError as error:
         return Tried(None, " ".join(str(error).split()), time.process_time() - begun)
     cpu = time.process_time() - begun
@@ -75,6 +75,16 @@ def run_trial(trial: Trial) -> Tried:
         return Tried(None, "the run ended in collapse", cpu)
     fault = "" if result.outcome is Outcome.EQUILIBRIUM else f"its run did not come to rest: {result.outcome}"
     return Tried(stone_motions(result.bodies, assembly.origin), fault, cpu)
+
+
+def since_rest(tried: Tried, rest: Tried) -> Tried:
+    """Return a run whose motions count from where the scene rests without any cause."""
+    if tried.motions is None:
+        return tried
+    fault = f"without any cause: {rest.fault}" if rest.fault else ""
+    if rest.motions is None:
+        return Tried(None, fault, tried.cpu)
+    return Tried(tried.motions.since(rest.motions), "; ".join(filter(None, (tried.fault, fault))), tried.cpu)
 
 
 @contextmanager
