@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import stdtr
 
-from survey.arrays import Array
+from survey.arrays import Array, Ints
 from survey.quality.bed_fit import BedCorners, BedScatter, fit_bed, pool, scatter_of
 from survey.quality.facades import Facade, WallPlane
 from survey.quality.precision import StoneQuality
@@ -36,6 +36,8 @@ ENOUGH = 5
 SIGNIFICANT = 0.01
 """Probability by chance below which a slope or sag is significant."""
 
+_BEVEL = 0.10  # longest lower side that is a bevel if it rises [m]
+_RISES = 4.0  # standard deviations by which its upper end lies higher
 _LEVEL = math.tan(math.radians(30.0))  # largest slope of a bed; steeper lower sides are worn or bevelled
 
 
@@ -52,7 +54,7 @@ class CourseLine:
     along : (n,) the same along the facade, to the right of the viewer [m]
     height : (n,) its z [m]
     sigma : (n,) standard deviation of its z, as measured [m]
-    left_out : lower corners that are ignored: worn, or of unknown precision
+    left_out : lower corners that are ignored: worn, the upper end of a bevel, or of unknown precision
     middle : half-way between the ends, along the facade [m]
     level : z of the line there [m]; it and `slope` have the covariance
     slope : rise to the right over length [-]; None if only one corner is left
@@ -235,6 +237,13 @@ def _courses(stones: Sequence[StoneQuality], facade: Facade, frame_sigma: float)
     return [one for one in courses if one is not None]
 
 
+def _bedded(along: Array, height: Array, sigma: Array) -> Ints:
+    """Return which of the lower corners (n,) of a stone are no upper ends of bevels."""
+    near = np.abs(along[:, None] - along) < _BEVEL
+    rises = height - height[:, None] > _RISES * np.hypot(sigma[:, None], sigma)
+    return np.flatnonzero(~(near & rises).any(axis=0))
+
+
 def _course(stones: Sequence[StoneQuality], facade: Facade, frame_sigma: float) -> _Course | None:
     codes: list[str] = []
     parts: list[Array] = []
@@ -243,10 +252,12 @@ def _course(stones: Sequence[StoneQuality], facade: Facade, frame_sigma: float) 
         lower = lower_corners(stone.outline, facade.frame)
         known = np.isfinite(stone.corner_sigma[:, 2])
         sound = [k for k in lower if k not in stone.worn_corners and known[k]]
-        left_out += len(lower) - len(sound)
-        along = (stone.outline[sound] - facade.frame.origin) @ facade.frame.axes[0]
-        parts.append(np.column_stack([along, stone.corner_sigma[sound, 2], stone.outline[sound]]))
-        codes += [stone.code] * len(sound)
+        places, sigma = stone.outline[sound], stone.corner_sigma[sound, 2]
+        along = (places - facade.frame.origin) @ facade.frame.axes[0]
+        bedded = _bedded(along, places[:, 2], sigma)
+        left_out += len(lower) - len(bedded)
+        parts.append(np.column_stack([along, sigma, places])[bedded])
+        codes += [stone.code] * len(bedded)
     if not codes:
         return None
     table = np.concatenate(parts)

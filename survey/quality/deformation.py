@@ -31,8 +31,6 @@ _NEAR = 0.06  # largest distance of two corners at one head joint: an open joint
 _MEDIAN = 0.6745  # of the absolute value of a standard normal variable
 _OUTLIER = 2.5  # standard deviations beyond which a step is a crack
 _KEPT = 0.9113  # variance of a standard normal variable within that limit
-_BEVEL = 0.10  # longest lower side that is a bevel if it rises [m]
-_RISES = 4.0  # standard deviations by which its upper end lies higher
 _FEWEST = 5  # steps from which a scatter is estimated
 
 
@@ -152,7 +150,7 @@ def _scatter(lines: Iterable[CourseLine]) -> tuple[float, int]:
     """Return τ from the steps at head joints, and the number of steps; without cracks."""
     steps, variances = [], []
     for line in lines:
-        for i, k in pairwise(_sound(line)):
+        for i, k in pairwise(range(len(line.codes))):
             if line.codes[i] != line.codes[k] and line.along[k] - line.along[i] < _NEAR:
                 steps.append(float(line.height[k] - line.height[i]))
                 variances.append(float(line.sigma[i] ** 2 + line.sigma[k] ** 2))
@@ -166,21 +164,6 @@ def _scatter(lines: Iterable[CourseLine]) -> tuple[float, int]:
         lambda square: float((step[kept] ** 2 / (measured[kept] + 2.0 * square)).sum()) - _KEPT * count
     )
     return math.sqrt(square), count
-
-
-def _sound(line: CourseLine) -> list[int]:
-    """Return the corners of a bed without the upper ends of bevels."""
-    rows = range(len(line.codes))
-    return [
-        k
-        for k in rows
-        if not any(
-            line.codes[i] == line.codes[k]
-            and abs(line.along[i] - line.along[k]) < _BEVEL
-            and line.height[k] - line.height[i] > _RISES * math.hypot(line.sigma[i], line.sigma[k])
-            for i in rows
-        )
-    ]
 
 
 def _root(excess: Callable[[float], float]) -> float:
@@ -199,7 +182,7 @@ def _root(excess: Callable[[float], float]) -> float:
 def _bed(
     line: CourseLine, scatter: float, level: float, undetermined: frozenset[str]
 ) -> DeformationGroup | None:
-    rows = [k for k in _sound(line) if line.codes[k] not in undetermined]
+    rows = [k for k, code in enumerate(line.codes) if code not in undetermined]
     if len(rows) < 2:
         return None
     codes, along = tuple(line.codes[k] for k in rows), line.along[rows]

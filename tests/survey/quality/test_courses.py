@@ -138,8 +138,11 @@ def test_worn_corners_and_bevels_are_no_beds() -> None:
     x = 0.51 * 3
     bevelled = [(x, 1.04), (x + 0.04, 1.0), (x + 0.5, 1.0), (x + 0.5, 1.3), (x, 1.3)]
     stones[3] = polygon_stone("1-3", "stretcher", bevelled)
+    x = 0.51 * 4
+    shallow = [(x, 1.02), (x + 0.05, 1.0), (x + 0.5, 1.0), (x + 0.5, 1.3), (x, 1.3)]
+    stones[4] = polygon_stone("1-4", "stretcher", shallow)
     (line,) = lines_of(stones)
-    assert line.left_out == 1
+    assert line.left_out == 2
     assert len(line.codes) == 11
     assert line.deviations == pytest.approx(0.0, abs=1e-12)
     assert lower_corners(stones[3].outline, facades_of(stones)[0].frame) == [1, 2]
