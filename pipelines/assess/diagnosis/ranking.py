@@ -10,17 +10,29 @@ from scipy.special import fdtrc, stdtrit
 from pipelines.assess.diagnosis.file import Unknown
 from pipelines.assess.diagnosis.fit import Fit
 
-__all__ = ["STILL", "Estimate", "Ranked", "Ranking", "estimates", "rank", "verdict"]
+__all__ = [
+    "APART",
+    "QUANTILE",
+    "STILL",
+    "Estimate",
+    "Ranked",
+    "Ranking",
+    "estimates",
+    "rank",
+    "verdict",
+]
 
 STILL = "nothing has moved"
 """Name of the hypothesis without a run, to which all others are compared."""
 
+APART = 6.0
+"""Difference of AICc from which two hypotheses are told apart: a relative likelihood of a twentieth."""
+
+QUANTILE = 0.975
+"""Of two-sided 95 % intervals."""
+
 _EXPLAINS = 0.01  # probability of so large a χ² by chance, below which a hypothesis does not explain
-_APART = (
-    6.0  # difference of AICc from which two hypotheses are told apart: a relative likelihood of a twentieth
-)
 _CORRELATED = 0.95  # correlation of two amplitudes beyond which they are not told apart
-_QUANTILE = 0.975  # of two-sided 95 % intervals
 
 
 @dataclass(frozen=True)
@@ -33,6 +45,7 @@ class Estimate:
     value : that explains best
     low, high : ends of its 95 % interval; infinite if it is not determined
     at_bound : whether the value lies at a bound of the search
+    run_sigma : standard deviation that comes from runs that do not answer smoothly; NaN if that was not tried
     """
 
     name: str
@@ -41,6 +54,7 @@ class Estimate:
     low: float
     high: float
     at_bound: bool
+    run_sigma: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -57,6 +71,7 @@ class Ranked:
     aicc : χ² + 2 k with the correction for few values
     estimates : its amplitudes
     remarks : cautions about its amplitudes and runs
+    uneven : amplitudes that scatter with the runs themselves, each with its unit
     """
 
     name: str
@@ -67,6 +82,7 @@ class Ranked:
     aicc: float
     estimates: tuple[Estimate, ...]
     remarks: tuple[str, ...]
+    uneven: tuple[str, ...] = ()
 
     @property
     def explains(self) -> bool:
@@ -100,7 +116,7 @@ class Ranking:
     def rivals(self) -> tuple[Ranked, ...]:
         """Others that are not told apart from the best."""
         best = self.hypotheses[0]
-        return tuple(one for one in self.hypotheses[1:] if one.aicc - best.aicc < _APART)
+        return tuple(one for one in self.hypotheses[1:] if one.aicc - best.aicc < APART)
 
 
 def rank(
@@ -129,7 +145,7 @@ def rank(
 
 def estimates(unknowns: Sequence[Unknown], found: Fit, dof: int) -> Iterator[Estimate]:
     """Yield the amplitudes with intervals of Student's t, widened where the residuals are larger than expected."""
-    wide = float(stdtrit(dof, _QUANTILE)) * max(1.0, math.sqrt(found.chi2 / dof))
+    wide = float(stdtrit(dof, QUANTILE)) * max(1.0, math.sqrt(found.chi2 / dof))
     blind = np.abs(np.array(found.undetermined).reshape(len(found.undetermined), len(unknowns))).max(
         axis=0, initial=0.0
     )
@@ -168,25 +184,29 @@ def verdict(ranking: Ranking) -> str:
     """Return the verdict in one line, with its caution."""
     best, still = ranking.hypotheses[0], ranking.still
     chi2 = f"χ² {best.fit.chi2:.4g} of {best.dof}, {still.fit.chi2:.4g} of {still.dof} if nothing had moved"
-    if still.explains and still.aicc - best.aicc < _APART:
+    if still.explains and still.aicc - best.aicc < APART:
         return (
             f"no movement is needed to explain what was measured: χ² {still.fit.chi2:.4g} of {still.dof} without any; "
             "CAUTION: movements that are small against the scatter of beds are not seen"
         )
     if not len(best.fit.residuals):
         return f"NONE OF THESE could be run; of {best.title!r}: {best.fit.trouble}; CAUTION: that excludes nothing"
+    uneven = (
+        f"runs do not answer smoothly: {' and '.join(best.uneven)} from run to run" if best.uneven else ""
+    )
     if not best.explains:
         return (
             f"NONE OF THESE EXPLAINS what was measured; the best of them is {best.title!r} ({chi2}); "
-            "CAUTION: its amounts are no estimates of anything"
+            f"CAUTION: {uneven or 'its amounts are no estimates of anything'}"
         )
     rivals = [one for one in ranking.rivals if one.name != best.name]
     names = " and ".join(repr(one.name) for one in rivals)
-    caution = (
-        f"CAUTION: it cannot be told apart from {names}"
+    other = (
+        f"it cannot be told apart from {names}"
         if rivals
-        else "CAUTION: a cause that is not in the list may move the stones alike"
+        else "a cause that is not in the list may move the stones alike"
     )
+    caution = f"CAUTION: {'; '.join(filter(None, (uneven, other)))}"
     amounts = "; ".join(_amount(one) for one in best.estimates)
     return f"{best.title!r} explains what was measured ({chi2}){f': {amounts}' if amounts else ''}; {caution}"
 

@@ -107,6 +107,7 @@ def _told(one: Ranked, best: Ranked) -> dict[str, Any]:
                 "low": _finite(own.low),
                 "high": _finite(own.high),
                 "at_bound": own.at_bound,
+                "run_sigma": _finite(own.run_sigma),
             }
             for own in one.estimates
         ],

@@ -14,7 +14,8 @@ from moma.errors import SceneError
 from pipelines.arrays import Array
 from pipelines.assess.diagnosis.file import DiagnosisFile, Hypothesis
 from pipelines.assess.diagnosis.fit import Ask, Fit, fit
-from pipelines.assess.diagnosis.ranking import STILL, Ranking, rank
+from pipelines.assess.diagnosis.ranking import APART, STILL, Ranked, Ranking, rank
+from pipelines.assess.diagnosis.smoothness import probes, with_unevenness
 from pipelines.assess.diagnosis.trials import Runner, Trial, Tried, since_rest
 from pipelines.assess.motions import Motions
 from pipelines.run.assemble import assemble
@@ -168,20 +169,24 @@ def fit_cases(
     searches: dict[int, Ask] = {k: fit(case.hypothesis.unknowns) for k, case in enumerate(cases)}
     asked = {k: next(search) for k, search in searches.items()}
     known: dict[tuple[int, tuple[float, ...]], Tried] = {}
+
+    def make(places: Mapping[int, Sequence[tuple[float, ...]]]) -> None:
+        fresh = [place for k, xs in places.items() for x in xs if (place := (k, x)) not in known]
+        fresh = list(dict.fromkeys(fresh))
+        progress(Progress("run", len(known), None, f"{len(fresh)} runs for {len(places)} hypotheses"))
+        answers = runs([(cases[k], x) for k, x in fresh])
+        known.update(zip(fresh, answers, strict=True))
+
     fits: dict[int, Fit] = {}
     while asked:
-        fresh = [place for k, xs in asked.items() for x in xs if (place := (k, x)) not in known]
-        fresh = list(dict.fromkeys(fresh))
-        progress(Progress("run", len(known), None, f"{len(fresh)} runs for {len(asked)} hypotheses"))
-        answers = runs([(cases[k], x) for k, x in fresh])
-        known |= dict(zip(fresh, answers, strict=True))
+        make(asked)
         for k, xs in tuple(asked.items()):
             try:
                 asked[k] = searches[k].send([_answer(known[k, x], deformation) for x in xs])
             except StopIteration as end:
                 fits[k] = end.value
                 del asked[k]
-    ranked, motions = [], {}
+    ranked, motions = list[Ranked](), {}
     for k, case in enumerate(cases):
         unknowns = case.hypothesis.unknowns
         one = rank(case.hypothesis.name, case.stood, unknowns, fits[k], deformation.dof, deformation.steps)
@@ -190,6 +195,18 @@ def fit_cases(
             one = replace(one, remarks=(*one.remarks, last.fault))
         ranked.append(one)
         motions[one.name, one.stood] = last.motions or _NOWHERE
+    # those that may be reported: the best, and what cannot be told apart from it
+    least = min(one.aicc for one in ranked)
+    near = {
+        k: [x for own in probes(case.hypothesis.unknowns, fits[k].amplitudes) for x in own]
+        for k, case in enumerate(cases)
+        if ranked[k].aicc < least + APART and len(fits[k].covariance)
+    }
+    if near:
+        make(near)
+    for k, xs in near.items():
+        answers = {x: _answer(known[k, x], deformation) for x in xs}
+        ranked[k] = with_unevenness(ranked[k], cases[k].hypothesis.unknowns, answers)
     residuals = deformation.residuals(_NOWHERE.displacement)
     still = Fit((), residuals, np.zeros((0, 0)), (), 0)
     ranking = Ranking(

@@ -13,6 +13,7 @@ from pipelines.assess.diagnosis.fit import Fit, fit
 from pipelines.assess.diagnosis.measurements import measure
 from pipelines.assess.diagnosis.ranking import STILL, Ranking, rank, verdict
 from pipelines.assess.diagnosis.search import cases_of, fit_cases, runs_of
+from pipelines.assess.diagnosis.smoothness import probes, with_unevenness
 from pipelines.assess.diagnosis.trials import Trial, Tried, runner
 from pipelines.assess.motions import Motions
 from pipelines.scene.file import parse_scene
@@ -186,6 +187,59 @@ def test_runs_that_fail_are_told():
         [unknown("a", start=0.9)], lambda a: "collapse" if a < 0.3 else 10.0 * (a**3 - 0.1) * place
     )
     assert found.amplitudes[0] == pytest.approx(0.1 ** (1 / 3), abs=0.01)
+
+
+def uneven_line(jump, seed):
+    """Rank of a hypothesis with residuals that are a line in its amplitude, but for a jump of their own in each run."""
+    place = np.linspace(0.5, 1.0, 40)
+    data = np.random.default_rng(seed).normal(size=40)
+
+    def residuals(a):
+        own = np.random.default_rng(abs(hash((seed, round(a, 12))))).normal()
+        return data + 100.0 * (a - 0.3 + jump * own) * place
+
+    unknowns = [unknown("a", step=0.1)]
+    told = rank("x", (), unknowns, searched(unknowns, residuals)[0], 40, 0)
+    asked = {x: residuals(*x) for own in probes(unknowns, told.fit.amplitudes) for x in own}
+    return told, with_unevenness(told, unknowns, asked)
+
+
+def test_runs_that_do_not_answer_smoothly_widen_the_interval_and_are_told():
+    smooth, same = uneven_line(0.0, 1)
+    assert same.estimates[0].low == pytest.approx(smooth.estimates[0].low)
+    assert same.uneven == ()
+    told = [uneven_line(0.02, seed) for seed in range(40)]
+    # the survey alone knows the amount to 0.002 or so: with the runs' own jumps of 0.02 that is no interval
+    covered = [
+        sum(one.estimates[0].low <= 0.3 <= one.estimates[0].high for one in half)
+        for half in zip(*told, strict=True)
+    ]
+    assert covered[0] <= 16
+    assert covered[1] >= 32
+    assert np.sqrt(np.mean([one.estimates[0].run_sigma ** 2 for _, one in told])) == pytest.approx(
+        0.02, rel=0.3
+    )
+    (_, one), *_ = told
+    assert one.uneven[0].startswith("a by 0.0")
+    said = verdict(Ranking((one,), still_of(900.0, 40)))
+    assert "CAUTION: runs do not answer smoothly: a by 0.0" in said
+
+
+def test_runs_that_fail_beside_the_best_amount_are_told():
+    told, _ = uneven_line(0.0, 1)
+    unknowns = [unknown("a", step=0.1)]
+    asked = {x: "the run ended in collapse" for own in probes(unknowns, told.fit.amplitudes) for x in own}
+    found = with_unevenness(told, unknowns, asked)
+    assert found.estimates == told.estimates
+    assert found.remarks[-1].endswith("may be too narrow: the run ended in collapse")
+
+
+def test_probes_keep_within_the_bounds():
+    unknowns = [unknown("a", step=0.4), unknown("b")]
+    first, second = probes(unknowns, (1.0, 0.2))
+    assert [x for x, _ in first] == pytest.approx([0.2, 0.4, 0.6, 0.8, 1.0])
+    assert {y for _, y in first} == {0.2}
+    assert [y for _, y in second] == pytest.approx([0.19, 0.195, 0.2, 0.205, 0.21])
 
 
 def still_of(chi2, dof):

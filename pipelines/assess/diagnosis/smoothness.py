@@ -1,0 +1,66 @@
+"""Smoothness of the answer of runs to their amplitudes, and what unevenness adds to the error of an amplitude.
+
+Finite differences and intervals take it that residuals change smoothly. Rocking, sliding and cracking may make two runs
+of nearly the same amplitude end differently. Of five runs across an amplitude, each tells by the linear model where the
+best amplitude lies: x̂ = x - (J⁺ r)ᵢ. What a parabola through the five x̂ leaves, with two degrees of freedom, is the
+standard deviation of the amplitude that comes from the runs themselves.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.special import stdtrit
+
+from pipelines.arrays import Array
+from pipelines.assess.diagnosis.file import Unknown
+from pipelines.assess.diagnosis.ranking import QUANTILE, Ranked
+
+__all__ = ["probes", "with_unevenness"]
+
+_OFFSETS = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])  # of the runs, in steps of the unknown
+_UNEVEN = 0.5  # standard deviation from the runs over that from the survey, beyond which it is told in the first line
+
+Place = tuple[float, ...]
+Answer = Array | str
+
+
+def probes(unknowns: Sequence[Unknown], best: Place) -> list[list[Place]]:
+    """Return for each unknown five places across its best amplitude, within its bounds, the others at their best."""
+    found = []
+    for k, one in enumerate(unknowns):
+        middle = min(max(best[k], one.low + one.step), one.high - one.step)
+        found.append([(*best[:k], float(middle + one.step * share), *best[k + 1 :]) for share in _OFFSETS])
+    return found
+
+
+def with_unevenness(ranked: Ranked, unknowns: Sequence[Unknown], answers: Mapping[Place, Answer]) -> Ranked:
+    """Return a hypothesis whose intervals include the unevenness of its runs, and that tells it.
+
+    Parameters
+    ----------
+    ranked : the hypothesis, with its best amplitudes
+    unknowns : of the hypothesis
+    answers : residuals (m,) at the places of `probes`; a text where a run has failed
+    """
+    rows = [[answers[place] for place in own] for own in probes(unknowns, ranked.fit.amplitudes)]
+    failed = next((one for row in rows for one in row if isinstance(one, str)), None)
+    if failed is not None:
+        remark = f"runs beside its best amounts fail, so that its intervals may be too narrow: {failed}"
+        return replace(ranked, remarks=(*ranked.remarks, remark))
+    residuals = np.array(rows)
+    steps = np.array([one.step for one in unknowns])
+    jacobian = ((residuals[:, -1] - residuals[:, 0]) / (2.0 * steps)[:, None]).T
+    inverse = np.linalg.pinv(jacobian)
+    wide = float(stdtrit(ranked.dof, QUANTILE))
+    estimates, uneven = [], []
+    for k, (one, own) in enumerate(zip(unknowns, ranked.estimates, strict=True)):
+        told = one.step * _OFFSETS - residuals[k] @ inverse[k]
+        left = told - np.polyval(np.polyfit(_OFFSETS, told, 2), _OFFSETS)
+        sigma = float(np.sqrt(left @ left / (len(left) - 3)))
+        half = own.high - own.value
+        if np.isfinite(half) and sigma > _UNEVEN * half / wide:
+            uneven.append(f"{own.name} by {sigma:.2g} {own.unit}")
+        half = float(np.hypot(half, wide * sigma))
+        estimates.append(replace(own, low=own.value - half, high=own.value + half, run_sigma=sigma))
+    return replace(ranked, estimates=tuple(estimates), uneven=tuple(uneven))
