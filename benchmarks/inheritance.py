@@ -17,7 +17,8 @@ from sqlalchemy import Engine, create_engine, func, insert, select, text
 from sqlalchemy.orm import Session
 
 from archmodel.store.bulk import batches
-from archmodel.tables.entities import kind_chain, kind_of, kinds, own_attributes
+from archmodel.tables.entities import kinds, own_attributes
+from archmodel.tables.hierarchy import kind_chain, kind_of
 from benchmarks.inheritance_layouts import COMMON, LAYOUTS, Layout, make_layout
 from benchmarks.processor import processor_clock
 from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress

@@ -8,7 +8,8 @@ from sqlalchemy import JSON, Float, ForeignKey, Index, Integer, MetaData, String
 from sqlalchemy.orm import DeclarativeBase, mapped_column
 
 from archmodel.tables.base import StoneAttribute
-from archmodel.tables.entities import Entity, kind_of, kinds
+from archmodel.tables.entities import Entity, kinds
+from archmodel.tables.hierarchy import kind_of
 
 __all__ = ["LAYOUTS", "Layout", "make_layout"]
 

@@ -15,8 +15,9 @@ from archmodel.store.find_by_code import held_named
 from archmodel.store.revisions import NOTHING, Outcome, end_rows, table_of
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Entry
+from archmodel.tables.hierarchy import kind_of
 from archmodel.tables.relations import INVERSE, RELATIONS, SYMMETRIC, Membership, Relation
-from archmodel.tables.structures import Structure, structure_kind_named, structure_kind_of
+from archmodel.tables.structures import Structure, structure_kind_named
 from moma.errors import UsageError
 
 __all__ = ["declare_members", "declare_relation", "declare_structure"]
@@ -43,7 +44,7 @@ def declare_structure(
     if session.scalar(select(Entity.id).where(Entity.code == label)) is not None:
         raise UsageError(f"{code} is a stone", remedy="give the structure a code of its own")
     values = {
-        "kind": structure_kind_of(cls),
+        "kind": kind_of(cls),
         "title": checked_text("title", title),
         "parent_id": None if above is None else above.id,
         "number": checked_whole("number", number, 0),

@@ -24,8 +24,9 @@ from archmodel.store.revisions import Outcome, table_of
 from archmodel.store.stone_record import StoneRecord
 from archmodel.store.stone_rows import entity_rows, measurement_row
 from archmodel.tables.base import StoneAttribute
-from archmodel.tables.entities import CORRECTABLE, Entity, kind_named, kind_of, own_attributes
+from archmodel.tables.entities import CORRECTABLE, Entity, kind_named, own_attributes
 from archmodel.tables.entries import Entry
+from archmodel.tables.hierarchy import kind_of
 from archmodel.tables.knowledge import Correction
 from archmodel.tables.surveys import Measurement
 from moma.errors import DatabaseError, UsageError

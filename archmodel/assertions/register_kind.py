@@ -1,4 +1,4 @@
-"""Registration of a user's own kind of stone in a database."""
+"""Registration of a user's own kind of stone or structure in a database."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -14,9 +14,10 @@ from archmodel.query.grammar import Call, parse
 from archmodel.query.tokens import KEYWORDS, Token, complaint
 from archmodel.store.revisions import Outcome
 from archmodel.tables.base import StoneAttribute
-from archmodel.tables.entities import kind_chain, kind_named, kind_of, kinds, own_attributes
+from archmodel.tables.entities import Entity, kinds, own_attributes
 from archmodel.tables.entries import Entry
-from archmodel.tables.registered import RegisteredKind, declare_registered
+from archmodel.tables.hierarchy import kind_among, kind_chain, kind_of
+from archmodel.tables.registered import NO_ATTRIBUTES, RegisteredKind, all_kinds, declare_registered
 from moma.errors import QueryError, UsageError
 
 __all__ = ["MAX_LEVELS", "register_kind"]
@@ -42,20 +43,22 @@ def register_kind(
     Parameters
     ----------
     name : in lower case, with _ between words
-    parent : the kind that it is a case of
+    parent : the kind that it is a case of, of stones or of structures
     definition : one sentence: one word, one role
     canon : canonical proportions, as a query expression; None: those of the parent
-    attributes : of its own, by name: unit ("-" for numbers without one, None for texts) and definition
+    attributes : of its own, by name: unit ("-" for numbers without one, None for texts) and definition;
+        kinds of structures have neither
 
     Raises
     ------
     UsageError
-        if the name is taken, the parent unknown, or an attribute is named like another one
+        if the name is taken, the parent unknown, an attribute is named like another one, or a kind of structure
+        has proportions or attributes
     QueryError
         if the canon is no expression, or asks for what is not known
     """
     declare_registered(session)
-    above = kind_named(parent)
+    above = kind_among(all_kinds(), parent)
     if len(kind_chain(above)) >= MAX_LEVELS:
         remedy = "make it a case of a kind that is less particular"
         raise UsageError(f"{name} is a case of a case, {MAX_LEVELS} times over", remedy=remedy)
@@ -74,9 +77,12 @@ def register_kind(
             return Outcome(unchanged=1)
         remedy = "give the new one another name; definitions of kinds do not change"
         raise UsageError(f"the kind {name} is registered already, with another definition", remedy=remedy)
-    if name in kinds():
+    if name in all_kinds():
         raise UsageError(f"there is a kind {name} already", remedy="give yours another name")
-    _check_attributes(given, own_attributes(above))
+    if issubclass(above, Entity):
+        _check_attributes(given, own_attributes(above))
+    elif row.canon is not None or given:
+        raise UsageError(f"{name} is {NO_ATTRIBUTES}", remedy="leave out canon and attributes")
     try:
         with session.begin_nested():
             session.add(row)

@@ -3,7 +3,7 @@
 from typing import Any, TypeVar
 
 from sqlalchemy import select
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import Session, object_mapper
 
 from archmodel.store.revisions import table_of
 from archmodel.tables.entities import Entity
@@ -23,7 +23,9 @@ def version_at(session: Session, row: T, at: int | None) -> T:
     row : as other rows refer to it, by the number that stays with what is held now
     """
     while at is not None and row.entry_id > at and row.supersedes_id is not None:
-        row = session.get_one(type(row), row.supersedes_id)
+        # of the most general class: a structure can have been of another kind
+        cls: type[T] = object_mapper(row).base_mapper.class_
+        row = session.get_one(cls, row.supersedes_id)
     return row
 
 

@@ -11,18 +11,11 @@ from archmodel.describe.as_of import entity_at, structures_named, version_at
 from archmodel.describe.knowledge import knowledge, memberships, owners_of, owners_of_structure
 from archmodel.describe.relations import joints, relations
 from archmodel.store.find_by_code import check_entry, no_such_code
-from archmodel.tables.entities import (
-    Entity,
-    canon_of,
-    definition_of,
-    kind_chain,
-    kind_named,
-    kind_of,
-    own_attributes,
-    refuse_unknown_kinds,
-)
+from archmodel.tables.entities import Entity, canon_of, kind_named, own_attributes
 from archmodel.tables.entries import held_at
+from archmodel.tables.hierarchy import definition_of, kind_chain, kind_of
 from archmodel.tables.knowledge import Correction
+from archmodel.tables.registered import refuse_unknown_kinds
 from archmodel.tables.relations import Membership
 from archmodel.tables.runs import EntityResult, Run
 from archmodel.tables.structures import Structure
@@ -56,7 +49,7 @@ def describe(session: Session, code: str, at: int | None = None) -> dict[str, ob
     UsageError
         if there is no such stone or structure, or was not; names the nearest codes
     """
-    refuse_unknown_kinds(session)
+    refuse_unknown_kinds(session, Entity, Structure)
     if not code.isprintable():
         raise no_such_code(session, code, Entity.code, Structure.code)
     check_entry(session, at)
@@ -126,7 +119,7 @@ def _structure(session: Session, held: Structure, at: int | None) -> Values:
     return {
         "code": row.code,
         "kind": row.kind,
-        "definition": _definition(type(row)),
+        "definition": definition_of(type(row)),
         "title": row.title,
         "number": row.number,
         "side": row.side,
@@ -255,8 +248,3 @@ def _result(result: EntityResult) -> dict[str, object]:
         "contact_force_max": result.contact_force_max,
         "values": dict(result.values),
     }
-
-
-def _definition(cls: type[Structure]) -> str:
-    """Return the one sentence that defines a kind of structure."""
-    return (cls.__doc__ or "").strip().split("\n", 1)[0]

@@ -18,6 +18,7 @@ from archmodel.store.find_by_code import no_such_code
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Entry, Recorded
 from archmodel.tables.knowledge import Correction, Statement
+from archmodel.tables.registered import refuse_unknown_kinds
 from archmodel.tables.relations import INVERSE, Membership, Relation
 from archmodel.tables.runs import EntityResult, Run
 from archmodel.tables.structures import Structure
@@ -60,7 +61,10 @@ def history(session: Session, code: str) -> tuple[Event, ...]:
     ------
     UsageError
         if there is no such stone or structure; names the nearest codes
+    DatabaseError
+        if the database holds a kind that is not declared
     """
+    refuse_unknown_kinds(session, Entity, Structure)
     number = session.scalar(select(Entity.id).where(Entity.code == code)) if code.isprintable() else None
     if number is not None:
         events = [*_of_entity(session, number), *_statements(session, "entity_id", number)]

@@ -4,9 +4,10 @@ from collections.abc import Sequence
 
 from sqlalchemy.orm import Session
 
-from archmodel.query.attributes import ATTRIBUTES, kinds_of
-from archmodel.tables.entities import Entity, canon_of, definition_of, kind_named, kind_of
-from archmodel.tables.structures import structure_kinds
+from archmodel.query.attributes import ATTRIBUTES
+from archmodel.tables.entities import Entity, canon_of, kind_named
+from archmodel.tables.hierarchy import definition_of, kind_chain, kind_of, kinds_in
+from archmodel.tables.structures import Structure
 
 __all__ = ["RELATION_DEFINITIONS", "schema"]
 
@@ -34,14 +35,15 @@ def schema(session: Session | None = None, kind: str | None = None) -> dict[str,
     dict
         ``kinds``: a tree of {kind, definition, registered, canonical, attributes: [{name, unit, definition}], kinds},
         in which attributes and canonical proportions are inherited; and, without `kind`, ``attributes`` of every
-        entity, ``structures`` and ``relations``
+        entity, ``structures`` (each {kind, definition, registered, parent}, general before particular) and
+        ``relations``
 
     Raises
     ------
     UsageError
         if there is no such kind
     """
-    known = frozenset(kinds_of(session).values())
+    known = frozenset(kinds_in(session, Entity).values())
     root = Entity if kind is None else kind_named(kind)
     tree = {"kinds": [_branch(root, known, whole=kind is not None)]}
     if kind is not None:
@@ -51,10 +53,7 @@ def schema(session: Session | None = None, kind: str | None = None) -> dict[str,
         "attributes": [
             {"name": one.name, "unit": one.unit, "definition": one.definition} for one in ATTRIBUTES.values()
         ],
-        "structures": [
-            {"kind": name, "definition": _first_sentence(cls.__doc__)}
-            for name, cls in structure_kinds().items()
-        ],
+        "structures": [_kind_of_structure(cls) for cls in kinds_in(session, Structure).values()],
         "relations": [
             {"relation": name, "definition": meaning} for name, meaning in RELATION_DEFINITIONS.items()
         ],
@@ -78,5 +77,12 @@ def _branch(cls: type[Entity], known: frozenset[type[Entity]], whole: bool = Fal
     }
 
 
-def _first_sentence(text: str | None) -> str:
-    return (text or "").strip().split("\n", 1)[0]
+def _kind_of_structure(cls: type[Structure]) -> dict[str, object]:
+    """Describe a kind of structure, with the kind that it is a case of."""
+    *above, _ = kind_chain(cls)
+    return {
+        "kind": kind_of(cls),
+        "definition": definition_of(cls),
+        "registered": cls.__users__ is not None,
+        "parent": kind_of(above[-1]) if above else None,
+    }

@@ -13,7 +13,7 @@ from archmodel.exchange.head import HEAD, TABLES, head_schema
 from archmodel.exchange.sections import Field, Section, sections
 from archmodel.exchange.values import NUMBER, Schema
 from archmodel.tables.base import declared_attribute
-from archmodel.tables.entities import Entity
+from archmodel.tables.hierarchy import Kind
 from archmodel.tables.layout import SCHEMA_VERSION
 
 __all__ = ["building_schema", "schema_text"]
@@ -82,7 +82,7 @@ def _row(section: Section) -> Schema:
 def _column(section: Section, field: Field, meanings: dict[str, str]) -> Schema:
     schema = dict(field.value.schema)
     on = section.mapper.polymorphic_on
-    if on is not None and on.key == field.name and section.table is not Entity.__table__:
+    if on is not None and on.key == field.name and not issubclass(section.mapper.class_, Kind):
         schema["enum"] = sorted(str(name) for name in section.mapper.polymorphic_map)
     if not field.required and _NULL not in schema.get("anyOf", ()):
         others = schema["anyOf"] if [*schema] == ["anyOf"] else [schema]

@@ -150,7 +150,7 @@ def _read_section(session: Session, section: Section, text: JsonText, name: str,
 
 
 def _declare(session: Session, name: str) -> None:
-    """Declare the registered kinds, so that entities can be of them."""
+    """Declare the registered kinds, so that entities and structures can be of them."""
     try:
         declare_registered(session)
     except DatabaseError as error:

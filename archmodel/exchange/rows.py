@@ -9,7 +9,7 @@ from typing import Any
 from archmodel.exchange.sections import Section
 from archmodel.exchange.values import Mismatch, quoted
 from archmodel.query.grammar import parse
-from archmodel.tables.entities import Entity
+from archmodel.tables.hierarchy import Kind, kinds_below
 from archmodel.tables.registered import RegisteredKind
 from moma.errors import ExchangeError, QueryError
 
@@ -47,7 +47,8 @@ class RowReader:
     ----------
     section : the section
     document : its name, for errors
-    kinds : names of the kinds that the document registers; filled from their section, read in that of entities
+    kinds : names of the kinds that the document registers; filled from their section, which declares them before
+        those of entities and structures are read
     """
 
     def __init__(self, section: Section, document: str, kinds: set[str]) -> None:
@@ -57,11 +58,10 @@ class RowReader:
         self._fields = [
             (field.name, field.value.decode, field.required, field.within) for field in section.fields
         ]
-        self._of_entities = section.table is Entity.__table__
         self._last: tuple[Any, ...] | None = None
         column = section.mapper.polymorphic_on
         self._kind = None if column is None else str(column.key)
-        self._kinds = _built_in(section)
+        self._kinds = _known(section, kinds)
 
     def read(self, given: Any, index: int, line: int) -> Row:
         """Return the row at this index of the section, at this line.
@@ -124,15 +124,19 @@ class RowReader:
         if self._kind is None:
             return
         kind = row.values[self._kind]
-        if kind not in self._kinds and not (self._of_entities and kind in self._registered):
+        if kind not in self._kinds:
             remedy = nearest(kind, sorted(self._kinds))
             raise row.wrong(f"is {quoted(kind)}, which is no kind", f".{self._kind}", remedy)
 
 
-def _built_in(section: Section) -> frozenset[str]:
-    """Return the kinds of a table's rows, without those that open databases register."""
-    classes = ((str(name), mapper.class_) for name, mapper in section.mapper.polymorphic_map.items())
-    return frozenset(name for name, cls in classes if getattr(cls, "__users__", None) is None)
+def _known(section: Section, registered: set[str]) -> frozenset[str]:
+    """Return the kinds of a table's rows: those built in, and those of its hierarchy that the document registers."""
+    root = section.mapper.class_
+    if not issubclass(root, Kind):
+        return frozenset(map(str, section.mapper.polymorphic_map))
+    return frozenset(
+        name for name, cls in kinds_below(root).items() if cls.__users__ is None or name in registered
+    )
 
 
 def _check_registered(row: Row) -> None:

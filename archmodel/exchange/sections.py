@@ -16,6 +16,7 @@ from archmodel.tables.base import Base, annotation_of
 from archmodel.tables.entities import Entity
 from archmodel.tables.layout import SchemaVersion
 from archmodel.tables.registered import RegisteredKind
+from archmodel.tables.structures import Structure
 
 __all__ = ["Field", "Label", "Section", "sections"]
 
@@ -125,7 +126,8 @@ def _needs(table: Table) -> set[Table]:
     """Return the tables that must come before this one."""
     needed = {key.column.table for key in table.foreign_keys} - {table}
     # Kinds are known by name, without a foreign key.
-    return needed | {RegisteredKind.__table__} if table is Entity.__table__ else needed  # type: ignore[arg-type]
+    of_kinds = table in (Entity.__table__, Structure.__table__)
+    return needed | {RegisteredKind.__table__} if of_kinds else needed  # type: ignore[arg-type]
 
 
 def _section(table: Table, mapper: Mapper[Any]) -> Section:

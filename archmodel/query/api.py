@@ -13,7 +13,9 @@ from archmodel.query.compile import column_named, condition, condition_in
 from archmodel.query.grammar import attributes_in, parse
 from archmodel.query.names import refuse_unknown_run
 from archmodel.query.scope import Context, Scope
-from archmodel.tables.entities import Entity, kind_named, kinds, refuse_unknown_kinds
+from archmodel.tables.entities import Entity, kind_named
+from archmodel.tables.hierarchy import kinds_below
+from archmodel.tables.registered import refuse_unknown_kinds
 from moma.errors import DatabaseError, QueryError
 
 __all__ = [
@@ -170,7 +172,7 @@ def _asked(
     scope = Scope(Context(session, run))
     refuse_unknown_run(scope.context)
     conditions = [condition_in(scope, parse(expression)) for expression in expressions]
-    refuse_unknown_kinds(session)
+    refuse_unknown_kinds(session, Entity)
     return scope, [*conditions, _not_withdrawn(scope.entity.c)]
 
 
@@ -198,7 +200,7 @@ def _of_kind(scope: Scope, kind: str) -> list[ColumnElement[bool]]:
     cls = kind_named(kind)
     if cls is Entity:
         return []
-    return [scope.entity.c.kind.in_([name for name, sub in kinds().items() if issubclass(sub, cls)])]
+    return [scope.entity.c.kind.in_(kinds_below(cls))]
 
 
 def _not_withdrawn(entity: Any) -> ColumnElement[bool]:

@@ -26,12 +26,13 @@ from archmodel.query.columns import (
 from archmodel.query.scope import Scope
 from archmodel.store.run_record import STONE_VALUES
 from archmodel.tables.base import Base, StoneAttribute, declared_attributes
-from archmodel.tables.entities import Entity, kinds, own_attributes
+from archmodel.tables.entities import Entity, own_attributes
+from archmodel.tables.hierarchy import kinds_in
 from archmodel.tables.knowledge import Correction
 from archmodel.tables.runs import EntityResult
 from archmodel.tables.surveys import Measurement, Simplification
 
-__all__ = ["ATTRIBUTES", "Attribute", "attributes_of", "kinds_of", "own_attributes_of"]
+__all__ = ["ATTRIBUTES", "Attribute", "attributes_of", "own_attributes_of"]
 
 
 @dataclass(frozen=True)
@@ -177,21 +178,11 @@ def attributes_of(session: Session | None = None, kind: type[Entity] | None = No
     return known
 
 
-def kinds_of(session: Session | None = None) -> dict[str, type[Entity]]:
-    """Return the kinds that a database can hold: those built in, and those that it registers itself."""
-    user = None if session is None else session.get_bind().dialect
-    return {
-        name: cls
-        for name, cls in kinds().items()
-        if cls.__users__ is None or (user is not None and user in cls.__users__)
-    }
-
-
 def own_attributes_of(
     session: Session | None = None, kind: type[Entity] | None = None
 ) -> dict[str, Attribute]:
     """Return the attributes that some kinds have of their own, by name; null for entities of other kinds."""
-    known = kinds_of(session).values()
+    known = kinds_in(session, Entity).values()
     found: dict[str, Attribute] = {}
     for cls in known:
         if kind is None or issubclass(cls, kind):

@@ -31,8 +31,9 @@ from archmodel.query.grammar import (
 from archmodel.query.names import meant, run_with_number
 from archmodel.query.scope import Context, Scope, StructureScope
 from archmodel.query.tokens import Token, complaint
-from archmodel.tables.entities import Entity, kind_named, kind_of
-from archmodel.tables.structures import structure_kind_named, structure_kind_of
+from archmodel.tables.entities import Entity, kind_named
+from archmodel.tables.hierarchy import kind_of
+from archmodel.tables.structures import structure_kind_named
 from moma.errors import UsageError
 
 __all__ = ["STRUCTURE_ATTRIBUTES", "column_named", "condition", "condition_in"]
@@ -60,7 +61,7 @@ STRUCTURE_ATTRIBUTES: Mapping[str, Attribute] = {
     one.name: one
     for one in (
         Attribute("code", None, "its name", _of_structure("code")),
-        Attribute("kind", None, "what it is, e.g. arch", _of_structure("kind")),
+        Attribute("kind", None, "its own kind, e.g. arch", _of_structure("kind")),
         Attribute("title", None, "its name in words", _of_structure("title")),
         Attribute("number", "-", "its place among its like, from the ground", _of_structure("number")),
         Attribute(
@@ -228,7 +229,7 @@ def _constant(scope: Where, attribute: Attribute, value: Token) -> Any:
     if attribute.name == "kind":
         try:
             if isinstance(scope, StructureScope):
-                return structure_kind_of(structure_kind_named(value.text))
+                return kind_of(structure_kind_named(value.text))
             return kind_of(kind_named(value.text))
         except UsageError as error:
             raise complaint(value, error.what, error.remedy) from None

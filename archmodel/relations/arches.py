@@ -12,20 +12,21 @@ from sqlalchemy.orm import Session, aliased
 from archmodel.relations.arch_rings import Arch, ArchJoint, arches_among
 from archmodel.relations.zones_and_courses import Part
 from archmodel.store.stone_arrays import stone_columns
-from archmodel.tables.entities import Entity, Springer, Voussoir, kind_of, kinds
+from archmodel.tables.entities import Entity, Springer, Voussoir
+from archmodel.tables.hierarchy import kinds_below
 from archmodel.tables.relations import Membership, Relation
-from archmodel.tables.structures import Structure
+from archmodel.tables.structures import Structure, structure_kind_named
 
 __all__ = ["arch_parts", "find_arches"]
 
 
 def find_arches(session: Session) -> list[Arch]:
     """Find the arches that the relations of the voussoirs form, by the smallest number of their stones."""
-    stones = stone_columns(session, Entity.kind.in_(_names(Voussoir)))
+    stones = stone_columns(session, Entity.kind.in_(kinds_below(Voussoir)))
     if len(stones) == 0:
         return []
     place = {number: i for i, number in enumerate(stones.ids.tolist())}
-    springers = set(_names(Springer))
+    springers = kinds_below(Springer)
     joints = (
         ArchJoint(place[one], place[two], np.array(normal))
         for one, two, *normal in _touching_voussoirs(session)
@@ -33,14 +34,10 @@ def find_arches(session: Session) -> list[Arch]:
     return arches_among(stones, [kind in springers for kind in stones.kinds], joints)
 
 
-def _names(cls: type[Entity]) -> list[str]:
-    return [kind_of(one) for one in kinds().values() if issubclass(one, cls)]
-
-
 def _touching_voussoirs(session: Session) -> Iterable[Any]:
     """Select subject, object and normal of the joints between voussoirs."""
     subject, other = aliased(Entity), aliased(Entity)
-    names = _names(Voussoir)
+    names = kinds_below(Voussoir)
     return session.execute(
         select(Relation.subject_id, Relation.object_id, Relation.nx, Relation.ny, Relation.nz)
         .join(subject, subject.id == Relation.subject_id)
@@ -64,7 +61,7 @@ def arch_parts(session: Session, arches: Sequence[Arch]) -> list[Part]:
         select(Membership.entity_id, Structure.code)
         .join(Structure, Structure.id == Membership.structure_id)
         .where(
-            Structure.kind == "arch",
+            Structure.kind.in_(kinds_below(structure_kind_named("arch"))),
             Structure.superseded_id.is_(None),
             Membership.superseded_id.is_(None),
             Membership.declared.is_(False),

@@ -12,7 +12,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from archmodel.arrays import Array, Bools, Ints
-from archmodel.tables.entities import Header, Quoin, RibSegment, Voussoir, WebStone, kind_of, kinds
+from archmodel.tables.entities import Entity, Header, Quoin, RibSegment, Voussoir, WebStone
+from archmodel.tables.hierarchy import kinds_below
 from archmodel.tables.relations import RELATIONS
 from moma.errors import UsageError
 
@@ -190,9 +191,9 @@ class _Faces:
         return np.asarray(tied | (corner & ~self.across))
 
 
-def _is_one_of(names: Sequence[str], *classes: type) -> Bools:
+def _is_one_of(names: Sequence[str], *classes: type[Entity]) -> Bools:
     """Return a mask of the stones that are of a kind or its subkinds."""
-    wanted = {kind_of(cls) for cls in kinds().values() if issubclass(cls, classes)}
+    wanted = {name for cls in classes for name in kinds_below(cls)}
     return np.fromiter((name in wanted for name in names), dtype=np.bool_, count=len(names))
 
 

@@ -10,8 +10,9 @@ from archmodel.relations.store import Act
 from archmodel.store.bulk import batches, insert_rows
 from archmodel.store.revisions import table_of
 from archmodel.store.stone_arrays import id_conditions
-from archmodel.tables.entities import Entity, Header, Stretcher, kind_of, kinds
+from archmodel.tables.entities import Entity, Header, Stretcher
 from archmodel.tables.entries import Entry
+from archmodel.tables.hierarchy import kinds_below
 from archmodel.tables.knowledge import Correction
 from archmodel.tables.relations import Relation
 
@@ -52,9 +53,9 @@ def tail_lengths(session: Session, headers: Collection[int] | None = None) -> di
                 .join(stretcher, stretcher.id == others)
                 .where(
                     condition,
-                    Entity.kind.in_(_names(Header)),
+                    Entity.kind.in_(kinds_below(Header)),
                     Entity.depth.is_not(None),
-                    stretcher.kind.in_(_names(Stretcher)),
+                    stretcher.kind.in_(kinds_below(Stretcher)),
                     stretcher.depth.is_not(None),
                     Relation.kind == "beside",
                     Relation.superseded_id.is_(None),
@@ -67,10 +68,6 @@ def tail_lengths(session: Session, headers: Collection[int] | None = None) -> di
                 tail = max(depth - deepest, 0.0)
                 found[number] = min(tail, found.get(number, tail))
     return found
-
-
-def _names(cls: type[Entity]) -> list[str]:
-    return [kind_of(one) for one in kinds().values() if issubclass(one, cls)]
 
 
 def give_values(session: Session, values: Mapping[int, Mapping[str, float | None]], act: Act) -> int:

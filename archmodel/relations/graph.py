@@ -15,8 +15,9 @@ from archmodel.relations.load_paths import LoadPath, LoadPathStone, load_path, p
 from archmodel.store.find_by_code import check_entry, no_such_code
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import held_at
+from archmodel.tables.hierarchy import kinds_below
 from archmodel.tables.relations import INVERSE, Membership, Relation
-from archmodel.tables.structures import Structure
+from archmodel.tables.structures import Course, Structure
 from moma.errors import UsageError
 
 __all__ = [
@@ -158,7 +159,11 @@ def courses_in_order(
         .join(Membership, Membership.structure_id == Structure.id)
         .join(Entity, Entity.id == Membership.entity_id)
         .outerjoin(part, part.id == Structure.parent_id)
-        .where(Structure.kind == "course", Structure.superseded_id.is_(None), held_at(Membership, as_of))
+        .where(
+            Structure.kind.in_(kinds_below(Course)),
+            Structure.superseded_id.is_(None),
+            held_at(Membership, as_of),
+        )
         .order_by(
             func.coalesce(part.code, ""), Structure.number, Structure.code, Membership.rank, Membership.id
         )

@@ -12,8 +12,9 @@ from archmodel.arrays import Array, Ints
 from archmodel.relations.store import Act, Changes, supersede
 from archmodel.store.bulk import batches, insert_rows
 from archmodel.store.stone_arrays import ENTITY, StoneColumns, id_conditions, joined, stone_columns
+from archmodel.tables.hierarchy import kinds_below
 from archmodel.tables.relations import Membership
-from archmodel.tables.structures import Structure, structure_kind_named
+from archmodel.tables.structures import Course, Structure, structure_kind_named
 
 __all__ = ["Part", "along_the_wall", "course_code", "parts_of_survey", "store_parts", "whole_courses"]
 
@@ -86,7 +87,7 @@ def whole_courses(session: Session, entities: Collection[int]) -> StoneColumns:
         .join(Membership, Membership.structure_id == Structure.id)
         .outerjoin(zone, zone.id == Structure.parent_id)
         .where(
-            Structure.kind == "course",
+            Structure.kind.in_(kinds_below(Course)),
             Membership.superseded_id.is_(None),
             Membership.declared.is_(False),
         )

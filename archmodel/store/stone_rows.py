@@ -17,7 +17,8 @@ from sqlalchemy.orm import Mapper
 from archmodel.arrays import Array
 from archmodel.store.stone_record import StoneRecord
 from archmodel.tables.base import ArrayType, Base, annotation_of
-from archmodel.tables.entities import Entity, kind_named, kind_of
+from archmodel.tables.entities import Entity, kind_named
+from archmodel.tables.hierarchy import kind_of
 from archmodel.tables.surveys import Measurement
 from moma.errors import DatabaseError, GeometryError, SurveyError, UsageError
 

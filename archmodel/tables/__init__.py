@@ -4,6 +4,7 @@ Public: `Entity`, `kind_named`, `kinds`, `own_attributes` (entities); `Structure
 `Membership`, `Relation` (relations); `Correction`, `Material`, `Phase`, `Statement` (knowledge); `Measurement`,
 `Simplification`, `Survey` (surveys); `CellResult`, `ContactPoint`, `EntityResult`, `JointResult`, `MechanismStone`,
 `Run` (runs);
-`Entry`, `held_at`, `new_entry` (entries); `StoneAttribute`, `attribute` (base); `RegisteredKind` (registered);
+`Entry`, `held_at`, `new_entry` (entries); `StoneAttribute`, `attribute` (base); `definition_of`, `kind_of`,
+`kinds_below` (hierarchy); `RegisteredKind` (registered);
 `SCHEMA_VERSION`, `metadata` (layout).
 """

@@ -38,20 +38,16 @@ with `attribute`. All kinds live in one table and differ in the column `kind` (s
 in a database (``archmodel.tables.registered``) become classes of this hierarchy while it is open.
 """
 
-import difflib
-import re
-from collections.abc import Iterator, Mapping
-from functools import cache
+from collections.abc import Mapping
 from typing import Any, ClassVar
-from weakref import WeakSet
 
-from sqlalchemy import ForeignKey, Index, func, select
-from sqlalchemy.orm import Mapped, MappedColumn, Session, declared_attr, mapped_column, relationship
+from sqlalchemy import ForeignKey, Index
+from sqlalchemy.orm import Mapped, MappedColumn, declared_attr, mapped_column, relationship
 
 from archmodel.tables.base import Base, StoneAttribute, attribute, declared_attribute
 from archmodel.tables.entries import Entry
+from archmodel.tables.hierarchy import Kind, kind_among, kind_chain, kind_of, kinds_below
 from archmodel.tables.surveys import Measurement
-from moma.errors import DatabaseError, UsageError
 
 __all__ = [
     "CORRECTABLE",
@@ -85,13 +81,9 @@ __all__ = [
     "Voussoir",
     "WebStone",
     "canon_of",
-    "definition_of",
-    "kind_chain",
     "kind_named",
-    "kind_of",
     "kinds",
     "own_attributes",
-    "refuse_unknown_kinds",
 ]
 
 
@@ -99,14 +91,7 @@ CORRECTABLE = ("kind", "code", "course", "zone")
 """Attributes of every entity that can be corrected, besides those of its kind; the others follow from its survey."""
 
 
-@cache
-def kind_of(cls: type["Entity"]) -> str:
-    """Return the name of a kind as users write it: its ``__kind__`` or, without one, rib_segment for RibSegment."""
-    own = cls.__dict__.get("__kind__")
-    return str(own) if own is not None else re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()
-
-
-class Entity(Base):
+class Entity(Kind, Base):
     """A part of the building that has one role and is not divided further.
 
     The columns made by `attribute` say what they are.
@@ -116,12 +101,10 @@ class Entity(Base):
     own : values of the attributes of a registered kind, by name
     entry : the act of recording that it came with; later changes are `knowledge.Correction`
 
-    Class attributes, for those who write kinds
-    -------------------------------------------
-    __kind__ : the name, if it is not that of the class
+    Class attributes, for those who write kinds, besides those of `Kind`
+    --------------------------------------------------------------------
     __own__ : the attributes that the kind has and its parents have not; taken from its columns
     __canon__ : canonical proportions, as a query expression; None: those of the parent
-    __users__ : the open databases that register the kind; None: it is built in
     """
 
     __tablename__ = "entity"
@@ -133,7 +116,6 @@ class Entity(Base):
     )
     __own__: ClassVar[tuple[StoneAttribute, ...]] = ()
     __canon__: ClassVar[str | None] = None
-    __users__: ClassVar["WeakSet[Any] | None"] = None
 
     id: Mapped[int] = mapped_column(primary_key=True)
     code: Mapped[str] = attribute(None, "name of the stone in the survey", unique=True)
@@ -332,41 +314,12 @@ class Joint(Entity):
 
 def kinds() -> Mapping[str, type[Entity]]:
     """Return every kind by its name, general before particular."""
-    return {kind_of(cls): cls for cls in _descend(Entity)}
-
-
-def _descend(cls: type[Entity]) -> Iterator[type[Entity]]:
-    yield cls
-    for child in cls.__subclasses__():
-        if child.__users__ is not None and not child.__users__:
-            continue  # registered in no database that is open
-        yield from _descend(child)
+    return kinds_below(Entity)
 
 
 def kind_named(name: str) -> type[Entity]:
-    """Return the kind of this name, in upper or lower case, with _, hyphen or blank between its words.
-
-    Raises
-    ------
-    UsageError
-        if there is none; names the nearest ones
-    """
-    known = kinds()
-    if (cls := known.get(re.sub(r"[\s-]+", "_", name[:80].strip().lower()))) is not None:
-        return cls
-    near = difflib.get_close_matches(name[:40].strip().lower(), known, n=3, cutoff=0.5)
-    remedy = f"did you mean {' or '.join(near)}?" if near else f"the kinds are {', '.join(known)}"
-    raise UsageError(f"unknown kind {name[:40]!r}", remedy=remedy)
-
-
-def kind_chain(cls: type[Entity]) -> tuple[type[Entity], ...]:
-    """Return the kind and its ancestors, most general first: Entity, Ashlar, Voussoir, Keystone."""
-    return tuple(base for base in reversed(cls.__mro__) if issubclass(base, Entity))
-
-
-def definition_of(cls: type[Entity]) -> str:
-    """Return the one sentence that defines a kind."""
-    return (cls.__doc__ or "").strip().split("\n", 1)[0]
+    """Return the kind of this name; see `kind_among`."""
+    return kind_among(kinds(), name)
 
 
 def own_attributes(cls: type[Entity]) -> Mapping[str, StoneAttribute]:
@@ -377,28 +330,3 @@ def own_attributes(cls: type[Entity]) -> Mapping[str, StoneAttribute]:
 def canon_of(cls: type[Entity]) -> str | None:
     """Return the canonical proportions of a kind as a query expression; None if it has none."""
     return cls.__canon__
-
-
-def refuse_unknown_kinds(session: Session) -> None:
-    """Refuse a database with kinds that are not declared, because another program added its own.
-
-    Raises
-    ------
-    DatabaseError
-        naming such a kind
-    """
-    unknown = next((kind for kind in _stored_kinds(session) if kind not in kinds()), None)
-    if unknown is not None:
-        remedy = (
-            "open the database again if it was registered since; else use the version of MOMA that stored it"
-        )
-        raise DatabaseError(f"the database holds a kind {unknown!r} that is not declared", remedy=remedy)
-
-
-def _stored_kinds(session: Session) -> list[str]:
-    """Return the kinds of stored entities, stepping through the index from one to the next."""
-    kind = Entity.__table__.c.kind
-    stored = select(func.min(kind).label("kind")).cte("stored", recursive=True)
-    following = select(func.min(kind)).where(kind > stored.c.kind).correlate(stored).scalar_subquery()
-    stored = stored.union_all(select(following).where(stored.c.kind.is_not(None)))
-    return list(session.scalars(select(stored.c.kind).where(stored.c.kind.is_not(None))))

@@ -1,21 +1,41 @@
-"""Kinds that users register: rows of the database, and classes of the hierarchy while it is open."""
+"""Kinds that users register, of stones or of structures: rows of the database, and classes while it is open."""
 
 import re
+from collections.abc import Mapping
 from typing import Any
 from weakref import WeakSet
 
-from sqlalchemy import Engine, ForeignKey, inspect, select
+from sqlalchemy import Engine, ForeignKey, func, inspect, select
 from sqlalchemy.orm import Mapped, Session, mapped_column
 
 from archmodel.tables.base import JSON_TYPE, Base, StoneAttribute
 from archmodel.tables.entities import Entity, kinds
+from archmodel.tables.hierarchy import Kind, kinds_below
+from archmodel.tables.structures import Structure, structure_kinds
 from moma.errors import DatabaseError
 
-__all__ = ["RegisteredKind", "declare_registered", "release_registered"]
+__all__ = [
+    "NO_ATTRIBUTES",
+    "RegisteredKind",
+    "all_kinds",
+    "declare_registered",
+    "refuse_unknown_kinds",
+    "release_registered",
+]
+
+NO_ATTRIBUTES = (
+    "a kind of structure, and those have neither canonical proportions nor attributes of their own"
+)
+"""What is wrong with a kind of structure that has them."""
+
+
+def all_kinds() -> Mapping[str, type[Kind]]:
+    """Return every kind of entity and of structure by its name; a name is in one hierarchy only."""
+    return {**kinds(), **structure_kinds()}
 
 
 class RegisteredKind(Base):
-    """One kind of a user's own.
+    """One kind of a user's own, of entities or of structures as its parent is.
 
     Attributes
     ----------
@@ -23,7 +43,8 @@ class RegisteredKind(Base):
     parent : name of the kind that it is a case of
     definition : one sentence
     canon : canonical proportions, as a query expression; None: those of the parent
-    attributes : of its own, {name: [unit, definition]}; the unit is "-" for numbers without one, None for texts
+    attributes : of its own, {name: [unit, definition]}; the unit is "-" for numbers without one, None for texts;
+        kinds of structures have neither proportions nor attributes
     """
 
     __tablename__ = "kind"
@@ -41,7 +62,7 @@ class RegisteredKind(Base):
         return self.name, self.parent, self.definition, self.canon, tuple(own.items())
 
 
-_CLASSES: dict[tuple[object, ...], type[Entity]] = {}
+_CLASSES: dict[tuple[object, ...], type[Kind]] = {}
 """Every class made in this process, by its parent and definition: a class cannot be unmade, but it can be reused."""
 
 
@@ -53,13 +74,14 @@ def declare_registered(session: Session) -> None:
     Raises
     ------
     DatabaseError
-        if another open database gives one of the names to something else, or a parent is not known
+        if another open database gives one of the names to something else, a parent is not known, or a kind of
+        structure has proportions or attributes
     """
     user = session.get_bind().dialect
-    declared: set[type[Entity]] = set()
+    declared: set[type[Kind]] = set()
     waiting = list(session.scalars(select(RegisteredKind).order_by(RegisteredKind.entry_id)))
     while waiting:
-        ready = [one for one in waiting if one.parent in kinds()]
+        ready = [one for one in waiting if one.parent in all_kinds()]
         if not ready:
             one = waiting[0]
             what = f"the kind {one.name} is a case of {one.parent}, which is not known"
@@ -83,22 +105,24 @@ def release_registered(engine: Engine) -> None:
         _users(cls).discard(engine.dialect)
 
 
-def _users(cls: type[Entity]) -> "WeakSet[Any]":
+def _users(cls: type[Kind]) -> "WeakSet[Any]":
     """Return the open databases that register a kind."""
     assert cls.__users__ is not None
     return cls.__users__
 
 
-def _declared(kind: RegisteredKind) -> type[Entity]:
+def _declared(kind: RegisteredKind) -> type[Kind]:
     """Return the class of a kind, made or reused."""
-    held = kinds().get(kind.name)
-    parent = kinds()[kind.parent]
+    known = all_kinds()
+    held, parent = known.get(kind.name), known[kind.parent]
+    if issubclass(parent, Structure) and (kind.canon is not None or kind.attributes):
+        raise DatabaseError(f"{kind.name} is {NO_ATTRIBUTES}", remedy="leave out canon and attributes")
     key = (parent, *kind.says())
     cls = _CLASSES.get(key)
     if held is not None and held is not cls:
         what = f"the kind {kind.name} means something else here than in this database"
         raise DatabaseError(what, remedy="close the other database first, or rename one of the two kinds")
-    identities: Any = inspect(Entity).polymorphic_map
+    identities: Any = inspect(parent).polymorphic_map
     if cls is None:
         identities.pop(kind.name, None)
         cls = _CLASSES[key] = _made(kind, parent)
@@ -106,19 +130,52 @@ def _declared(kind: RegisteredKind) -> type[Entity]:
     return cls
 
 
-def _made(kind: RegisteredKind, parent: Any) -> type[Entity]:
-    """Make the class of a kind; its attributes are in ``Entity.own``."""
-    own = tuple(StoneAttribute(name, unit, meaning) for name, (unit, meaning) in kind.attributes.items())
+def _made(kind: RegisteredKind, parent: Any) -> type[Kind]:
+    """Make the class of a kind; attributes of an entity are in ``Entity.own``."""
     contents: dict[str, object] = {
         "__doc__": kind.definition,
         # two definitions of one name are two classes
         "__module__": f"{__name__}.definition{len(_CLASSES)}",
         "__kind__": kind.name,
-        "__own__": own,
         "__users__": WeakSet(),
     }
+    if issubclass(parent, Entity):
+        own = kind.attributes.items()
+        contents["__own__"] = tuple(StoneAttribute(name, unit, meaning) for name, (unit, meaning) in own)
     if kind.canon is not None:
         contents["__canon__"] = kind.canon
     name = re.sub(r"(?:^|_)(.)", lambda found: found[1].upper(), kind.name)
-    made: type[Entity] = type(parent)(name, (parent,), contents)
+    made: type[Kind] = type(parent)(name, (parent,), contents)
     return made
+
+
+def refuse_unknown_kinds(session: Session, *roots: type[Entity] | type[Structure]) -> None:
+    """Refuse a database with kinds that are not declared, because another program added its own.
+
+    Parameters
+    ----------
+    roots : the most general kinds of the hierarchies in question
+
+    Raises
+    ------
+    DatabaseError
+        naming such a kind
+    """
+    for root in roots:
+        known = kinds_below(root)
+        unknown = next((kind for kind in _stored_kinds(session, root) if kind not in known), None)
+        if unknown is not None:
+            remedy = (
+                "open the database again if it was registered since; "
+                "else use the version of MOMA that stored it"
+            )
+            raise DatabaseError(f"the database holds a kind {unknown!r} that is not declared", remedy=remedy)
+
+
+def _stored_kinds(session: Session, root: type[Entity] | type[Structure]) -> list[str]:
+    """Return the kinds of stored rows, stepping from one to the next: through the index, where there is one."""
+    kind = root.__table__.c.kind
+    stored = select(func.min(kind).label("kind")).cte("stored", recursive=True)
+    following = select(func.min(kind)).where(kind > stored.c.kind).correlate(stored).scalar_subquery()
+    stored = stored.union_all(select(following).where(stored.c.kind.is_not(None)))
+    return list(session.scalars(select(stored.c.kind).where(stored.c.kind.is_not(None))))

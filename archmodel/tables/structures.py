@@ -22,11 +22,10 @@
     └── Crenelation
 
 Structures contain structures (`parent`), and entities are members of structures (`relations.Membership`); an entity
-can be a member of several, of a course and of a window, say.
+can be a member of several, of a course and of a window, say. Kinds that a user registers in a database
+(``archmodel.tables.registered``) become classes of this hierarchy while it is open; no name is in both hierarchies.
 """
 
-import difflib
-import re
 from collections.abc import Mapping
 
 from sqlalchemy import ForeignKey, Index
@@ -34,7 +33,7 @@ from sqlalchemy.orm import Mapped, declared_attr, mapped_column, relationship
 
 from archmodel.tables.base import Base
 from archmodel.tables.entries import Recorded, held_index
-from moma.errors import UsageError
+from archmodel.tables.hierarchy import Kind, kind_among, kind_of, kinds_below
 
 __all__ = [
     "Arch",
@@ -56,23 +55,17 @@ __all__ = [
     "Web",
     "Window",
     "structure_kind_named",
-    "structure_kind_of",
     "structure_kinds",
 ]
 
 
-def structure_kind_of(cls: type["Structure"]) -> str:
-    """Return the name of a kind of structure as users write it: wall_facing for WallFacing."""
-    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()
-
-
-class Structure(Recorded, Base):
+class Structure(Kind, Recorded, Base):
     """A part of the building that is made of entities and of other structures.
 
     Attributes
     ----------
     code : its name, unique among the structures that are held now
-    kind : name of its class
+    kind : name of its own kind
     title : in words; None if the code says enough
     parent : the structure that it is a part of
     number : its place among its like: a course counted from the ground, a storey from the lowest
@@ -103,7 +96,7 @@ class Structure(Recorded, Base):
     @declared_attr.directive
     @classmethod
     def __mapper_args__(cls) -> dict[str, object]:
-        identity: dict[str, object] = {"polymorphic_identity": structure_kind_of(cls)}
+        identity: dict[str, object] = {"polymorphic_identity": kind_of(cls)}
         return identity | {"polymorphic_on": "kind"} if cls.__name__ == "Structure" else identity
 
     def __repr__(self) -> str:
@@ -179,22 +172,10 @@ class Crenelation(Structure):
 
 
 def structure_kinds() -> Mapping[str, type[Structure]]:
-    """Return every kind of structure by its name."""
-    classes: tuple[type[Structure], ...] = (Structure, *Structure.__subclasses__())
-    return {structure_kind_of(cls): cls for cls in classes}
+    """Return every kind of structure by its name, general before particular."""
+    return kinds_below(Structure)
 
 
 def structure_kind_named(name: str) -> type[Structure]:
-    """Return the kind of structure of this name.
-
-    Raises
-    ------
-    UsageError
-        if there is none; names the nearest ones
-    """
-    known = structure_kinds()
-    if (cls := known.get(name.strip().lower())) is not None:
-        return cls
-    near = difflib.get_close_matches(name[:40].strip().lower(), known, n=3, cutoff=0.5)
-    remedy = f"did you mean {' or '.join(near)}?" if near else f"they are {', '.join(known)}"
-    raise UsageError(f"unknown kind of structure {name[:40]!r}", remedy=remedy)
+    """Return the kind of structure of this name; see `kind_among`."""
+    return kind_among(structure_kinds(), name, "kind of structure")

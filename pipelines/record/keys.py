@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from archmodel.assertions.declare import DOCUMENT_TYPES
 from archmodel.tables.knowledge import OBSERVATIONS
 from archmodel.tables.relations import RELATIONS
-from archmodel.tables.structures import structure_kinds
 from pipelines.toml.schema import Key, Kind
 
 __all__ = ["ABOUT", "ARRAYS", "ATTRIBUTE", "CITED", "PROPERTY", "RECORD", "WHO", "WITHDRAWN"]
@@ -47,7 +46,7 @@ _SAID = (*ABOUT, *CITED, *WHO)
 
 _KIND = (
     Key("name", Kind.TEXT, "In small letters, with _ between words."),
-    Key("parent", Kind.TEXT, "The more general kind."),
+    Key("parent", Kind.TEXT, "The more general kind, of stones or of structures."),
     Key("definition", Kind.TEXT, "One sentence: one word, one role."),
     Key(
         "canon",
@@ -104,7 +103,7 @@ _DOCUMENT = (
 )
 
 _STRUCTURE = (
-    Key("kind", Kind.TEXT, "What it is.", choices=tuple(structure_kinds())),
+    Key("kind", Kind.TEXT, "What it is."),
     Key("code", Kind.TEXT, "Its name."),
     Key("title", Kind.TEXT, "In words.", default=None),
     Key("parent", Kind.TEXT, "Code of the structure that contains it.", default=None),

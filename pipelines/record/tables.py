@@ -38,7 +38,7 @@ from archmodel.tables.knowledge import (
     Reference,
     Statement,
 )
-from archmodel.tables.structures import Structure
+from archmodel.tables.structures import Structure, structure_kind_named
 from moma.errors import UsageError
 from pipelines.record.depth import record_depth
 from pipelines.record.file import RecordFile, Table
@@ -135,6 +135,9 @@ def _document(work: _Work) -> Outcome:
 
 
 def _structure(work: _Work) -> Outcome:
+    with work.file.at(*work.table.path, "kind"):
+        # also of the kinds that the database, or this file, registers
+        structure_kind_named(work["kind"])
     outcome = declare_structure(
         work.session,
         work.entry,

@@ -14,7 +14,7 @@ from sqlalchemy.orm import Mapper, Session
 
 from archmodel.database.session import Database
 from archmodel.tables.base import ArrayType, Base, UtcDateTime, annotation_of
-from archmodel.tables.entities import kinds as entity_kinds
+from archmodel.tables.hierarchy import kinds_below
 from archmodel.tables.layout import SchemaVersion
 
 TEXTS = (
@@ -68,7 +68,7 @@ def tables() -> list[Table]:
 def fill(session: Session, random: Random, rows: int = 4) -> None:
     """Put rows into every table: the first without any null, the second with every null that there can be."""
     known: dict[str, list[Values]] = {}
-    # entities can be of registered kinds
+    # entities and structures can be of registered kinds
     for table in sorted(tables(), key=lambda table: table.name not in ("entry", "kind")):
         made = [_row(table, number, rows, random, known) for number in range(rows)]
         if table.name == "kind":
@@ -102,11 +102,17 @@ def _row(table: Table, number: int, rows: int, random: Random, known: dict[str, 
     return row
 
 
+OWN_KINDS = {"entity": "own_kind_0", "structure": "own_kind_1"}
+"""A registered kind of each hierarchy, by table."""
+
+
 def _kind(table: Table, random: Random) -> str:
     """A kind that has a class, so that the row can be loaded."""
-    kinds = sorted(_mapper(table).polymorphic_map)
-    if table.name == "entity":
-        kinds = [name for name, cls in entity_kinds().items() if cls.__users__ is None] + ["own_kind_0"]
+    if table.name in OWN_KINDS:
+        known = kinds_below(_mapper(table).class_).items()
+        kinds = [name for name, cls in known if cls.__users__ is None] + [OWN_KINDS[table.name]]
+    else:
+        kinds = sorted(_mapper(table).polymorphic_map)
     return random.choice(kinds) if kinds else "rests_on"
 
 
@@ -116,9 +122,12 @@ def _mapper(table: Table) -> Mapper[Any]:
 
 def _registered(number: int, random: Random) -> Values:
     """A kind of a user's own; few different ones, since each is a class of the process."""
+    if (name := f"own_kind_{number}") == OWN_KINDS["structure"]:
+        parent = random.choice(("structure", "rib"))
+        return {"name": name, "parent": parent, "definition": TEXTS[0], "canon": None, "attributes": {}}
     attributes = {"batter": ["m/m", "façade"], "mason": [None, ""], "holes": ["-", "x"]}
     return {
-        "name": f"own_kind_{number}",
+        "name": name,
         "parent": f"own_kind_{number - 1}" if number > 2 else random.choice(("entity", "ashlar")),
         "definition": random.choice(TEXTS[:3]),
         "canon": None if number == 1 else "depth > 0.1 and not code = 'x'",

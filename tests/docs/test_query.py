@@ -17,7 +17,8 @@ from archmodel.query.grammar import MAX_CALLS, MAX_DEPTH
 from archmodel.query.scope import MAX_FUNCTIONS, MAX_RUNS
 from archmodel.query.tokens import MAX_LENGTH
 from archmodel.store.stones import store_survey
-from archmodel.tables.entities import canon_of, definition_of, kind_of, kinds
+from archmodel.tables.entities import canon_of, kinds
+from archmodel.tables.hierarchy import definition_of, kind_of
 from moma.errors import QueryError
 from tests.archmodel.conftest import WALL
 from tests.archmodel.known_wall import MEMBERS, RELATIONS, STRUCTURES, furnish

@@ -2,17 +2,19 @@
 
 from sqlalchemy import FromClause, case, exists, func, null, select
 
-from archmodel.query.attributes import attributes_of, kinds_of
+from archmodel.query.attributes import attributes_of
 from archmodel.query.columns import DOCUMENTING
 from archmodel.query.functions.usages import Ask, Condition, tokens
 from archmodel.query.grammar import Call, parse
 from archmodel.query.inherited import entities_with_statement, held
 from archmodel.query.names import document_named, mark_named, meant
-from archmodel.query.scope import Scope
+from archmodel.query.scope import Scope, StructureScope
 from archmodel.query.tokens import Token, complaint
-from archmodel.tables.entities import canon_of, kind_named, kinds
+from archmodel.tables.entities import Entity, canon_of, kind_named
+from archmodel.tables.hierarchy import kinds_below, kinds_in
 from archmodel.tables.knowledge import OBSERVATIONS, Correction, Statement
 from archmodel.tables.runs import MechanismStone
+from archmodel.tables.structures import structure_kind_named
 from moma.errors import QueryError, UsageError
 
 __all__ = ["canonical", "corrected", "documented", "has_mark", "in_mechanism", "is_a", "observed"]
@@ -104,21 +106,22 @@ def in_mechanism(scope: Scope, call: Call, ask: Ask) -> Condition:
     return _any_row(scope, *conditions)
 
 
-def is_a(scope: Scope, call: Call, ask: Ask) -> Condition:
+def is_a(scope: Scope | StructureScope, call: Call, ask: Ask) -> Condition:
     """Test for a kind, or one of its subkinds."""
     (name,) = tokens(call, 1)
     try:
-        cls = kind_named(name.text)
+        if isinstance(scope, StructureScope):
+            return scope.structure.c.kind.in_(kinds_below(structure_kind_named(name.text)))
+        return scope.entity.c.kind.in_(kinds_below(kind_named(name.text)))
     except UsageError as error:
         raise complaint(name, error.what, error.remedy) from None
-    return scope.entity.c.kind.in_([kind for kind, sub in kinds().items() if issubclass(sub, cls)])
 
 
 def canonical(scope: Scope, call: Call, ask: Ask) -> Condition:
     """Test for the proportions that theory asks of its kind, stated in the query language itself."""
     tokens(call, 0)
     with_canon: dict[str, list[str]] = {}
-    for kind, cls in kinds_of(scope.context.session).items():
+    for kind, cls in kinds_in(scope.context.session, Entity).items():
         if (canon := canon_of(cls)) is not None:
             with_canon.setdefault(canon, []).append(kind)
     if scope.context.within_canon:

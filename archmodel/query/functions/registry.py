@@ -57,6 +57,7 @@ FUNCTIONS: Mapping[str, Function] = {
 """What can be asked of an entity."""
 
 STRUCTURE_FUNCTIONS: Mapping[str, Function] = {
-    "part_of": Function("part_of", STRUCTURE_USAGES["part_of"], related.part_of)
+    "part_of": Function("part_of", STRUCTURE_USAGES["part_of"], related.part_of),
+    "is_a": Function("is_a", STRUCTURE_USAGES["is_a"], told.is_a),
 }
 """What can be asked of a structure, within ``member_of(…)``."""

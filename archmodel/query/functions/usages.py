@@ -85,6 +85,7 @@ STRUCTURE_USAGES: Mapping[str, Usages] = {
         ("part_of(CODE or expression)", "it is such a structure, or a part of one"),
         ("part_of()", "it is a part of any structure"),
     ),
+    "is_a": (("is_a(KIND)", "it is of that kind of structure or of a subkind"),),
 }
 """The functions of structures, within ``member_of(…)``."""
 

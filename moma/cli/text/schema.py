@@ -21,7 +21,7 @@ def print_schema(schema: Branch) -> None:
     for line in schema_lines(schema):
         text = Text(line)
         text.highlight_regex(r"(?<=── )[a-z_0-9]+(?=  )|^[a-z_0-9]+(?=  )", "bold")
-        text.highlight_regex(r"canonical:|registered:", "italic")
+        text.highlight_regex(r"canonical:|registered(, a case of [a-z_0-9]+)?:", "italic")
         text.highlight_regex(r"^[│├└─ ]+", "dim")
         text.highlight_regex(r"(?<=· )[a-z_0-9]+", "cyan")
         console.print(text, soft_wrap=True)
@@ -36,7 +36,7 @@ def schema_lines(schema: Branch) -> Iterator[str]:
             yield ""
             yield title
             width = max(len(one[name]) for one in schema[key])
-            yield from (f"  {one[name]:<{width}}  {one['definition']}" for one in schema[key])
+            yield from (f"  {one[name]:<{width}}  {_origin(one)}{one['definition']}" for one in schema[key])
     if "attributes" in schema:
         yield ""
         yield "Attributes of every entity"
@@ -45,8 +45,7 @@ def schema_lines(schema: Branch) -> Iterator[str]:
 
 def _kind_lines(branch: Branch, first: str, rest: str) -> Iterator[str]:
     """Yield a kind, its attributes and subkinds; `first` and `rest` begin the first line and those below."""
-    origin = "registered: " if branch["registered"] else ""
-    yield f"{first}{branch['kind']}  {origin}{branch['definition']}"
+    yield f"{first}{branch['kind']}  {_origin(branch)}{branch['definition']}"
     below = rest + ("│   " if branch["kinds"] else "    ")
     if branch["canonical"] is not None:
         yield f"{below}canonical: {branch['canonical']}"
@@ -55,6 +54,13 @@ def _kind_lines(branch: Branch, first: str, rest: str) -> Iterator[str]:
     for number, sub in enumerate(branch["kinds"], start=1):
         last = number == len(branch["kinds"])
         yield from _kind_lines(sub, rest + ("└── " if last else "├── "), rest + ("    " if last else "│   "))
+
+
+def _origin(one: Branch) -> str:
+    """Return what marks a registered kind; with its parent, where the tree does not show it."""
+    if not one.get("registered"):
+        return ""
+    return f"registered, a case of {one['parent']}: " if "parent" in one else "registered: "
 
 
 def _attribute(one: Branch) -> str:

@@ -1,30 +1,35 @@
-"""Kinds of a user's own: classes of the hierarchy while a database that registers them is open."""
+"""Kinds of a user's own: classes of their hierarchy while a database that registers them is open."""
 
 import itertools
 from collections.abc import Callable
 
 import pytest
-from sqlalchemy import select
+from sqlalchemy import select, update
 from sqlalchemy.orm import Session, aliased
 
+from archmodel.assertions.arrange import declare_members, declare_structure
 from archmodel.assertions.correct import correct
 from archmodel.assertions.register_kind import MAX_LEVELS, register_kind
 from archmodel.database.session import Database, open_database
 from archmodel.describe.entity import describe
+from archmodel.describe.history import history
 from archmodel.query.api import find
+from archmodel.relations.graph import courses_in_order
 from archmodel.store.revisions import Outcome
 from archmodel.store.stones import store_survey
 from archmodel.tables.entities import (
     Ashlar,
     Entity,
     canon_of,
-    definition_of,
     kind_named,
     kinds,
     own_attributes,
 )
 from archmodel.tables.entries import Entry, new_entry
+from archmodel.tables.hierarchy import definition_of, kind_chain
 from archmodel.tables.knowledge import Correction
+from archmodel.tables.registered import all_kinds
+from archmodel.tables.structures import Rib, Structure, structure_kind_named, structure_kinds
 from moma.errors import DatabaseError, MomaError, UsageError
 from tests.archmodel.stones import box_stone
 
@@ -134,6 +139,14 @@ def test_two_buildings_can_mean_different_things_but_not_at_once(new_url: Callab
 def test_what_cannot_be_registered_is_refused(empty: Database) -> None:
     cases: list[tuple[dict[str, object], str]] = [
         ({"name": "header"}, "there is a kind header already"),
+        ({"name": "tower"}, "there is a kind tower already"),
+        ({"name": "header", "parent": "rib"}, "there is a kind header already"),
+        ({"parent": "ribb"}, "unknown kind 'ribb'; did you mean rib"),
+        (
+            {"parent": "rib", "canon": "depth > 1"},
+            "slab_of_merlon is a kind of structure, and those have neither",
+        ),
+        ({"parent": "rib", "attributes": {"slit": ("m", "x")}}, "leave out canon and attributes"),
         ({"name": "merlon"}, "registered already, with another definition"),
         ({"name": "Merlon"}, "'Merlon' is not the name of a kind; write it in small letters"),
         ({"name": "x" * 41}, "is not the name of a kind"),
@@ -188,3 +201,105 @@ def test_attributes_are_not_named_like_members_of_the_classes(empty: Database, n
     given = {name: ("m", "the width")}
     with empty.session() as session, pytest.raises(UsageError, match=f"{name} means something"):
         register_kind(session, entry_of(session), "slab_of_own", "ashlar", "A slab.", attributes=given)
+
+
+def wall_rib(session: Session, definition: str = "A rib along a wall.", parent: str = "rib") -> Outcome:
+    return register_kind(session, entry_of(session), "wall_rib", parent, definition)
+
+
+def test_no_name_is_in_both_hierarchies() -> None:
+    assert not set(kinds()) & set(structure_kinds())
+    assert len(all_kinds()) == len(kinds()) + len(structure_kinds())
+
+
+def test_a_registered_kind_of_structure_is_like_any_other(filled: Database) -> None:
+    with filled.session() as session:
+        assert wall_rib(session) == Outcome(new=1)
+        assert wall_rib(session) == Outcome(unchanged=1)
+        register_kind(session, entry_of(session), "corner_rib", "wall_rib", "A wall rib at a corner.")
+        cls = structure_kind_named("Corner rib")
+        assert kind_chain(cls) == (Structure, Rib, structure_kind_named("wall_rib"), cls)
+        assert "wall_rib" not in kinds()
+        stones = {one.code: one.id for one in session.scalars(select(Entity))}
+        for kind, code, stone in (("rib", "R", "V1"), ("wall_rib", "W", "V2"), ("corner_rib", "C", "V3")):
+            declare_structure(session, entry_of(session), kind, code)
+            declare_members(session, entry_of(session), code, [stones[stone]])
+        session.expire_all()
+        assert describe(session, "C")["definition"] == "A wall rib at a corner."
+        for question, found in (
+            ("kind = rib", ["V1"]),
+            ("is_a(rib)", ["V1", "V2", "V3"]),
+            ("is_a(wall_rib)", ["V2", "V3"]),
+            ("is_a(structure) and not is_a(wall_rib)", ["V1"]),
+            ("is_a(arch)", []),
+        ):
+            assert [one.code for one in find(session, "voussoir", [f"member_of({question})"])] == found
+        with pytest.raises(UsageError, match="did you mean wall_rib"):
+            find(session, "entity", ["member_of(is_a(wallrib))"])
+        # a class of its hierarchy alone
+        with pytest.raises(UsageError, match="unknown kind 'wall_rib'"):
+            find(session, "wall_rib")
+        rows = {one.code: type(one) for one in session.scalars(select(Structure))}
+        assert (rows["C"], rows["R"]) == (cls, Rib)
+
+
+def test_what_a_structure_was_before_its_kind_was_told_better_is_kept(filled: Database) -> None:
+    with filled.session() as session:
+        first = entry_of(session)
+        declare_structure(session, first, "rib", "R", title="the southern one")
+        wall_rib(session)
+        assert declare_structure(session, entry_of(session), "wall_rib", "R") == Outcome(replaced=1)
+        session.expire_all()
+        assert describe(session, "R")["kind"] == "wall_rib"
+        then = describe(session, "R", first.id)
+        assert (then["kind"], then["title"]) == ("rib", "the southern one")
+        assert [one.says["kind"] for one in history(session, "R")] == ["rib", "wall_rib"]
+
+
+def test_kinds_of_structures_are_known_while_a_database_that_registers_them_is_open(
+    new_url: Callable[[], str],
+) -> None:
+    first, second = new_url(), new_url()
+    with open_database(first) as database, database.session() as session:
+        wall_rib(session)
+        declare_structure(session, entry_of(session), "wall_rib", "R")
+    assert "wall_rib" not in structure_kinds()
+    with open_database(second) as database, database.session() as session:
+        # the same name, and even in the other hierarchy, once the first one is closed
+        wall_rib(session, "A stone.", "ashlar")
+        assert "wall_rib" in kinds()
+        assert "wall_rib" not in structure_kinds()
+        with pytest.raises(DatabaseError, match="the kind wall_rib means something else here"):
+            open_database(first)
+    with open_database(first) as database, database.session(read_only=True) as session:
+        assert describe(session, "R")["definition"] == "A rib along a wall."
+        assert "wall_rib" not in kinds()
+
+
+def test_a_kind_of_structure_that_was_rolled_back_is_not_known(empty: Database) -> None:
+    with empty.session() as session:
+        attempt = session.begin_nested()
+        wall_rib(session)
+        attempt.rollback()
+        assert wall_rib(session, "A stone.", "ashlar") == Outcome(new=1)
+        assert "wall_rib" not in structure_kinds()
+
+
+def test_a_kind_of_structure_that_another_program_stored_is_named(filled: Database) -> None:
+    with filled.session() as session:
+        declare_structure(session, entry_of(session), "rib", "R")
+        session.execute(update(Structure).values(kind="tierceron"))
+        session.expunge_all()
+        for told in (describe, history):
+            with pytest.raises(DatabaseError, match="a kind 'tierceron' that is not declared"):
+                told(session, "R")
+
+
+def test_a_case_of_a_course_is_a_course(filled: Database) -> None:
+    with filled.session() as session:
+        entry = entry_of(session)
+        numbers = session.scalars(select(Entity.id).where(Entity.course == 1)).all()
+        register_kind(session, entry, "plinth", "course", "A course that projects at the foot of a wall.")
+        declare_structure(session, entry, "plinth", "P", number=1)
+        declare_members(session, entry, "P", numbers, ordered=True)
+        assert [one.code for one in courses_in_order(session)] == ["P"]

@@ -16,15 +16,15 @@ from archmodel.store.stones import store_survey
 from archmodel.tables.entities import (
     Entity,
     Keystone,
-    definition_of,
-    kind_of,
     kinds,
     own_attributes,
 )
 from archmodel.tables.entries import new_entry
+from archmodel.tables.hierarchy import definition_of, kind_of
 from archmodel.tables.registered import RegisteredKind, declare_registered
 from archmodel.tables.relations import INVERSE
 from archmodel.tables.structures import structure_kinds
+from moma.cli.text.schema import schema_lines
 from moma.errors import QueryError, UsageError
 from tests.archmodel.stones import SHA, box_stone
 
@@ -107,6 +107,20 @@ def test_a_registered_kind_is_in_the_tree_of_its_database_alone(with_merlon: Dat
     assert merlon["registered"]
     assert [sub["kind"] for sub in merlon["kinds"]] == ["corner_merlon"]
     assert "merlon" not in [one["kind"] for one in branches(schema())]
+
+
+def test_a_registered_kind_of_structure_is_listed_with_its_parent(empty: Database) -> None:
+    with empty.session() as session:
+        entry = new_entry(session, "declaration", "field book")
+        register_kind(session, entry, "wall_rib", "rib", "A rib where a web meets a wall: formeret.")
+        tree: Any = schema(session)
+    listed = {one["kind"]: (one["registered"], one["parent"]) for one in tree["structures"]}
+    assert (listed["structure"], listed["rib"]) == ((False, None), (False, "structure"))
+    assert listed["wall_rib"] == (True, "rib")
+    line = next(line for line in schema_lines(tree) if "wall_rib" in line)
+    told = "registered, a case of rib: A rib where a web meets a wall: formeret."
+    assert line.split(maxsplit=1) == ["wall_rib", told]
+    assert "wall_rib" not in [one["kind"] for one in schema()["structures"]]  # type: ignore[attr-defined]
 
 
 FOUND = {

@@ -14,9 +14,8 @@ from archmodel.database.session import Database, open_database
 from archmodel.exchange.head import FRAME, UNITS
 from archmodel.exchange.reader import import_building
 from archmodel.exchange.writer import export_building
-from archmodel.tables.entities import kinds
 from archmodel.tables.layout import SCHEMA_VERSION
-from archmodel.tables.registered import release_registered
+from archmodel.tables.registered import all_kinds, release_registered
 from moma.errors import ExchangeError, MomaError
 from tests.archmodel.random_databases import everything, fill, tables
 from tests.postgresql import Server
@@ -55,7 +54,7 @@ def refused_by(database: Database, document: str | bytes, path: Path) -> str:
     with pytest.raises(ExchangeError) as caught:
         import_building(path, database)
     assert not any(everything(database).values())
-    assert not any(name.startswith("own_kind") for name in kinds())
+    assert not any(name.startswith("own_kind") for name in all_kinds())
     return str(caught.value).replace(str(path), "given")
 
 
@@ -121,6 +120,11 @@ WRONG = (
     ("tables.entity.1.kind", "gargoyle", r"\.kind: is 'gargoyle', which is no kind; known are"),
     ("tables.entity.1.kind", "headr", r"\.kind: is 'headr', which is no kind; did you mean header\?"),
     ("tables.structure.1.kind", "own_kind_0", r"structure\[1\]\.kind: is 'own_kind_0', which is no kind"),
+    ("tables.entity.1.kind", "own_kind_1", r"entity\[1\]\.kind: is 'own_kind_1', which is no kind"),
+    ("tables.structure.1.kind", "own_kind_9", r"structure\[1\]\.kind: is 'own_kind_9', which is no kind"),
+    ("tables.kind.1.canon", "depth > 1", r"\$\.tables\.kind: own_kind_1 is a kind of structure, and those have"),
+    ("tables.kind.1.attributes", {"a": ["m", "x"]}, r"own_kind_1 is a kind of structure.* leave out canon and"),
+    ("tables.kind.0.name", "arch", r"\$\.tables\.kind: the kind arch means something else here than in this"),
     ("tables.statement.1.kind", "statement", r"statement\[1\]\.kind: is 'statement', which is no kind"),
     ("tables.entity.1.depth", "deep", r"\.depth: is 'deep', expected a number"),
     ("tables.entity.1.depth", True, r"\.depth: is true, expected a number"),

@@ -14,13 +14,11 @@ from archmodel.tables.entities import (
     Stone,
     Voussoir,
     canon_of,
-    definition_of,
-    kind_chain,
     kind_named,
-    kind_of,
     kinds,
     own_attributes,
 )
+from archmodel.tables.hierarchy import definition_of, kind_chain, kind_of
 from moma.errors import UsageError
 
 

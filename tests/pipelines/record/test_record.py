@@ -274,7 +274,19 @@ name = "WALL"
             "the relation has no kind",
         ),
         ("[[relation]]\nkind = 'beside'\nof = ['V1']\nto = ['V1']\n", 1, "in relation to themselves"),
-        ("[[structure]]\nkind = 'wal'\ncode = 'W'\n", 2, "did you mean 'wall'"),
+        ("[[structure]]\nkind = 'wal'\ncode = 'W'\n", 2, "kind of structure 'wal'; did you mean wall"),
+        (
+            "[[kind]]\nname = 'wall_rib'\nparent = 'rib'\ndefinition = 'z'\n"
+            "[[structure]]\nkind = 'wallrib'\ncode = 'R'\n",
+            6,
+            "unknown kind of structure 'wallrib'; did you mean wall_rib",
+        ),
+        (
+            "[[kind]]\nname='x'\nparent='rib'\ndefinition='z'\ncanon = 'depth > 1'\n",
+            1,
+            "x is a kind of structure, and those have neither canonical proportions nor attributes of their own; "
+            "leave out canon",
+        ),
         ("[[phase]]\nname = 'x'\nauthor = \"\\u0000\"\n", 1, "author '.x00' has no visible character"),
         ("[[depth]]\nstones = ['V1']\nvalue = 0\n", 3, "value = 0 is out of range"),
     ],
