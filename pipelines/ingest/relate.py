@@ -27,6 +27,8 @@ from archmodel.store.stone_arrays import (
     stone_shapes,
 )
 from archmodel.tables.entities import Entity
+from archmodel.tables.hierarchy import kinds_below
+from archmodel.tables.structures import structure_kind_named, structure_kinds
 from pipelines.arrays import Array, Ints
 from survey.geometry.adjacency import Polyhedra, PolyhedraBuilder, find_touching
 
@@ -114,14 +116,15 @@ def relate(
     found, ids = _relations(stones, shapes, settings, chosen)
     relations = store_relations(session, ids, found, act, chosen)
     courses = stones if chosen is None else whole_courses(session, chosen)
-    changes = [
-        store_parts(session, parts_of_survey(courses), act, kinds=("structure", "course"), among=chosen)
-    ]
+    arch_kinds = kinds_below(structure_kind_named("arch"))
+    # zones and courses stay what they are when their kind is corrected, a zone as a tower, say
+    other_kinds = structure_kinds().keys() - arch_kinds
+    changes = [store_parts(session, parts_of_survey(courses), act, kinds=other_kinds, among=chosen)]
     near = None if chosen is None else chosen.union(ids[found.subject].tolist(), ids[found.object].tolist())
     tails = {number: {"tail_length": tail} for number, tail in tail_lengths(session, near).items()}
     values = give_values(session, tails, act)
     arches = find_arches(session)
-    changes.append(store_parts(session, arch_parts(session, arches), act, kinds=("arch",)))
+    changes.append(store_parts(session, arch_parts(session, arches), act, kinds=arch_kinds))
     values += give_values(session, arch_values(arches), act)
     session.expire_all()  # objects loaded earlier hold outdated values
     return RelationReport(

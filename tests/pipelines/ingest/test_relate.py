@@ -8,6 +8,8 @@ import pytest
 from sqlalchemy import select, update
 from sqlalchemy.orm import aliased
 
+from archmodel.assertions.arrange import declare_structure
+from archmodel.assertions.register_kind import register_kind
 from archmodel.database.session import open_database
 from archmodel.relations.classify import RelationSettings
 from archmodel.relations.store import held_settings
@@ -410,6 +412,28 @@ def test_rings_of_an_arch_are_counted_from_the_intrados(database):
     assert {found[f"oV{k}"][0] for k in range(1, 12)} == {2}
     assert [found[f"oV{k}"][1] for k in range(11, 0, -1)] == list(range(2, 13))
     assert set(members(database)) == {"arch 1"}
+
+
+def test_a_structure_whose_kind_is_told_better_keeps_its_members(database):
+    loose = stone(masonry.cuboid("L", (5, 0, 0), (5.3, 0.3, 0.3)), "rubble", zone="south")
+    take_in(database, [*wall(2, 2, zone="south"), loose, *arch(5, at=(9.0, 0.0, 0.0))])
+    related(database)
+    before = members(database)
+    with database.session() as session:
+        entry = new_entry(session, "declaration", "a test")
+        register_kind(session, entry, "relieving_arch", "arch", "An arch in a wall, over a weaker place.")
+        register_kind(session, entry, "plinth", "course", "A course that projects at the foot of a wall.")
+        declare_structure(session, entry, "relieving_arch", "arch 1")
+        declare_structure(session, entry, "plinth", "south/course 1")
+        declare_structure(session, entry, "tower", "south")
+    kept = rows_of(database, Structure, Membership)
+    related(database)
+    assert members(database) == before
+    assert rows_of(database, Structure, Membership) == kept
+    with database.session() as session:
+        number = session.scalars(select(Entity.id).where(Entity.code == "1-1")).one()
+    related(database, only=[number])
+    assert rows_of(database, Structure, Membership) == kept
 
 
 def test_two_arches_are_two_and_keep_their_names_when_a_third_comes(database):
