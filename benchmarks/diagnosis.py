@@ -93,9 +93,16 @@ def laboratory(kind: str, folder: Path) -> Laboratory:
     assert cause is not None
     cases = cases_of(file, found.phases)
     possible = tuple(one for one in cases if not check_case(file, one, url, False))
-    moved = partial(cause.build, true_movement(cause))
-    truth = -min(cause.settlement.values())
-    return Laboratory(file, possible, url, dict(found.phases), moved, truth, file.phases[:1])
+    movement = true_movement(cause)
+    return Laboratory(
+        file,
+        possible,
+        url,
+        dict(found.phases),
+        lambda seed: cause.build(movement, seed).building,
+        cause.settlement,
+        file.phases[:1],
+    )
 
 
 class Interpolated:

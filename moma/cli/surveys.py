@@ -43,6 +43,8 @@ class SampleName(StrEnum):
     SETTLED_PHASES = "settled-phases"
     SETTLED_SMALL = "settled-small"
     TOWER = "tower"
+    TOWER_SETTLED = "tower-settled"
+    TOWER_SETTLED_SMALL = "tower-settled-small"
     TOWER_SMALL = "tower-small"
     VAULT = "vault"
     WALL = "wall"

@@ -1,6 +1,6 @@
 """A synthetic survey with a scene that runs, written into a folder for people to start from."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from pipelines.arrays import Array
 from survey.formats.native.writer import write_head, write_moma
 from survey.formats.solids.obj_writer import write_obj
 from survey.synthetic.building import Building
-from survey.synthetic.frame import Movement, RigidMotion, wall_frame
+from survey.synthetic.frame import Movement, RigidMotion
 from survey.synthetic.samples import SAMPLES, Cause, SampleRecipe
 
 __all__ = ["WrittenSample", "true_movement", "write_sample"]
@@ -62,19 +62,21 @@ displacement = [0.0, 0.0, {height}]
 duration = {duration}
 """
 _HEAD = "head.moma"  # header file of closed solids
-_DURATION = 1.0  # of settlements in the simulation of the truth [s]
-_LONGEST = 3.0  # of that simulation, and of the scene [s]
+_LONGEST = 3.0  # of the simulation of the truth, and of the scene [s]
 
 _DIAGNOSIS = """\
-# What has moved the wall? Four answers, each with an amount that is not known. Explained in docs/howto/diagnose.md.
+# What has moved the {what}? {count} answers, each of unknown amount. Explained in docs/howto/diagnose.md.
 {commands}
 [diagnosis]
 scene = "{kind}.toml"
 without = ["loads"]  # the scene knows the cause; a diagnosis is to find it
-battered = true
-{phases}
+{built}{hypotheses}"""
+
+_BATTERED = "battered = true\n"
+
+_SETTLED = """
 [[hypotheses]]
-name = "the left corner settled"
+name = "the {corner} corner settled"
 
 [[hypotheses.unknowns]]
 name = "settlement"
@@ -82,17 +84,9 @@ unit = "m"
 start = 0.010
 low = 0.0
 high = 0.060
-{left}
-[[hypotheses]]
-name = "the right corner settled"
+"""
 
-[[hypotheses.unknowns]]
-name = "settlement"
-unit = "m"
-start = 0.010
-low = 0.0
-high = 0.060
-{right}
+_TILTED = """
 [[hypotheses]]
 name = "the base tilted"
 
@@ -109,7 +103,9 @@ stones = ["{fixed}"]
 spin = {{ time = [0.0, {duration}, {after}], value = ["= tilt / {duration}", "= tilt / {duration}", 0.0] }}
 axis = [{axis[0]:.6f}, {axis[1]:.6f}, 0.0]
 pivot = [{pivot[0]:.3f}, {pivot[1]:.3f}, {pivot[2]:.3f}]
+"""
 
+_LOADED = """
 [[hypotheses]]
 name = "a load stood on the upper left corner"
 
@@ -124,6 +120,25 @@ high = 50000.0
 type = "force"
 stones = ["{top}"]
 force = [0.0, 0.0, "= -load"]
+"""
+
+_PUSHED = """
+[[hypotheses]]
+name = "the thrust of a vault pushed the walls apart"
+
+[[hypotheses.unknowns]]
+name = "thrust"  # on each stone that goes through the heads of the walls
+unit = "N"
+start = 500.0
+low = 0.0
+high = 2000.0
+"""
+
+_PUSHING = """
+[[hypotheses.scene.loads]]
+type = "force"
+stones = ["{stones}"]
+force = ["= thrust * {out[0]:.6f}", "= thrust * {out[1]:.6f}", 0.0]
 """
 
 _SETTLING = """
@@ -230,29 +245,40 @@ def _listed(commands: Sequence[str]) -> str:
 
 
 def _diagnosis(kind: str, fixed: str, cause: Cause, commands: Sequence[str]) -> str:
-    """Return hypotheses on the movement of a wall: the true one, the other corner, a tilt, and a load."""
-    building = cause.build({}, None)
-    most = min(cause.settlement.values())
-    shares = [height / most for height in cause.settlement.values()]
-    facing = wall_frame().axes[2]
-    return _DIAGNOSIS.format(
-        commands=_listed(commands),
-        kind=kind,
-        phases="" if cause.stood is None else 'phases = ["1", "2"]  # the oldest first\n',
-        left="".join(_settling(cause, cause.settlement, shares)),
-        right="".join(_settling(cause, reversed(building.base), shares)),
+    """Return hypotheses on the movement of a building, the true one first."""
+    site = cause.build({}, None)
+    hypotheses = [_SETTLED.format(corner="left") + _settling(cause, site.settled)]
+    if site.rival:
+        hypotheses.append(_SETTLED.format(corner="right") + _settling(cause, site.rival))
+    tilted = _TILTED.format(
         fixed=fixed,
         duration=cause.duration,
         after=cause.duration + _INSTANT,
-        axis=facing,
-        pivot=building.solids[0].vertices[0],
-        top=next(one.code for one in building.survey.blocks if one.course == _top(building)),
+        axis=site.facing,
+        pivot=site.building.solids[0].vertices[0],
+    )
+    pushing = [_PUSHING.format(stones=stones, out=out) for stones, out in site.pushed.items()]
+    top = next(one.code for one in site.building.survey.blocks if one.course == _top(site.building))
+    hypotheses += [tilted, "".join([_PUSHED, *pushing]) if pushing else _LOADED.format(top=top)]
+    dated = cause.stood is not None
+    return _DIAGNOSIS.format(
+        what="storey" if pushing else "wall",
+        count=_COUNTS[len(hypotheses)],
+        commands=_listed(commands),
+        kind=kind,
+        built=(_BATTERED if cause.battered else "")
+        + ('phases = ["1", "2"]  # the oldest first\n' if dated else ""),
+        hypotheses="".join(hypotheses),
     )
 
 
-def _settling(cause: Cause, codes: Iterable[str], shares: Sequence[float]) -> Iterator[str]:
-    for code, share in zip(codes, shares, strict=False):
-        yield _SETTLING.format(code=code, share=share, duration=cause.duration)
+_COUNTS = {3: "Three", 4: "Four"}
+
+
+def _settling(cause: Cause, shares: Mapping[str, float]) -> str:
+    return "".join(
+        _SETTLING.format(code=code, share=share, duration=cause.duration) for code, share in shares.items()
+    )
 
 
 def _top(building: Building) -> int:
@@ -261,13 +287,14 @@ def _top(building: Building) -> int:
 
 def _loads(cause: Cause) -> Iterator[str]:
     yield "\n# What moved it: the same as in the truth.\n"
-    for code, height in cause.settlement.items():
+    for code, height in cause.heights(cause.build({}, None)).items():
         yield _SETTLEMENT.format(code=code, height=height, duration=cause.duration)
 
 
 def true_movement(cause: Cause) -> Movement:
     """Simulate how the true stones of a building move when the ground beneath some settles."""
-    building = cause.build({}, None)
+    site = cause.build({}, None)
+    building = site.building
     limestone = Material("limestone", density=2350.0, young=12e9, poisson=0.2)
     middle = building.solids[0].vertices[0]
     course = {one.code: one.course or 0 for one in building.survey.blocks}
@@ -282,8 +309,10 @@ def true_movement(cause: Cause) -> Movement:
         for one in building.solids
         if cause.stood is None or course[one.code] <= cause.stood
     )
-    motions = [settlement([code], (0.0, 0.0, z), _DURATION) for code, z in cause.settlement.items()]
-    time = TimeSettings(step=0.005, duration=_LONGEST, relaxation=True, start=Start.EQUILIBRIUM)
+    motions = [
+        settlement([code], (0.0, 0.0, z), cause.true_duration) for code, z in cause.heights(site).items()
+    ]
+    time = TimeSettings(step=cause.true_step, duration=_LONGEST, relaxation=True, start=Start.EQUILIBRIUM)
     result = simulate(Scene("movement", blocks, time=time, loads=Loads(motions=tuple(motions))))
     return {body.code: _motion(body.reference + middle, body.position + middle) for body in result.bodies}
 
@@ -314,6 +343,7 @@ def _commands(
         yield f"moma propose infill --record {database}"
     yield f"moma run {scene} {database} --out {scene.parent / 'results'}"
     if recipe.cause is not None and recipe.cause.stood is None:
-        yield f"moma compare {scene} --battered {database} --out {scene.parent / 'comparison'}"
+        battered = "--battered " if recipe.cause.battered else ""
+        yield f"moma compare {scene} {battered}{database} --out {scene.parent / 'comparison'}"
     if diagnosis is not None:
         yield f"moma diagnose {diagnosis} {database} --out {scene.parent / 'diagnosis'}"

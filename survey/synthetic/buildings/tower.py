@@ -11,20 +11,22 @@
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from random import Random
+from types import MappingProxyType
 
 import numpy as np
 
+from survey.arrays import Array
 from survey.records.survey import Station
 from survey.synthetic.bond import PlannedStone, upright
 from survey.synthetic.building import Building, Draft, flat_stone, measured_building
 from survey.synthetic.buildings.openings import Arch, Opening, plan_opening
 from survey.synthetic.buildings.walls import plan_courses
 from survey.synthetic.coursing import Bed, Piece, planned
-from survey.synthetic.frame import WallFrame, build_stone
+from survey.synthetic.frame import Movement, WallFrame, build_stone
 
 __all__ = ["THICKNESS", "TowerStorey", "tower_storey"]
 
@@ -64,10 +66,14 @@ class TowerStorey:
     ----------
     building : its stones; zones name wall and side
     level_break : last course of the first phase
+    corners : (2, 3) feet of the corners at the left and the right end of wall A [m]
+    outward : of each wall by its letter, (3,) [-]
     """
 
     building: Building
     level_break: int
+    corners: Array
+    outward: Mapping[str, Array]
 
 
 @dataclass(frozen=True)
@@ -104,7 +110,14 @@ class _Wall:
 
 
 def tower_storey(
-    courses: int = 40, seed: int = 1, *, width: float = 7.0, depth: float = 5.6, blunders: float = 0.12
+    courses: int = 40,
+    seed: int = 1,
+    *,
+    width: float = 7.0,
+    depth: float = 5.6,
+    blunders: float = 0.12,
+    movement: Movement = MappingProxyType({}),
+    measured: int | None = None,
 ) -> TowerStorey:
     """Build the storey and measure all its faces.
 
@@ -114,6 +127,8 @@ def tower_storey(
     seed : of Python's own generator, whose stream is the same everywhere
     width, depth : of the tower outside, along wall A and along the others; not much smaller [m]
     blunders : gross errors per stone
+    movement : of the stones since they were laid
+    measured : seed of the joints, wear and noise alone, so that the same stones are measured again; None: as `seed`
 
     Returns
     -------
@@ -123,17 +138,23 @@ def tower_storey(
     rng = Random(seed)
     level_break = round(_BREAK * courses)
     heights = _bed_heights(rng, courses, level_break)
-    drafts = [draft for wall in _walls(width, depth) for draft in _wall(wall, heights, rng)]
+    walls = _walls(width, depth)
+    drafts = [draft for wall in walls for draft in _wall(wall, heights, rng)]
     depths = {kind: value for kind, value in _DEPTHS.items() if kind != "bonder"}
     stations = [
         Station(f"{wall.letter} {side}", np.round(frame.place(np.array([[0.3, 1.6]]), away)[0], 4))
-        for wall in _walls(width, depth)
+        for wall in walls
         for side, frame, away in (("outer", wall.frame, 9.0), ("inner", wall.inner_frame, 2.0))
     ]
     base = [draft.stone.plan.code for draft in drafts if draft.stone.plan.course == 1]
     count = round(blunders * len(drafts))
-    building = measured_building("tower storey", drafts, depths, stations, base, rng, blunders=count)
-    return TowerStorey(building, level_break)
+    rng = rng if measured is None else Random(measured)
+    building = measured_building(
+        "tower storey", drafts, depths, stations, base, rng, blunders=count, movement=movement
+    )
+    front = walls[0]
+    corners = front.frame.place(np.array([[end, 0.0] for end in front.ends]))
+    return TowerStorey(building, level_break, corners, {wall.letter: wall.frame.axes[2] for wall in walls})
 
 
 def _bed_heights(rng: Random, courses: int, level_break: int) -> list[float]:
