@@ -24,7 +24,8 @@ from pipelines.assess.diagnosis.trials import Tried, run_trial
 from pipelines.assess.motions import Motions
 from pipelines.ingest.ingest import ingest
 from pipelines.record.record import record
-from pipelines.scene.sample import true_movement, write_sample
+from pipelines.scene.sample import write_sample
+from pipelines.scene.true_movement import true_movement
 from survey.formats.native.writer import write_moma
 from survey.quality.precision import appraise
 from survey.synthetic.building import Building

@@ -4,22 +4,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
-from mechanics.scene.loads.load import Loads
-from mechanics.scene.loads.motions import settlement
-from mechanics.scene.scene import Block, Fidelity, Scene, Start, TimeSettings
-from mechanics.simulate import simulate
-from mechanics.stones.materials import Material
 from moma.errors import UsageError
-from pipelines.arrays import Array
+from pipelines.scene.true_movement import true_movement
 from survey.formats.native.writer import write_head, write_moma
 from survey.formats.solids.obj_writer import write_obj
 from survey.synthetic.building import Building
-from survey.synthetic.frame import Movement, RigidMotion
-from survey.synthetic.samples import SAMPLES, Cause, SampleRecipe
+from survey.synthetic.causes import Cause
+from survey.synthetic.samples import SAMPLES, SampleRecipe, moved_sample
 
-__all__ = ["WrittenSample", "true_movement", "write_sample"]
+__all__ = ["WrittenSample", "write_sample"]
 
 _SCENE = """\
 # {title}: synthetic, no such building exists. Every key is explained in docs/scene.md.
@@ -42,7 +35,7 @@ max_width = 0.04   # m
 
 [contact]
 friction = 0.6
-
+{joints}
 [time]
 start = "equilibrium"  # found at once; the steps then show that it lasts
 step = {step}{pad}# s
@@ -61,11 +54,28 @@ stones = ["{code}"]
 displacement = [0.0, 0.0, {height}]
 duration = {duration}
 """
+_FORCE = """
+[[loads]]
+type = "force"
+stones = ["{code}"]
+force = {force}
+"""
+
+_SPRINGS = """\
+placement = "centroid"  # joints bend on their springs like the whole bed
+
+# Soft lime mortar, which has crept; synthetic values. The amount of a thrust is known no better than they are.
+[[laws]]
+type = "elastic_joint"
+friction = 0.6
+normal_stiffness = {across:g}  # Pa/m
+shear_stiffness = {along:g}
+"""
 _HEAD = "head.moma"  # header file of closed solids
-_LONGEST = 3.0  # of the simulation of the truth, and of the scene [s]
+_LONGEST = 3.0  # duration of the scene of a building that has moved [s]
 
 _DIAGNOSIS = """\
-# What has moved the {what}? {count} answers, each of unknown amount. Explained in docs/howto/diagnose.md.
+# What has moved it? {count} answers, each of unknown amount. Explained in docs/howto/diagnose.md.
 {commands}
 [diagnosis]
 scene = "{kind}.toml"
@@ -124,14 +134,14 @@ force = [0.0, 0.0, "= -load"]
 
 _PUSHED = """
 [[hypotheses]]
-name = "the thrust of a vault pushed the walls apart"
+name = "the thrust of a vault pushed the walls out"
 
 [[hypotheses.unknowns]]
-name = "thrust"  # on each stone that goes through the heads of the walls
+name = "thrust"  # on each of the stones below
 unit = "N"
-start = 500.0
+start = {start}
 low = 0.0
-high = 2000.0
+high = {most}
 """
 
 _PUSHING = """
@@ -198,7 +208,7 @@ def write_sample(kind: str, folder: Path) -> WrittenSample:
         raise UsageError(f"no sample {kind!r}", remedy=f"the samples are {', '.join(SAMPLES)}")
     recipe = SAMPLES[kind]
     cause = recipe.cause
-    sample = recipe.make() if cause is None else cause.sample(true_movement(cause))
+    sample = recipe.make() if cause is None else moved_sample(cause, true_movement(cause))
     survey, scene = folder / f"{kind}.moma", folder / f"{kind}.toml"
     knowledge = folder / "knowledge.toml" if sample.knowledge else None
     solids = folder / "solids.obj" if sample.modelled else None
@@ -228,8 +238,10 @@ def write_sample(kind: str, folder: Path) -> WrittenSample:
 
 def _scene(recipe: SampleRecipe, commands: Sequence[str]) -> str:
     step = 0.005 if recipe.cause is None else recipe.cause.step
+    stiffness = None if recipe.cause is None else recipe.cause.stiffness
     return _SCENE.format(
         title=recipe.title,
+        joints="" if stiffness is None else _SPRINGS.format(across=stiffness[0], along=stiffness[1]),
         commands=_listed(commands),
         core=_CORE if recipe.core else "",
         fixed=recipe.fixed,
@@ -254,15 +266,15 @@ def _diagnosis(kind: str, fixed: str, cause: Cause, commands: Sequence[str]) -> 
         fixed=fixed,
         duration=cause.duration,
         after=cause.duration + _INSTANT,
-        axis=site.facing,
+        axis=site.axis,
         pivot=site.building.solids[0].vertices[0],
     )
+    pushed = _PUSHED.format(start=0.25 * cause.most, most=cause.most)
     pushing = [_PUSHING.format(stones=stones, out=out) for stones, out in site.pushed.items()]
     top = next(one.code for one in site.building.survey.blocks if one.course == _top(site.building))
-    hypotheses += [tilted, "".join([_PUSHED, *pushing]) if pushing else _LOADED.format(top=top)]
+    hypotheses += [tilted, "".join([pushed, *pushing]) if pushing else _LOADED.format(top=top)]
     dated = cause.stood is not None
     return _DIAGNOSIS.format(
-        what="storey" if pushing else "wall",
         count=_COUNTS[len(hypotheses)],
         commands=_listed(commands),
         kind=kind,
@@ -287,42 +299,11 @@ def _top(building: Building) -> int:
 
 def _loads(cause: Cause) -> Iterator[str]:
     yield "\n# What moved it: the same as in the truth.\n"
-    for code, height in cause.heights(cause.build({}, None)).items():
-        yield _SETTLEMENT.format(code=code, height=height, duration=cause.duration)
-
-
-def true_movement(cause: Cause) -> Movement:
-    """Simulate how the true stones of a building move when the ground beneath some settles."""
     site = cause.build({}, None)
-    building = site.building
-    limestone = Material("limestone", density=2350.0, young=12e9, poisson=0.2)
-    middle = building.solids[0].vertices[0]
-    course = {one.code: one.course or 0 for one in building.survey.blocks}
-    blocks = tuple(
-        Block(
-            one.code,
-            one.vertices - middle,
-            one.faces,
-            limestone,
-            Fidelity.FIXED if one.code in building.base else Fidelity.RIGID,
-        )
-        for one in building.solids
-        if cause.stood is None or course[one.code] <= cause.stood
-    )
-    motions = [
-        settlement([code], (0.0, 0.0, z), cause.true_duration) for code, z in cause.heights(site).items()
-    ]
-    time = TimeSettings(step=cause.true_step, duration=_LONGEST, relaxation=True, start=Start.EQUILIBRIUM)
-    result = simulate(Scene("movement", blocks, time=time, loads=Loads(motions=tuple(motions))))
-    return {body.code: _motion(body.reference + middle, body.position + middle) for body in result.bodies}
-
-
-def _motion(before: Array, after: Array) -> RigidMotion:
-    """Return the motion between two places (n, 3) of the corners of a rigid stone (Kabsch 1976)."""
-    first, second = before.mean(axis=0), after.mean(axis=0)
-    left, _, right = np.linalg.svd((after - second).T @ (before - first))
-    rotation = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
-    return RigidMotion(rotation, second - rotation @ first)
+    for code, height in cause.heights(site).items():
+        yield _SETTLEMENT.format(code=code, height=height, duration=cause.duration)
+    for code, force in cause.forces(site).items():
+        yield _FORCE.format(code=code, force=list(force))
 
 
 def _commands(

@@ -12,12 +12,13 @@ from survey.extrusion.extrusion import prism
 from survey.geometry.solids import Solid
 from survey.synthetic.bond import PlannedStone
 
-__all__ = ["Movement", "RigidMotion", "TrueStone", "WallFrame", "build_stone", "wall_frame"]
+__all__ = ["BATTER", "Movement", "RigidMotion", "TrueStone", "WallFrame", "build_stone", "wall_frame"]
 
 
 ORIGIN = (12.4, 38.25, 6.83)  # foot of the window's axis in the local site frame [m]
 AZIMUTH = math.radians(7.0)  # of the wall against the x axis
-BATTER = math.radians(0.3)  # the wall leans back from the observer
+BATTER = math.radians(0.3)
+"""Angle by which walls lean back from the observer [rad]."""
 RELIEF = 0.002  # standard deviation of a face's distance from the wall plane [m]
 FACE_TILT = math.radians(0.15)  # standard deviation of each tilt of a face against the wall plane
 
@@ -100,12 +101,12 @@ class TrueStone:
         return replace(self, normal=normal, offset=self.offset + float(normal @ motion.shift), solid=solid)
 
 
-def wall_frame() -> WallFrame:
-    """Lay the wall's frame: turned about the vertical, then leaning back."""
+def wall_frame(batter: float = BATTER) -> WallFrame:
+    """Lay the wall's frame: turned about the vertical, then leaning back by an angle [rad]."""
     along = np.array([math.cos(AZIMUTH), math.sin(AZIMUTH), 0.0])
     facing, vertical = np.array([along[1], -along[0], 0.0]), np.array([0.0, 0.0, 1.0])
-    up = math.cos(BATTER) * vertical - math.sin(BATTER) * facing
-    out = math.cos(BATTER) * facing + math.sin(BATTER) * vertical
+    up = math.cos(batter) * vertical - math.sin(batter) * facing
+    out = math.cos(batter) * facing + math.sin(batter) * vertical
     return WallFrame(np.array(ORIGIN), np.array([along, up, out]))
 
 

@@ -1,14 +1,12 @@
 """Synthetic surveys to start from, by name, each with its truth."""
 
 import json
-import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
 
-from survey.arrays import Array
 from survey.records.survey import SolidRecord, Survey
 from survey.synthetic.building import Building
 from survey.synthetic.buildings.facings import two_facings
@@ -18,10 +16,18 @@ from survey.synthetic.buildings.ribs import WEBS, rib_vault
 from survey.synthetic.buildings.tower import tower_storey
 from survey.synthetic.buildings.vaults import barrel_vault, semicircular_arch
 from survey.synthetic.buildings.walls import wall
-from survey.synthetic.frame import Movement, wall_frame
+from survey.synthetic.causes import (
+    PUSHED,
+    SETTLED,
+    SETTLED_PHASES,
+    SETTLED_SMALL,
+    TOWER_SMALL_SETTLED,
+    Cause,
+)
+from survey.synthetic.frame import Movement
 from survey.synthetic.window_bay.sample import make_sample, truth_text
 
-__all__ = ["SAMPLES", "Cause", "Sample", "SampleRecipe", "Site"]
+__all__ = ["SAMPLES", "Sample", "SampleRecipe", "moved_sample"]
 
 
 @dataclass(frozen=True)
@@ -40,69 +46,6 @@ class Sample:
     truth: str
     knowledge: str = ""
     modelled: tuple[SolidRecord, ...] = ()
-
-
-@dataclass(frozen=True)
-class Site:
-    """A building at the time of its movement, with what may have moved it.
-
-    Attributes
-    ----------
-    building : measured
-    settled : by code of a stone on the ground its share of the settlement of the left corner, which is the cause [-]
-    rival : the same of the right corner, which did not settle; empty if that is not suspected
-    facing : (3,) direction in which the front faces, the axis of a tilt to the left or right [-]
-    pushed : by query expression the direction (3,) in which the thrust of a vault may have pushed stones; empty if
-        there is no vault
-    level_break : last course of the first phase of a building that stood as a whole; None: it has one phase
-    """
-
-    building: Building
-    settled: Mapping[str, float]
-    rival: Mapping[str, float]
-    facing: Array
-    pushed: Mapping[str, Array] = field(default_factory=dict)
-    level_break: int | None = None
-
-
-@dataclass(frozen=True)
-class Cause:
-    """Settlement of the left corner, and the building that it moves.
-
-    Attributes
-    ----------
-    settlement : the largest, downwards [m]
-    build : the building after a movement; the same is measured again with the seed that may be given
-    duration : of the settlement in the scene [s]
-    step : of the scene [s]
-    stood : last course that stood when the ground settled; those above were laid later, level, in a phase of their
-        own; None: all stood
-    true_duration, true_step : of the simulation of the truth [s]
-    """
-
-    settlement: float
-    build: Callable[[Movement, int | None], Site]
-    duration: float = 1.0
-    step: float = 0.005
-    stood: int | None = None
-    battered: bool = True
-    true_duration: float = 1.0
-    true_step: float = 0.005
-
-    def heights(self, site: Site) -> dict[str, float]:
-        """Return by code of a stone on the ground its displacement upwards [m]."""
-        return {code: round(-self.settlement * share, 6) for code, share in site.settled.items()}
-
-    def sample(self, movement: Movement) -> Sample:
-        """Return the sample after a movement, the truth with the causes."""
-        site = self.build(movement, None)
-        last = self.stood or site.level_break
-        knowledge = "" if last is None else _PHASES.format(last=last)
-        return Sample(site.building.survey, _truth_of(site.building, self.heights(site)), knowledge)
-
-    def unmoved(self) -> Sample:
-        """Return the sample as it was laid."""
-        return self.sample({})
 
 
 @dataclass(frozen=True)
@@ -224,6 +167,7 @@ def _truth_of(
     building: Building,
     settlement: Mapping[str, float] = MappingProxyType({}),
     axes: Mapping[str, object] = MappingProxyType({}),
+    forces: Mapping[str, Sequence[float]] = MappingProxyType({}),
 ) -> str:
     """Return the true stones of a building, one to a line, with what has moved them and how, and the axes of ribs."""
     stones = [
@@ -238,6 +182,7 @@ def _truth_of(
     lines = ",\n".join(json.dumps(stone) for stone in stones)
     about = json.dumps(f"true geometry of the synthetic survey {building.survey.head.path}; metres")
     cause = f'"settlement": {json.dumps(dict(settlement))},\n' if settlement else ""
+    cause += f'"forces": {json.dumps(dict(forces))},\n' if forces else ""
     curves = f'"axes": {json.dumps(dict(axes))},\n' if axes else ""
     return f'{{\n"about": {about},\n{cause}{curves}"stones": [\n{lines}\n]\n}}\n'
 
@@ -250,57 +195,19 @@ def _motion_of(building: Building, code: str) -> dict[str, object]:
     return {name: (np.round(getattr(motion, name), 9) + 0.0).tolist() for name in ("rotation", "shift")}
 
 
-def _moved_wall(stones: int, shares: Sequence[float]) -> Callable[[Movement, int | None], Site]:
-    """Return the generator of a wall that has moved, with shares of the settlement from its corner inwards."""
-
-    def build(movement: Movement, measured: int | None) -> Site:
-        built = wall(stones, movement=movement, measured=measured)
-        settled, rival = (dict(zip(codes, shares, strict=False)) for codes in (built.base, built.base[::-1]))
-        return Site(built, settled, rival, wall_frame().axes[2])
-
-    return build
+def moved_sample(cause: Cause, movement: Movement) -> Sample:
+    """Return the sample of a building after a movement, the truth with its causes."""
+    site = cause.build(movement, None)
+    last = cause.stood or site.level_break
+    knowledge = "" if last is None else _PHASES.format(last=last)
+    truth = _truth_of(site.building, cause.heights(site), forces=cause.forces(site))
+    return Sample(site.building.survey, truth, knowledge)
 
 
-def _moved_tower(courses: int) -> Callable[[Movement, int | None], Site]:
-    """Return the generator of a storey of the tower that has moved."""
+def _moved(title: str, cause: Cause) -> SampleRecipe:
+    """Return the recipe of a building that has moved, which is made as it was laid."""
+    return SampleRecipe(title, "course = 1", lambda: moved_sample(cause, {}), cause=cause)
 
-    def build(movement: Movement, measured: int | None) -> Site:
-        storey = tower_storey(courses, movement=movement, measured=measured)
-        # through stones below the uppermost courses, which alone tie the facings
-        tied = f"depth > {_TIED} and course > {round(_HEADS * courses)}"
-        pushed = {f"zone = '{letter} outer' and {tied}": storey.outward[letter] for letter in "BC"}
-        laid = tower_storey(courses) if movement else storey
-        settled = _around(laid.building, storey.corners[0])
-        return Site(storey.building, settled, {}, storey.outward["A"], pushed, storey.level_break)
-
-    return build
-
-
-def _around(building: Building, corner: Array) -> dict[str, float]:
-    """Return shares of a settlement that falls off linearly from a corner of a building."""
-    solids = {solid.code: solid for solid in building.solids}
-    shares = {}
-    for code in building.base:
-        apart = solids[code].vertices.mean(axis=0) - corner
-        share = 1.0 - math.hypot(apart[0], apart[1]) / _REACH
-        if share > 0.0:
-            shares[code] = round(share, 3)
-    return shares
-
-
-_REACH = 2.5  # distance from the corner of the tower at which its settlement ends [m]
-_HEADS = 0.75  # share of the courses of the tower below the heads of its walls
-_TIED = 1.0  # depth beyond which a stone goes through the wall [m]
-
-_SETTLED = Cause(0.030, _moved_wall(90, (1.0, 2.0 / 3.0, 1.0 / 3.0)))
-_SETTLED_SMALL = Cause(0.030, _moved_wall(30, (1.0, 0.5)), 0.5, 0.02)
-_SETTLED_PHASES = Cause(0.020, _moved_wall(42, (1.0, 0.5)), 0.5, 0.02, stood=3)
-
-
-_TOWER_SETTLED, _TOWER_SMALL_SETTLED = (
-    Cause(0.030, _moved_tower(courses), 0.2, 0.05, battered=False, true_duration=0.2, true_step=0.025)
-    for courses in (40, 12)
-)
 
 SAMPLES: Mapping[str, SampleRecipe] = MappingProxyType(
     {
@@ -312,31 +219,16 @@ SAMPLES: Mapping[str, SampleRecipe] = MappingProxyType(
             _of(lambda: two_facings(4.0, 8).building),
             core=True,
         ),
+        "pushed": _moved("Wall that the thrust of a vault has pushed out", PUSHED),
         "ribvault": SampleRecipe("Rib vault", "kind = rib_springer", _rib_vault),
-        "settled": SampleRecipe(
-            "Wall whose left corner settled", "course = 1", _SETTLED.unmoved, cause=_SETTLED
+        "settled": _moved("Wall whose left corner settled", SETTLED),
+        "settled-phases": _moved(
+            "Wall whose left corner settled before its upper courses were laid", SETTLED_PHASES
         ),
-        "settled-phases": SampleRecipe(
-            "Wall whose left corner settled before its upper courses were laid",
-            "course = 1",
-            _SETTLED_PHASES.unmoved,
-            cause=_SETTLED_PHASES,
-        ),
-        "settled-small": SampleRecipe(
-            "Small wall whose left corner settled", "course = 1", _SETTLED_SMALL.unmoved, cause=_SETTLED_SMALL
-        ),
+        "settled-small": _moved("Small wall whose left corner settled", SETTLED_SMALL),
         "tower": SampleRecipe("Storey of a tower", "course = 1", _tower(40), core=True),
-        "tower-settled": SampleRecipe(
-            "Storey of a tower whose left corner settled",
-            "course = 1",
-            _TOWER_SETTLED.unmoved,
-            cause=_TOWER_SETTLED,
-        ),
-        "tower-settled-small": SampleRecipe(
-            "Storey of a tower, of twelve courses, whose left corner settled",
-            "course = 1",
-            _TOWER_SMALL_SETTLED.unmoved,
-            cause=_TOWER_SMALL_SETTLED,
+        "tower-settled-small": _moved(
+            "Storey of a tower, of twelve courses, whose left corner settled", TOWER_SMALL_SETTLED
         ),
         "tower-small": SampleRecipe(
             "Storey of a tower, of twelve courses", "course = 1", _tower(12), core=True

@@ -14,7 +14,7 @@ from survey.synthetic.bond import Line, PlannedStone, upright
 from survey.synthetic.building import Building, Draft, measured_building, observer
 from survey.synthetic.buildings.openings import Arch, Opening, plan_opening
 from survey.synthetic.coursing import CLEARANCES, Bed, Piece, fill_run, planned
-from survey.synthetic.frame import Movement, build_stone, wall_frame
+from survey.synthetic.frame import BATTER, Movement, build_stone, wall_frame
 
 __all__ = ["DEPTHS", "Course", "bed_heights", "plan_courses", "wall"]
 
@@ -53,6 +53,7 @@ def wall(
     arch: Arch | None = None,
     sag: float = 0.0,
     snecked: float = 0.0,
+    batter: float = BATTER,
     movement: Movement = MappingProxyType({}),
     measured: int | None = None,
 ) -> Building:
@@ -65,6 +66,7 @@ def wall(
     arch : of an opening in its middle; needs about 60 stones
     sag : by which beds sag over 10 m, along a parabola [m]; not together with an arch
     snecked : share of the stones that are two courses high [-]
+    batter : angle by which it leans back [rad]
     movement : of the stones since they were laid
     measured : seed of the joints, wear and noise alone, so that the same stones are measured again; None: as `seed`
 
@@ -88,7 +90,7 @@ def wall(
     plans = _outlines(courses, heights, sag)
     if opening is not None:
         plans += [(plan, (0, 1, 2, 3)) for plan in opening.voussoirs()]
-    frame = wall_frame()
+    frame = wall_frame(batter)
     drafts = []
     for plan, side_of in plans:
         stone = build_stone(plan, DEPTHS[plan.kind], frame, rng)

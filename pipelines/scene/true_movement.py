@@ -1,0 +1,82 @@
+"""Simulation of the true movement of a synthetic building by its cause."""
+
+import numpy as np
+
+from mechanics.results.result import Outcome
+from mechanics.scene.laws.elastic_joint import ElasticJoint
+from mechanics.scene.loads.forces import StoneForce
+from mechanics.scene.loads.load import Loads
+from mechanics.scene.loads.motions import settlement
+from mechanics.scene.loads.time_series import History
+from mechanics.scene.scene import Block, ContactSettings, Fidelity, Placement, Scene, Start, TimeSettings
+from mechanics.simulate import simulate
+from mechanics.stones.materials import Material
+from moma.errors import SolverError
+from pipelines.arrays import Array
+from survey.synthetic.causes import Cause
+from survey.synthetic.frame import Movement, RigidMotion
+
+__all__ = ["true_movement"]
+
+_LONGEST = 3.0  # duration of the simulation [s]
+_FRICTION = 0.6  # of all joints [-]
+
+
+def true_movement(cause: Cause) -> Movement:
+    """Simulate how the true stones of a building move by a cause.
+
+    Raises
+    ------
+    SolverError : they do not come to rest
+    """
+    site = cause.build({}, None)
+    building = site.building
+    limestone = Material("limestone", density=2350.0, young=12e9, poisson=0.2)
+    middle = building.solids[0].vertices[0]
+    course = {one.code: one.course or 0 for one in building.survey.blocks}
+    blocks = tuple(
+        Block(
+            one.code,
+            one.vertices - middle,
+            one.faces,
+            limestone,
+            Fidelity.FIXED if one.code in building.base else Fidelity.RIGID,
+        )
+        for one in building.solids
+        if cause.stood is None or course[one.code] <= cause.stood
+    )
+    motions = [
+        settlement([code], (0.0, 0.0, z), cause.true_duration) for code, z in cause.heights(site).items()
+    ]
+    forces = [
+        StoneForce(frozenset({code}), History.constant(np.array(force)))
+        for code, force in cause.forces(site).items()
+    ]
+    time = TimeSettings(step=cause.true_step, duration=_LONGEST, relaxation=True, start=Start.EQUILIBRIUM)
+    scene = Scene(
+        "movement",
+        blocks,
+        contact=_contact(cause),
+        time=time,
+        loads=Loads(motions=tuple(motions), forces=tuple(forces)),
+    )
+    result = simulate(scene)
+    if result.outcome is not Outcome.EQUILIBRIUM:
+        raise SolverError(
+            f"the stones of the sample do not come to rest: {result.outcome}", remedy="choose another sample"
+        )
+    return {body.code: _motion(body.reference + middle, body.position + middle) for body in result.bodies}
+
+
+def _contact(cause: Cause) -> ContactSettings:
+    if cause.stiffness is None:
+        return ContactSettings()
+    return ContactSettings(law=ElasticJoint(_FRICTION, *cause.stiffness), placement=Placement.CENTROID)
+
+
+def _motion(before: Array, after: Array) -> RigidMotion:
+    """Return the motion between two places (n, 3) of the corners of a rigid stone (Kabsch 1976)."""
+    first, second = before.mean(axis=0), after.mean(axis=0)
+    left, _, right = np.linalg.svd((after - second).T @ (before - first))
+    rotation = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+    return RigidMotion(rotation, second - rotation @ first)

@@ -1,0 +1,164 @@
+"""Buildings that have moved, each with the cause of its movement and with what else may have caused it."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from survey.arrays import Array
+from survey.synthetic.building import Building
+from survey.synthetic.buildings.tower import tower_storey
+from survey.synthetic.buildings.walls import wall
+from survey.synthetic.frame import Movement, wall_frame
+
+__all__ = [
+    "PUSHED",
+    "SETTLED",
+    "SETTLED_PHASES",
+    "SETTLED_SMALL",
+    "TOWER_SMALL_SETTLED",
+    "Cause",
+    "Site",
+]
+
+
+_REACH = 2.5  # distance from the corner of the tower at which its settlement ends [m]
+_HEADS = 0.75  # share of the courses of the tower below the heads of its walls
+_TIED = 1.0  # depth beyond which a stone goes through the wall [m]
+
+
+@dataclass(frozen=True)
+class Site:
+    """A building at the time of its movement, with what may have moved it.
+
+    Attributes
+    ----------
+    building : measured
+    settled : by code of a stone on the ground its share of the settlement of the left corner, which is the cause [-]
+    rival : the same of the right corner, which did not settle; empty if that is not suspected
+    axis : (3,) about which the base may have tilted [-]
+    pushed : by code or query expression of stones the direction (3,) in which the thrust of a vault may have pushed
+        them; empty if there is no vault
+    level_break : last course of the first phase of a building that stood as a whole; None: it has one phase
+    """
+
+    building: Building
+    settled: Mapping[str, float]
+    rival: Mapping[str, float]
+    axis: Array
+    pushed: Mapping[str, Array] = field(default_factory=dict)
+    level_break: int | None = None
+
+
+@dataclass(frozen=True)
+class Cause:
+    """Settlement of the left corner, or thrust of a vault, and the building that it moves.
+
+    Attributes
+    ----------
+    settlement : of the ground at the corner, downwards [m]
+    build : the building after a movement; the same is measured again with the seed that may be given
+    duration : of the settlement in the scene [s]
+    step : of the scene [s]
+    stood : last course that stood when the ground settled; those above were laid later, level, in a phase of their
+        own; None: all stood
+    true_duration, true_step : of the simulation of the truth [s]
+    """
+
+    settlement: float
+    build: Callable[[Movement, int | None], Site]
+    duration: float = 1.0
+    step: float = 0.005
+    stood: int | None = None
+    thrust: float = 0.0
+    most: float = 2000.0
+    stiffness: tuple[float, float] | None = None
+    battered: bool = True
+    true_duration: float = 1.0
+    true_step: float = 0.005
+
+    def heights(self, site: Site) -> dict[str, float]:
+        """Return by code of a stone on the ground its displacement upwards [m]."""
+        if not self.settlement:
+            return {}
+        return {code: round(-self.settlement * share, 6) for code, share in site.settled.items()}
+
+    def forces(self, site: Site) -> dict[str, tuple[float, float, float]]:
+        """Return by code of a stone the force of the vault [N]."""
+        if not self.thrust:
+            return {}
+        outward = {code: np.round(self.thrust * out, 3) + 0.0 for code, out in site.pushed.items()}
+        return {code: (float(x), float(y), float(z)) for code, (x, y, z) in outward.items()}
+
+
+def _moved_wall(stones: int, shares: Sequence[float]) -> Callable[[Movement, int | None], Site]:
+    """Return the generator of a wall that has moved, with shares of the settlement from its corner inwards."""
+
+    def build(movement: Movement, measured: int | None) -> Site:
+        built = wall(stones, movement=movement, measured=measured)
+        settled, rival = (dict(zip(codes, shares, strict=False)) for codes in (built.base, built.base[::-1]))
+        return Site(built, settled, rival, wall_frame().axes[2])
+
+    return build
+
+
+def _pushed_wall(stones: int) -> Callable[[Movement, int | None], Site]:
+    """Return the generator of a plumb wall against which a vault leans below its uppermost course."""
+
+    def build(movement: Movement, measured: int | None) -> Site:
+        built = wall(stones, batter=0.0, movement=movement, measured=measured)
+        frame = wall_frame(0.0)
+        last = max(one.course or 0 for one in built.survey.blocks)
+        pushed = {one.code: frame.axes[2] for one in built.survey.blocks if one.course == last - 1}
+        settled = dict(zip(built.base, (1.0, 0.5), strict=False))
+        return Site(built, settled, {}, frame.axes[0], pushed)
+
+    return build
+
+
+def _moved_tower(courses: int) -> Callable[[Movement, int | None], Site]:
+    """Return the generator of a storey of the tower that has moved."""
+
+    def build(movement: Movement, measured: int | None) -> Site:
+        storey = tower_storey(courses, movement=movement, measured=measured)
+        # through stones below the uppermost courses, which alone tie the facings
+        tied = f"depth > {_TIED} and course > {round(_HEADS * courses)}"
+        pushed = {f"zone = '{letter} outer' and {tied}": storey.outward[letter] for letter in "BC"}
+        laid = tower_storey(courses) if movement else storey
+        settled = _around(laid.building, storey.corners[0])
+        return Site(storey.building, settled, {}, storey.outward["A"], pushed, storey.level_break)
+
+    return build
+
+
+def _around(building: Building, corner: Array) -> dict[str, float]:
+    """Return shares of a settlement that falls off linearly from a corner of a building."""
+    solids = {solid.code: solid for solid in building.solids}
+    shares = {}
+    for code in building.base:
+        apart = solids[code].vertices.mean(axis=0) - corner
+        share = 1.0 - math.hypot(apart[0], apart[1]) / _REACH
+        if share > 0.0:
+            shares[code] = round(share, 3)
+    return shares
+
+
+SETTLED = Cause(0.030, _moved_wall(90, (1.0, 2.0 / 3.0, 1.0 / 3.0)))
+SETTLED_SMALL = Cause(0.030, _moved_wall(30, (1.0, 0.5)), 0.5, 0.02)
+SETTLED_PHASES = Cause(0.020, _moved_wall(42, (1.0, 0.5)), 0.5, 0.02, stood=3)
+
+PUSHED = Cause(
+    0.0,
+    _pushed_wall(60),
+    0.5,
+    0.05,
+    thrust=900.0,
+    most=1200.0,
+    stiffness=(5e8, 2e8),
+    battered=False,
+    true_step=0.02,
+)
+TOWER_SMALL_SETTLED = Cause(
+    0.030, _moved_tower(12), 0.2, 0.05, battered=False, true_duration=0.2, true_step=0.025
+)
