@@ -63,6 +63,10 @@ class Cause:
     step : of the scene [s]
     stood : last course that stood when the ground settled; those above were laid later, level, in a phase of their
         own; None: all stood
+    thrust : with which a vault pushes each of `Site.pushed` [N]
+    most : thrust that a diagnosis considers [N]
+    stiffness : across and along the joints, per area; None: rigid joints [Pa/m]
+    battered : the walls may have been built leaning
     true_duration, true_step : of the simulation of the truth [s]
     """
 
