@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from sqlalchemy.orm import Session
 
 from archmodel.query.attributes import ATTRIBUTES
-from archmodel.tables.entities import Entity, canon_of, kind_named
-from archmodel.tables.hierarchy import definition_of, kind_chain, kind_of, kinds_in
+from archmodel.tables.entities import Entity, canon_of
+from archmodel.tables.hierarchy import Kind, definition_of, kind_among, kind_chain, kind_of, kinds_in
 from archmodel.tables.structures import Structure
 
 __all__ = ["RELATION_DEFINITIONS", "schema"]
@@ -28,7 +28,7 @@ def schema(session: Session | None = None, kind: str | None = None) -> dict[str,
     Parameters
     ----------
     session : of a database whose registered kinds are shown too
-    kind : only this kind and its subkinds
+    kind : only this kind, of entities or of structures, and its subkinds
 
     Returns
     -------
@@ -36,24 +36,31 @@ def schema(session: Session | None = None, kind: str | None = None) -> dict[str,
         ``kinds``: a tree of {kind, definition, registered, canonical, attributes: [{name, unit, definition}], kinds},
         in which attributes and canonical proportions are inherited; and, without `kind`, ``attributes`` of every
         entity, ``structures`` (each {kind, definition, registered, parent}, general before particular) and
-        ``relations``
+        ``relations``; of a kind of structure, no ``kinds`` but its ``structures``
 
     Raises
     ------
     UsageError
         if there is no such kind
     """
-    known = frozenset(kinds_in(session, Entity).values())
-    root = Entity if kind is None else kind_named(kind)
-    tree = {"kinds": [_branch(root, known, whole=kind is not None)]}
+    of_entities, of_structures = kinds_in(session, Entity), kinds_in(session, Structure)
+    known: dict[str, type[Kind]] = {**of_entities, **of_structures}
+    name = kind_of(Entity if kind is None else kind_among(known, kind))
+    tree: dict[str, object] = {"kinds": []}
+    if name in of_entities:
+        whole = kind is not None
+        tree["kinds"] = [_branch(of_entities[name], frozenset(of_entities.values()), whole)]
+    else:
+        below = [cls for cls in of_structures.values() if issubclass(cls, of_structures[name])]
+        tree["structures"] = [_kind_of_structure(cls) for cls in below]
     if kind is not None:
-        return dict(tree)
+        return tree
     return {
         **tree,
         "attributes": [
             {"name": one.name, "unit": one.unit, "definition": one.definition} for one in ATTRIBUTES.values()
         ],
-        "structures": [_kind_of_structure(cls) for cls in kinds_in(session, Structure).values()],
+        "structures": [_kind_of_structure(cls) for cls in of_structures.values()],
         "relations": [
             {"relation": name, "definition": meaning} for name, meaning in RELATION_DEFINITIONS.items()
         ],

@@ -16,7 +16,8 @@ from archmodel.query.scope import Context, Scope
 from archmodel.tables.entities import Entity, kind_named
 from archmodel.tables.hierarchy import kinds_below
 from archmodel.tables.registered import refuse_unknown_kinds
-from moma.errors import DatabaseError, QueryError
+from archmodel.tables.structures import structure_kinds
+from moma.errors import DatabaseError, QueryError, UsageError
 
 __all__ = [
     "MAX_EXPRESSIONS",
@@ -197,7 +198,13 @@ def _select(
 
 def _of_kind(scope: Scope, kind: str) -> list[ColumnElement[bool]]:
     """Return the conditions that restrict entities to a kind and its subkinds; none where every entity is one."""
-    cls = kind_named(kind)
+    try:
+        cls = kind_named(kind)
+    except UsageError as error:
+        if kind not in structure_kinds():
+            raise
+        remedy = f'ask for its stones: entity, where "member_of(is_a({kind}))"'
+        raise UsageError(f"{error.what}: it is a kind of structure", remedy=remedy) from None
     if cls is Entity:
         return []
     return [scope.entity.c.kind.in_(kinds_below(cls))]

@@ -33,7 +33,8 @@ def schema_lines(schema: Branch) -> Iterator[str]:
         yield from _kind_lines(root, "", "")
     for title, key, name in (("Structures", "structures", "kind"), ("Relations", "relations", "relation")):
         if key in schema:
-            yield ""
+            if schema["kinds"]:
+                yield ""
             yield title
             width = max(len(one[name]) for one in schema[key])
             yield from (f"  {one[name]:<{width}}  {_origin(one)}{one['definition']}" for one in schema[key])

@@ -114,6 +114,9 @@ def test_a_registered_kind_of_structure_is_listed_with_its_parent(empty: Databas
         entry = new_entry(session, "declaration", "field book")
         register_kind(session, entry, "wall_rib", "rib", "A rib where a web meets a wall: formeret.")
         tree: Any = schema(session)
+        ribs: Any = schema(session, "rib")
+    assert [one["kind"] for one in ribs["structures"]] == ["rib", "wall_rib"]
+    assert next(schema_lines(ribs)) == "Structures"
     listed = {one["kind"]: (one["registered"], one["parent"]) for one in tree["structures"]}
     assert (listed["structure"], listed["rib"]) == ((False, None), (False, "structure"))
     assert listed["wall_rib"] == (True, "rib")
