@@ -172,31 +172,33 @@ def run_geology(
 
     Raises
     ------
-    UsageError : the folder holds other files or an unfinished run, or the scene is not that of the run to be resumed
+    UsageError : the folder holds other files or an unfinished run, or the scene is not that of the run to be resumed;
+        the folder of samples cannot be written
     SceneError : with file and line, at the first mistake
     SolverError : if the motion is no longer finite
     DatabaseError : the database cannot be opened, or not written at the end; the folder is complete then
     """
     folder, scene = Path(folder), read_geology(path, kind)
     check_replaceable(folder)
-    sample = prepare(scene, Path(samples) if samples is not None else folder.parent / _SAMPLES, progress)
-    planar = planar_scene(scene, sample)
-    observation = _observation(scene, sample, planar, folder / UNFINISHED)
-    observers = (
-        PlanarObserver(scene.output.every, observation.row),
-        PlanarObserver(scene.output.fields_every, observation.fields),
-    )
     summary: dict[str, Any] = {}
     rows: dict[str, dict[str, Array]] = {}
     number: int | None = None
-
-    def write(fresh: Path, result: PlanarResult, archive: UnfinishedRun) -> None:
-        progress(Progress("write", 0, 1, "results"))
-        rows.update(observation.rows(scene.output.every))
-        instants = observation.instants(scene.output.fields_every)
-        summary.update(write_results(fresh, scene, sample, result, rows, instants, archive))
-
+    # a database that cannot be opened is told before anything is deposited
     with nullcontext() if url is None else open_database(url) as database:
+        sample = prepare(scene, Path(samples) if samples is not None else folder.parent / _SAMPLES, progress)
+        planar = planar_scene(scene, sample)
+        observation = _observation(scene, sample, planar, folder / UNFINISHED)
+        observers = (
+            PlanarObserver(scene.output.every, observation.row),
+            PlanarObserver(scene.output.fields_every, observation.fields),
+        )
+
+        def write(fresh: Path, result: PlanarResult, archive: UnfinishedRun) -> None:
+            progress(Progress("write", 0, 1, "results"))
+            rows.update(observation.rows(scene.output.every))
+            instants = observation.instants(scene.output.fields_every)
+            summary.update(write_results(fresh, scene, sample, result, rows, instants, archive))
+
         with scene.document.at(kind):
             result, _ = run_planar(
                 planar, folder, resume, scene.output.checkpoint, progress, stop, observers, write

@@ -10,6 +10,7 @@ import numpy as np
 from mechanics.arrays import Array, Ints
 from mechanics.dynamics.progress import Listener, silent
 from mechanics.planar.deposit import Deposit, deposit
+from moma.errors import UsageError
 from pipelines.geology.file import GeologyScene
 
 __all__ = ["PreparedSample", "prepare"]
@@ -37,7 +38,13 @@ class PreparedSample:
 
 
 def prepare(scene: GeologyScene, cache: Path, progress: Listener = silent) -> PreparedSample:
-    """Take the sample of a scene out of the cache, or deposit it and keep it there."""
+    """Take the sample of a scene out of the cache, or deposit it and keep it there.
+
+    Raises
+    ------
+    UsageError : the cache cannot be written; said before anything is deposited
+    SceneError : the sample cannot be deposited
+    """
     asked, own = scene.sample, scene.experiment
     x = np.linspace(0.0, own.length, 1001)
     settings = {
@@ -54,6 +61,7 @@ def prepare(scene: GeologyScene, cache: Path, progress: Listener = silent) -> Pr
     path = cache / f"{digest}.npz"
     found = _stored(path)
     if found is None:
+        _make(cache)
         with scene.document.at("sample"):
             found = deposit(
                 Deposit(
@@ -72,7 +80,6 @@ def prepare(scene: GeologyScene, cache: Path, progress: Listener = silent) -> Pr
                 ),
                 progress,
             )
-        cache.mkdir(parents=True, exist_ok=True)
         fresh = path.with_suffix(".new.npz")
         np.savez(fresh, centre=found[0], radius=found[1])
         fresh.replace(path)
@@ -80,6 +87,17 @@ def prepare(scene: GeologyScene, cache: Path, progress: Listener = silent) -> Pr
     part = centre[:, 1] / own.highest
     layer = np.clip((part * asked.layers).astype(np.int64), 0, asked.layers - 1)
     return PreparedSample(centre, radius, layer, digest)
+
+
+def _make(cache: Path) -> None:
+    try:
+        cache.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(
+            f"the samples cannot be kept here: {error.strerror}",
+            where=str(cache),
+            remedy="name another folder: --samples DIR",
+        ) from error
 
 
 def _stored(path: Path) -> tuple[Array, Array] | None:

@@ -10,12 +10,13 @@ import time
 import numpy as np
 import pytest
 
-from benchmarks import fc3d, lmgc90, report
+from benchmarks import fc3d, geology, lmgc90, report
 from benchmarks.generated import rigid_scenes, running_bond
 from benchmarks.report import commit, progress, table_lines, write_between
 from benchmarks.scenes import write_scene
 from benchmarks.siconos_child import timed
 from moma.errors import UsageError
+from pipelines.geology.file import read_geology
 from tests.paths import ROOT
 
 SIDES = (
@@ -187,6 +188,25 @@ def test_tables_are_written_between_their_marks_with_the_commit(tmp_path):
 def test_the_page_has_a_place_for_each_table(name):
     text = (ROOT / "benchmarks" / "README.md").read_text(encoding="utf-8")
     assert text.count(f"<!-- {name} -->") == text.count(f"<!-- /{name} -->") == 1
+
+
+@pytest.mark.parametrize(("options", "length", "share"), [(["--full"], 150.0, 1.0), ([], 47.43, 0.3162)])
+def test_faults_have_the_cohesion_of_the_paper_for_the_weight_of_their_cover(
+    tmp_path, monkeypatch, options, length, share
+):
+    made = []
+    monkeypatch.setattr(
+        geology, "run_geology", lambda path, kind, *_, **__: made.append(read_geology(path, kind))
+    )
+    monkeypatch.setattr(
+        sys, "argv", ["geology", *options, "--only", "fault", "--seeds", "2", "--out", str(tmp_path)]
+    )
+    geology.main()
+    assert [one.contact.cohesion for one in made[:4]] == [share * gamma for gamma in (0.0, 1e3, 1e4, 1e5)]
+    assert {one.sample.seed for one in made} == {2}
+    assert {one.experiment.length for one in made} == {length}
+    # ten times the sweeps are run with a tenth of the disks alone
+    assert len(made) == (4 if options else 5)
 
 
 @pytest.mark.slow

@@ -13,7 +13,7 @@ from mechanics.planar.model import build_planar_model
 from mechanics.planar.scene import Disk, PlanarScene, PlanarTime
 from mechanics.planar.simulate import simulate_planar
 from moma.cli.geology import Experiment
-from moma.errors import SceneError
+from moma.errors import MomaError, SceneError
 from pipelines.geology.file import EXPERIMENTS, parse_geology, read_geology
 from pipelines.geology.observe import CELL_COLUMNS, Fields, read_rows
 from pipelines.geology.results import quality_of
@@ -212,6 +212,28 @@ def test_a_sample_is_made_once(tmp_path):
     assert sorted(set(first.layer.tolist())) == [0, 1, 2]
     path.write_bytes(b"cut short")
     assert np.array_equal(prepare(scene, tmp_path).centre, first.centre)
+
+
+@pytest.mark.parametrize(
+    ("samples", "url", "said"),
+    [
+        ("taken", None, "the samples cannot be kept here"),
+        ("samples", "none/geology.db", "there is no folder"),
+    ],
+)
+def test_places_that_cannot_be_written_are_refused_before_a_sample_is_deposited(
+    tmp_path, monkeypatch, samples, url, said
+):
+    def refuse(*_):
+        raise AssertionError("deposits")
+
+    monkeypatch.setattr("pipelines.geology.sample.deposit", refuse)
+    (tmp_path / "taken").write_text("", encoding="utf-8")
+    scene = tmp_path / "fault.toml"
+    scene.write_text(SMALL, encoding="utf-8")
+    database = None if url is None else f"sqlite:///{tmp_path / url}"
+    with pytest.raises(MomaError, match=said):
+        run_geology(scene, "fault", tmp_path / "out", tmp_path / samples, url=database)
 
 
 def test_a_run_leaves_rows_of_its_cells_fields_and_a_summary(tmp_path):
