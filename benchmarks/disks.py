@@ -1,7 +1,7 @@
 """Disks at rest, 1,000 to 200,000, per contact and sweep: `python -m benchmarks.disks [--disks N …] [--json]`.
 
 Beside Chipmunk (`pip install pymunk`), where it is installed, with as many iterations of its sequential impulses:
-for each number of disks right after ours, in a process of its own.
+for each number of disks right after ours, in a process of its own, up to `--theirs` disks.
 """
 
 import resource
@@ -58,6 +58,7 @@ def main() -> None:
     """Print a row for each number of disks."""
     parser = options_of("disks", __doc__)
     parser.add_argument("--disks", nargs="+", type=int, default=[1000, 4000, 15000, 43000, 200000])
+    parser.add_argument("--theirs", type=int, default=50_000, help="most disks with which Chipmunk is timed")
     options = parser.parse_args()
     centre, radius, length = _sample()
     _ours(centre, radius, length, 1)
@@ -72,7 +73,7 @@ def main() -> None:
         grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - begin
         # what the first, small ones take was taken by compiling already
         row["memory"] = grown / len(radii) if grown else None
-        if find_spec("pymunk"):
+        if find_spec("pymunk") and len(radii) <= options.theirs:
             progress(f"{len(radii):,} disks: {row['step']:.3g} ms a step; Chipmunk")
             # in another process, so that its memory is not counted as ours
             with ProcessPoolExecutor(1, get_context("spawn")) as apart:
