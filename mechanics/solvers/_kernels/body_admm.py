@@ -7,9 +7,11 @@ where z = P_K(x) holds the impulses and û = -σ y the velocities that are dual 
     q = z - y - (u_free + bias n + μ‖û_T‖ n) / σ,     (M + H Σ⁻¹ Hᵀ) v = H q,     r = q - Hᵀ v / σ
     x ← y + ω r + (1 - ω) z
 
-and one pass over the contacts on either side of the solution for v makes it. What is solved for is the change of v,
-from H q - (M + H Σ⁻¹ Hᵀ) v, so that factors of single precision lose nothing: each iteration corrects the last one's
-errors. Contacts of the same two bodies follow each other, so the bodies' velocities and sums stay in registers.
+and one pass over the contacts, between two solutions for v, makes it: the x that it finds gives the next q. What is
+solved for is the change of v, from H q - (M + H Σ⁻¹ Hᵀ) v, so that factors of single precision lose nothing: each
+iteration corrects the last one's errors. Contacts of the same two bodies follow each other in runs, so the bodies'
+velocities and sums stay in registers. Runs of one part of the bodies (`body_parts`) touch no other part, so that parts
+may be taken at once.
 """
 
 from typing import NamedTuple
@@ -21,28 +23,70 @@ from numpy.typing import NDArray
 from mechanics.contact._kernels.vectors import cross, dot, row, write_row
 from mechanics.delassus._kernels.sides import inverse_columns
 from mechanics.problem._kernels import onto_cone
-from mechanics.solvers._kernels.body_cholesky import Panels, solve
+from mechanics.solvers._kernels.body_cholesky import Panels, backward, forward
+from mechanics.solvers._kernels.body_parts import Parts
 
 __all__ = [
+    "ADHESION",
+    "ARM",
+    "BLOCK",
+    "COHESION",
+    "FRICTION",
+    "ROWS",
+    "SHIFT",
+    "SOFT",
     "Acceleration",
     "Factors",
     "Iterate",
+    "Runs",
     "Touching",
     "advance",
     "assemble",
+    "begin",
+    "between",
     "broken_laws",
+    "down",
     "masses",
+    "packed",
     "projected",
     "to_local",
     "to_world",
+    "up",
 ]
 
 # regularisation of the extrapolation's normal equations over their trace [-]
 _REGULAR = 1e-10
 # numbers of a vector that are combined at once
 _PIECE = 1024
+# places of a block: a multiple of what a processor multiplies at once, so few that a block stays in the fastest memory
+BLOCK = 64
+# rows of a block of a field, and where the vectors and numbers of contacts begin
+ROWS = 13
+_NORMAL, ARM, SHIFT, FRICTION, COHESION, ADHESION, SOFT = 0, 3, 6, 9, 10, 11, 12
 # growth of the change of an iteration from which earlier ones mislead [-]
 _WORSE = 2.0
+
+
+class Runs(NamedTuple):
+    """Runs of contacts of the same two bodies, in blocks of `BLOCK` places, of which some at the end may be empty.
+
+    Attributes
+    ----------
+    begin, end : (nr,) int64, first place of each run, and the one after the last
+    body : (nr, 2) int64, the two bodies in the order of elimination, -1: does not move
+    sum : (nr, 2) int64, where what the run exerts on them adds up, as in `Parts`
+    offset : (nr, 3) float64, the candidate's arms less the antagonist's, which all contacts of a run share [m]
+    block : (n+1,) int64, first run of each block
+    part : (k+2,) int64, first block of each part; the last holds those between bodies of no part
+    """
+
+    begin: NDArray[np.int64]
+    end: NDArray[np.int64]
+    body: NDArray[np.int64]
+    sum: NDArray[np.int64]
+    offset: NDArray[np.float64]
+    block: NDArray[np.int64]
+    part: NDArray[np.int64]
 
 
 class Touching(NamedTuple):
@@ -50,22 +94,14 @@ class Touching(NamedTuple):
 
     Attributes
     ----------
-    side : (nc, 2) int64, place of the two bodies in the order of elimination, -1: does not move
-    normal : (nc, 3) float64 [-]
-    arm : (nc, 6) float64, from the two centres of mass [m]
-    shift : (nc, 3) float64, u_free + bias n [m/s]
-    friction, cohesion, adhesion : (nc,) float64, μ [-], k and s [N s]
-    soft : (nc,) float64, 1/σ [kg]
+    runs : of the contacts
+    field : (n ROWS BLOCK,) float64, block by block, and row by row in it, one number for each place: normal n [-], the
+        arm from the candidate's centre of mass [m], shift u_free + bias n [m/s], friction μ [-], cohesion k and
+        adhesion s [N s], and 1/σ [kg], which is 0 where a place is empty, like all else
     """
 
-    side: NDArray[np.int64]
-    normal: NDArray[np.float64]
-    arm: NDArray[np.float64]
-    shift: NDArray[np.float64]
-    friction: NDArray[np.float64]
-    cohesion: NDArray[np.float64]
-    adhesion: NDArray[np.float64]
-    soft: NDArray[np.float64]
+    runs: Runs
+    field: NDArray[np.float64]
 
 
 class Iterate(NamedTuple):
@@ -73,14 +109,16 @@ class Iterate(NamedTuple):
 
     Attributes
     ----------
-    x, z, q : (nc, 3) float64, as above [N s]; z and q belong to the x of the iteration before
+    x : (3 n BLOCK,) float64, as above, in blocks of three rows [N s]
+    way : alike, q - z [N s]
     velocity : (6 nm,) float64, v in the order of elimination [m/s], [rad/s]
+    load : (6 (nm + (k+1) ns),) float64, H q - (M + H Σ⁻¹ Hᵀ) v by bodies, and by copies of those between the k parts
     """
 
     x: NDArray[np.float64]
-    z: NDArray[np.float64]
-    q: NDArray[np.float64]
+    way: NDArray[np.float64]
     velocity: NDArray[np.float64]
+    load: NDArray[np.float64]
 
 
 class Factors(NamedTuple):
@@ -88,12 +126,13 @@ class Factors(NamedTuple):
 
     Attributes
     ----------
-    panels : their pattern
+    panels, parts : their pattern
     value : as `factorise` leaves them, of single or double precision
     mass : (nm, 6, 6) float64, M in the order of elimination [kg], [kg m²]
     """
 
     panels: Panels
+    parts: Parts
     value: NDArray[np.floating]
     mass: NDArray[np.float64]
 
@@ -161,6 +200,52 @@ def _add_product(block, a, b, weight):
         block[3 + i, 3 + i] += weight * along
 
 
+@njit(cache=True, inline="always")
+def _vector(rows, at):
+    """Return a vector of a block."""
+    return rows[at], rows[at + BLOCK], rows[at + 2 * BLOCK]
+
+
+@njit(cache=True)
+def packed(sizes, part, parts):  # pragma: no cover - compiled
+    """Return where runs begin among the places of blocks, so that none lies in two blocks and no block in two parts.
+
+    Inputs
+    ------
+    sizes : (nr,) int64, contacts of each run, `BLOCK` at most
+    part : (nr,) int64, their part, in order
+    parts : int64, number of the parts
+
+    Outputs
+    -------
+    begin : (nr,) int64
+    block : (n+1,) int64, first run of each block
+    of_part : (parts+1,) int64, first block of each part
+    """
+    count = sizes.shape[0]
+    begin, block, of_part = (
+        np.empty(count, np.int64),
+        np.empty(count + 1, np.int64),
+        np.empty(parts + 1, np.int64),
+    )
+    blocks, used, reached = 0, BLOCK, 0
+    for g in range(count):
+        new = used + sizes[g] > BLOCK
+        while reached <= part[g]:
+            of_part[reached] = blocks
+            reached, new = reached + 1, True
+        if new:
+            block[blocks] = g
+            blocks, used = blocks + 1, 0
+        begin[g] = BLOCK * (blocks - 1) + used
+        used += sizes[g]
+    while reached <= parts:
+        of_part[reached] = blocks
+        reached += 1
+    block[blocks] = count
+    return begin, block[: blocks + 1].copy(), of_part
+
+
 @njit(cache=True)
 def assemble(touching, mass, panels, value):  # pragma: no cover - compiled
     """Write the panels of M + H Σ⁻¹ Hᵀ.
@@ -181,21 +266,21 @@ def assemble(touching, mass, panels, value):  # pragma: no cover - compiled
     own = mass.copy()
     for s in range(body.shape[0] - 1):
         owner[body[s] : body[s + 1]] = s
-    side, nc, c = touching.side, touching.side.shape[0], 0
+    runs, field = touching.runs, touching.field
     between = np.zeros((6, 6))
-    while c < nc:
-        i, j = side[c, 0], side[c, 1]
+    for g in range(runs.body.shape[0]):
+        i, j = runs.body[g]
         between[:] = 0.0
-        while c < nc and side[c, 0] == i and side[c, 1] == j:
-            arms, weight = touching.arm[c], touching.soft[c]
-            a, b = (arms[0], arms[1], arms[2]), (arms[3], arms[4], arms[5])
+        for c in range(runs.begin[g], runs.end[g]):
+            at = ROWS * BLOCK * (c // BLOCK) + c % BLOCK
+            a, weight = _vector(field, at + ARM * BLOCK), field[at + SOFT * BLOCK]
+            b = a[0] - runs.offset[g, 0], a[1] - runs.offset[g, 1], a[2] - runs.offset[g, 2]
             if i >= 0:
                 _add_product(own[i], a, a, weight)
             if j >= 0:
                 _add_product(own[j], b, b, weight)
             if i >= 0 and j >= 0:
                 _add_product(between, a, b, weight)
-            c += 1
         if i < 0 or j < 0:
             continue
         early, late = min(i, j), max(i, j)
@@ -236,102 +321,235 @@ def _speeds(v, k):
 
 
 @njit(cache=True)
-def _push(iterate, load, touching, mass):
-    """Write z and q of an iterate, and H q - (M + H Σ⁻¹ Hᵀ) v into `load` (6 nm,)."""
-    x, kept, q, v = iterate.x, iterate.z, iterate.q, iterate.velocity
-    side, normal, arm, shift = touching.side, touching.normal, touching.arm, touching.shift
-    friction, cohesion, soft_of = touching.friction, touching.cohesion, touching.soft
-    for k in range(mass.shape[0]):
-        for p in range(6):
-            total = 0.0
-            for b in range(6):
-                total -= mass[k, p, b] * v[6 * k + b]
-            load[6 * k + p] = total
-    nc, c = side.shape[0], 0
-    while c < nc:
-        i, j = side[c, 0], side[c, 1]
-        f0 = f1 = f2 = m0 = m1 = m2 = w0 = w1 = w2 = 0.0
-        one, other = _speeds(v, i), _speeds(v, j)
-        v0, v1, v2 = one[0] - other[0], one[1] - other[1], one[2] - other[2]
-        v3, v4, v5, o3, o4, o5 = one[3], one[4], one[5], other[3], other[4], other[5]
-        while c < nc and side[c, 0] == i and side[c, 1] == j:
-            n, p, soft = row(normal, c), row(x, c), soft_of[c]
-            along = dot(p, n)
-            t = p[0] - along * n[0], p[1] - along * n[1], p[2] - along * n[2]
-            most = friction[c] * along + cohesion[c]
-            if along >= 0.0 and most >= 0.0 and dot(t, t) <= most * most:
-                # sticks: z = x and y = 0, as for most contacts of a wall
-                z, g0, g1, g2 = p, p[0], p[1], p[2]
-            else:
-                size = np.sqrt(dot(t, t))
-                height, radius = onto_cone(along, size, friction[c], cohesion[c])
-                shrink = radius / size if size > 0.0 else 0.0
-                z = (
-                    shrink * t[0] + height * n[0],
-                    shrink * t[1] + height * n[1],
-                    shrink * t[2] + height * n[2],
-                )
-                lag = friction[c] * (1.0 - shrink) * size
-                g0 = 2.0 * z[0] - p[0] - lag * n[0]
-                g1 = 2.0 * z[1] - p[1] - lag * n[1]
-                g2 = 2.0 * z[2] - p[2] - lag * n[2]
-            kept[c, 0], kept[c, 1], kept[c, 2] = z
-            g0 -= shift[c, 0] * soft
-            g1 -= shift[c, 1] * soft
-            g2 -= shift[c, 2] * soft
-            q[c, 0], q[c, 1], q[c, 2] = g0, g1, g2
-            a = arm[c]
-            g0 -= soft * (v0 + v4 * a[2] - v5 * a[1] - o4 * a[5] + o5 * a[4])
-            g1 -= soft * (v1 + v5 * a[0] - v3 * a[2] - o5 * a[3] + o3 * a[5])
-            g2 -= soft * (v2 + v3 * a[1] - v4 * a[0] - o3 * a[4] + o4 * a[3])
-            f0 += g0
-            f1 += g1
-            f2 += g2
-            m0 += a[1] * g2 - a[2] * g1
-            m1 += a[2] * g0 - a[0] * g2
-            m2 += a[0] * g1 - a[1] * g0
-            w0 += a[4] * g2 - a[5] * g1
-            w1 += a[5] * g0 - a[3] * g2
-            w2 += a[3] * g1 - a[4] * g0
-            c += 1
-        if i >= 0:
-            to = load[6 * i : 6 * i + 6]
-            to[0] += f0
-            to[1] += f1
-            to[2] += f2
-            to[3] += m0
-            to[4] += m1
-            to[5] += m2
-        if j >= 0:
-            to = load[6 * j : 6 * j + 6]
-            to[0] -= f0
-            to[1] -= f1
-            to[2] -= f2
-            to[3] -= w0
-            to[4] -= w1
-            to[5] -= w2
+def _velocities(block, v, touching, room):
+    """Write Hᵀ v of the contacts of a block into the first three rows of `room` (6 BLOCK,)."""
+    runs, base = touching.runs, BLOCK * block
+    for g in range(runs.block[block], runs.block[block + 1]):
+        one, other, s = _speeds(v, runs.body[g, 0]), _speeds(v, runs.body[g, 1]), row(runs.offset, g)
+        # the arm of the antagonist is that of the candidate less a vector that all of a run share
+        c0 = one[0] - other[0] + other[4] * s[2] - other[5] * s[1]
+        c1 = one[1] - other[1] + other[5] * s[0] - other[3] * s[2]
+        c2 = one[2] - other[2] + other[3] * s[1] - other[4] * s[0]
+        w0, w1, w2 = one[3] - other[3], one[4] - other[4], one[5] - other[5]
+        for c in range(runs.begin[g] - base, runs.end[g] - base):
+            room[c], room[BLOCK + c], room[2 * BLOCK + c] = c0, c1, c2
+            room[3 * BLOCK + c], room[4 * BLOCK + c], room[5 * BLOCK + c] = w0, w1, w2
+    _turned(room, touching.field[ROWS * base : ROWS * (base + BLOCK)])
+
+
+@njit(cache=True, fastmath={"contract"})
+def _turned(room, field):
+    """Add the rotations in the last three rows of `room`, about the arms, to the velocities in the first three."""
+    for c in range(BLOCK):
+        a0, a1, a2 = field[ARM * BLOCK + c], field[(ARM + 1) * BLOCK + c], field[(ARM + 2) * BLOCK + c]
+        w0, w1, w2 = room[3 * BLOCK + c], room[4 * BLOCK + c], room[5 * BLOCK + c]
+        room[c] += w1 * a2 - w2 * a1
+        room[BLOCK + c] += w2 * a0 - w0 * a2
+        room[2 * BLOCK + c] += w0 * a1 - w1 * a0
 
 
 @njit(cache=True)
-def _pull(iterate, image, v, over, touching):
-    """Write the next iterate's x into `image` (nc, 3), from the velocities v (6 nm,)."""
-    x, z, q = iterate.x, iterate.z, iterate.q
-    side, arm, soft_of = touching.side, touching.arm, touching.soft
-    nc, c = side.shape[0], 0
-    while c < nc:
-        i, j = side[c, 0], side[c, 1]
-        one, other = _speeds(v, i), _speeds(v, j)
-        v0, v1, v2 = one[0] - other[0], one[1] - other[1], one[2] - other[2]
-        v3, v4, v5, o3, o4, o5 = one[3], one[4], one[5], other[3], other[4], other[5]
-        while c < nc and side[c, 0] == i and side[c, 1] == j:
-            a, soft = arm[c], soft_of[c]
-            r0 = q[c, 0] - soft * (v0 + v4 * a[2] - v5 * a[1] - o4 * a[5] + o5 * a[4])
-            r1 = q[c, 1] - soft * (v1 + v5 * a[0] - v3 * a[2] - o5 * a[3] + o3 * a[5])
-            r2 = q[c, 2] - soft * (v2 + v3 * a[1] - v4 * a[0] - o3 * a[4] + o4 * a[3])
-            image[c, 0] = x[c, 0] + over * (r0 - z[c, 0])
-            image[c, 1] = x[c, 1] + over * (r1 - z[c, 1])
-            image[c, 2] = x[c, 2] + over * (r2 - z[c, 2])
-            c += 1
+def _gather(block, touching, room, load, place):
+    """Add the forces and moments (6 BLOCK,) of a block's contacts to what acts on their bodies, by run, at `place`."""
+    runs, base = touching.runs, BLOCK * block
+    for g in range(runs.block[block], runs.block[block + 1]):
+        f0 = f1 = f2 = m0 = m1 = m2 = 0.0
+        for c in range(runs.begin[g] - base, runs.end[g] - base):
+            f0 += room[c]
+            f1 += room[BLOCK + c]
+            f2 += room[2 * BLOCK + c]
+            m0 += room[3 * BLOCK + c]
+            m1 += room[4 * BLOCK + c]
+            m2 += room[5 * BLOCK + c]
+        if runs.body[g, 0] >= 0:
+            _add(load, place[g, 0], (f0, f1, f2, m0, m1, m2))
+        if runs.body[g, 1] >= 0:
+            s = row(runs.offset, g)
+            m0 -= s[1] * f2 - s[2] * f1
+            m1 -= s[2] * f0 - s[0] * f2
+            m2 -= s[0] * f1 - s[1] * f0
+            _add(load, place[g, 1], (-f0, -f1, -f2, -m0, -m1, -m2))
+
+
+@njit(cache=True, fastmath={"contract"})
+def _relax(x, image, way, room, field, over):
+    """Write x + ω (r - z) = x + ω (way - u / σ) of a block into `image`, and u / σ where u is."""
+    for c in range(BLOCK):
+        soft = field[SOFT * BLOCK + c]
+        room[c] *= soft
+        room[BLOCK + c] *= soft
+        room[2 * BLOCK + c] *= soft
+    for c in range(3 * BLOCK):
+        image[c] = x[c] + over * (way[c] - room[c])
+
+
+@njit(cache=True, fastmath={"contract"}, error_model="numpy")
+def _exerted(x, way, room, field):
+    """Write q - z of a block's x into `way`, and q - u / σ, with its moments, into `room`, where u / σ is."""
+    for c in range(BLOCK):
+        n0, n1, n2 = field[c], field[BLOCK + c], field[2 * BLOCK + c]
+        mu, k, soft = field[FRICTION * BLOCK + c], field[COHESION * BLOCK + c], field[SOFT * BLOCK + c]
+        x0, x1, x2 = x[c], x[BLOCK + c], x[2 * BLOCK + c]
+        along = x0 * n0 + x1 * n1 + x2 * n2
+        t0, t1, t2 = x0 - along * n0, x1 - along * n1, x2 - along * n2
+        size = np.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
+        height, shrink = _height_and_shrink(along, size, mu, k)
+        inside = (along >= 0.0) & (size <= mu * along + k)
+        # sticks, as most contacts of a wall: z = x and y = 0
+        lag = 0.0 if inside else mu * (size - shrink * size)
+        y0 = 0.0 if inside else x0 - (shrink * t0 + height * n0)
+        y1 = 0.0 if inside else x1 - (shrink * t1 + height * n1)
+        y2 = 0.0 if inside else x2 - (shrink * t2 + height * n2)
+        d0 = -y0 - lag * n0 - field[SHIFT * BLOCK + c] * soft
+        d1 = -y1 - lag * n1 - field[(SHIFT + 1) * BLOCK + c] * soft
+        d2 = -y2 - lag * n2 - field[(SHIFT + 2) * BLOCK + c] * soft
+        way[c], way[BLOCK + c], way[2 * BLOCK + c] = d0, d1, d2
+        room[c] = x0 - y0 + d0 - room[c]
+        room[BLOCK + c] = x1 - y1 + d1 - room[BLOCK + c]
+        room[2 * BLOCK + c] = x2 - y2 + d2 - room[2 * BLOCK + c]
+    _moments(room, field)
+
+
+@njit(cache=True, fastmath={"contract"})
+def _moments(room, field):
+    """Write the moments of the forces in the first three rows of `room` about the arms into the last three."""
+    for c in range(BLOCK):
+        a0, a1, a2 = field[ARM * BLOCK + c], field[(ARM + 1) * BLOCK + c], field[(ARM + 2) * BLOCK + c]
+        f0, f1, f2 = room[c], room[BLOCK + c], room[2 * BLOCK + c]
+        room[3 * BLOCK + c] = a1 * f2 - a2 * f1
+        room[4 * BLOCK + c] = a2 * f0 - a0 * f2
+        room[5 * BLOCK + c] = a0 * f1 - a1 * f0
+
+
+@njit(cache=True, inline="always")
+def _height_and_shrink(along, size, mu, k):
+    """Return the height of the nearest point of a cone, and by how much its tangent is shorter; without a branch.
+
+    As `onto_cone`, for points outside of it: on the disk of the cohesion, on the line t = μ n + k, or in its corner.
+    """
+    foot = (along + mu * (size - k)) / (1.0 + mu * mu)
+    height = foot if foot > 0.0 else 0.0
+    disk = (along < 0.0) & (size <= k)
+    radius = size if disk else mu * height + k
+    return (0.0 if disk else height), radius / (size if size > 0.0 else 1.0)
+
+
+@njit(cache=True)
+def _pass(part, iterate, image, over, touching, does):
+    """Find the next x of a part's contacts, if the first of `does`, and what they exert by the next q, if the second.
+
+    x + ω (r - z) goes to `image`, which may be x itself, and then exerts.
+    """
+    pull, push = does
+    runs, room = touching.runs, np.zeros(6 * BLOCK)
+    for block in range(runs.part[part], runs.part[part + 1]):
+        begin, end = 3 * BLOCK * block, 3 * BLOCK * (block + 1)
+        x, to, way = iterate.x[begin:end], image[begin:end], iterate.way[begin:end]
+        field = touching.field[ROWS * BLOCK * block : ROWS * BLOCK * (block + 1)]
+        _velocities(block, iterate.velocity, touching, room)
+        _relax(x, to, way, room, field, over if pull else 0.0)
+        if push:
+            _exerted(to, way, room, field)
+            _gather(block, touching, room, iterate.load, runs.sum)
+
+
+@njit(cache=True, inline="always")
+def _add(load, k, six):
+    """Add six numbers of a body or copy."""
+    for a in range(6):
+        load[6 * k + a] += six[a]
+
+
+@njit(cache=True)
+def _inertial(load, velocity, mass, k):
+    """Write -M v of a body."""
+    for p in range(6):
+        total = 0.0
+        for b in range(6):
+            total -= mass[k, p, b] * velocity[6 * k + b]
+        load[6 * k + p] = total
+
+
+@njit(cache=True)
+def _exert(part, iterate, image, over, touching, factors, does):
+    """Write what acts on the bodies of a part, and on its copies of those between parts, as `_pass` finds it."""
+    parts, load, bodies = factors.parts, iterate.load, factors.mass.shape[0]
+    if does[1] and part < parts.body.shape[0]:
+        for k in range(parts.body[part, 0], parts.body[part, 1]):
+            _inertial(load, iterate.velocity, factors.mass, k)
+    copies = bodies + part * parts.shared.shape[0]
+    for a in range(6 * copies, 6 * (copies + parts.shared.shape[0])):
+        load[a] = 0.0
+    _pass(part, iterate, image, over, touching, does)
+
+
+@njit(cache=True)
+def _down(part, load, step, factors):
+    """Solve downwards for the bodies of a part; its copies of those between parts gather what these contribute."""
+    parts, bodies = factors.parts, factors.mass.shape[0]
+    first, last = parts.panel[part]
+    for a in range(6 * parts.body[part, 0], 6 * parts.body[part, 1]):
+        step[a] = load[a]
+    copies = bodies + part * parts.shared.shape[0]
+    for a in range(6 * copies, 6 * (copies + parts.shared.shape[0])):
+        step[a] = 0.0
+    work = np.empty(_longest(factors.panels, first, last), factors.value.dtype)
+    forward(factors.panels, factors.value, step, work, first, last, parts.row)
+
+
+@njit(cache=True)
+def _longest(panels, begin, end):
+    """Return the length of the longest of some panels."""
+    longest = 0
+    for s in range(begin, end):
+        longest = max(longest, panels.first[s + 1] - panels.first[s])
+    return panels.size * longest
+
+
+@njit(cache=True, nogil=True)
+def between(iterate, step, length, factors):  # pragma: no cover - compiled
+    """Solve for the bodies between parts, from what all parts contribute, and move them; inputs as of `up`.
+
+    Outputs
+    -------
+    iterate, step : written
+    float64, the largest change of velocity of these bodies [m/s]
+    """
+    parts, panels, load, velocity = factors.parts, factors.panels, iterate.load, iterate.velocity
+    bodies, count, many = factors.mass.shape[0], parts.body.shape[0], parts.shared.shape[0]
+    for r in range(many):
+        k = parts.shared[r]
+        _inertial(load, velocity, factors.mass, k)
+        for part in range(count + 1):
+            come = 6 * (bodies + part * many + r)
+            for a in range(6):
+                load[6 * k + a] += load[come + a]
+        for a in range(6 * k, 6 * k + 6):
+            step[a] = load[a]
+        for part in range(count):
+            come = 6 * (bodies + part * many + r)
+            for a in range(6):
+                step[6 * k + a] += step[come + a]
+    change, rest = 0.0, parts.rest
+    for i in range(rest.shape[0]):
+        s = rest[i]
+        work = np.empty(_longest(panels, s, s + 1), step.dtype)
+        forward(panels, factors.value, step, work, s, s + 1, panels.row)
+    for i in range(rest.shape[0] - 1, -1, -1):
+        s = rest[i]
+        work = np.empty(_longest(panels, s, s + 1), step.dtype)
+        backward(panels, factors.value, step, work, s, s + 1)
+        change = max(change, _moved(velocity, step, length, panels.body[s], panels.body[s + 1]))
+    return change
+
+
+@njit(cache=True)
+def _up(part, velocity, step, length, factors):
+    """Solve upwards for the bodies of a part and move them; return their largest change of velocity [m/s]."""
+    first, last = factors.parts.panel[part]
+    work = np.empty(_longest(factors.panels, first, last), step.dtype)
+    backward(factors.panels, factors.value, step, work, first, last)
+    return _moved(velocity, step, length, factors.parts.body[part, 0], factors.parts.body[part, 1])
 
 
 @njit(cache=True)
@@ -372,13 +590,13 @@ def projected(impulse, friction, cohesion):  # pragma: no cover - compiled
 
 
 @njit(cache=True)
-def _moved(velocity, step, length):
-    """Add a step to velocities; return the largest of a body, or of a point `length` from its centre as it turns."""
+def _moved(velocity, step, length, begin, end):
+    """Add a step to the velocities of some bodies; return the largest, or of a point `length` from a centre that turns."""
     change = 0.0
-    for k in range(0, step.shape[0], 6):
+    for k in range(6 * begin, 6 * end, 6):
         for a in range(3):
             change = max(change, abs(step[k + a]), length * abs(step[k + 3 + a]))
-    for k in range(step.shape[0]):
+    for k in range(6 * begin, 6 * end):
         velocity[k] += step[k]
     return change
 
@@ -467,28 +685,143 @@ def advance(iterate, count, limit, over, length, touching, factors, memory):  # 
     iterate, memory : written
     int64, iterations made; float64, the last change [m/s]
     """
-    panels, x, velocity = factors.panels, iterate.x, iterate.velocity
-    highest = 0
-    for s in range(panels.body.shape[0] - 1):
-        highest = max(highest, panels.first[s + 1] - panels.first[s])
-    image, load = np.empty_like(x), np.empty_like(velocity)
-    step = np.empty(velocity.shape[0], factors.value.dtype)
-    work = np.empty(6 * highest, factors.value.dtype)
+    x, parts = iterate.x, factors.parts.body.shape[0]
+    step = np.empty(iterate.load.shape[0], factors.value.dtype)
+    extrapolated = memory.image.shape[0] > 1
+    image = np.empty_like(x) if extrapolated else x
     change = np.inf
+    for part in range(parts + 1):
+        _exert(part, iterate, x, over, touching, factors, (False, True))
     for k in range(count):
-        _push(iterate, load, touching, factors.mass)
-        for i in range(load.shape[0]):
-            step[i] = load[i]
-        solve(panels, factors.value, step, work)
-        change = _moved(velocity, step, length)
-        _pull(iterate, image, velocity, over, touching)
-        if memory.image.shape[0] > 1:
-            _extrapolate(x.reshape(x.size), image.reshape(x.size), memory)
-        else:
-            x[:] = image
+        for part in range(parts):
+            _down(part, iterate.load, step, factors)
+        change = between(iterate, step, length, factors)
+        for part in range(parts):
+            change = max(change, _up(part, iterate.velocity, step, length, factors))
+        for part in range(parts + 1):
+            _exert(part, iterate, image, over, touching, factors, (True, not extrapolated))
+        if extrapolated:
+            _extrapolate(x, image, memory)
+            for part in range(parts + 1):
+                _exert(part, iterate, x, over, touching, factors, (False, True))
         if not change > limit:
             return k + 1, change
     return count, change
+
+
+@njit(cache=True, nogil=True)
+def begin(which, iterate, touching, factors):  # pragma: no cover - compiled
+    """Find what some parts' contacts exert, with which `down` begins.
+
+    Inputs
+    ------
+    which : int64, the parts, of which the last is that of the contacts between parts
+    iterate, touching, factors : as in `advance`
+
+    Outputs
+    -------
+    iterate : written
+    """
+    for part in which:
+        _exert(part, iterate, iterate.x, 0.0, touching, factors, (False, True))
+
+
+@njit(cache=True, nogil=True)
+def down(which, iterate, step, factors):  # pragma: no cover - compiled
+    """Solve downwards for the bodies of some parts: the first of the three stages of an iteration.
+
+    Inputs
+    ------
+    which, iterate, factors : as in `begin`
+    step : as long as `iterate.load`, of the precision of the factors
+
+    Outputs
+    -------
+    step : written
+    """
+    for part in which:
+        if part < factors.parts.body.shape[0]:
+            _down(part, iterate.load, step, factors)
+
+
+@njit(cache=True, nogil=True)
+def up(which, iterate, step, lengths, touching, factors):  # pragma: no cover - compiled
+    """Solve upwards for the bodies of some parts, and go on with their contacts: the last stage, after `between`.
+
+    Inputs
+    ------
+    lengths : ω [-], and the distance at which rotations count [m]
+    which, iterate, step, touching, factors : as in `down`
+
+    Outputs
+    -------
+    iterate : written
+    float64, the largest change of velocity of their bodies [m/s]
+    """
+    over, length = lengths
+    change = 0.0
+    for part in which:
+        if part < factors.parts.body.shape[0]:
+            change = max(change, _up(part, iterate.velocity, step, length, factors))
+        _exert(part, iterate, iterate.x, over, touching, factors, (True, True))
+    return change
+
+
+@njit(cache=True, fastmath={"contract"}, error_model="numpy")
+def _projected(x, z, field):
+    """Write the nearest points of a block's cones into z."""
+    for c in range(BLOCK):
+        n0, n1, n2 = field[c], field[BLOCK + c], field[2 * BLOCK + c]
+        mu, k = field[FRICTION * BLOCK + c], field[COHESION * BLOCK + c]
+        x0, x1, x2 = x[c], x[BLOCK + c], x[2 * BLOCK + c]
+        along = x0 * n0 + x1 * n1 + x2 * n2
+        t0, t1, t2 = x0 - along * n0, x1 - along * n1, x2 - along * n2
+        size = np.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
+        height, shrink = _height_and_shrink(along, size, mu, k)
+        inside = (along >= 0.0) & (size <= mu * along + k)
+        z[c] = x0 if inside else shrink * t0 + height * n0
+        z[BLOCK + c] = x1 if inside else shrink * t1 + height * n1
+        z[2 * BLOCK + c] = x2 if inside else shrink * t2 + height * n2
+
+
+@njit(cache=True, fastmath={"contract"})
+def _opposed(z, room, free, field, rho):
+    """Write z - ρ û of a block into `room`, where Hᵀ v is."""
+    for c in range(BLOCK):
+        n0, n1, n2 = field[c], field[BLOCK + c], field[2 * BLOCK + c]
+        free0, free1, free2 = free[c], free[BLOCK + c], free[2 * BLOCK + c]
+        u0, u1, u2 = room[c] + free0, room[BLOCK + c] + free1, room[2 * BLOCK + c] + free2
+        along = u0 * n0 + u1 * n1 + u2 * n2
+        t0, t1, t2 = u0 - along * n0, u1 - along * n1, u2 - along * n2
+        # the bias is what the shift has beyond u_free
+        up = (
+            (field[SHIFT * BLOCK + c] - free0) * n0
+            + (field[(SHIFT + 1) * BLOCK + c] - free1) * n1
+            + (field[(SHIFT + 2) * BLOCK + c] - free2) * n2
+            + field[FRICTION * BLOCK + c] * np.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
+        )
+        room[c] = z[c] - rho * (u0 + up * n0)
+        room[BLOCK + c] = z[BLOCK + c] - rho * (u1 + up * n1)
+        room[2 * BLOCK + c] = z[2 * BLOCK + c] - rho * (u2 + up * n2)
+
+
+@njit(cache=True, fastmath={"contract", "reassoc"})
+def _apart(z, other, field):
+    """Return the sum and the largest of ‖z - other‖² of a block's contacts, and the sums of ‖z - s n‖² of both."""
+    whole = largest = size = projected = 0.0
+    for c in range(BLOCK):
+        shift = field[ADHESION * BLOCK + c]
+        e = one = two = 0.0
+        for i in range(3):
+            f, g, less = z[i * BLOCK + c], other[i * BLOCK + c], shift * field[i * BLOCK + c]
+            e += (f - g) ** 2
+            one += (f - less) ** 2
+            two += (g - less) ** 2
+        whole += e
+        largest = max(largest, e)
+        size += one
+        projected += two
+    return whole, largest, size, projected
 
 
 @njit(cache=True)
@@ -497,64 +830,47 @@ def broken_laws(x, touching, free, inertia, rho, z):  # pragma: no cover - compi
 
     Inputs
     ------
-    x : (nc, 3) float64 [N s]
+    x : (3 n BLOCK,) float64, as in `Iterate` [N s]
     touching : Touching
-    free : (nc, 3) float64, u_free, world axes [m/s]
+    free : alike, u_free, world axes [m/s]
     inertia : (nm, 7) float64, inverse masses and inertias of the bodies, in the order of elimination
     rho : float64, 1 over the scale of W [kg]
 
     Outputs
     -------
-    z : (nc, 3), written
+    z : as x, written
     whole, largest : ‖e‖ over all contacts, and of the worst [N s]
     size : the larger of ‖z‖ and ‖P_K(z - ρ û)‖ [N s]
     """
-    side, normal, arm = touching.side, touching.normal, touching.arm
-    friction, cohesion, nc = touching.friction, touching.cohesion, touching.side.shape[0]
-    v = np.zeros((inertia.shape[0], 6))
-    for c in range(nc):
-        f = _onto(row(x, c), row(normal, c), friction[c], cohesion[c])
-        write_row(z, c, f)
-        for s in range(2):
-            k, sign = side[c, s], 1.0 - 2.0 * s
-            if k >= 0:
-                moment = cross((arm[c, 3 * s], arm[c, 3 * s + 1], arm[c, 3 * s + 2]), f)
-                for a in range(3):
-                    v[k, a] += sign * f[a]
-                    v[k, 3 + a] += sign * moment[a]
+    runs, blocks = touching.runs, touching.runs.block.shape[0] - 1
+    v, room, other = np.zeros(6 * inertia.shape[0]), np.zeros(6 * BLOCK), np.empty(3 * BLOCK)
+    for block in range(blocks):
+        begin, end = 3 * BLOCK * block, 3 * BLOCK * (block + 1)
+        field = touching.field[ROWS * BLOCK * block : ROWS * BLOCK * (block + 1)]
+        _projected(x[begin:end], z[begin:end], field)
+        for c in range(3 * BLOCK):
+            room[c] = z[begin + c]
+        _moments(room, field)
+        # straight to the bodies, as all is done in order
+        _gather(block, touching, room, v, runs.body)
     for k in range(inertia.shape[0]):
-        i, moment = inertia[k], (v[k, 3], v[k, 4], v[k, 5])
+        i, at = inertia[k], 6 * k
+        moment = v[at + 3], v[at + 4], v[at + 5]
         for a in range(3):
-            v[k, a] *= i[0]
-        v[k, 3] = dot((i[1], i[2], i[3]), moment)
-        v[k, 4] = dot((i[2], i[4], i[5]), moment)
-        v[k, 5] = dot((i[3], i[5], i[6]), moment)
+            v[at + a] *= i[0]
+        v[at + 3] = dot((i[1], i[2], i[3]), moment)
+        v[at + 4] = dot((i[2], i[4], i[5]), moment)
+        v[at + 5] = dot((i[3], i[5], i[6]), moment)
     whole = largest = size = projected = 0.0
-    for c in range(nc):
-        n, f = row(normal, c), row(z, c)
-        u0, u1, u2 = free[c, 0], free[c, 1], free[c, 2]
-        for s in range(2):
-            k, sign = side[c, s], 1.0 - 2.0 * s
-            if k >= 0:
-                turn = cross(
-                    (v[k, 3], v[k, 4], v[k, 5]), (arm[c, 3 * s], arm[c, 3 * s + 1], arm[c, 3 * s + 2])
-                )
-                u0 += sign * (v[k, 0] + turn[0])
-                u1 += sign * (v[k, 1] + turn[1])
-                u2 += sign * (v[k, 2] + turn[2])
-        along = u0 * n[0] + u1 * n[1] + u2 * n[2]
-        slide = np.sqrt((u0 - along * n[0]) ** 2 + (u1 - along * n[1]) ** 2 + (u2 - along * n[2]) ** 2)
-        # the bias is what the shift has beyond u_free
-        bias = 0.0
-        for a in range(3):
-            bias += (touching.shift[c, a] - free[c, a]) * n[a]
-        up = bias + friction[c] * slide
-        p = f[0] - rho * (u0 + up * n[0]), f[1] - rho * (u1 + up * n[1]), f[2] - rho * (u2 + up * n[2])
-        g = _onto(p, n, friction[c], cohesion[c])
-        e = (f[0] - g[0]) ** 2 + (f[1] - g[1]) ** 2 + (f[2] - g[2]) ** 2
-        whole += e
-        largest = max(largest, e)
-        shift = touching.adhesion[c]
-        size += (f[0] - shift * n[0]) ** 2 + (f[1] - shift * n[1]) ** 2 + (f[2] - shift * n[2]) ** 2
-        projected += (g[0] - shift * n[0]) ** 2 + (g[1] - shift * n[1]) ** 2 + (g[2] - shift * n[2]) ** 2
+    for k in range(6 * BLOCK):
+        room[k] = 0.0
+    for block in range(blocks):
+        begin, end = 3 * BLOCK * block, 3 * BLOCK * (block + 1)
+        field = touching.field[ROWS * BLOCK * block : ROWS * BLOCK * (block + 1)]
+        _velocities(block, v, touching, room)
+        _opposed(z[begin:end], room, free[begin:end], field, rho)
+        _projected(room, other, field)
+        one = _apart(z[begin:end], other, field)
+        whole, largest = whole + one[0], max(largest, one[1])
+        size, projected = size + one[2], projected + one[3]
     return np.sqrt(whole), np.sqrt(largest), np.sqrt(max(size, projected))

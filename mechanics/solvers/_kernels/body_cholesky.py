@@ -18,7 +18,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["Panels", "factorise", "panels_of", "postorder", "solve"]
+__all__ = ["Panels", "backward", "factorise", "forward", "panels_of", "postorder", "solve"]
 
 # rows of a panel that are finished before they are taken from the others by one product
 _ROWS = 48
@@ -501,6 +501,68 @@ def _backward(block, x, work):
 
 
 @njit(cache=True, fastmath={"contract", "reassoc"})
+def forward(panels, value, x, work, begin, end, place):  # pragma: no cover - compiled
+    """Solve L D y = b for the bodies of some panels, once those before them have contributed.
+
+    Inputs
+    ------
+    panels : Panels
+    value : as `factorise` leaves it
+    x : b by bodies, of the same precision, overwritten
+    work : as long as the longest panel at least, alike, overwritten
+    begin, end : int64, the first of the panels and the one after the last
+    place : int64, as long as `panels.row`, of each row the place in x where what a panel contributes to it adds up
+
+    Outputs
+    -------
+    x : y, and at places of later bodies what these panels contribute
+    """
+    body, first, start, size = panels.body, panels.first, panels.start, panels.size
+    zero = value.dtype.type(0.0)
+    for s in range(begin, end):
+        width, height, at = body[s + 1] - body[s], first[s + 1] - first[s], size * body[s]
+        w, n = size * width, size * height
+        panel = value[start[s] : start[s + 1]]
+        for i in range(n):
+            work[i] = zero
+        for k in range(0, w, 6):
+            end_k = min(k + 6, w)
+            _forward(panel[k * n : end_k * n], x[at + k : at + end_k], work[k:n])
+        for p in range(width, height):
+            to, come = size * place[first[s] + p], size * p
+            for a in range(3):
+                x[to + a] -= work[come + a]
+            if size == 6:
+                for a in range(3, 6):
+                    x[to + a] -= work[come + a]
+
+
+@njit(cache=True, fastmath={"contract", "reassoc"})
+def backward(panels, value, x, work, begin, end):  # pragma: no cover - compiled
+    """Solve Lᵀ x = D⁻¹ y for the bodies of some panels, once those after them are solved; as `forward`.
+
+    Outputs
+    -------
+    x : the solution
+    """
+    body, first, row, start, size = panels.body, panels.first, panels.row, panels.start, panels.size
+    for s in range(end - 1, begin - 1, -1):
+        width, height, at = body[s + 1] - body[s], first[s + 1] - first[s], size * body[s]
+        w, n = size * width, size * height
+        panel = value[start[s] : start[s + 1]]
+        for p in range(width, height):
+            come, to = size * row[first[s] + p], size * p
+            for a in range(3):
+                work[to + a] = x[come + a]
+            if size == 6:
+                for a in range(3, 6):
+                    work[to + a] = x[come + a]
+        for k in range(w - 1 - (w - 1) % 6, -1, -6):
+            end_k = min(k + 6, w)
+            _backward(panel[k * n : end_k * n], x[at + k : at + end_k], work[k:n])
+
+
+@njit(cache=True)
 def solve(panels, value, x, work):  # pragma: no cover - compiled
     """Solve L D Lᵀ x = b.
 
@@ -515,35 +577,6 @@ def solve(panels, value, x, work):  # pragma: no cover - compiled
     -------
     x : the solution
     """
-    body, first, row, start, size = panels.body, panels.first, panels.row, panels.start, panels.size
-    number, zero = body.shape[0] - 1, value.dtype.type(0.0)
-    for s in range(number):
-        width, height, at = body[s + 1] - body[s], first[s + 1] - first[s], size * body[s]
-        w, n = size * width, size * height
-        panel = value[start[s] : start[s + 1]]
-        for i in range(n):
-            work[i] = zero
-        for k in range(0, w, 6):
-            end = min(k + 6, w)
-            _forward(panel[k * n : end * n], x[at + k : at + end], work[k:n])
-        for p in range(width, height):
-            to, come = size * row[first[s] + p], size * p
-            for a in range(3):
-                x[to + a] -= work[come + a]
-            if size == 6:
-                for a in range(3, 6):
-                    x[to + a] -= work[come + a]
-    for s in range(number - 1, -1, -1):
-        width, height, at = body[s + 1] - body[s], first[s + 1] - first[s], size * body[s]
-        w, n = size * width, size * height
-        panel = value[start[s] : start[s + 1]]
-        for p in range(width, height):
-            come, to = size * row[first[s] + p], size * p
-            for a in range(3):
-                work[to + a] = x[come + a]
-            if size == 6:
-                for a in range(3, 6):
-                    work[to + a] = x[come + a]
-        for k in range(w - 1 - (w - 1) % 6, -1, -6):
-            end = min(k + 6, w)
-            _backward(panel[k * n : end * n], x[at + k : at + end], work[k:n])
+    number = panels.body.shape[0] - 1
+    forward(panels, value, x, work, 0, number, panels.row)
+    backward(panels, value, x, work, 0, number)

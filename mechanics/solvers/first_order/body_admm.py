@@ -6,6 +6,8 @@ what counts is the cost of an iteration: of two passes over the contacts and one
 M + H Σ⁻¹ Hᵀ, less than that of a Gauss–Seidel sweep (mechanics/solvers/_kernels/body_admm.py).
 """
 
+from collections.abc import Callable
+from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -17,6 +19,7 @@ from mechanics.problem.problem import ContactProblem, ContactSolution, ContactSt
 from mechanics.problem.residual import residual
 from mechanics.solvers._kernels import body_admm as kernel
 from mechanics.solvers._kernels import body_cholesky as cholesky
+from mechanics.solvers._kernels.body_parts import Parts, parts_of
 from moma.errors import SolverError
 
 __all__ = ["BodyADMM", "Stage"]
@@ -33,6 +36,10 @@ _SPARE = 0.2
 _FEW = 1000
 # numbers in factors that are kept until contacts are detected again, at most: 32 MB
 _KEPT = 4_000_000
+# work of a block of contacts in an iteration, over that of a number in the factors [-]
+_CONTACT = 3000
+# difference of the offsets between the centres of two bodies at contacts of one run: rounding [-]
+_SAME = 1e-12
 # iterations before the first look at the residual
 _FIRST_LOOK = 10
 # fewest iterations between two looks
@@ -128,29 +135,27 @@ class _Run:
             settings,
             _bodies_of(problem.delassus, contacts),
         )
-        bodies = self._bodies
-        self._free: Array = kernel.to_world(bodies.geometry, problem.u_free)
-        self._touching = kernel.Touching(
-            bodies.side,
-            bodies.normal,
-            bodies.arm,
-            self._free + problem.bias[:, None] * bodies.normal,
-            problem.friction,
-            problem.cohesion,
-            np.zeros(len(bodies.side)) if problem.adhesion is None else problem.adhesion,
-            bodies.soft(np.max(settings.stages[0].penalty)),
-        )
-        self._stages = list(settings.stages)
+        bodies, scale = self._bodies, settings.stages[0].penalty
+        self._soft = bodies.soft(np.max(scale))
+        free = kernel.to_world(bodies.geometry, problem.u_free)
+        self._free = bodies.spread(free)
+        rows = [free + problem.bias[:, None] * bodies.geometry[:, :3], problem.friction, problem.cohesion]
+        field = bodies.field(rows, problem.adhesion, self._soft)
+        self._touching = kernel.Touching(bodies.runs, field)
         self._pace = float(np.abs(problem.u_free).max()) or float(np.abs(problem.bias).max()) or 1.0
         x = kernel.projected(start.impulse, problem.friction, problem.cohesion)
-        x -= start.velocity * self._touching.soft[:, None]
-        x = kernel.to_world(bodies.geometry, x)
-        self._iterate = kernel.Iterate(
-            x, np.empty_like(x), np.empty_like(x), np.zeros(6 * len(bodies.inertia))
-        )
+        x -= start.velocity * bodies.collected(self._soft)[:, None]
+        x = bodies.spread(kernel.to_world(bodies.geometry, x))
+        # the first pass is not to go on from it
+        way = np.zeros_like(x)
+        self._iterate = kernel.Iterate(x, way, np.zeros(6 * len(bodies.inertia)), bodies.load())
+        self._z = np.empty_like(x)
+        self._stages = list(settings.stages)
         self._factors: kernel.Factors | None = None
         self._memory = _acceleration(0, 0)
         self._until = 0
+        threads = len(bodies.groups)
+        self._pool = ThreadPoolExecutor(threads - 1) if threads > 1 else None
         self.iterations, self.excess, self._change, self._limit = 0, np.inf, np.inf, 0.0
 
     @property
@@ -174,6 +179,9 @@ class _Run:
             self._advance(min(most - least, later), self._limit)
 
     def _advance(self, count: int, limit: float) -> None:
+        if self._pool is not None and not self._memory.image.size:
+            self._advance_at_once(self._pool, count, limit)
+            return
         made, self._change = kernel.advance(
             self._iterate,
             count,
@@ -186,17 +194,41 @@ class _Run:
         )
         self.iterations += made
 
+    def _advance_at_once(self, pool: Executor, count: int, limit: float) -> None:
+        """Make the same iterations with all groups of parts at once; the same bits."""
+        iterate, length, touching, factors = self._iterate, self._bodies.length, self._touching, self._factors
+        assert factors is not None
+        first, *others = self._bodies.groups
+
+        def each(stage: Callable[..., float | None], *given: object) -> list[float | None]:
+            waiting = [pool.submit(stage, group, iterate, *given) for group in others]
+            return [stage(first, iterate, *given), *(one.result() for one in waiting)]
+
+        step = np.empty(len(iterate.load), factors.value.dtype)
+        each(kernel.begin, touching, factors)
+        for _ in range(count):
+            each(kernel.down, step, factors)
+            change = kernel.between(iterate, step, length, factors)
+            self._change = max(change, *each(kernel.up, step, (_OVER, length), touching, factors))
+            self.iterations += 1
+            if not self._change > limit:
+                return
+
     def _begin(self, stage: Stage) -> None:
         """Go on with the penalty of a stage; y keeps its velocities."""
         self._until += stage.iterations
         self._memory = _acceleration(_DEPTH if stage.extrapolated else 0, self._iterate.x.size)
         self._broken()
-        x, z = self._iterate.x, self._iterate.z
+        x, z = _vectors(self._iterate.x), _vectors(self._z)
         common = stage.penalty if isinstance(stage.penalty, float) else None
-        soft = self._bodies.soft(common or np.array(stage.penalty)[_kinds(x, z)])
-        if not np.array_equal(soft, self._touching.soft):
-            x[:] = z + (x - z) * (soft / self._touching.soft)[:, None]
-        self._touching = self._touching._replace(soft=soft)
+        soft = self._bodies.soft(common or np.array(stage.penalty)[_kinds(x, z).ravel()])
+        if not np.array_equal(soft, self._soft):
+            ratio = np.ones_like(soft)
+            np.divide(soft, self._soft, out=ratio, where=self._soft > 0)
+            x[:] = z + (x - z) * ratio.reshape(len(x), 1, -1)
+            rows = self._touching.field.reshape(-1, kernel.ROWS, kernel.BLOCK)
+            rows[:, kernel.SOFT] = soft.reshape(-1, kernel.BLOCK)
+        self._soft = soft
         # those of the stage before make room for them
         self._factors = None
         self._factors = self._bodies.factors(common, self._touching)
@@ -204,7 +236,7 @@ class _Run:
     def _broken(self) -> tuple[float, float, float]:
         iterate, scale = self._iterate, self._problem.delassus.scale
         found: tuple[float, float, float] = kernel.broken_laws(
-            iterate.x, self._touching, self._free, self._bodies.inertia, 1.0 / scale, iterate.z
+            iterate.x, self._touching, self._free, self._bodies.inertia, 1.0 / scale, self._z
         )
         return found
 
@@ -217,19 +249,23 @@ class _Run:
         if np.isfinite(self._change) and excess > 0:
             self._limit = self._change * _EARLY * self.goal / excess
         if self.iterations == 0 or excess < self.excess:
-            x, z, _, _ = self._iterate
-            self.excess, self._best = float(excess), (x.copy(), z.copy(), self._touching.soft)
+            found = self._iterate.x.copy(), self._z.copy(), self._soft
+            self.excess, self._best = float(excess), found
 
     def end(self) -> None:
         """Let go of factors that are too large to be kept."""
         self._factors = None
         self._bodies.forget()
+        if self._pool is not None:
+            self._pool.shutdown()
 
     def best(self) -> tuple[Array, Array]:
         """Return the impulses and the velocities û (nc, 3) of the best look, local frames."""
         x, z, soft = self._best
-        velocity = kernel.to_local(self._bodies.geometry, (z - x) / soft[:, None])
-        return kernel.to_local(self._bodies.geometry, z), velocity
+        geometry, collected = self._bodies.geometry, self._bodies.collected
+        impulse, beyond = collected(z), collected(z - x)
+        velocity = beyond / collected(soft)[:, None]
+        return kernel.to_local(geometry, impulse), kernel.to_local(geometry, velocity)
 
 
 class _Bodies:
@@ -240,25 +276,64 @@ class _Bodies:
     Attributes
     ----------
     geometry : (nc, 15) as in `RigidContacts`
-    side, normal, arm : as in `Touching`
+    runs : as in `Touching`
     inertia : (nm, 7) of the moving bodies, in the order of elimination
     length : mean distance of contacts from the centres of mass [m]
+    groups : parts that each thread takes
     """
 
     def __init__(self, delassus: Delassus, contacts: RigidContacts) -> None:
         moving = np.flatnonzero(contacts.inertia[:, 0] > 0)
-        order, self.side, self._panels = _eliminated(contacts, moving)
+        order, side, self._panels = _eliminated(contacts, moving)
+        self._parts = parts_of(self._panels, len(moving) >= _FEW)
+        self._place, self.runs = _runs(side, contacts.geometry, self._parts, len(moving))
+        self._blocks = len(self.runs.block) - 1
         self.geometry = np.ascontiguousarray(contacts.geometry)
-        self.normal = np.ascontiguousarray(contacts.geometry[:, :3])
-        self.arm = np.ascontiguousarray(contacts.geometry[:, 9:])
         self.inertia = contacts.inertia[order]
         self._mass: Array = kernel.masses(contacts.inertia, order)
-        self._compliance = np.einsum("cii->c", delassus.diagonal) / 3.0
-        self.length = float(np.sqrt((self.arm[:, :3] ** 2) @ np.ones(3)).mean())
+        self._compliance = np.full(kernel.BLOCK * self._blocks, np.inf)
+        self._compliance[self._place] = np.einsum("cii->c", delassus.diagonal) / 3.0
+        self.length = float(np.sqrt((self.geometry[:, 9:12] ** 2) @ np.ones(3)).mean())
+        self._fixed = [self.spread(self.geometry[:, a : a + 3]) for a in (0, 9)]
         self._factors: dict[float | None, kernel.Factors] = {}
+        threads = min(getattr(delassus, "threads", 1), len(self._parts.body))
+        self.groups = _groups(self._panels, self._parts, self.runs, threads)
+
+    def spread(self, values: Array) -> Array:
+        """Return numbers (nc,) or vectors (nc, 3) of contacts in their places, block by block, else 0."""
+        places = np.zeros((kernel.BLOCK * self._blocks, *values.shape[1:]))
+        places[self._place] = values
+        if values.ndim == 1:
+            return places
+        return np.ascontiguousarray(places.reshape(-1, kernel.BLOCK, 3).transpose(0, 2, 1)).ravel()
+
+    def collected(self, values: Array) -> Array:
+        """Return numbers or vectors of contacts from their places: the reverse of `spread`."""
+        if len(values) == kernel.BLOCK * self._blocks:
+            return values[self._place]
+        vectors: Array = _vectors(values).transpose(0, 2, 1).reshape(-1, 3)[self._place]
+        return vectors
+
+    def field(self, laws: list[Array], adhesion: Array | None, soft: Array) -> Array:
+        """Return the field of `Touching`; `laws` are shift (nc, 3), friction and cohesion (nc,)."""
+        rows = np.zeros((self._blocks, kernel.ROWS, kernel.BLOCK))
+        shift, friction, cohesion = map(self.spread, laws)
+        for at, vectors in zip((0, kernel.ARM, kernel.SHIFT), (*self._fixed, shift), strict=True):
+            rows[:, at : at + 3] = _vectors(vectors)
+        numbers = {kernel.FRICTION: friction, kernel.COHESION: cohesion, kernel.SOFT: soft}
+        if adhesion is not None:
+            numbers[kernel.ADHESION] = self.spread(adhesion)
+        for at, values in numbers.items():
+            rows[:, at] = values.reshape(-1, kernel.BLOCK)
+        return rows.ravel()
+
+    def load(self) -> Array:
+        """Return room for what acts on the bodies, and on the copies of those between parts."""
+        copies = (len(self._parts.body) + 1) * len(self._parts.shared)
+        return np.empty(_VELOCITIES * (len(self.inertia) + copies))
 
     def soft(self, penalty: float | Array) -> Array:
-        """Return 1/σ (nc,) for a penalty, or one of each contact, over the mean diagonals of W_αα [kg]."""
+        """Return 1/σ of each place for a penalty, or one of each, over the mean diagonals of W_αα; else 0 [kg]."""
         soft: Array = 1.0 / (penalty * self._compliance)
         return soft
 
@@ -276,7 +351,7 @@ class _Bodies:
         kernel.assemble(touching, self._mass, self._panels, value)
         if not cholesky.factorise(self._panels, value):
             raise SolverError("W is not a number", where="ADMM of bodies", remedy="use another method")
-        factors = kernel.Factors(self._panels, value, self._mass)
+        factors = kernel.Factors(self._panels, self._parts, value, self._mass)
         if penalty is not None:
             self._factors[penalty] = factors
         return factors
@@ -294,8 +369,61 @@ def _bodies_of(delassus: Delassus, contacts: RigidContacts) -> _Bodies:
     return memo["bodies"]
 
 
+def _runs(side: Ints, geometry: Array, parts: Parts, count: int) -> tuple[Ints, kernel.Runs]:
+    """Return the place of each contact, and the runs.
+
+    Parameters
+    ----------
+    side : (nc, 2) places of their bodies in the order of elimination, -1: does not move
+    geometry : as in `RigidContacts`
+    parts : of the `count` bodies that move
+    """
+    offset = geometry[:, 9:12] - geometry[:, 12:]
+    new = np.ones(len(side), dtype=bool)
+    new[1:] = (side[1:] != side[:-1]).any(axis=1)
+    new[1:] |= (np.abs(offset[1:] - offset[:-1]) > _SAME * np.abs(offset[1:]).max(axis=1)[:, None]).any(
+        axis=1
+    )
+    number = np.arange(len(side))
+    new |= (number - np.maximum.accumulate(np.where(new, number, 0))) % kernel.BLOCK == 0
+    first = np.flatnonzero(new)
+    body, many, shared = side[first], len(parts.body), len(parts.shared)
+    # bodies that do not move belong to no part; -1 takes the last place
+    part_of, rank = np.full(count + 1, many), np.zeros(count + 1, dtype=np.int64)
+    for part, (begin, end) in enumerate(parts.body):
+        part_of[begin:end] = part
+    part_of[parts.shared] = many
+    rank[parts.shared] = np.arange(shared)
+    part = part_of[body].min(axis=1)
+    place = np.where(part_of[body] < many, body, count + part[:, None] * shared + rank[body])
+    order = np.argsort(part, kind="stable")
+    sizes = np.diff(first, append=len(side))
+    begin, block, of_part = kernel.packed(sizes[order], part[order], many + 1)
+    runs = kernel.Runs(
+        begin, begin + sizes[order], body[order], place[order], offset[first[order]], block, of_part
+    )
+    where = np.empty(len(first), dtype=np.int64)
+    where[order] = begin
+    return np.repeat(where - first, sizes) + number, runs
+
+
+def _vectors(values: Array) -> Array:
+    """Return vectors of contacts as (n, 3, BLOCK)."""
+    return values.reshape(-1, 3, kernel.BLOCK)
+
+
+def _groups(panels: cholesky.Panels, parts: Parts, runs: kernel.Runs, threads: int) -> list[Ints]:
+    """Return the parts that each thread takes, so that all have about the same to do."""
+    numbers = np.append(np.diff(panels.start[parts.panel], axis=1)[:, 0], 0)
+    work = numbers + _CONTACT * np.diff(runs.block[runs.part])
+    given: list[list[int]] = [[] for _ in range(threads)]
+    for part in np.argsort(-work, kind="stable"):
+        min(given, key=lambda one: work[one].sum()).append(int(part))
+    return [np.array(one, dtype=np.int64) for one in given]
+
+
 def _kinds(x: Array, z: Array) -> Ints:
-    """Return whether contacts are open (0), slide (1) or stick (2), from x and z = P_K(x) (nc, 3)."""
+    """Return whether contacts are open (0), slide (1) or stick (2), from x and z = P_K(x) (n, 3, BLOCK)."""
     force, beyond = np.abs(z).max(axis=1), np.abs(x - z).max(axis=1)
     kinds: Ints = np.where(force == 0.0, 0, np.where(beyond > _BESIDE * force, 1, 2))
     return kinds
