@@ -7,11 +7,14 @@ where z = P_K(x) holds the impulses and û = -σ y the velocities that are dual 
     q = z - y - (u_free + bias n + μ‖û_T‖ n) / σ,     (M + H Σ⁻¹ Hᵀ) v = H q,     r = q - Hᵀ v / σ
     x ← y + ω r + (1 - ω) z
 
-and one pass over the contacts, between two solutions for v, makes it: the x that it finds gives the next q. What is
-solved for is the change of v, from H q - (M + H Σ⁻¹ Hᵀ) v, so that factors of single precision lose nothing: each
-iteration corrects the last one's errors. Contacts of the same two bodies follow each other in runs, so the bodies'
-velocities and sums stay in registers. Runs of one part of the bodies (`body_parts`) touch no other part, so that parts
-may be taken at once.
+where joints are rigid. Joints with a compliance E have σ + E for σ in M + H Σ⁻¹ Hᵀ, and r = σ/(σ + E) (q - Hᵀ v / σ);
+E is one number across the joint and one along it. One pass over the contacts, between two solutions for v, makes it:
+the x that it finds gives the next q. What is solved for is the change of v, from H q - (M + H Σ⁻¹ Hᵀ) v, so that
+factors of single precision lose nothing: each iteration corrects the last one's errors.
+
+Contacts of the same two bodies follow each other in runs, so the bodies' velocities and sums stay in registers. Runs of
+one part of the bodies (`body_parts`) touch no other part, so that parts may be taken at once. Numbers of contacts stand
+in blocks, row by row, so that loops over a block have no branch and take several contacts at once.
 """
 
 from typing import NamedTuple
@@ -33,8 +36,10 @@ __all__ = [
     "COHESION",
     "FRICTION",
     "ROWS",
+    "SHARE",
     "SHIFT",
     "SOFT",
+    "YIELD",
     "Acceleration",
     "Factors",
     "Iterate",
@@ -61,8 +66,8 @@ _PIECE = 1024
 # places of a block: a multiple of what a processor multiplies at once, so few that a block stays in the fastest memory
 BLOCK = 64
 # rows of a block of a field, and where the vectors and numbers of contacts begin
-ROWS = 13
-_NORMAL, ARM, SHIFT, FRICTION, COHESION, ADHESION, SOFT = 0, 3, 6, 9, 10, 11, 12
+ROWS = 17
+ARM, SHIFT, FRICTION, COHESION, ADHESION, SOFT, SHARE, YIELD = 3, 6, 9, 10, 11, 12, 13, 15
 # growth of the change of an iteration from which earlier ones mislead [-]
 _WORSE = 2.0
 
@@ -97,7 +102,8 @@ class Touching(NamedTuple):
     runs : of the contacts
     field : (n ROWS BLOCK,) float64, block by block, and row by row in it, one number for each place: normal n [-], the
         arm from the candidate's centre of mass [m], shift u_free + bias n [m/s], friction μ [-], cohesion k and
-        adhesion s [N s], and 1/σ [kg], which is 0 where a place is empty, like all else
+        adhesion s [N s], 1/σ [kg], σ/(σ + E) across the joint and along it [-], and E [1/kg], the compliance of the
+        joint; 0 where a place is empty
     """
 
     runs: Runs
@@ -110,7 +116,7 @@ class Iterate(NamedTuple):
     Attributes
     ----------
     x : (3 n BLOCK,) float64, as above, in blocks of three rows [N s]
-    way : alike, q - z [N s]
+    way : alike, σ q / (σ + E) - z [N s]
     velocity : (6 nm,) float64, v in the order of elimination [m/s], [rad/s]
     load : (6 (nm + (k+1) ns),) float64, H q - (M + H Σ⁻¹ Hᵀ) v by bodies, and by copies of those between the k parts
     """
@@ -200,6 +206,16 @@ def _add_product(block, a, b, weight):
         block[3 + i, 3 + i] += weight * along
 
 
+@njit(cache=True)
+def _add_outer(block, one, other, weight):
+    """Add what a contact has across its joint, over what it has along it."""
+    if weight == 0.0:
+        return
+    for i in range(6):
+        for k in range(6):
+            block[i, k] += weight * one[i] * other[k]
+
+
 @njit(cache=True, inline="always")
 def _vector(rows, at):
     """Return a vector of a block."""
@@ -273,14 +289,20 @@ def assemble(touching, mass, panels, value):  # pragma: no cover - compiled
         between[:] = 0.0
         for c in range(runs.begin[g], runs.end[g]):
             at = ROWS * BLOCK * (c // BLOCK) + c % BLOCK
-            a, weight = _vector(field, at + ARM * BLOCK), field[at + SOFT * BLOCK]
+            a, soft = _vector(field, at + ARM * BLOCK), field[at + SOFT * BLOCK]
+            across, weight = soft * field[at + SHARE * BLOCK], soft * field[at + (SHARE + 1) * BLOCK]
             b = a[0] - runs.offset[g, 0], a[1] - runs.offset[g, 1], a[2] - runs.offset[g, 2]
+            n = _vector(field, at)
+            one, other = (*n, *cross(a, n)), (*n, *cross(b, n))
             if i >= 0:
                 _add_product(own[i], a, a, weight)
+                _add_outer(own[i], one, one, across - weight)
             if j >= 0:
                 _add_product(own[j], b, b, weight)
+                _add_outer(own[j], other, other, across - weight)
             if i >= 0 and j >= 0:
                 _add_product(between, a, b, weight)
+                _add_outer(between, one, other, across - weight)
         if i < 0 or j < 0:
             continue
         early, late = min(i, j), max(i, j)
@@ -373,19 +395,22 @@ def _gather(block, touching, room, load, place):
 
 @njit(cache=True, fastmath={"contract"})
 def _relax(x, image, way, room, field, over):
-    """Write x + ω (r - z) = x + ω (way - u / σ) of a block into `image`, and u / σ where u is."""
+    """Write x + ω (r - z) of a block into `image`, and u / (σ + E) where u is."""
     for c in range(BLOCK):
-        soft = field[SOFT * BLOCK + c]
-        room[c] *= soft
-        room[BLOCK + c] *= soft
-        room[2 * BLOCK + c] *= soft
+        n0, n1, n2, soft = field[c], field[BLOCK + c], field[2 * BLOCK + c], field[SOFT * BLOCK + c]
+        across, along = soft * field[SHARE * BLOCK + c], soft * field[(SHARE + 1) * BLOCK + c]
+        u0, u1, u2 = room[c], room[BLOCK + c], room[2 * BLOCK + c]
+        more = (across - along) * (u0 * n0 + u1 * n1 + u2 * n2)
+        room[c] = along * u0 + more * n0
+        room[BLOCK + c] = along * u1 + more * n1
+        room[2 * BLOCK + c] = along * u2 + more * n2
     for c in range(3 * BLOCK):
         image[c] = x[c] + over * (way[c] - room[c])
 
 
 @njit(cache=True, fastmath={"contract"}, error_model="numpy")
 def _exerted(x, way, room, field):
-    """Write q - z of a block's x into `way`, and q - u / σ, with its moments, into `room`, where u / σ is."""
+    """Write σ q / (σ + E) - z of a block's x into `way`, and r, with its moments, into `room`, where u / (σ + E) is."""
     for c in range(BLOCK):
         n0, n1, n2 = field[c], field[BLOCK + c], field[2 * BLOCK + c]
         mu, k, soft = field[FRICTION * BLOCK + c], field[COHESION * BLOCK + c], field[SOFT * BLOCK + c]
@@ -400,13 +425,17 @@ def _exerted(x, way, room, field):
         y0 = 0.0 if inside else x0 - (shrink * t0 + height * n0)
         y1 = 0.0 if inside else x1 - (shrink * t1 + height * n1)
         y2 = 0.0 if inside else x2 - (shrink * t2 + height * n2)
-        d0 = -y0 - lag * n0 - field[SHIFT * BLOCK + c] * soft
-        d1 = -y1 - lag * n1 - field[(SHIFT + 1) * BLOCK + c] * soft
-        d2 = -y2 - lag * n2 - field[(SHIFT + 2) * BLOCK + c] * soft
-        way[c], way[BLOCK + c], way[2 * BLOCK + c] = d0, d1, d2
-        room[c] = x0 - y0 + d0 - room[c]
-        room[BLOCK + c] = x1 - y1 + d1 - room[BLOCK + c]
-        room[2 * BLOCK + c] = x2 - y2 + d2 - room[2 * BLOCK + c]
+        z0, z1, z2 = x0 - y0, x1 - y1, x2 - y2
+        q0 = z0 - y0 - lag * n0 - field[SHIFT * BLOCK + c] * soft
+        q1 = z1 - y1 - lag * n1 - field[(SHIFT + 1) * BLOCK + c] * soft
+        q2 = z2 - y2 - lag * n2 - field[(SHIFT + 2) * BLOCK + c] * soft
+        share = field[(SHARE + 1) * BLOCK + c]
+        more = (field[SHARE * BLOCK + c] - share) * (q0 * n0 + q1 * n1 + q2 * n2)
+        q0, q1, q2 = share * q0 + more * n0, share * q1 + more * n1, share * q2 + more * n2
+        way[c], way[BLOCK + c], way[2 * BLOCK + c] = q0 - z0, q1 - z1, q2 - z2
+        room[c] = q0 - room[c]
+        room[BLOCK + c] = q1 - room[BLOCK + c]
+        room[2 * BLOCK + c] = q2 - room[2 * BLOCK + c]
     _moments(room, field)
 
 
@@ -591,7 +620,7 @@ def projected(impulse, friction, cohesion):  # pragma: no cover - compiled
 
 @njit(cache=True)
 def _moved(velocity, step, length, begin, end):
-    """Add a step to the velocities of some bodies; return the largest, or of a point `length` from a centre that turns."""
+    """Add a step to the velocities of some bodies; return its largest, rotations counted at a distance `length`."""
     change = 0.0
     for k in range(6 * begin, 6 * end, 6):
         for a in range(3):
@@ -790,7 +819,12 @@ def _opposed(z, room, free, field, rho):
     for c in range(BLOCK):
         n0, n1, n2 = field[c], field[BLOCK + c], field[2 * BLOCK + c]
         free0, free1, free2 = free[c], free[BLOCK + c], free[2 * BLOCK + c]
-        u0, u1, u2 = room[c] + free0, room[BLOCK + c] + free1, room[2 * BLOCK + c] + free2
+        z0, z1, z2 = z[c], z[BLOCK + c], z[2 * BLOCK + c]
+        give = field[(YIELD + 1) * BLOCK + c]
+        more = (field[YIELD * BLOCK + c] - give) * (z0 * n0 + z1 * n1 + z2 * n2)
+        u0 = room[c] + free0 + give * z0 + more * n0
+        u1 = room[BLOCK + c] + free1 + give * z1 + more * n1
+        u2 = room[2 * BLOCK + c] + free2 + give * z2 + more * n2
         along = u0 * n0 + u1 * n1 + u2 * n2
         t0, t1, t2 = u0 - along * n0, u1 - along * n1, u2 - along * n2
         # the bias is what the shift has beyond u_free
@@ -800,9 +834,9 @@ def _opposed(z, room, free, field, rho):
             + (field[(SHIFT + 2) * BLOCK + c] - free2) * n2
             + field[FRICTION * BLOCK + c] * np.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
         )
-        room[c] = z[c] - rho * (u0 + up * n0)
-        room[BLOCK + c] = z[BLOCK + c] - rho * (u1 + up * n1)
-        room[2 * BLOCK + c] = z[2 * BLOCK + c] - rho * (u2 + up * n2)
+        room[c] = z0 - rho * (u0 + up * n0)
+        room[BLOCK + c] = z1 - rho * (u1 + up * n1)
+        room[2 * BLOCK + c] = z2 - rho * (u2 + up * n2)
 
 
 @njit(cache=True, fastmath={"contract", "reassoc"})

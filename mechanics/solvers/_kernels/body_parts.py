@@ -1,7 +1,7 @@
 """Numba kernels of parts of the bodies that no factor couples: subtrees of the elimination tree.
 
-What bodies of a part contribute to those between the parts adds up in copies of these, one for each part, and the copies
-are summed in order. So parts may be taken at once, in whatever order, with the same bits.
+What bodies of a part contribute to those between the parts adds up in copies of these, one for each part, and the
+copies are summed in order. So parts may be taken at once, in whatever order, with the same bits.
 """
 
 from typing import NamedTuple

@@ -40,6 +40,8 @@ _KEPT = 4_000_000
 _CONTACT = 3000
 # difference of the offsets between the centres of two bodies at contacts of one run: rounding [-]
 _SAME = 1e-12
+# σ over E of joints that yield, beyond that of rigid ones: of small contacts E is 10⁴ times W_αα [-]
+_GIVING = 10.0
 # iterations before the first look at the residual
 _FIRST_LOOK = 10
 # fewest iterations between two looks
@@ -79,6 +81,8 @@ STAGES = (Stage(0.02, 150, False), Stage(0.05, 150, True), Stage(0.2, 250, True)
 class BodyADMM:
     """ADMM on the velocities of rigid bodies until η and the velocity error are within their tolerances.
 
+    Joints between them may be rigid or compliant. Threads share the iterations of many bodies, with the same bits.
+
     Attributes
     ----------
     tolerance, velocity_tolerance, max_iterations : as in `ADMM`
@@ -106,13 +110,15 @@ class BodyADMM:
                 "bodies are not all rigid", where="ADMM of bodies", remedy='use the method "admm"'
             )
         run = _Run(problem, contacts, start, self)
-        run.look()
         most = min(self.max_iterations, sum(stage.iterations for stage in self.stages))
-        while run.excess > run.goal and run.iterations < most:
-            run.iterate()
+        try:
             run.look()
-        impulse, velocity = run.best()
-        run.end()
+            while run.excess > run.goal and run.iterations < most:
+                run.iterate()
+                run.look()
+            impulse, velocity = run.best()
+        finally:
+            run.end()
         left = residual(problem, impulse)
         within = left.within(self.tolerance, self.velocity_tolerance)
         return ContactSolution(impulse, velocity, run.iterations, left.natural_map, within)
@@ -136,19 +142,19 @@ class _Run:
             _bodies_of(problem.delassus, contacts),
         )
         bodies, scale = self._bodies, settings.stages[0].penalty
-        self._soft = bodies.soft(np.max(scale))
+        self._compliance = bodies.compliance(problem.delassus.joint_compliance)
+        self._soft = bodies.soft(np.max(scale), self._compliance)
         free = kernel.to_world(bodies.geometry, problem.u_free)
         self._free = bodies.spread(free)
         rows = [free + problem.bias[:, None] * bodies.geometry[:, :3], problem.friction, problem.cohesion]
-        field = bodies.field(rows, problem.adhesion, self._soft)
+        field = bodies.field(rows, problem.adhesion, self._compliance)
         self._touching = kernel.Touching(bodies.runs, field)
+        self._soften(self._soft)
         self._pace = float(np.abs(problem.u_free).max()) or float(np.abs(problem.bias).max()) or 1.0
         x = kernel.projected(start.impulse, problem.friction, problem.cohesion)
         x -= start.velocity * bodies.collected(self._soft)[:, None]
         x = bodies.spread(kernel.to_world(bodies.geometry, x))
-        # the first pass is not to go on from it
-        way = np.zeros_like(x)
-        self._iterate = kernel.Iterate(x, way, np.zeros(6 * len(bodies.inertia)), bodies.load())
+        self._iterate = kernel.Iterate(x, np.zeros_like(x), np.zeros(6 * len(bodies.inertia)), bodies.load())
         self._z = np.empty_like(x)
         self._stages = list(settings.stages)
         self._factors: kernel.Factors | None = None
@@ -221,17 +227,24 @@ class _Run:
         self._broken()
         x, z = _vectors(self._iterate.x), _vectors(self._z)
         common = stage.penalty if isinstance(stage.penalty, float) else None
-        soft = self._bodies.soft(common or np.array(stage.penalty)[_kinds(x, z).ravel()])
+        penalty = common or np.array(stage.penalty)[_kinds(x, z).ravel()]
+        soft = self._bodies.soft(penalty, self._compliance)
         if not np.array_equal(soft, self._soft):
             ratio = np.ones_like(soft)
             np.divide(soft, self._soft, out=ratio, where=self._soft > 0)
             x[:] = z + (x - z) * ratio.reshape(len(x), 1, -1)
-            rows = self._touching.field.reshape(-1, kernel.ROWS, kernel.BLOCK)
-            rows[:, kernel.SOFT] = soft.reshape(-1, kernel.BLOCK)
-        self._soft = soft
+            self._soften(soft)
         # those of the stage before make room for them
         self._factors = None
-        self._factors = self._bodies.factors(common, self._touching)
+        self._factors = self._bodies.factors(common if self._compliance is None else None, self._touching)
+
+    def _soften(self, soft: Array) -> None:
+        """Give the contacts their 1/σ."""
+        self._soft = soft
+        rows = self._touching.field.reshape(-1, kernel.ROWS, kernel.BLOCK)
+        rows[:, kernel.SOFT] = soft.reshape(-1, kernel.BLOCK)
+        if self._compliance is not None:
+            rows[:, kernel.SHARE : kernel.SHARE + 2] = 1.0 / (1.0 + rows[:, [kernel.SOFT]] * self._compliance)
 
     def _broken(self) -> tuple[float, float, float]:
         iterate, scale = self._iterate, self._problem.delassus.scale
@@ -314,13 +327,23 @@ class _Bodies:
         vectors: Array = _vectors(values).transpose(0, 2, 1).reshape(-1, 3)[self._place]
         return vectors
 
-    def field(self, laws: list[Array], adhesion: Array | None, soft: Array) -> Array:
-        """Return the field of `Touching`; `laws` are shift (nc, 3), friction and cohesion (nc,)."""
+    def compliance(self, diagonal: Array | None) -> Array | None:
+        """Return E (n, 2, BLOCK) across and along joints of a diagonal (nc, 3); None where joints are rigid."""
+        if diagonal is None:
+            return None
+        both = [self.spread(np.ascontiguousarray(diagonal[:, k])).reshape(-1, kernel.BLOCK) for k in (0, 1)]
+        return np.stack(both, axis=1)
+
+    def field(self, laws: list[Array], adhesion: Array | None, compliance: Array | None) -> Array:
+        """Return the field of `Touching` without 1/σ; `laws` are shift (nc, 3), friction and cohesion (nc,)."""
         rows = np.zeros((self._blocks, kernel.ROWS, kernel.BLOCK))
         shift, friction, cohesion = map(self.spread, laws)
         for at, vectors in zip((0, kernel.ARM, kernel.SHIFT), (*self._fixed, shift), strict=True):
             rows[:, at : at + 3] = _vectors(vectors)
-        numbers = {kernel.FRICTION: friction, kernel.COHESION: cohesion, kernel.SOFT: soft}
+        rows[:, kernel.SHARE : kernel.SHARE + 2] = 1.0
+        if compliance is not None:
+            rows[:, kernel.YIELD : kernel.YIELD + 2] = compliance
+        numbers = {kernel.FRICTION: friction, kernel.COHESION: cohesion}
         if adhesion is not None:
             numbers[kernel.ADHESION] = self.spread(adhesion)
         for at, values in numbers.items():
@@ -332,9 +355,15 @@ class _Bodies:
         copies = (len(self._parts.body) + 1) * len(self._parts.shared)
         return np.empty(_VELOCITIES * (len(self.inertia) + copies))
 
-    def soft(self, penalty: float | Array) -> Array:
-        """Return 1/σ of each place for a penalty, or one of each, over the mean diagonals of W_αα; else 0 [kg]."""
-        soft: Array = 1.0 / (penalty * self._compliance)
+    def soft(self, penalty: float | Array, compliance: Array | None) -> Array:
+        """Return 1/σ of each place for a penalty, or one of each, over the mean diagonals of W_αα; else 0 [kg].
+
+        Where joints yield by E, `compliance`, σ is larger by some E.
+        """
+        sigma = penalty * self._compliance
+        if compliance is not None:
+            sigma += _GIVING * compliance[:, 0].ravel()
+        soft: Array = 1.0 / sigma
         return soft
 
     def factors(self, penalty: float | None, touching: kernel.Touching) -> kernel.Factors:
@@ -362,7 +391,8 @@ class _Bodies:
 
 
 def _bodies_of(delassus: Delassus, contacts: RigidContacts) -> _Bodies:
-    """Return the bodies of an operator, which remembers them if it can."""
+    """Return the bodies of an operator, which remembers them if it can; joints that yield have those of rigid ones."""
+    delassus = getattr(delassus, "inner", delassus)
     memo: dict[str, _Bodies] = getattr(delassus, "memo", {})
     if "bodies" not in memo:
         memo["bodies"] = _Bodies(delassus, contacts)

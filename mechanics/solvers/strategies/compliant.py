@@ -5,10 +5,12 @@ from dataclasses import dataclass, replace
 from mechanics.delassus.compliant import CompliantDelassus
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.problem.residual import residual
+from mechanics.solvers.first_order.body_admm import BodyADMM, Stage
 from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.second_order.proximal_newton import ProximalNewton
 from mechanics.solvers.second_order.scaling import equilibrated
 from mechanics.solvers.strategies.elastic import Elastic
+from mechanics.solvers.strategies.rigid import many_bodies
 
 __all__ = ["Compliant"]
 
@@ -22,11 +24,16 @@ _NEWTON_STEPS = 30
 _FURTHER = 1e-3
 # iterations of the interior point
 _INTERIOR = 60
+# of many bodies, iterations with kept factors: joints that yield let no forces drift, so one penalty serves, in some
+# hundred iterations, where each step of Newton's method factorises anew
+_MANY_STAGES = (Stage(0.2, 600, extrapolated=False),)
 
 
 @dataclass(frozen=True)
 class Compliant:
     """Newton's method, from softer joints where it fails, then the interior point; with deformable stones as `Elastic`.
+
+    Many bodies begin with ADMM, whose factors last for a step.
 
     With E the matrix W + E is regular, however many points stones share, so the method that solves it is fast; from
     contacts far from those of the solution it wanders, and softer joints bring it near. Where it is not solved, the
@@ -51,7 +58,16 @@ class Compliant:
         if problem.delassus.rigid is None:
             found = Elastic(self.tolerance, self.velocity_tolerance, self.max_iterations)(problem, start)
             return replace(found, why=f"compliant joints, {found.why}")
-        found = self._newton(problem, start, "Newton", self.max_iterations)
+        made = 0
+        if many_bodies(problem):
+            limits = self.tolerance, self.velocity_tolerance
+            solver = BodyADMM(*limits, self.max_iterations, _MANY_STAGES)
+            found = self._judged(problem, solver(problem, start), "admm of bodies")
+            if found.converged:
+                return found
+            start, made = ContactStart(found.impulse, found.velocity), found.iterations
+        found = self._newton(problem, start, "Newton", max(self.max_iterations - made, 1))
+        found = replace(found, iterations=found.iterations + made)
         if not found.converged and found.iterations < self.max_iterations:
             found = self._softer(problem, start, found.iterations)
         left = self.max_iterations - found.iterations

@@ -16,7 +16,7 @@ from mechanics.solvers.second_order.newton import Newton
 from mechanics.solvers.second_order.proximal_newton import ProximalNewton
 from mechanics.solvers.second_order.scaling import equilibrated
 
-__all__ = ["Alternating", "moving_admm"]
+__all__ = ["Alternating", "many_bodies", "moving_admm"]
 
 # sweeps with which every solution but the first begins: near a solution they suffice
 _FIRST_SWEEPS = 20
@@ -155,7 +155,7 @@ class Alternating:
             if kept is not None:
                 return kept
         motion = start.motion is not None
-        many = motion and _moving(problem) >= _MANY
+        many = motion and many_bodies(problem)
         rests = ("sweeps",) if many else _RESTING
         moved = False
         for name, solve, from_best in self._stages(problem, warm, motion, many):
@@ -217,7 +217,7 @@ class Alternating:
         nothing; then forces among them grow until one slips. Newton's method follows them there, ADMM sorts the others.
         """
         assert start.motion is not None
-        many = _moving(problem) >= _MANY
+        many = many_bodies(problem)
         found = self._bodies(self.max_iterations, many)(problem, start)
         found = replace(found, why="admm of bodies: motion")
         best = found
@@ -380,10 +380,10 @@ class Alternating:
         return replace(found, natural_map=left.natural_map, converged=within, why=why)
 
 
-def _moving(problem: ContactProblem) -> int:
-    """Return the number of rigid bodies that move."""
+def many_bodies(problem: ContactProblem) -> bool:
+    """Return whether so many rigid bodies move that kept factors beat Newton's method."""
     contacts = problem.delassus.rigid
-    return 0 if contacts is None else int(np.count_nonzero(contacts.inertia[:, 0]))
+    return contacts is not None and int(np.count_nonzero(contacts.inertia[:, 0])) >= _MANY
 
 
 def _without_self_stress(problem: ContactProblem, impulse: Array) -> Array:

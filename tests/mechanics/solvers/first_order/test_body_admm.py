@@ -7,6 +7,7 @@ import pytest
 
 from benchmarks.generated import running_bond
 from benchmarks.scenes import engine_scene
+from mechanics.delassus.compliant import CompliantDelassus
 from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
 from mechanics.problem.problem import ContactStart
@@ -15,9 +16,11 @@ from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.motions import ImposedMotion
 from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import SolverSettings
+from mechanics.solvers._kernels.body_parts import parts_of
 from mechanics.solvers.first_order import body_admm
 from mechanics.solvers.first_order.body_admm import BodyADMM, Stage
 from mechanics.solvers.second_order.interior_point import InteriorPoint
+from mechanics.solvers.strategies.compliant import Compliant
 from moma.errors import SolverError
 
 _ALONG, _ACROSS = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
@@ -104,6 +107,60 @@ def test_factors_of_single_precision_lose_nothing(problem, monkeypatch):
     # velocities themselves, solved for in single precision, would be wrong by some 10⁻⁷
     np.testing.assert_allclose(single.velocity, double.velocity, atol=1e-10 * np.abs(problem.u_free).max())
     assert single.natural_map < 1.001 * double.natural_map
+
+
+@pytest.fixture(scope="module")
+def wide():
+    """The contact problem of a step of a wall of 20 × 4 bricks that is shaken."""
+    scene = shaken(_ALONG)
+    bricks = engine_scene(running_bond(20, 4), 1e-3, 0.5, 1e-6, 2000).blocks
+    return followed(replace(scene, blocks=bricks), 20)[-1].problem
+
+
+def test_threads_share_the_parts_of_many_bodies_with_the_same_bits(wide, monkeypatch):
+    monkeypatch.setattr(body_admm, "_FEW", 1)
+    solver = BodyADMM(1e-14, 1e-14, 60, (Stage(0.05, 40, False), Stage((1.0, 0.1, 0.01), 20, False)))
+    found = []
+    for threads in (1, 2, 3):
+        wide.delassus.memo.clear()
+        operator = replace(wide.delassus, threads=threads)
+        found.append(solver(replace(wide, delassus=operator), nothing(wide)))
+        assert len(body_admm._bodies_of(operator, operator.rigid).groups) == threads
+    assert len({one.impulse.tobytes() for one in found}) == 1
+    assert len({one.velocity.tobytes() for one in found}) == 1
+
+
+def test_parts_change_nothing_but_rounding(wide, monkeypatch):
+    monkeypatch.setattr(body_admm, "_FEW", 1)
+    solver = BodyADMM(1e-14, 1e-14, 40, (Stage(0.05, 40, False),))
+    found = []
+    for several in (False, True):
+        monkeypatch.setattr(
+            body_admm, "parts_of", lambda panels, _, several=several: parts_of(panels, several)
+        )
+        wide.delassus.memo.clear()
+        found.append(solver(wide, nothing(wide)))
+        assert (len(body_admm._bodies_of(wide.delassus, wide.delassus.rigid)._parts.body) > 1) == several
+    wide.delassus.memo.clear()
+    whole, cut = found
+    # factors are of single precision, and each iteration corrects the last one's rounding
+    np.testing.assert_allclose(cut.impulse, whole.impulse, atol=1e-6 * np.abs(whole.impulse).max())
+
+
+def test_contacts_of_joints_that_yield_share_their_load_as_newton_finds_it(problem):
+    """(W + E) instead of W: E is 2 % of W across joints, 4 % along them, and of small contacts 10⁴ times as large."""
+    mean = np.einsum("cii->c", problem.delassus.diagonal) / 3.0
+    compliance = mean[:, None] * np.array([0.02, 0.04, 0.04])
+    compliance[::7] *= 1e4
+    yielding = replace(problem, delassus=CompliantDelassus(problem.delassus, compliance))
+    found = BodyADMM(1e-10, 1e-9, 3000, (Stage(0.2, 3000, True),))(yielding, nothing(problem))
+    exact = Compliant(1e-10, 1e-9)(yielding, nothing(problem))
+    assert found.converged
+    assert exact.why == "compliant joints, Newton"
+    # W + E is regular, so the impulses are unique
+    np.testing.assert_allclose(found.impulse, exact.impulse, atol=1e-6 * np.abs(exact.impulse).max())
+    rigid = BodyADMM(1e-10, 1e-9, 3000, (Stage(0.05, 3000, True),))(problem, nothing(problem))
+    assert np.abs(rigid.impulse - exact.impulse).max() > 0.01 * np.abs(exact.impulse).max()
 
 
 def test_a_problem_that_is_not_of_rigid_bodies_is_refused(problem):
