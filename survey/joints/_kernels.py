@@ -240,7 +240,8 @@ def _huber(design, heights, sound, unknowns, prior, usual):
 @njit(cache=True)
 def _weigh(design, heights, sound, solution, weights):
     """Replace `weights` by Huber's weights of the residuals; return the mean square residual by the old weights."""
-    residuals, count, total = np.empty(design.shape[0]), np.int64(0), 0.0  # a literal 0 compiles `_median` twice
+    # of no literal type, or numba compiles `_median` twice
+    residuals, count, total = np.empty(design.shape[0]), np.int64(0), 0.0
     for i in range(design.shape[0]):
         residual = abs(heights[i] - _value(design[i], solution))
         total += weights[i] * residual**2

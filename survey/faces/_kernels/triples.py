@@ -137,7 +137,8 @@ def search_triples(points, size, known, view):
     best[:, :], scores[:] = np.inf, np.inf
     largest = 0.0
     for sweep in range(2):
-        i, j, k = np.int64(0), np.int64(1), np.int64(1)  # of no literal type, or numba compiles `_triple` twice
+        # of no literal type, or numba compiles `_triple` twice
+        i, j, k = np.int64(0), np.int64(1), np.int64(1)
         for number in range(count):
             i, j, k = _triple(number, n, i, j, k)
             area = _normal_of(local, i, j, k, normal)
