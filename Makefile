@@ -8,7 +8,10 @@
 PYTHON ?= python3
 VENV := .venv
 MOMA := $(VENV)/bin/moma
-PIP := $(VENV)/bin/python -m pip install --quiet --disable-pip-version-check
+# Almost half of pip's work is to compile 5,900 files to byte code; Python does so for those that it imports, where it may
+# write them.
+PIP := $(VENV)/bin/python -m pip install --quiet --disable-pip-version-check \
+  $(if $(PYTHONDONTWRITEBYTECODE),,--no-compile)
 SAMPLE := data/samples/window
 OUT := out
 KERNELS := $(shell find survey mechanics benchmarks -path "*/_kernels*" -name "*.py")

@@ -68,6 +68,7 @@ def face_cells(surfaces: Surfaces, nodes: int) -> FaceCells:
         Bodies(np.zeros((1, 3)), np.eye(3)[None]),
         meshes,
         surfaces.shapes,
+        np.empty(int(size.sum())),
     )
     count = np.bincount(face[row], minlength=len(meshes.of_face))
     return FaceCells(

@@ -4,7 +4,8 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from mechanics.arrays import Array, Bools, Ints
-from mechanics.contact._kernels.mortar import Bodies, Interfaces, mortar_rows, mortar_shares
+from mechanics.contact._kernels.facets import FacetMeshes
+from mechanics.contact._kernels.mortar import Bodies, Interfaces, mortar_rows
 from mechanics.contact._kernels.points import surface_points
 from mechanics.contact.contacts import NODE, Contacts
 from mechanics.contact.surfaces import Placed, Surfaces
@@ -85,12 +86,13 @@ def mortar_contacts(
     # where a face lies on one other alone, all its nodes have contacts
     plane = surfaces.plane[face[:, 0]]
     several = np.flatnonzero(np.bincount(plane)[plane] > 1)
-    pointer, share = mortar_shares(
-        Interfaces._make(array[several] for array in interfaces), bodies, meshes, placed.shapes
-    )
-    kept = _kept(surfaces, face[:, 0], several, pointer, share)
+    own = Interfaces._make(array[several] for array in interfaces)
+    pointer = _starts(meshes, own.mesh[:, 0])
+    share = np.zeros(int(pointer[-1]))
+    mortar_rows(pointer, np.empty(0, dtype=bool), own, bodies, meshes, placed.shapes, share)
+    start, kept = _kept(surfaces, face[:, 0], several, pointer, share)
     interface, node, area, middle, pointer, column, value = mortar_rows(
-        *kept, interfaces, bodies, meshes, placed.shapes
+        start, kept, interfaces, bodies, meshes, placed.shapes, np.empty(len(kept))
     )
     arm = np.zeros((len(interface), 2, 3))
     rigid = np.flatnonzero(meshes.of_face[face[interface, 1]] < 0)
@@ -144,7 +146,7 @@ def _kept(surfaces: Surfaces, face: Ints, several: Ints, start: Ints, share: Arr
     """
     meshes = surfaces.meshes
     size = np.diff(meshes.node_ptr)[meshes.of_face[face]]
-    pointer = np.concatenate([[0], np.cumsum(size)]).astype(np.int64)
+    pointer = _starts(meshes, meshes.of_face[face])
     kept = np.ones(int(pointer[-1]), dtype=bool)
     if len(share) == 0:
         return pointer, kept
@@ -157,6 +159,12 @@ def _kept(surfaces: Surfaces, face: Ints, several: Ints, start: Ints, share: Arr
     place = within + np.repeat(pointer[several], size[several])
     kept[place[order]] = share[order] >= (1.0 - _ALIKE) * largest
     return pointer, kept
+
+
+def _starts(meshes: FacetMeshes, mesh: Ints) -> Ints:
+    """Return where the nodes of each of some meshes (n,) begin in their list, and where it ends (n + 1,)."""
+    starts: Ints = np.concatenate([[0], np.cumsum(np.diff(meshes.node_ptr)[mesh])]).astype(np.int64)
+    return starts
 
 
 def _frames(surfaces: Surfaces, placed: Placed, face: Ints) -> tuple[Array, Array]:

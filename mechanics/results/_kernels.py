@@ -91,13 +91,14 @@ def joint_motion(joints, centre, rotation):  # pragma: no cover - compiled
     for j in range(count):
         a, b = joints.bodies[j]
         ra, rb = rotation[a], rotation[b]
-        apart, n = centre[a] - centre[b], joints.normal[j]
+        n = joints.normal[j]
+        c0, c1, c2 = centre[a, 0] - centre[b, 0], centre[a, 1] - centre[b, 1], centre[a, 2] - centre[b, 2]
         most = 0.0
         for k in range(joints.first[j], joints.first[j + 1]):
             p, q = joints.own[k], joints.other[k]
-            x = apart[0] + ra[0, 0] * p[0] + ra[0, 1] * p[1] + ra[0, 2] * p[2]
-            y = apart[1] + ra[1, 0] * p[0] + ra[1, 1] * p[1] + ra[1, 2] * p[2]
-            z = apart[2] + ra[2, 0] * p[0] + ra[2, 1] * p[1] + ra[2, 2] * p[2]
+            x = c0 + ra[0, 0] * p[0] + ra[0, 1] * p[1] + ra[0, 2] * p[2]
+            y = c1 + ra[1, 0] * p[0] + ra[1, 1] * p[1] + ra[1, 2] * p[2]
+            z = c2 + ra[2, 0] * p[0] + ra[2, 1] * p[1] + ra[2, 2] * p[2]
             # in the axes of the second stone
             d0 = rb[0, 0] * x + rb[1, 0] * y + rb[2, 0] * z - q[0]
             d1 = rb[0, 1] * x + rb[1, 1] * y + rb[2, 1] * z - q[1]

@@ -195,11 +195,14 @@ def _intersect(planes: Array, centre: Array, reach: float, code: str) -> CutSton
     room = len(planes) + 6
     vertices = np.empty((16 * room, 3))
     loops, sizes = np.empty((room + 1, _MOST), np.int64), np.empty(room + 1, np.int64)
-    of_face = np.empty(room + 1, np.int64)
+    of_face, meeting = np.empty(room + 1, np.int64), np.empty((16 * room, 3), np.int64)
     status, corners, faces = cut_out(
-        local, np.zeros(3), reach, _NEAR, CutSolid(vertices, loops, sizes, of_face)
+        local, np.zeros(3), reach, _NEAR, CutSolid(vertices, loops, sizes, of_face, meeting)
     )
     if status != FULL:
         return None
+    sharp = np.flatnonzero(meeting[:corners, 0] >= 0)
+    crossing = local[meeting[sharp]]
+    vertices[sharp] = np.linalg.solve(crossing[:, :, :3], crossing[:, :, 3:])[..., 0]
     named = tuple(tuple(loops[f, : sizes[f]].tolist()) for f in range(faces))
     return CutStone(Solid(code, vertices[:corners] + centre, named), tuple(of_face[:faces].tolist()))

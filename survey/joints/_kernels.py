@@ -211,11 +211,13 @@ def _value(row, solution):
 def _huber(design, heights, sound, unknowns, prior, usual):
     """Return the Huber solution (6,) of the least squares, and the weighted mean square residual."""
     k = design.shape[0]
-    solution, previous = np.zeros(6), np.zeros(6)
-    weights = np.ones(k)
+    solution, previous, weights = np.zeros(6), np.zeros(6), np.empty(k)
     for i in range(k):
         weights[i] = 1.0 if sound[i] else _WORN
-    if unknowns == 4 and sound.sum() >= _MANY:
+    number = 0
+    for i in range(k):
+        number += sound[i]
+    if unknowns == 4 and number >= _MANY:
         # least squares alone would never identify an odd stone at the end of a bed
         _weigh(design, heights, sound, _least_sum(design, heights, sound), weights)
     left = 0.0
@@ -238,7 +240,8 @@ def _huber(design, heights, sound, unknowns, prior, usual):
 @njit(cache=True)
 def _weigh(design, heights, sound, solution, weights):
     """Replace `weights` by Huber's weights of the residuals; return the mean square residual by the old weights."""
-    residuals, count, total = np.empty(design.shape[0]), 0, 0.0
+    # of no literal type, or numba compiles `_median` twice
+    residuals, count, total = np.empty(design.shape[0]), np.int64(0), 0.0
     for i in range(design.shape[0]):
         residual = abs(heights[i] - _value(design[i], solution))
         total += weights[i] * residual**2
@@ -246,12 +249,38 @@ def _weigh(design, heights, sound, solution, weights):
             residuals[count] = residual
             count += 1
     left = total / weights.sum()
-    spread = 1e-4 if count == 0 else max(1.4826 * np.median(residuals[:count]), 1e-4)
+    spread = 1e-4 if count == 0 else max(1.4826 * _median(residuals, count), 1e-4)
     for i in range(design.shape[0]):
         residual = abs(heights[i] - _value(design[i], solution))
         weight, bend = (1.0, _HUBER * spread) if sound[i] else (_WORN, _WEAR)
         weights[i] = weight * min(1.0, bend / max(residual, 1e-300))
     return left
+
+
+@njit(cache=True)
+def _median(values, count):
+    """Return the median of the first values, which are reordered (Hoare 1961); np.median takes a second to compile."""
+    low, high, half = 0, count - 1, count // 2
+    while low < high:
+        pivot, i, j = values[half], low, high
+        while i <= j:
+            while values[i] < pivot:
+                i += 1
+            while values[j] > pivot:
+                j -= 1
+            if i <= j:
+                values[i], values[j] = values[j], values[i]
+                i, j = i + 1, j - 1
+        if j < half:
+            low = i
+        if i > half:
+            high = j
+    if count % 2:
+        return values[half]
+    lower = values[0]
+    for k in range(1, half):
+        lower = max(lower, values[k])
+    return 0.5 * (lower + values[half])
 
 
 @njit(cache=True)
@@ -287,10 +316,19 @@ def continuing_faces(pairs, solid, normals, offsets, joined, cosine, near):
                     and _off(g, f, solid, normals, offsets) <= near
                 ):
                     if count == out.shape[0]:
-                        out = np.concatenate((out, np.empty_like(out)))
+                        out = _doubled(out)
                     out[count, 0], out[count, 1] = f, g
                     count += 1
     return out[:count]
+
+
+@njit(cache=True)
+def _doubled(faces):
+    """Return a copy with twice as many rows."""
+    out = np.empty((2 * faces.shape[0], 2), np.int64)
+    for k in range(faces.shape[0]):
+        out[k, 0], out[k, 1] = faces[k, 0], faces[k, 1]
+    return out
 
 
 @njit(cache=True)

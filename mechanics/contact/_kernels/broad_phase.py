@@ -99,7 +99,33 @@ def _cell_size(low, high):
         for k in range(d):
             e = max(e, high[b, k] - low[b, k])
         extent[b] = e
-    return max(np.median(extent), 1e-300)
+    return max(_median(extent, nb), 1e-300)
+
+
+@njit(cache=True)
+def _median(values, count):
+    """Return the median of the first values, which are reordered (Hoare 1961); np.median takes a second to compile."""
+    low, high, half = 0, count - 1, count // 2
+    while low < high:
+        pivot, i, j = values[half], low, high
+        while i <= j:
+            while values[i] < pivot:
+                i += 1
+            while values[j] > pivot:
+                j -= 1
+            if i <= j:
+                values[i], values[j] = values[j], values[i]
+                i, j = i + 1, j - 1
+        if j < half:
+            low = i
+        if i > half:
+            high = j
+    if count % 2:
+        return values[half]
+    lower = values[0]
+    for k in range(1, half):
+        lower = max(lower, values[k])
+    return 0.5 * (lower + values[half])
 
 
 @njit(cache=True)
@@ -176,7 +202,7 @@ def close_pairs(low, high, owner, fixed):  # pragma: no cover - compiled
     (np, 2) int64, smaller index first
     """
     nb, d = low.shape
-    pairs, count = np.empty((8 * nb + 8, 2), dtype=np.int64), 0
+    pairs, count = np.empty((8 * nb + 8, 2), dtype=np.int64), np.int64(0)  # of no literal type
     if nb < 2:
         return pairs[:0]
     origin = low[0].copy()

@@ -10,7 +10,7 @@ from mechanics.contact._kernels.facets import corner_count
 from mechanics.contact._kernels.overlap import FlatMesh, flattened, overlap_integrals, room
 from mechanics.contact._kernels.vectors import dot, minus, row
 
-__all__ = ["Bodies", "Interfaces", "mortar_rows", "mortar_shares"]
+__all__ = ["Bodies", "Interfaces", "mortar_rows"]
 
 _SLIVER = 1e-2  # a node whose share of the overlap is below this part of a neighbour's is joined to it
 
@@ -116,26 +116,14 @@ def _scatter(nodes, values, scale, side, column, value, base, end):
 
 
 @njit(cache=True)
-def _flat_mesh(m, p, side, interfaces, bodies, meshes):
-    """Return mesh m in the plane of interface p; -1 gives one without nodes."""
+def _flat_mesh(m, b, p, interfaces, bodies, meshes):
+    """Return mesh m of body b in the plane of interface p; -1 gives one without nodes."""
     if m < 0:
         return FlatMesh(np.empty((0, 2)), meshes.facet[:0, :0], np.int64(0))
-    nodes, b = meshes.reference[meshes.node_ptr[m] : meshes.node_ptr[m + 1]], interfaces.body[p, side]
+    nodes = meshes.reference[meshes.node_ptr[m] : meshes.node_ptr[m + 1]]
     x = flattened(nodes, bodies.centre[b], bodies.rotation[b], interfaces.origin[p], interfaces.frame[p])
     kind = meshes.kind[m]
     return FlatMesh(x, meshes.facet[meshes.facet_ptr[m] : meshes.facet_ptr[m + 1], :kind], kind)
-
-
-@njit(cache=True)
-def _interface(p, interfaces, bodies, meshes, shapes):
-    """Return both meshes, the candidate's shares (nodes,) and moments (nodes, 3), and `overlap_integrals`."""
-    m, a = interfaces.mesh[p, 0], interfaces.mesh[p, 1]
-    own = _flat_mesh(m, p, 0, interfaces, bodies, meshes)
-    other = _flat_mesh(a, p, 1, interfaces, bodies, meshes)
-    bounded = meshes.cut[m], a < 0 or meshes.cut[a]
-    outlines, size = _outlines(p, bounded, interfaces, shapes)
-    share, moment = np.zeros(own.x.shape[0]), np.zeros((own.x.shape[0], 3))
-    return own, other, share, moment, overlap_integrals(own, other, outlines, size, share, moment)
 
 
 @njit(cache=True)
@@ -147,38 +135,7 @@ def _bare(p, interfaces, meshes):
 
 
 @njit(cache=True)
-def mortar_shares(interfaces, bodies, meshes, shapes):  # pragma: no cover - compiled
-    """Integrate ψ of all nodes of the candidate in each interface, as of `mortar_rows`.
-
-    Inputs
-    ------
-    interfaces : Interfaces
-    bodies : Bodies
-    meshes : FacetMeshes
-    shapes : Polyhedra, world axes
-
-    Outputs
-    -------
-    pointer : (ni+1,) int64, nodes of each interface
-    shares : float64, ∫ψ of each [m²]
-    """
-    count = interfaces.mesh.shape[0]
-    pointer = np.zeros(count + 1, dtype=np.int64)
-    for p in range(count):
-        m = interfaces.mesh[p, 0]
-        pointer[p + 1] = pointer[p] + meshes.node_ptr[m + 1] - meshes.node_ptr[m]
-    shares = np.zeros(pointer[-1])
-    for p in range(count):
-        if not _bare(p, interfaces, meshes):
-            _, _, share, _, _ = _interface(p, interfaces, bodies, meshes, shapes)
-            if share.sum() >= interfaces.least[p]:
-                for n in range(share.shape[0]):
-                    shares[pointer[p] + n] = share[n]
-    return pointer, shares
-
-
-@njit(cache=True)
-def mortar_rows(kept_ptr, kept, interfaces, bodies, meshes, shapes):  # pragma: no cover - compiled
+def mortar_rows(kept_ptr, kept, interfaces, bodies, meshes, shapes, shares):  # pragma: no cover - compiled
     """Make weighted points of flat interfaces: one per corner node of the candidate's facets.
 
     ψ_α is linear or bilinear on the facets of the candidate: the hat, one at its node α and zero at the other corners,
@@ -190,7 +147,7 @@ def mortar_rows(kept_ptr, kept, interfaces, bodies, meshes, shapes):  # pragma: 
     Inputs
     ------
     kept_ptr : (ni+1,) int64, nodes of the candidate in each interface
-    kept : bool, whether each of them may have a contact
+    kept : bool, whether each of them may have a contact; empty if only the shares are wanted
     interfaces : Interfaces
     bodies : Bodies
     meshes : FacetMeshes
@@ -198,6 +155,7 @@ def mortar_rows(kept_ptr, kept, interfaces, bodies, meshes, shapes):  # pragma: 
 
     Outputs
     -------
+    shares : float64, ∫ψ of each node of the candidates before any are joined [m²], written where faces touch
     interface, key : (nc,) int64, interface and node (numbered over all bodies) of each contact
     area : (nc,) float64, ∫ψ [m²]
     middle : (nc, 3) float64, ∫ψ (x, y, x² + y²) / ∫ψ, with x, y along the second and third row of the frame from the
@@ -214,15 +172,23 @@ def mortar_rows(kept_ptr, kept, interfaces, bodies, meshes, shapes):  # pragma: 
         largest = max(largest, meshes.node_ptr[m + 1] - meshes.node_ptr[m])
     # where a node has its place in the row at work; places only grow, so old entries need no clearing
     slot_c, slot_a = np.full(largest, -1), np.full(largest, -1)
-    count, end = 0, 0
+    # of no literal type, for each of which numba would compile the callees once more
+    count, end = np.int64(0), np.int64(0)
     for p in range(interfaces.mesh.shape[0]):
         if _bare(p, interfaces, meshes):
             continue
-        own, other, share, moment, integrals = _interface(p, interfaces, bodies, meshes, shapes)
-        used, mass, met_ptr, met, cross = integrals
-        if not share.sum() >= interfaces.least[p] or used.shape[0] == 0:
-            continue
         m, a = interfaces.mesh[p, 0], interfaces.mesh[p, 1]
+        own = _flat_mesh(m, interfaces.body[p, 0], p, interfaces, bodies, meshes)
+        other = _flat_mesh(a, interfaces.body[p, 1], p, interfaces, bodies, meshes)
+        outlines, size = _outlines(p, (meshes.cut[m], a < 0 or meshes.cut[a]), interfaces, shapes)
+        share, moment = np.zeros(own.x.shape[0]), np.zeros((own.x.shape[0], 3))
+        used, mass, met_ptr, met, cross = overlap_integrals(own, other, outlines, size, share, moment)
+        if not share.sum() >= interfaces.least[p]:
+            continue
+        for n in range(share.shape[0]):
+            shares[kept_ptr[p] + n] = share[n]
+        if kept.shape[0] == 0 or used.shape[0] == 0:
+            continue
         candidate = _Side(meshes.node[meshes.node_ptr[m] :], slot_c)
         antagonist = _Side(meshes.node[meshes.node_ptr[a] :], slot_a)  # unused if it is rigid
         corners = corner_count(own.kind)

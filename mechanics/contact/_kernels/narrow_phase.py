@@ -478,7 +478,7 @@ def _nearest_points(polygon, count, limit, points, recess, chosen):
     Of a single point the lowest is kept.
     """
     x, y, z, label = polygon
-    k = 0
+    k = np.int64(0)  # of no literal type
     for q in range(count):
         if z[q] <= limit:
             x[k], y[k], z[k], label[k] = x[q], y[q], z[q], label[q]
@@ -575,7 +575,7 @@ def interface_points(pairs, points, inner, middle, flat, thin, shapes):  # pragm
         # t1 runs along the first edge, so that the frame turns with the stone
         write_frame(f, n, along(edge, -dot(edge, n), n))
         t1, t2 = row(f, 1), row(f, 2)
-        k = 0
+        k = np.int64(0)  # of no literal type, for each of which numba would compile the callees once more
         # seen along the normal the incident face runs clockwise
         for v in range(cptr[incident + 1] - 1, cptr[incident] - 1, -1):
             arm = minus(row(vertex, corner[v]), o)

@@ -68,6 +68,7 @@ def write_row(matrix, k, a):  # pragma: no cover - compiled
 def write_frame(frame, n, direction):  # pragma: no cover - compiled
     """Set the rows n, t1, t2 = n × t1 of a frame (3, 3), t1 along a direction orthogonal to the unit vector n."""
     t1 = over(direction, norm(direction))
-    write_row(frame, 0, n)
-    write_row(frame, 1, t1)
-    write_row(frame, 2, cross(n, t1))
+    t2 = cross(n, t1)
+    frame[0, 0], frame[0, 1], frame[0, 2] = n
+    frame[1, 0], frame[1, 1], frame[1, 2] = t1
+    frame[2, 0], frame[2, 1], frame[2, 2] = t2

@@ -26,12 +26,14 @@ def largest_displacement(
     -------
     largest : (nb,) float64 [m]; NaN for a body whose place is not a number
     """
-    largest = np.zeros(centre.shape[0])
+    largest, turn = np.zeros(centre.shape[0]), np.empty((3, 3))
     for b in range(centre.shape[0]):
         c0 = centre[b, 0] - centre_then[b, 0]
         c1 = centre[b, 1] - centre_then[b, 1]
         c2 = centre[b, 2] - centre_then[b, 2]
-        turn = rotation[b] - rotation_then[b]
+        for i in range(3):
+            for j in range(3):
+                turn[i, j] = rotation[b, i, j] - rotation_then[b, i, j]
         most = 0.0
         for k in range(first[b], first[b + 1]):
             x, y, z = corner[k, 0], corner[k, 1], corner[k, 2]

@@ -133,7 +133,7 @@ def _grow(accepted, majority, points, known, view, frame, work):
         if total == 0.0:
             return np.inf
         leverages(points, frame, total, residuals, lever)
-        squares, count, truncated = 0.0, 0, 0.0
+        squares, count, truncated = 0.0, np.int64(0), 0.0  # a literal 0 would compile `_scale` once more
         along = dot(frame[3], view)
         side = 0.0 if along == 0.0 else math.copysign(1.0, along)
         for i in range(n):
@@ -268,7 +268,9 @@ def fit_face(xyz, sigma, known, observer):
         for k in range(3):
             local[k, i] = xyz[i, k] - xyz[0, k]
     points = Points(local, root)
-    near, kept, sound = points, np.arange(n), np.ones(n, dtype=np.bool_)
+    near, kept, sound = points, np.empty(n, dtype=np.int64), np.ones(n, dtype=np.bool_)
+    for i in range(n):
+        kept[i] = i
     total = weighted_plane(points, sound, frame, work)
     exact = _is_exact(xyz, local, frame)
     compact = kept if exact else beside_the_rest(local)

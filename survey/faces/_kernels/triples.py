@@ -137,7 +137,8 @@ def search_triples(points, size, known, view):
     best[:, :], scores[:] = np.inf, np.inf
     largest = 0.0
     for sweep in range(2):
-        i, j, k = 0, 1, 1
+        # of no literal type, or numba compiles `_triple` twice
+        i, j, k = np.int64(0), np.int64(1), np.int64(1)
         for number in range(count):
             i, j, k = _triple(number, n, i, j, k)
             area = _normal_of(local, i, j, k, normal)
@@ -173,13 +174,15 @@ def beside_the_rest(local):
     lie all around, at similar distances, are kept: they are the corners of a face that was measured in its middle.
     """
     n = local.shape[1]
-    everything = np.arange(n)
+    everything = np.empty(n, dtype=np.int64)
+    for i in range(n):
+        everything[i] = i
     if n < 6:
         return everything
     centre = _spatial_median(local)
     away, balance = np.empty(n), np.zeros(3)
     for i in range(n):
-        away[i] = math.sqrt(_squared_distance(local[:, i], centre))
+        away[i] = math.sqrt(_squared_distance(local, i, centre[0], centre[1], centre[2]))
     limit, count = _FARTHEST * smallest(away, n - n // 4), 0
     nearest, farthest = np.inf, 0.0
     beside = np.zeros(n, dtype=np.bool_)
@@ -208,13 +211,13 @@ def _nearest_of(local, i, away, limit):
     least = np.inf
     for j in range(local.shape[1]):
         if away[j] <= limit:
-            least = min(least, _squared_distance(local[:, i], local[:, j]))
+            least = min(least, _squared_distance(local, i, local[0, j], local[1, j], local[2, j]))
     return math.sqrt(least)
 
 
 @njit(cache=True)
-def _squared_distance(p, q):
-    d = (p[0] - q[0], p[1] - q[1], p[2] - q[2])
+def _squared_distance(local, i, x, y, z):
+    d = (local[0, i] - x, local[1, i] - y, local[2, i] - z)
     return dot(d, d)
 
 
@@ -229,7 +232,7 @@ def _spatial_median(local):
     for _ in range(15):
         x, y, z, total = 0.0, 0.0, 0.0, 0.0
         for i in range(n):
-            weight = 1.0 / max(math.sqrt(_squared_distance(local[:, i], centre)), 1e-9)
+            weight = 1.0 / max(math.sqrt(_squared_distance(local, i, centre[0], centre[1], centre[2])), 1e-9)
             total += weight
             x, y, z = x + weight * local[0, i], y + weight * local[1, i], z + weight * local[2, i]
         centre[0], centre[1], centre[2] = x / total, y / total, z / total

@@ -73,11 +73,11 @@ def _is_convex(vertices, ring, normal, area):
 
 
 @njit(cache=True)
-def _flatten(vertices, ring, origin, u, v, flip, out):
-    """Project the corners of a ring onto two directions, in reverse order if `flip`; return their number."""
+def _flatten(vertices, ring, origin, u, v, sense, out):
+    """Project the corners of a ring onto two directions, in reverse order if `sense` is -1.0; return their number."""
     n = ring.shape[0]
     for i in range(n):
-        corner = vertices[ring[n - 1 - i if flip else i]]
+        corner = vertices[ring[n - 1 - i if sense < 0.0 else i]]
         x, y = 0.0, 0.0
         for k in range(3):
             x += (corner[k] - origin[k]) * u[k]
@@ -183,7 +183,10 @@ def _height(vertices, ring, normal, n, place):
 @njit(cache=True)
 def _buffers(face_starts):
     """Return four polygons with room for the largest face, clipped by another."""
-    return np.empty((4, 2 * (face_starts[1:] - face_starts[:-1]).max() + 8, 2))
+    largest = 0
+    for f in range(face_starts.shape[0] - 1):
+        largest = max(largest, face_starts[f + 1] - face_starts[f])
+    return np.empty((4, 2 * largest + 8, 2))
 
 
 @njit(cache=True)
@@ -328,8 +331,8 @@ def _contact(faces, solids, facing, solid, planes, limits, work, row):
     first = corners[face_starts[i] : face_starts[i + 1]]
     second = corners[face_starts[j] : face_starts[j + 1]]
     origin = vertices[first[0]]
-    ni = _flatten(vertices, first, origin, u, v, True, buffers[0])
-    nj = _flatten(vertices, second, origin, u, v, False, buffers[1])
+    ni = _flatten(vertices, first, origin, u, v, -1.0, buffers[0])
+    nj = _flatten(vertices, second, origin, u, v, 1.0, buffers[1])
     area, mx, my = _shared(buffers[0], ni, buffers[1], nj, convex[i] and convex[j], buffers)
     if area <= 0.0 or area < share * min(areas[i], areas[j]):
         return False

@@ -107,6 +107,6 @@ def list_near(tree, size, order, wanted, start, stop, found):
     -------
     found : (n, 2) int64, pairs of solids
     """
-    row = 0
+    row = np.int64(0)  # of no literal type, for each of which numba would compile the callee once more
     for leaf in range(start, stop):
         row = _near(leaf, tree, size, order, wanted, found, row)

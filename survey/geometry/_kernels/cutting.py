@@ -26,12 +26,14 @@ class CutSolid(NamedTuple):
     loops : (n + 6, _MOST) corners of each face, counter-clockwise seen from outside
     sizes : (n + 6,) number of corners of each face
     of_face : (n + 6,) plane on which each face lies; -1: a side of the box
+    meeting : (room, 3) three planes that cross in each corner, those at the widest angles; -1: none cross at wide ones
     """
 
     vertices: Array
     loops: Ints
     sizes: Ints
     of_face: Ints
+    meeting: Ints
 
 
 @njit(cache=True)
@@ -40,7 +42,8 @@ def cut_out(planes, centre, reach, near, solid):
 
     A box is cut by one plane after another. Corners within `near` of a plane count as lying on it, which keeps the
     result closed whatever the rounding: the faces left by a plane have one open ring of edges, which its new face
-    closes. At the end each corner is put at the intersection of three of its planes, those at the widest angles.
+    closes. The caller puts each corner where the three planes of `meeting` cross: numba takes five seconds to compile
+    its call of LAPACK.
 
     Inputs
     ------
@@ -53,7 +56,7 @@ def cut_out(planes, centre, reach, near, solid):
     solid : CutSolid, corners and faces written into it
     status, number of corners, number of faces : returned
     """
-    vertices, loops, sizes, of_face = solid
+    vertices, loops, sizes, of_face, meeting = solid
     count, faces = _box(centre, reach, vertices, loops, sizes, of_face)
     # of no literal type, for each of which numba would compile the callees once more
     count, faces = np.int64(count), np.int64(faces)
@@ -66,7 +69,7 @@ def cut_out(planes, centre, reach, near, solid):
         if of_face[f] < 0:
             return OPEN, 0, 0
     count = _compact(vertices, count, loops, sizes, faces)
-    _sharpen(planes, vertices, count, loops, sizes, of_face, faces)
+    _choose_planes(planes, count, loops, sizes, of_face, faces, meeting)
     return FULL, count, faces
 
 
@@ -86,7 +89,7 @@ def _box(centre, reach, vertices, loops, sizes, of_face):
 @njit(cache=True)
 def _cut(planes, p, near, solid, count, faces, distance):
     """Cut by plane p; return the status and the numbers of corners and faces."""
-    vertices, loops, sizes, of_face = solid
+    vertices, loops, sizes, of_face, _ = solid
     inside, outside = False, False
     for v in range(count):
         distance[v] = height_over(planes[p], planes[p, 3], vertices[v])
@@ -101,7 +104,7 @@ def _cut(planes, p, near, solid, count, faces, distance):
     room = vertices.shape[0]
     ends = np.empty((_MOST, 2), np.int64)  # cut edges, with the corner that each has got
     made = np.empty(_MOST, np.int64)
-    cuts, kept = 0, 0
+    cuts, kept = np.int64(0), np.int64(0)
     work = np.empty(2 * _MOST, np.int64)
     for f in range(faces):
         n, size = sizes[f], 0
@@ -193,8 +196,8 @@ def _compact(vertices, count, loops, sizes, faces):
 
 
 @njit(cache=True)
-def _sharpen(planes, vertices, count, loops, sizes, of_face, faces):
-    """Put each corner where three of its planes cross, those at the widest angles."""
+def _choose_planes(planes, count, loops, sizes, of_face, faces, meeting):
+    """Write three planes of each corner, those at the widest angles."""
     own = np.empty(faces, np.int64)
     for v in range(count):
         n = 0
@@ -203,22 +206,14 @@ def _sharpen(planes, vertices, count, loops, sizes, of_face, faces):
                 if loops[f, k] == v:
                     own[n] = of_face[f]
                     n += 1
-        best, at = 0.0, np.zeros(3, np.int64)
+        best = 1e-6
+        meeting[v, 0] = meeting[v, 1] = meeting[v, 2] = -1
         for a in range(n):
             for b in range(a):
                 for c in range(b):
                     volume = abs(_determinant(planes[own[a]], planes[own[b]], planes[own[c]]))
                     if volume > best:
-                        best, at[0], at[1], at[2] = volume, own[a], own[b], own[c]
-        if best > 1e-6:
-            matrix, right = np.empty((3, 3)), np.empty(3)
-            for r in range(3):
-                for k in range(3):
-                    matrix[r, k] = planes[at[r], k]
-                right[r] = planes[at[r], 3]
-            solved = np.linalg.solve(matrix, right)
-            for k in range(3):
-                vertices[v, k] = solved[k]
+                        best, meeting[v, 0], meeting[v, 1], meeting[v, 2] = volume, own[a], own[b], own[c]
 
 
 @njit(cache=True)

@@ -127,8 +127,8 @@ def matching_faces(pairs, solid, planes, tolerance, out, measures):
                     continue
                 _basis(n, u, v)
                 origin = vertices[first[0]]
-                ni = _flatten(vertices, first, origin, u, v, True, buffers[0])
-                nj = _flatten(vertices, second, origin, u, v, False, buffers[1])
+                ni = _flatten(vertices, first, origin, u, v, -1.0, buffers[0])
+                nj = _flatten(vertices, second, origin, u, v, 1.0, buffers[1])
                 both = convex[i] and convex[j]
                 area = _shared(buffers[0], ni, buffers[1], nj, both, buffers)[0]
                 seam = 0.5 * tolerance * min(_perimeter(buffers[0], ni), _perimeter(buffers[1], nj))

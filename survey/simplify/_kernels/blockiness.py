@@ -28,11 +28,10 @@ def area_vectors(vertices, corners, starts):
     """
     out = np.zeros((len(starts) - 1, 3))
     for f in range(len(starts) - 1):
-        origin = vertices[corners[starts[f]]]
+        o = vertices[corners[starts[f]]]
         for c in range(starts[f] + 1, starts[f + 1] - 1):
-            turn = _cross(vertices[corners[c]] - origin, vertices[corners[c + 1]] - origin)
-            for k in range(3):
-                out[f, k] += 0.5 * turn[k]
+            x, y, z = _cross(_minus(vertices[corners[c]], o), _minus(vertices[corners[c + 1]], o))
+            out[f, 0], out[f, 1], out[f, 2] = out[f, 0] + 0.5 * x, out[f, 1] + 0.5 * y, out[f, 2] + 0.5 * z
     return out
 
 
@@ -51,12 +50,12 @@ def face_planes(vertices, corners, starts):
     out = np.zeros((len(starts) - 1, 4))
     vectors = area_vectors(vertices, corners, starts)
     for f in range(len(starts) - 1):
-        length = math.sqrt((vectors[f] * vectors[f]).sum())
+        length = math.sqrt(dot(vectors[f], vectors[f]))
         if length > 0.0:
             for k in range(3):
                 out[f, k] = vectors[f, k] / length
             for c in range(starts[f], starts[f + 1]):
-                out[f, 3] += (out[f, :3] * vertices[corners[c]]).sum() / (starts[f + 1] - starts[f])
+                out[f, 3] += dot(out[f], vertices[corners[c]]) / (starts[f + 1] - starts[f])
     return out
 
 
@@ -65,7 +64,8 @@ def _middle(vertices, corners, start, stop):
     """Return the mean (3,) of the corners of a face."""
     out = np.zeros(3)
     for c in range(start, stop):
-        out += vertices[corners[c]] / (stop - start)
+        for k in range(3):
+            out[k] += vertices[corners[c], k] / (stop - start)
     return out
 
 
@@ -84,10 +84,11 @@ def volume(vertices, corners, starts):
     origin = vertices[corners[0]]
     total = 0.0
     for f in range(len(starts) - 1):
-        a = _middle(vertices, corners, starts[f], starts[f + 1]) - origin
+        a = _minus(_middle(vertices, corners, starts[f], starts[f + 1]), origin)
         for c in range(starts[f], starts[f + 1]):
             following = c + 1 if c + 1 < starts[f + 1] else starts[f]
-            total += (a * _cross(vertices[corners[c]] - origin, vertices[corners[following]] - origin)).sum()
+            second, third = _minus(vertices[corners[c]], origin), _minus(vertices[corners[following]], origin)
+            total += dot(a, _cross(second, third))
     return total / 6.0
 
 
@@ -114,10 +115,10 @@ def worst_angle(vertices, corners, starts):
             g = _face_with(q, p, corners, starts)
             if g < 0:
                 continue
-            n, m = planes[f, :3], planes[g, :3]
-            turn = _cross(n, m)
-            sine = (turn * (vertices[q] - vertices[p])).sum()
-            exterior = math.copysign(math.atan2(math.sqrt((turn * turn).sum()), (n * m).sum()), sine)
+            n, m = planes[f], planes[g]
+            turn = _cross((n[0], n[1], n[2]), (m[0], m[1], m[2]))
+            sine = dot(turn, _minus(vertices[q], vertices[p]))
+            exterior = math.copysign(math.atan2(math.sqrt(dot(turn, turn)), dot(n, m)), sine)
             worst = max(worst, abs(0.5 * math.pi - exterior))
     return worst
 
@@ -150,13 +151,13 @@ def edge_distances(points, vertices, corners, starts):
     for f in range(len(starts) - 1):
         for c in range(starts[f], starts[f + 1]):
             a = vertices[corners[c]]
-            u = vertices[corners[c + 1 if c + 1 < starts[f + 1] else starts[f]]] - a
-            square = (u * u).sum()
+            u = _minus(vertices[corners[c + 1 if c + 1 < starts[f + 1] else starts[f]]], a)
+            square = dot(u, u)
             for i in range(len(points)):
-                w = points[i] - a
-                along = min(max((w * u).sum() / square, 0.0), 1.0) if square > 0.0 else 0.0
-                w = w - along * u
-                out[i] = min(out[i], math.sqrt((w * w).sum()))
+                w = _minus(points[i], a)
+                along = min(max(dot(w, u) / square, 0.0), 1.0) if square > 0.0 else 0.0
+                w = (w[0] - along * u[0], w[1] - along * u[1], w[2] - along * u[2])
+                out[i] = min(out[i], math.sqrt(dot(w, w)))
     return out
 
 
@@ -279,13 +280,16 @@ def _pieces(body, heights, inside):
 
 @njit(cache=True)
 def _six_volumes(four):
-    return ((four[1] - four[0]) * _cross(four[2] - four[0], four[3] - four[0])).sum()
+    o = four[0]
+    return dot(_minus(four[1], o), _cross(_minus(four[2], o), _minus(four[3], o)))
 
 
 @njit(cache=True)
 def _cross(u, v):
-    out = np.empty(3)
-    out[0] = u[1] * v[2] - u[2] * v[1]
-    out[1] = u[2] * v[0] - u[0] * v[2]
-    out[2] = u[0] * v[1] - u[1] * v[0]
-    return out
+    return u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
+
+
+@njit(cache=True)
+def _minus(a, b):
+    """Return a - b as a tuple: array expressions take numba much longer to compile."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]

@@ -97,7 +97,8 @@ def lay_points(stone, sizes):
         # no edge is cut: only a point in the middle lets the stone deform
         middle = np.zeros(3)
         for k in range(len(corners)):
-            middle += corners[k] / len(corners)
+            for d in range(3):
+                middle[d] += corners[k, d] / len(corners)
         points, owner, count = _add(points, owner, count, middle[0], middle[1], middle[2], inside)
     ends[3] = count
     return points[:count], ends, owner[:count]
@@ -122,7 +123,10 @@ def _cuts(a, b, sizes):
     length = sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
     if len(sizes.offsets) == 0:
         count = max(1, ceil(length / sizes.size - _SHORT))
-        return np.arange(1, count) / count
+        even = np.empty(count - 1)
+        for k in range(count - 1):
+            even[k] = (k + 1) / count
+        return even
     parts = np.zeros(_STATIONS + 1)
     for s in range(_STATIONS):
         t = (s + 0.5) / _STATIONS
@@ -179,12 +183,15 @@ def _flat_face(corners, loop, plane):
     origin, along = np.zeros(3), np.zeros(3)
     longest = 0.0
     for k in range(m):
-        origin += corners[loop[k]] / m
+        for d in range(3):
+            origin[d] += corners[loop[k], d] / m
         side = corners[loop[(k + 1) % m]] - corners[loop[k]]
         if side @ side > (1.0 + _ON_PLANE) * longest:  # of equal ones the first
             longest, along = side @ side, side
     u = along / sqrt(longest)
-    v = np.cross(plane[:3], u)
+    v = np.empty(3)
+    v[0], v[1] = plane[1] * u[2] - plane[2] * u[1], plane[2] * u[0] - plane[0] * u[2]
+    v[2] = plane[0] * u[1] - plane[1] * u[0]
     walls = np.empty((m, 3))
     far_u, far_v = 0.0, 0.0
     for k in range(m):
@@ -208,7 +215,7 @@ def _on_face(points, owner, count, stone, face, sizes):
     origin, u, v, walls, far_u, far_v = _flat_face(stone.corners, loop, plane)
     m = len(walls)
     # the points on its edges; those on the other side of a thin stone do not count
-    near, there = np.empty((count, 3)), 0
+    near, none, there = np.empty((count, 3)), np.int64(0), np.int64(0)  # of no literal type
     for j in range(count):
         if abs(plane[:3] @ points[j] - plane[3]) < _ON_PLANE:
             near[there, 0], near[there, 1], near[there, 2] = points[j, 0], points[j, 1], points[j, 2]
@@ -230,7 +237,7 @@ def _on_face(points, owner, count, stone, face, sizes):
                     if not inside:
                         break
                     inside = walls[w, 0] * s + walls[w, 1] * t <= walls[w, 2] - _INSIDE * h + _ON_PLANE
-                inside = inside and _free(near, 0, there, x, y, z, _APART * h)
+                inside = inside and _free(near, none, there, x, y, z, _APART * h)
                 if inside and _free(points, first, count, x, y, z, _APART * h):
                     points, owner, count = _add(points, owner, count, x, y, z, face)
     return points, owner, count
@@ -240,9 +247,10 @@ def _on_face(points, owner, count, stone, face, sizes):
 def _inside(points, owner, count, stone, sizes):
     """Add points of body-centred cubic lattices, as `_on_face` does those of triangular ones."""
     corners, planes, axes = stone.corners, stone.planes, stone.axes
-    origin = np.zeros(3)
+    origin, none = np.zeros(3), np.int64(0)
     for k in range(len(corners)):
-        origin += corners[k] / len(corners)
+        for d in range(3):
+            origin[d] += corners[k, d] / len(corners)
     extent = np.zeros(3)
     for j in range(len(corners)):
         for k in range(3):
@@ -265,6 +273,6 @@ def _inside(points, owner, count, stone, sizes):
                             break
                         deep = planes[w, 3] - planes[w, 0] * x - planes[w, 1] * y - planes[w, 2] * z
                         inside = deep >= _INSIDE * h - _ON_PLANE
-                    if inside and _free(points, 0, count, x, y, z, _APART * h):
+                    if inside and _free(points, none, count, x, y, z, _APART * h):
                         points, owner, count = _add(points, owner, count, x, y, z, np.int64(-1))
     return points, owner, count
