@@ -28,8 +28,8 @@ def central(difference: Array, level: float) -> tuple[Array, Array]:
     """Return the s and z inside the cones with s - z = `difference` (nc, 3) and s ∘ z = `level` e (Fukushima 2002).
 
     >>> s, z = central(np.array([[3.0, 0.0, 0.0]]), 4.0)
-    >>> s.tolist(), z.tolist()
-    ([[4.0, 0.0, 0.0]], [[1.0, 0.0, 0.0]])
+    >>> float(s[0, 0]), float(z[0, 0])
+    (4.0, 1.0)
     """
     size = np.sqrt((difference[:, 1:] ** 2).sum(axis=1))
     along = difference[:, 1:] / np.maximum(size, 1e-300)[:, None]
