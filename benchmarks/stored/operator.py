@@ -44,6 +44,7 @@ class StoredDelassus:
     rigid = None
     plane = None
     joint_compliance = None
+    mostly_rigid = False
 
     def __post_init__(self) -> None:
         nc, entries = len(self.indptr) - 1, len(self.indices)

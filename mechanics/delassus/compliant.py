@@ -69,6 +69,11 @@ class CompliantDelassus:
         """Scale of W [1/kg]."""
         return self.inner.scale
 
+    @property
+    def mostly_rigid(self) -> bool:
+        """As that of W."""
+        return self.inner.mostly_rigid
+
     @cached_property
     def diagonal(self) -> Array:
         """W_αα + E_α (nc, d, d) [1/kg]."""

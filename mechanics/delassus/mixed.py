@@ -59,6 +59,12 @@ class MixedDelassus:
     joint_compliance = None
 
     @cached_property
+    def mostly_rigid(self) -> bool:
+        """True where more rigid bodies than deformable ones move."""
+        rigid, elastic = (len(np.unique(self.body[self.kind == kind])) for kind in (RIGID, ELASTIC))
+        return 0 < elastic < rigid
+
+    @cached_property
     def _sides(self) -> Sides:
         return Sides(
             self.body, self.kind, self.jacobian, self.response, self.slot, self.yptr, self.bptr, self.block

@@ -86,6 +86,7 @@ class RigidDelassus:
     centre: Array | None = None
     plane = None
     joint_compliance = None
+    mostly_rigid = False
 
     @cached_property
     def rigid(self) -> RigidContacts:

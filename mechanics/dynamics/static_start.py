@@ -16,6 +16,7 @@ from mechanics.scene.scene import TimeSettings
 from mechanics.scene.state import State
 from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.strategies.compliant import Compliant
+from mechanics.solvers.strategies.mixed import Mixed
 
 __all__ = ["static_start"]
 
@@ -25,6 +26,10 @@ _LONG = (
 _STEPS = 10  # most such steps; few scenes need more than three
 # the same where joints alone yield: in longer ones the joints that slide slide too far before they are seen again
 _YIELDING, _YIELDING_STEPS = 0.1, 40
+# the same where stones deform and more of them are rigid: a stone yields by a thousandth of what it moves as a whole
+# then, in steps of 1 s by a hundred millionth. Each step leaves a hundredth of the imbalance
+_MIXED, _MIXED_STEPS = 5e-3, 20
+_UNSOLVED = 2  # such steps in a row that may be left unsolved
 _RELAXED = 1e-2  # shortest time step in which rigid stones settle [s]: they fall by a millimetre in it
 _RELAXED_STEPS = 50  # most of these; joints that are open by a millimetre need some ten
 _NATURAL_MAP = (
@@ -43,12 +48,16 @@ def static_start(
 
     Where stones deform, in steps of 1 s, each from a halt, until every body is in balance: with θ = 1 such a step is
     the static problem (docs/theory.md §2), as M/h² is negligible beside K, but determines the motion that nothing else
-    holds. Where joints alone do, in steps of 0.1 s. Between rigid stones a step from rest is the static problem
-    whatever its length, so that the run's own will do, and it is the one with which a run from rest begins. Where that
-    leaves stones in motion, because their joints are open or warped, they settle in a relaxation.
+    holds. Where joints alone do, in steps of 0.1 s; where stones deform beside more rigid ones, in steps of 5 ms.
+    Between rigid stones a step from rest is the static problem whatever its length, so that the run's own will do, and
+    it is the one with which a run from rest begins. Where that leaves stones in motion, because their joints are open
+    or warped, they settle in a relaxation.
     """
     search = _Search(model, halted(start), report)
-    return search.rigid() if model.rigid_only and not model.laws.sprung else search.elastic()
+    if model.rigid_only and not model.laws.sprung:
+        return search.rigid()
+    mixed = 0 < int(model.elastic.sum()) < int(model.inertia.moving.sum())
+    return search.mixed() if mixed and not model.laws.sprung else search.elastic()
 
 
 class _Search:
@@ -81,6 +90,22 @@ class _Search:
             settles = self._settles(search)
             found = settles and self._eta <= eta and self._largest <= self._model.scene.time.balance_tolerance
         if found and self._model.inertia.moving.any():
+            search = _set_down(self._model, search)
+        return self._told(found), search
+
+    def mixed(self) -> tuple[StaticStart, Simulation]:
+        """Search in short steps, each to the tolerances of the run and from a halt."""
+        asked, own = self._model.scene.solver, self._model.scene.time.step
+        solver = Mixed(asked.tolerance, asked.velocity_tolerance)
+        search = Simulation(_still(self._model, _MIXED), self._start, solver=solver)
+        found, unsolved = False, 0
+        while self._count < _MIXED_STEPS and not found and unsolved < _UNSOLVED and self._settles(search):
+            solved = self._step(search, _MIXED_STEPS).solution.converged
+            search.halt(self._start.time)
+            unsolved = 0 if solved else unsolved + 1
+            found = solved and self._largest <= self._model.scene.time.balance_tolerance
+        found = found and self._settles(search)
+        if found and own != _MIXED:
             search = _set_down(self._model, search)
         return self._told(found), search
 

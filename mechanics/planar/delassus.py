@@ -55,6 +55,7 @@ class PlanarDelassus:
     centre: Array | None = None
     rigid = None
     joint_compliance = None
+    mostly_rigid = False
 
     @property
     def plane(self) -> PlaneContacts:

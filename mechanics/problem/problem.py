@@ -90,6 +90,7 @@ class Delassus(Protocol):
     plane : the same in the plane
     joint_compliance : (nc, d) diagonal of E where the operator is W + E (`CompliantDelassus`), which `rigid` leaves
         out; None for others [1/kg]
+    mostly_rigid : some bodies deform, and more of those that move do not
     """
 
     @property
@@ -115,6 +116,10 @@ class Delassus(Protocol):
     @property
     def joint_compliance(self) -> Array | None:
         """Diagonal of E (nc, d) [1/kg], or None."""
+
+    @property
+    def mostly_rigid(self) -> bool:
+        """True where some bodies deform, and more do not."""
 
     def apply(self, impulse: Array) -> Array:
         """Return W r (nc, d) [m/s]."""
@@ -162,6 +167,11 @@ class ScaledDelassus:
         """D_α W_αα D_α (nc, d, d) [-]."""
         blocks: Array = self.inner.diagonal * (self.unit**2)[:, None, None]
         return blocks
+
+    @property
+    def mostly_rigid(self) -> bool:
+        """As that of the operator itself."""
+        return self.inner.mostly_rigid
 
     @cached_property
     def form(self) -> ScaledForm | None:

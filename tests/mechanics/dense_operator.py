@@ -19,6 +19,7 @@ class DenseDelassus:
     rigid = None
     plane = None
     joint_compliance = None
+    mostly_rigid = False
 
     @cached_property
     def diagonal(self):

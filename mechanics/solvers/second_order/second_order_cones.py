@@ -7,7 +7,7 @@ import numpy as np
 from mechanics.arrays import Array
 from moma.errors import SolverError
 
-__all__ = ["Scaling", "divide", "product", "reach", "scaling"]
+__all__ = ["Scaling", "central", "divide", "product", "reach", "scaling"]
 
 
 _MIRROR = np.array([1.0, -1.0, -1.0])
@@ -22,6 +22,32 @@ def divide(x: Array, y: Array) -> Array:
     """Return the z with x ∘ z = y, for x inside its cone."""
     first = (x[:, 0] * y[:, 0] - (x[:, 1:] * y[:, 1:]).sum(axis=1)) / _determinant(x)
     return np.column_stack([first, (y[:, 1:] - first[:, None] * x[:, 1:]) / x[:, :1]])
+
+
+def central(difference: Array, level: float) -> tuple[Array, Array]:
+    """Return the s and z inside the cones with s - z = `difference` (nc, 3) and s ∘ z = `level` e (Fukushima 2002).
+
+    >>> s, z = central(np.array([[3.0, 0.0, 0.0]]), 4.0)
+    >>> float(s[0, 0]), float(z[0, 0])
+    (4.0, 1.0)
+    """
+    size = np.sqrt((difference[:, 1:] ** 2).sum(axis=1))
+    along = difference[:, 1:] / np.maximum(size, 1e-300)[:, None]
+    first, second = difference[:, 0] + size, difference[:, 0] - size
+    return _spectral(first, second, along, level), _spectral(-second, -first, -along, level)
+
+
+def _spectral(first: Array, second: Array, along: Array, level: float) -> Array:
+    """Return the elements (nc, 3) whose eigenvalues are the positive roots of λ² - p λ = level for two p (nc,)."""
+    one, two = _root(first, level), _root(second, level)
+    return np.column_stack([0.5 * (one + two), 0.5 * (one - two)[:, None] * along])
+
+
+def _root(p: Array, level: float) -> Array:
+    # without cancellation for p < 0
+    whole = 0.5 * (np.abs(p) + np.sqrt(p * p + 4.0 * level))
+    root: Array = np.where(p >= 0, whole, level / whole)
+    return root
 
 
 def reach(x: Array, step: Array) -> float:

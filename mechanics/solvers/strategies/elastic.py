@@ -7,6 +7,7 @@ from mechanics.problem.residual import residual
 from mechanics.solvers.first_order.admm import ADMM
 from mechanics.solvers.second_order.cone_program import ConeProgram
 from mechanics.solvers.second_order.interior_point import InteriorPoint
+from mechanics.solvers.strategies.mixed import Mixed
 
 __all__ = ["Elastic"]
 
@@ -16,6 +17,8 @@ _ADMM = 400
 _NEARLY_ADMM = 60
 # η of such a start [-]
 _NEARLY = 1e-4
+# iterations of the central path where most stones are rigid, a factorisation each
+_PATH = 200
 # most contacts of a step that cone programmes may solve: they take 2 to 5 s of 300 contacts
 _FEW = 1000
 
@@ -28,7 +31,7 @@ class Elastic:
     iterations suffice, and where they do not, Newton's method, with which the interior point begins, ends it. The
     interior point factorises in each of some 30 iterations, whatever the state (docs/decisions/010-interior-point.md
     and 035-elastic-factors.md have the measurements). Warped stones that settle ask for more now and then: cone
-    programmes, slow and sure, solve what neither did.
+    programmes, slow and sure, solve what neither did. Where most stones are rigid, `Mixed` comes before all of them.
 
     Attributes
     ----------
@@ -43,6 +46,10 @@ class Elastic:
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from `start`; `why` names the method of the two that solved it."""
         limits = self.tolerance, self.velocity_tolerance
+        if problem.delassus.mostly_rigid:
+            found = Mixed(*limits, min(_PATH, self.max_iterations))(problem, start)
+            if found.converged:
+                return replace(found, why="central path: most stones are rigid")
         warm = "warm start" if start.impulse.any() else f"cold start, {len(start.impulse):,} contacts"
         near = start.impulse.any() and residual(problem, start.impulse).natural_map <= _NEARLY
         most = min(_NEARLY_ADMM if near else _ADMM, self.max_iterations)

@@ -44,6 +44,7 @@ COLUMNS = {
     "elastic ones": (SOFT, SOFT),
     "rigid on elastic": (SOFT, HARD),
     "elastic on rigid": (HARD, SOFT),
+    "one elastic between rigid ones": (HARD, SOFT, HARD),
     "rigid": (HARD,),
     "rigid ones": (HARD, HARD, HARD),
 }

@@ -13,7 +13,8 @@ from mechanics.scene.laws.mortar import MortarJoint
 from mechanics.scene.scene import ContactSettings, Fidelity
 from mechanics.solvers.first_order.nsgs import NSGS
 from mechanics.solvers.second_order import interior_point
-from mechanics.solvers.second_order.interior_point import InteriorPoint, _Path
+from mechanics.solvers.second_order.central_path import CentralPath
+from mechanics.solvers.second_order.interior_point import InteriorPoint
 from moma.errors import SolverError
 from tests.mechanics.dense_operator import products_alone
 from tests.mechanics.shapes import TURN, brick, dense_operator, ground, moved, posed, scene
@@ -99,7 +100,7 @@ PATHS = [name for name in SCENES if name not in ("all lifting off",)]
 def test_the_central_path_alone_leads_to_the_solution(name):
     """Without Newton's method on the natural map at its end: complementarity falls to 1e-7 within 40 iterations."""
     problem = problem_of(name)
-    path = _Path(problem)
+    path = CentralPath(problem)
     for _ in range(40):
         if path.complementarity < 1e-7:
             break
