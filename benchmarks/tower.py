@@ -2,11 +2,11 @@
 
 Generated towers of about N rigid blocks are built and come to rest under their weight; then the strongest part of a
 record of 30 s in three directions shakes them. Both are synthetic (benchmarks/tower_masonry.py). Joints are rigid, or
-have a stiffness (`--stiffness`, Pa/m) and a little damping, as in distinct-element codes. The time of a step is processor time of this
-process, stage by stage, with all that a run observes in each step, and that of the clock; from the mean by the clock
-follows what the whole record would take, with so many `--threads`, and from several towers how it grows. `--seconds`
-ends a motion early; the table has the steps that were made. `--build N` builds a tower of N blocks, counts its
-contacts, and makes one step.
+have a stiffness (`--stiffness`, Pa/m) and a little damping, as in distinct-element codes. The time of a step is
+processor time of this process, stage by stage, with all that a run observes in each step, and that of the clock; from
+the mean by the clock follows what the whole record would take, with so many `--threads`, and from several towers how it
+grows. `--seconds` ends a motion early; the table has the steps that were made. `--build N` builds a tower of N blocks,
+counts its contacts, and makes one step.
 """
 
 import argparse

@@ -23,6 +23,7 @@ __all__ = ["Building", "Cut", "as_building", "close_within_bounds"]
 _ROUNDS = 10  # rounds in which single joints are left open; then all joints of a stone that moves too far
 _CONVEX = 1e-6  # of a stone's size: height of a corner above a face's plane that is due to rounding
 _CORE = "infill"  # kind of the parts of the core of a wall
+_INFERRED = ("rule", "kind", "structure")  # origins of a depth that nobody has measured on the stone itself
 _BOTH_KEPT = "both stones keep their shape"
 _KEPT = "one of the stones keeps its shape, and the other is led by its other joints"
 
@@ -101,7 +102,9 @@ def as_building(stones: Sequence[BlockyStone]) -> Building:
     sound = np.concatenate([_sound(stone) for stone in stones])
     notched = ~convex & np.array([joins_three(solid.faces) for solid in solids])
     core = np.array([stone.kind == _CORE for stone in stones])
-    faces = StoneFaces(gathered, planes, sound, ~(convex | notched)[planes.owner], core[planes.owner])
+    slack = np.concatenate([_slack(stone) for stone in stones])
+    kept = ~(convex | notched)[planes.owner]
+    faces = StoneFaces(gathered, planes, sound, kept, core[planes.owner], slack)
     rows = np.column_stack([planes.normals, planes.offsets])
     return Building(tuple(stones), solids, origin, faces, rows, convex, notched)
 
@@ -132,7 +135,7 @@ def close_within_bounds(
         solids, offended = list(building.solids), False
         of_face = {}
         for i, stone in cut_stones(building.solids, touched, notched).items():
-            moved = np.inf if stone is None else float(moves(building.solids[i], stone.solid).max())
+            moved = np.inf if stone is None else _moved(building, i, stone.solid, planes[i])
             if stone is not None and moved <= settings.max_displacement:
                 solids[i], of_face[i] = stone.solid, stone.of_face
             else:
@@ -150,6 +153,16 @@ def _sound(stone: BlockyStone) -> Bools:
     """Return the corners known from measurement; a hidden one counts if the one in front of it does."""
     count, known = len(stone.solid.vertices), np.array(stone.sound, np.bool_)
     return np.tile(known, -(-count // len(known)))[:count]
+
+
+def _slack(stone: BlockyStone) -> Array:
+    """Return the distance by which each face may be wrong, as a hidden side of a stone whose depth is inferred [m]."""
+    if stone.depth.origin not in _INFERRED:
+        return np.zeros(len(stone.solid.faces))
+    first = len(stone.sound)
+    hidden = np.array([min(face) >= first for face in stone.solid.faces])
+    sigma = np.inf if stone.depth.sigma is None else stone.depth.sigma
+    return np.where(hidden, sigma, 0.0)
 
 
 def _arrays(solids: Polyhedra) -> tuple[Array, Ints, Ints, Ints]:
@@ -197,6 +210,17 @@ def _stone_planes(
         planes[i] = np.vstack([rows[building.rows(i)], more])
         free[i] = np.concatenate([~taken[building.rows(i)], np.zeros(len(more), np.bool_)])
     return planes, free
+
+
+def _moved(building: Building, stone: int, solid: Solid, planes: Array) -> float:
+    """Return how far a corner moves; of the core, how far it comes to lie from the surface [m].
+
+    Two sides of a core block that come to lie in one plane have no corner between them any more; nobody measured it.
+    """
+    old = building.solids[stone]
+    if building.stones[stone].kind != _CORE:
+        return float(moves(old, solid).max())
+    return float(np.abs((old.vertices @ planes[:, :3].T - planes[:, 3]).max(axis=1)).max())
 
 
 def _changed(building: Building, stone: int, planes: Array) -> bool:

@@ -20,6 +20,7 @@ from survey.geometry.adjacency import Polyhedra
 from survey.joints._kernels import KNOWN, JointCorners, continuing_faces, fit_middle_planes
 from survey.joints.bent_beds import fit_bent_bed
 from survey.joints.facing import FacePlanes, FacingFaces
+from survey.joints.hidden_sides import HiddenSides, common_planes
 from survey.joints.settings import JointSettings
 
 __all__ = ["ContactPlanes", "StoneFaces", "contact_planes", "some_links"]
@@ -42,6 +43,7 @@ class StoneFaces:
     sound : (nv,) whether a corner is known from measurement
     kept : (nf,) whether a face has to stay in place
     core : (nf,) whether a face is of the core of a wall, which nobody has measured
+    slack : (nf,) distance by which the plane of a hidden side may be wrong, as its depth was not measured; else 0 [m]
     """
 
     solids: Polyhedra
@@ -49,6 +51,7 @@ class StoneFaces:
     sound: Bools
     kept: Bools
     core: Bools
+    slack: Array
 
     def corners(self, face: int) -> Ints:
         """Return the vertex indices of a face's corners."""
@@ -88,7 +91,8 @@ def contact_planes(faces: StoneFaces, facing: FacingFaces, settings: JointSettin
 
     Faces that have to stay in place take no part in the fit. A face whose only joint is with them moves to their
     plane; one with other joints meets them only if it already lies in their plane. Nor do those of the core, which
-    follow the stones: a core between stones leaves their joints as they are without it.
+    follow the stones. It has two effects on these, where nothing was measured: beds of a course on its two sides get
+    one plane if one fits them, and so do hidden sides that continue each other.
 
     Parameters
     ----------
@@ -99,21 +103,57 @@ def contact_planes(faces: StoneFaces, facing: FacingFaces, settings: JointSettin
     found = _Found(faces, facing, [], [], np.full(len(facing), -1))
     kept = faces.kept[facing.faces]
     movable, core = ~kept.any(axis=1), faces.core[facing.faces]
-    _add_joints(found, np.flatnonzero(movable & ~core.any(axis=1)), settings)
+    _add_joints(
+        found,
+        np.flatnonzero(movable & ~core.any(axis=1)),
+        settings,
+        np.flatnonzero(movable & core.any(axis=1)),
+    )
     for link in np.flatnonzero(~movable).tolist():
         found.add_kept(link, kept[link])
-    for link in np.flatnonzero(movable & (core[:, 0] != core[:, 1])).tolist():
+    beside = np.flatnonzero(movable & (core[:, 0] != core[:, 1]))
+    _add_hidden_sides(found, beside, settings)
+    for link in beside.tolist():
         found.add_beside_core(link, int(facing.faces[link, int(core[link, 0])]))
-    inside = np.flatnonzero(movable & core.all(axis=1))
-    alone = [link for link in inside.tolist() if not found.add_in_core(link)]
+    alone = np.flatnonzero(movable & core.all(axis=1)).tolist()
+    count = -1
+    while len(alone) != count:
+        # a plane goes on from block to block, to those that touch no stone
+        count = len(alone)
+        alone = [link for link in alone if not found.add_in_core(link)]
     _add_joints(found, np.array(alone, np.int64), settings)
     return found.planes()
 
 
-def _add_joints(found: "_Found", links: Ints, settings: JointSettings) -> None:
-    """Add the planes of the joints that these links make."""
+def _add_hidden_sides(found: "_Found", links: Ints, settings: JointSettings) -> None:
+    """Add one plane for all hidden sides that continue each other, among those that touch nothing but the core."""
+    faces, facing = found.faces, found.facing
+    side = facing.faces[links, faces.core[facing.faces[links]].argmin(axis=1)]
+    taken = np.zeros(len(faces.slack), np.bool_)
+    taken[facing.faces[found.of_link >= 0]] = True
+    hidden = np.unique(side[(faces.slack[side] > 0.0) & ~taken[side]])
+    if not len(hidden):
+        return
+    place = np.full(len(faces.slack), -1)
+    place[hidden] = np.arange(len(hidden))
+    between = facing.faces[found.of_link >= 0]
+    between = between[~faces.core[between].any(axis=1)]
+    pairs = place[_continuing(faces, between, place >= 0, settings)]
+    planes = np.column_stack([faces.planes.normals[hidden], faces.planes.offsets[hidden]])
+    corners = [faces.solids.vertices[faces.corners(face)] for face in hidden.tolist()]
+    starts = np.cumsum([0, *map(len, corners)])
+    slack = np.minimum(faces.slack[hidden], settings.straightness)
+    common, number = common_planes(HiddenSides(np.concatenate(corners), starts, planes, slack), pairs)
+    own = np.flatnonzero(place[side] >= 0)
+    found.add_many(common, links[own], number[place[side[own]]])
+
+
+def _add_joints(found: "_Found", links: Ints, settings: JointSettings, core: Ints | None = None) -> None:
+    """Add the planes of the joints of these links; beds that links of the `core` tie are one if that is straight."""
     faces, facing = found.faces, some_links(found.facing, links)
     label = _joints(faces, facing, settings)
+    if core is not None and len(core) and len(links):
+        label = _through_core(faces, facing, label, found.facing.faces[core], settings)
     count = int(label.max()) + 1 if len(label) else 0
     groups = _gathered(faces, facing, label, count)
     planes, values = _fitted(faces, groups, -1.0, settings)
@@ -203,9 +243,12 @@ class _Found:
         """Add a pair of faces of the core: the plane that one has beside a stone; return False if none has."""
         one, other = self.facing.faces[link].tolist()
         nearest = self._nearest(link, (one, other))
-        if nearest is not None:
-            self.of_link[link] = nearest
-        return nearest is not None
+        if nearest is None:
+            return False
+        self.of_link[link] = nearest
+        for face in (one, other):
+            self._of_face.setdefault(face, {nearest})
+        return True
 
     def _nearest(self, link: int, faces: tuple[int, ...]) -> int | None:
         """Return the plane of these faces that is nearest to the middle of a joint; None if they have none."""
@@ -255,7 +298,9 @@ def _joints(faces: StoneFaces, facing: FacingFaces, settings: JointSettings) -> 
     if not len(facing):
         return np.zeros(0, np.int64)
     count = len(faces.planes.areas)
-    pairs = np.concatenate([facing.faces, _continuing(faces, facing, settings)])
+    joined = np.zeros(count, np.bool_)
+    joined[facing.faces] = True
+    pairs = np.concatenate([facing.faces, _continuing(faces, facing.faces, joined, settings)])
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
     _, label = connected_components(graph, directed=False)
     _, first, number = np.unique(label[facing.faces[:, 0]], return_index=True, return_inverse=True)
@@ -265,13 +310,41 @@ def _joints(faces: StoneFaces, facing: FacingFaces, settings: JointSettings) -> 
     return out
 
 
-def _continuing(faces: StoneFaces, facing: FacingFaces, settings: JointSettings) -> Ints:
-    """Return faces (m, 2) of neighbours that lie in one plane."""
+def _through_core(
+    faces: StoneFaces, facing: FacingFaces, label: Ints, core: Ints, settings: JointSettings
+) -> Ints:
+    """Return the joints (m,) of all pairs, with the beds of two facings that the core ties as one where one plane fits.
+
+    How a bed slopes into a wall is not measured at all: where the course is the same on both sides, one plane goes
+    through both visible edges, as where a stone passes through. Of two planes, one above the other by a millimetre, the
+    core could bear on one alone.
+    """
+    count, joints = len(faces.planes.areas), int(label.max()) + 1
+    level = (np.abs(faces.planes.normals[core][:, :, 2]) > _ALIKE).all(axis=1)
+    # a face of a stone stands for its joint, so that nodes are the joints and the faces of the core
+    node = np.where(faces.core, joints + np.arange(count), -1)
+    node[facing.faces] = label[:, None]
+    ties = node[core[level]]
+    ties = ties[(ties >= 0).all(axis=1)]
+    graph = coo_array((np.ones(len(ties)), (ties[:, 0], ties[:, 1])), shape=(joints + count, joints + count))
+    _, group = connected_components(graph, directed=False)
+    _, group = np.unique(group[:joints], return_inverse=True)
+    of_link, groups = group[label], int(group.max()) + 1
+    _, values = _fitted(faces, _gathered(faces, facing, of_link, groups), -1.0, settings)
+    straight = values[:, 2] <= settings.straightness
+    merged = np.where(straight[of_link], of_link, groups + label)
+    _, first, number = np.unique(merged, return_index=True, return_inverse=True)
+    rank = np.empty(len(first), np.int64)
+    rank[np.argsort(first, kind="stable")] = np.arange(len(first))
+    out: Ints = rank[number]
+    return out
+
+
+def _continuing(faces: StoneFaces, pairs: Ints, joined: Bools, settings: JointSettings) -> Ints:
+    """Return the faces (m, 2), among those `joined`, of the owners of `pairs` (n, 2) that lie in one plane."""
     solids, planes = faces.solids, faces.planes
-    joined = np.zeros(len(planes.areas), np.bool_)
-    joined[facing.faces] = True
     found: Ints = continuing_faces(
-        planes.owner[facing.faces],
+        planes.owner[pairs],
         (solids.vertices, solids.corners, solids.face_starts, solids.solid_starts),
         planes.normals,
         planes.offsets,

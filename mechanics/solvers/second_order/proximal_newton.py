@@ -13,10 +13,12 @@ from functools import cached_property
 import numpy as np
 
 from mechanics.arrays import Array, Ints
+from mechanics.delassus.elimination import elimination
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, RigidContacts
 from mechanics.problem.residual import Residual, project_on_cone, residual
 from mechanics.solvers._kernels import block_fronts as fronts
 from mechanics.solvers._kernels import body_newton as bodies
+from mechanics.solvers.second_order.sparse_blocks import SparseBlocks
 from moma.errors import SolverError
 
 __all__ = ["ProximalNewton"]
@@ -40,6 +42,8 @@ _MEMORY = 5
 _GAIN = 1e-4
 # most numbers in the fronts of a factorisation, 3 GB; beyond, the method gives up and another one must solve
 _ROOM = 400_000_000
+# bodies from which sparse factors take less time than dense fronts, and a tenth of their memory
+_MANY = 300
 # shortest part of a step [-]
 _SHORTEST = 1e-3
 
@@ -174,32 +178,52 @@ class _System:
         own[:, 0] = np.eye(3) / inertia[moving, 0][:, None, None]
         upper = inertia[moving][:, [1, 2, 3, 2, 4, 5, 3, 5, 6]].reshape(-1, 3, 3)
         own[:, 1] = np.linalg.inv(upper)
-        blocks, width, indices, indptr = _pattern(place[contacts.body], len(moving))
+        side = place[contacts.body]
+        blocks, width, indices, indptr = _pattern(side, len(moving))
         self._blocks = bodies.BodyBlocks(place, blocks, own, width)
-        self._plan = fronts.analyse(indices, indptr)
         nc = len(contacts.body)
         self._inverse, self._gain = np.empty((2, nc, 3, 3))
-        self._fits = int(self._plan.aptr[-1]) <= _ROOM
         self._value = np.empty((len(indices), 3, 3))
-        self._factor = np.empty(self._plan.aptr[-1] if self._fits else 0)
-        self._pivot = np.empty(6 * len(moving), dtype=np.int64)
-        self._work = np.empty(int(self._plan.whole.max()))
+        self._factors: SparseBlocks | _Fronts
+        if len(moving) >= _MANY:
+            rank = elimination(side[(side >= 0).all(axis=1)], moving, contacts.centre)
+            each = (2 * rank[:, None] + np.arange(2)).ravel()
+            self._factors = SparseBlocks(indices, indptr, each)
+        else:
+            self._factors = _Fronts(indices, indptr)
 
     def step(self, first: Array, second: Array, error: Array, alpha: float) -> Array | None:
         """Return Δr (nc, 3); None if the equations are singular, or their factors too large."""
-        if not self._fits:
-            return None
         contacts, place = self._contacts, self._blocks.place
         if not bodies.inverse_blocks(first, second, alpha + self._compliance, self._inverse, self._gain):
             return None
         bodies.body_matrix(contacts, self._gain, self._blocks, self._value)
-        if not fronts.factorise(self._value, False, self._plan, self._factor, self._pivot):
+        if not self._factors.factorise(self._value):
             return None
         velocity, step = np.empty((2 * len(self._blocks.own), 3)), np.empty_like(error)
         bodies.body_load(contacts, self._inverse, error, place, velocity)
-        fronts.solve(velocity, self._plan, self._factor, self._pivot, self._work)
+        self._factors.solve(velocity)
         bodies.contact_step(contacts, self._inverse, second, error, place, velocity, step)
         return step
+
+
+class _Fronts:
+    """Dense fronts of few bodies, in the order of least degree."""
+
+    def __init__(self, indices: Ints, indptr: Ints) -> None:
+        self._plan = fronts.analyse(indices, indptr)
+        self._fits = int(self._plan.aptr[-1]) <= _ROOM
+        self._factor = np.empty(self._plan.aptr[-1] if self._fits else 0)
+        self._pivot = np.empty(3 * (len(indptr) - 1), dtype=np.int64)
+        self._work = np.empty(int(self._plan.whole.max()))
+
+    def factorise(self, value: Array) -> bool:
+        """Factorise the matrix of these blocks (nnz, 3, 3); return whether it is regular, and its fronts fit."""
+        return self._fits and bool(fronts.factorise(value, False, self._plan, self._factor, self._pivot))
+
+    def solve(self, x: Array) -> None:
+        """Replace a right side (n, 3) by the solution."""
+        fronts.solve(x, self._plan, self._factor, self._pivot, self._work)
 
 
 def _pattern(side: Ints, count: int) -> tuple[Ints, Ints, Ints, Ints]:

@@ -28,7 +28,7 @@ def faces_of(solids, lost=LOST, kept=()):
     sound[list(lost)] = False
     stays = np.zeros(len(planes.areas), np.bool_)
     stays[list(kept)] = True
-    return StoneFaces(gathered, planes, sound, stays, np.zeros_like(stays))
+    return StoneFaces(gathered, planes, sound, stays, np.zeros_like(stays), np.zeros(len(stays)))
 
 
 def mended(solids, lost=LOST, free=None, kept=(), beside=True, reach=REACH):
