@@ -267,8 +267,8 @@ class SolverSettings:
 
     Attributes
     ----------
-    threads : also those that factorise deformable scenes. More than one pays on idle cores only, as each waits for
-        the slowest
+    threads : also those that factorise deformable scenes, and iterate between 1,000 moving rigid stones or more. More
+        than one pays on idle cores only, as each waits for the slowest
     """
 
     method: Annotated[
@@ -307,8 +307,8 @@ class SolverSettings:
     threads: Annotated[
         int,
         Setting(
-            "Threads that find and sweep the contacts of large rigid scenes, and factorise deformable ones; the "
-            "results are the same to the last bit.",
+            "Threads that find, sweep and iterate over the contacts of large rigid scenes, and factorise deformable "
+            "ones; the results are the same to the last bit.",
             at_least=1,
         ),
     ] = 1

@@ -2,8 +2,10 @@
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from mechanics.delassus.compliant import CompliantDelassus
-from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
+from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, Delassus
 from mechanics.problem.residual import residual
 from mechanics.solvers.first_order.body_admm import BodyADMM, Stage
 from mechanics.solvers.second_order.interior_point import InteriorPoint
@@ -27,13 +29,15 @@ _INTERIOR = 60
 # of many bodies, iterations with kept factors: joints that yield let no forces drift, so one penalty serves, in some
 # hundred iterations, where each step of Newton's method factorises anew
 _MANY_STAGES = (Stage(0.2, 600, extrapolated=False),)
+# compliance of most joints over W_αα below which these would take hundreds, as between rigid stones [-]
+_YIELDING = 5e-3
 
 
 @dataclass(frozen=True)
 class Compliant:
     """Newton's method, from softer joints where it fails, then the interior point; with deformable stones as `Elastic`.
 
-    Many bodies begin with ADMM, whose factors last for a step.
+    Many bodies on springs begin with ADMM, whose factors last for a step.
 
     With E the matrix W + E is regular, however many points stones share, so the method that solves it is fast; from
     contacts far from those of the solution it wanders, and softer joints bring it near. Where it is not solved, the
@@ -59,7 +63,7 @@ class Compliant:
             found = Elastic(self.tolerance, self.velocity_tolerance, self.max_iterations)(problem, start)
             return replace(found, why=f"compliant joints, {found.why}")
         made = 0
-        if many_bodies(problem):
+        if many_bodies(problem) and _yields(problem.delassus):
             limits = self.tolerance, self.velocity_tolerance
             solver = BodyADMM(*limits, self.max_iterations, _MANY_STAGES)
             found = self._judged(problem, solver(problem, start), "admm of bodies")
@@ -110,3 +114,10 @@ class Compliant:
         left = residual(problem, found.impulse)
         within = left.within(self.tolerance, self.velocity_tolerance)
         return replace(found, natural_map=left.natural_map, converged=within, why=f"compliant joints, {name}")
+
+
+def _yields(operator: Delassus) -> bool:
+    """Return whether most joints yield by as much as springs do, and not by as little as keeps W regular."""
+    assert isinstance(operator, CompliantDelassus)
+    own = np.einsum("cii->c", operator.inner.diagonal) / 3.0
+    return bool(np.median(operator.joint_compliance[:, 0] / own) >= _YIELDING)

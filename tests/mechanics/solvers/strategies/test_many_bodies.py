@@ -6,6 +6,7 @@ import pytest
 from benchmarks.tower import tower_scene
 from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
+from mechanics.scene.laws.elastic_joint import ElasticJoint
 from mechanics.scene.scene import SolverSettings
 from mechanics.solvers.first_order.body_admm import BodyADMM, Stage
 from mechanics.solvers.strategies import rigid
@@ -49,6 +50,35 @@ def test_penalties_by_what_a_contact_does_save_nearly_half_of_the_iterations(man
     moving = shaken(_STRONG, 40)[10:]
     assert all(step.solution.converged for step in moving)
     assert sum(step.solution.iterations for step in moving) < 4500
+
+
+def on_springs(steps, stiffness=1e10):
+    """Return the steps of a tower of 300 blocks with elastic joints, as `shaken`."""
+    tolerance, velocity = _LIMITS
+    settings = SolverSettings(tolerance=tolerance, velocity_tolerance=velocity, max_iterations=4000)
+    law = ElasticJoint(0.6, stiffness, 0.5 * stiffness, 2e-3)
+    simulation = Simulation(*build_model(tower_scene(300, _STEP, 40, settings, law)))
+    return [simulation.step() for _ in range(steps)]
+
+
+def test_many_bodies_on_springs_move_as_newton_finds_it_in_a_hundred_iterations_a_step(monkeypatch):
+    exact = on_springs(_STRONG)
+    monkeypatch.setattr(rigid, "_MANY", 100)
+    steps = on_springs(_STRONG)
+    assert {step.solution.why for step in exact} == {"compliant joints, Newton"}
+    assert {step.solution.why for step in steps} == {"compliant joints, admm of bodies"}
+    assert all(step.solution.converged for step in steps)
+    # 74 in the mean
+    assert sum(step.solution.iterations for step in steps) < 100 * _STRONG
+    ends = [one[-1].after.centre - one[0].after.centre for one in (exact, steps)]
+    moved = np.abs(ends[0]).max()
+    assert moved > 1e-3
+    assert np.abs(ends[1] - ends[0]).max() < 0.02 * moved
+
+
+def test_joints_that_hardly_yield_are_left_to_newton(monkeypatch):
+    monkeypatch.setattr(rigid, "_MANY", 100)
+    assert {step.solution.why for step in on_springs(3, 1e12)} == {"compliant joints, Newton"}
 
 
 def test_few_bodies_that_wedge_take_turns_where_one_penalty_does_not_end():
