@@ -48,7 +48,7 @@ def static_start(
 
     Where stones deform, in steps of 1 s, each from a halt, until every body is in balance: with θ = 1 such a step is
     the static problem (docs/theory.md §2), as M/h² is negligible beside K, but determines the motion that nothing else
-    holds. Where joints alone do, in steps of 0.1 s; where stones deform beside more rigid ones, in steps of 5 ms.
+    holds. Where joints alone do, in steps of 0.1 s; where stones deform beside more rigid ones, in steps of 5 ms first.
     Between rigid stones a step from rest is the static problem whatever its length, so that the run's own will do, and
     it is the one with which a run from rest begins. Where that leaves stones in motion, because their joints are open
     or warped, they settle in a relaxation.
@@ -56,8 +56,12 @@ def static_start(
     search = _Search(model, halted(start), report)
     if model.rigid_only and not model.laws.sprung:
         return search.rigid()
-    mixed = 0 < int(model.elastic.sum()) < int(model.inertia.moving.sum())
-    return search.mixed() if mixed and not model.laws.sprung else search.elastic()
+    if 0 < int(model.elastic.sum()) < int(model.inertia.moving.sum()) and not model.laws.sprung:
+        told, found = search.mixed()
+        if told.found:
+            return told, found
+        search = _Search(model, halted(start), report)
+    return search.elastic()
 
 
 class _Search:

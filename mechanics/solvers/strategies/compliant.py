@@ -7,12 +7,12 @@ import numpy as np
 from mechanics.delassus.compliant import CompliantDelassus
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, Delassus
 from mechanics.problem.residual import residual
-from mechanics.solvers.first_order.body_admm import BodyADMM, Stage
+from mechanics.solvers.first_order.body_admm import BodyADMM
 from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.second_order.proximal_newton import ProximalNewton
 from mechanics.solvers.second_order.scaling import equilibrated
 from mechanics.solvers.strategies.elastic import Elastic
-from mechanics.solvers.strategies.rigid import many_bodies
+from mechanics.solvers.strategies.rigid import TURNS, many_bodies
 
 __all__ = ["Compliant"]
 
@@ -26,9 +26,9 @@ _NEWTON_STEPS = 30
 _FURTHER = 1e-3
 # iterations of the interior point
 _INTERIOR = 60
-# of many bodies, iterations with kept factors: joints that yield let no forces drift, so one penalty serves, in some
-# hundred iterations, where each step of Newton's method factorises anew
-_MANY_STAGES = (Stage(0.2, 600, extrapolated=False),)
+# iterations with kept factors between many bodies, in the turns of rigid joints: forces of joints that yield do not drift
+# for long, so most steps end in the first turn, where each step of Newton's method factorises anew
+_MANY_ITERATIONS = 1000
 # compliance of most joints over W_αα below which these would take hundreds, as between rigid stones [-]
 _YIELDING = 5e-3
 
@@ -64,8 +64,8 @@ class Compliant:
             return replace(found, why=f"compliant joints, {found.why}")
         made = 0
         if many_bodies(problem) and _yields(problem.delassus):
-            limits = self.tolerance, self.velocity_tolerance
-            solver = BodyADMM(*limits, self.max_iterations, _MANY_STAGES)
+            most = min(_MANY_ITERATIONS, self.max_iterations)
+            solver = BodyADMM(self.tolerance, self.velocity_tolerance, most, TURNS)
             found = self._judged(problem, solver(problem, start), "admm of bodies")
             if found.converged:
                 return found

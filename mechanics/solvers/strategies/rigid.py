@@ -16,7 +16,7 @@ from mechanics.solvers.second_order.newton import Newton
 from mechanics.solvers.second_order.proximal_newton import ProximalNewton
 from mechanics.solvers.second_order.scaling import equilibrated
 
-__all__ = ["Alternating", "many_bodies", "moving_admm"]
+__all__ = ["TURNS", "Alternating", "many_bodies", "moving_admm"]
 
 # sweeps with which every solution but the first begins: near a solution they suffice
 _FIRST_SWEEPS = 20
@@ -96,14 +96,14 @@ _MANY = 1000
 _SORTED = Stage(1.0, 40, extrapolated=False)
 _DRIFTED = Stage((1.0, 0.05, 0.005), 60, extrapolated=False)
 # most steps end in the first turn, which is gentler and has more time to sort itself out
-_TURNS = (
+TURNS = (
     replace(_SORTED, iterations=10),
     replace(_DRIFTED, penalty=(1.0, 0.05, 0.01)),
     replace(_SORTED, iterations=80),
     *(50 * (_DRIFTED, _SORTED)),
 )
 # of few bodies: most walls need one penalty, in some 40 iterations; what wedges needs the turns
-_LOOSE_STAGES = (Stage(0.1, 80, extrapolated=True), *_TURNS)
+_LOOSE_STAGES = (Stage(0.1, 80, extrapolated=True), *TURNS)
 # and the one with which the forces of rest are found from nothing: it goes as far as methods for rest do, so that the
 # next steps need none
 _COLD_STAGES = (Stage(1e-3, 300, extrapolated=False),)
@@ -254,7 +254,7 @@ class Alternating:
             solver = BodyADMM(self.tolerance, self.velocity_tolerance, most, further=_MOTION_FURTHER)
             return lambda p, s: solver(p, s if s.ahead is None else s.ahead)
         # errors of this size would be extrapolated with the rest
-        stages = _TURNS if many else _LOOSE_STAGES
+        stages = TURNS if many else _LOOSE_STAGES
         return BodyADMM(self.tolerance, self.velocity_tolerance, most, stages)
 
     def _following(self, most: int) -> _Solver:
@@ -265,7 +265,7 @@ class Alternating:
         return BodyADMM(self.tolerance, self.velocity_tolerance, most, _SORTING)
 
     def _turning(self, most: int) -> _Solver:
-        return BodyADMM(self.tolerance, self.velocity_tolerance, most, _TURNS)
+        return BodyADMM(self.tolerance, self.velocity_tolerance, most, TURNS)
 
     def _cold(self, most: int) -> _Solver:
         return BodyADMM(*self._tight, most, _COLD_STAGES)
