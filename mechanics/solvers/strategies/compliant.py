@@ -26,8 +26,8 @@ _NEWTON_STEPS = 30
 _FURTHER = 1e-3
 # iterations of the interior point
 _INTERIOR = 60
-# iterations with kept factors between many bodies, in the turns of rigid joints: forces of joints that yield do not drift
-# for long, so most steps end in the first turn, where each step of Newton's method factorises anew
+# iterations with kept factors between many bodies, in the turns of rigid joints: forces of joints that yield do not
+# drift for long, so most steps end in the first turn, where each step of Newton's method factorises anew
 _MANY_ITERATIONS = 1000
 # compliance of most joints over W_αα below which these would take hundreds, as between rigid stones [-]
 _YIELDING = 5e-3
