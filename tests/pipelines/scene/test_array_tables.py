@@ -266,7 +266,7 @@ def test_records_are_read_filtered_and_corrected_as_asked(tmp_path):
 def test_the_examples_of_the_documentation_are_valid():
     documented = (ROOT / "docs/scene.md").read_text(encoding="utf-8")
     examples = re.findall(r"^```toml\n(.*?)^```$", documented, re.MULTILINE | re.DOTALL)
-    assert len(examples) == 7
+    assert len(examples) == 8
     assert "[materials.sandstone.orthotropy]" in examples[1]
     material = (
         "[materials.sandstone]\ndensity = 2200\nyoung = 1e10\npoisson = 0.2\nstones = ['kind = sill']\n"
@@ -275,6 +275,10 @@ def test_the_examples_of_the_documentation_are_valid():
     (staged,) = (one for one in examples if "[[stages]]" in one)
     assert len(parse_scene(f"{material}\n{staged}", "scene.toml").stages) == 5
     examples.remove(staged)
+    # another [bodies]
+    (arch,) = (one for one in examples if "voussoir and code like" in one)
+    assert parse_scene(f"{material}\n{arch}", "scene.toml").bodies.deformable
+    examples.remove(arch)
     scene = parse_scene("\n".join([material, *examples]), "scene.toml")
     assert scene.materials[0].material.orthotropy is not None
     assert (len(scene.meshes), len(scene.laws), len(scene.loads)) == (3, 2, 2)
