@@ -2,8 +2,8 @@
 
 The iteration of `ADMM`, from a start that is predicted from the last two steps, and with a penalty of each contact's
 own compliance. As the contacts of moving stones change from step to step and their forces from iteration to iteration,
-what counts is the cost of an iteration: of two passes over the contacts and one solution with the factors of
-M + H Σ⁻¹ Hᵀ, less than that of a Gauss–Seidel sweep (mechanics/solvers/_kernels/body_admm.py).
+what counts is the cost of an iteration: of a pass over the contacts and one solution with the factors of M + H Σ⁻¹ Hᵀ,
+less than that of a Gauss–Seidel sweep (mechanics/solvers/_kernels/body_admm.py).
 """
 
 from collections.abc import Callable

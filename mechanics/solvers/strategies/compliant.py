@@ -66,9 +66,9 @@ class Compliant:
         if many_bodies(problem) and _yields(problem.delassus):
             most = min(_MANY_ITERATIONS, self.max_iterations)
             solver = BodyADMM(self.tolerance, self.velocity_tolerance, most, TURNS)
-            found = self._judged(problem, solver(problem, start), "admm of bodies")
+            found = solver(problem, start)
             if found.converged:
-                return found
+                return replace(found, why="compliant joints, admm of bodies")
             start, made = ContactStart(found.impulse, found.velocity), found.iterations
         found = self._newton(problem, start, "Newton", max(self.max_iterations - made, 1))
         found = replace(found, iterations=found.iterations + made)
