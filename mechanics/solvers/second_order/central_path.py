@@ -5,14 +5,15 @@ Slack s and dual z of the cones turn this into
 
     W r + u_free + μ‖z_T‖ n = Aᵀ z,     s = A r + (k, 0, 0),     s ∘ z = 0,     A = diag(μ, 1, 1)
 
-which Newton's method follows along the central path s ∘ z = ν e, ν → 0, with Mehrotra's corrector and the scaling of
-Nesterov and Todd. Unlike a cone programme, Coulomb's friction is no minimum of anything: the derivative of the shift
-μ‖z_T‖ n belongs to Newton's matrix W + Θ, which is not symmetric, and the whole converges in some 30 iterations
-whatever the conditioning of W. Contacts with cohesion have r_N ≥ 0 as a second cone; without friction it is the only
-one.
+which Newton's method follows along the central path s ∘ z = ν e, ν → 0, with Mehrotra's corrector, corrections of the
+pairs that are far from the others (Gondzio 1996), and the scaling of Nesterov and Todd. Unlike a cone programme,
+Coulomb's friction is no minimum of anything: the derivative of the shift μ‖z_T‖ n belongs to Newton's matrix W + Θ,
+which is not symmetric, and the whole converges in some 30 iterations whatever the conditioning of W. Where nothing
+moves, that derivative has no limit; with the shift held, the path is that of a cone programme. Contacts with cohesion
+have r_N ≥ 0 as a second cone; without friction it is the only one.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -26,6 +27,7 @@ from mechanics.solvers.second_order.second_order_cones import (
     product,
     reach,
     scaling,
+    to_bounds,
 )
 
 __all__ = ["NAME", "CentralPath"]
@@ -42,6 +44,12 @@ _RIGID = 1e9
 _BACK_OFF = 0.98
 # part of a step below which it counts as short [-]
 _SHORT = 0.1
+# most corrections of pairs far from the others in a step; each costs a substitution, a twentieth of the factors
+_CORRECTIONS = 5
+# part of a step from which none is needed, how much farther a corrected one aims, and what it has to gain [-]
+_LONG, _AIM, _WORTH = 0.95, 0.3, 0.01
+# complementarities over the one wanted between which pairs stay as they are [-]
+_WIDE = (0.1, 10.0)
 # distance of the start from the cones, over typical impulses and the velocities that they cause: nearer, the first
 # steps are short (measured: 13 iterations instead of 19) [-]
 _INSIDE = 10.0
@@ -60,13 +68,14 @@ class _Side:
 
 @dataclass
 class _Cone:
-    """The friction cones of some contacts: slack and dual."""
+    """The friction cones of some contacts: slack and dual, and whether their shift μ‖z_T‖ is held."""
 
     rows: Ints
     friction: Array
     cohesion: Array
     slack: Array
     dual: Array
+    held: bool
     diagonal: Array = field(init=False)
 
     def __post_init__(self) -> None:
@@ -75,13 +84,17 @@ class _Cone:
     def transpose(self) -> Array:
         """Return Aᵀ - n ∂(μ‖z_T‖)/∂z (n, 3, 3), the derivative of the balance of velocities by z."""
         matrix = self.diagonal[:, :, None] * np.eye(3)
+        if self.held:
+            return matrix
         size = np.sqrt((self.dual[:, 1:] ** 2).sum(axis=1))
         matrix[:, 0, 1:] -= (self.friction / np.maximum(size, 1e-300))[:, None] * self.dual[:, 1:]
         return matrix
 
     def velocity(self) -> Array:
-        """Return Aᵀ z - μ‖z_T‖ n, the velocity u that the dual asks for."""
+        """Return Aᵀ z - μ‖z_T‖ n, the velocity u that the dual asks for; Aᵀ z where the shift is held."""
         u = self.diagonal * self.dual
+        if self.held:
+            return u
         u[:, 0] -= self.friction * np.sqrt((self.dual[:, 1:] ** 2).sum(axis=1))
         return u
 
@@ -95,13 +108,21 @@ class CentralPath:
     near : (nc, 3) impulses near the solution, as those of the last step, from which it begins; None: far inside the
         cones
     level : complementarity with which it begins there; as small as the impulses are right [-]
+    shift : (nc,) μ‖u_T‖ as it is held, in the units of the problem; None: that of each iterate
     """
 
-    def __init__(self, problem: ContactProblem, near: Array | None = None, level: float = 1.0) -> None:
+    def __init__(
+        self,
+        problem: ContactProblem,
+        near: Array | None = None,
+        level: float = 1.0,
+        shift: Array | None = None,
+    ) -> None:
         self._problem, form = problem, problem.form(NAME)
         # a direction a little wrong costs less than another factorisation
         self._system = partial(form.shifted, exact=False)
-        self._free = problem.biased
+        self._held = shift is not None
+        self._free = problem.biased if shift is None else replace(problem, bias=problem.bias + shift).biased
         mu, k = problem.friction, problem.cohesion
         cone, side = np.flatnonzero((mu > _SMOOTH) | (k > 0)), np.flatnonzero((mu <= _SMOOTH) | (k > 0))
         self._smooth = np.flatnonzero((mu <= _SMOOTH) & (k <= 0))
@@ -124,7 +145,7 @@ class CentralPath:
         inside = _INSIDE * size
         slack[:, 0] = np.maximum(slack[:, 0], np.sqrt((slack[:, 1:] ** 2).sum(axis=1)) + inside)
         dual = np.tile([inside * scale, 0.0, 0.0], (len(cone), 1))
-        self._cone = _Cone(cone, mu[cone], k[cone], slack, dual)
+        self._cone = _Cone(cone, mu[cone], k[cone], slack, dual, self._held)
         self._side = _Side(side, np.maximum(self._r[side, 0], inside), np.full(len(side), inside * scale))
 
     def _begin_near(self, cone: Ints, side: Ints, near: Array, level: float) -> None:
@@ -140,12 +161,13 @@ class CentralPath:
         self._unit = size * size * scale
         dual = problem.delassus.apply(near) + self._free
         normal = dual[side, 0]
-        dual[:, 0] += mu * np.sqrt((dual[:, 1:] ** 2).sum(axis=1))
+        if not self._held:
+            dual[:, 0] += mu * np.sqrt((dual[:, 1:] ** 2).sum(axis=1))
         diagonal = np.column_stack([mu[cone], np.ones((len(cone), 2))])
         point = diagonal * near[cone]
         point[:, 0] += k[cone]
         slack, other = central(point - dual[cone] / (diagonal * scale), level * size * size)
-        self._cone = _Cone(cone, mu[cone], k[cone], slack, scale * other)
+        self._cone = _Cone(cone, mu[cone], k[cone], slack, scale * other, self._held)
         point = near[side, 0] - normal / scale
         root = np.sqrt(point**2 + 4.0 * level * size * size)
         self._side = _Side(side, 0.5 * (root + point), 0.5 * scale * (root - point))
@@ -175,8 +197,18 @@ class CentralPath:
         length = min(1.0, self._reach(step))
         # the gain of the predictor decides how much centring is needed (Mehrotra 1992)
         centring = (1.0 - length) ** 3
-        step = newton.direction(newton.corrected(step, centring * self._gap), 1.0 - centring)
+        level = centring * self._gap
+        step = newton.direction(newton.corrected(step, level), 1.0 - centring)
         length = min(1.0, _BACK_OFF * self._reach(step))
+        for _ in range(_CORRECTIONS):
+            if length > _LONG:
+                break
+            right = newton.recentred(step, min(1.0, length + _AIM), level)
+            other = tuple(a + b for a, b in zip(step, newton.direction(right, 0.0), strict=True))
+            farther = min(1.0, _BACK_OFF * self._reach(other))
+            if farther < length + _WORTH:
+                break
+            step, length = other, farther
         if length < 2.0 * _SHORT:
             other = newton.direction(newton.centred(0.5 * self._gap), 0.5)
             farther = min(1.0, _BACK_OFF * self._reach(other))
@@ -243,6 +275,17 @@ class _Newton:
         side = self._side
         own = level - side.slack * side.dual - slack_n * dual_n
         return divide(self._lambda, square), own / side.dual
+
+    def recentred(self, step: tuple[Array, ...], length: float, level: float) -> tuple[Array, Array]:
+        """Return the right side of a correction: of the pairs that a part of a step leaves far from the level."""
+        _, slack, dual, slack_n, dual_n = step
+        cone, side = self._cone, self._side
+        low, high = _WIDE[0] * level, _WIDE[1] * level
+        primal = self._scaling.inverse(cone.slack + length * slack)
+        pairs = product(primal, self._scaling(cone.dual + length * dual))
+        own = (side.slack + length * slack_n) * (side.dual + length * dual_n)
+        change = np.maximum(np.clip(own, low, high) - own, -high)
+        return divide(self._lambda, to_bounds(pairs, low, high)), change / side.dual
 
     def direction(self, right: tuple[Array, Array], share: float) -> tuple[Array, ...]:
         """Return the changes of r, of slack and dual of the cones, and of the sides, for a share of the residuals."""

@@ -7,7 +7,7 @@ import numpy as np
 from mechanics.arrays import Array
 from moma.errors import SolverError
 
-__all__ = ["Scaling", "central", "divide", "product", "reach", "scaling"]
+__all__ = ["Scaling", "central", "divide", "product", "reach", "scaling", "to_bounds"]
 
 
 _MIRROR = np.array([1.0, -1.0, -1.0])
@@ -35,6 +35,18 @@ def central(difference: Array, level: float) -> tuple[Array, Array]:
     along = difference[:, 1:] / np.maximum(size, 1e-300)[:, None]
     first, second = difference[:, 0] + size, difference[:, 0] - size
     return _spectral(first, second, along, level), _spectral(-second, -first, -along, level)
+
+
+def to_bounds(x: Array, low: float, high: float) -> Array:
+    """Return the change (nc, 3) that brings the eigenvalues of x between two bounds, none down by more than `high`.
+
+    >>> to_bounds(np.array([[3.0, 2.0, 0.0]]), 2.0, 4.0)[0, :2]
+    array([ 0., -1.])
+    """
+    size = np.sqrt((x[:, 1:] ** 2).sum(axis=1))
+    along = x[:, 1:] / np.maximum(size, 1e-300)[:, None]
+    one, two = (np.maximum(np.clip(own, low, high) - own, -high) for own in (x[:, 0] + size, x[:, 0] - size))
+    return np.column_stack([0.5 * (one + two), 0.5 * (one - two)[:, None] * along])
 
 
 def _spectral(first: Array, second: Array, along: Array, level: float) -> Array:

@@ -5,7 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mechanics.solvers.second_order.second_order_cones import divide, product, reach, scaling
+from mechanics.solvers.second_order.second_order_cones import (
+    divide,
+    product,
+    reach,
+    scaling,
+    to_bounds,
+)
 
 seeds = st.integers(0, 2**32 - 1)
 IDENTITY = np.array([1.0, 0.0, 0.0])
@@ -139,3 +145,16 @@ def test_where_slack_and_dual_agree_nothing_is_scaled():
     t = scaling(s, s)
     np.testing.assert_allclose(t.inverse_squared[0], np.eye(3), atol=1e-14)
     np.testing.assert_allclose(t(s), s, rtol=1e-14)
+
+
+@given(seeds, st.floats(0.01, 1.0), st.floats(1.0, 10.0))
+def test_eigenvalues_are_brought_between_bounds_and_none_falls_by_more_than_the_larger(seed, low, high):
+    x = 10.0 * np.random.default_rng(seed).normal(size=(20, 3))
+
+    def values(of):
+        size = np.linalg.norm(of[:, 1:], axis=1)
+        return np.array([of[:, 0] + size, of[:, 0] - size])
+
+    before = values(x)
+    wanted = np.maximum(np.clip(before, low, high), before - high)
+    np.testing.assert_allclose(values(x + to_bounds(x, low, high)), wanted, rtol=1e-9, atol=1e-9)
