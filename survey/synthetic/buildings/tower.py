@@ -54,6 +54,7 @@ _LEAVES = (0.47, 0.63)  # depths of the stones of its sides and vault, in turn, 
 _THROUGH = (1.0, 0.40, 2.4)  # of through stones: distance from the end of a run, length, distance of two [m]
 _RELIEF = 0.01  # distance of the inner facings of B and C from that of A, whose faces are not flush [m]
 _EVERY = 3  # courses from one row of through stones to the next
+_OPEN = 10  # least number of courses of a storey with openings
 _FOOT = np.array([48.6, 23.9, 11.4])  # middle of the foot of wall A in the site [m]
 _AZIMUTH = math.radians(14.0)  # of wall A against the x axis
 
@@ -123,7 +124,7 @@ def tower_storey(
 
     Parameters
     ----------
-    courses : 11 or more
+    courses : 2 or more; with fewer than 10 the walls have no openings
     seed : of Python's own generator, whose stream is the same everywhere
     width, depth : of the tower outside, along wall A and along the others; not much smaller [m]
     blunders : gross errors per stone
@@ -184,16 +185,12 @@ def _walls(width: float, depth: float) -> tuple[_Wall, ...]:
 
 def _wall(wall: _Wall, heights: Sequence[float], rng: Random) -> Iterator[Draft]:
     """Draft the stones of both facings of a wall."""
-    outer, inner = (_opening(wall, half, heights) for half in (_PASSAGE if wall.passage else _WINDOW))
+    halves = _PASSAGE if wall.passage else _WINDOW
+    outer, inner = (_opening(wall, half, heights) if len(heights) > _OPEN else None for half in halves)
     corners = [list(_corners(wall, number, heights)) for number in range(1, len(heights))]
-    widest = max(outer.reach, inner.reach) + 0.7  # with the stones beside the opening
-    last = max(outer.arch[1], inner.arch[1]) + 1
+    widest = [_kept_clear(outer, inner, number) for number in range(1, len(heights))]
     through = [
-        list(
-            _through(
-                wall, number, 0.5 * (low + high), widest if outer.jambs[0] - 1 <= number <= last else 0.0
-            )
-        )
+        list(_through(wall, number, 0.5 * (low + high), widest[number - 1]))
         for number, (low, high) in enumerate(pairwise(heights), start=1)
     ]
     given = [[*a, *b] for a, b in zip(corners, through, strict=True)]
@@ -206,11 +203,22 @@ def _wall(wall: _Wall, heights: Sequence[float], rng: Random) -> Iterator[Draft]
     yield from _facing(wall, "I", own, [[]] * len(own), inner, heights, rng)
 
 
+def _kept_clear(outer: Opening | None, inner: Opening | None, number: int) -> float:
+    """Return the distance from the axis within which a course has no through stones [m]."""
+    if (
+        outer is None
+        or inner is None
+        or not outer.jambs[0] - 1 <= number <= max(outer.arch[1], inner.arch[1]) + 1
+    ):
+        return 0.0
+    return max(outer.reach, inner.reach) + 0.7  # with the stones beside the opening
+
+
 def _opening(wall: _Wall, half: float, heights: Sequence[float]) -> Opening:
     """Lay out a window between a quarter and half of the height, or the passage from the second course."""
     courses = len(heights) - 1
     if wall.passage:
-        return plan_opening(Arch.SEGMENTAL, half, heights, min(7, courses - 6))
+        return plan_opening(Arch.SEMICIRCULAR, half, heights, min(7, courses - 6))
     sill = max(2, round(0.25 * courses))
     opening = plan_opening(Arch.SEGMENTAL, half, heights, sill + min(6, courses - 7) - 1)
     return replace(opening, jambs=(sill + 1, opening.jambs[1]))
@@ -258,7 +266,7 @@ def _facing(
     side: str,
     courses: Sequence[Sequence[Piece]],
     through: Sequence[Sequence[Piece]],
-    opening: Opening,
+    opening: Opening | None,
     heights: Sequence[float],
     rng: Random,
 ) -> Iterator[Draft]:
@@ -270,7 +278,7 @@ def _facing(
             plan = planned(f"{wall.letter}{side}{number:02d}-{k:02d}", piece, *beds, number)[0]
             depth = THICKNESS if piece in through[number - 1] else _DEPTHS[piece.kind]
             yield _draft(wall, side, plan, depth, number, rng)
-    for number, plan in enumerate(opening.voussoirs(), start=1):
+    for number, plan in enumerate(opening.voussoirs() if opening else (), start=1):
         named = replace(plan, code=f"{wall.letter}{side}-{plan.code}")
         # the vault's stones lie before and behind each other: their numbers run from opposite ends
         rank = number if side == "O" else len(opening.radials) - number

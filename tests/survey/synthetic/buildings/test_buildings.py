@@ -26,7 +26,8 @@ BUILDINGS = {
     "arch": semicircular_arch,
     "corner": lambda: corner(4, 2.0),
     "facings": lambda: two_facings(3.0, 5).building,
-    "tower": lambda: tower_storey(11, seed=2, blunders=0.0).building,
+    "tower": lambda: tower_storey(11, seed=8, blunders=0.0).building,
+    "low tower": lambda: tower_storey(5, blunders=0.0).building,
 }
 
 
@@ -207,3 +208,48 @@ def test_the_storey_is_bonded_at_its_corners_and_through_its_walls() -> None:
 
 def _depth(solid) -> float:
     return float(np.ptp((solid.vertices - solid.vertices[0]) @ _out(solid)))
+
+
+def test_storeys_of_less_than_ten_courses_have_no_openings() -> None:
+    for courses in (2, 5, 9, 10):
+        records = tower_storey(courses).building.survey.blocks
+        assert max(record.course or 0 for record in records) == courses
+        assert any(record.kind in ("jamb", "voussoir") for record in records) == (courses == 10)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+def test_narrow_stretches_beside_openings_are_filled_whatever_the_seed(seed: int) -> None:
+    """From the corner to the stone beside an opening there may be too little room for another stone."""
+    for courses in (10, 12):
+        widths = [
+            float(np.linalg.norm(solid.vertices[1] - solid.vertices[0]))
+            for solid, record in _pairs(tower_storey(courses, seed).building)
+            if record.kind in ("header", "stretcher")
+        ]
+        assert min(widths) > 0.30
+        assert max(widths) < 0.82
+
+
+def _pairs(building: Building):
+    return zip(building.solids, building.survey.blocks, strict=True)
+
+
+def test_a_semicircular_barrel_vault_spans_the_passage() -> None:
+    """Its joints lie in planes through the axis of one half circle, and its stones bond through the wall."""
+    building = tower_storey(12).building
+    vault = [pair for pair in _pairs(building) if pair[1].code.startswith(("CO-V", "CI-V"))]
+    outer = [solid for solid, record in vault if record.code.startswith("CO")]
+    left, right = outer[0].vertices[0], outer[-1].vertices[1]
+    assert left[2] == pytest.approx(right[2], abs=1e-9)
+    centre, across = 0.5 * (left + right), (right - left) / np.linalg.norm(right - left)
+    flat = np.array([across, [0.0, 0.0, 1.0]])
+    for solid, record in vault:
+        inner, back = ((solid.vertices[k] - centre) @ flat.T for k in ([0, 1, 4, 5], [3, 2, 7, 6]))
+        assert np.linalg.norm(inner, axis=1) == pytest.approx(np.full(4, 0.6), abs=1e-9), record.code
+        assert inner[:, 0] * back[:, 1] - inner[:, 1] * back[:, 0] == pytest.approx(np.zeros(4), abs=1e-9)
+    assert len(outer) == len(vault) - len(outer) == 15
+    depths = {record.code: _depth(solid) for solid, record in vault}
+    for number in range(1, 16):
+        leaves = depths[f"CO-V{number}"], depths[f"CI-V{16 - number}"]
+        assert sorted(leaves) == pytest.approx([0.47, 0.63], abs=1e-9)
+        assert (leaves[0] > leaves[1]) == (number % 2 == 0)
