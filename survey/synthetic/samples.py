@@ -27,7 +27,7 @@ from survey.synthetic.causes import (
 from survey.synthetic.frame import Movement
 from survey.synthetic.window_bay.sample import make_sample, truth_text
 
-__all__ = ["SAMPLES", "Sample", "SampleRecipe", "moved_sample"]
+__all__ = ["SAMPLES", "Sample", "SampleRecipe", "moved_sample", "storey_recipe"]
 
 
 @dataclass(frozen=True)
@@ -204,6 +204,11 @@ def moved_sample(cause: Cause, movement: Movement) -> Sample:
     return Sample(site.building.survey, truth, knowledge)
 
 
+def storey_recipe(courses: int, title: str) -> SampleRecipe:
+    """Return the recipe of a storey of the tower, of any number of courses."""
+    return SampleRecipe(title, "course = 1", _tower(courses), core=True)
+
+
 def _moved(title: str, cause: Cause) -> SampleRecipe:
     """Return the recipe of a building that has moved, which is made as it was laid."""
     return SampleRecipe(title, "course = 1", lambda: moved_sample(cause, {}), cause=cause)
@@ -226,13 +231,11 @@ SAMPLES: Mapping[str, SampleRecipe] = MappingProxyType(
             "Wall whose left corner settled before its upper courses were laid", SETTLED_PHASES
         ),
         "settled-small": _moved("Small wall whose left corner settled", SETTLED_SMALL),
-        "tower": SampleRecipe("Storey of a tower", "course = 1", _tower(40), core=True),
+        "tower": storey_recipe(40, "Storey of a tower"),
         "tower-settled-small": _moved(
             "Storey of a tower, of twelve courses, whose left corner settled", TOWER_SMALL_SETTLED
         ),
-        "tower-small": SampleRecipe(
-            "Storey of a tower, of twelve courses", "course = 1", _tower(12), core=True
-        ),
+        "tower-small": storey_recipe(12, "Storey of a tower, of twelve courses"),
         "vault": SampleRecipe("Barrel vault", "kind = springer", _of(lambda: barrel_vault(seed=2))),
         "wall": SampleRecipe(
             "Wall with an arched opening", "course = 1", _of(lambda: wall(80, arch=Arch.SEGMENTAL))
