@@ -12,7 +12,7 @@ from survey.synthetic.building import Building
 from survey.synthetic.buildings.facings import two_facings
 from survey.synthetic.buildings.openings import Arch
 from survey.synthetic.buildings.quoins import corner
-from survey.synthetic.buildings.ribs import WEBS, rib_vault
+from survey.synthetic.buildings.ribs import WEBS, RibVaultShape, rib_vault
 from survey.synthetic.buildings.tower import tower_storey
 from survey.synthetic.buildings.vaults import barrel_vault, semicircular_arch
 from survey.synthetic.buildings.walls import wall
@@ -121,7 +121,7 @@ text = "another height of the courses, above one that levels them"
 
 
 def _rib_vault() -> Sample:
-    vault = rib_vault()
+    vault = rib_vault(RibVaultShape(wall_rib=_WALL_RIB))
     axes = {f"R{rib}": (np.round(vault.rib_axis(rib, 3), 6) + 0.0).tolist() for rib in range(1, 5)}
     parts = [
         _PART.format(kind="web", code=web, title=f"Web {web}", stones=f"zone = 'web {web}'", ordered="false")
@@ -135,6 +135,17 @@ def _rib_vault() -> Sample:
         parts.append(
             _PART.format(kind="rib", code=code, title=title, stones='", "'.join(row), ordered="true")
         )
+    for web in WEBS:
+        row = '", "'.join(f"F{web}-{k:02d}" for k in range(1, 2 * count + 2))
+        parts.append(
+            _PART.format(
+                kind="wall_rib",
+                code=f"F{web}",
+                title=f"Wall rib of the web {web}",
+                stones=row,
+                ordered="true",
+            )
+        )
     truth = _truth_of(vault.building, axes=axes)
     return Sample(vault.building.survey, truth, _VAULT + "".join(parts), vault.modelled)
 
@@ -146,11 +157,17 @@ _VAULT = """\
 author = "synthetic"
 source = "invented for this sample"
 
+[[kind]]
+name = "wall_rib"
+parent = "rib"
+definition = "A rib where a web meets a wall: formeret."
+
 [[structure]]
 kind = "rib_vault"
 code = "VAULT"
 title = "Rib vault"
 """
+_WALL_RIB = 0.22  # width of the wall ribs of the sample [m]
 
 _PART = """
 [[structure]]
