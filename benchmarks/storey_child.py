@@ -12,7 +12,9 @@ from benchmarks.memory import peak_bytes
 from benchmarks.report import Row
 from mechanics.simulate import simulate
 from pipelines.ingest.ingest import ingest
+from pipelines.ingest.reading_options import reading_options
 from pipelines.propose.propose import Recording, propose_core
+from pipelines.record.record import record
 from pipelines.run.assemble import assemble
 from pipelines.scene.file import read_scene
 from pipelines.scene.sample import write_recipe
@@ -41,6 +43,9 @@ def _from_survey(courses: int, folder: Path) -> Row:
     url = f"sqlite:///{folder / 'storey.db'}"
     clock = [time.process_time()]
     ingest([folder / "storey.moma"], url)
+    if (solids := folder / "solids.obj").exists():
+        ingest([solids], url, "solids", options=reading_options(folder / "head.moma", None, None, None))
+    record([folder / "knowledge.toml"], url)
     clock.append(time.process_time())
     propose_core(url, recording=Recording())
     clock.append(time.process_time())

@@ -1,7 +1,7 @@
 """Synthetic surveys to start from, by name, each with its truth."""
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -87,13 +87,29 @@ def _tower(courses: int) -> Callable[[], Sample]:
     """Return the generator of a storey of the tower."""
 
     def make() -> Sample:
-        storey = tower_storey(courses)
-        knowledge = _PHASES.format(last=storey.level_break)
-        return Sample(storey.building.survey, _truth_of(storey.building), knowledge)
+        storey = tower_storey(courses, splayed=True)
+        building = storey.building
+        knowledge = _PHASES.format(last=storey.level_break) + "".join(_places(building))
+        return Sample(building.survey, _truth_of(building), knowledge, building.modelled)
 
     return make
 
 
+def _places(building: Building) -> Iterator[str]:
+    """Yield corrections that give the splayed jambs of a storey their zones and courses, which files of solids lack."""
+    rows: dict[tuple[str, int | None], list[str]] = {}
+    for one in building.modelled:
+        rows.setdefault((f"{one.code[0]} inner", one.course), []).append(one.code)
+    for (zone, course), codes in rows.items():
+        yield _PLACE.format(stones='", "'.join(codes), zone=zone, course=course)
+
+
+_PLACE = """
+[[correction]]
+stones = ["{stones}"]
+set = {{ zone = "{zone}", course = {course} }}
+reason = "the file of solids has neither zones nor courses"
+"""
 _PHASES = """\
 # What is "known" of the synthetic building besides its geometry; as invented as the building.
 
@@ -147,7 +163,7 @@ def _rib_vault() -> Sample:
             )
         )
     truth = _truth_of(vault.building, axes=axes)
-    return Sample(vault.building.survey, truth, _VAULT + "".join(parts), vault.modelled)
+    return Sample(vault.building.survey, truth, _VAULT + "".join(parts), vault.building.modelled)
 
 
 _VAULT = """\

@@ -29,15 +29,12 @@ import numpy as np
 
 from moma.errors import GeometryError
 from survey.arrays import Array
-from survey.extrusion.extrusion import SurveyedBlock, prism
-from survey.extrusion.imported_solids import block_of_solid
+from survey.extrusion.extrusion import prism
 from survey.geometry.half_spaces import intersection
 from survey.geometry.solids import Solid
-from survey.records.survey import OBSERVER, SolidRecord
 from survey.synthetic.bond import PlannedStone
-from survey.synthetic.building import Building, Draft, measured_building, observer
+from survey.synthetic.building import Building, Draft, SolidDraft, measured_building, observer
 from survey.synthetic.frame import TrueStone, WallFrame
-from survey.synthetic.modelled import modelled_solid
 
 __all__ = ["WEBS", "Bed", "RibVault", "RibVaultShape", "rib_vault"]
 
@@ -51,7 +48,6 @@ _SHORTEST = 0.15  # part of a stone of a web beyond the seat that it rests on [m
 _JITTER = 0.04  # largest deviation of head joints from a regular bond [m]
 _PENDANT = 0.03  # drop of the boss below the ribs [m]
 _ROUNDING = 1e-12  # distance of corners that lie on one plane [m]
-_DECIMALS = 5  # of the coordinates of modelled solids, in metres
 
 
 @dataclass(frozen=True)
@@ -150,24 +146,16 @@ class RibVault:
 
     Attributes
     ----------
-    building : its webs measured from below, and all its true stones: those of the webs, then the others
-    modelled : the others as measured: closed solids of springers, segments of both kinds of ribs, and boss
+    building : its webs measured from below; springers, segments of both kinds of ribs, and boss modelled as solids
     shape : its dimensions
     foot : (3,) centre of the arcs of both diagonal ribs, beneath the boss [m]
     axes : (3, 3) rows: along the walls S and W, and upwards [-]
     """
 
     building: Building
-    modelled: tuple[SolidRecord, ...]
     shape: RibVaultShape
     foot: Array
     axes: Array
-
-    def blocks(self) -> list[SurveyedBlock]:
-        """Make the surveyed stones, in the order of the true ones."""
-        seen_from = self.building.survey.head.viewpoint(OBSERVER)
-        ribs = [block_of_solid(one, seen_from, "ribs") for one in self.modelled]
-        return [*self.building.blocks(), *ribs]
 
     def rib_axis(self, rib: int, count: int = 50) -> Array:
         """Return places (count, 3) along the axis of a half rib, 1 to 4, from its springer to the boss [m].
@@ -212,24 +200,14 @@ def rib_vault(shape: RibVaultShape | None = None, seed: int = 1) -> RibVault:
         for turns, name in enumerate(WEBS)
         for stone in _web(name, _turn(turns), beds, shape, rng)
     ]
-    ribs = dict(_ribs(beds, shape))
-    placed = [Solid(code, one.vertices @ axes + _FOOT, one.faces) for code, (_, one) in ribs.items()]
-    base = [code for code, (kind, _) in ribs.items() if kind == "rib_springer"]
-    building = measured_building(
-        "rib vault", drafts, {"web_stone": shape.thickness}, [observer(_FOOT)], base, rng, others=placed
-    )
-    modelled = []
-    for solid in placed:
-        touched = [
-            face
-            for joint in building.joints
-            for code, face in zip(joint.stones, joint.faces, strict=True)
-            if code == solid.code
-        ]
-        seen = modelled_solid(solid, touched, rng)
-        vertices = np.round(seen.vertices, _DECIMALS) + 0.0
-        modelled.append(SolidRecord(solid.code, ribs[solid.code][0], None, vertices, seen.faces))
-    return RibVault(building, tuple(modelled), shape, _FOOT, axes)
+    ribs = [
+        SolidDraft(Solid(code, one.vertices @ axes + _FOOT, one.faces), kind)
+        for code, (kind, one) in _ribs(beds, shape)
+    ]
+    base = [draft.solid.code for draft in ribs if draft.kind == "rib_springer"]
+    depths = {"web_stone": shape.thickness}
+    building = measured_building("rib vault", drafts, depths, [observer(_FOOT)], base, rng, modelled=ribs)
+    return RibVault(building, shape, _FOOT, axes)
 
 
 def _check(shape: RibVaultShape) -> None:

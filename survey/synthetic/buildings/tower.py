@@ -3,11 +3,12 @@
 ::
 
               back
-        B │ │      │ │ C      Wall A, in front, has a window, as has B on the left. A passage under a barrel vault leads
-          │ │      │ │        through C. Corners are solid: in each course a quoin lies along one wall and a bonder,
-          │ └──────┘ │        as deep as the walls are thick, beside it in the other; in the next course they change
-          └──────────┘        places. Through stones tie the facings. Above the level break the second phase begins with
-               A              a thin course; its courses are lower than those of the first.
+        B │ │      │ │ C      Wall A, in front, has a window, as has B on the left; jambs of its inner facing may be
+          │ │      │ │        splayed, below a rear arch. A passage under a barrel vault leads through C. Corners are
+          │ └──────┘ │        solid: in each course a quoin lies along one wall and a bonder, as deep as the walls are
+          └──────────┘        thick, beside it in the other; in the next course they change places. Through stones tie
+               A              the facings. Above the level break the second phase begins with a thin course; its
+                              courses are lower than those of the first.
 """
 
 import math
@@ -20,9 +21,10 @@ from types import MappingProxyType
 import numpy as np
 
 from survey.arrays import Array
+from survey.extrusion.extrusion import prism
 from survey.records.survey import Station
 from survey.synthetic.bond import PlannedStone, upright
-from survey.synthetic.building import Building, Draft, flat_stone, measured_building
+from survey.synthetic.building import Building, Draft, SolidDraft, flat_stone, measured_building, observer
 from survey.synthetic.buildings.openings import Arch, Opening, plan_opening
 from survey.synthetic.buildings.walls import plan_courses
 from survey.synthetic.coursing import Bed, Piece, planned
@@ -49,12 +51,14 @@ _HEIGHTS = ((0.26, 0.34), (0.23, 0.29))  # of the courses of each phase [m]
 _LEVELLING = 0.15  # height of the first course of the second phase [m]
 _BREAK = 0.6  # share of the courses that belong to the first phase
 _WINDOW = (0.45, 0.70)  # half the width of a window outside and inside, where it widens in a step [m]
+_SPLAYED = (0.45, 0.65)  # the same of a window that widens along splayed jambs [m]
 _PASSAGE = (0.60, 0.60)  # the same of the passage, which runs straight through [m]
 _LEAVES = (0.47, 0.63)  # depths of the stones of its sides and vault, in turn, so that they bond [m]
 _THROUGH = (1.0, 0.40, 2.4)  # of through stones: distance from the end of a run, length, distance of two [m]
 _RELIEF = 0.01  # distance of the inner facings of B and C from that of A, whose faces are not flush [m]
 _EVERY = 3  # courses from one row of through stones to the next
 _OPEN = 10  # least number of courses of a storey with openings
+_EYES = 0.6  # part of the height of the jambs at which they are modelled: higher, where courses are lower
 _FOOT = np.array([48.6, 23.9, 11.4])  # middle of the foot of wall A in the site [m]
 _AZIMUTH = math.radians(14.0)  # of wall A against the x axis
 
@@ -116,6 +120,7 @@ def tower_storey(
     *,
     width: float = 7.0,
     depth: float = 5.6,
+    splayed: bool = False,
     blunders: float = 0.12,
     movement: Movement = MappingProxyType({}),
     measured: int | None = None,
@@ -127,6 +132,7 @@ def tower_storey(
     courses : 2 or more; with fewer than 10 the walls have no openings
     seed : of Python's own generator, whose stream is the same everywhere
     width, depth : of the tower outside, along wall A and along the others; not much smaller [m]
+    splayed : whether the windows widen along splayed jambs, modelled as closed solids, instead of in a step
     blunders : gross errors per stone
     movement : of the stones since they were laid
     measured : seed of the joints, wear and noise alone, so that the same stones are measured again; None: as `seed`
@@ -140,22 +146,41 @@ def tower_storey(
     level_break = round(_BREAK * courses)
     heights = _bed_heights(rng, courses, level_break)
     walls = _walls(width, depth)
-    drafts = [draft for wall in walls for draft in _wall(wall, heights, rng)]
+    stones = [stone for wall in walls for stone in _wall(wall, heights, splayed, rng)]
+    drafts = [stone for stone in stones if isinstance(stone, Draft)]
+    solids = [stone for stone in stones if isinstance(stone, SolidDraft)]
     depths = {kind: value for kind, value in _DEPTHS.items() if kind != "bonder"}
     stations = [
         Station(f"{wall.letter} {side}", np.round(frame.place(np.array([[0.3, 1.6]]), away)[0], 4))
         for wall in walls
         for side, frame, away in (("outer", wall.frame, 9.0), ("inner", wall.inner_frame, 2.0))
     ]
+    if solids:
+        stations.append(_before_windows(walls[-1], depth, solids))
     base = [draft.stone.plan.code for draft in drafts if draft.stone.plan.course == 1]
     count = round(blunders * len(drafts))
     rng = rng if measured is None else Random(measured)
     building = measured_building(
-        "tower storey", drafts, depths, stations, base, rng, blunders=count, movement=movement
+        "tower storey",
+        drafts,
+        depths,
+        stations,
+        base,
+        rng,
+        blunders=count,
+        movement=movement,
+        modelled=solids,
     )
     front = walls[0]
     corners = front.frame.place(np.array([[end, 0.0] for end in front.ends]))
     return TowerStorey(building, level_break, corners, {wall.letter: wall.frame.axes[2] for wall in walls})
+
+
+def _before_windows(wall: _Wall, depth: float, jambs: Sequence[SolidDraft]) -> Station:
+    """Return the station in the middle of the room, before both windows, from which their jambs are modelled."""
+    heights = [z for jamb in jambs for z in jamb.solid.vertices[:, 2]]
+    middle = _FOOT + 0.5 * (THICKNESS + depth) * wall.frame.axes[0]
+    return observer(np.array([*middle[:2], (1.0 - _EYES) * min(heights) + _EYES * max(heights)]))
 
 
 def _bed_heights(rng: Random, courses: int, level_break: int) -> list[float]:
@@ -183,9 +208,9 @@ def _walls(width: float, depth: float) -> tuple[_Wall, ...]:
     )
 
 
-def _wall(wall: _Wall, heights: Sequence[float], rng: Random) -> Iterator[Draft]:
+def _wall(wall: _Wall, heights: Sequence[float], splayed: bool, rng: Random) -> Iterator[Draft | SolidDraft]:
     """Draft the stones of both facings of a wall."""
-    halves = _PASSAGE if wall.passage else _WINDOW
+    halves = _PASSAGE if wall.passage else _SPLAYED if splayed else _WINDOW
     outer, inner = (_opening(wall, half, heights) if len(heights) > _OPEN else None for half in halves)
     corners = [list(_corners(wall, number, heights)) for number in range(1, len(heights))]
     widest = [_kept_clear(outer, inner, number) for number in range(1, len(heights))]
@@ -200,7 +225,9 @@ def _wall(wall: _Wall, heights: Sequence[float], rng: Random) -> Iterator[Draft]
     given = [[_mirrored(piece) for piece in row] for row in through]
     courses = plan_courses(rng, heights, (ends[0], ends[1]), inner, through=given)
     own = [[p for p in one.pieces if p not in row] for one, row in zip(courses, given, strict=True)]
-    yield from _facing(wall, "I", own, [[]] * len(own), inner, heights, rng)
+    splay = halves if splayed and not wall.passage else None
+    for draft in _facing(wall, "I", own, [[]] * len(own), inner, heights, rng):
+        yield _splayed(draft, *splay) if splay is not None and draft.stone.plan.kind == "jamb" else draft
 
 
 def _kept_clear(outer: Opening | None, inner: Opening | None, number: int) -> float:
@@ -283,6 +310,16 @@ def _facing(
         # the vault's stones lie before and behind each other: their numbers run from opposite ends
         rank = number if side == "O" else len(opening.radials) - number
         yield _draft(wall, side, named, _DEPTHS[plan.kind], rank, rng)
+
+
+def _splayed(draft: Draft, outside: float, inside: float) -> SolidDraft:
+    """Give a jamb of the inner facing an oblique reveal: behind its face the window is as wide as outside."""
+    plan, frame = draft.stone.plan, draft.frame
+    behind = plan.corners.copy()
+    at_reveal = np.isclose(np.abs(behind[:, 0]), inside, rtol=0.0, atol=1e-9)
+    behind[at_reveal, 0] *= outside / inside
+    solid = prism(plan.code, frame.place(plan.corners), frame.place(behind, -draft.stone.depth))
+    return SolidDraft(solid, plan.kind, plan.course)
 
 
 def _draft(wall: _Wall, side: str, plan: PlannedStone, depth: float, turn: int, rng: Random) -> Draft:

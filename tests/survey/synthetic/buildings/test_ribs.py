@@ -73,7 +73,7 @@ def test_ribs_have_an_axis_of_their_own(vault: RibVault) -> None:
 @pytest.mark.parametrize(("seed", "wall_rib"), [(1, 0.0), (2, 0.0), (1, 0.22)])
 def test_all_joints_of_the_survey_close(seed: int, wall_rib: float) -> None:
     vault = rib_vault(RibVaultShape(wall_rib=wall_rib), seed)
-    closed = close_joints(vault.blocks())
+    closed = close_joints(vault.building.blocks())
     true: dict[frozenset[str], float] = {}
     found: dict[frozenset[str], float] = {}
     for joint in vault.building.joints:
@@ -131,6 +131,6 @@ def test_shapes_whose_stones_would_lie_in_each_other_are_refused() -> None:
 
 def test_a_vault_is_the_same_for_the_same_seed(vault: RibVault) -> None:
     again, other = rib_vault(), rib_vault(seed=2)
-    for a, b in zip(vault.modelled, again.modelled, strict=True):
+    for a, b in zip(vault.building.modelled, again.building.modelled, strict=True):
         np.testing.assert_array_equal(a.vertices, b.vertices)
-    assert not np.array_equal(vault.modelled[0].vertices, other.modelled[0].vertices)
+    assert not np.array_equal(vault.building.modelled[0].vertices, other.building.modelled[0].vertices)
