@@ -87,7 +87,7 @@ def _tower(courses: int) -> Callable[[], Sample]:
     """Return the generator of a storey of the tower."""
 
     def make() -> Sample:
-        storey = tower_storey(courses, splayed=True)
+        storey = tower_storey(courses, elaborate=True)
         building = storey.building
         knowledge = _PHASES.format(last=storey.level_break) + "".join(_places(building))
         return Sample(building.survey, _truth_of(building), knowledge, building.modelled)

@@ -26,7 +26,7 @@ from survey.records.survey import Station
 from survey.synthetic.bond import PlannedStone, upright
 from survey.synthetic.building import Building, Draft, SolidDraft, flat_stone, measured_building, observer
 from survey.synthetic.buildings.openings import Arch, Opening, plan_opening
-from survey.synthetic.buildings.walls import plan_courses
+from survey.synthetic.buildings.walls import Course, plan_courses
 from survey.synthetic.coursing import Bed, Piece, planned
 from survey.synthetic.frame import Movement, WallFrame, build_stone
 
@@ -120,7 +120,7 @@ def tower_storey(
     *,
     width: float = 7.0,
     depth: float = 5.6,
-    splayed: bool = False,
+    elaborate: bool = False,
     blunders: float = 0.12,
     movement: Movement = MappingProxyType({}),
     measured: int | None = None,
@@ -132,7 +132,8 @@ def tower_storey(
     courses : 2 or more; with fewer than 10 the walls have no openings
     seed : of Python's own generator, whose stream is the same everywhere
     width, depth : of the tower outside, along wall A and along the others; not much smaller [m]
-    splayed : whether the windows widen along splayed jambs, modelled as closed solids, instead of in a step
+    elaborate : whether the windows widen along splayed jambs, modelled as closed solids, and a semicircular barrel
+        vault spans the passage; else they widen in a step, and it is segmental
     blunders : gross errors per stone
     movement : of the stones since they were laid
     measured : seed of the joints, wear and noise alone, so that the same stones are measured again; None: as `seed`
@@ -146,7 +147,7 @@ def tower_storey(
     level_break = round(_BREAK * courses)
     heights = _bed_heights(rng, courses, level_break)
     walls = _walls(width, depth)
-    stones = [stone for wall in walls for stone in _wall(wall, heights, splayed, rng)]
+    stones = [stone for wall in walls for stone in _wall(wall, heights, elaborate, rng)]
     drafts = [stone for stone in stones if isinstance(stone, Draft)]
     solids = [stone for stone in stones if isinstance(stone, SolidDraft)]
     depths = {kind: value for kind, value in _DEPTHS.items() if kind != "bonder"}
@@ -208,10 +209,14 @@ def _walls(width: float, depth: float) -> tuple[_Wall, ...]:
     )
 
 
-def _wall(wall: _Wall, heights: Sequence[float], splayed: bool, rng: Random) -> Iterator[Draft | SolidDraft]:
+def _wall(
+    wall: _Wall, heights: Sequence[float], elaborate: bool, rng: Random
+) -> Iterator[Draft | SolidDraft]:
     """Draft the stones of both facings of a wall."""
-    halves = _PASSAGE if wall.passage else _SPLAYED if splayed else _WINDOW
-    outer, inner = (_opening(wall, half, heights) if len(heights) > _OPEN else None for half in halves)
+    halves = _PASSAGE if wall.passage else _SPLAYED if elaborate else _WINDOW
+    outer, inner = (
+        _opening(wall, half, heights, elaborate) if len(heights) > _OPEN else None for half in halves
+    )
     corners = [list(_corners(wall, number, heights)) for number in range(1, len(heights))]
     widest = [_kept_clear(outer, inner, number) for number in range(1, len(heights))]
     through = [
@@ -220,12 +225,13 @@ def _wall(wall: _Wall, heights: Sequence[float], splayed: bool, rng: Random) -> 
     ]
     given = [[*a, *b] for a, b in zip(corners, through, strict=True)]
     courses = plan_courses(rng, heights, wall.ends, outer, through=given)
-    yield from _facing(wall, "O", [one.pieces for one in courses], through, outer, heights, rng)
+    yield from _facing(wall, "O", _with_springers(courses, outer, heights), through, outer, heights, rng)
     ends = tuple(-end for end in wall.inner_ends[::-1])
     given = [[_mirrored(piece) for piece in row] for row in through]
     courses = plan_courses(rng, heights, (ends[0], ends[1]), inner, through=given)
-    own = [[p for p in one.pieces if p not in row] for one, row in zip(courses, given, strict=True)]
-    splay = halves if splayed and not wall.passage else None
+    pieces = _with_springers(courses, inner, heights)
+    own = [[p for p in one if p not in row] for one, row in zip(pieces, given, strict=True)]
+    splay = halves if elaborate and not wall.passage else None
     for draft in _facing(wall, "I", own, [[]] * len(own), inner, heights, rng):
         yield _splayed(draft, *splay) if splay is not None and draft.stone.plan.kind == "jamb" else draft
 
@@ -241,14 +247,33 @@ def _kept_clear(outer: Opening | None, inner: Opening | None, number: int) -> fl
     return max(outer.reach, inner.reach) + 0.7  # with the stones beside the opening
 
 
-def _opening(wall: _Wall, half: float, heights: Sequence[float]) -> Opening:
+def _opening(wall: _Wall, half: float, heights: Sequence[float], elaborate: bool) -> Opening:
     """Lay out a window between a quarter and half of the height, or the passage from the second course."""
     courses = len(heights) - 1
+    if wall.passage and elaborate:
+        return plan_opening(Arch.SEMICIRCULAR, half, heights, min(7, courses - 8))
     if wall.passage:
-        return plan_opening(Arch.SEMICIRCULAR, half, heights, min(7, courses - 6))
+        return plan_opening(Arch.SEGMENTAL, half, heights, min(7, courses - 6))
     sill = max(2, round(0.25 * courses))
     opening = plan_opening(Arch.SEGMENTAL, half, heights, sill + min(6, courses - 7) - 1)
     return replace(opening, jambs=(sill + 1, opening.jambs[1]))
+
+
+def _with_springers(
+    courses: Sequence[Course], opening: Opening | None, heights: Sequence[float]
+) -> list[list[Piece]]:
+    """Return the stones of the courses; those beside an arch are springers, which bear its thrust in half the wall."""
+    out = []
+    for number, course in enumerate(courses, start=1):
+        edges = opening.edges(number, 0.5 * (heights[number - 1] + heights[number])) if opening else None
+        ends = () if edges is None or edges[2] == "jamb" else edges[:2]
+        out.append(
+            [
+                replace(piece, kind="springer") if piece.right in ends or piece.left in ends else piece
+                for piece in course.pieces
+            ]
+        )
+    return out
 
 
 def _corners(wall: _Wall, number: int, heights: Sequence[float]) -> Iterator[Piece]:
