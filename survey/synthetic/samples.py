@@ -152,13 +152,13 @@ def _rib_vault() -> Sample:
             _PART.format(kind="rib", code=code, title=title, stones='", "'.join(row), ordered="true")
         )
     for web in WEBS:
-        row = '", "'.join(f"F{web}-{k:02d}" for k in range(1, 2 * count + 2))
+        row = [f"F{web}-{k:02d}" for k in range(1, 2 * count + 2)]
         parts.append(
             _PART.format(
                 kind="wall_rib",
                 code=f"F{web}",
                 title=f"Wall rib of the web {web}",
-                stones=row,
+                stones='", "'.join(row),
                 ordered="true",
             )
         )

@@ -330,10 +330,11 @@ def _facing(
             plan = planned(f"{wall.letter}{side}{number:02d}-{k:02d}", piece, *beds, number)[0]
             depth = THICKNESS if piece in through[number - 1] else _DEPTHS[piece.kind]
             yield _draft(wall, side, plan, depth, number, rng)
-    for number, plan in enumerate(opening.voussoirs() if opening else (), start=1):
+    arch = opening.voussoirs() if opening else []
+    for number, plan in enumerate(arch, start=1):
         named = replace(plan, code=f"{wall.letter}{side}-{plan.code}")
         # the vault's stones lie before and behind each other: their numbers run from opposite ends
-        rank = number if side == "O" else len(opening.radials) - number
+        rank = number if side == "O" else len(arch) + 1 - number
         yield _draft(wall, side, named, _DEPTHS[plan.kind], rank, rng)
 
 
