@@ -83,11 +83,11 @@ def _window() -> Sample:
     return Sample(sample.survey, truth_text(sample))
 
 
-def _tower(courses: int) -> Callable[[], Sample]:
+def _tower(courses: int, elaborate: bool) -> Callable[[], Sample]:
     """Return the generator of a storey of the tower."""
 
     def make() -> Sample:
-        storey = tower_storey(courses, elaborate=True)
+        storey = tower_storey(courses, elaborate=elaborate)
         building = storey.building
         knowledge = _PHASES.format(last=storey.level_break) + "".join(_places(building))
         return Sample(building.survey, _truth_of(building), knowledge, building.modelled)
@@ -237,9 +237,9 @@ def moved_sample(cause: Cause, movement: Movement) -> Sample:
     return Sample(site.building.survey, truth, knowledge)
 
 
-def storey_recipe(courses: int, title: str) -> SampleRecipe:
-    """Return the recipe of a storey of the tower, of any number of courses."""
-    return SampleRecipe(title, "course = 1", _tower(courses), core=True)
+def storey_recipe(courses: int, title: str, *, elaborate: bool = True) -> SampleRecipe:
+    """Return the recipe of a storey of the tower, of any number of courses; see `tower_storey`."""
+    return SampleRecipe(title, "course = 1", _tower(courses, elaborate), core=True)
 
 
 def _moved(title: str, cause: Cause) -> SampleRecipe:
@@ -268,7 +268,7 @@ SAMPLES: Mapping[str, SampleRecipe] = MappingProxyType(
         "tower-settled-small": _moved(
             "Storey of a tower, of twelve courses, whose left corner settled", TOWER_SMALL_SETTLED
         ),
-        "tower-small": storey_recipe(12, "Storey of a tower, of twelve courses"),
+        "tower-small": storey_recipe(12, "Storey of a tower, of twelve courses", elaborate=False),
         "vault": SampleRecipe("Barrel vault", "kind = springer", _of(lambda: barrel_vault(seed=2))),
         "wall": SampleRecipe(
             "Wall with an arched opening", "course = 1", _of(lambda: wall(80, arch=Arch.SEGMENTAL))

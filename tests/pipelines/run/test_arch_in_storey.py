@@ -17,12 +17,9 @@ deformable = ["kind = voussoir and code like 'AO%'"]
 @pytest.mark.slow
 def test_the_arch_of_a_window_deforms_in_a_rigid_storey_and_every_step_is_solved(tmp_path):
     db = f"sqlite:///{tmp_path / 'storey.db'}"
-    solids = [str(tmp_path / "solids.obj"), "--format", "solids", "--header", str(tmp_path / "head.moma")]
     for command in (
         ["sample", NAME, "--out", str(tmp_path)],
         ["ingest", str(tmp_path / f"{NAME}.moma"), "--db", db],
-        ["ingest", *solids, "--db", db],
-        ["record", str(tmp_path / "knowledge.toml"), "--db", db],
         ["propose", "infill", "--record", "--db", db],
     ):
         assert CliRunner().invoke(app, command).exit_code == 0
