@@ -12,7 +12,7 @@ from survey.synthetic.building import Building
 from survey.synthetic.causes import Cause
 from survey.synthetic.samples import SAMPLES, SampleRecipe, moved_sample
 
-__all__ = ["WrittenSample", "write_sample"]
+__all__ = ["WrittenSample", "write_recipe", "write_sample"]
 
 _SCENE = """\
 # {title}: synthetic, no such building exists. Every key is explained in docs/scene.md.
@@ -206,7 +206,11 @@ def write_sample(kind: str, folder: Path) -> WrittenSample:
     """
     if kind not in SAMPLES:
         raise UsageError(f"no sample {kind!r}", remedy=f"the samples are {', '.join(SAMPLES)}")
-    recipe = SAMPLES[kind]
+    return write_recipe(kind, SAMPLES[kind], folder)
+
+
+def write_recipe(kind: str, recipe: SampleRecipe, folder: Path) -> WrittenSample:
+    """Write a sample of a recipe, its files named after `kind`; as `write_sample`."""
     cause = recipe.cause
     sample = recipe.make() if cause is None else moved_sample(cause, true_movement(cause))
     survey, scene = folder / f"{kind}.moma", folder / f"{kind}.toml"

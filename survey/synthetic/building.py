@@ -10,21 +10,24 @@ import numpy as np
 from survey.arrays import Array
 from survey.extrusion.depth import depth_for
 from survey.extrusion.extrusion import SurveyedBlock, extrude, prism
+from survey.extrusion.imported_solids import block_of_solid
 from survey.faces.faces import outline_face
 from survey.geometry.solids import Solid
-from survey.records.survey import OBSERVER, DepthRule, Station, Survey, SurveyHead
+from survey.records.survey import OBSERVER, DepthRule, SolidRecord, Station, Survey, SurveyHead
 from survey.synthetic.bond import PlannedStone
 from survey.synthetic.frame import Movement, RigidMotion, TrueStone, WallFrame
 from survey.synthetic.measure import HALF_JOINT, SIGMA, Measured, add_blunders, measure_stone
+from survey.synthetic.modelled import modelled_solid
 from survey.synthetic.shared_faces import TrueJoint, true_joints
 
-__all__ = ["Building", "Draft", "flat_stone", "measured_building", "observer"]
+__all__ = ["Building", "Draft", "SolidDraft", "flat_stone", "measured_building", "observer"]
 
 
 SOURCE = "synthetic value, chosen for this building"
 SEEN = "synthetic value, as if measured on a side that can be seen"
 _NONE: Movement = MappingProxyType({})
 DEPTH_SIGMA = 0.03  # standard deviation of a depth by rule [m]
+_DECIMALS = 5  # of the coordinates of modelled solids, in metres
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,21 @@ class Draft:
 
 
 @dataclass(frozen=True)
+class SolidDraft:
+    """A true stone that is modelled as a closed solid, as several of its sides are seen.
+
+    Attributes
+    ----------
+    solid : its true geometry, convex
+    kind, course : as in a survey's record
+    """
+
+    solid: Solid
+    kind: str
+    course: int | None = None
+
+
+@dataclass(frozen=True)
 class Building:
     """A synthetic building.
 
@@ -58,7 +76,8 @@ class Building:
     ----------
     name : a description
     survey : the measurements of a surveyor
-    solids : the true stones, convex, where they are now; in the order of the survey, then those that it leaves out
+    modelled : stones that were measured as closed solids, seen from the observer, and are not in the survey
+    solids : the true stones, convex, where they are now; in the order of the survey, then of `modelled`
     joints : all true joints, as they were laid
     base : codes of the stones that stand on the ground
     movement : of the stones since their joints were closed
@@ -66,18 +85,20 @@ class Building:
 
     name: str
     survey: Survey
+    modelled: tuple[SolidRecord, ...]
     solids: tuple[Solid, ...]
     joints: tuple[TrueJoint, ...]
     base: tuple[str, ...]
     movement: Movement = field(default_factory=dict)
 
     def blocks(self) -> list[SurveyedBlock]:
-        """Make the surveyed stones: fit planes, extrude outlines by their depth."""
+        """Make the surveyed stones, in the order of the true ones: fit planes, extrude outlines by their depth."""
         head = self.survey.head
-        return [
+        extruded = [
             extrude(outline_face(one, head.viewpoint(one.station)), depth_for(one, head.depth_rules))
             for one in self.survey.blocks
         ]
+        return [*extruded, *(block_of_solid(one, head.viewpoint(None), self.name) for one in self.modelled)]
 
 
 def flat_stone(plan: PlannedStone, depth: float, frame: WallFrame) -> TrueStone:
@@ -97,7 +118,7 @@ def measured_building(
     *,
     blunders: int = 0,
     movement: Movement = _NONE,
-    others: Sequence[Solid] = (),
+    modelled: Sequence[SolidDraft] = (),
 ) -> Building:
     """Measure a building; sides in contact with another stone are surveyed half a joint inside.
 
@@ -111,18 +132,24 @@ def measured_building(
     rng : random numbers
     blunders : number of points with a gross error
     movement : of the stones since they were laid
-    others : true stones that this survey leaves out, after those of the drafts in the building
+    modelled : true stones that are measured as closed solids, after the others
     """
-    joints = true_joints([*(draft.stone.solid for draft in drafts), *others])
+    joints = true_joints([*(draft.stone.solid for draft in drafts), *(draft.solid for draft in modelled)])
     touched = {(code, face) for joint in joints for code, face in zip(joint.stones, joint.faces, strict=True)}
     drafts = [_moved(draft, movement.get(draft.stone.plan.code)) for draft in drafts]
+    modelled = [_moved_solid(draft, movement.get(draft.solid.code)) for draft in modelled]
     measured = [_measured(draft, touched, rng) for draft in drafts]
     measured = add_blunders(measured, [draft.stone.normal for draft in drafts], blunders, rng)
     rules = tuple(DepthRule(kind, depth, DEPTH_SIGMA, SOURCE) for kind, depth in sorted(depths.items()))
     head = SurveyHead(f"{name} (synthetic)", f"{name}.moma", tuple(stations), depth_rules=rules)
-    solids = (*(draft.stone.solid for draft in drafts), *others)
     return Building(
-        name, Survey(head, tuple(one.record for one in measured)), solids, joints, tuple(base), movement
+        name,
+        Survey(head, tuple(one.record for one in measured)),
+        tuple(_modelled(draft, touched, rng) for draft in modelled),
+        (*(draft.stone.solid for draft in drafts), *(draft.solid for draft in modelled)),
+        joints,
+        tuple(base),
+        movement,
     )
 
 
@@ -135,6 +162,19 @@ def _moved(draft: Draft, motion: RigidMotion | None) -> Draft:
     if motion is None:
         return draft
     return replace(draft, stone=draft.stone.moved(motion), frame=draft.frame.moved(motion))
+
+
+def _moved_solid(draft: SolidDraft, motion: RigidMotion | None) -> SolidDraft:
+    if motion is None:
+        return draft
+    return replace(draft, solid=replace(draft.solid, vertices=motion.place(draft.solid.vertices)))
+
+
+def _modelled(draft: SolidDraft, touched: set[tuple[str, int]], rng: Random) -> SolidRecord:
+    """Measure the planes of a stone that is modelled as a closed solid."""
+    code = draft.solid.code
+    seen = modelled_solid(draft.solid, (face for stone, face in touched if stone == code), rng)
+    return SolidRecord(code, draft.kind, draft.course, np.round(seen.vertices, _DECIMALS) + 0.0, seen.faces)
 
 
 def _measured(draft: Draft, touched: set[tuple[str, int]], rng: Random) -> Measured:

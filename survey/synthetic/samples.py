@@ -1,7 +1,7 @@
 """Synthetic surveys to start from, by name, each with its truth."""
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -12,7 +12,7 @@ from survey.synthetic.building import Building
 from survey.synthetic.buildings.facings import two_facings
 from survey.synthetic.buildings.openings import Arch
 from survey.synthetic.buildings.quoins import corner
-from survey.synthetic.buildings.ribs import WEBS, rib_vault
+from survey.synthetic.buildings.ribs import WEBS, RibVaultShape, rib_vault
 from survey.synthetic.buildings.tower import tower_storey
 from survey.synthetic.buildings.vaults import barrel_vault, semicircular_arch
 from survey.synthetic.buildings.walls import wall
@@ -27,7 +27,7 @@ from survey.synthetic.causes import (
 from survey.synthetic.frame import Movement
 from survey.synthetic.window_bay.sample import make_sample, truth_text
 
-__all__ = ["SAMPLES", "Sample", "SampleRecipe", "moved_sample"]
+__all__ = ["SAMPLES", "Sample", "SampleRecipe", "moved_sample", "storey_recipe"]
 
 
 @dataclass(frozen=True)
@@ -83,17 +83,33 @@ def _window() -> Sample:
     return Sample(sample.survey, truth_text(sample))
 
 
-def _tower(courses: int) -> Callable[[], Sample]:
+def _tower(courses: int, elaborate: bool) -> Callable[[], Sample]:
     """Return the generator of a storey of the tower."""
 
     def make() -> Sample:
-        storey = tower_storey(courses)
-        knowledge = _PHASES.format(last=storey.level_break)
-        return Sample(storey.building.survey, _truth_of(storey.building), knowledge)
+        storey = tower_storey(courses, elaborate=elaborate)
+        building = storey.building
+        knowledge = _PHASES.format(last=storey.level_break) + "".join(_places(building))
+        return Sample(building.survey, _truth_of(building), knowledge, building.modelled)
 
     return make
 
 
+def _places(building: Building) -> Iterator[str]:
+    """Yield corrections that give the splayed jambs of a storey their zones and courses, which files of solids lack."""
+    rows: dict[tuple[str, int | None], list[str]] = {}
+    for one in building.modelled:
+        rows.setdefault((f"{one.code[0]} inner", one.course), []).append(one.code)
+    for (zone, course), codes in rows.items():
+        yield _PLACE.format(stones='", "'.join(codes), zone=zone, course=course)
+
+
+_PLACE = """
+[[correction]]
+stones = ["{stones}"]
+set = {{ zone = "{zone}", course = {course} }}
+reason = "the file of solids has neither zones nor courses"
+"""
 _PHASES = """\
 # What is "known" of the synthetic building besides its geometry; as invented as the building.
 
@@ -121,7 +137,7 @@ text = "another height of the courses, above one that levels them"
 
 
 def _rib_vault() -> Sample:
-    vault = rib_vault()
+    vault = rib_vault(RibVaultShape(wall_rib=_WALL_RIB))
     axes = {f"R{rib}": (np.round(vault.rib_axis(rib, 3), 6) + 0.0).tolist() for rib in range(1, 5)}
     parts = [
         _PART.format(kind="web", code=web, title=f"Web {web}", stones=f"zone = 'web {web}'", ordered="false")
@@ -135,8 +151,19 @@ def _rib_vault() -> Sample:
         parts.append(
             _PART.format(kind="rib", code=code, title=title, stones='", "'.join(row), ordered="true")
         )
+    for web in WEBS:
+        row = [f"F{web}-{k:02d}" for k in range(1, 2 * count + 2)]
+        parts.append(
+            _PART.format(
+                kind="wall_rib",
+                code=f"F{web}",
+                title=f"Wall rib of the web {web}",
+                stones='", "'.join(row),
+                ordered="true",
+            )
+        )
     truth = _truth_of(vault.building, axes=axes)
-    return Sample(vault.building.survey, truth, _VAULT + "".join(parts), vault.modelled)
+    return Sample(vault.building.survey, truth, _VAULT + "".join(parts), vault.building.modelled)
 
 
 _VAULT = """\
@@ -146,11 +173,17 @@ _VAULT = """\
 author = "synthetic"
 source = "invented for this sample"
 
+[[kind]]
+name = "wall_rib"
+parent = "rib"
+definition = "A rib where a web meets a wall: formeret."
+
 [[structure]]
 kind = "rib_vault"
 code = "VAULT"
 title = "Rib vault"
 """
+_WALL_RIB = 0.22  # width of the wall ribs of the sample [m]
 
 _PART = """
 [[structure]]
@@ -204,6 +237,11 @@ def moved_sample(cause: Cause, movement: Movement) -> Sample:
     return Sample(site.building.survey, truth, knowledge)
 
 
+def storey_recipe(courses: int, title: str, *, elaborate: bool = True) -> SampleRecipe:
+    """Return the recipe of a storey of the tower, of any number of courses; see `tower_storey`."""
+    return SampleRecipe(title, "course = 1", _tower(courses, elaborate), core=True)
+
+
 def _moved(title: str, cause: Cause) -> SampleRecipe:
     """Return the recipe of a building that has moved, which is made as it was laid."""
     return SampleRecipe(title, "course = 1", lambda: moved_sample(cause, {}), cause=cause)
@@ -226,13 +264,11 @@ SAMPLES: Mapping[str, SampleRecipe] = MappingProxyType(
             "Wall whose left corner settled before its upper courses were laid", SETTLED_PHASES
         ),
         "settled-small": _moved("Small wall whose left corner settled", SETTLED_SMALL),
-        "tower": SampleRecipe("Storey of a tower", "course = 1", _tower(40), core=True),
+        "tower": storey_recipe(40, "Storey of a tower"),
         "tower-settled-small": _moved(
             "Storey of a tower, of twelve courses, whose left corner settled", TOWER_SMALL_SETTLED
         ),
-        "tower-small": SampleRecipe(
-            "Storey of a tower, of twelve courses", "course = 1", _tower(12), core=True
-        ),
+        "tower-small": storey_recipe(12, "Storey of a tower, of twelve courses", elaborate=False),
         "vault": SampleRecipe("Barrel vault", "kind = springer", _of(lambda: barrel_vault(seed=2))),
         "wall": SampleRecipe(
             "Wall with an arched opening", "course = 1", _of(lambda: wall(80, arch=Arch.SEGMENTAL))

@@ -42,6 +42,7 @@ def test_the_queries_find_the_stones_of_a_web_and_of_a_rib(place):
     crown = after(found, 'moma query web_stone --where "member_of(kind = web')
     assert {code[:3] for code in crown} == {"N09", "E09", "S09", "W09"}
     assert len(after(found, "moma query rib_segment")) == 2 * 8 + 3
+    assert sorted(after(found, 'moma query entity --where "member_of(is_a(wall_rib))')) == ["FE-01", "FN-17"]
     assert after(found, "moma query boss") == ["B"]
     path = after(said, "moma load-path")
     assert re.search(r"\bR1-0\d\b", path)

@@ -1,4 +1,4 @@
-"""A quadripartite rib vault over a square bay: diagonal ribs, a boss, springers, and webs in courses.
+"""A quadripartite rib vault over a square bay: diagonal ribs, a boss, springers, webs in courses, and wall ribs.
 
 ::
 
@@ -14,6 +14,9 @@ Above the springers the web's soffit along a rib is an arc of radius R in the ri
 vertical, u = R sin θ from the centre. The web over a half of a wall goes through the same heights at x = (u - w) / √2,
 where w is half the width of the rib at its joints. So tan α = √2 tan θ is its slope, and a bed that is square to it
 meets the joint of the rib, square to the arc, in a line upright over y = x + √2 w.
+
+Along each wall a wall rib (formeret) may continue the curve of the web, an arch from springer to springer: its joints
+lie in the beds of the web, whose courses end beside it.
 """
 
 import math
@@ -26,15 +29,12 @@ import numpy as np
 
 from moma.errors import GeometryError
 from survey.arrays import Array
-from survey.extrusion.extrusion import SurveyedBlock, prism
-from survey.extrusion.imported_solids import block_of_solid
+from survey.extrusion.extrusion import prism
 from survey.geometry.half_spaces import intersection
 from survey.geometry.solids import Solid
-from survey.records.survey import OBSERVER, SolidRecord
 from survey.synthetic.bond import PlannedStone
-from survey.synthetic.building import Building, Draft, measured_building, observer
+from survey.synthetic.building import Building, Draft, SolidDraft, measured_building, observer
 from survey.synthetic.frame import TrueStone, WallFrame
-from survey.synthetic.modelled import modelled_solid
 
 __all__ = ["WEBS", "Bed", "RibVault", "RibVaultShape", "rib_vault"]
 
@@ -48,7 +48,6 @@ _SHORTEST = 0.15  # part of a stone of a web beyond the seat that it rests on [m
 _JITTER = 0.04  # largest deviation of head joints from a regular bond [m]
 _PENDANT = 0.03  # drop of the boss below the ribs [m]
 _ROUNDING = 1e-12  # distance of corners that lie on one plane [m]
-_DECIMALS = 5  # of the coordinates of modelled solids, in metres
 
 
 @dataclass(frozen=True)
@@ -66,6 +65,8 @@ class RibVaultShape:
     height : of a rib [m]
     thickness : of the webs [m]
     springer : height of a springer below the web's soffit at its joint with the rib [m]
+    wall_rib : width of the wall ribs; 0: there are none [m]
+    wall_drop : of the soffit of a wall rib below the web's [m]
     """
 
     half: float = 2.0
@@ -78,6 +79,13 @@ class RibVaultShape:
     height: float = 0.34
     thickness: float = 0.20
     springer: float = 0.7
+    wall_rib: float = 0.0
+    wall_drop: float = 0.06
+
+    @property
+    def reach(self) -> float:
+        """Distance of the ends of the webs from the axis [m]."""
+        return self.half - self.wall_rib
 
     @property
     def angles(self) -> Array:
@@ -138,24 +146,16 @@ class RibVault:
 
     Attributes
     ----------
-    building : its webs measured from below, and all its true stones: those of the webs, then the others
-    modelled : the others as measured: closed solids of springers, rib segments and boss
+    building : its webs measured from below; springers, segments of both kinds of ribs, and boss modelled as solids
     shape : its dimensions
     foot : (3,) centre of the arcs of both diagonal ribs, beneath the boss [m]
     axes : (3, 3) rows: along the walls S and W, and upwards [-]
     """
 
     building: Building
-    modelled: tuple[SolidRecord, ...]
     shape: RibVaultShape
     foot: Array
     axes: Array
-
-    def blocks(self) -> list[SurveyedBlock]:
-        """Make the surveyed stones, in the order of the true ones."""
-        seen_from = self.building.survey.head.viewpoint(OBSERVER)
-        ribs = [block_of_solid(one, seen_from, "ribs") for one in self.modelled]
-        return [*self.building.blocks(), *ribs]
 
     def rib_axis(self, rib: int, count: int = 50) -> Array:
         """Return places (count, 3) along the axis of a half rib, 1 to 4, from its springer to the boss [m].
@@ -182,7 +182,8 @@ def rib_vault(shape: RibVaultShape | None = None, seed: int = 1) -> RibVault:
     Returns
     -------
     RibVault, whose codes are <web><course>-<number>, with l or r after the course for the halves of a web;
-    R<rib>-<number> for the segments of the four half ribs, T<rib> for their springers, and B for the boss
+    R<rib>-<number> for the segments of the four half ribs, T<rib> for their springers, B for the boss, and
+    F<web>-<number> for the segments of the wall rib beside a web, from left to right as seen from inside
 
     Raises
     ------
@@ -199,24 +200,14 @@ def rib_vault(shape: RibVaultShape | None = None, seed: int = 1) -> RibVault:
         for turns, name in enumerate(WEBS)
         for stone in _web(name, _turn(turns), beds, shape, rng)
     ]
-    ribs = dict(_ribs(beds, shape))
-    placed = [Solid(code, one.vertices @ axes + _FOOT, one.faces) for code, (_, one) in ribs.items()]
-    base = [code for code, (kind, _) in ribs.items() if kind == "rib_springer"]
-    building = measured_building(
-        "rib vault", drafts, {"web_stone": shape.thickness}, [observer(_FOOT)], base, rng, others=placed
-    )
-    modelled = []
-    for solid in placed:
-        touched = [
-            face
-            for joint in building.joints
-            for code, face in zip(joint.stones, joint.faces, strict=True)
-            if code == solid.code
-        ]
-        seen = modelled_solid(solid, touched, rng)
-        vertices = np.round(seen.vertices, _DECIMALS) + 0.0
-        modelled.append(SolidRecord(solid.code, ribs[solid.code][0], None, vertices, seen.faces))
-    return RibVault(building, tuple(modelled), shape, _FOOT, axes)
+    ribs = [
+        SolidDraft(Solid(code, one.vertices @ axes + _FOOT, one.faces), kind)
+        for code, (kind, one) in _ribs(beds, shape)
+    ]
+    base = [draft.solid.code for draft in ribs if draft.kind == "rib_springer"]
+    depths = {"web_stone": shape.thickness}
+    building = measured_building("rib vault", drafts, depths, [observer(_FOOT)], base, rng, modelled=ribs)
+    return RibVault(building, shape, _FOOT, axes)
 
 
 def _check(shape: RibVaultShape) -> None:
@@ -227,9 +218,10 @@ def _check(shape: RibVaultShape) -> None:
             f"webs {shape.thickness:g} m thick meet behind ribs {shape.width:g} m wide",
             remedy="make ribs wider, webs thinner, or springers higher",
         )
-    if first.end + _SHORTEST >= shape.half:
+    if first.end + _SHORTEST >= shape.reach:
         raise GeometryError(
-            f"the first bed ends {first.end:.2f} m from the axis, the wall is at {shape.half:g} m",
+            f"the first bed ends {first.end:.2f} m from the axis, the {'wall rib' if shape.wall_rib else 'wall'} is at "
+            f"{shape.reach:g} m",
             remedy="give a smaller radius, or a smaller angle of the springing",
         )
 
@@ -249,6 +241,12 @@ def _turn(quarters: int) -> Array:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
+def _mirrored(bed: Bed) -> Bed:
+    """Return the bed of the other half of a web, whose joint and rise stay those of this half's rib."""
+    mirror = np.diag([-1.0, 1.0, 1.0])
+    return Bed(-bed.x, bed.z, bed.end, mirror @ bed.along, mirror @ bed.up, bed.joint, bed.rise)
+
+
 def _web(
     name: str, turn: Array, beds: Sequence[Bed], shape: RibVaultShape, rng: Random
 ) -> Iterator[_WebStone]:
@@ -257,11 +255,11 @@ def _web(
     for half, into in (("l", turn @ mirror), ("r", turn)):
         for course, (low, high) in enumerate(pairwise(beds), start=1):
             seat = beds[course - 2].end if course > 1 else low.end
-            heads = _heads(course, low.end, seat, shape.half, rng)
+            heads = _heads(course, low.end, seat, shape.reach, rng)
             yield from _course(f"{name}{course:02d}{half}", course, (low, high), heads, into, shape)
     last, course = beds[-1], len(beds)
-    other = Bed(-last.x, last.z, last.end, mirror @ last.along, mirror @ last.up, last.joint, last.rise)
-    heads = _heads(course, last.end, beds[-2].end, shape.half, rng)
+    other = _mirrored(last)
+    heads = _heads(course, last.end, beds[-2].end, shape.reach, rng)
     yield from _course(f"{name}{course:02d}", course, (last, other), heads, turn, shape)
 
 
@@ -305,7 +303,7 @@ def _web_draft(stone: _WebStone, foot: Array, axes: Array) -> Draft:
 
 
 def _ribs(beds: Sequence[Bed], shape: RibVaultShape) -> Iterator[tuple[str, tuple[str, Solid]]]:
-    """Cut springers, segments and boss in the bay; yield code, kind and solid."""
+    """Cut springers, segments of the ribs and the wall ribs, and boss in the bay; yield code, kind and solid."""
     for rib in range(4):
         turn = _turn(rib)
         yield f"T{rib + 1}", ("rib_springer", _turned(_springer(beds[0], shape), turn))
@@ -313,6 +311,13 @@ def _ribs(beds: Sequence[Bed], shape: RibVaultShape) -> Iterator[tuple[str, tupl
             segment = _turned(_segment(low, high, shape), turn)
             yield f"R{rib + 1}-{number:02d}", ("rib_segment", segment)
     yield "B", ("boss", _boss(beds[-1], shape))
+    whole = [*map(_mirrored, beds), *reversed(beds)]
+    for turns, name in enumerate(WEBS if shape.wall_rib else ""):
+        for number, (left, right) in enumerate(pairwise(whole), start=1):
+            yield (
+                f"F{name}-{number:02d}",
+                ("rib_segment", _turned(_wall_segment(left, right, shape), _turn(turns))),
+            )
 
 
 def _turned(solid: Solid, turn: Array) -> Solid:
@@ -331,6 +336,23 @@ def _segment(low: Bed, high: Bed, shape: RibVaultShape) -> Solid:
         *_both(np.array([0.0, 1.0, 0.0]), low.end),
         (-back, float(-back @ soffit[0])),
         (back, float(back @ soffit[0]) + shape.height),
+    ]
+    return _cut("segment", planes, shape)
+
+
+def _wall_segment(left: Bed, right: Bed, shape: RibVaultShape) -> Solid:
+    """Cut the segment of the wall rib over +y between two beds of the web, as thick as the web and its drop."""
+    chord = np.array([right.x - left.x, 0.0, right.z - left.z])
+    outward = np.array([-chord[2], 0.0, chord[0]]) / float(np.linalg.norm(chord))
+    soffit = float(outward @ left.on_soffit())
+    ends = [-math.copysign(1.0, left.along[0]) * left.along, math.copysign(1.0, right.along[0]) * right.along]
+    planes = [
+        (ends[0], float(ends[0] @ left.on_soffit())),
+        (ends[1], float(ends[1] @ right.on_soffit())),
+        (np.array([0.0, 1.0, 0.0]), shape.half),
+        (np.array([0.0, -1.0, 0.0]), -shape.reach),
+        (-outward, shape.wall_drop - soffit),
+        (outward, soffit + shape.thickness),
     ]
     return _cut("segment", planes, shape)
 

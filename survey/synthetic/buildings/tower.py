@@ -3,11 +3,12 @@
 ::
 
               back
-        B │ │      │ │ C      Wall A, in front, has a window, as has B on the left. A passage under a barrel vault leads
-          │ │      │ │        through C. Corners are solid: in each course a quoin lies along one wall and a bonder,
-          │ └──────┘ │        as deep as the walls are thick, beside it in the other; in the next course they change
-          └──────────┘        places. Through stones tie the facings. Above the level break the second phase begins with
-               A              a thin course; its courses are lower than those of the first.
+        B │ │      │ │ C      Wall A, in front, has a window, as has B on the left; jambs of its inner facing may be
+          │ │      │ │        splayed, below a rear arch. A passage under a barrel vault leads through C. Corners are
+          │ └──────┘ │        solid: in each course a quoin lies along one wall and a bonder, as deep as the walls are
+          └──────────┘        thick, beside it in the other; in the next course they change places. Through stones tie
+               A              the facings. Above the level break the second phase begins with a thin course; its
+                              courses are lower than those of the first.
 """
 
 import math
@@ -20,11 +21,12 @@ from types import MappingProxyType
 import numpy as np
 
 from survey.arrays import Array
+from survey.extrusion.extrusion import prism
 from survey.records.survey import Station
 from survey.synthetic.bond import PlannedStone, upright
-from survey.synthetic.building import Building, Draft, flat_stone, measured_building
+from survey.synthetic.building import Building, Draft, SolidDraft, flat_stone, measured_building, observer
 from survey.synthetic.buildings.openings import Arch, Opening, plan_opening
-from survey.synthetic.buildings.walls import plan_courses
+from survey.synthetic.buildings.walls import Course, plan_courses
 from survey.synthetic.coursing import Bed, Piece, planned
 from survey.synthetic.frame import Movement, WallFrame, build_stone
 
@@ -49,11 +51,14 @@ _HEIGHTS = ((0.26, 0.34), (0.23, 0.29))  # of the courses of each phase [m]
 _LEVELLING = 0.15  # height of the first course of the second phase [m]
 _BREAK = 0.6  # share of the courses that belong to the first phase
 _WINDOW = (0.45, 0.70)  # half the width of a window outside and inside, where it widens in a step [m]
+_SPLAYED = (0.45, 0.65)  # the same of a window that widens along splayed jambs [m]
 _PASSAGE = (0.60, 0.60)  # the same of the passage, which runs straight through [m]
 _LEAVES = (0.47, 0.63)  # depths of the stones of its sides and vault, in turn, so that they bond [m]
 _THROUGH = (1.0, 0.40, 2.4)  # of through stones: distance from the end of a run, length, distance of two [m]
 _RELIEF = 0.01  # distance of the inner facings of B and C from that of A, whose faces are not flush [m]
 _EVERY = 3  # courses from one row of through stones to the next
+_OPEN = 10  # least number of courses of a storey with openings
+_EYES = 0.6  # part of the height of the jambs at which they are modelled: higher, where courses are lower
 _FOOT = np.array([48.6, 23.9, 11.4])  # middle of the foot of wall A in the site [m]
 _AZIMUTH = math.radians(14.0)  # of wall A against the x axis
 
@@ -115,6 +120,7 @@ def tower_storey(
     *,
     width: float = 7.0,
     depth: float = 5.6,
+    elaborate: bool = False,
     blunders: float = 0.12,
     movement: Movement = MappingProxyType({}),
     measured: int | None = None,
@@ -123,9 +129,11 @@ def tower_storey(
 
     Parameters
     ----------
-    courses : 11 or more
+    courses : 2 or more; with fewer than 10 the walls have no openings
     seed : of Python's own generator, whose stream is the same everywhere
     width, depth : of the tower outside, along wall A and along the others; not much smaller [m]
+    elaborate : whether the windows widen along splayed jambs, modelled as closed solids, and a semicircular barrel
+        vault spans the passage; else they widen in a step, and it is segmental
     blunders : gross errors per stone
     movement : of the stones since they were laid
     measured : seed of the joints, wear and noise alone, so that the same stones are measured again; None: as `seed`
@@ -139,22 +147,41 @@ def tower_storey(
     level_break = round(_BREAK * courses)
     heights = _bed_heights(rng, courses, level_break)
     walls = _walls(width, depth)
-    drafts = [draft for wall in walls for draft in _wall(wall, heights, rng)]
+    stones = [stone for wall in walls for stone in _wall(wall, heights, elaborate, rng)]
+    drafts = [stone for stone in stones if isinstance(stone, Draft)]
+    solids = [stone for stone in stones if isinstance(stone, SolidDraft)]
     depths = {kind: value for kind, value in _DEPTHS.items() if kind != "bonder"}
     stations = [
         Station(f"{wall.letter} {side}", np.round(frame.place(np.array([[0.3, 1.6]]), away)[0], 4))
         for wall in walls
         for side, frame, away in (("outer", wall.frame, 9.0), ("inner", wall.inner_frame, 2.0))
     ]
+    if solids:
+        stations.append(_before_windows(walls[-1], depth, solids))
     base = [draft.stone.plan.code for draft in drafts if draft.stone.plan.course == 1]
     count = round(blunders * len(drafts))
     rng = rng if measured is None else Random(measured)
     building = measured_building(
-        "tower storey", drafts, depths, stations, base, rng, blunders=count, movement=movement
+        "tower storey",
+        drafts,
+        depths,
+        stations,
+        base,
+        rng,
+        blunders=count,
+        movement=movement,
+        modelled=solids,
     )
     front = walls[0]
     corners = front.frame.place(np.array([[end, 0.0] for end in front.ends]))
     return TowerStorey(building, level_break, corners, {wall.letter: wall.frame.axes[2] for wall in walls})
+
+
+def _before_windows(wall: _Wall, depth: float, jambs: Sequence[SolidDraft]) -> Station:
+    """Return the station in the middle of the room, before both windows, from which their jambs are modelled."""
+    heights = [z for jamb in jambs for z in jamb.solid.vertices[:, 2]]
+    middle = _FOOT + 0.5 * (THICKNESS + depth) * wall.frame.axes[0]
+    return observer(np.array([*middle[:2], (1.0 - _EYES) * min(heights) + _EYES * max(heights)]))
 
 
 def _bed_heights(rng: Random, courses: int, level_break: int) -> list[float]:
@@ -182,38 +209,71 @@ def _walls(width: float, depth: float) -> tuple[_Wall, ...]:
     )
 
 
-def _wall(wall: _Wall, heights: Sequence[float], rng: Random) -> Iterator[Draft]:
+def _wall(
+    wall: _Wall, heights: Sequence[float], elaborate: bool, rng: Random
+) -> Iterator[Draft | SolidDraft]:
     """Draft the stones of both facings of a wall."""
-    outer, inner = (_opening(wall, half, heights) for half in (_PASSAGE if wall.passage else _WINDOW))
+    halves = _PASSAGE if wall.passage else _SPLAYED if elaborate else _WINDOW
+    outer, inner = (
+        _opening(wall, half, heights, elaborate) if len(heights) > _OPEN else None for half in halves
+    )
     corners = [list(_corners(wall, number, heights)) for number in range(1, len(heights))]
-    widest = max(outer.reach, inner.reach) + 0.7  # with the stones beside the opening
-    last = max(outer.arch[1], inner.arch[1]) + 1
+    widest = [_kept_clear(outer, inner, number) for number in range(1, len(heights))]
     through = [
-        list(
-            _through(
-                wall, number, 0.5 * (low + high), widest if outer.jambs[0] - 1 <= number <= last else 0.0
-            )
-        )
+        list(_through(wall, number, 0.5 * (low + high), widest[number - 1]))
         for number, (low, high) in enumerate(pairwise(heights), start=1)
     ]
     given = [[*a, *b] for a, b in zip(corners, through, strict=True)]
     courses = plan_courses(rng, heights, wall.ends, outer, through=given)
-    yield from _facing(wall, "O", [one.pieces for one in courses], through, outer, heights, rng)
+    yield from _facing(wall, "O", _with_springers(courses, outer, heights), through, outer, heights, rng)
     ends = tuple(-end for end in wall.inner_ends[::-1])
     given = [[_mirrored(piece) for piece in row] for row in through]
     courses = plan_courses(rng, heights, (ends[0], ends[1]), inner, through=given)
-    own = [[p for p in one.pieces if p not in row] for one, row in zip(courses, given, strict=True)]
-    yield from _facing(wall, "I", own, [[]] * len(own), inner, heights, rng)
+    pieces = _with_springers(courses, inner, heights)
+    own = [[p for p in one if p not in row] for one, row in zip(pieces, given, strict=True)]
+    splay = halves if elaborate and not wall.passage else None
+    for draft in _facing(wall, "I", own, [[]] * len(own), inner, heights, rng):
+        yield _splayed(draft, *splay) if splay is not None and draft.stone.plan.kind == "jamb" else draft
 
 
-def _opening(wall: _Wall, half: float, heights: Sequence[float]) -> Opening:
+def _kept_clear(outer: Opening | None, inner: Opening | None, number: int) -> float:
+    """Return the distance from the axis within which a course has no through stones [m]."""
+    if (
+        outer is None
+        or inner is None
+        or not outer.jambs[0] - 1 <= number <= max(outer.arch[1], inner.arch[1]) + 1
+    ):
+        return 0.0
+    return max(outer.reach, inner.reach) + 0.7  # with the stones beside the opening
+
+
+def _opening(wall: _Wall, half: float, heights: Sequence[float], elaborate: bool) -> Opening:
     """Lay out a window between a quarter and half of the height, or the passage from the second course."""
     courses = len(heights) - 1
+    if wall.passage and elaborate:
+        return plan_opening(Arch.SEMICIRCULAR, half, heights, min(7, courses - 8))
     if wall.passage:
         return plan_opening(Arch.SEGMENTAL, half, heights, min(7, courses - 6))
     sill = max(2, round(0.25 * courses))
     opening = plan_opening(Arch.SEGMENTAL, half, heights, sill + min(6, courses - 7) - 1)
     return replace(opening, jambs=(sill + 1, opening.jambs[1]))
+
+
+def _with_springers(
+    courses: Sequence[Course], opening: Opening | None, heights: Sequence[float]
+) -> list[list[Piece]]:
+    """Return the stones of the courses; those beside an arch are springers, which bear its thrust in half the wall."""
+    out = []
+    for number, course in enumerate(courses, start=1):
+        edges = opening.edges(number, 0.5 * (heights[number - 1] + heights[number])) if opening else None
+        ends = () if edges is None or edges[2] == "jamb" else edges[:2]
+        out.append(
+            [
+                replace(piece, kind="springer") if piece.right in ends or piece.left in ends else piece
+                for piece in course.pieces
+            ]
+        )
+    return out
 
 
 def _corners(wall: _Wall, number: int, heights: Sequence[float]) -> Iterator[Piece]:
@@ -258,7 +318,7 @@ def _facing(
     side: str,
     courses: Sequence[Sequence[Piece]],
     through: Sequence[Sequence[Piece]],
-    opening: Opening,
+    opening: Opening | None,
     heights: Sequence[float],
     rng: Random,
 ) -> Iterator[Draft]:
@@ -270,11 +330,22 @@ def _facing(
             plan = planned(f"{wall.letter}{side}{number:02d}-{k:02d}", piece, *beds, number)[0]
             depth = THICKNESS if piece in through[number - 1] else _DEPTHS[piece.kind]
             yield _draft(wall, side, plan, depth, number, rng)
-    for number, plan in enumerate(opening.voussoirs(), start=1):
+    arch = opening.voussoirs() if opening else []
+    for number, plan in enumerate(arch, start=1):
         named = replace(plan, code=f"{wall.letter}{side}-{plan.code}")
         # the vault's stones lie before and behind each other: their numbers run from opposite ends
-        rank = number if side == "O" else len(opening.radials) - number
+        rank = number if side == "O" else len(arch) + 1 - number
         yield _draft(wall, side, named, _DEPTHS[plan.kind], rank, rng)
+
+
+def _splayed(draft: Draft, outside: float, inside: float) -> SolidDraft:
+    """Give a jamb of the inner facing an oblique reveal: behind its face the window is as wide as outside."""
+    plan, frame = draft.stone.plan, draft.frame
+    behind = plan.corners.copy()
+    at_reveal = np.isclose(np.abs(behind[:, 0]), inside, rtol=0.0, atol=1e-9)
+    behind[at_reveal, 0] *= outside / inside
+    solid = prism(plan.code, frame.place(plan.corners), frame.place(behind, -draft.stone.depth))
+    return SolidDraft(solid, plan.kind, plan.course)
 
 
 def _draft(wall: _Wall, side: str, plan: PlannedStone, depth: float, turn: int, rng: Random) -> Draft:

@@ -10,7 +10,7 @@ from types import MappingProxyType
 import numpy as np
 
 from moma.errors import GeometryError
-from survey.synthetic.bond import Line, PlannedStone, upright
+from survey.synthetic.bond import WIDTHS, Line, PlannedStone, upright
 from survey.synthetic.building import Building, Draft, measured_building, observer
 from survey.synthetic.buildings.openings import Arch, Opening, plan_opening
 from survey.synthetic.coursing import CLEARANCES, Bed, Piece, fill_run, planned
@@ -189,12 +189,32 @@ def _fill_beside(
     left, right, kind = edges
     lengths = opening.beside(number)
     if stop == left:
-        cut = upright(_clear(min(stop.at(middle), -opening.half) - lengths[0], -1, below), middle, rng)
+        edge = min(stop.at(middle), -opening.half)
+        place = _end_beside(edge, lengths, -1, start.at(middle), below)
+        if place is None:
+            return [Piece(kind, start, stop)]
+        cut = upright(place, middle, rng)
         return [*fill_run(rng, start, cut, middle, below), Piece(kind, cut, stop)]
     if start == right:
-        cut = upright(_clear(max(start.at(middle), opening.half) + lengths[1], 1, below), middle, rng)
+        edge = max(start.at(middle), opening.half)
+        place = _end_beside(edge, lengths[::-1], 1, stop.at(middle), below)
+        if place is None:
+            return [Piece(kind, start, stop)]
+        cut = upright(place, middle, rng)
         return [Piece(kind, start, cut), *fill_run(rng, cut, stop, middle, below)]
     return fill_run(rng, start, stop, middle, below)
+
+
+def _end_beside(
+    edge: float, lengths: Sequence[float], outward: int, end: float, below: Sequence[float]
+) -> float | None:
+    """Return where the stone beside an opening ends, with the first length whose rest can be filled; None: at `end`."""
+    for length in lengths:
+        place = _clear(edge + outward * length, outward, below)
+        rest = outward * (end - place)
+        if WIDTHS["header"][0] <= rest <= WIDTHS["header"][1] or rest >= WIDTHS["stretcher"][0]:
+            return place
+    return None
 
 
 def _clear(place: float, outward: int, below: Sequence[float]) -> float:

@@ -168,7 +168,7 @@ def test_the_thrust_is_that_of_the_sliced_vault(vault):
 
 
 def test_so_it_is_with_the_joints_of_the_survey_closed(vault):
-    push, borne = pushes(vault, close_joints(vault.blocks()).solids)
+    push, borne = pushes(vault, close_joints(vault.building.blocks()).solids)
     middle, weight = by_hand(vault, THIRDS)
     print(f"\nby hand {middle:.0f} N; simulated from the survey {push.round()} N")
     assert push == pytest.approx(np.full(4, middle), rel=0.10)

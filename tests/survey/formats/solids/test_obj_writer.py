@@ -16,7 +16,7 @@ from survey.synthetic.buildings.ribs import RibVaultShape, rib_vault
 def test_solids_are_read_back_to_the_last_bit(tmp_path):
     vault = rib_vault(RibVaultShape(segments=4))
     head = replace(vault.building.survey.head, name="ribs (synthetic)")
-    write_obj(vault.modelled, tmp_path / "ribs.obj")
+    write_obj(vault.building.modelled, tmp_path / "ribs.obj")
     write_head(head, tmp_path / "head.moma")
     read = read_head(tmp_path / "head.moma")
     assert read.name == "ribs (synthetic)"
@@ -26,8 +26,8 @@ def test_solids_are_read_back_to_the_last_bit(tmp_path):
     ]
     stream = open_survey(tmp_path / "ribs.obj", "solids", ReadingOptions(head=read))
     back = [one for one in stream.blocks if isinstance(one, SolidRecord)]
-    assert len(back) == len(vault.modelled)
-    for one, solid in zip(back, vault.modelled, strict=True):
+    assert len(back) == len(vault.building.modelled)
+    for one, solid in zip(back, vault.building.modelled, strict=True):
         assert (one.code, one.kind) == (solid.code, solid.kind)
         assert {tuple(row) for row in one.vertices.tolist()} == {
             tuple(row) for row in solid.vertices.tolist()
