@@ -20,6 +20,7 @@ from mechanics.problem.residual import residual
 from mechanics.solvers._kernels import body_admm as kernel
 from mechanics.solvers._kernels import body_cholesky as cholesky
 from mechanics.solvers._kernels.body_parts import Parts, parts_of
+from mechanics.solvers.first_order.body_factors import factorise
 from moma.errors import SolverError
 
 __all__ = ["BodyADMM", "Stage"]
@@ -378,7 +379,7 @@ class _Bodies:
         precision = np.float32 if len(self.inertia) >= _FEW else np.float64
         value = np.zeros(self._panels.start[-1], dtype=precision)
         kernel.assemble(touching, self._mass, self._panels, value)
-        if not cholesky.factorise(self._panels, value):
+        if not factorise(self._panels, value, self._parts, len(self.groups)):
             raise SolverError("W is not a number", where="ADMM of bodies", remedy="use another method")
         factors = kernel.Factors(self._panels, self._parts, value, self._mass)
         if penalty is not None:
