@@ -8,7 +8,6 @@ are exchanged within a front (docs/decisions/009-factors-by-stones.md, 035-elast
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property, partial
 
@@ -19,6 +18,7 @@ from scipy.linalg.lapack import dgetrf, dgetrs
 from mechanics.arrays import Array, Ints
 from mechanics.delassus._kernels.fronts import Layout, add_into, solve
 from mechanics.delassus.elimination import elimination
+from mechanics.threads import pool
 from moma.errors import SolverError
 
 __all__ = ["Cliques", "Factors", "Fronts", "fronts", "fronts_of_graph"]
@@ -79,10 +79,10 @@ class Fronts:
                 run.eliminate(f, map)
         else:
             trees, top = self._split
-            with ThreadPoolExecutor(threads) as pool:
-                list(pool.map(run.eliminate_all, trees))
-                for f in top:
-                    run.eliminate(f, pool.map)
+            at_once = pool(threads).map
+            list(at_once(run.eliminate_all, trees))
+            for f in top:
+                run.eliminate(f, at_once)
         return Factors(self, run.factor, run.pivots)
 
     @cached_property

@@ -7,7 +7,6 @@ What is taken from a block is taken in the same order and by the same products, 
 """
 
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
 import numpy as np
@@ -15,6 +14,7 @@ import numpy as np
 from mechanics.arrays import Array, Ints
 from mechanics.solvers._kernels import body_cholesky as kernel
 from mechanics.solvers._kernels.body_parts import Parts
+from mechanics.threads import pool
 
 __all__ = ["factorise"]
 
@@ -40,10 +40,7 @@ def factorise(panels: kernel.Panels, value: Array, parts: Parts | None = None, t
             return False
         kernel.divide(panels, value, 0, number)
         return True
-    if threads == 1:
-        return _factorise(panels, value, parts, 1, map)
-    with ThreadPoolExecutor(threads) as pool:
-        return _factorise(panels, value, parts, threads, pool.map)
+    return _factorise(panels, value, parts, threads, pool(threads).map if threads > 1 else map)
 
 
 def _factorise(panels: kernel.Panels, value: Array, parts: Parts, threads: int, each: _Each) -> bool:
