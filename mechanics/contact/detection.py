@@ -31,7 +31,7 @@ from mechanics.contact.mortar_contacts import mortar_contacts, surface_weights
 from mechanics.contact.surfaces import Placed, Surfaces, middles
 from mechanics.scene.scene import Placement
 from mechanics.scene.state import State
-from mechanics.threads import pool
+from mechanics.scene.threads import pool
 
 __all__ = ["FLAT", "THIN", "Detector"]
 

@@ -16,11 +16,11 @@ from mechanics.arrays import Array, Ints
 from mechanics.delassus.elimination import elimination
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, Delassus, RigidContacts
 from mechanics.problem.residual import residual
+from mechanics.scene.threads import pool
 from mechanics.solvers._kernels import body_admm as kernel
 from mechanics.solvers._kernels import body_cholesky as cholesky
 from mechanics.solvers._kernels.body_parts import Parts, parts_of
 from mechanics.solvers.first_order.body_factors import factorise
-from mechanics.threads import pool
 from moma.errors import SolverError
 
 __all__ = ["BodyADMM", "Stage"]

@@ -12,9 +12,9 @@ from functools import partial
 import numpy as np
 
 from mechanics.arrays import Array, Ints
+from mechanics.scene.threads import pool
 from mechanics.solvers._kernels import body_cholesky as kernel
 from mechanics.solvers._kernels.body_parts import Parts
-from mechanics.threads import pool
 
 __all__ = ["factorise"]
 

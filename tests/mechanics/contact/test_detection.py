@@ -14,7 +14,7 @@ from mechanics.contact.detection import Detector
 from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
 from mechanics.scene.scene import Fidelity
-from mechanics.threads import pool
+from mechanics.scene.threads import pool
 from tests.mechanics.shapes import TURN, brick, detected, ground, moved, scene
 
 SOFT = Fidelity.DEFORMABLE
