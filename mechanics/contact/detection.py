@@ -31,7 +31,7 @@ from mechanics.contact.mortar_contacts import mortar_contacts, surface_weights
 from mechanics.contact.surfaces import Placed, Surfaces, middles
 from mechanics.scene.scene import Placement
 from mechanics.scene.state import State
-from mechanics.scene.threads import pool
+from mechanics.scene.threads import at_once
 
 __all__ = ["FLAT", "THIN", "Detector"]
 
@@ -208,8 +208,7 @@ class Detector:
         if parts < 2:
             return work(0, count)
         end = [count * k // parts for k in range(parts + 1)]
-        found = list(pool(self.threads).map(work, end[:-1], end[1:]))
-        return _joined(found)
+        return _joined(at_once(self.threads)(work, end[:-1], end[1:]))
 
     def _balls(self, pairs: Pairs, placed: Placed) -> _Singles:
         """Find the single points of the pairs in which a ball takes part."""

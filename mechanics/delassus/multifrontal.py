@@ -18,7 +18,7 @@ from scipy.linalg.lapack import dgetrf, dgetrs
 from mechanics.arrays import Array, Ints
 from mechanics.delassus._kernels.fronts import Layout, add_into, solve
 from mechanics.delassus.elimination import elimination
-from mechanics.scene.threads import pool
+from mechanics.scene.threads import at_once
 from moma.errors import SolverError
 
 __all__ = ["Cliques", "Factors", "Fronts", "fronts", "fronts_of_graph"]
@@ -79,10 +79,10 @@ class Fronts:
                 run.eliminate(f, map)
         else:
             trees, top = self._split
-            at_once = pool(threads).map
-            list(at_once(run.eliminate_all, trees))
+            each = at_once(threads)
+            each(run.eliminate_all, trees)
             for f in top:
-                run.eliminate(f, at_once)
+                run.eliminate(f, each)
         return Factors(self, run.factor, run.pivots)
 
     @cached_property

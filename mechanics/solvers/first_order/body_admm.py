@@ -16,7 +16,7 @@ from mechanics.arrays import Array, Ints
 from mechanics.delassus.elimination import elimination
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, Delassus, RigidContacts
 from mechanics.problem.residual import residual
-from mechanics.scene.threads import pool
+from mechanics.scene.threads import at_once
 from mechanics.solvers._kernels import body_admm as kernel
 from mechanics.solvers._kernels import body_cholesky as cholesky
 from mechanics.solvers._kernels.body_parts import Parts, parts_of
@@ -203,12 +203,11 @@ class _Run:
         """Make the same iterations with all groups of parts at once; the same bits."""
         iterate, length, touching, factors = self._iterate, self._bodies.length, self._touching, self._factors
         assert factors is not None
-        first, *others = self._bodies.groups
-        submit = pool(len(others)).submit
+        groups = self._bodies.groups
+        share = at_once(len(groups))
 
         def each(stage: Callable[..., float | None], *given: object) -> list[float | None]:
-            waiting = [submit(stage, group, iterate, *given) for group in others]
-            return [stage(first, iterate, *given), *(one.result() for one in waiting)]
+            return share(lambda group: stage(group, iterate, *given), groups)
 
         step = np.empty(len(iterate.load), factors.value.dtype)
         each(kernel.begin, touching, factors)

@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from mechanics.arrays import Array, Ints
-from mechanics.scene.threads import pool
+from mechanics.scene.threads import at_once
 from mechanics.solvers._kernels import body_cholesky as kernel
 from mechanics.solvers._kernels.body_parts import Parts
 
@@ -40,7 +40,7 @@ def factorise(panels: kernel.Panels, value: Array, parts: Parts | None = None, t
             return False
         kernel.divide(panels, value, 0, number)
         return True
-    return _factorise(panels, value, parts, threads, pool(threads).map if threads > 1 else map)
+    return _factorise(panels, value, parts, threads, at_once(threads) if threads > 1 else map)
 
 
 def _factorise(panels: kernel.Panels, value: Array, parts: Parts, threads: int, each: _Each) -> bool:
