@@ -134,12 +134,12 @@ class _Touched(NamedTuple):
     Attributes
     ----------
     node, weight : of each touch
-    count : of each side, its touches
+    number : of each side, its touches
     """
 
     node: Ints
     weight: Array
-    count: Ints
+    number: Ints
 
 
 def _compliance_block(touched: _Touched, turn: Array, compliance: Compliance, first: int) -> Array:
@@ -150,7 +150,7 @@ def _compliance_block(touched: _Touched, turn: Array, compliance: Compliance, fi
     nodes, column = np.unique(touched.node, return_inverse=True)
     # stones have few nodes beside: dense products are faster than sparse ones
     own = np.zeros((len(turn), len(nodes)))
-    own[np.repeat(np.arange(len(turn)), touched.count), column] = touched.weight
+    own[np.repeat(np.arange(len(turn)), touched.number), column] = touched.weight
     half = _condensed(own, turn, compliance.between(nodes - first))
     block = _condensed(own, turn, np.ascontiguousarray(half.T))
     symmetric: Array = 0.5 * (block + block.T)
