@@ -212,14 +212,15 @@ def grid_of(low, high):  # pragma: no cover - compiled
 
     Inputs
     ------
-    low, high : (n, d) float64, n > 0 [m]
+    low, high : (n, d) float64 [m]
 
     Outputs
     -------
     Grid
     """
     nb, d = low.shape
-    first, span, large = _cells_of(low, high, low[0].copy(), _cell_size(low, high))
+    origin, size = (low[0].copy(), _cell_size(low, high)) if nb else (np.zeros(d), 1.0)
+    first, span, large = _cells_of(low, high, origin, size)
     entries = 0
     for b in range(nb):
         e = 1
@@ -255,7 +256,7 @@ def close_pairs(low, high, owner, fixed, grid, begin, end):  # pragma: no cover 
     first, large, start, box, cell = grid
     pairs, count = np.empty((8 * (end - begin) + 8, 2), dtype=np.int64), np.int64(0)  # of no literal type
     slots = start.shape[0] - 1
-    for s in range(begin * slots // nb, end * slots // nb):
+    for s in range(begin * slots // max(nb, 1), end * slots // max(nb, 1)):
         for a in range(start[s], start[s + 1]):
             i = box[a]
             for b in range(a + 1, start[s + 1]):
