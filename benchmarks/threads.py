@@ -9,12 +9,14 @@ from moma.errors import SolverError
 
 __all__ = ["SIZES", "main"]
 
-# disks or bricks along and up: about 84,000 contacts in the plane, a wall of 40 × 40 bricks
+# disks or bricks along and up: about 84,000 contacts in the plane, a wall of 40 × 40 bricks, 10,000 bodies that touch
 SIZES: Mapping[str, int] = {
     "sweeps in the plane": 168,
     "sweeps in space": 40,
     "detection": 40,
     "elastic factorisation": 40,
+    "elastic first step": 40,
+    "factors of bodies": 100,
 }
 _TABLE: Table = (
     ("stage", "stage", ""),

@@ -19,6 +19,7 @@ from mechanics.arrays import Array, Ints
 from mechanics.contact.contacts import take
 from mechanics.delassus import rigid
 from mechanics.delassus.assembly import rigid_delassus
+from mechanics.delassus.elimination import elimination
 from mechanics.dynamics.contact_search import detector
 from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import Model, build_model
@@ -28,7 +29,11 @@ from mechanics.planar.model import build_planar_model
 from mechanics.problem.problem import GaussSeidel
 from mechanics.scene.scene import Start
 from mechanics.scene.state import State
+from mechanics.solvers._kernels.body_cholesky import panels_of, postorder
+from mechanics.solvers._kernels.body_parts import parts_of
+from mechanics.solvers.first_order.body_factors import factorise
 from mechanics.stones.meshing.elements import Element
+from moma.errors import SolverError
 
 __all__ = ["STAGES", "main"]
 
@@ -136,28 +141,74 @@ def _detection(size: int, threads: int) -> _Stage:
     return _Stage(len(detector(model)(state, reach)), prepare)
 
 
-def _elastic(size: int, threads: int) -> _Stage:
-    """The first step of a deformable wall of size × size bricks, one iteration: assembly and factorisation."""
+def _elastic(size: int, threads: int) -> Simulation:
+    """A deformable wall of size × size bricks, of which a step is one iteration."""
     scene = wall_scene(size, size, Element.HEX8, Start.REST, base=False)
     scene = replace(scene, solver=replace(scene.solver, threads=threads, max_iterations=1))
-    model, state = build_model(scene)
+    return Simulation(*build_model(scene))
+
+
+def _factorisation(size: int, threads: int) -> _Stage:
+    """W + Θ of that wall, whose order of elimination is known."""
+    problem = _elastic(size, threads).step().problem
+    form, load = problem.form("benchmark"), problem.u_free.ravel()
+    theta = np.tile(problem.delassus.scale * np.eye(3), (len(problem.friction), 1, 1))
+
+    def run() -> tuple[Result, ...]:
+        return (form.shifted(theta)(load),)
+
+    return _Stage(len(theta), lambda: run)
+
+
+def _first_step(size: int, threads: int) -> _Stage:
+    """The first step of that wall: detection, assembly, the order of elimination, and factorisation."""
 
     def prepare() -> Callable[[], tuple[Result, ...]]:
-        simulation = Simulation(model, state)
+        simulation = _elastic(size, threads)
 
         def run() -> tuple[Result, ...]:
             return (simulation.step().solution.impulse,)
 
         return run
 
-    return _Stage(len(Simulation(model, state).step().contacts), prepare)
+    return _Stage(len(_elastic(size, threads).step().contacts), prepare)
+
+
+def _bodies(size: int, threads: int) -> _Stage:
+    """Factors of single precision of size × size bodies in running bond, each of which touches six."""
+    body = np.arange(size * size).reshape(size, size)
+    pairs = [(body[1:], body[:-1]), (body[:, 1:], body[:, :-1]), (body[1:, 1:], body[:-1, :-1])]
+    touching = np.concatenate([np.column_stack([one.ravel(), other.ravel()]) for one, other in pairs])
+    place = np.column_stack([*np.divmod(body.ravel(), size), np.zeros(size * size)]).astype(float)
+    rank = elimination(touching, body.ravel(), place)
+    rank = postorder(rank[touching], size * size)[rank]
+    panels = panels_of(rank[touching], size * size, 0.2, 6)
+    parts = parts_of(panels, True)
+    # fill is part of the matrix too, so that any small numbers do
+    matrix = 1e-4 * np.random.default_rng(1).random(panels.start[-1], dtype=np.float32)
+    for s, width in enumerate(6 * np.diff(panels.body)):
+        matrix[panels.start[s] : panels.start[s + 1]].reshape(width, -1)[:, :width] += np.eye(width)
+
+    def prepare() -> Callable[[], tuple[Result, ...]]:
+        value = matrix.copy()
+
+        def run() -> tuple[Result, ...]:
+            if not factorise(panels, value, parts, threads):
+                raise SolverError("a matrix is not positive definite", where="benchmark")
+            return (value,)
+
+        return run
+
+    return _Stage(len(touching), prepare)
 
 
 STAGES: Mapping[str, Callable[[int, int], _Stage]] = {
     "sweeps in the plane": _plane,
     "sweeps in space": _space,
     "detection": _detection,
-    "elastic factorisation": _elastic,
+    "elastic factorisation": _factorisation,
+    "elastic first step": _first_step,
+    "factors of bodies": _bodies,
 }
 
 

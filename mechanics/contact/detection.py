@@ -7,8 +7,7 @@ elsewhere a deformable stone touches in single points.
 All tolerances are fractions of the stones' own sizes.
 """
 
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,7 +16,7 @@ from scipy.sparse import csr_array
 
 from mechanics.arrays import Array, Bools, Ints
 from mechanics.contact._kernels.balls import ball_points
-from mechanics.contact._kernels.broad_phase import boxes, close_pairs, place, single_points
+from mechanics.contact._kernels.broad_phase import boxes, close_pairs, grid_of, place, single_points
 from mechanics.contact._kernels.narrow_phase import (
     EDGES,
     FACE_FIRST,
@@ -32,12 +31,13 @@ from mechanics.contact.mortar_contacts import mortar_contacts, surface_weights
 from mechanics.contact.surfaces import Placed, Surfaces, middles
 from mechanics.scene.scene import Placement
 from mechanics.scene.state import State
+from mechanics.scene.threads import at_once
 
 __all__ = ["FLAT", "THIN", "Detector"]
 
 
 FLAT = float(np.cos(np.radians(5.0)))  # cosine of the angle within which faces lie flat on one another
-# pairs of a part from which another thread pays: 0.5 ms of work
+# pairs, or boxes, of a part from which another thread pays: 0.5 ms of work
 _PART = 500
 THIN = 1e-6  # flat faces that overlap by less than this part of the smaller one do not touch
 
@@ -129,13 +129,17 @@ class Detector:
         round_ = own.radius > 0
         around = placed.centre[own.body[round_]], (own.radius + margin)[round_, None]
         low[round_], high[round_] = around[0] - around[1], around[0] + around[1]
-        shapes = close_pairs(low, high, own.body, self.fixed[own.body])
+        fixed, grid = self.fixed[own.body], grid_of(low, high)
+        (shapes,) = self._in_parts(
+            len(low), lambda a, b: (close_pairs(low, high, own.body, fixed, grid, a, b),)
+        )
         key = _pair_key(shapes, len(own.body))
         order = np.argsort(key)
         shapes, key = shapes[order], key[order]
-        limit = np.maximum(self.alert * size[shapes].min(axis=1), self.distance)
-        limit = limit + reach[shapes].sum(axis=1)
-        balls = round_[shapes].any(axis=1)
+        one, other = shapes.T
+        limit = np.maximum(self.alert * np.minimum(size[one], size[other]), self.distance)
+        limit = limit + (reach[one] + reach[other])
+        balls = round_[one] | round_[other]
         hint = self._hints.of(key)
         near = np.where(balls, -np.inf, limit)
 
@@ -150,6 +154,8 @@ class Detector:
     def _flat_and_meshed(self, pairs: Pairs, placed: Placed) -> Bools:
         """Choose the pairs of flat faces of which one has finite elements."""
         meshed = self.surfaces.meshes.of_face >= 0
+        if not meshed.any():
+            return np.zeros(len(pairs.kind), dtype=bool)
         faces = (pairs.kind > 0) & (pairs.kind != EDGES)
         chosen: Bools = faces & meshed[np.where(faces[:, None], pairs.feature, 0)].any(axis=1)
         normal = placed.shapes.normal[pairs.feature[chosen]]
@@ -161,14 +167,11 @@ class Detector:
     ) -> Contacts:
         """Make contacts in single points: those of polyhedra, except the `weighted` pairs, and those of balls."""
         own = self.surfaces
-        found, frame, nearest, area = self._interfaces(
-            pairs._replace(kind=np.where(weighted, SEPARATED, pairs.kind)), placed
-        )
-        count = len(found)
+        points = self._interfaces(pairs._replace(kind=np.where(weighted, SEPARATED, pairs.kind)), placed)
+        count = len(points[0])
         if balls is not None:
-            found, frame = np.concatenate([found, balls.place]), np.concatenate([frame, balls.frame])
-            nearest, area = np.concatenate([nearest, balls.nearest]), np.concatenate([area, balls.area])
-        body, arm = single_points(pairs.shapes, found, nearest, own.body, placed.centre, placed.rotation)
+            points = _joined([points, self._of_bodies(pairs, balls, placed)])
+        found, frame, area, body, arm = points
         pair = found[:, 0]
         key = _pair_key(pairs.shapes, len(own.body))[pair] + found[:, 2]
         if not nodes:
@@ -180,29 +183,32 @@ class Detector:
         weights, outside = surface_weights(own, placed, sides, feature, frame[:, 0], arm, nodes)
         return take(Contacts(body, key, frame, area, arm, weights), np.flatnonzero(outside))
 
-    def _interfaces(self, pairs: Pairs, placed: Placed) -> tuple[Ints, Array, Array, Array]:
-        """Return the contact points of all pairs, as `interface_points` does of some."""
+    def _interfaces(self, pairs: Pairs, placed: Placed) -> tuple[Any, ...]:
+        """Return the contact points of all pairs, as `_of_bodies` does of single points."""
         inner, middle = self.placement == Placement.INERTIA, self.placement == Placement.CENTROID
 
-        def part(a: int, b: int) -> tuple[Ints, Array, Array, Array]:
+        def part(a: int, b: int) -> tuple[Any, ...]:
             some = Pairs._make(one[a:b] for one in pairs)
-            found, frame, nearest, area = interface_points(
-                some, self.points, inner, middle, FLAT, THIN, placed.shapes
-            )
+            found, *points = interface_points(some, self.points, inner, middle, FLAT, THIN, placed.shapes)
             found[:, 0] += a
-            return found, frame, nearest, area
+            return self._of_bodies(pairs, _Singles(found, *points), placed)
 
         return self._in_parts(len(pairs.kind), part)
 
+    def _of_bodies(self, pairs: Pairs, points: _Singles, placed: Placed) -> tuple[Any, ...]:
+        """Return place, frame and area of single points, and their bodies and arms (`single_points`)."""
+        body, arm = single_points(
+            pairs.shapes, points.place, points.nearest, self.surfaces.body, placed.centre, placed.rotation
+        )
+        return points.place, points.frame, points.area, body, arm
+
     def _in_parts(self, count: int, work: Callable[[int, int], tuple[Any, ...]]) -> tuple[Any, ...]:
-        """Return what `work` makes of all pairs, of which each thread takes a part from one to another, in order."""
+        """Return what `work` makes of all pairs or boxes: each thread takes those from one to another; in order."""
         parts = min(self.threads, count // _PART)
         if parts < 2:
             return work(0, count)
         end = [count * k // parts for k in range(parts + 1)]
-        with ThreadPoolExecutor(parts) as pool:
-            found = list(pool.map(work, end[:-1], end[1:]))
-        return tuple(np.concatenate(one) for one in zip(*found, strict=True))
+        return _joined(at_once(self.threads)(work, end[:-1], end[1:]))
 
     def _balls(self, pairs: Pairs, placed: Placed) -> _Singles:
         """Find the single points of the pairs in which a ball takes part."""
@@ -244,6 +250,11 @@ def _place(surfaces: Surfaces, state: State) -> Placed:
     normal = place(own.fptr, own.normal, np.zeros_like(centre), turn)
     shapes = own._replace(vertex=vertex, normal=normal, inside=middles(own.vptr, vertex))
     return Placed(shapes, state.centre, state.rotation)
+
+
+def _joined(parts: Sequence[tuple[Any, ...]]) -> tuple[Any, ...]:
+    """Join the arrays of all parts, one after the other."""
+    return tuple(np.concatenate(one) for one in zip(*parts, strict=True))
 
 
 def _pair_key(shapes: Ints, count: int) -> Ints:

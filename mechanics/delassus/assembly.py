@@ -1,6 +1,7 @@
 """Assembly of Delassus operators: Jacobians of rigid sides, compliance between elastic ones."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -61,10 +62,15 @@ def mixed_delassus(
     bptr = np.concatenate([[0], np.cumsum((3 * count) ** 2)]).astype(np.int64)
     block, diagonal = np.zeros(int(bptr[-1])), np.zeros((2 * len(contacts), 3, 3))
     first = np.concatenate([[0], np.cumsum(count)])
+    # all at once, as SciPy takes longer to take the rows of a stone than its block takes
+    weights = contacts.weights[sides]
     for group, own in zip(model.elastic_stones.groups, compliance, strict=True):
         for b in group.bodies[count[group.bodies] > 0]:
-            rows = sides[first[b] : first[b + 1]]
-            square = _compliance_block(model, state, contacts, int(b), rows, own)
+            rows, pointer = sides[first[b] : first[b + 1]], weights.indptr[first[b] : first[b + 1] + 1]
+            entries = slice(pointer[0], pointer[-1])
+            touched = _Touched(weights.indices[entries], weights.data[entries], np.diff(pointer))
+            turn = contacts.frame[rows // 2] @ state.rotation[b]
+            square = _compliance_block(touched, turn, own, int(model.elastic_stones.start[b]))
             block[bptr[b] : bptr[b + 1]] = square.ravel()
             n = np.arange(len(rows))
             diagonal[rows] = square.reshape(len(rows), 3, len(rows), 3)[n, :, n]
@@ -122,17 +128,30 @@ def _slots(body: Ints, kind: Ints, bodies: int) -> tuple[Ints, Ints, Ints]:
     return count.astype(np.int64), slot.reshape(body.shape), order
 
 
-def _compliance_block(
-    model: Model, state: State, contacts: Contacts, b: int, sides: Ints, compliance: Compliance
-) -> Array:
-    """Return T C Tᵀ of one body: C between the nodes that its contact sides touch, T their weights in local frames."""
-    weights = contacts.weights[sides]
-    nodes, column = np.unique(weights.indices, return_inverse=True)
+class _Touched(NamedTuple):
+    """Nodes that the contact sides of a body touch, side by side.
+
+    Attributes
+    ----------
+    node, weight : of each touch
+    number : of each side, its touches
+    """
+
+    node: Ints
+    weight: Array
+    number: Ints
+
+
+def _compliance_block(touched: _Touched, turn: Array, compliance: Compliance, first: int) -> Array:
+    """Return T C Tᵀ of one body: C between the nodes that its contact sides touch, T their weights in local frames.
+
+    `turn` (s, 3, 3) has the frames in the axes of the body, whose `first` node is the number 0 of its compliance.
+    """
+    nodes, column = np.unique(touched.node, return_inverse=True)
     # stones have few nodes beside: dense products are faster than sparse ones
-    own = np.zeros((len(sides), len(nodes)))
-    own[np.repeat(np.arange(len(sides)), np.diff(weights.indptr)), column] = weights.data
-    turn = contacts.frame[sides // 2] @ state.rotation[b]
-    half = _condensed(own, turn, compliance.between(nodes - model.elastic_stones.start[b]))
+    own = np.zeros((len(turn), len(nodes)))
+    own[np.repeat(np.arange(len(turn)), touched.number), column] = touched.weight
+    half = _condensed(own, turn, compliance.between(nodes - first))
     block = _condensed(own, turn, np.ascontiguousarray(half.T))
     symmetric: Array = 0.5 * (block + block.T)
     return symmetric

@@ -8,7 +8,6 @@ are exchanged within a front (docs/decisions/009-factors-by-stones.md, 035-elast
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property, partial
 
@@ -19,6 +18,7 @@ from scipy.linalg.lapack import dgetrf, dgetrs
 from mechanics.arrays import Array, Ints
 from mechanics.delassus._kernels.fronts import Layout, add_into, solve
 from mechanics.delassus.elimination import elimination
+from mechanics.scene.threads import at_once
 from moma.errors import SolverError
 
 __all__ = ["Cliques", "Factors", "Fronts", "fronts", "fronts_of_graph"]
@@ -79,10 +79,10 @@ class Fronts:
                 run.eliminate(f, map)
         else:
             trees, top = self._split
-            with ThreadPoolExecutor(threads) as pool:
-                list(pool.map(run.eliminate_all, trees))
-                for f in top:
-                    run.eliminate(f, pool.map)
+            each = at_once(threads)
+            each(run.eliminate_all, trees)
+            for f in top:
+                run.eliminate(f, each)
         return Factors(self, run.factor, run.pivots)
 
     @cached_property
@@ -305,7 +305,9 @@ def _least_degree(count: int, size: Ints, around: Sequence[Ints]) -> tuple[Ints,
             adjacent[g].update(groups.tolist())
     for g in range(count):
         adjacent[g].discard(g)
-    degree = np.array([sum(size[h] for h in adjacent[g]) for g in range(count)], dtype=float)
+    # Python's numbers add up faster than numpy's, one by one
+    contacts = size.tolist()
+    degree = np.array([sum(map(contacts.__getitem__, adjacent[g])) for g in range(count)], dtype=float)
     order = np.empty(count, dtype=np.int64)
     for k in range(count):
         g = int(degree.argmin())
@@ -313,7 +315,7 @@ def _least_degree(count: int, size: Ints, around: Sequence[Ints]) -> tuple[Ints,
         for h in adjacent[g]:
             adjacent[h] |= adjacent[g]
             adjacent[h] -= {g, h}
-            degree[h] = sum(size[i] for i in adjacent[h])
+            degree[h] = sum(map(contacts.__getitem__, adjacent[h]))
     rank = np.empty(count, dtype=np.int64)
     rank[order] = np.arange(count)
     return order, [sorted(adjacent[g], key=rank.__getitem__) for g in range(count)]

@@ -1,11 +1,14 @@
 """Broad phase: bodies put in place, their boxes, and the pairs of boxes that overlap."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from mechanics.contact._kernels.vectors import row, write_row
 
-__all__ = ["boxes", "close_pairs", "place", "points_of", "single_points"]
+__all__ = ["Grid", "boxes", "close_pairs", "grid_of", "place", "points_of", "single_points"]
 
 _MANY_CELLS = 64  # a box that spans more cells than this is compared with all others instead
 
@@ -184,30 +187,40 @@ def _fill(first, span, mask):
     return start, box, cell
 
 
-@njit(cache=True)
-def close_pairs(low, high, owner, fixed):  # pragma: no cover - compiled
-    """Find the pairs of boxes that overlap, d = 2 or 3.
+class Grid(NamedTuple):
+    """Boxes by the cells of a uniform, hashed grid that they touch.
 
-    The grid is uniform and hashed, so the cost grows linearly with the number of boxes, and not with the space between
-    them; boxes much larger than most are compared with all others.
+    Attributes
+    ----------
+    first : (n, d) int64, first cell of each box
+    large : (n,) bool, boxes much larger than most, which lie in no cell
+    start : (ns+1,) int64, where the entries of each slot begin
+    box : (ne,) int64, box of each entry
+    cell : (ne, 3) int64, and its cell
+    """
+
+    first: NDArray[np.int64]
+    large: NDArray[np.bool_]
+    start: NDArray[np.int64]
+    box: NDArray[np.int64]
+    cell: NDArray[np.int64]
+
+
+@njit(cache=True)
+def grid_of(low, high):  # pragma: no cover - compiled
+    """Sort boxes into a grid, d = 2 or 3: the cost grows linearly with their number, and not with the space between.
 
     Inputs
     ------
     low, high : (n, d) float64 [m]
-    owner : (n,) int64; boxes of one owner make no pair
-    fixed : (n,) bool; two fixed boxes make no pair
 
     Outputs
     -------
-    (np, 2) int64, smaller index first
+    Grid
     """
     nb, d = low.shape
-    pairs, count = np.empty((8 * nb + 8, 2), dtype=np.int64), np.int64(0)  # of no literal type
-    if nb < 2:
-        return pairs[:0]
-    origin = low[0].copy()
-    cell = _cell_size(low, high)
-    first, span, large = _cells_of(low, high, origin, cell)
+    origin, size = (low[0].copy(), _cell_size(low, high)) if nb else (np.zeros(d), 1.0)
+    first, span, large = _cells_of(low, high, origin, size)
     entries = 0
     for b in range(nb):
         e = 1
@@ -217,24 +230,48 @@ def close_pairs(low, high, owner, fixed):  # pragma: no cover - compiled
     mask = 1
     while mask < 2 * entries:
         mask *= 2
-    mask -= 1
-    start, box, place_of = _fill(first, span, mask)
-    for s in range(mask + 1):
+    start, box, cell = _fill(first, span, mask - 1)
+    return Grid(first, large, start, box, cell)
+
+
+@njit(cache=True, nogil=True)
+def close_pairs(low, high, owner, fixed, grid, begin, end):  # pragma: no cover - compiled
+    """Find pairs of boxes that overlap: those that the slots of a share of the grid show, and a share of large boxes.
+
+    Large boxes are compared with all others. Shares from 0 to n find all pairs, each of them once.
+
+    Inputs
+    ------
+    low, high : (n, d) float64 [m]
+    owner : (n,) int64; boxes of one owner make no pair
+    fixed : (n,) bool; two fixed boxes make no pair
+    grid : Grid
+    begin, end : int64, the share, from 0 to n
+
+    Outputs
+    -------
+    (np, 2) int64, smaller index first
+    """
+    nb, d = low.shape
+    first, large, start, box, cell = grid
+    pairs, count = np.empty((8 * (end - begin) + 8, 2), dtype=np.int64), np.int64(0)  # of no literal type
+    slots = start.shape[0] - 1
+    for s in range(begin * slots // max(nb, 1), end * slots // max(nb, 1)):
         for a in range(start[s], start[s + 1]):
             i = box[a]
             for b in range(a + 1, start[s + 1]):
                 j = box[b]
                 # in the lowest cell that both touch, and nowhere else
-                here = place_of[a, 0] == place_of[b, 0] and place_of[a, 1] == place_of[b, 1]
-                here = here and place_of[a, 2] == place_of[b, 2]
+                here = cell[a, 0] == cell[b, 0] and cell[a, 1] == cell[b, 1]
+                here = here and cell[a, 2] == cell[b, 2]
                 for k in range(d):
-                    here = here and place_of[a, k] == max(first[i, k], first[j, k])
+                    here = here and cell[a, k] == max(first[i, k], first[j, k])
                 if not here or owner[i] == owner[j] or (fixed[i] and fixed[j]):
                     continue
                 if _overlap(i, j, low, high):
                     pairs = _push(pairs, count, i, j)
                     count += 1
-    for i in range(nb):
+    for i in range(begin, end):
         if large[i]:
             for j in range(nb):
                 if i == j or (large[j] and j < i) or owner[i] == owner[j] or (fixed[i] and fixed[j]):
@@ -245,7 +282,7 @@ def close_pairs(low, high, owner, fixed):  # pragma: no cover - compiled
     return pairs[:count]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def single_points(shapes, place, point, owner, centre, rotation):  # pragma: no cover - compiled
     """Turn single contact points into the axes of their bodies.
 

@@ -133,7 +133,7 @@ class Factors(NamedTuple):
     Attributes
     ----------
     panels, parts : their pattern
-    value : as `factorise` leaves them, of single or double precision
+    value : as `divide` leaves them, of single or double precision
     mass : (nm, 6, 6) float64, M in the order of elimination [kg], [kg m²]
     """
 
@@ -275,7 +275,7 @@ def assemble(touching, mass, panels, value):  # pragma: no cover - compiled
 
     Outputs
     -------
-    value : as `factorise` takes it
+    value : as `eliminate` takes it
     """
     body, first, rows, start = panels.body, panels.first, panels.row, panels.start
     owner = np.empty(mass.shape[0], dtype=np.int64)

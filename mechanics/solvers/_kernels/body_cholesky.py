@@ -18,7 +18,18 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["Panels", "backward", "factorise", "forward", "panels_of", "postorder", "solve"]
+__all__ = [
+    "Panels",
+    "backward",
+    "divide",
+    "eliminate",
+    "finish",
+    "forward",
+    "panels_of",
+    "postorder",
+    "reduce",
+    "solve",
+]
 
 # rows of a panel that are finished before they are taken from the others by one product
 _ROWS = 48
@@ -249,26 +260,38 @@ def _copied(source, begin, end, space):
 
 
 @njit(cache=True, fastmath={"contract"})
+def _finish_rows(panel, begin, end):
+    """Turn some rows of a panel into those of the Cholesky factor, once all before them have been taken from them.
+
+    Return whether they are those of a positive definite matrix.
+    """
+    one = panel.dtype.type(1.0)
+    n = panel.shape[1]
+    for b in range(begin, end):
+        pivot, line = panel[b, b], panel[b]
+        if not (pivot > 0.0 and np.isfinite(pivot)):
+            return False
+        scale = one / np.sqrt(pivot)
+        for x in range(b, n):
+            line[x] *= scale
+        for d in range(b + 1, end):
+            factor, other, own = line[d], panel[d, d:], line[d:]
+            for x in range(n - d):
+                other[x] -= factor * own[x]
+    return True
+
+
+@njit(cache=True)
 def _finish(panel, space):
     """Turn an updated panel into one of the Cholesky factor; return whether it is positive definite.
 
     Rows are finished some at a time; what they take from all others is one product.
     """
-    one = panel.dtype.type(1.0)
     w, n = panel.shape
     for k in range(0, w, _ROWS):
         end = min(k + _ROWS, w)
-        for b in range(k, end):
-            pivot, line = panel[b, b], panel[b]
-            if not (pivot > 0.0 and np.isfinite(pivot)):
-                return False
-            scale = one / np.sqrt(pivot)
-            for x in range(b, n):
-                line[x] *= scale
-            for d in range(b + 1, end):
-                factor, other, own = line[d], panel[d, d:], line[d:]
-                for x in range(n - d):
-                    other[x] -= factor * own[x]
+        if not _finish_rows(panel, k, end):
+            return False
         if end < w:
             done = panel[k:end]
             taken = _product(
@@ -342,76 +365,197 @@ def _divide(panel, n, inverse, spare):
 
 
 @njit(cache=True)
-def factorise(panels, value):  # pragma: no cover - compiled
-    """Factorise A = L D Lᵀ in place.
+def _panel(panels, value, s):
+    """Return panel s (6 w, 6 m) of the values."""
+    width, height = panels.body[s + 1] - panels.body[s], panels.first[s + 1] - panels.first[s]
+    return value[panels.start[s] : panels.start[s + 1]].reshape((panels.size * width, panels.size * height))
+
+
+@njit(cache=True)
+def _take(source, which, panel, spot, row, work, space):
+    """Take from the lines of some bodies what an earlier panel contributes; `which` as in `_subtract_rows`."""
+    size, begin, end, own = which
+    if end - begin > _FEW and source.shape[0] > size * _FEW:
+        _subtract_rows(source, which, panel, spot, row, space)
+        return
+    for q in range(begin, end):
+        for b in range(size):
+            _subtract(source, size * q + b, size, panel[size * (row[q] - own) + b], spot, row, work)
+
+
+@njit(cache=True, nogil=True)
+def eliminate(panels, value, begin, end):  # pragma: no cover - compiled
+    """Turn the panels of a subtree, or of the whole tree, into those of the Cholesky factor, in place.
 
     Inputs
     ------
     panels : Panels
-    value : float64, the panels of A: its lower triangle, and zeros
+    value : float64 or float32, the panels of A: its lower triangle, and zeros
+    begin, end : int64, the first of the panels and the one after the last
 
     Outputs
     -------
-    value : the panels of L, with D⁻¹ in the blocks on their diagonals
-    bool, whether A is positive definite
+    value : these panels of the factor
+    bool, whether their part of A is positive definite
     """
-    body, first, row, start, size = panels.body, panels.first, panels.row, panels.start, panels.size
-    number = body.shape[0] - 1
-    owner, spot = np.empty(body[number], dtype=np.int64), np.zeros(body[number], dtype=np.int64)
+    body, first, row, size = panels.body, panels.first, panels.row, panels.size
+    low, number = body[begin], end - begin
+    owner = np.empty(body[end] - low, dtype=np.int64)
+    spot = np.zeros(body[-1], dtype=np.int64)
     # finished panels wait in a list of the next panel that they reach
     head, follower = np.full(number, -1, dtype=np.int64), np.full(number, -1, dtype=np.int64)
     place = np.zeros(number, dtype=np.int64)
     highest, widest, largest = 0, 0, 0
-    for s in range(number):
-        owner[body[s] : body[s + 1]] = s
+    for s in range(begin, end):
+        owner[body[s] - low : body[s + 1] - low] = s - begin
         highest = max(highest, first[s + 1] - first[s])
         widest = max(widest, body[s + 1] - body[s])
         largest = max(largest, (body[s + 1] - body[s]) * (first[s + 1] - first[s]))
-    work, inverse = np.empty(size * highest, value.dtype), np.empty((6, 6), value.dtype)
-    largest, widest = size * size * largest, size * widest
+    work, largest = np.empty(size * highest, value.dtype), size * size * largest
     space = _Space(
         np.empty(largest, value.dtype),
         np.empty(largest, value.dtype),
-        np.empty(widest * size * highest, value.dtype),
+        np.empty(size * widest * size * highest, value.dtype),
     )
-    for s in range(number):
+    for s in range(begin, end):
         width, height = body[s + 1] - body[s], first[s + 1] - first[s]
-        panel = value[start[s] : start[s + 1]].reshape((size * width, size * height))
+        panel = _panel(panels, value, s)
         for p in range(height):
             spot[row[first[s] + p]] = p
-        j = head[s]
+        j = head[s - begin]
         while j >= 0:
-            then = follower[j]
-            high = first[j + 1] - first[j]
-            shape = size * (body[j + 1] - body[j]), size * high
-            source = value[start[j] : start[j + 1]].reshape(shape)
-            rows, q = row[first[j] : first[j + 1]], place[j]
-            end = q
-            while end < high and rows[end] < body[s + 1]:
-                end += 1
-            if end - q > _FEW and source.shape[0] > size * _FEW:
-                _subtract_rows(source, (size, q, end, body[s]), panel, spot, rows, space)
-                q = end
-            while q < end:
-                for b in range(size):
-                    line = panel[size * (rows[q] - body[s]) + b]
-                    _subtract(source, size * q + b, size, line, spot, rows, work)
-                q += 1
-            place[j] = q
-            if q < high:
-                follower[j] = head[owner[rows[q]]]
-                head[owner[rows[q]]] = j
+            then, rows, q = follower[j], row[first[begin + j] : first[begin + j + 1]], place[j]
+            after = q
+            while after < rows.shape[0] and rows[after] < body[s + 1]:
+                after += 1
+            source = _panel(panels, value, begin + j)
+            _take(source, (size, q, after, body[s]), panel, spot, rows, work, space)
+            place[j] = after
+            if after < rows.shape[0] and rows[after] < body[end]:
+                up = owner[rows[after] - low]
+                follower[j] = head[up]
+                head[up] = j
             j = then
         if not _finish(panel, space):
             return False
-        if height > width:
-            place[s] = width
-            up = owner[row[first[s] + width]]
-            follower[s] = head[up]
-            head[up] = s
-    for s in range(number):
-        _divide(value[start[s] : start[s + 1]], size * (first[s + 1] - first[s]), inverse, space.left)
+        if height > width and row[first[s] + width] < body[end]:
+            place[s - begin] = width
+            up = owner[row[first[s] + width] - low]
+            follower[s - begin] = head[up]
+            head[up] = s - begin
     return True
+
+
+@njit(cache=True)
+def _first(values, begin, end, least):
+    """Return the first place from `begin` to `end` of a value that is not less; `values` are in order."""
+    while begin < end:
+        middle = (begin + end) // 2
+        if values[middle] < least:
+            begin = middle + 1
+        else:
+            end = middle
+    return begin
+
+
+@njit(cache=True)
+def _panel_with(body, k):
+    """Return the panel of body k."""
+    return _first(body, 0, body.shape[0], k + 1) - 1
+
+
+@njit(cache=True, nogil=True)
+def reduce(panels, value, sources, targets):  # pragma: no cover - compiled
+    """Take from the rows of some bodies what earlier bodies contribute, whose own rows are those of the factor.
+
+    Inputs
+    ------
+    panels : Panels
+    value : as in `eliminate`
+    sources : (n, 2) int64, runs of earlier bodies: the first, and the one after the last
+    targets : (m, 2) int64, runs alike, each within a panel
+
+    Outputs
+    -------
+    value : the rows of the targets, with the same bits whatever other targets there are
+    """
+    body, first, row, size = panels.body, panels.first, panels.row, panels.size
+    number, most = body.shape[0] - 1, 0
+    for t in range(targets.shape[0]):
+        most = max(most, targets[t, 1] - targets[t, 0])
+    highest, widest, largest = 0, 0, 0
+    for k in range(sources.shape[0]):
+        for j in range(_panel_with(body, sources[k, 0]), _panel_with(body, sources[k, 1] - 1) + 1):
+            width, height = (
+                min(body[j + 1], sources[k, 1]) - max(body[j], sources[k, 0]),
+                first[j + 1] - first[j],
+            )
+            highest, widest, largest = max(highest, height), max(widest, width), max(largest, width * height)
+    spot, work = np.zeros(body[number], dtype=np.int64), np.empty(size * highest, value.dtype)
+    space = _Space(
+        np.empty(size * widest * size * most, value.dtype),
+        np.empty(size * size * largest, value.dtype),
+        np.empty(size * most * size * highest, value.dtype),
+    )
+    for t in range(targets.shape[0]):
+        low, high = targets[t]
+        s = _panel_with(body, low)
+        panel = _panel(panels, value, s)
+        for p in range(first[s], first[s + 1]):
+            spot[row[p]] = p - first[s]
+        for k in range(sources.shape[0]):
+            for j in range(_panel_with(body, sources[k, 0]), _panel_with(body, sources[k, 1] - 1) + 1):
+                if row[first[j + 1] - 1] < low:
+                    continue
+                begin = _first(row, first[j], first[j + 1], low) - first[j]
+                end = _first(row, first[j] + begin, first[j + 1], high) - first[j]
+                if begin < end:
+                    own = size * (max(sources[k, 0], body[j]) - body[j]), size * (sources[k, 1] - body[j])
+                    source = _panel(panels, value, j)[own[0] : own[1]]
+                    rows = row[first[j] : first[j + 1]]
+                    _take(source, (size, begin, end, body[s]), panel, spot, rows, work, space)
+
+
+@njit(cache=True)
+def finish(panels, value, begin, end):  # pragma: no cover - compiled
+    """Turn the rows of some bodies of a panel into those of the factor, once nothing is left to be taken from them.
+
+    Inputs
+    ------
+    panels : Panels
+    value : as in `eliminate`
+    begin, end : int64, the first of the bodies and the one after the last
+
+    Outputs
+    -------
+    value : these rows of the factor
+    bool, whether their part of A is positive definite
+    """
+    s = _panel_with(panels.body, begin)
+    own, size = panels.body[s], panels.size
+    return _finish_rows(_panel(panels, value, s), size * (begin - own), size * (end - own))
+
+
+@njit(cache=True, nogil=True)
+def divide(panels, value, begin, end):  # pragma: no cover - compiled
+    """Turn panels of the Cholesky factor into those of L, with D⁻¹ in the blocks on their diagonals, as they are read.
+
+    Inputs
+    ------
+    panels : Panels
+    value : as `eliminate` leaves it
+    begin, end : int64, the first of the panels and the one after the last
+
+    Outputs
+    -------
+    value : these panels of L
+    """
+    first, start, size, longest = panels.first, panels.start, panels.size, 0
+    for s in range(begin, end):
+        longest = max(longest, size * (first[s + 1] - first[s]))
+    inverse, spare = np.empty((6, 6), value.dtype), np.empty(6 * longest, value.dtype)
+    for s in range(begin, end):
+        _divide(value[start[s] : start[s + 1]], size * (first[s + 1] - first[s]), inverse, spare)
 
 
 @njit(cache=True, inline="always")
@@ -507,7 +651,7 @@ def forward(panels, value, x, work, begin, end, place):  # pragma: no cover - co
     Inputs
     ------
     panels : Panels
-    value : as `factorise` leaves it
+    value : as `divide` leaves it
     x : b by bodies, of the same precision, overwritten
     work : as long as the longest panel at least, alike, overwritten
     begin, end : int64, the first of the panels and the one after the last
@@ -569,7 +713,7 @@ def solve(panels, value, x, work):  # pragma: no cover - compiled
     Inputs
     ------
     panels : Panels
-    value : as `factorise` leaves it
+    value : as `divide` leaves it
     x : (6 nm,), or (3 nm,) in the plane, of the same precision, b, overwritten
     work : as long as the longest panel at least, alike, overwritten
 

@@ -54,7 +54,7 @@ class DiskIterate(NamedTuple):
 
 
 class DiskFactors(NamedTuple):
-    """Factors of M + H Σ⁻¹ Hᵀ: their pattern, and their values as `factorise` leaves them."""
+    """Factors of M + H Σ⁻¹ Hᵀ: their pattern, and their values as `divide` leaves them."""
 
     panels: Panels
     value: NDArray[np.float64]
@@ -72,7 +72,7 @@ def assemble_disks(touching, mass, panels):  # pragma: no cover - compiled
 
     Outputs
     -------
-    float64, as `factorise` takes them
+    float64, as `eliminate` takes them
     """
     body, first, rows, start = panels.body, panels.first, panels.row, panels.start
     value, count = np.zeros(start[-1]), mass.shape[0]

@@ -7,7 +7,6 @@ less than that of a Gauss–Seidel sweep (mechanics/solvers/_kernels/body_admm.p
 """
 
 from collections.abc import Callable
-from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -17,9 +16,11 @@ from mechanics.arrays import Array, Ints
 from mechanics.delassus.elimination import elimination
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, Delassus, RigidContacts
 from mechanics.problem.residual import residual
+from mechanics.scene.threads import at_once
 from mechanics.solvers._kernels import body_admm as kernel
 from mechanics.solvers._kernels import body_cholesky as cholesky
 from mechanics.solvers._kernels.body_parts import Parts, parts_of
+from mechanics.solvers.first_order.body_factors import factorise
 from moma.errors import SolverError
 
 __all__ = ["BodyADMM", "Stage"]
@@ -160,8 +161,6 @@ class _Run:
         self._factors: kernel.Factors | None = None
         self._memory = _acceleration(0, 0)
         self._until = 0
-        threads = len(bodies.groups)
-        self._pool = ThreadPoolExecutor(threads - 1) if threads > 1 else None
         self.iterations, self.excess, self._change, self._limit = 0, np.inf, np.inf, 0.0
 
     @property
@@ -185,8 +184,8 @@ class _Run:
             self._advance(min(most - least, later), self._limit)
 
     def _advance(self, count: int, limit: float) -> None:
-        if self._pool is not None and not self._memory.image.size:
-            self._advance_at_once(self._pool, count, limit)
+        if len(self._bodies.groups) > 1 and not self._memory.image.size:
+            self._advance_at_once(count, limit)
             return
         made, self._change = kernel.advance(
             self._iterate,
@@ -200,15 +199,15 @@ class _Run:
         )
         self.iterations += made
 
-    def _advance_at_once(self, pool: Executor, count: int, limit: float) -> None:
+    def _advance_at_once(self, count: int, limit: float) -> None:
         """Make the same iterations with all groups of parts at once; the same bits."""
         iterate, length, touching, factors = self._iterate, self._bodies.length, self._touching, self._factors
         assert factors is not None
-        first, *others = self._bodies.groups
+        groups = self._bodies.groups
+        share = at_once(len(groups))
 
         def each(stage: Callable[..., float | None], *given: object) -> list[float | None]:
-            waiting = [pool.submit(stage, group, iterate, *given) for group in others]
-            return [stage(first, iterate, *given), *(one.result() for one in waiting)]
+            return share(lambda group: stage(group, iterate, *given), groups)
 
         step = np.empty(len(iterate.load), factors.value.dtype)
         each(kernel.begin, touching, factors)
@@ -269,8 +268,6 @@ class _Run:
         """Let go of factors that are too large to be kept."""
         self._factors = None
         self._bodies.forget()
-        if self._pool is not None:
-            self._pool.shutdown()
 
     def best(self) -> tuple[Array, Array]:
         """Return the impulses and the velocities û (nc, 3) of the best look, local frames."""
@@ -378,7 +375,7 @@ class _Bodies:
         precision = np.float32 if len(self.inertia) >= _FEW else np.float64
         value = np.zeros(self._panels.start[-1], dtype=precision)
         kernel.assemble(touching, self._mass, self._panels, value)
-        if not cholesky.factorise(self._panels, value):
+        if not factorise(self._panels, value, self._parts, len(self.groups)):
             raise SolverError("W is not a number", where="ADMM of bodies", remedy="use another method")
         factors = kernel.Factors(self._panels, self._parts, value, self._mass)
         if penalty is not None:

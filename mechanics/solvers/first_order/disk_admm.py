@@ -14,6 +14,7 @@ from mechanics.problem.problem import ContactProblem, ContactSolution, ContactSt
 from mechanics.problem.residual import Residual, project_on_cone, residual
 from mechanics.solvers._kernels import body_cholesky as cholesky
 from mechanics.solvers._kernels import disk_admm as kernel
+from mechanics.solvers.first_order.body_factors import factorise
 from moma.errors import SolverError
 
 __all__ = ["DiskADMM"]
@@ -108,7 +109,7 @@ class _Run:
         self._iterate = kernel.DiskIterate(x, np.empty_like(x), np.empty_like(x), np.zeros(count))
         mass = np.ascontiguousarray(1.0 / contacts.inertia[order])
         value: Array = kernel.assemble_disks(self._touching, mass, panels)
-        if not cholesky.factorise(panels, value):
+        if not factorise(panels, value):
             raise SolverError("W is not a number", where="ADMM of disks", remedy="use another method")
         self._factors = kernel.DiskFactors(panels, value)
 

@@ -14,6 +14,7 @@ from mechanics.contact.detection import Detector
 from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
 from mechanics.scene.scene import Fidelity
+from mechanics.scene.threads import at_once
 from tests.mechanics.shapes import TURN, brick, detected, ground, moved, scene
 
 SOFT = Fidelity.DEFORMABLE
@@ -340,9 +341,8 @@ def test_any_number_of_threads_finds_the_same_contacts_in_the_same_order(monkeyp
     reach = np.zeros(len(model.mass))
     parts = []
     monkeypatch.setattr(detection, "_PART", 4)
-    runs = [Detector(model.surfaces, model.fixed, 0.1, threads=threads) for threads in (1, 2, 5)]
-    pooled = detection.ThreadPoolExecutor
-    monkeypatch.setattr(detection, "ThreadPoolExecutor", lambda count: parts.append(count) or pooled(count))
+    runs = [Detector(model.surfaces, model.fixed, 0.1, threads=count) for count in (1, 2, 5)]
+    monkeypatch.setattr(detection, "at_once", lambda count: parts.append(count) or at_once(count))
     # the second time with the faces that kept pairs apart the first time
     whole, *others = [(find(state, reach), find(state, reach)) for find in runs]
     assert {2, 5} == set(parts)

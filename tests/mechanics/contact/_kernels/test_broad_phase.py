@@ -25,8 +25,15 @@ def close_pairs(low, high, owner, fixed):
     }
 
 
+def found_pairs(low, high, owner, fixed):
+    """Return what three shares of unequal size find."""
+    grid, count = kernel.grid_of(low, high), len(low)
+    shares = itertools.pairwise((0, count // 5, count // 2, count))
+    return np.concatenate([kernel.close_pairs(low, high, owner, fixed, grid, *share) for share in shares])
+
+
 def assert_all_pairs_found(low, high, owner, fixed):
-    found = kernel.close_pairs(low, high, owner, fixed)
+    found = found_pairs(low, high, owner, fixed)
     assert found.shape[1:] == (2,)
     assert (found[:, 0] < found[:, 1]).all()
     pairs = [tuple(pair) for pair in found.tolist()]
@@ -64,7 +71,7 @@ def test_boxes_of_very_different_sizes_far_away_are_found_as_well(seed, dimensio
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_there_is_room_for_any_number_of_pairs(dimension):
     low = np.zeros((60, dimension))
-    found = kernel.close_pairs(low, low + 1, np.arange(60), np.zeros(60, dtype=bool))
+    found = found_pairs(low, low + 1, np.arange(60), np.zeros(60, dtype=bool))
     assert len(found) == 60 * 59 // 2
 
 
@@ -75,7 +82,7 @@ def test_one_floor_under_everything_meets_everything_once(dimension):
     high = low + 0.1
     high[0] = 1e3
     free = np.zeros(501, dtype=bool)
-    found = kernel.close_pairs(low, high, np.arange(501), free)
+    found = found_pairs(low, high, np.arange(501), free)
     assert {(0, j) for j in range(1, 501)} <= {tuple(pair) for pair in found.tolist()}
     assert_all_pairs_found(low, high, np.arange(501), free)
 
@@ -83,14 +90,14 @@ def test_one_floor_under_everything_meets_everything_once(dimension):
 def test_boxes_that_share_no_more_than_a_corner_make_a_pair():
     low = np.array([[0.0, 0, 0], [0.1, 0.1, 0.1], [0.3, 0.3, 0.3]])
     high = np.array([[0.1, 0.1, 0.1], [0.3, 0.3, 0.3], [0.4, 0.4, 0.4]])
-    found = kernel.close_pairs(low, high, np.arange(3), np.zeros(3, dtype=bool))
+    found = found_pairs(low, high, np.arange(3), np.zeros(3, dtype=bool))
     assert sorted(map(tuple, found.tolist())) == [(0, 1), (1, 2)]
 
 
 @pytest.mark.parametrize("count", [0, 1])
 def test_fewer_than_two_boxes_make_no_pair(count):
     low = np.zeros((count, 3))
-    found = kernel.close_pairs(low, low + 1, np.arange(count), np.zeros(count, dtype=bool))
+    found = found_pairs(low, low + 1, np.arange(count), np.zeros(count, dtype=bool))
     assert found.shape == (0, 2)
 
 
@@ -98,7 +105,7 @@ def test_a_wall_of_equal_bricks_has_the_pairs_of_its_bond():
     """Running bond: each brick meets the next of its course, and two of the course below."""
     courses, width = 30, 40
     low = np.array([(x + 0.5 * (z % 2), 0.0, 0.5 * z) for z in range(courses) for x in range(width)])
-    found = kernel.close_pairs(
+    found = found_pairs(
         low - 1e-3, low + [1, 0.5, 0.5] + 1e-3, np.arange(len(low)), np.zeros(len(low), dtype=bool)
     )
     ends = courses - 1  # one brick of each upper course has but one below it

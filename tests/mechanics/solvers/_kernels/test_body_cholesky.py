@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mechanics.solvers._kernels.body_cholesky import factorise, panels_of, postorder, solve
+from mechanics.solvers._kernels.body_cholesky import divide, eliminate, panels_of, postorder, solve
 
 
 def blocks_of(panels, value):
@@ -38,7 +38,11 @@ def factors(dense, pairs, count, spare, size=6, precision=np.float64):
     for (k, r), view in blocks_of(panels, value).items():
         if r >= k:
             view[:] = dense[size * k : size * (k + 1), size * r : size * (r + 1)]
-    return panels, value, factorise(panels, value)
+    every = 0, len(panels.body) - 1
+    regular = eliminate(panels, value, *every)
+    if regular:
+        divide(panels, value, *every)
+    return panels, value, regular
 
 
 @settings(max_examples=40, deadline=None)
