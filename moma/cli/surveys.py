@@ -43,6 +43,7 @@ class SampleName(StrEnum):
     SETTLED = "settled"
     SETTLED_PHASES = "settled-phases"
     SETTLED_SMALL = "settled-small"
+    SHAKEN = "shaken"
     TOWER = "tower"
     TOWER_SETTLED_SMALL = "tower-settled-small"
     TOWER_SMALL = "tower-small"

@@ -3,23 +3,23 @@
 import numpy as np
 
 from mechanics.results.result import Outcome
+from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.elastic_joint import ElasticJoint
 from mechanics.scene.loads.forces import StoneForce
 from mechanics.scene.loads.load import Loads
-from mechanics.scene.loads.motions import settlement
+from mechanics.scene.loads.motions import ImposedMotion, settlement
 from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import Block, ContactSettings, Fidelity, Placement, Scene, Start, TimeSettings
 from mechanics.simulate import simulate
 from mechanics.stones.materials import Material
 from moma.errors import SolverError
 from pipelines.arrays import Array
-from survey.synthetic.causes import Cause
+from survey.synthetic.causes import PULSE, Cause
 from survey.synthetic.frame import Movement, RigidMotion
 
 __all__ = ["true_movement"]
 
 _LONGEST = 3.0  # duration of the simulation [s]
-_FRICTION = 0.6  # of all joints [-]
 
 
 def true_movement(cause: Cause) -> Movement:
@@ -48,11 +48,17 @@ def true_movement(cause: Cause) -> Movement:
     motions = [
         settlement([code], (0.0, 0.0, z), cause.true_duration) for code, z in cause.heights(site).items()
     ]
+    jerk = cause.jerk(site)
+    if jerk is not None:
+        velocity = History(np.array([0.0, *PULSE]), np.array([np.zeros(3), jerk, np.zeros(3)]))
+        motions.append(ImposedMotion(frozenset(building.base), velocity))
     forces = [
         StoneForce(frozenset({code}), History.constant(np.array(force)))
         for code, force in cause.forces(site).items()
     ]
-    time = TimeSettings(step=cause.true_step, duration=_LONGEST, relaxation=True, start=Start.EQUILIBRIUM)
+    time = TimeSettings(
+        step=cause.true_step, duration=_LONGEST, relaxation=jerk is None, start=Start.EQUILIBRIUM
+    )
     scene = Scene(
         "movement",
         blocks,
@@ -70,8 +76,8 @@ def true_movement(cause: Cause) -> Movement:
 
 def _contact(cause: Cause) -> ContactSettings:
     if cause.stiffness is None:
-        return ContactSettings()
-    return ContactSettings(law=ElasticJoint(_FRICTION, *cause.stiffness), placement=Placement.CENTROID)
+        return ContactSettings(law=DryJoint(cause.friction))
+    return ContactSettings(law=ElasticJoint(cause.friction, *cause.stiffness), placement=Placement.CENTROID)
 
 
 def _motion(before: Array, after: Array) -> RigidMotion:

@@ -13,10 +13,12 @@ from survey.synthetic.buildings.walls import wall
 from survey.synthetic.frame import Movement, wall_frame
 
 __all__ = [
+    "PULSE",
     "PUSHED",
     "SETTLED",
     "SETTLED_PHASES",
     "SETTLED_SMALL",
+    "SHAKEN",
     "TOWER_SMALL_SETTLED",
     "Cause",
     "Site",
@@ -25,6 +27,9 @@ __all__ = [
 
 _REACH = 2.5  # distance from the corner of the tower at which its settlement ends [m]
 _HEADS = 0.75  # share of the courses of the tower below the heads of its walls
+PULSE = (0.05, 0.25)
+"""Times after which the velocity of an earthquake pulse is at its peak and over; it is linear between them [s]."""
+
 _TIED = 1.0  # depth beyond which a stone goes through the wall [m]
 
 
@@ -40,6 +45,7 @@ class Site:
     axis : (3,) about which the base may have tilted [-]
     pushed : by code or query expression of stones the direction (3,) in which the thrust of a vault may have pushed
         them; empty if there is no vault
+    jerked : (3,) in which the ground jerked; None if that is not suspected
     level_break : last course of the first phase of a building that stood as a whole; None: it has one phase
     """
 
@@ -48,12 +54,13 @@ class Site:
     rival: Mapping[str, float]
     axis: Array
     pushed: Mapping[str, Array] = field(default_factory=dict)
+    jerked: Array | None = None
     level_break: int | None = None
 
 
 @dataclass(frozen=True)
 class Cause:
-    """Settlement of the left corner, or thrust of a vault, and the building that it moves.
+    """Settlement of the left corner, thrust of a vault or earthquake pulse, and the building that it moves.
 
     Attributes
     ----------
@@ -65,6 +72,8 @@ class Cause:
         own; None: all stood
     thrust : with which a vault pushes each of `Site.pushed` [N]
     most : thrust that a diagnosis considers [N]
+    pulse : peak velocity of the ground along `Site.jerked`; the motion itself is followed then [m/s]
+    friction : of all joints [-]
     stiffness : across and along the joints, per area; None: rigid joints [Pa/m]
     battered : the walls may have been built leaning
     true_duration, true_step : of the simulation of the truth [s]
@@ -77,10 +86,17 @@ class Cause:
     stood: int | None = None
     thrust: float = 0.0
     most: float = 2000.0
+    pulse: float = 0.0
+    friction: float = 0.6
     stiffness: tuple[float, float] | None = None
     battered: bool = True
     true_duration: float = 1.0
     true_step: float = 0.005
+
+    @property
+    def amount(self) -> float:
+        """Amount of the cause, in the unit of the true hypothesis."""
+        return self.pulse or self.thrust or self.settlement
 
     def heights(self, site: Site) -> dict[str, float]:
         """Return by code of a stone on the ground its displacement upwards [m]."""
@@ -95,6 +111,13 @@ class Cause:
         outward = {code: np.round(self.thrust * out, 3) + 0.0 for code, out in site.pushed.items()}
         return {code: (float(x), float(y), float(z)) for code, (x, y, z) in outward.items()}
 
+    def jerk(self, site: Site) -> tuple[float, float, float] | None:
+        """Return the peak velocity (3,) of the ground, if it has jerked [m/s]."""
+        if not self.pulse or site.jerked is None:
+            return None
+        x, y, z = (np.round(self.pulse * site.jerked, 6) + 0.0).tolist()
+        return x, y, z
+
 
 def _moved_wall(stones: int, shares: Sequence[float]) -> Callable[[Movement, int | None], Site]:
     """Return the generator of a wall that has moved, with shares of the settlement from its corner inwards."""
@@ -107,7 +130,7 @@ def _moved_wall(stones: int, shares: Sequence[float]) -> Callable[[Movement, int
     return build
 
 
-def _pushed_wall(stones: int) -> Callable[[Movement, int | None], Site]:
+def _pushed_wall(stones: int, shaken: bool = False) -> Callable[[Movement, int | None], Site]:
     """Return the generator of a plumb wall against which a vault leans below its uppermost course."""
 
     def build(movement: Movement, measured: int | None) -> Site:
@@ -116,7 +139,8 @@ def _pushed_wall(stones: int) -> Callable[[Movement, int | None], Site]:
         last = max(one.course or 0 for one in built.survey.blocks)
         pushed = {one.code: frame.axes[2] for one in built.survey.blocks if one.course == last - 1}
         settled = dict(zip(built.base, (1.0, 0.5), strict=False))
-        return Site(built, settled, {}, frame.axes[0], pushed)
+        inward = -frame.axes[2] if shaken else None
+        return Site(built, settled, {}, frame.axes[0], pushed, inward)
 
     return build
 
@@ -131,7 +155,7 @@ def _moved_tower(courses: int) -> Callable[[Movement, int | None], Site]:
         pushed = {f"zone = '{letter} outer' and {tied}": storey.outward[letter] for letter in "BC"}
         laid = tower_storey(courses) if movement else storey
         settled = _around(laid.building, storey.corners[0])
-        return Site(storey.building, settled, {}, storey.outward["A"], pushed, storey.level_break)
+        return Site(storey.building, settled, {}, storey.outward["A"], pushed, level_break=storey.level_break)
 
     return build
 
@@ -162,6 +186,17 @@ PUSHED = Cause(
     stiffness=(5e8, 2e8),
     battered=False,
     true_step=0.02,
+)
+SHAKEN = Cause(
+    0.0,
+    _pushed_wall(30, shaken=True),
+    0.5,
+    0.01,
+    most=600.0,
+    pulse=0.5,
+    friction=0.3,
+    battered=False,
+    true_step=0.01,
 )
 TOWER_SMALL_SETTLED = Cause(
     0.030, _moved_tower(12), 0.2, 0.05, battered=False, true_duration=0.2, true_step=0.025

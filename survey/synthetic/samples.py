@@ -1,7 +1,7 @@
 """Synthetic surveys to start from, by name, each with its truth."""
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -21,6 +21,7 @@ from survey.synthetic.causes import (
     SETTLED,
     SETTLED_PHASES,
     SETTLED_SMALL,
+    SHAKEN,
     TOWER_SMALL_SETTLED,
     Cause,
 )
@@ -165,9 +166,8 @@ ordered = {ordered}
 
 def _truth_of(
     building: Building,
-    settlement: Mapping[str, float] = MappingProxyType({}),
+    causes: Mapping[str, object] = MappingProxyType({}),
     axes: Mapping[str, object] = MappingProxyType({}),
-    forces: Mapping[str, Sequence[float]] = MappingProxyType({}),
 ) -> str:
     """Return the true stones of a building, one to a line, with what has moved them and how, and the axes of ribs."""
     stones = [
@@ -181,8 +181,7 @@ def _truth_of(
     ]
     lines = ",\n".join(json.dumps(stone) for stone in stones)
     about = json.dumps(f"true geometry of the synthetic survey {building.survey.head.path}; metres")
-    cause = f'"settlement": {json.dumps(dict(settlement))},\n' if settlement else ""
-    cause += f'"forces": {json.dumps(dict(forces))},\n' if forces else ""
+    cause = "".join(f'"{name}": {json.dumps(value)},\n' for name, value in causes.items() if value)
     curves = f'"axes": {json.dumps(dict(axes))},\n' if axes else ""
     return f'{{\n"about": {about},\n{cause}{curves}"stones": [\n{lines}\n]\n}}\n'
 
@@ -200,7 +199,8 @@ def moved_sample(cause: Cause, movement: Movement) -> Sample:
     site = cause.build(movement, None)
     last = cause.stood or site.level_break
     knowledge = "" if last is None else _PHASES.format(last=last)
-    truth = _truth_of(site.building, cause.heights(site), forces=cause.forces(site))
+    causes = {"settlement": cause.heights(site), "forces": cause.forces(site), "jerk": cause.jerk(site)}
+    truth = _truth_of(site.building, causes)
     return Sample(site.building.survey, truth, knowledge)
 
 
@@ -226,6 +226,7 @@ SAMPLES: Mapping[str, SampleRecipe] = MappingProxyType(
             "Wall whose left corner settled before its upper courses were laid", SETTLED_PHASES
         ),
         "settled-small": _moved("Small wall whose left corner settled", SETTLED_SMALL),
+        "shaken": _moved("Small wall shaken by an earthquake pulse", SHAKEN),
         "tower": SampleRecipe("Storey of a tower", "course = 1", _tower(40), core=True),
         "tower-settled-small": _moved(
             "Storey of a tower, of twelve courses, whose left corner settled", TOWER_SMALL_SETTLED

@@ -71,6 +71,7 @@ class Ranked:
     aicc : χ² + 2 k with the correction for few values
     estimates : its amplitudes
     remarks : cautions about its amplitudes and runs
+    tied : pairs of amplitudes that are not told apart, in words
     uneven : amplitudes that scatter with the runs themselves, each with its unit
     """
 
@@ -82,6 +83,7 @@ class Ranked:
     aicc: float
     estimates: tuple[Estimate, ...]
     remarks: tuple[str, ...]
+    tied: tuple[str, ...] = ()
     uneven: tuple[str, ...] = ()
 
     @property
@@ -140,7 +142,9 @@ def rank(
     probability = float(fdtrc(left, steps or 1e9, ratio))
     aicc = found.chi2 + 2.0 * count + 2.0 * count * (count + 1) / max(dof - count - 1, 1)
     own = tuple(estimates(unknowns, found, left))
-    return Ranked(name, stood, found, left, probability, aicc, own, tuple(_remarks(unknowns, found, own)))
+    tied = tuple(_tied(unknowns, found))
+    remarks = (*_remarks(unknowns, found, own), *tied)
+    return Ranked(name, stood, found, left, probability, aicc, own, remarks, tied)
 
 
 def estimates(unknowns: Sequence[Unknown], found: Fit, dof: int) -> Iterator[Estimate]:
@@ -172,6 +176,11 @@ def _remarks(unknowns: Sequence[Unknown], found: Fit, own: Sequence[Estimate]) -
         ]
         told = " ".join(parts) if len(parts) > 1 else parts[0].split()[1]
         yield f"not determined, as it moves nothing that was measured: {told}"
+
+
+def _tied(unknowns: Sequence[Unknown], found: Fit) -> Iterator[str]:
+    """Yield the pairs of amplitudes of which the measurements tell a combination alone."""
+    names = [one.name for one in unknowns]
     sigma = np.sqrt(np.diag(found.covariance))
     for i in range(len(names)):
         for k in range(i):
@@ -206,7 +215,7 @@ def verdict(ranking: Ranking) -> str:
         if rivals
         else "a cause that is not in the list may move the stones alike"
     )
-    caution = f"CAUTION: {'; '.join(filter(None, (uneven, other)))}"
+    caution = f"CAUTION: {'; '.join(filter(None, (uneven, *best.tied, other)))}"
     amounts = "; ".join(_amount(one) for one in best.estimates)
     return f"{best.title!r} explains what was measured ({chi2}){f': {amounts}' if amounts else ''}; {caution}"
 

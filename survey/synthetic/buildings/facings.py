@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from random import Random
+from types import MappingProxyType
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from survey.synthetic.bond import PlannedStone, upright
 from survey.synthetic.building import Building, Draft, flat_stone, measured_building
 from survey.synthetic.buildings.walls import bed_heights, plan_courses
 from survey.synthetic.coursing import Bed, Piece, planned
-from survey.synthetic.frame import WallFrame, build_stone, wall_frame
+from survey.synthetic.frame import Movement, WallFrame, build_stone, wall_frame
 
 __all__ = ["BACK", "TwoFacings", "two_facings"]
 
@@ -54,7 +55,15 @@ class TwoFacings:
 
 
 def two_facings(
-    length: float = 5.0, courses: int = 10, seed: int = 1, *, thickness: float = 1.1, storeys: int = 2
+    length: float = 5.0,
+    courses: int = 10,
+    seed: int = 1,
+    *,
+    thickness: float = 1.1,
+    storeys: int = 2,
+    capped: bool = False,
+    movement: Movement = MappingProxyType({}),
+    measured: int | None = None,
 ) -> TwoFacings:
     """Build a wall of two facings and measure both.
 
@@ -65,6 +74,9 @@ def two_facings(
     seed : of Python's own generator, whose stream is the same everywhere
     thickness : from face to face; more than 0.95, so that headers of both sides do not meet [m]
     storeys : number of storeys; a record's zone names its facing and storey
+    capped : all stones of the last course go through the wall, and stand on both facings and the core
+    movement : of the stones since they were laid
+    measured : seed of the joints, wear and noise alone, so that the same stones are measured again; None: as `seed`
 
     Returns
     -------
@@ -86,7 +98,7 @@ def two_facings(
             beds = Bed(heights[number - 1]), Bed(heights[number])
             zone = f"{letter} storey {next(k for k, s in enumerate(spans, start=1) if number <= s[1])}"
             for k, piece in enumerate(course.pieces, start=1):
-                passes = piece in given[number - 1]
+                passes = piece in given[number - 1] or (capped and number == courses)
                 if passes and letter == "B":
                     continue
                 code = f"{'T' if passes else letter}{number:02d}-{k:02d}"
@@ -97,7 +109,10 @@ def two_facings(
         for name, frame in ((OBSERVER, front), (BACK, back))
     ]
     base = [draft.stone.plan.code for draft in drafts if draft.stone.plan.course == 1]
-    building = measured_building("wall of two facings", drafts, _DEPTHS, stations, base, rng)
+    rng = rng if measured is None else Random(measured)
+    building = measured_building(
+        "wall of two facings", drafts, _DEPTHS, stations, base, rng, movement=movement
+    )
     codes = {letter: tuple(s.code for s in building.solids if s.code[0] == letter) for letter in "FBT"}
     return TwoFacings(
         building=building,
