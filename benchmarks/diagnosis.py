@@ -23,6 +23,7 @@ from pipelines.assess.diagnosis.search import Case, Fitted, Place, cases_of, che
 from pipelines.assess.diagnosis.trials import Tried, run_trial
 from pipelines.assess.motions import Motions
 from pipelines.ingest.ingest import ingest
+from pipelines.propose.propose import Recording, propose_core
 from pipelines.record.record import record
 from pipelines.scene.sample import write_sample
 from pipelines.scene.true_movement import true_movement
@@ -35,13 +36,14 @@ __all__ = ["Laboratory", "drawn", "laboratory", "main", "outcome"]
 
 _SETTLED = "the left corner settled"
 _TRUE = {
+    "core-sunk": "the core decayed and sank",
     "settled-small": _SETTLED,
     "settled-phases": _SETTLED,
     "shaken": "an earthquake pulse jerked the ground inwards",
 }
 """True hypothesis of each sample."""
 
-_GRID = {"shaken": 12}  # intervals of the range of an unknown, at whose ends runs are made
+_GRID = {"core-sunk": 12, "shaken": 12}  # intervals of the range of an unknown, at whose ends runs are made
 _FINE = 24  # of other samples
 _TABLE: Table = (
     ("sample", "sample", ""),
@@ -70,6 +72,7 @@ class Laboratory:
     url : of a database with its stones
     phases : of the stones by code, if it has any
     moved : the true building, measured with a seed
+    core : whether a core has to be proposed
     true : name of the true hypothesis
     amount : the truth, in the unit of its unknown
     grid : intervals of the range of an unknown, at whose ends runs are made
@@ -81,6 +84,7 @@ class Laboratory:
     url: str
     phases: dict[str, str]
     moved: Callable[[int], Building]
+    core: bool
     true: str
     amount: float
     grid: int
@@ -97,6 +101,8 @@ def laboratory(kind: str, folder: Path) -> Laboratory:
     write_sample(kind, folder)
     url = f"sqlite:///{folder / 'stones.db'}"
     ingest([folder / f"{kind}.moma"], url)
+    if SAMPLES[kind].core:
+        propose_core(url, recording=Recording())
     knowledge = folder / "knowledge.toml"
     if knowledge.exists():
         record([knowledge], url)
@@ -112,6 +118,7 @@ def laboratory(kind: str, folder: Path) -> Laboratory:
         url,
         dict(found.phases),
         lambda seed: cause.build(movement, seed).building,
+        SAMPLES[kind].core,
         _TRUE[kind],
         cause.amount,
         _GRID.get(kind, _FINE),
@@ -209,6 +216,8 @@ def whole(place: Laboratory, draws: int, folder: Path) -> list[Row]:
         path = folder / f"{seed}.moma"
         write_moma(place.moved(seed).survey, path)
         ingest([path], url)
+        if place.core:
+            propose_core(url, recording=Recording())
         if place.phases:
             record([folder / "knowledge.toml"], url)
         runs = runs_of(place.file, url, lambda trials: [run_trial(one) for one in trials])

@@ -36,6 +36,7 @@ class SampleName(StrEnum):
     """Names in survey.synthetic.samples, which is not loaded for a help text."""
 
     ARCH = "arch"
+    CORE_SUNK = "core-sunk"
     CORNER = "corner"
     FACINGS = "facings"
     PUSHED = "pushed"

@@ -96,7 +96,7 @@ _BATTERED = "battered = true\n"
 
 _SETTLED = """
 [[hypotheses]]
-name = "the {corner} corner settled"
+name = "the {what}"
 
 [[hypotheses.unknowns]]
 name = "settlement"
@@ -284,9 +284,10 @@ def _listed(commands: Sequence[str]) -> str:
 def _diagnosis(kind: str, fixed: str, cause: Cause, commands: Sequence[str]) -> str:
     """Return hypotheses on the movement of a building, the true one first."""
     site = cause.build({}, None)
-    hypotheses = [_SETTLED.format(corner="left") + _settling(cause, site.settled)]
+    first, second = ("core decayed and sank", "left corner settled") if site.core else _CORNERS
+    hypotheses = [_SETTLED.format(what=first) + _settling(cause, site.settled)]
     if site.rival:
-        hypotheses.append(_SETTLED.format(corner="right") + _settling(cause, site.rival))
+        hypotheses.append(_SETTLED.format(what=second) + _settling(cause, site.rival))
     tilted = _TILTED.format(
         fixed=fixed,
         duration=cause.duration,
@@ -314,6 +315,7 @@ def _diagnosis(kind: str, fixed: str, cause: Cause, commands: Sequence[str]) -> 
     )
 
 
+_CORNERS = ("left corner settled", "right corner settled")
 _COUNTS = {3: "Three", 4: "Four", 5: "Five"}
 
 

@@ -14,8 +14,11 @@ from mechanics.simulate import simulate
 from mechanics.stones.materials import Material
 from moma.errors import SolverError
 from pipelines.arrays import Array
-from survey.synthetic.causes import PULSE, Cause
+from survey.geometry.solids import Solid, planes_of_solid
+from survey.synthetic.causes import PULSE, Cause, Site
 from survey.synthetic.frame import Movement, RigidMotion
+from survey.unseen.core.facings import FacingStone
+from survey.unseen.core.propose import propose_infill
 
 __all__ = ["true_movement"]
 
@@ -45,8 +48,13 @@ def true_movement(cause: Cause) -> Movement:
         for one in building.solids
         if cause.stood is None or course[one.code] <= cause.stood
     )
+    core = _core(site)
+    blocks += tuple(
+        Block(one.code, one.vertices - middle, one.faces, limestone, Fidelity.FIXED) for one in core
+    )
     motions = [
-        settlement([code], (0.0, 0.0, z), cause.true_duration) for code, z in cause.heights(site).items()
+        settlement([one.code for one in core] or [code], (0.0, 0.0, z), cause.true_duration)
+        for code, z in cause.heights(site).items()
     ]
     jerk = cause.jerk(site)
     if jerk is not None:
@@ -71,7 +79,22 @@ def true_movement(cause: Cause) -> Movement:
         raise SolverError(
             f"the stones of the sample do not come to rest: {result.outcome}", remedy="choose another sample"
         )
-    return {body.code: _motion(body.reference + middle, body.position + middle) for body in result.bodies}
+    return {
+        body.code: _motion(body.reference + middle, body.position + middle)
+        for body in result.bodies
+        if body.code in course
+    }
+
+
+def _core(site: Site) -> list[Solid]:
+    """Return the true core on which stones stand, between the hidden sides of two facings, if there is one."""
+    if site.core is None:
+        return []
+    stones = [
+        FacingStone(record.code, record.course, solid, planes_of_solid(solid)[0, :3])
+        for record, solid in zip(site.building.survey.blocks, site.building.solids, strict=True)
+    ]
+    return [one.solid for one in propose_infill(stones) if one.course == site.core]
 
 
 def _contact(cause: Cause) -> ContactSettings:

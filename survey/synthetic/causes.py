@@ -2,17 +2,19 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from survey.arrays import Array
 from survey.synthetic.building import Building
+from survey.synthetic.buildings.facings import two_facings
 from survey.synthetic.buildings.tower import tower_storey
 from survey.synthetic.buildings.walls import wall
 from survey.synthetic.frame import Movement, wall_frame
 
 __all__ = [
+    "CORE_SUNK",
     "PULSE",
     "PUSHED",
     "SETTLED",
@@ -30,6 +32,8 @@ _HEADS = 0.75  # share of the courses of the tower below the heads of its walls
 PULSE = (0.05, 0.25)
 """Times after which the velocity of an earthquake pulse is at its peak and over; it is linear between them [s]."""
 
+_THICK = 1.6  # wall of two facings with a core that has sunk [m]
+_UPPER = 1.1  # its upper part, which stands on the first facing and the core [m]
 _TIED = 1.0  # depth beyond which a stone goes through the wall [m]
 
 
@@ -40,12 +44,14 @@ class Site:
     Attributes
     ----------
     building : measured
-    settled : by code of a stone on the ground its share of the settlement of the left corner, which is the cause [-]
-    rival : the same of the right corner, which did not settle; empty if that is not suspected
+    settled : by code or query expression of stones on the ground their share of the settlement of the left corner, or
+        of the core, which is the cause [-]
+    rival : the same of the right corner, or of the left one beside a core; empty if that is not suspected
     axis : (3,) about which the base may have tilted [-]
     pushed : by code or query expression of stones the direction (3,) in which the thrust of a vault may have pushed
         them; empty if there is no vault
     jerked : (3,) in which the ground jerked; None if that is not suspected
+    core : course of the core on which the stones above stand, and which is what has settled; None: no core
     level_break : last course of the first phase of a building that stood as a whole; None: it has one phase
     """
 
@@ -55,16 +61,17 @@ class Site:
     axis: Array
     pushed: Mapping[str, Array] = field(default_factory=dict)
     jerked: Array | None = None
+    core: int | None = None
     level_break: int | None = None
 
 
 @dataclass(frozen=True)
 class Cause:
-    """Settlement of the left corner, thrust of a vault or earthquake pulse, and the building that it moves.
+    """Settlement of a corner or a core, thrust of a vault or earthquake pulse, and the building that it moves.
 
     Attributes
     ----------
-    settlement : of the ground at the corner, downwards [m]
+    settlement : of the ground at the corner, or of the core, downwards [m]
     build : the building after a movement; the same is measured again with the seed that may be given
     duration : of the settlement in the scene [s]
     step : of the scene [s]
@@ -145,6 +152,29 @@ def _pushed_wall(stones: int, shaken: bool = False) -> Callable[[Movement, int |
     return build
 
 
+def _core_sunk(length: float, lower: int, upper: int) -> Callable[[Movement, int | None], Site]:
+    """Return the generator of a plumb wall whose upper courses stand on a facing and on a core that has sunk."""
+
+    def build(movement: Movement, measured: int | None) -> Site:
+        built = two_facings(
+            length,
+            lower + upper,
+            thickness=_THICK,
+            storeys=1,
+            upper=(upper, _UPPER),
+            batter=0.0,
+            movement=movement,
+            measured=measured,
+        ).building
+        ground = tuple(one.code for one in built.survey.blocks if (one.course or 0) <= lower)
+        core = {f"kind = infill and course = {lower}": 1.0}
+        corner = [code for code in ground if code.startswith(f"F{lower:02d}")][:2]
+        rival = dict(zip(corner, (1.0, 0.5), strict=False))
+        return Site(replace(built, base=ground), core, rival, wall_frame(0.0).axes[0], core=lower)
+
+    return build
+
+
 def _moved_tower(courses: int) -> Callable[[Movement, int | None], Site]:
     """Return the generator of a storey of the tower that has moved."""
 
@@ -187,6 +217,7 @@ PUSHED = Cause(
     battered=False,
     true_step=0.02,
 )
+CORE_SUNK = Cause(0.020, _core_sunk(2.6, 3, 3), 0.5, 0.02, battered=False)
 SHAKEN = Cause(
     0.0,
     _pushed_wall(30, shaken=True),

@@ -17,6 +17,7 @@ from survey.synthetic.buildings.tower import tower_storey
 from survey.synthetic.buildings.vaults import barrel_vault, semicircular_arch
 from survey.synthetic.buildings.walls import wall
 from survey.synthetic.causes import (
+    CORE_SUNK,
     PUSHED,
     SETTLED,
     SETTLED_PHASES,
@@ -204,14 +205,15 @@ def moved_sample(cause: Cause, movement: Movement) -> Sample:
     return Sample(site.building.survey, truth, knowledge)
 
 
-def _moved(title: str, cause: Cause) -> SampleRecipe:
+def _moved(title: str, cause: Cause, fixed: str = "course = 1", core: bool = False) -> SampleRecipe:
     """Return the recipe of a building that has moved, which is made as it was laid."""
-    return SampleRecipe(title, "course = 1", lambda: moved_sample(cause, {}), cause=cause)
+    return SampleRecipe(title, fixed, lambda: moved_sample(cause, {}), core, cause)
 
 
 SAMPLES: Mapping[str, SampleRecipe] = MappingProxyType(
     {
         "arch": SampleRecipe("Semicircular arch", "kind = springer", _of(semicircular_arch)),
+        "core-sunk": _moved("Small wall whose core decayed and sank", CORE_SUNK, "course <= 3", core=True),
         "corner": SampleRecipe("Corner of two walls, bonded by quoins", "course = 1", _of(corner)),
         "facings": SampleRecipe(
             "Wall of two facings with a core",
