@@ -174,6 +174,8 @@ def test_amplitudes_that_do_the_same_cannot_be_told_apart():
     unknowns = [unknown("a"), unknown("b")]
     told = rank("x", (), unknowns, searched(unknowns, residuals)[0], 40, 0)
     assert any("a and b cannot be told apart" in remark for remark in told.remarks)
+    said = verdict(Ranking((told,), still_of(900.0, 40)))
+    assert "CAUTION: a and b cannot be told apart: their correlation is -0.9" in said
 
 
 def test_runs_that_fail_are_told():
@@ -187,6 +189,49 @@ def test_runs_that_fail_are_told():
         [unknown("a", start=0.9)], lambda a: "collapse" if a < 0.3 else 10.0 * (a**3 - 0.1) * place
     )
     assert found.amplitudes[0] == pytest.approx(0.1 ** (1 / 3), abs=0.01)
+
+
+def from_a_threshold(a):
+    """Residuals of stones that slide by the square of what an amplitude is over 0.4, which is 0.3 in truth."""
+    return 20.0 * (max(0.0, abs(a) - 0.4) ** 2 - 0.09) * np.ones(30)
+
+
+def test_an_amplitude_that_acts_from_a_threshold_on_is_found():
+    found, places = searched([unknown("a", start=0.1, low=0.0, high=1.0)], from_a_threshold)
+    assert found.amplitudes[0] == pytest.approx(0.7, abs=0.01)
+    assert found.undetermined == ()
+    # the range is scanned as nothing moves at the start; not where it answers
+    assert (0.0625,) in places
+    _, places = searched([unknown("a", start=0.6, low=0.0, high=1.0)], from_a_threshold)
+    assert (0.0625,) not in places
+
+
+def test_a_scan_that_is_asked_for_leaves_a_minimum_beside_the_best():
+    def residuals(a):
+        # minima near -0.6 and at 0.6
+        return np.array([20.0 * (a**2 - 0.36), 3.0 * (a - 0.6)])
+
+    near, _ = searched([unknown("a", start=-0.7)], residuals)
+    best, places = searched([replace(unknown("a", start=-0.7), scan=4)], residuals)
+    assert near.amplitudes[0] < 0.0
+    assert best.amplitudes[0] > 0.0
+    assert best.chi2 < near.chi2
+    assert {(-0.75,), (-0.25,), (0.25,), (0.75,)} < set(places)
+
+
+def test_a_start_at_which_the_run_fails_is_left():
+    def residuals(a):
+        return "the run ended in collapse" if a > 0.5 else 10.0 * (a - 0.2) * np.ones(10)
+
+    found, _ = searched([unknown("a", start=0.9)], residuals)
+    assert found.amplitudes[0] == pytest.approx(0.2, abs=1e-6)
+
+
+def test_two_amplitudes_that_answer_nowhere_are_not_determined():
+    found, places = searched([unknown("a"), unknown("b")], lambda a, b: np.ones(10))
+    assert len(found.undetermined) == 2
+    assert found.amplitudes == (0.0, 0.0)
+    assert len(set(places)) == 3 + 16
 
 
 def uneven_line(jump, seed):
