@@ -217,7 +217,7 @@ PUSHED = Cause(
     battered=False,
     true_step=0.02,
 )
-CORE_SUNK = Cause(0.020, _core_sunk(2.6, 3, 3), 0.5, 0.02, battered=False)
+CORE_SUNK = Cause(0.020, _core_sunk(2.6, 3, 3), 0.5, 0.01, battered=False)
 SHAKEN = Cause(
     0.0,
     _pushed_wall(30, shaken=True),

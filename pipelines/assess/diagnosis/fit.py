@@ -80,9 +80,9 @@ def fit(unknowns: Sequence[Unknown]) -> Ask:
     places = _scan(unknowns, best, residuals, jacobian)
     if places:
         answer = yield places
-        there = _least(places, answer, residuals)
-        if there is not None:
-            best = np.array(there)
+        least = _least(places, answer, residuals)
+        if least is not None:
+            best = np.array(least)
             answer = yield _asked(best, step, high)
             residuals, jacobian, trouble = _read(answer, best, step, high)
             turns += 1
