@@ -11,7 +11,7 @@ from pipelines.assess.diagnosis.dating import date_movement
 from pipelines.assess.diagnosis.file import Unknown, read_diagnosis
 from pipelines.assess.diagnosis.fit import Fit, fit
 from pipelines.assess.diagnosis.measurements import measure
-from pipelines.assess.diagnosis.ranking import STILL, Ranking, rank, verdict
+from pipelines.assess.diagnosis.ranking import STILL, Ranking, rank, verdict, with_others
 from pipelines.assess.diagnosis.search import cases_of, fit_cases, runs_of
 from pipelines.assess.diagnosis.smoothness import probes, with_unevenness
 from pipelines.assess.diagnosis.trials import Trial, Tried, runner
@@ -178,6 +178,17 @@ def test_amplitudes_that_do_the_same_cannot_be_told_apart():
     assert "CAUTION: a and b cannot be told apart: their correlation is -0.9" in said
 
 
+def test_amounts_beyond_an_interval_that_explain_as_well_are_told():
+    one = hypothesis("a", 45.0)
+    half = one.estimates[0].high - 0.03
+    near = with_others(one, {(0.03,): 45.0, (0.03 + 0.9 * half,): 48.0, (0.06,): 60.0})
+    assert near == one
+    told = with_others(one, {(0.03,): 45.0, (0.05,): 47.0})
+    said = "settlement = 0.05 m explains as well, so that its intervals are too narrow"
+    assert told.remarks[-1] == said
+    assert said in verdict(Ranking((told,), still_of(900.0, 50)))
+
+
 def test_runs_that_fail_are_told():
     failed, _ = searched([unknown("a")], lambda a: "the run ended in collapse")
     told = rank("x", (), [unknown("a")], failed, 20, 0)
@@ -305,6 +316,9 @@ def test_the_first_line_gives_the_verdict_with_its_caution():
     )
     assert "settlement = 0.0300 ± 0.0020 m (95 %)" in verdict(ranking)
     assert verdict(ranking).endswith("CAUTION: it cannot be told apart from 'b'")
+    early = hypothesis("a", 45.0)
+    early = replace(early, fit=replace(early.fit, trouble="not converged in 12 turns"))
+    assert "CAUTION: not converged in 12 turns; " in verdict(replace(ranking, hypotheses=(early,)))
     alone = replace(ranking, hypotheses=(hypothesis("a", 45.0),))
     assert verdict(alone).endswith("CAUTION: a cause that is not in the list may move the stones alike")
     wrong = replace(ranking, hypotheses=(hypothesis("c", 90.0),))
