@@ -23,6 +23,7 @@ from pipelines.assess.diagnosis.search import Case, Fitted, Place, cases_of, che
 from pipelines.assess.diagnosis.trials import Tried, run_trial
 from pipelines.assess.motions import Motions
 from pipelines.ingest.ingest import ingest
+from pipelines.propose.propose import Recording, propose_core
 from pipelines.record.record import record
 from pipelines.scene.sample import write_sample
 from pipelines.scene.true_movement import true_movement
@@ -33,11 +34,17 @@ from survey.synthetic.samples import SAMPLES
 
 __all__ = ["Laboratory", "drawn", "laboratory", "main", "outcome"]
 
-TRUE = "the left corner settled"
-"""Name of the true hypothesis of the samples."""
+_SETTLED = "the left corner settled"
+_TRUE = {
+    "core-sunk": "the core decayed and sank",
+    "settled-small": _SETTLED,
+    "settled-phases": _SETTLED,
+    "shaken": "an earthquake pulse jerked the ground inwards",
+}
+"""True hypothesis of each sample."""
 
-_GRID = 24  # intervals of the range of an unknown, at whose ends runs are made
-_KINDS = ("settled-small", "settled-phases")
+_GRID = {"core-sunk": 12, "shaken": 12}  # intervals of the range of an unknown, at whose ends runs are made
+_FINE = 24  # of other samples
 _TABLE: Table = (
     ("sample", "sample", ""),
     ("runs", "runs", ""),
@@ -45,9 +52,11 @@ _TABLE: Table = (
     ("first", "true cause first", "d"),
     ("explains", "and explains", "d"),
     ("covered", "truth within its 95 %", "d"),
-    ("mean", "mean settlement mm", ".2f"),
-    ("scatter", "its scatter mm", ".2f"),
-    ("half", "half interval mm", ".2f"),
+    ("truth", "truth", ".3g"),
+    ("mean", "mean amount", ".4g"),
+    ("scatter", "its scatter", ".2g"),
+    ("half", "half interval", ".3g"),
+    ("unit", "unit", ""),
     ("none", "without the true cause: none explains", "d"),
     ("dated", "dated right", "d"),
 )
@@ -63,7 +72,10 @@ class Laboratory:
     url : of a database with its stones
     phases : of the stones by code, if it has any
     moved : the true building, measured with a seed
-    settlement : the truth [m]
+    core : whether a core has to be proposed
+    true : name of the true hypothesis
+    amount : the truth, in the unit of its unknown
+    grid : intervals of the range of an unknown, at whose ends runs are made
     stood : the phases that stood when the ground settled; empty if there are none
     """
 
@@ -72,7 +84,10 @@ class Laboratory:
     url: str
     phases: dict[str, str]
     moved: Callable[[int], Building]
-    settlement: float
+    core: bool
+    true: str
+    amount: float
+    grid: int
     stood: tuple[str, ...]
 
     def survey(self, seed: int) -> Measurements:
@@ -86,6 +101,8 @@ def laboratory(kind: str, folder: Path) -> Laboratory:
     write_sample(kind, folder)
     url = f"sqlite:///{folder / 'stones.db'}"
     ingest([folder / f"{kind}.moma"], url)
+    if SAMPLES[kind].core:
+        propose_core(url, recording=Recording())
     knowledge = folder / "knowledge.toml"
     if knowledge.exists():
         record([knowledge], url)
@@ -101,7 +118,10 @@ def laboratory(kind: str, folder: Path) -> Laboratory:
         url,
         dict(found.phases),
         lambda seed: cause.build(movement, seed).building,
-        cause.settlement,
+        SAMPLES[kind].core,
+        _TRUE[kind],
+        cause.amount,
+        _GRID.get(kind, _FINE),
         file.phases[:1],
     )
 
@@ -115,6 +135,7 @@ class Interpolated:
     """
 
     def __init__(self, place: Laboratory) -> None:
+        self._grid = place.grid
         self._run = runs_of(place.file, place.url, lambda trials: [run_trial(one) for one in trials])
         self._known: dict[tuple[str, tuple[str, ...], float], Tried] = {}
 
@@ -124,8 +145,8 @@ class Interpolated:
 
     def _at(self, case: Case, x: float) -> Tried:
         (unknown,) = case.hypothesis.unknowns
-        step = (unknown.high - unknown.low) / _GRID
-        before = min(int((x - unknown.low) / step), _GRID - 1)
+        step = (unknown.high - unknown.low) / self._grid
+        before = min(int((x - unknown.low) / step), self._grid - 1)
         share = (x - unknown.low) / step - before
         ends = [self._end(case, unknown.low + k * step) for k in (before, before + 1)]
         first, second = (one.motions for one in ends)
@@ -145,12 +166,14 @@ class Interpolated:
 def outcome(place: Laboratory, done: Fitted) -> Row:
     """Return what a diagnosis has found, beside the truth."""
     best = done.ranking.hypotheses[0]
-    row: Row = {"first": best.name == TRUE, "explains": best.name == TRUE and best.explains}
-    true = next(one for one in done.ranking.hypotheses if one.name == TRUE and one.stood == place.stood)
+    row: Row = {"first": best.name == place.true}
+    row["explains"] = row["first"] and best.explains
+    true = next(one for one in done.ranking.hypotheses if one.name == place.true and one.stood == place.stood)
     (amount,) = true.estimates
-    row["covered"] = amount.low <= place.settlement <= amount.high
-    row["mean"], row["half"] = 1e3 * amount.value, 1e3 * (amount.high - amount.value)
-    wrong = tuple(one for one in done.ranking.hypotheses if one.name != TRUE)
+    row["covered"] = amount.low <= place.amount <= amount.high
+    row["mean"], row["half"], row["unit"] = amount.value, amount.high - amount.value, amount.unit
+    row["truth"] = place.amount
+    wrong = tuple(one for one in done.ranking.hypotheses if one.name != place.true)
     row["none"] = verdict(Ranking(wrong, done.ranking.still)).startswith("NONE OF THESE")
     rivals = [one for one in done.ranking.rivals if one.stood != best.stood]
     row["dated"] = best.explains and best.stood == place.stood and not rivals if place.stood else None
@@ -166,6 +189,8 @@ def _summed(kind: str, runs: str, rows: Sequence[Row]) -> Row:
         "runs": runs,
         "draws": len(rows),
         **counts,
+        "truth": rows[0]["truth"],
+        "unit": rows[0]["unit"],
         "mean": float(np.mean(values)),
         "scatter": float(np.std(values, ddof=1)) if len(values) > 1 else None,
         "half": float(np.mean([row["half"] for row in rows])),
@@ -191,6 +216,8 @@ def whole(place: Laboratory, draws: int, folder: Path) -> list[Row]:
         path = folder / f"{seed}.moma"
         write_moma(place.moved(seed).survey, path)
         ingest([path], url)
+        if place.core:
+            propose_core(url, recording=Recording())
         if place.phases:
             record([folder / "knowledge.toml"], url)
         runs = runs_of(place.file, url, lambda trials: [run_trial(one) for one in trials])
@@ -205,7 +232,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.diagnosis", description=__doc__)
     parser.add_argument("--draws", type=int, default=100, help="surveys with the runs of one")
     parser.add_argument("--whole", type=int, default=10, help="surveys with runs of their own")
-    parser.add_argument("--samples", nargs="+", choices=_KINDS, default=list(_KINDS))
+    parser.add_argument("--samples", nargs="+", choices=_TRUE, default=list(_TRUE))
     parser.add_argument("--json", action="store_true", help="print an array of objects, one for each row")
     options = parser.parse_args()
     rows = []

@@ -36,6 +36,7 @@ class SampleName(StrEnum):
     """Names in survey.synthetic.samples, which is not loaded for a help text."""
 
     ARCH = "arch"
+    CORE_SUNK = "core-sunk"
     CORNER = "corner"
     FACINGS = "facings"
     PUSHED = "pushed"
@@ -43,6 +44,7 @@ class SampleName(StrEnum):
     SETTLED = "settled"
     SETTLED_PHASES = "settled-phases"
     SETTLED_SMALL = "settled-small"
+    SHAKEN = "shaken"
     TOWER = "tower"
     TOWER_SETTLED_SMALL = "tower-settled-small"
     TOWER_SMALL = "tower-small"

@@ -5,11 +5,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from moma.errors import UsageError
+from pipelines.arrays import Array
 from pipelines.scene.true_movement import true_movement
 from survey.formats.native.writer import write_head, write_moma
 from survey.formats.solids.obj_writer import write_obj
 from survey.synthetic.building import Building
-from survey.synthetic.causes import Cause
+from survey.synthetic.causes import PULSE, Cause
 from survey.synthetic.samples import SAMPLES, SampleRecipe, moved_sample
 
 __all__ = ["WrittenSample", "write_recipe", "write_sample"]
@@ -34,14 +35,14 @@ fixed = ["{fixed}"]
 max_width = 0.04   # m
 
 [contact]
-friction = 0.6
+friction = {friction}
 {joints}
 [time]
 start = "equilibrium"  # found at once; the steps then show that it lasts
 step = {step}{pad}# s
 theta = 1.0
 duration = {duration}     # s
-relaxation = true  # only where it comes to rest is asked for
+{relaxation}
 {loads}
 [output]
 pictures = ["displacement", "pressure"]
@@ -60,6 +61,15 @@ type = "force"
 stones = ["{code}"]
 force = {force}
 """
+
+_JERK = """
+[[loads]]
+type = "motion"
+stones = ["{fixed}"]
+velocity = {{ time = [0.0, {peak}, {end}], value = [[0.0, 0.0, 0.0], {velocity}, [0.0, 0.0, 0.0]] }}
+"""
+_RELAXED = "relaxation = true  # only where it comes to rest is asked for"
+_FOLLOWED = "relaxation = false # the motion itself is followed"
 
 _SPRINGS = """\
 placement = "centroid"  # joints bend on their springs like the whole bed
@@ -86,7 +96,7 @@ _BATTERED = "battered = true\n"
 
 _SETTLED = """
 [[hypotheses]]
-name = "the {corner} corner settled"
+name = "the {what}"
 
 [[hypotheses.unknowns]]
 name = "settlement"
@@ -149,6 +159,19 @@ _PUSHING = """
 type = "force"
 stones = ["{stones}"]
 force = ["= thrust * {out[0]:.6f}", "= thrust * {out[1]:.6f}", 0.0]
+"""
+
+_JERKED = """
+[[hypotheses]]
+name = "an earthquake pulse jerked the ground {way}"
+
+[[hypotheses.unknowns]]
+name = "peak"
+unit = "m/s"
+start = 0.1
+low = 0.0
+high = 1.0
+scan = 5  # stones slide from a threshold on
 """
 
 _SETTLING = """
@@ -245,6 +268,8 @@ def _scene(recipe: SampleRecipe, commands: Sequence[str]) -> str:
     stiffness = None if recipe.cause is None else recipe.cause.stiffness
     return _SCENE.format(
         title=recipe.title,
+        friction=0.6 if recipe.cause is None else recipe.cause.friction,
+        relaxation=_FOLLOWED if recipe.cause is not None and recipe.cause.pulse else _RELAXED,
         joints="" if stiffness is None else _SPRINGS.format(across=stiffness[0], along=stiffness[1]),
         commands=_listed(commands),
         core=_CORE if recipe.core else "",
@@ -252,7 +277,7 @@ def _scene(recipe: SampleRecipe, commands: Sequence[str]) -> str:
         step=step,
         pad=" " * (12 - len(str(step))),
         duration=1.0 if recipe.cause is None else _LONGEST,
-        loads="" if recipe.cause is None else "".join(_loads(recipe.cause)),
+        loads="" if recipe.cause is None else "".join(_loads(recipe.cause, recipe.fixed)),
     )
 
 
@@ -263,9 +288,10 @@ def _listed(commands: Sequence[str]) -> str:
 def _diagnosis(kind: str, fixed: str, cause: Cause, commands: Sequence[str]) -> str:
     """Return hypotheses on the movement of a building, the true one first."""
     site = cause.build({}, None)
-    hypotheses = [_SETTLED.format(corner="left") + _settling(cause, site.settled)]
+    first, second = ("core decayed and sank", "left corner settled") if site.core else _CORNERS
+    hypotheses = [_SETTLED.format(what=first) + _settling(cause, site.settled)]
     if site.rival:
-        hypotheses.append(_SETTLED.format(corner="right") + _settling(cause, site.rival))
+        hypotheses.append(_SETTLED.format(what=second) + _settling(cause, site.rival))
     tilted = _TILTED.format(
         fixed=fixed,
         duration=cause.duration,
@@ -277,6 +303,11 @@ def _diagnosis(kind: str, fixed: str, cause: Cause, commands: Sequence[str]) -> 
     pushing = [_PUSHING.format(stones=stones, out=out) for stones, out in site.pushed.items()]
     top = next(one.code for one in site.building.survey.blocks if one.course == _top(site.building))
     hypotheses += [tilted, "".join([pushed, *pushing]) if pushing else _LOADED.format(top=top)]
+    if site.jerked is not None:
+        jerks = [
+            _jerked(way, sign * site.jerked, fixed) for way, sign in (("inwards", 1.0), ("outwards", -1.0))
+        ]
+        hypotheses = [jerks[0], *hypotheses, jerks[1]]
     dated = cause.stood is not None
     return _DIAGNOSIS.format(
         count=_COUNTS[len(hypotheses)],
@@ -288,7 +319,8 @@ def _diagnosis(kind: str, fixed: str, cause: Cause, commands: Sequence[str]) -> 
     )
 
 
-_COUNTS = {3: "Three", 4: "Four"}
+_CORNERS = ("left corner settled", "right corner settled")
+_COUNTS = {3: "Three", 4: "Four", 5: "Five"}
 
 
 def _settling(cause: Cause, shares: Mapping[str, float]) -> str:
@@ -301,13 +333,28 @@ def _top(building: Building) -> int:
     return max(one.course or 0 for one in building.survey.blocks)
 
 
-def _loads(cause: Cause) -> Iterator[str]:
+def _jerked(way: str, direction: Array, fixed: str) -> str:
+    """Return the hypothesis of an earthquake pulse."""
+    x, y = (f"= peak * {part:.6f}" for part in direction[:2])
+    load = _JERK.replace("loads", "hypotheses.scene.loads").format(**_jerk(fixed, f'["{x}", "{y}", 0.0]'))
+    return _JERKED.format(way=way) + load
+
+
+def _jerk(fixed: str, velocity: str) -> dict[str, object]:
+    peak, end = PULSE
+    return {"fixed": fixed, "peak": peak, "end": end, "velocity": velocity}
+
+
+def _loads(cause: Cause, fixed: str) -> Iterator[str]:
     yield "\n# What moved it: the same as in the truth.\n"
     site = cause.build({}, None)
     for code, height in cause.heights(site).items():
         yield _SETTLEMENT.format(code=code, height=height, duration=cause.duration)
     for code, force in cause.forces(site).items():
         yield _FORCE.format(code=code, force=list(force))
+    jerk = cause.jerk(site)
+    if jerk is not None:
+        yield _JERK.format(**_jerk(fixed, str(list(jerk))))
 
 
 def _commands(

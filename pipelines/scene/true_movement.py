@@ -3,23 +3,26 @@
 import numpy as np
 
 from mechanics.results.result import Outcome
+from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.elastic_joint import ElasticJoint
 from mechanics.scene.loads.forces import StoneForce
 from mechanics.scene.loads.load import Loads
-from mechanics.scene.loads.motions import settlement
+from mechanics.scene.loads.motions import ImposedMotion, settlement
 from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import Block, ContactSettings, Fidelity, Placement, Scene, Start, TimeSettings
 from mechanics.simulate import simulate
 from mechanics.stones.materials import Material
 from moma.errors import SolverError
 from pipelines.arrays import Array
-from survey.synthetic.causes import Cause
+from survey.geometry.solids import Solid, planes_of_solid
+from survey.synthetic.causes import PULSE, Cause, Site
 from survey.synthetic.frame import Movement, RigidMotion
+from survey.unseen.core.facings import FacingStone
+from survey.unseen.core.propose import propose_infill
 
 __all__ = ["true_movement"]
 
 _LONGEST = 3.0  # duration of the simulation [s]
-_FRICTION = 0.6  # of all joints [-]
 
 
 def true_movement(cause: Cause) -> Movement:
@@ -45,14 +48,25 @@ def true_movement(cause: Cause) -> Movement:
         for one in building.solids
         if cause.stood is None or course[one.code] <= cause.stood
     )
+    core = _core(site)
+    blocks += tuple(
+        Block(one.code, one.vertices - middle, one.faces, limestone, Fidelity.FIXED) for one in core
+    )
     motions = [
-        settlement([code], (0.0, 0.0, z), cause.true_duration) for code, z in cause.heights(site).items()
+        settlement([one.code for one in core] or [code], (0.0, 0.0, z), cause.true_duration)
+        for code, z in cause.heights(site).items()
     ]
+    jerk = cause.jerk(site)
+    if jerk is not None:
+        velocity = History(np.array([0.0, *PULSE]), np.array([np.zeros(3), jerk, np.zeros(3)]))
+        motions.append(ImposedMotion(frozenset(building.base), velocity))
     forces = [
         StoneForce(frozenset({code}), History.constant(np.array(force)))
         for code, force in cause.forces(site).items()
     ]
-    time = TimeSettings(step=cause.true_step, duration=_LONGEST, relaxation=True, start=Start.EQUILIBRIUM)
+    time = TimeSettings(
+        step=cause.true_step, duration=_LONGEST, relaxation=jerk is None, start=Start.EQUILIBRIUM
+    )
     scene = Scene(
         "movement",
         blocks,
@@ -65,13 +79,28 @@ def true_movement(cause: Cause) -> Movement:
         raise SolverError(
             f"the stones of the sample do not come to rest: {result.outcome}", remedy="choose another sample"
         )
-    return {body.code: _motion(body.reference + middle, body.position + middle) for body in result.bodies}
+    return {
+        body.code: _motion(body.reference + middle, body.position + middle)
+        for body in result.bodies
+        if body.code in course
+    }
+
+
+def _core(site: Site) -> list[Solid]:
+    """Return the true core on which stones stand, between the hidden sides of two facings, if there is one."""
+    if site.core is None:
+        return []
+    stones = [
+        FacingStone(record.code, record.course, solid, planes_of_solid(solid)[0, :3])
+        for record, solid in zip(site.building.survey.blocks, site.building.solids, strict=True)
+    ]
+    return [one.solid for one in propose_infill(stones) if one.course == site.core]
 
 
 def _contact(cause: Cause) -> ContactSettings:
     if cause.stiffness is None:
-        return ContactSettings()
-    return ContactSettings(law=ElasticJoint(_FRICTION, *cause.stiffness), placement=Placement.CENTROID)
+        return ContactSettings(law=DryJoint(cause.friction))
+    return ContactSettings(law=ElasticJoint(cause.friction, *cause.stiffness), placement=Placement.CENTROID)
 
 
 def _motion(before: Array, after: Array) -> RigidMotion:

@@ -17,10 +17,12 @@ from survey.synthetic.buildings.tower import tower_storey
 from survey.synthetic.buildings.vaults import barrel_vault, semicircular_arch
 from survey.synthetic.buildings.walls import wall
 from survey.synthetic.causes import (
+    CORE_SUNK,
     PUSHED,
     SETTLED,
     SETTLED_PHASES,
     SETTLED_SMALL,
+    SHAKEN,
     TOWER_SMALL_SETTLED,
     Cause,
 )
@@ -198,9 +200,8 @@ ordered = {ordered}
 
 def _truth_of(
     building: Building,
-    settlement: Mapping[str, float] = MappingProxyType({}),
+    causes: Mapping[str, object] = MappingProxyType({}),
     axes: Mapping[str, object] = MappingProxyType({}),
-    forces: Mapping[str, Sequence[float]] = MappingProxyType({}),
 ) -> str:
     """Return the true stones of a building, one to a line, with what has moved them and how, and the axes of ribs."""
     stones = [
@@ -214,8 +215,7 @@ def _truth_of(
     ]
     lines = ",\n".join(json.dumps(stone) for stone in stones)
     about = json.dumps(f"true geometry of the synthetic survey {building.survey.head.path}; metres")
-    cause = f'"settlement": {json.dumps(dict(settlement))},\n' if settlement else ""
-    cause += f'"forces": {json.dumps(dict(forces))},\n' if forces else ""
+    cause = "".join(f'"{name}": {json.dumps(value)},\n' for name, value in causes.items() if value)
     curves = f'"axes": {json.dumps(dict(axes))},\n' if axes else ""
     return f'{{\n"about": {about},\n{cause}{curves}"stones": [\n{lines}\n]\n}}\n'
 
@@ -233,7 +233,8 @@ def moved_sample(cause: Cause, movement: Movement) -> Sample:
     site = cause.build(movement, None)
     last = cause.stood or site.level_break
     knowledge = "" if last is None else _PHASES.format(last=last)
-    truth = _truth_of(site.building, cause.heights(site), forces=cause.forces(site))
+    causes = {"settlement": cause.heights(site), "forces": cause.forces(site), "jerk": cause.jerk(site)}
+    truth = _truth_of(site.building, causes)
     return Sample(site.building.survey, truth, knowledge)
 
 
@@ -242,14 +243,15 @@ def storey_recipe(courses: int, title: str, *, elaborate: bool = True) -> Sample
     return SampleRecipe(title, "course = 1", _tower(courses, elaborate), core=True)
 
 
-def _moved(title: str, cause: Cause) -> SampleRecipe:
+def _moved(title: str, cause: Cause, fixed: str = "course = 1", core: bool = False) -> SampleRecipe:
     """Return the recipe of a building that has moved, which is made as it was laid."""
-    return SampleRecipe(title, "course = 1", lambda: moved_sample(cause, {}), cause=cause)
+    return SampleRecipe(title, fixed, lambda: moved_sample(cause, {}), core, cause)
 
 
 SAMPLES: Mapping[str, SampleRecipe] = MappingProxyType(
     {
         "arch": SampleRecipe("Semicircular arch", "kind = springer", _of(semicircular_arch)),
+        "core-sunk": _moved("Small wall whose core decayed and sank", CORE_SUNK, "course <= 3", core=True),
         "corner": SampleRecipe("Corner of two walls, bonded by quoins", "course = 1", _of(corner)),
         "facings": SampleRecipe(
             "Wall of two facings with a core",
@@ -264,6 +266,7 @@ SAMPLES: Mapping[str, SampleRecipe] = MappingProxyType(
             "Wall whose left corner settled before its upper courses were laid", SETTLED_PHASES
         ),
         "settled-small": _moved("Small wall whose left corner settled", SETTLED_SMALL),
+        "shaken": _moved("Small wall shaken by an earthquake pulse", SHAKEN),
         "tower": storey_recipe(40, "Storey of a tower"),
         "tower-settled-small": _moved(
             "Storey of a tower, of twelve courses, whose left corner settled", TOWER_SMALL_SETTLED

@@ -6,7 +6,7 @@ from benchmarks.diagnosis import drawn, laboratory
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["settled-small", "settled-phases"])
+@pytest.mark.parametrize("kind", ["core-sunk", "settled-small", "settled-phases", "shaken"])
 def test_surveys_made_again_give_the_same_verdict(kind, tmp_path):
     place = laboratory(kind, tmp_path / kind)
     rows = drawn(place, 12)

@@ -6,11 +6,24 @@ import re
 import pytest
 
 from pipelines.assess.diagnosis.file import DIAGNOSIS_KEYS, HYPOTHESIS_KEYS, UNKNOWN_KEYS, read_diagnosis
+from pipelines.scene.file import parse_scene
+from pipelines.toml.writer import toml_text
 from tests.docs.pages import blocks, ran
 from tests.moma.commands import answer
 from tests.paths import ROOT
 
 PAGE = "docs/howto/diagnose.md"
+SCENE = """
+[materials.limestone]
+density = 2350.0
+young = 12e9
+poisson = 0.2
+[bodies]
+fixed = ["course = 1"]
+[[loads]]
+type = "gravity_ramp"
+duration = 0.1
+"""
 
 
 @pytest.fixture(scope="module")
@@ -70,13 +83,27 @@ def test_the_tables_list_all_keys_and_the_example_can_be_read(tmp_path):
     listed = [(row[0].strip("`"), row[1], row[3]) for row in rows if len(row) == 4 and row[3]]
     for key in (*DIAGNOSIS_KEYS, *HYPOTHESIS_KEYS, *UNKNOWN_KEYS):
         assert (key.name, key.unit, key.doc) in listed
-    (example,) = blocks(PAGE, "toml")
+    example, _ = blocks(PAGE, "toml")
     (tmp_path / "settled-small.toml").write_text("[[loads]]\n", encoding="utf-8")
     (tmp_path / "diagnosis.toml").write_text(example, encoding="utf-8")
     file = read_diagnosis(tmp_path / "diagnosis.toml")
     (hypothesis,) = file.hypotheses
     (load,) = hypothesis.scene(file.base, (0.02,))["loads"]
     assert load["displacement"] == [0.0, 0.0, -0.02]
+
+
+def test_each_cause_that_is_shown_makes_a_scene(tmp_path):
+    _, others = blocks(PAGE, "toml")
+    (tmp_path / "scene.toml").write_text(SCENE, encoding="utf-8")
+    (tmp_path / "diagnosis.toml").write_text('[diagnosis]\nscene = "scene.toml"\n' + others, encoding="utf-8")
+    file = read_diagnosis(tmp_path / "diagnosis.toml")
+    base = len(file.base["loads"])
+    for one in file.hypotheses:
+        start = tuple(unknown.start for unknown in one.unknowns)
+        scene = parse_scene(toml_text(one.scene(file.base, start)), "scene.toml")
+        assert len(scene.loads) == base + (2 if one.name.startswith("a tie") else 1)
+    named = " ".join(one.name for one in file.hypotheses)
+    assert all(word in named for word in ("tilted", "spread", "tie", "load", "pulse", "core"))
 
 
 @pytest.mark.slow

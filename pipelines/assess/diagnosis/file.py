@@ -81,6 +81,15 @@ UNKNOWN_KEYS = (
         default=None,
         above=0,
     ),
+    Key(
+        "scan",
+        Kind.INTEGER,
+        "Number of values across its range that are tried first; the search begins with the best. Where nothing moves "
+        "at the start, or its run fails, some are tried in any case.",
+        default=0,
+        at_least=0,
+        at_most=100,
+    ),
 )
 
 _OPERATORS: Mapping[type[ast.operator], Callable[[float, float], float]] = {
@@ -101,6 +110,7 @@ class Unknown:
     name, unit : for formulas and reports
     start, low, high : first value and bounds
     step : change for derivatives, positive
+    scan : number of values across the range that are tried first
     """
 
     name: str
@@ -109,6 +119,7 @@ class Unknown:
     low: float
     high: float
     step: float
+    scan: int = 0
 
 
 @dataclass(frozen=True)

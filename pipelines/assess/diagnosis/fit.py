@@ -3,10 +3,14 @@
 In each turn the residuals r at amplitudes x and at x + δ eᵢ are asked for together, so that they can be computed side
 by side. J eᵢ = (r(x + δ eᵢ) - r(x)) / δ; the step minimises |r + J s|² within the bounds, and is halved as long as the
 sum of squares grows. The search ends where a step promises to lower χ² by less than a fiftieth.
+
+Derivatives say nothing below a threshold, as of the shaking under which stones begin to slide. Where they are zero at
+the start, where its run fails, and where it is asked for, the range is scanned first: the search begins with the best.
 """
 
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -19,6 +23,7 @@ __all__ = ["Ask", "Fit", "fit"]
 _TURNS = 12  # of the search
 _ENOUGH = 0.02  # fall of χ² that a step must promise [-]
 _HALVINGS = 4  # of a step that makes χ² grow
+_SCANNED = 8  # values across a range that are tried where the start says nothing; fewer of each of several
 _FELT = 2.0  # change of the residuals over the whole range below which a direction is not determined [-]
 
 Ask = Generator[list[tuple[float, ...]], list[Array | str], "Fit"]
@@ -71,9 +76,18 @@ def fit(unknowns: Sequence[Unknown]) -> Ask:
     best = np.array([one.start for one in unknowns], dtype=np.float64)
     answer = yield _asked(best, step, high)
     residuals, jacobian, trouble = _read(answer, best, step, high)
+    turns = 1
+    places = _scan(unknowns, best, residuals, jacobian)
+    if places:
+        answer = yield places
+        least = _least(places, answer, residuals)
+        if least is not None:
+            best = np.array(least)
+            answer = yield _asked(best, step, high)
+            residuals, jacobian, trouble = _read(answer, best, step, high)
+            turns += 1
     if residuals is None:
         return Fit(tuple(best.tolist()), np.zeros(0), np.zeros((len(best),) * 2), (), 1, trouble)
-    turns = 1
     while jacobian is not None and len(best):
         # the least change among all that lower χ² as much: a direction without effect is left alone
         scaled = jacobian * span
@@ -103,6 +117,41 @@ def fit(unknowns: Sequence[Unknown]) -> Ask:
         assert residuals is not None
     covariance, undetermined = _covariance(jacobian, span)
     return Fit(tuple(best.tolist()), residuals, covariance, undetermined, turns, trouble)
+
+
+def _scan(
+    unknowns: Sequence[Unknown], start: Array, residuals: Array | None, jacobian: Array | None
+) -> list[tuple[float, ...]]:
+    """Return the places to be tried before the search: a grid over the unknowns that ask for it, or do not answer."""
+    blind = [
+        residuals is None
+        or (jacobian is not None and np.linalg.norm(jacobian[:, k]) * (one.high - one.low) < _FELT)
+        for k, one in enumerate(unknowns)
+    ]
+    few = max(2, _SCANNED // max(1, sum(blind)))
+    counts = [one.scan or (few if own else 0) for one, own in zip(unknowns, blind, strict=True)]
+    if not any(counts):
+        return []
+    values = [
+        [float(one.low + (one.high - one.low) * (i + 0.5) / count) for i in range(count)]
+        if count
+        else [float(x)]
+        for one, count, x in zip(unknowns, counts, start, strict=True)
+    ]
+    return list(product(*values))
+
+
+def _least(
+    places: Sequence[tuple[float, ...]], answer: Sequence[Array | str], residuals: Array | None
+) -> tuple[float, ...] | None:
+    """Return the place with the least χ², if it is less than that of the start."""
+    known = [
+        (float(one @ one), place)
+        for one, place in zip(answer, places, strict=True)
+        if not isinstance(one, str)
+    ]
+    chi2, best = min(known, default=(np.inf, None))
+    return best if residuals is None or chi2 < float(residuals @ residuals) - _ENOUGH else None
 
 
 def _asked(place: Array, step: Array, high: Array) -> list[tuple[float, ...]]:

@@ -1,8 +1,8 @@
 """Rank of hypotheses by what they leave unexplained and the number of their unknowns; the verdict in one line."""
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import fdtrc, stdtrit
@@ -20,6 +20,7 @@ __all__ = [
     "estimates",
     "rank",
     "verdict",
+    "with_others",
 ]
 
 STILL = "nothing has moved"
@@ -71,6 +72,7 @@ class Ranked:
     aicc : χ² + 2 k with the correction for few values
     estimates : its amplitudes
     remarks : cautions about its amplitudes and runs
+    tied : amplitudes that are not told apart, or have others beside them, in words
     uneven : amplitudes that scatter with the runs themselves, each with its unit
     """
 
@@ -82,6 +84,7 @@ class Ranked:
     aicc: float
     estimates: tuple[Estimate, ...]
     remarks: tuple[str, ...]
+    tied: tuple[str, ...] = ()
     uneven: tuple[str, ...] = ()
 
     @property
@@ -140,7 +143,9 @@ def rank(
     probability = float(fdtrc(left, steps or 1e9, ratio))
     aicc = found.chi2 + 2.0 * count + 2.0 * count * (count + 1) / max(dof - count - 1, 1)
     own = tuple(estimates(unknowns, found, left))
-    return Ranked(name, stood, found, left, probability, aicc, own, tuple(_remarks(unknowns, found, own)))
+    tied = tuple(_tied(unknowns, found))
+    remarks = (*_remarks(unknowns, found, own), *tied)
+    return Ranked(name, stood, found, left, probability, aicc, own, remarks, tied)
 
 
 def estimates(unknowns: Sequence[Unknown], found: Fit, dof: int) -> Iterator[Estimate]:
@@ -172,12 +177,46 @@ def _remarks(unknowns: Sequence[Unknown], found: Fit, own: Sequence[Estimate]) -
         ]
         told = " ".join(parts) if len(parts) > 1 else parts[0].split()[1]
         yield f"not determined, as it moves nothing that was measured: {told}"
+
+
+def _tied(unknowns: Sequence[Unknown], found: Fit) -> Iterator[str]:
+    """Yield the pairs of amplitudes of which the measurements tell a combination alone."""
+    names = [one.name for one in unknowns]
     sigma = np.sqrt(np.diag(found.covariance))
     for i in range(len(names)):
         for k in range(i):
             correlation = found.covariance[i, k] / (sigma[i] * sigma[k]) if sigma[i] * sigma[k] > 0.0 else 0.0
             if abs(correlation) > _CORRELATED:
                 yield f"{names[k]} and {names[i]} cannot be told apart: their correlation is {correlation:+.3f}"
+
+
+def with_others(ranked: Ranked, tried: Mapping[tuple[float, ...], float]) -> Ranked:
+    """Return a hypothesis that tells amplitudes outside its intervals with which it explains as well.
+
+    Where residuals are linear in the amplitudes there are none; where they are not, intervals are too narrow.
+
+    Parameters
+    ----------
+    ranked : with its intervals
+    tried : χ² of the amplitudes at which runs were made
+    """
+    more = float(stdtrit(ranked.dof, QUANTILE)) ** 2 * max(1.0, ranked.fit.chi2 / ranked.dof)
+    beyond = {
+        place: max(
+            abs(x - own.value) / max(own.high - own.value, 1e-300)
+            for own, x in zip(ranked.estimates, place, strict=True)
+        )
+        for place, chi2 in tried.items()
+        if chi2 < ranked.fit.chi2 + more
+    }
+    farthest = max(beyond, key=lambda place: beyond[place], default=())
+    if not farthest or beyond[farthest] <= 1.0:
+        return ranked
+    amounts = " and ".join(
+        f"{own.name} = {x:.3g} {own.unit}" for own, x in zip(ranked.estimates, farthest, strict=True)
+    )
+    said = f"{amounts} explains as well, so that its intervals are too narrow"
+    return replace(ranked, remarks=(*ranked.remarks, said), tied=(*ranked.tied, said))
 
 
 def verdict(ranking: Ranking) -> str:
@@ -206,7 +245,7 @@ def verdict(ranking: Ranking) -> str:
         if rivals
         else "a cause that is not in the list may move the stones alike"
     )
-    caution = f"CAUTION: {'; '.join(filter(None, (uneven, other)))}"
+    caution = f"CAUTION: {'; '.join(filter(None, (best.fit.trouble, uneven, *best.tied, other)))}"
     amounts = "; ".join(_amount(one) for one in best.estimates)
     return f"{best.title!r} explains what was measured ({chi2}){f': {amounts}' if amounts else ''}; {caution}"
 

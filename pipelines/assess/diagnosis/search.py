@@ -14,7 +14,7 @@ from moma.errors import SceneError
 from pipelines.arrays import Array
 from pipelines.assess.diagnosis.file import DiagnosisFile, Hypothesis
 from pipelines.assess.diagnosis.fit import Ask, Fit, fit
-from pipelines.assess.diagnosis.ranking import APART, STILL, Ranked, Ranking, rank
+from pipelines.assess.diagnosis.ranking import APART, STILL, Ranked, Ranking, rank, with_others
 from pipelines.assess.diagnosis.smoothness import probes, with_unevenness
 from pipelines.assess.diagnosis.trials import Runner, Trial, Tried, since_rest
 from pipelines.assess.motions import Motions
@@ -206,7 +206,13 @@ def fit_cases(
         make(near)
     for k, xs in near.items():
         answers = {x: _answer(known[k, x], deformation) for x in xs}
-        ranked[k] = with_unevenness(ranked[k], cases[k].hypothesis.unknowns, answers)
+        uneven = with_unevenness(ranked[k], cases[k].hypothesis.unknowns, answers)
+        everywhere = {
+            x: _answer(tried, deformation) for (own, x), tried in known.items() if own == k and tried.motions
+        }
+        ranked[k] = with_others(
+            uneven, {x: float(one @ one) for x, one in everywhere.items() if not isinstance(one, str)}
+        )
     residuals = deformation.residuals(_NOWHERE.displacement)
     still = Fit((), residuals, np.zeros((0, 0)), (), 0)
     ranking = Ranking(

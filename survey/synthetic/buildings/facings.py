@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from random import Random
+from types import MappingProxyType
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from survey.synthetic.bond import PlannedStone, upright
 from survey.synthetic.building import Building, Draft, flat_stone, measured_building
 from survey.synthetic.buildings.walls import bed_heights, plan_courses
 from survey.synthetic.coursing import Bed, Piece, planned
-from survey.synthetic.frame import WallFrame, build_stone, wall_frame
+from survey.synthetic.frame import BATTER, Movement, WallFrame, build_stone, wall_frame
 
 __all__ = ["BACK", "TwoFacings", "two_facings"]
 
@@ -54,7 +55,16 @@ class TwoFacings:
 
 
 def two_facings(
-    length: float = 5.0, courses: int = 10, seed: int = 1, *, thickness: float = 1.1, storeys: int = 2
+    length: float = 5.0,
+    courses: int = 10,
+    seed: int = 1,
+    *,
+    thickness: float = 1.1,
+    storeys: int = 2,
+    upper: tuple[int, float] = (0, 0.0),
+    batter: float = BATTER,
+    movement: Movement = MappingProxyType({}),
+    measured: int | None = None,
 ) -> TwoFacings:
     """Build a wall of two facings and measure both.
 
@@ -65,6 +75,10 @@ def two_facings(
     seed : of Python's own generator, whose stream is the same everywhere
     thickness : from face to face; more than 0.95, so that headers of both sides do not meet [m]
     storeys : number of storeys; a record's zone names its facing and storey
+    upper : number of courses of the first facing above the second one, and the depth of their stones [m]
+    batter : angle by which it leans back [rad]
+    movement : of the stones since they were laid
+    measured : seed of the joints, wear and noise alone, so that the same stones are measured again; None: as `seed`
 
     Returns
     -------
@@ -74,30 +88,35 @@ def two_facings(
     heights = bed_heights(rng, courses)
     ends = (-0.5 * length, 0.5 * length)
     through = _through(heights, ends)
-    front = wall_frame()
+    front = wall_frame(batter)
     back = WallFrame(
         front.origin - thickness * front.axes[2], np.array([-front.axes[0], front.axes[1], -front.axes[2]])
     )
     spans = [(courses * k // storeys + 1, courses * (k + 1) // storeys) for k in range(storeys)]
     drafts: list[Draft] = []
     for letter, frame in (("F", front), ("B", back)):
+        top = courses - upper[0]
         given = through if letter == "F" else [[_mirrored(piece) for piece in row] for row in through]
         for number, course in enumerate(plan_courses(rng, heights, ends, through=given), start=1):
             beds = Bed(heights[number - 1]), Bed(heights[number])
             zone = f"{letter} storey {next(k for k, s in enumerate(spans, start=1) if number <= s[1])}"
             for k, piece in enumerate(course.pieces, start=1):
                 passes = piece in given[number - 1]
-                if passes and letter == "B":
+                if letter == "B" and (passes or number > top):
                     continue
+                depth = upper[1] if number > top else thickness if passes else None
                 code = f"{'T' if passes else letter}{number:02d}-{k:02d}"
                 plan = planned(code, piece, *beds, number)[0]
-                drafts.append(_draft(plan, frame, zone, thickness if passes else None, rng))
+                drafts.append(_draft(plan, frame, zone, depth, rng))
     stations = [
         Station(name, np.round(frame.place(np.array([[0.5, 1.5]]), 8.0)[0], 4))
         for name, frame in ((OBSERVER, front), (BACK, back))
     ]
     base = [draft.stone.plan.code for draft in drafts if draft.stone.plan.course == 1]
-    building = measured_building("wall of two facings", drafts, _DEPTHS, stations, base, rng)
+    rng = rng if measured is None else Random(measured)
+    building = measured_building(
+        "wall of two facings", drafts, _DEPTHS, stations, base, rng, movement=movement
+    )
     codes = {letter: tuple(s.code for s in building.solids if s.code[0] == letter) for letter in "FBT"}
     return TwoFacings(
         building=building,
@@ -129,7 +148,7 @@ def _mirrored(piece: Piece) -> Piece:
 
 
 def _draft(plan: PlannedStone, frame: WallFrame, zone: str, through: float | None, rng: Random) -> Draft:
-    """Draft a stone of a facing; a through stone has its two faces in those of the wall."""
+    """Draft a stone of a facing; one with a depth of its own has two faces parallel to the wall."""
     stone = (
         flat_stone(plan, through, frame)
         if through is not None

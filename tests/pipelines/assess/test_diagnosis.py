@@ -11,7 +11,7 @@ from pipelines.assess.diagnosis.dating import date_movement
 from pipelines.assess.diagnosis.file import Unknown, read_diagnosis
 from pipelines.assess.diagnosis.fit import Fit, fit
 from pipelines.assess.diagnosis.measurements import measure
-from pipelines.assess.diagnosis.ranking import STILL, Ranking, rank, verdict
+from pipelines.assess.diagnosis.ranking import STILL, Ranking, rank, verdict, with_others
 from pipelines.assess.diagnosis.search import cases_of, fit_cases, runs_of
 from pipelines.assess.diagnosis.smoothness import probes, with_unevenness
 from pipelines.assess.diagnosis.trials import Trial, Tried, runner
@@ -174,6 +174,19 @@ def test_amplitudes_that_do_the_same_cannot_be_told_apart():
     unknowns = [unknown("a"), unknown("b")]
     told = rank("x", (), unknowns, searched(unknowns, residuals)[0], 40, 0)
     assert any("a and b cannot be told apart" in remark for remark in told.remarks)
+    said = verdict(Ranking((told,), still_of(900.0, 40)))
+    assert "CAUTION: a and b cannot be told apart: their correlation is -0.9" in said
+
+
+def test_amounts_beyond_an_interval_that_explain_as_well_are_told():
+    one = hypothesis("a", 45.0)
+    half = one.estimates[0].high - 0.03
+    near = with_others(one, {(0.03,): 45.0, (0.03 + 0.9 * half,): 48.0, (0.06,): 60.0})
+    assert near == one
+    told = with_others(one, {(0.03,): 45.0, (0.05,): 47.0})
+    said = "settlement = 0.05 m explains as well, so that its intervals are too narrow"
+    assert told.remarks[-1] == said
+    assert said in verdict(Ranking((told,), still_of(900.0, 50)))
 
 
 def test_runs_that_fail_are_told():
@@ -187,6 +200,49 @@ def test_runs_that_fail_are_told():
         [unknown("a", start=0.9)], lambda a: "collapse" if a < 0.3 else 10.0 * (a**3 - 0.1) * place
     )
     assert found.amplitudes[0] == pytest.approx(0.1 ** (1 / 3), abs=0.01)
+
+
+def from_a_threshold(a):
+    """Residuals of stones that slide by the square of what an amplitude is over 0.4, which is 0.3 in truth."""
+    return 20.0 * (max(0.0, abs(a) - 0.4) ** 2 - 0.09) * np.ones(30)
+
+
+def test_an_amplitude_that_acts_from_a_threshold_on_is_found():
+    found, places = searched([unknown("a", start=0.1, low=0.0, high=1.0)], from_a_threshold)
+    assert found.amplitudes[0] == pytest.approx(0.7, abs=0.01)
+    assert found.undetermined == ()
+    # the range is scanned as nothing moves at the start; not where it answers
+    assert (0.0625,) in places
+    _, places = searched([unknown("a", start=0.6, low=0.0, high=1.0)], from_a_threshold)
+    assert (0.0625,) not in places
+
+
+def test_a_scan_that_is_asked_for_leaves_a_minimum_beside_the_best():
+    def residuals(a):
+        # minima near -0.6 and at 0.6
+        return np.array([20.0 * (a**2 - 0.36), 3.0 * (a - 0.6)])
+
+    near, _ = searched([unknown("a", start=-0.7)], residuals)
+    best, places = searched([replace(unknown("a", start=-0.7), scan=4)], residuals)
+    assert near.amplitudes[0] < 0.0
+    assert best.amplitudes[0] > 0.0
+    assert best.chi2 < near.chi2
+    assert {(-0.75,), (-0.25,), (0.25,), (0.75,)} < set(places)
+
+
+def test_a_start_at_which_the_run_fails_is_left():
+    def residuals(a):
+        return "the run ended in collapse" if a > 0.5 else 10.0 * (a - 0.2) * np.ones(10)
+
+    found, _ = searched([unknown("a", start=0.9)], residuals)
+    assert found.amplitudes[0] == pytest.approx(0.2, abs=1e-6)
+
+
+def test_two_amplitudes_that_answer_nowhere_are_not_determined():
+    found, places = searched([unknown("a"), unknown("b")], lambda a, b: np.ones(10))
+    assert len(found.undetermined) == 2
+    assert found.amplitudes == (0.0, 0.0)
+    assert len(set(places)) == 3 + 16
 
 
 def uneven_line(jump, seed):
@@ -260,6 +316,9 @@ def test_the_first_line_gives_the_verdict_with_its_caution():
     )
     assert "settlement = 0.0300 ± 0.0020 m (95 %)" in verdict(ranking)
     assert verdict(ranking).endswith("CAUTION: it cannot be told apart from 'b'")
+    early = hypothesis("a", 45.0)
+    early = replace(early, fit=replace(early.fit, trouble="not converged in 12 turns"))
+    assert "CAUTION: not converged in 12 turns; " in verdict(replace(ranking, hypotheses=(early,)))
     alone = replace(ranking, hypotheses=(hypothesis("a", 45.0),))
     assert verdict(alone).endswith("CAUTION: a cause that is not in the list may move the stones alike")
     wrong = replace(ranking, hypotheses=(hypothesis("c", 90.0),))

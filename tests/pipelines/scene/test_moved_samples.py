@@ -38,12 +38,19 @@ def test_the_true_hypothesis_with_the_true_amount_is_the_cause_in_the_scene_and_
     read_scene(folder / f"{kind}.toml")
     assert "loads" not in file.base
     cause = SAMPLES[kind].cause
-    true, amount = (-1, cause.thrust) if cause.thrust else (0, cause.settlement)
-    loads = file.hypotheses[true].scene(file.base, (amount,))["loads"]
+    true = -1 if cause.thrust else 0
+    loads = file.hypotheses[true].scene(file.base, (cause.amount,))["loads"]
     for said, tried in zip(scene["loads"], loads, strict=True):
         assert said["type"] == tried["type"]
         assert said["stones"] == tried["stones"]
-        if cause.thrust:
+        if cause.pulse:
+            assert said["velocity"]["time"] == tried["velocity"]["time"]
+            peak = said["velocity"]["value"][1]
+            assert peak == pytest.approx(tried["velocity"]["value"][1], abs=1e-6)
+            assert truth["jerk"] == peak
+            assert np.linalg.norm(peak) == pytest.approx(cause.pulse, abs=1e-6)
+            assert scene["time"]["relaxation"] is False
+        elif cause.thrust:
             # directions of the formulas have six digits
             assert said["force"] == pytest.approx(tried["force"], abs=2e-3)
             assert truth["forces"][said["stones"][0]] == said["force"]
@@ -52,7 +59,8 @@ def test_the_true_hypothesis_with_the_true_amount_is_the_cause_in_the_scene_and_
             # shares of the formulas have four digits
             assert said["displacement"] == pytest.approx(tried["displacement"], abs=2e-6)
             assert truth["settlement"][said["stones"][0]] == said["displacement"][2]
-    assert len(scene["loads"]) == len(truth["forces" if cause.thrust else "settlement"])
+    if not cause.pulse:
+        assert len(scene["loads"]) == len(truth["forces" if cause.thrust else "settlement"])
     assert len({one.name for one in file.hypotheses}) == len(file.hypotheses) >= 3
 
 

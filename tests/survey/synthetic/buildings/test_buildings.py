@@ -28,6 +28,7 @@ BUILDINGS = {
     "arch": semicircular_arch,
     "corner": lambda: corner(4, 2.0),
     "facings": lambda: two_facings(3.0, 5).building,
+    "facings with an upper part": lambda: two_facings(2.6, 6, thickness=1.6, upper=(3, 1.1)).building,
     "tower": lambda: tower_storey(11, seed=2, blunders=0.0).building,
     "low tower": lambda: tower_storey(5, blunders=0.0).building,
 }
