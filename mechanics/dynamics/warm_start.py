@@ -9,7 +9,7 @@ from mechanics.arrays import Array, Bools, Ints
 from mechanics.carried import Carrier
 from mechanics.contact.contacts import PAIR_BIT
 from mechanics.problem.problem import ContactSolution, ContactStart
-from mechanics.scene.laws.law import BOND, REST, SPRING, STATE
+from mechanics.scene.laws.law import BOND, ENERGY, REST, SPRING, STATE
 
 __all__ = ["Memory"]
 
@@ -67,6 +67,7 @@ class Memory(Carrier):
                 values[known] = self._values[at[known]]
                 if place is not None and self._place is not None:
                     self._inherit(values, np.flatnonzero(~known), key, place, order)
+                self._share(values, key, order)
         d = self._dimension
         motion = self._motion if self.follows else None
         last = ContactStart(values[:, :d], values[:, d : 2 * d], motion)
@@ -104,6 +105,18 @@ class Memory(Carrier):
         heir = np.repeat(np.arange(len(heirs)), count)
         nearest = old[np.lexsort((distance, heir))[first]]
         values[heirs, 2 * self._dimension :] = state[nearest]
+
+    def _share(self, values: Array, key: Ints, order: Ints) -> None:
+        """Share what the springs of each pair of shapes hold evenly over the contacts that it has now."""
+        column = 2 * self._dimension + ENERGY
+        held = self._values[order, column]
+        if not held.any():
+            return
+        pair, first = np.unique(self._key[order] >> PAIR_BIT, return_index=True)
+        total = np.add.reduceat(held, first)
+        now, row, count = np.unique(key >> PAIR_BIT, return_inverse=True, return_counts=True)
+        at, known = _places(pair, now, np.arange(len(pair)))
+        values[:, column] = (np.where(known, total[at], 0.0) / count)[row]
 
     def store(self, key: Ints, solution: ContactSolution, state: Array, place: Array | None = None) -> None:
         """Remember a step: its solution, with true impulses r, internal variables (nc, STATE) and places."""

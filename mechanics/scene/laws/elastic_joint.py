@@ -6,9 +6,9 @@ from typing import Annotated
 import numpy as np
 
 from mechanics.arrays import Array, Bools
-from mechanics.scene.laws.bonds import with_bonds
+from mechanics.scene.laws.bonds import bonded, with_bonds
 from mechanics.scene.laws.dry_joint import DryJoint, DynamicFriction, Friction, at_limit
-from mechanics.scene.laws.law import REST, SPRING, Approach, Law, Springs, Terms
+from mechanics.scene.laws.law import BOND, ENERGY, REST, SPRING, Approach, Law, Springs, Terms
 from mechanics.scene.laws.mortar import MortarJoint, check_tension
 from mechanics.stones.settings import Setting, check_settings
 
@@ -72,38 +72,81 @@ class ElasticJoint:
 
     def terms(self, contacts: Approach) -> Terms:
         """Return the strength of the joint, with its springs."""
-        strength = self._strength.terms(contacts)
         contacts = with_bonds(contacts) if self.bonded else contacts
+        strength = self._strength.terms(contacts)
         step, theta, has = contacts.step, contacts.theta, contacts.area > 0
-        begin = contacts.gap - contacts.state[:, REST] - step * (1.0 - theta) * contacts.speed
+        begin = self._begin(contacts)
         compliance, shift = np.zeros((len(has), 3)), np.zeros((len(has), 2))
         area = np.where(has, contacts.area, 1.0)
         for columns, stiffness in ((slice(0, 1), self.normal_stiffness), (slice(1, 3), self.shear_stiffness)):
             compliance[:, columns] = (has / (step * theta * self._hold(contacts, stiffness) * area))[:, None]
-        across = self._lag(contacts, self.normal_stiffness, begin, contacts.speed)
-        along = self._lag(contacts, self.shear_stiffness, contacts.state[:, _ALONG], contacts.slide)
+        across = self._lag(contacts, self.normal_stiffness, begin[:, 0], contacts.speed)
+        along = self._lag(contacts, self.shear_stiffness, begin[:, 1:], contacts.slide)
         shift[has] = along[has]
         return replace(
             strength, bias=np.where(has, across, strength.bias), springs=Springs(compliance, shift)
         )
 
     def after(self, contacts: Approach, impulse: Array, velocity: Array) -> Array:
-        """Return the internal variables with the stretch of the springs along the joint at the end of the step."""
+        """Return the internal variables with the springs at the end of the step."""
+        contacts = with_bonds(contacts) if self.bonded else contacts
         strength = self._strength.terms(contacts)
         step, theta, has = contacts.step, contacts.theta, contacts.area > 0
+        begin = self._begin(contacts)
+        way = step * ((1.0 - theta) * _motion(contacts) + theta * velocity)
         area, stiffness = np.where(has, contacts.area, np.inf)[:, None], self.shear_stiffness
-        stretch = contacts.state[:, _ALONG]
         traction = -impulse[:, 1:] / (step * area)
-        rate = (traction - stiffness * stretch) / self._hold(contacts, stiffness)
-        mean = (1.0 - theta) * contacts.slide + theta * velocity[:, 1:]
+        stretched = step * (traction - stiffness * begin[:, 1:]) / self._hold(contacts, stiffness)
         slip = velocity.copy()
-        slip[has, 1:] = (mean - rate)[has]
+        slip[has, 1:] = ((way[:, 1:] - stretched) / step)[has]
         state = self._strength.after(contacts, impulse, slip)
-        held = np.where(at_limit(strength, impulse)[:, None], traction / stiffness, stretch + step * rate)
-        closed: Bools = has & (impulse[:, 0] > 0)
-        state[:, SPRING.start] = 0.0
-        state[:, _ALONG] = np.where(closed[:, None], held, 0.0)
+        closed, holds = has & (impulse[:, 0] > 0), state[:, BOND] > 0
+        along = begin[:, 1:] + stretched
+        limit = traction / stiffness
+        slack = at_limit(strength, impulse) & (_square(limit) < _square(along))
+        along = np.where(slack[:, None], limit, along)
+        gap = contacts.gap - state[:, REST] + step * theta * velocity[:, 0]
+        across = self._across(contacts, begin[:, 0], way[:, 0], holds)
+        torn = np.minimum(begin[:, 0] + way[:, 0], strength.adhesion / (step * area[:, 0] * self.normal_stiffness))
+        across = np.where(closed, across, np.where(holds, torn, np.maximum(gap, 0.0)))
+        state[:, SPRING.start] = np.where(has, across - gap, 0.0)
+        state[:, _ALONG] = np.where(closed[:, None], along, 0.0)
+        stretch = np.column_stack([across, state[:, _ALONG]])
+        state[:, ENERGY] = self._energy(contacts.area, stretch, holds)
         return state
+
+    def _begin(self, contacts: Approach) -> Array:
+        """Return the stretch of the springs (n, 3) at the start of the step, normal first [m].
+
+        Where areas or points have changed since the last step, so that the springs of a pair would hold more energy
+        than they did, all of them are stretched less.
+        """
+        stretch = contacts.state[:, SPRING].copy()
+        flight = contacts.step * (1.0 - contacts.theta)
+        stretch[:, 0] += contacts.gap - contacts.state[:, REST] - flight * contacts.speed
+        holds = bonded(contacts)
+        now = np.bincount(contacts.pair, self._energy(contacts.area, stretch, holds))
+        before = np.bincount(contacts.pair, contacts.state[:, ENERGY])
+        factor = np.sqrt(np.divide(before, now, out=np.ones(len(now)), where=now > before))[contacts.pair]
+        stretch[:, 0] *= np.where(holds | (stretch[:, 0] < 0), factor, 1.0)
+        stretch[:, 1:] *= factor[:, None]
+        return stretch
+
+    def _energy(self, area: Array, stretch: Array, holds: Bools) -> Array:
+        """Return what springs (n,) hold [J]; those across a joint hold nothing where it is open, and no bond holds."""
+        across = np.where(holds, stretch[:, 0], np.minimum(stretch[:, 0], 0.0))
+        energy: Array = 0.5 * area * (self.normal_stiffness * across**2 + self.shear_stiffness * _square(stretch[:, 1:]))
+        return energy
+
+    def _across(self, contacts: Approach, begin: Array, way: Array, holds: Bools) -> Array:
+        """Return the stretch across a joint (n,) at the end of a step that pressed it, or that its bond held [m].
+
+        A joint that closes in the step is pressed by the mean, and stores no more than the work of that.
+        """
+        end = begin + way
+        work = np.maximum(2.0 * way * (begin + contacts.theta * way), 0.0)
+        closes = ~holds & (begin > 0) & (end < 0)
+        return np.where(closes, np.maximum(end, -np.sqrt(work)), end)
 
     def _hold(self, contacts: Approach, stiffness: float) -> float:
         """Return d = k θ h + c, traction per mean velocity of the step [Pa s/m]."""
@@ -114,3 +157,14 @@ class ElasticJoint:
         theta = contacts.theta
         lag: Array = (stiffness / self._hold(contacts, stiffness) * begin + (1.0 - theta) * speed) / theta
         return lag
+
+
+def _motion(contacts: Approach) -> Array:
+    """Return u (n, 3) before the step [m/s]."""
+    return np.column_stack([contacts.speed, contacts.slide])
+
+
+def _square(vectors: Array) -> Array:
+    """Return the squares (n,) of the lengths of vectors (n, d)."""
+    square: Array = np.einsum("ci,ci->c", vectors, vectors)
+    return square

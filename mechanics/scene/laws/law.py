@@ -10,10 +10,11 @@ A new law is one class with the members of `Law`.
 from dataclasses import dataclass
 from typing import Protocol
 
-from mechanics.arrays import Array, Bools
+from mechanics.arrays import Array, Bools, Ints
 
 __all__ = [
     "BOND",
+    "ENERGY",
     "OPENING",
     "REST",
     "SLIDING",
@@ -30,7 +31,8 @@ __all__ = [
 # columns of the internal variables that a contact carries from step to step
 BOND, SLIDING, OPENING, SLIP, REST = range(5)
 SPRING = slice(5, 8)
-STATE = 8
+ENERGY = 8
+STATE = 9
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,7 @@ class Approach:
     compliance : (n,) W_NN, change of u_N per unit of normal impulse [1/kg]
     step, theta : h [s] and θ; the gap is gap + h θ u_N at the end of the step, and gap + h u_N at the next kick
     push_out : overlaps are pushed out (relaxation) instead of only kept from growing
+    pair : (n,) number of the pair of shapes that each belongs to
     first : (n,) contacts of stones that meet as the run, or a stage of building, begins: bonds are made in them
     state : (n, STATE) internal variables, as the law left them in the last step; zeros for new contacts.
         BOND intact fraction (1 whole, between: damaged, 0 never bonded, -1 broken), SLIDING 1 if it slid in the last
@@ -64,6 +67,7 @@ class Approach:
     step: float
     theta: float
     push_out: bool
+    pair: Ints
     first: Bools
     state: Array
 
