@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 
 from mechanics.arrays import Array, Bools
-from mechanics.scene.laws.bonds import bonded, with_bonds
+from mechanics.scene.laws.bonds import with_bonds
 from mechanics.scene.laws.dry_joint import DryJoint, DynamicFriction, Friction, at_limit
 from mechanics.scene.laws.law import BOND, ENERGY, REST, SPRING, Approach, Law, Springs, Terms
 from mechanics.scene.laws.mortar import MortarJoint, check_tension
@@ -31,9 +31,14 @@ class ElasticJoint:
         u + (k x_i/d + (1-θ) u_i)/θ + E r = 0,     E = 1/(h A d θ)
 
     holds where the joint neither opens nor slides: a shift of u and a compliance E of the contact. With θ = ½ springs
-    keep their energy, with θ = 1 they come to rest. A contact that slides ends with its spring at the limit; one that
-    opens, without any stretch. Edges and corners have no area, and are rigid. Overlaps under load are the compression
-    of the joint, not an error. Without tensile and shear strength the joint is dry, else mortar (`MortarJoint`).
+    keep their energy, with θ = 1 they come to rest. A contact that slides ends with its spring at the limit, if that is
+    less stretched; one that opens, without any stretch. Edges and corners have no area, and are rigid. Overlaps under
+    load are the compression of the joint, not an error. Without tensile and shear strength the joint is dry, else
+    mortar (`MortarJoint`).
+
+    Springs never hold more than the work that was done on them. Where the area or the points of a joint change, they
+    begin the step with no more energy than they had; where a joint closes within a step, with no more than the work of
+    its force in it. The stretch across a joint then differs from the gap, until it opens.
     """
 
     friction: Friction
@@ -88,65 +93,63 @@ class ElasticJoint:
         )
 
     def after(self, contacts: Approach, impulse: Array, velocity: Array) -> Array:
-        """Return the internal variables with the springs at the end of the step."""
+        """Return the internal variables with the springs at the end of the step, and what they hold."""
         contacts = with_bonds(contacts) if self.bonded else contacts
         strength = self._strength.terms(contacts)
         step, theta, has = contacts.step, contacts.theta, contacts.area > 0
+        area = np.where(has, contacts.area, np.inf)
         begin = self._begin(contacts)
-        way = step * ((1.0 - theta) * _motion(contacts) + theta * velocity)
-        area, stiffness = np.where(has, contacts.area, np.inf)[:, None], self.shear_stiffness
-        traction = -impulse[:, 1:] / (step * area)
-        stretched = step * (traction - stiffness * begin[:, 1:]) / self._hold(contacts, stiffness)
+        way = step * ((1.0 - theta) * np.column_stack([contacts.speed, contacts.slide]) + theta * velocity)
+        traction, stiffness = -impulse[:, 1:] / (step * area)[:, None], self.shear_stiffness
+        longer = step * (traction - stiffness * begin[:, 1:]) / self._hold(contacts, stiffness)
         slip = velocity.copy()
-        slip[has, 1:] = ((way[:, 1:] - stretched) / step)[has]
+        slip[has, 1:] = ((way[:, 1:] - longer) / step)[has]
         state = self._strength.after(contacts, impulse, slip)
-        closed, holds = has & (impulse[:, 0] > 0), state[:, BOND] > 0
-        along = begin[:, 1:] + stretched
-        limit = traction / stiffness
-        slack = at_limit(strength, impulse) & (_square(limit) < _square(along))
-        along = np.where(slack[:, None], limit, along)
+        closed: Bools = has & (impulse[:, 0] > 0)
+        along, limit = begin[:, 1:] + longer, traction / stiffness
+        ends = at_limit(strength, impulse) & (_square(limit) < _square(along))
+        along = np.where(ends[:, None], limit, along) * closed[:, None]
         gap = contacts.gap - state[:, REST] + step * theta * velocity[:, 0]
-        across = self._across(contacts, begin[:, 0], way[:, 0], holds)
-        torn = np.minimum(begin[:, 0] + way[:, 0], strength.adhesion / (step * area[:, 0] * self.normal_stiffness))
-        across = np.where(closed, across, np.where(holds, torn, np.maximum(gap, 0.0)))
-        state[:, SPRING.start] = np.where(has, across - gap, 0.0)
-        state[:, _ALONG] = np.where(closed[:, None], along, 0.0)
-        stretch = np.column_stack([across, state[:, _ALONG]])
-        state[:, ENERGY] = self._energy(contacts.area, stretch, holds)
+        most = np.where(_holds(state), strength.adhesion / (step * area * self.normal_stiffness), np.inf)
+        opened = np.minimum(np.maximum(gap, 0.0), most)
+        across = np.where(closed, self._pressed(contacts, state, begin[:, 0], way[:, 0]), opened)
+        state[:, SPRING] = np.column_stack([across - gap, along]) * has[:, None]
+        state[:, ENERGY] = self._energy(contacts, np.column_stack([across, along]), state)
         return state
 
     def _begin(self, contacts: Approach) -> Array:
-        """Return the stretch of the springs (n, 3) at the start of the step, normal first [m].
+        """Return the stretch of the springs (n, 3), that across the joint first, at the start of the step [m].
 
-        Where areas or points have changed since the last step, so that the springs of a pair would hold more energy
-        than they did, all of them are stretched less.
+        Where areas, or points, have changed since the last step so that the springs of a pair of shapes would hold more
+        than they did, all of them are less stretched.
         """
+        flight = contacts.step * (1.0 - contacts.theta) * contacts.speed
         stretch = contacts.state[:, SPRING].copy()
-        flight = contacts.step * (1.0 - contacts.theta)
-        stretch[:, 0] += contacts.gap - contacts.state[:, REST] - flight * contacts.speed
-        holds = bonded(contacts)
-        now = np.bincount(contacts.pair, self._energy(contacts.area, stretch, holds))
+        stretch[:, 0] += contacts.gap - contacts.state[:, REST] - flight
+        now = np.bincount(contacts.pair, self._energy(contacts, stretch, contacts.state))
         before = np.bincount(contacts.pair, contacts.state[:, ENERGY])
         factor = np.sqrt(np.divide(before, now, out=np.ones(len(now)), where=now > before))[contacts.pair]
-        stretch[:, 0] *= np.where(holds | (stretch[:, 0] < 0), factor, 1.0)
+        is_open = (stretch[:, 0] > 0) & ~_holds(contacts.state)
+        stretch[:, 0] *= np.where(is_open, 1.0, factor)
         stretch[:, 1:] *= factor[:, None]
         return stretch
 
-    def _energy(self, area: Array, stretch: Array, holds: Bools) -> Array:
-        """Return what springs (n,) hold [J]; those across a joint hold nothing where it is open, and no bond holds."""
-        across = np.where(holds, stretch[:, 0], np.minimum(stretch[:, 0], 0.0))
-        energy: Array = 0.5 * area * (self.normal_stiffness * across**2 + self.shear_stiffness * _square(stretch[:, 1:]))
-        return energy
+    def _pressed(self, contacts: Approach, state: Array, begin: Array, way: Array) -> Array:
+        """Return the stretch across joints (n,) at the end of a step that pressed them, or that bonds held [m].
 
-    def _across(self, contacts: Approach, begin: Array, way: Array, holds: Bools) -> Array:
-        """Return the stretch across a joint (n,) at the end of a step that pressed it, or that its bond held [m].
-
-        A joint that closes in the step is pressed by the mean, and stores no more than the work of that.
+        Where a joint closes within the step, its force is that of the mean, and the spring holds no more than its work.
         """
         end = begin + way
         work = np.maximum(2.0 * way * (begin + contacts.theta * way), 0.0)
-        closes = ~holds & (begin > 0) & (end < 0)
+        closes = (begin > 0) & (end < 0) & ~_holds(state)
         return np.where(closes, np.maximum(end, -np.sqrt(work)), end)
+
+    def _energy(self, contacts: Approach, stretch: Array, state: Array) -> Array:
+        """Return what springs (n,) hold [J]: nothing across a joint that is open without a bond."""
+        across = np.where(_holds(state), stretch[:, 0], np.minimum(stretch[:, 0], 0.0))
+        held = self.normal_stiffness * across**2 + self.shear_stiffness * _square(stretch[:, 1:])
+        energy: Array = 0.5 * contacts.area * held
+        return energy
 
     def _hold(self, contacts: Approach, stiffness: float) -> float:
         """Return d = k θ h + c, traction per mean velocity of the step [Pa s/m]."""
@@ -159,9 +162,10 @@ class ElasticJoint:
         return lag
 
 
-def _motion(contacts: Approach) -> Array:
-    """Return u (n, 3) before the step [m/s]."""
-    return np.column_stack([contacts.speed, contacts.slide])
+def _holds(state: Array) -> Bools:
+    """Return the contacts (n,) whose bond is not broken."""
+    holds: Bools = state[:, BOND] > 0
+    return holds
 
 
 def _square(vectors: Array) -> Array:

@@ -54,8 +54,9 @@ class Approach:
     state : (n, STATE) internal variables, as the law left them in the last step; zeros for new contacts.
         BOND intact fraction (1 whole, between: damaged, 0 never bonded, -1 broken), SLIDING 1 if it slid in the last
         step, OPENING largest opening so far [m], SLIP path of sliding so far [m], REST gap that counts as closed, where
-        stones overlapped or mortar filled a joint as they met [m], SPRING three columns, stretch of the springs
-        along the joint: what the candidate has moved over the antagonist in them, local frame, zero across it [m]
+        stones overlapped or mortar filled a joint as they met [m], SPRING three columns of springs, local frame: what
+        their stretch exceeds the gap across the joint, and their stretch along it, which is what the candidate has
+        moved over the antagonist in them [m], ENERGY what they hold [J]
     """
 
     gap: Array
