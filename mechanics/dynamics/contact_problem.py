@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechanics.arrays import Array
-from mechanics.contact.contacts import Contacts, gaps
+from mechanics.contact.contacts import PAIR_BIT, Contacts, gaps
 from mechanics.delassus.assembly import local_velocity
 from mechanics.delassus.compliant import CompliantDelassus
 from mechanics.dynamics.contact_search import Detection
@@ -155,6 +155,7 @@ def contact_problem(
         theta=time.theta,
         # a compliant joint answers to its overlap; rigid ones between two such steps keep it
         push_out=time.relaxation if joints.value == 0 else not joints.rigid,
+        pair=np.unique(contacts.key >> PAIR_BIT, return_inverse=True)[1],
         first=meets,
         state=internal,
     )

@@ -23,10 +23,10 @@ __all__ = ["ContactSearch", "Detection", "detection", "detector"]
 
 # displacements since the last detection, over the smallest width, from which contacts are detected again [-]:
 _MOVED_RIGID = 1e-6  # rigid stones: at rest nothing changes, in motion W is that of the very instant
-_MOVED_LOOSE = 2.5e-5  # the same where the motion may be wrong by much more in each step
-_PER_SPEED = (
-    2.5e-4  # that displacement over the speed of such an error, over the one that gravity gives in a step [-]
-)
+# the same where the motion may be wrong by much more in each step: over the speed of such an error, over the one that
+# gravity gives in a step, and over its square, where directions of contacts need not be better than forces by far
+_PER_SPEED, _MOVED_LOOSE = 2.5e-4, 4e-5
+_PER_SQUARE, _MOVED_ROUGH = 1e-3, 2e-3
 _MOVED = 1e-3  # deformable stones, whose Delassus operator is expensive
 _MOVED_SETTLED = 1e-6  # deformable stones that come to rest, so that the last detection does not lag behind
 _SLOWED = 1e-2  # they come to rest where one step moves them by less than this part of that displacement [-]
@@ -165,4 +165,6 @@ def _rigid_limit(model: Model) -> float:
     fall = float(np.linalg.norm(model.scene.gravity)) * time.step * time.duration
     if error is None or time.relaxation or fall == 0.0:
         return _MOVED_RIGID
-    return float(np.clip(_PER_SPEED * error / fall, _MOVED_RIGID, _MOVED_LOOSE))
+    slack = error / fall
+    loose = min(_PER_SPEED * slack, _MOVED_LOOSE)
+    return max(_MOVED_RIGID, loose, min(_PER_SQUARE * slack**2, _MOVED_ROUGH))

@@ -9,7 +9,7 @@ from mechanics.arrays import Array, Bools, Ints
 from mechanics.carried import Carrier
 from mechanics.contact.contacts import PAIR_BIT
 from mechanics.problem.problem import ContactSolution, ContactStart
-from mechanics.scene.laws.law import BOND, REST, SPRING, STATE
+from mechanics.scene.laws.law import BOND, ENERGY, REST, SPRING, STATE
 
 __all__ = ["Memory"]
 
@@ -76,6 +76,7 @@ class Memory(Carrier):
                     self._pass_on(values, at[known], key, place, axes)
                 if place is not None and self._place is not None:
                     self._inherit(values, np.flatnonzero(~known), key, place, order)
+                self._share(values, key, order)
         d = self._dimension
         motion = self._motion if self.follows else None
         last = ContactStart(values[:, :d], values[:, d : 2 * d], motion)
@@ -116,6 +117,18 @@ class Memory(Carrier):
             return
         heirs, nearest = _nearest(key[new], place[new], self._key, self._place, order)
         values[new[heirs], 2 * self._dimension :] = state[nearest]
+
+    def _share(self, values: Array, key: Ints, order: Ints) -> None:
+        """Share what the springs of each pair of shapes hold evenly over the contacts that it has now."""
+        column = 2 * self._dimension + ENERGY
+        held = self._values[order, column]
+        if not held.any():
+            return
+        pair, first = np.unique(self._key[order] >> PAIR_BIT, return_index=True)
+        total = np.add.reduceat(held, first)
+        now, row, count = np.unique(key >> PAIR_BIT, return_inverse=True, return_counts=True)
+        at, known = _places(pair, now, np.arange(len(pair)))
+        values[:, column] = (np.where(known, total[at], 0.0) / count)[row]
 
     def store(
         self,

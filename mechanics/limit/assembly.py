@@ -173,6 +173,7 @@ def _strength(found: Detection) -> Strength:
         step=1.0,
         theta=1.0,
         push_out=False,
+        pair=np.arange(len(contacts)),
         first=np.ones(len(contacts), dtype=bool),
         state=np.zeros((len(contacts), STATE)),
     )

@@ -217,6 +217,7 @@ class PlanarSimulation(Carrier):
             step=time.step,
             theta=time.theta,
             push_out=False,
+            pair=np.arange(len(contacts.gap)),
             first=np.full(len(contacts.gap), self._first),
             state=internal,
         )

@@ -55,7 +55,7 @@ _FAST = Profile(
         tolerance=1e-5,
         # with a looser one, rigid stones in steps of this length miss a balance of 10⁻⁴ and never come to rest
         velocity_tolerance=1e-5,
-        motion_error=1e-4,
+        motion_error=1e-3,
         max_iterations=2000,
     ),
     step=0.002,

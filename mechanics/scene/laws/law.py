@@ -10,10 +10,11 @@ A new law is one class with the members of `Law`.
 from dataclasses import dataclass
 from typing import Protocol
 
-from mechanics.arrays import Array, Bools
+from mechanics.arrays import Array, Bools, Ints
 
 __all__ = [
     "BOND",
+    "ENERGY",
     "OPENING",
     "REST",
     "SLIDING",
@@ -30,7 +31,8 @@ __all__ = [
 # columns of the internal variables that a contact carries from step to step
 BOND, SLIDING, OPENING, SLIP, REST = range(5)
 SPRING = slice(5, 8)
-STATE = 8
+ENERGY = 8
+STATE = 9
 
 
 @dataclass(frozen=True)
@@ -47,12 +49,14 @@ class Approach:
     compliance : (n,) W_NN, change of u_N per unit of normal impulse [1/kg]
     step, theta : h [s] and θ; the gap is gap + h θ u_N at the end of the step, and gap + h u_N at the next kick
     push_out : overlaps are pushed out (relaxation) instead of only kept from growing
+    pair : (n,) number of the pair of shapes that each belongs to
     first : (n,) contacts of stones that meet as the run, or a stage of building, begins: bonds are made in them
     state : (n, STATE) internal variables, as the law left them in the last step; zeros for new contacts.
         BOND intact fraction (1 whole, between: damaged, 0 never bonded, -1 broken), SLIDING 1 if it slid in the last
         step, OPENING largest opening so far [m], SLIP path of sliding so far [m], REST gap that counts as closed, where
-        stones overlapped or mortar filled a joint as they met [m], SPRING three columns, stretch of the springs
-        along the joint: what the candidate has moved over the antagonist in them, local frame, zero across it [m]
+        stones overlapped or mortar filled a joint as they met [m], SPRING three columns of springs, local frame: what
+        their stretch exceeds the gap across the joint, and their stretch along it, which is what the candidate has
+        moved over the antagonist in them [m], ENERGY what they hold [J]
     """
 
     gap: Array
@@ -64,6 +68,7 @@ class Approach:
     step: float
     theta: float
     push_out: bool
+    pair: Ints
     first: Bools
     state: Array
 

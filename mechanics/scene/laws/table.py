@@ -13,7 +13,7 @@ from mechanics.scene.laws.mortar import MortarJoint
 
 __all__ = ["LawTable", "law_table"]
 
-_PER_CONTACT = ("gap", "speed", "slide", "area", "size", "compliance", "state", "first")
+_PER_CONTACT = ("gap", "speed", "slide", "area", "size", "compliance", "state", "pair", "first")
 _NUMBERS = ("bias", "friction", "cohesion", "adhesion")
 
 

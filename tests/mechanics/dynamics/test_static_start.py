@@ -14,6 +14,7 @@ from mechanics.dynamics.warm_start import Memory
 from mechanics.model.model import build_model
 from mechanics.problem.problem import ContactSolution
 from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.laws.law import STATE
 from mechanics.scene.loads.gravity import GravityRamp, TiltingTable
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.motions import ImposedMotion
@@ -292,7 +293,8 @@ def test_forces_are_kept_and_velocities_forgotten():
     """The same forces over steps 0.5 times as long: half the impulses; internal variables as they are."""
     memory, key = Memory(), np.array([5, 3, 9])
     impulse, velocity = np.arange(9.0).reshape(3, 3), np.ones((3, 3))
-    state = np.arange(15.0).reshape(3, 5)
+    state = np.zeros((3, STATE))
+    state[:, :5] = np.arange(15.0).reshape(3, 5)
     memory.store(key, ContactSolution(impulse, velocity, 1, 0.0, True), state)
     for asked, rows in ((key, [0, 1, 2]), (np.array([9, 5]), [2, 0])):
         start, internal = memory.at_rest(0.5).recall(asked)

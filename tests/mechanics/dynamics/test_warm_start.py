@@ -9,7 +9,7 @@ from scipy.sparse import csr_array
 from mechanics.contact.contacts import PAIR_BIT, Contacts, towards_first
 from mechanics.dynamics.warm_start import Memory
 from mechanics.problem.problem import ContactSolution
-from mechanics.scene.laws.law import BOND, SLIP, STATE
+from mechanics.scene.laws.law import BOND, ENERGY, SLIP, STATE
 
 
 def solution(values):
@@ -17,8 +17,8 @@ def solution(values):
 
 
 def inner(values):
-    """Internal variables, different for each contact."""
-    return values[:, :1] + 100.0 * np.arange(1, STATE + 1)
+    """Internal variables, different for each contact; springs hold nothing."""
+    return (values[:, :1] + 100.0 * np.arange(1, STATE + 1)) * (np.arange(STATE) != ENERGY)
 
 
 def numbers(count, dimension=3):
@@ -166,3 +166,15 @@ def test_the_axes_of_a_contact_push_the_first_of_its_bodies():
         csr_array((4, 0)),
     )
     np.testing.assert_array_equal(towards_first(contacts), [turned(0.4), -turned(1.1)])
+
+
+def test_the_contacts_of_a_pair_share_what_its_springs_held():
+    """Pair 5 held 3 J in two contacts and has three, one of them new; pair 6 lost its only one, pair 9 is new."""
+    memory, (key, state, place) = Memory(), bonded_pairs()
+    state[:, ENERGY] = [1.0, 2.0, 4.0]
+    memory.store(key, solution(numbers(3)), state, place)
+    asked = np.array([(9 << PAIR_BIT) + 2, key[1], (5 << PAIR_BIT) + 7, key[0]])
+    _, found = memory.recall(asked, np.zeros((4, 3)))
+    np.testing.assert_allclose(found[:, ENERGY], [0.0, 1.0, 1.0, 1.0])
+    _, same = memory.recall(key, place)
+    np.testing.assert_array_equal(same[:, ENERGY], [1.0, 2.0, 4.0])

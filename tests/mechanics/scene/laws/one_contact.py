@@ -14,7 +14,13 @@ def approach(gap, speed=0.0, state=None, slide=0.0, **changed):
         name: changed.pop(name) for name in ("area", "size", "compliance") if name in changed
     }
     full = {name: np.broadcast_to(np.asarray(value, dtype=float), gap.shape) for name, value in given.items()}
-    settings = {"step": 1e-3, "theta": 0.5, "push_out": False, "first": False} | changed
+    settings = {
+        "step": 1e-3,
+        "theta": 0.5,
+        "push_out": False,
+        "first": False,
+        "pair": np.arange(len(gap)),
+    } | changed
     settings["first"] = np.full(len(gap), settings["first"])
     state = np.zeros((len(gap), STATE)) if state is None else np.array(state, dtype=float)
     slide = np.broadcast_to(np.asarray(slide, dtype=float), (len(gap), 2))

@@ -204,6 +204,16 @@ def test_a_motion_is_as_wrong_as_the_user_allows_within_a_factor_of_three(asked,
     assert np.abs(places(steps) - finest).max() <= 3.0 * asked
 
 
+def test_the_loosest_motion_finds_contacts_seldom_takes_few_iterations_and_keeps_its_error():
+    """Across the wall, where all stones move: to 1 mm, where the default finds contacts in each step."""
+    default, loose = (followed(shaken(_ACROSS, **setting)) for setting in ({}, {"motion_error": 1e-3}))
+    assert np.abs(places(loose) - places(default)).max() <= 1e-3
+    found, seldom = (len({id(step.found) for step in steps}) for steps in (default, loose))
+    assert found > 2 * seldom
+    total, few = (sum(step.solution.iterations for step in steps[10:]) for steps in (default, loose))
+    assert total > 2.5 * few
+
+
 def test_the_default_follows_a_motion_to_nanometres(finest):
     assert np.abs(places(followed(shaken(_ALONG))) - finest).max() < 1e-8
 

@@ -115,6 +115,20 @@ def test_contacts_of_a_wall_that_only_trembles_are_kept_where_its_motion_may_be_
     assert np.abs(moved).max() <= 1e-4
 
 
+@pytest.mark.parametrize(
+    ("times", "penalty", "extrapolated"), [(1.9, 0.1, True), (2.0, 0.1, False), (4.0, 0.2, False)]
+)
+def test_errors_of_many_times_the_loosest_tolerance_are_reached_without_extrapolation(
+    rest, times, penalty, extrapolated
+):
+    problem = rest[-1].problem
+    loosest = 0.025 * np.abs(problem.u_free).max()
+    strategy = Alternating(motion_speed=times * loosest)._in_motion(problem)
+    assert strategy.velocity_tolerance == 0.025
+    first = strategy._bodies(problem, many=False).stages[0]
+    assert (first.penalty, first.extrapolated) == (penalty, extrapolated)
+
+
 def test_forces_that_clamp_are_taken_out_and_all_bodies_feel_the_same():
     """A column of stones of 1 and 10⁶ in turns, whose contacts press sideways against each other in pairs."""
     problem = first_problem(column([2400.0, 2.4e9] * 3), friction=0.5)
