@@ -1,7 +1,7 @@
 """Synthetic surveys to start from, by name, each with its truth."""
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
