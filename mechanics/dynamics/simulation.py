@@ -106,6 +106,8 @@ class Simulation(Carrier):
         # stiffness 1/(ε h²) stays
         self._joints = replace(other._joints, value=other._joints.value / pace**2)
         self.cold = other.cold and pace == 1.0
+        if pace == 1.0 and self.model.rigid_only:
+            self._detect.follow(other._detect, self.model)
         self._sleepers = Sleepers(self.model, self.state, self._memory)
         self._first = False
 
