@@ -11,7 +11,7 @@ from mechanics.contact._kernels.broad_phase import points_of
 from mechanics.contact._kernels.narrow_phase import NAME_BITS
 from mechanics.scene.state import State
 
-__all__ = ["NODE", "PAIR_BIT", "Contacts", "gaps", "joined", "material_points", "take", "towards_first"]
+__all__ = ["NODE", "PAIR_BIT", "Contacts", "gaps", "joined", "material_points", "take"]
 
 
 # A contact's key names the pair of shapes in its high bits; below them the node that carries the contact, or the name
@@ -95,13 +95,3 @@ def gaps(contacts: Contacts, state: State) -> Array:
     points = material_points(contacts, state)
     gap: Array = np.einsum("ci,ci->c", contacts.frame[:, 0], points[:, 0] - points[:, 1])
     return gap
-
-
-def towards_first(contacts: Contacts) -> Array:
-    """Return the rows n, t1, t2 (nc, 3, 3) of each contact, with the signs in which they push the first of its bodies.
-
-    The frame belongs to one of two faces: where both are nearly parallel, which of them it is may change.
-    """
-    first, second = contacts.bodies.T
-    axes: Array = np.where(first < second, 1.0, -1.0)[:, None, None] * contacts.frame
-    return axes

@@ -144,6 +144,7 @@ def contact_problem(
         internal[:, REST] = np.where(kept, closed, internal[:, REST])
     else:
         meets = np.zeros(len(gap), dtype=bool)
+    sprung = model.laws.sprung
     approach = Approach(
         gap=gap,
         speed=motion[:, 0],
@@ -155,7 +156,9 @@ def contact_problem(
         theta=time.theta,
         # a compliant joint answers to its overlap; rigid ones between two such steps keep it
         push_out=time.relaxation if joints.value == 0 else not joints.rigid,
-        pair=np.unique(contacts.key >> PAIR_BIT, return_inverse=True)[1],
+        pair=np.unique(contacts.key >> PAIR_BIT, return_inverse=True)[1]
+        if sprung
+        else np.zeros_like(contacts.key),
         first=meets,
         state=internal,
     )

@@ -8,7 +8,6 @@ import numpy as np
 
 from mechanics.arrays import Array, Bools
 from mechanics.carried import Carried, Carrier
-from mechanics.contact.contacts import towards_first
 from mechanics.dynamics.contact_problem import JointCompliance, contact_problem, shifted, unshifted
 from mechanics.dynamics.contact_search import ContactSearch, Detection
 from mechanics.dynamics.handover import Beginning, Handover, of_run
@@ -180,9 +179,7 @@ class Simulation(Carrier):
         while disturbed:
             found = self._detect(sleepers.model, predicted)
             with clock("assemble"):
-                warm, internal = self._memory.recall(
-                    found.contacts.key, found.place, towards_first(found.contacts)
-                )
+                warm, internal = self._memory.recall(found.contacts.key, found.place)
                 free = sleepers.hold(free_kick(model, start, predicted, self._compliance, h, theta))
             given = predicted, found, free, internal, self._begin if self._first else None
             problem, approach, solution = self._solved(given, warm)
@@ -246,9 +243,7 @@ class Simulation(Carrier):
                 remedy="use a smaller time step",
             )
         solution = replace(step.solution, impulse=step.active.impulse)
-        self._memory.store(
-            found.contacts.key, solution, step.active.internal, found.place, towards_first(found.contacts)
-        )
+        self._memory.store(found.contacts.key, solution, step.active.internal, found.place)
         self._first = False
         self.state = self._relax(self._sleepers.settle(step))
         if self.state is after:

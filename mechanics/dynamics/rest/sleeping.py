@@ -13,7 +13,7 @@ import numpy as np
 
 from mechanics.arrays import Array, Bools
 from mechanics.carried import Carried, Carrier
-from mechanics.contact.contacts import Contacts, material_points, towards_first
+from mechanics.contact.contacts import Contacts, material_points
 from mechanics.delassus.assembly import world_impulse
 from mechanics.dynamics.observers.equilibrium import displacement, speed, wrenches
 from mechanics.dynamics.step import ContactForces, Step
@@ -171,9 +171,7 @@ class Sleepers(Carrier):
             rows = woken[kept.contacts.bodies].any(axis=1)
             again = kept.take(np.flatnonzero(rows))
             solution = np.hstack([again.impulse, again.dual])
-            self._memory.take_up(
-                again.contacts.key, solution, again.internal, again.place, towards_first(again.contacts)
-            )
+            self._memory.take_up(again.contacts.key, solution, again.internal, again.place)
             kept = kept.take(np.flatnonzero(~rows))
         self._keep(kept, state)
 

