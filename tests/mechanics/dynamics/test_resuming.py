@@ -138,7 +138,7 @@ def soft():
 
 def jammed():
     """Stones that a relaxation jams over an opening: their rest is refuted, and they fall without it."""
-    return opening(step=1e-3, relaxation=True)
+    return opening(step=5e-4, relaxation=True)
 
 
 def relaxed():

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks.deformable_wall import wall_scene
+from mechanics.dynamics.contact_search import ContactSearch
 from mechanics.dynamics.observers.equilibrium import speed, support_reaction
 from mechanics.dynamics.simulation import Simulation
 from mechanics.dynamics.static_start import static_start
@@ -90,6 +91,21 @@ def test_the_ground_carries_the_weight_from_the_first_step_on(name):
         support = support_reaction(model, step.contacts, step.force, step.kick.load, step.after.time)
         assert support.weight == pytest.approx(weight, rel=1e-12)
         assert support.reaction == pytest.approx(weight, rel=1e-7)
+
+
+def test_a_run_of_rigid_stones_begins_with_the_contacts_of_its_search(monkeypatch):
+    """A sliver may be found or not after movements of rounding, and with it its force would be lost."""
+    found, detect = [], ContactSearch._detection
+    monkeypatch.setattr(
+        ContactSearch, "_detection", lambda own, *given: found.append(detect(own, *given)) or found[-1]
+    )
+    model, _, told, _, simulation = searched(column(HARD, HARD))
+    made = simulation.step()
+    assert told.found
+    assert len(found) == 1
+    assert made.solution.iterations == 0
+    # and where it would have to be made again, in a resumed run
+    assert simulation._detect.configuration(model) is found[0].configuration
 
 
 @EVERY
