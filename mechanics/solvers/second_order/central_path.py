@@ -8,12 +8,11 @@ Slack s and dual z of the cones turn this into
 which Newton's method follows along the central path s ∘ z = ν e, ν → 0, with Mehrotra's corrector, corrections of the
 pairs that are far from the others (Gondzio 1996), and the scaling of Nesterov and Todd. Unlike a cone programme,
 Coulomb's friction is no minimum of anything: the derivative of the shift μ‖z_T‖ n belongs to Newton's matrix W + Θ,
-which is not symmetric, and the whole converges in some 30 iterations whatever the conditioning of W. Where nothing
-moves, that derivative has no limit; with the shift held, the path is that of a cone programme. Contacts with cohesion
-have r_N ≥ 0 as a second cone; without friction it is the only one.
+which is not symmetric, and the whole converges in some 30 iterations whatever the conditioning of W. Contacts with
+cohesion have r_N ≥ 0 as a second cone; without friction it is the only one.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
@@ -68,14 +67,13 @@ class _Side:
 
 @dataclass
 class _Cone:
-    """The friction cones of some contacts: slack and dual, and whether their shift μ‖z_T‖ is held."""
+    """The friction cones of some contacts: slack and dual."""
 
     rows: Ints
     friction: Array
     cohesion: Array
     slack: Array
     dual: Array
-    held: bool
     diagonal: Array = field(init=False)
 
     def __post_init__(self) -> None:
@@ -84,17 +82,13 @@ class _Cone:
     def transpose(self) -> Array:
         """Return Aᵀ - n ∂(μ‖z_T‖)/∂z (n, 3, 3), the derivative of the balance of velocities by z."""
         matrix = self.diagonal[:, :, None] * np.eye(3)
-        if self.held:
-            return matrix
         size = np.sqrt((self.dual[:, 1:] ** 2).sum(axis=1))
         matrix[:, 0, 1:] -= (self.friction / np.maximum(size, 1e-300))[:, None] * self.dual[:, 1:]
         return matrix
 
     def velocity(self) -> Array:
-        """Return Aᵀ z - μ‖z_T‖ n, the velocity u that the dual asks for; Aᵀ z where the shift is held."""
+        """Return Aᵀ z - μ‖z_T‖ n, the velocity u that the dual asks for."""
         u = self.diagonal * self.dual
-        if self.held:
-            return u
         u[:, 0] -= self.friction * np.sqrt((self.dual[:, 1:] ** 2).sum(axis=1))
         return u
 
@@ -108,21 +102,13 @@ class CentralPath:
     near : (nc, 3) impulses near the solution, as those of the last step, from which it begins; None: far inside the
         cones
     level : complementarity with which it begins there; as small as the impulses are right [-]
-    shift : (nc,) μ‖u_T‖ as it is held, in the units of the problem; None: that of each iterate
     """
 
-    def __init__(
-        self,
-        problem: ContactProblem,
-        near: Array | None = None,
-        level: float = 1.0,
-        shift: Array | None = None,
-    ) -> None:
+    def __init__(self, problem: ContactProblem, near: Array | None = None, level: float = 1.0) -> None:
         self._problem, form = problem, problem.form(NAME)
         # a direction a little wrong costs less than another factorisation
         self._system = partial(form.shifted, exact=False)
-        self._held = shift is not None
-        self._free = problem.biased if shift is None else replace(problem, bias=problem.bias + shift).biased
+        self._free = problem.biased
         mu, k = problem.friction, problem.cohesion
         cone, side = np.flatnonzero((mu > _SMOOTH) | (k > 0)), np.flatnonzero((mu <= _SMOOTH) | (k > 0))
         self._smooth = np.flatnonzero((mu <= _SMOOTH) & (k <= 0))
@@ -145,7 +131,7 @@ class CentralPath:
         inside = _INSIDE * size
         slack[:, 0] = np.maximum(slack[:, 0], np.sqrt((slack[:, 1:] ** 2).sum(axis=1)) + inside)
         dual = np.tile([inside * scale, 0.0, 0.0], (len(cone), 1))
-        self._cone = _Cone(cone, mu[cone], k[cone], slack, dual, self._held)
+        self._cone = _Cone(cone, mu[cone], k[cone], slack, dual)
         self._side = _Side(side, np.maximum(self._r[side, 0], inside), np.full(len(side), inside * scale))
 
     def _begin_near(self, cone: Ints, side: Ints, near: Array, level: float) -> None:
@@ -161,13 +147,12 @@ class CentralPath:
         self._unit = size * size * scale
         dual = problem.delassus.apply(near) + self._free
         normal = dual[side, 0]
-        if not self._held:
-            dual[:, 0] += mu * np.sqrt((dual[:, 1:] ** 2).sum(axis=1))
+        dual[:, 0] += mu * np.sqrt((dual[:, 1:] ** 2).sum(axis=1))
         diagonal = np.column_stack([mu[cone], np.ones((len(cone), 2))])
         point = diagonal * near[cone]
         point[:, 0] += k[cone]
         slack, other = central(point - dual[cone] / (diagonal * scale), level * size * size)
-        self._cone = _Cone(cone, mu[cone], k[cone], slack, scale * other, self._held)
+        self._cone = _Cone(cone, mu[cone], k[cone], slack, scale * other)
         point = near[side, 0] - normal / scale
         root = np.sqrt(point**2 + 4.0 * level * size * size)
         self._side = _Side(side, 0.5 * (root + point), 0.5 * scale * (root - point))
