@@ -155,7 +155,8 @@ def _simulate(
             balance = log(step)
             outcome = watch(step, balance)
         if outcome is Outcome.EQUILIBRIUM and (settings.stop_at_equilibrium or count == total):
-            at_once = count == LASTING and not settings.relaxation and run.simulation.cold
+            # nothing but velocities of rest can have been halted since
+            at_once = count == LASTING and run.simulation.cold
             with clock("confirm"):
                 confirmed = at_once or lasts(run.simulation.released())
             if not confirmed:

@@ -57,6 +57,8 @@ def is_known(proposal: InfillProposal, known: Sequence[StoneRecord]) -> bool:
 
 def _contains(solid: Solid, point: Array) -> bool:
     """Test a point for being in a closed solid, by the solid angle of its faces: 4π inside, 0 outside."""
+    if (point < solid.vertices.min(axis=0)).any() or (point > solid.vertices.max(axis=0)).any():
+        return False
     a, b, c = np.moveaxis(solid.vertices[triangulate(solid)] - point, 1, 0)
     la, lb, lc = (np.linalg.norm(one, axis=1) for one in (a, b, c))
     volume = (a * np.cross(b, c)).sum(axis=1)

@@ -26,6 +26,7 @@ from mechanics.solvers.second_order.second_order_cones import (
     product,
     reach,
     scaling,
+    tangential,
     to_bounds,
 )
 
@@ -82,14 +83,14 @@ class _Cone:
     def transpose(self) -> Array:
         """Return Aᵀ - n ∂(μ‖z_T‖)/∂z (n, 3, 3), the derivative of the balance of velocities by z."""
         matrix = self.diagonal[:, :, None] * np.eye(3)
-        size = np.sqrt((self.dual[:, 1:] ** 2).sum(axis=1))
+        size = tangential(self.dual)
         matrix[:, 0, 1:] -= (self.friction / np.maximum(size, 1e-300))[:, None] * self.dual[:, 1:]
         return matrix
 
     def velocity(self) -> Array:
         """Return Aᵀ z - μ‖z_T‖ n, the velocity u that the dual asks for."""
         u = self.diagonal * self.dual
-        u[:, 0] -= self.friction * np.sqrt((self.dual[:, 1:] ** 2).sum(axis=1))
+        u[:, 0] -= self.friction * tangential(self.dual)
         return u
 
 
@@ -129,7 +130,7 @@ class CentralPath:
         slack = mu[cone, None] * self._r[cone] * [1.0, 0.0, 0.0] + self._r[cone] * [0.0, 1.0, 1.0]
         slack[:, 0] += k[cone]
         inside = _INSIDE * size
-        slack[:, 0] = np.maximum(slack[:, 0], np.sqrt((slack[:, 1:] ** 2).sum(axis=1)) + inside)
+        slack[:, 0] = np.maximum(slack[:, 0], tangential(slack) + inside)
         dual = np.tile([inside * scale, 0.0, 0.0], (len(cone), 1))
         self._cone = _Cone(cone, mu[cone], k[cone], slack, dual)
         self._side = _Side(side, np.maximum(self._r[side, 0], inside), np.full(len(side), inside * scale))
@@ -147,7 +148,7 @@ class CentralPath:
         self._unit = size * size * scale
         dual = problem.delassus.apply(near) + self._free
         normal = dual[side, 0]
-        dual[:, 0] += mu * np.sqrt((dual[:, 1:] ** 2).sum(axis=1))
+        dual[:, 0] += mu * tangential(dual)
         diagonal = np.column_stack([mu[cone], np.ones((len(cone), 2))])
         point = diagonal * near[cone]
         point[:, 0] += k[cone]

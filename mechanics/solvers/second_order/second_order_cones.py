@@ -7,7 +7,7 @@ import numpy as np
 from mechanics.arrays import Array
 from moma.errors import SolverError
 
-__all__ = ["Scaling", "central", "divide", "product", "reach", "scaling", "to_bounds"]
+__all__ = ["Scaling", "central", "divide", "product", "reach", "scaling", "tangential", "to_bounds"]
 
 
 _MIRROR = np.array([1.0, -1.0, -1.0])
@@ -15,12 +15,12 @@ _MIRROR = np.array([1.0, -1.0, -1.0])
 
 def product(x: Array, y: Array) -> Array:
     """Return Jordan's product x ∘ y = (x·y, x₀ y_T + y₀ x_T)."""
-    return np.column_stack([(x * y).sum(axis=1), x[:, :1] * y[:, 1:] + y[:, :1] * x[:, 1:]])
+    return np.column_stack([x[:, 0] * y[:, 0] + _dot(x, y), x[:, :1] * y[:, 1:] + y[:, :1] * x[:, 1:]])
 
 
 def divide(x: Array, y: Array) -> Array:
     """Return the z with x ∘ z = y, for x inside its cone."""
-    first = (x[:, 0] * y[:, 0] - (x[:, 1:] * y[:, 1:]).sum(axis=1)) / _determinant(x)
+    first = (x[:, 0] * y[:, 0] - _dot(x, y)) / _determinant(x)
     return np.column_stack([first, (y[:, 1:] - first[:, None] * x[:, 1:]) / x[:, :1]])
 
 
@@ -31,7 +31,7 @@ def central(difference: Array, level: float) -> tuple[Array, Array]:
     >>> float(s[0, 0]), float(z[0, 0])
     (4.0, 1.0)
     """
-    size = np.sqrt((difference[:, 1:] ** 2).sum(axis=1))
+    size = tangential(difference)
     along = difference[:, 1:] / np.maximum(size, 1e-300)[:, None]
     first, second = difference[:, 0] + size, difference[:, 0] - size
     return _spectral(first, second, along, level), _spectral(-second, -first, -along, level)
@@ -43,7 +43,7 @@ def to_bounds(x: Array, low: float, high: float) -> Array:
     >>> to_bounds(np.array([[3.0, 2.0, 0.0]]), 2.0, 4.0)[0, :2]
     array([ 0., -1.])
     """
-    size = np.sqrt((x[:, 1:] ** 2).sum(axis=1))
+    size = tangential(x)
     along = x[:, 1:] / np.maximum(size, 1e-300)[:, None]
     one, two = (np.maximum(np.clip(own, low, high) - own, -high) for own in (x[:, 0] + size, x[:, 0] - size))
     return np.column_stack([0.5 * (one + two), 0.5 * (one - two)[:, None] * along])
@@ -64,8 +64,8 @@ def _root(p: Array, level: float) -> Array:
 
 def reach(x: Array, step: Array) -> float:
     """Return the largest a with x + a · step in all cones, for x inside them; infinite if there is none."""
-    a = step[:, 0] ** 2 - (step[:, 1:] ** 2).sum(axis=1)
-    b = 2.0 * (x[:, 0] * step[:, 0] - (x[:, 1:] * step[:, 1:]).sum(axis=1))
+    a = step[:, 0] ** 2 - _dot(step, step)
+    b = 2.0 * (x[:, 0] * step[:, 0] - _dot(x, step))
     c = _determinant(x)
     # the roots of a α² + b α + c without cancellation; the first positive one is where the cone is left
     q = -0.5 * (b + np.where(b >= 0, 1.0, -1.0) * np.sqrt(np.maximum(b * b - 4.0 * a * c, 0.0)))
@@ -75,8 +75,20 @@ def reach(x: Array, step: Array) -> float:
     return float(roots.min(initial=np.inf))
 
 
+def tangential(x: Array) -> Array:
+    """Return ‖(x₁, x₂)‖ (nc,)."""
+    size: Array = np.sqrt(_dot(x, x))
+    return size
+
+
+def _dot(x: Array, y: Array) -> Array:
+    # a sum over an axis of two takes five times as long
+    result: Array = x[:, 1] * y[:, 1] + x[:, 2] * y[:, 2]
+    return result
+
+
 def _determinant(x: Array) -> Array:
-    size = np.sqrt((x[:, 1:] ** 2).sum(axis=1))
+    size = tangential(x)
     result: Array = (x[:, 0] - size) * (x[:, 0] + size)
     return result
 
@@ -112,7 +124,7 @@ class Scaling:
 
     @staticmethod
     def _apply(axis: Array, x: Array) -> Array:
-        along = (axis[:, 1:] * x[:, 1:]).sum(axis=1)
+        along = _dot(axis, x)
         rest = x[:, 1:] + (x[:, 0] + along / (1.0 + axis[:, 0]))[:, None] * axis[:, 1:]
         return np.column_stack([axis[:, 0] * x[:, 0] + along, rest])
 
@@ -129,5 +141,5 @@ def scaling(s: Array, z: Array) -> Scaling:
         raise SolverError("rounding has left the cones", where="interior point", remedy="ask for less")
     own, other = np.sqrt(inside[0]), np.sqrt(inside[1])
     unit, dual = s / own[:, None], z / other[:, None]
-    gamma = np.sqrt(0.5 * (1.0 + (unit * dual).sum(axis=1)))
+    gamma = np.sqrt(0.5 * (1.0 + unit[:, 0] * dual[:, 0] + _dot(unit, dual)))
     return Scaling((unit + _MIRROR * dual) / (2.0 * gamma[:, None]), np.sqrt(own / other))

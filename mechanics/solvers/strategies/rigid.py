@@ -85,8 +85,8 @@ _CLOSED = 0.9
 _EXACT = 1e-6
 # iterations from where ADMM with a small penalty stood, as it nearly always is close when it gives up
 _ENDING = (Stage(1e-3, 60, extrapolated=True),)
-# bodies from which a cold start asks the interior point before Newton's method: where a tenth of 10⁴ contacts slides or
-# opens, this seldom finds them within its steps, of which each takes as long as an iteration of that
+# bodies from which a cold start asks ADMM and the interior point before Newton's method: where a tenth of 10⁴ contacts
+# slides or opens, this seldom finds them within its steps, of which each takes as long as an iteration of that
 _SOME = 300
 # bodies from which Newton's steps in a motion, which factorise anew each, cost more than iterations with kept factors
 _MANY = 1000
@@ -109,9 +109,15 @@ _LOOSE_STAGES = (Stage(0.1, 80, extrapolated=True), *TURNS)
 _ROUGH = tuple(
     (times, (Stage(penalty, 80, extrapolated=False), *TURNS)) for times, penalty in ((4.0, 0.2), (2.0, 0.1))
 )
-# and the one with which the forces of rest are found from nothing: it goes as far as methods for rest do, so that the
-# next steps need none
-_COLD_STAGES = (Stage(1e-3, 300, extrapolated=False),)
+# those with which forces of rest are found from nothing in joints as real ones are: once it is known what opens and
+# slides, a hundredth of the penalty suffices where contacts stick, so that their forces arrive in some 50 iterations
+_COLD_STAGES = (
+    TURNS[0],
+    replace(TURNS[1], iterations=30),
+    Stage((1.0, 0.01, 1e-3), 150, extrapolated=True),
+)
+# and what finds them at once where all contacts stick
+_STICKING = Stage(1e-3, 50, extrapolated=True)
 # stages that solve steps in which next to nothing moves
 _RESTING = ("sweeps", "admm, small penalty")
 
@@ -278,7 +284,11 @@ class Alternating:
         return BodyADMM(self.tolerance, self.velocity_tolerance, most, TURNS)
 
     def _cold(self, most: int) -> _Solver:
-        return BodyADMM(*self._tight, most, _COLD_STAGES)
+        # the interior point has its turn where these are in vain
+        return BodyADMM(*self._tight, max(most - _INTERIOR, 1), _COLD_STAGES)
+
+    def _cold_many(self, most: int) -> _Solver:
+        return BodyADMM(*self._tight, most, (_STICKING, *_COLD_STAGES))
 
     def _slides(self, problem: ContactProblem, found: ContactSolution) -> bool:
         """Return whether a contact that carries a force moves by more than the solution leaves undecided."""
@@ -300,7 +310,7 @@ class Alternating:
         """Yield names, solvers by their largest number of iterations, and whether each begins with the best so far."""
         limits = self.tolerance, self.velocity_tolerance
         if many and not warm:
-            yield "admm of bodies", self._cold, False
+            yield "admm of bodies", self._cold_many, False
         # from nothing, sweeps would leave much of the friction where they happen to begin
         if warm or problem.delassus.form is None:
             yield "sweeps", self._first, False
@@ -308,6 +318,9 @@ class Alternating:
             yield "admm, small penalty", self._static, False
             later = [("admm, balanced penalty", self._moving, False)]
             if problem.delassus.rigid is not None:
+                some = _moving(problem) >= _SOME
+                if some and not (warm or many):
+                    yield "admm of bodies", self._cold, False
                 if motion and not (warm or many):
                     yield "admm of bodies", self._ended, True
                 newton = [("Newton", self._newton, False)]
@@ -321,10 +334,10 @@ class Alternating:
                     interior = [interior[0], interior[-1]]
                 if warm:
                     later = newton + later + interior
-                elif _moving(problem) < _SOME:
-                    later = newton + interior + later
-                else:
+                elif some:
                     later = interior[:1] + newton + interior[1:] + later
+                else:
+                    later = newton + interior + later
             yield from later
         if self.thorough or problem.delassus.form is None:
             yield "sweeps", lambda most: NSGS(*limits, most, _LOOK, _DEPTH), True
