@@ -1,4 +1,4 @@
-"""One storey of a tower on three sides: two facings with a core, quoins, windows, a vaulted passage, two phases.
+"""One storey of a tower on three sides: two facings with a core, quoins, windows, vaults, two phases.
 
 ::
 
@@ -8,7 +8,7 @@
           │ └──────┘ │        solid: in each course a quoin lies along one wall and a bonder, as deep as the walls are
           └──────────┘        thick, beside it in the other; in the next course they change places. Through stones tie
                A              the facings. Above the level break the second phase begins with a thin course; its
-                              courses are lower than those of the first.
+                              courses are lower than those of the first. A rib vault may span the room.
 """
 
 import math
@@ -26,6 +26,8 @@ from survey.records.survey import Station
 from survey.synthetic.bond import PlannedStone, upright
 from survey.synthetic.building import Building, Draft, SolidDraft, flat_stone, measured_building, observer
 from survey.synthetic.buildings.openings import Arch, Opening, plan_opening
+from survey.synthetic.buildings.ribs import RibVaultShape
+from survey.synthetic.buildings.storey_vault import PROJECTION, STANDING, StoreyVault, plan_vault
 from survey.synthetic.buildings.walls import Course, plan_courses
 from survey.synthetic.coursing import Bed, Piece, planned
 from survey.synthetic.frame import Movement, WallFrame, build_stone
@@ -59,6 +61,9 @@ _RELIEF = 0.01  # distance of the inner facings of B and C from that of A, whose
 _EVERY = 3  # courses from one row of through stones to the next
 _OPEN = 10  # least number of courses of a storey with openings
 _EYES = 0.6  # part of the height of the jambs at which they are modelled: higher, where courses are lower
+_WIDTH = 7.0  # of the tower outside, along wall A [m]
+_DEPTH = 5.6  # of the tower outside, along the other walls [m]
+_VAULTED = 6.0  # the same of an elaborate storey, whose room has place for a square bay [m]
 _FOOT = np.array([48.6, 23.9, 11.4])  # middle of the foot of wall A in the site [m]
 _AZIMUTH = math.radians(14.0)  # of wall A against the x axis
 
@@ -73,12 +78,14 @@ class TowerStorey:
     level_break : last course of the first phase
     corners : (2, 3) feet of the corners at the left and the right end of wall A [m]
     outward : of each wall by its letter, (3,) [-]
+    vault : dimensions of the rib vault over its room; None: there is none
     """
 
     building: Building
     level_break: int
     corners: Array
     outward: Mapping[str, Array]
+    vault: RibVaultShape | None
 
 
 @dataclass(frozen=True)
@@ -118,8 +125,6 @@ def tower_storey(
     courses: int = 40,
     seed: int = 1,
     *,
-    width: float = 7.0,
-    depth: float = 5.6,
     elaborate: bool = False,
     blunders: float = 0.12,
     movement: Movement = MappingProxyType({}),
@@ -131,9 +136,9 @@ def tower_storey(
     ----------
     courses : 2 or more; with fewer than 10 the walls have no openings
     seed : of Python's own generator, whose stream is the same everywhere
-    width, depth : of the tower outside, along wall A and along the others; not much smaller [m]
-    elaborate : whether the windows widen along splayed jambs, modelled as closed solids, and a semicircular barrel
-        vault spans the passage; else they widen in a step, and it is segmental
+    elaborate : whether the windows widen along splayed jambs, modelled as closed solids, a semicircular barrel vault
+        spans the passage, and a rib vault the room, if the walls are high enough; else windows widen in a step, the
+        vault of the passage is segmental, and the room, less deep, has none
     blunders : gross errors per stone
     movement : of the stones since they were laid
     measured : seed of the joints, wear and noise alone, so that the same stones are measured again; None: as `seed`
@@ -141,15 +146,18 @@ def tower_storey(
     Returns
     -------
     TowerStorey. Codes are AO<course>-<number> in the outer facing of wall A, AI… in the inner one, and so on for B and
-    C; of the arches AO-V<number>
+    C; of the arches AO-V<number>; of the corbels AI<course>-K<number>; of the rib vault as of `rib_vault`
     """
     rng = Random(seed)
     level_break = round(_BREAK * courses)
     heights = _bed_heights(rng, courses, level_break)
-    walls = _walls(width, depth)
-    stones = [stone for wall in walls for stone in _wall(wall, heights, elaborate, rng)]
+    depth = _VAULTED if elaborate else _DEPTH
+    walls = _walls(_WIDTH, depth)
+    vault = _rib_vault(walls[0], heights) if elaborate else None
+    stones = [stone for wall in walls for stone in _wall(wall, heights, elaborate, vault, rng)]
     drafts = [stone for stone in stones if isinstance(stone, Draft)]
     solids = [stone for stone in stones if isinstance(stone, SolidDraft)]
+    base = [draft.stone.plan.code for draft in drafts if draft.stone.plan.course == 1]
     depths = {kind: value for kind, value in _DEPTHS.items() if kind != "bonder"}
     stations = [
         Station(f"{wall.letter} {side}", np.round(frame.place(np.array([[0.3, 1.6]]), away)[0], 4))
@@ -158,7 +166,11 @@ def tower_storey(
     ]
     if solids:
         stations.append(_before_windows(walls[-1], depth, solids))
-    base = [draft.stone.plan.code for draft in drafts if draft.stone.plan.course == 1]
+    if vault is not None:
+        webs, ribs = vault.webs_and_ribs(rng)
+        drafts, solids = drafts + webs, [*solids, *vault.corbels(_HALF), *ribs]
+        base += STANDING
+        depths["web_stone"] = vault.shape.thickness
     count = round(blunders * len(drafts))
     rng = rng if measured is None else Random(measured)
     building = measured_building(
@@ -174,7 +186,15 @@ def tower_storey(
     )
     front = walls[0]
     corners = front.frame.place(np.array([[end, 0.0] for end in front.ends]))
-    return TowerStorey(building, level_break, corners, {wall.letter: wall.frame.axes[2] for wall in walls})
+    outward = {wall.letter: wall.frame.axes[2] for wall in walls}
+    return TowerStorey(building, level_break, corners, outward, None if vault is None else vault.shape)
+
+
+def _rib_vault(front: _Wall, heights: Sequence[float]) -> StoreyVault | None:
+    """Plan the rib vault over the square room behind a wall."""
+    along, up, out = front.frame.axes
+    half = 0.5 * _WIDTH - THICKNESS
+    return plan_vault(heights, half, _FOOT - (THICKNESS + half) * out, np.array([along, -out, up]))
 
 
 def _before_windows(wall: _Wall, depth: float, jambs: Sequence[SolidDraft]) -> Station:
@@ -210,14 +230,17 @@ def _walls(width: float, depth: float) -> tuple[_Wall, ...]:
 
 
 def _wall(
-    wall: _Wall, heights: Sequence[float], elaborate: bool, rng: Random
+    wall: _Wall, heights: Sequence[float], elaborate: bool, vault: StoreyVault | None, rng: Random
 ) -> Iterator[Draft | SolidDraft]:
     """Draft the stones of both facings of a wall."""
     halves = _PASSAGE if wall.passage else _SPLAYED if elaborate else _WINDOW
     outer, inner = (
         _opening(wall, half, heights, elaborate) if len(heights) > _OPEN else None for half in halves
     )
-    corners = [list(_corners(wall, number, heights)) for number in range(1, len(heights))]
+    corbels = 0 if vault is None else vault.course
+    corners = [
+        list(_corners(wall, number, heights, corbel=number == corbels)) for number in range(1, len(heights))
+    ]
     widest = [_kept_clear(outer, inner, number) for number in range(1, len(heights))]
     through = [
         list(_through(wall, number, 0.5 * (low + high), widest[number - 1]))
@@ -228,11 +251,14 @@ def _wall(
     yield from _facing(wall, "O", _with_springers(courses, outer, heights), through, outer, heights, rng)
     ends = tuple(-end for end in wall.inner_ends[::-1])
     given = [[_mirrored(piece) for piece in row] for row in through]
+    if vault is not None:
+        given[corbels - 1] += _corbels(wall, (ends[0], ends[1]), 0.5 * sum(vault.beds))
     courses = plan_courses(rng, heights, (ends[0], ends[1]), inner, through=given)
     pieces = _with_springers(courses, inner, heights)
     own = [[p for p in one if p not in row] for one, row in zip(pieces, given, strict=True)]
     splay = halves if elaborate and not wall.passage else None
-    for draft in _facing(wall, "I", own, [[]] * len(own), inner, heights, rng):
+    flush = (0, 0) if vault is None else vault.flush
+    for draft in _facing(wall, "I", own, [[]] * len(own), inner, heights, rng, flush):
         yield _splayed(draft, *splay) if splay is not None and draft.stone.plan.kind == "jamb" else draft
 
 
@@ -276,11 +302,15 @@ def _with_springers(
     return out
 
 
-def _corners(wall: _Wall, number: int, heights: Sequence[float]) -> Iterator[Piece]:
-    """Yield the stones of the corners in a course; the end of a quoin of the other wall is one "of another wall"."""
+def _corners(wall: _Wall, number: int, heights: Sequence[float], *, corbel: bool) -> Iterator[Piece]:
+    """Yield the stones of the corners in a course; the end of a quoin of the other wall is one "of another wall".
+
+    Behind a corbel the other stone is a quoin, too, half as deep.
+    """
     middle = 0.5 * (heights[number - 1] + heights[number])
     along = (number % 2 == 1) == (wall.letter == "A")
-    kinds = (("quoin", 0.0, _QUOIN),) if along else ((_OTHER, 0.0, _HALF), ("bonder", _HALF, THICKNESS))
+    beside = "quoin" if corbel else "bonder"
+    kinds = (("quoin", 0.0, _QUOIN),) if along else ((_OTHER, 0.0, _HALF), (beside, _HALF, THICKNESS))
     for corner, place, right in zip(wall.corners, wall.ends, (1.0, -1.0), strict=True):
         for kind, start, stop in kinds if corner else ():
             left, end = sorted((place + right * start, place + right * stop))
@@ -288,6 +318,15 @@ def _corners(wall: _Wall, number: int, heights: Sequence[float]) -> Iterator[Pie
 
 
 _OTHER = "of another wall"
+
+
+def _corbels(wall: _Wall, ends: tuple[float, float], middle: float) -> Iterator[Piece]:
+    """Yield what corbels take of the course of an inner facing, seen from inside, as stones "of another wall"."""
+    for corner, end, right in zip(wall.corners[::-1], ends, (1.0, -1.0), strict=True):
+        if corner:
+            corbel = PROJECTION - (0.0 if wall.letter == "A" else _RELIEF)
+            left, stop = sorted((end, end + right * corbel))
+            yield Piece(_OTHER, upright(left, middle), upright(stop, middle))
 
 
 def _through(wall: _Wall, number: int, middle: float, opening: float) -> Iterator[Piece]:
@@ -321,15 +360,16 @@ def _facing(
     opening: Opening | None,
     heights: Sequence[float],
     rng: Random,
+    flush: tuple[int, int] = (0, 0),
 ) -> Iterator[Draft]:
-    """Draft the stones of one facing, course by course, then those of the arch over its opening."""
+    """Draft the stones of one facing, course by course, then those of the arch; faces of some courses are flush."""
     for number, pieces in enumerate(courses, start=1):
         beds = Bed(heights[number - 1]), Bed(heights[number])
         own = [piece for piece in pieces if piece.kind != _OTHER]
         for k, piece in enumerate(own, start=1):
             plan = planned(f"{wall.letter}{side}{number:02d}-{k:02d}", piece, *beds, number)[0]
             depth = THICKNESS if piece in through[number - 1] else _DEPTHS[piece.kind]
-            yield _draft(wall, side, plan, depth, number, rng)
+            yield _draft(wall, side, plan, depth, number, rng, flush=flush[0] <= number <= flush[1])
     arch = opening.voussoirs() if opening else []
     for number, plan in enumerate(arch, start=1):
         named = replace(plan, code=f"{wall.letter}{side}-{plan.code}")
@@ -348,7 +388,9 @@ def _splayed(draft: Draft, outside: float, inside: float) -> SolidDraft:
     return SolidDraft(solid, plan.kind, plan.course)
 
 
-def _draft(wall: _Wall, side: str, plan: PlannedStone, depth: float, turn: int, rng: Random) -> Draft:
+def _draft(
+    wall: _Wall, side: str, plan: PlannedStone, depth: float, turn: int, rng: Random, *, flush: bool = False
+) -> Draft:
     """Draft a stone; those that meet others in the wall have no relief, and a depth that is seen in an opening."""
     frame = wall.frame if side == "O" else wall.inner_frame
     zone = f"{wall.letter} {'outer' if side == 'O' else 'inner'}"
@@ -360,7 +402,7 @@ def _draft(wall: _Wall, side: str, plan: PlannedStone, depth: float, turn: int, 
         plan = replace(plan, kind="quoin")
     stone = (
         flat_stone(plan, depth, frame)
-        if depth >= _HALF or lines_passage
+        if depth >= _HALF or lines_passage or flush
         else build_stone(plan, depth, frame, rng)
     )
     return Draft(stone, frame, plan.corners, zone=zone, station=zone, seen_depth=seen)
