@@ -148,9 +148,14 @@ text = "another height of the courses, above one that levels them"
 
 _WALLS = " and kind != web_stone"  # courses of webs are numbered from their springers
 _OF_VAULT = """
+[[correction]]
+stones = ["is_a(rib_segment)"]
+set = { zone = "vault" }
+reason = "the file of solids has no zones"
+
 [[of_phase]]
 phase = "2"
-stones = ["is_a(rib_segment) or kind in (rib_springer, web_stone)"]
+stones = ["is_a(rib_segment) or kind = web_stone"]
 text = "the rib vault, after the walls"
 """
 
@@ -257,7 +262,9 @@ def moved_sample(cause: Cause, movement: Movement) -> Sample:
 
 def storey_recipe(courses: int, title: str, *, elaborate: bool = True) -> SampleRecipe:
     """Return the recipe of a storey of the tower, of any number of courses; see `tower_storey`."""
-    fixed = f"course = 1 and kind != web_stone or code in ({', '.join(STANDING)})" if elaborate else "course = 1"
+    fixed = (
+        f"course = 1 and kind != web_stone or code in ({', '.join(STANDING)})" if elaborate else "course = 1"
+    )
     return SampleRecipe(title, fixed, _tower(courses, elaborate), core=True)
 
 

@@ -91,7 +91,7 @@ class RibVaultShape:
 
     @property
     def heights(self) -> tuple[float, float, float]:
-        """Heights of foot and highest corner of the springers, and of the boss's back, above the centre of the arcs [m]."""
+        """Heights of the springers' foot and highest corner and of the boss's back above the arcs' centre [m]."""
         first = self.beds()[0]
         corner = first.z - (self.half - first.x) * float(first.along[0] / first.along[2])
         return first.z - self.springer, corner, (self.radius + self.height - self.drop) * math.cos(self.crown)
