@@ -7,7 +7,8 @@ from survey.geometry.solids import area_vector
 from survey.geometry.watertight import check_watertight
 from survey.joints.close import close_joints
 from survey.synthetic.buildings.storey_vault import STANDING
-from survey.synthetic.buildings.tower import THICKNESS, TowerStorey, tower_storey
+from survey.synthetic.buildings.storey_walls import THICKNESS
+from survey.synthetic.buildings.tower import TowerStorey, tower_storey
 from tests.survey.unseen.statics import near_pairs, overlap_depth
 
 CORBELS = {"T3": "AI08-K1", "T2": "AI08-K2"}
