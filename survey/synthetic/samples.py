@@ -94,7 +94,7 @@ def _tower(courses: int, elaborate: bool) -> Callable[[], Sample]:
         building = storey.building
         vault = storey.vault
         phases = _PHASES.format(last=storey.level_break, walls="" if vault is None else _WALLS)
-        knowledge = _KNOWN + phases + "".join(_places(building))
+        knowledge = _KNOWN.format(what="building") + phases + "".join(_places(building))
         if vault is not None:
             knowledge += _OF_VAULT + _structures(vault)
         return Sample(building.survey, _truth_of(building), knowledge, building.modelled)
@@ -120,7 +120,7 @@ set = {{ zone = "{zone}", course = {course} }}
 reason = "the file of solids has neither zones nor courses"
 """
 _KNOWN = """\
-# What is "known" of the synthetic building besides its geometry; as invented as the building.
+# What is "known" of the synthetic {what} besides its geometry; as invented as the {what}.
 
 [record]
 author = "synthetic"
@@ -144,8 +144,6 @@ phase = "2"
 stones = ["course > {last}{walls}"]
 text = "another height of the courses, above one that levels them"
 """
-
-
 _WALLS = " and kind != web_stone"  # courses of webs are numbered from their springers
 _OF_VAULT = """
 [[correction]]
@@ -164,8 +162,8 @@ def _rib_vault() -> Sample:
     vault = rib_vault(RibVaultShape(wall_rib=_WALL_RIB))
     axes = {f"R{rib}": (np.round(vault.rib_axis(rib, 3), 6) + 0.0).tolist() for rib in range(1, 5)}
     truth = _truth_of(vault.building, axes=axes)
-    known = _KNOWN.replace("building", "rib vault", 1).replace("as the building", "as the vault")
-    return Sample(vault.building.survey, truth, known + _structures(vault.shape), vault.building.modelled)
+    knowledge = _KNOWN.format(what="rib vault") + _structures(vault.shape)
+    return Sample(vault.building.survey, truth, knowledge, vault.building.modelled)
 
 
 def _structures(shape: RibVaultShape) -> str:
@@ -254,7 +252,9 @@ def moved_sample(cause: Cause, movement: Movement) -> Sample:
     """Return the sample of a building after a movement, the truth with its causes."""
     site = cause.build(movement, None)
     last = cause.stood or site.level_break
-    knowledge = "" if last is None else _KNOWN + _PHASES.format(last=last, walls="")
+    knowledge = ""
+    if last is not None:
+        knowledge = _KNOWN.format(what="building") + _PHASES.format(last=last, walls="")
     causes = {"settlement": cause.heights(site), "forces": cause.forces(site), "jerk": cause.jerk(site)}
     truth = _truth_of(site.building, causes)
     return Sample(site.building.survey, truth, knowledge)
