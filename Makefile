@@ -1,6 +1,6 @@
 # make demo   from a survey file to a picture of the stresses, in out/window
 # make test   the tests
-# make tower  a synthetic storey of 2,154 stones with a core, from its survey to a report, in out/tower
+# make tower  a synthetic storey of 2,508 stones with a core, from its survey to a report, in out/tower
 # make clean  remove .venv and out
 #
 # Another interpreter: make demo PYTHON=python3.12
@@ -36,6 +36,7 @@ tower: $(VENV)/.kernels $(VENV)/.installed
 	@rm -rf $(OUT)/tower
 	$(MOMA) sample tower --out $(OUT)/tower
 	$(MOMA) ingest $(OUT)/tower/tower.moma --db sqlite:///$(OUT)/tower/tower.db
+	$(MOMA) ingest $(OUT)/tower/solids.obj --format solids --header $(OUT)/tower/head.moma --db sqlite:///$(OUT)/tower/tower.db
 	$(MOMA) record $(OUT)/tower/knowledge.toml --db sqlite:///$(OUT)/tower/tower.db
 	$(MOMA) propose infill --record --db sqlite:///$(OUT)/tower/tower.db > $(OUT)/tower/core.txt
 	$(MOMA) run $(OUT)/tower/tower.toml --db sqlite:///$(OUT)/tower/tower.db --out $(OUT)/tower/results

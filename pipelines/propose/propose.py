@@ -27,6 +27,7 @@ __all__ = ["Facings", "Proposal", "ProposalReport", "Recording", "propose_core",
 
 _SIZE = ("code", "kind", "course", "zone", "length", "height", "depth")
 _NO_STONES = frozenset({"infill", "joint", "support"})
+_OF_VAULTS = frozenset({"boss", "rib_segment", "web_stone"})  # which stand in no facing
 
 Facings = tuple[str, str]
 """Expressions for the stones of the two facings of a wall."""
@@ -154,7 +155,11 @@ def propose_core(
         records = _stones(session, where)
         blocks = [surveyed_block(record) for record in records]
         closed = close_joints(blocks).solids
-        stones = [facing_stone(block, solid) for block, solid in zip(blocks, closed, strict=True)]
+        stones = [
+            facing_stone(block, solid)
+            for block, solid in zip(blocks, closed, strict=True)
+            if block.kind not in _OF_VAULTS
+        ]
         named = None if facings is None else _named(session, where, facings)
         found = propose_infill(stones, settings, facings=named, taken=_codes(session))
         known = _measured(session, find(session, "infill"))

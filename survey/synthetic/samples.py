@@ -13,6 +13,7 @@ from survey.synthetic.buildings.facings import two_facings
 from survey.synthetic.buildings.openings import Arch
 from survey.synthetic.buildings.quoins import corner
 from survey.synthetic.buildings.ribs import WEBS, RibVaultShape, rib_vault
+from survey.synthetic.buildings.storey_vault import STANDING
 from survey.synthetic.buildings.tower import tower_storey
 from survey.synthetic.buildings.vaults import barrel_vault, semicircular_arch
 from survey.synthetic.buildings.walls import wall
@@ -91,16 +92,22 @@ def _tower(courses: int, elaborate: bool) -> Callable[[], Sample]:
     def make() -> Sample:
         storey = tower_storey(courses, elaborate=elaborate)
         building = storey.building
-        knowledge = _PHASES.format(last=storey.level_break) + "".join(_places(building))
+        vault = storey.vault
+        phases = _PHASES.format(last=storey.level_break, walls="" if vault is None else _WALLS)
+        knowledge = _KNOWN.format(what="building") + phases + "".join(_places(building))
+        if vault is not None:
+            knowledge += _OF_VAULT + _structures(vault)
         return Sample(building.survey, _truth_of(building), knowledge, building.modelled)
 
     return make
 
 
 def _places(building: Building) -> Iterator[str]:
-    """Yield corrections that give the splayed jambs of a storey their zones and courses, which files of solids lack."""
+    """Yield corrections that give modelled stones of the walls their zones and courses, which files of solids lack."""
     rows: dict[tuple[str, int | None], list[str]] = {}
     for one in building.modelled:
+        if one.course is None:
+            continue
         rows.setdefault((f"{one.code[0]} inner", one.course), []).append(one.code)
     for (zone, course), codes in rows.items():
         yield _PLACE.format(stones='", "'.join(codes), zone=zone, course=course)
@@ -112,13 +119,14 @@ stones = ["{stones}"]
 set = {{ zone = "{zone}", course = {course} }}
 reason = "the file of solids has neither zones nor courses"
 """
-_PHASES = """\
-# What is "known" of the synthetic building besides its geometry; as invented as the building.
+_KNOWN = """\
+# What is "known" of the synthetic {what} besides its geometry; as invented as the {what}.
 
 [record]
 author = "synthetic"
 source = "invented for this sample"
-
+"""
+_PHASES = """
 [[phase]]
 name = "1"
 description = "up to the level break"
@@ -129,23 +137,42 @@ description = "from the levelling course on, with lower courses"
 
 [[of_phase]]
 phase = "1"
-stones = ["course <= {last}"]
+stones = ["course <= {last}{walls}"]
 
 [[of_phase]]
 phase = "2"
-stones = ["course > {last}"]
+stones = ["course > {last}{walls}"]
 text = "another height of the courses, above one that levels them"
+"""
+_WALLS = " and kind != web_stone"  # courses of webs are numbered from their springers
+_OF_VAULT = """
+[[correction]]
+stones = ["is_a(rib_segment)"]
+set = { zone = "vault" }
+reason = "the file of solids has no zones"
+
+[[of_phase]]
+phase = "2"
+stones = ["is_a(rib_segment) or kind = web_stone"]
+text = "the rib vault, after the walls"
 """
 
 
 def _rib_vault() -> Sample:
     vault = rib_vault(RibVaultShape(wall_rib=_WALL_RIB))
     axes = {f"R{rib}": (np.round(vault.rib_axis(rib, 3), 6) + 0.0).tolist() for rib in range(1, 5)}
+    truth = _truth_of(vault.building, axes=axes)
+    knowledge = _KNOWN.format(what="rib vault") + _structures(vault.shape)
+    return Sample(vault.building.survey, truth, knowledge, vault.building.modelled)
+
+
+def _structures(shape: RibVaultShape) -> str:
+    """Return what belongs to which web and rib of a vault with wall ribs."""
+    count = shape.segments
     parts = [
         _PART.format(kind="web", code=web, title=f"Web {web}", stones=f"zone = 'web {web}'", ordered="false")
         for web in WEBS
     ]
-    count = vault.shape.segments
     for code, (up, down) in {"D1": (1, 3), "D2": (2, 4)}.items():
         row = [f"T{up}", *(f"R{up}-{k:02d}" for k in range(1, count + 1)), "B"]
         row += [*(f"R{down}-{k:02d}" for k in range(count, 0, -1)), f"T{down}"]
@@ -164,17 +191,10 @@ def _rib_vault() -> Sample:
                 ordered="true",
             )
         )
-    truth = _truth_of(vault.building, axes=axes)
-    return Sample(vault.building.survey, truth, _VAULT + "".join(parts), vault.building.modelled)
+    return _VAULT + "".join(parts)
 
 
-_VAULT = """\
-# What is "known" of the synthetic rib vault besides its geometry; as invented as the vault.
-
-[record]
-author = "synthetic"
-source = "invented for this sample"
-
+_VAULT = """
 [[kind]]
 name = "wall_rib"
 parent = "rib"
@@ -232,7 +252,9 @@ def moved_sample(cause: Cause, movement: Movement) -> Sample:
     """Return the sample of a building after a movement, the truth with its causes."""
     site = cause.build(movement, None)
     last = cause.stood or site.level_break
-    knowledge = "" if last is None else _PHASES.format(last=last)
+    knowledge = ""
+    if last is not None:
+        knowledge = _KNOWN.format(what="building") + _PHASES.format(last=last, walls="")
     causes = {"settlement": cause.heights(site), "forces": cause.forces(site), "jerk": cause.jerk(site)}
     truth = _truth_of(site.building, causes)
     return Sample(site.building.survey, truth, knowledge)
@@ -240,7 +262,10 @@ def moved_sample(cause: Cause, movement: Movement) -> Sample:
 
 def storey_recipe(courses: int, title: str, *, elaborate: bool = True) -> SampleRecipe:
     """Return the recipe of a storey of the tower, of any number of courses; see `tower_storey`."""
-    return SampleRecipe(title, "course = 1", _tower(courses, elaborate), core=True)
+    fixed = (
+        f"course = 1 and kind != web_stone or code in ({', '.join(STANDING)})" if elaborate else "course = 1"
+    )
+    return SampleRecipe(title, fixed, _tower(courses, elaborate), core=True)
 
 
 def _moved(title: str, cause: Cause, fixed: str = "course = 1", core: bool = False) -> SampleRecipe:

@@ -36,7 +36,7 @@ from survey.synthetic.bond import PlannedStone
 from survey.synthetic.building import Building, Draft, SolidDraft, measured_building, observer
 from survey.synthetic.frame import TrueStone, WallFrame
 
-__all__ = ["WEBS", "Bed", "RibVault", "RibVaultShape", "rib_vault"]
+__all__ = ["WEBS", "Bed", "RibVault", "RibVaultShape", "rib_vault", "vault_drafts"]
 
 WEBS = "NESW"
 """Names of the webs, by the walls that they meet."""
@@ -67,6 +67,7 @@ class RibVaultShape:
     springer : height of a springer below the web's soffit at its joint with the rib [m]
     wall_rib : width of the wall ribs; 0: there are none [m]
     wall_drop : of the soffit of a wall rib below the web's [m]
+    clear : distance of wall ribs, or of webs without them, from the walls, which springers reach [m]
     """
 
     half: float = 2.0
@@ -81,11 +82,19 @@ class RibVaultShape:
     springer: float = 0.7
     wall_rib: float = 0.0
     wall_drop: float = 0.06
+    clear: float = 0.0
 
     @property
     def reach(self) -> float:
         """Distance of the ends of the webs from the axis [m]."""
-        return self.half - self.wall_rib
+        return self.half - self.clear - self.wall_rib
+
+    @property
+    def heights(self) -> tuple[float, float, float]:
+        """Heights of the springers' foot and highest corner and of the boss's back above the arcs' centre [m]."""
+        first = self.beds()[0]
+        corner = first.z - (self.half - first.x) * float(first.along[0] / first.along[2])
+        return first.z - self.springer, corner, (self.radius + self.height - self.drop) * math.cos(self.crown)
 
     @property
     def angles(self) -> Array:
@@ -191,23 +200,44 @@ def rib_vault(shape: RibVaultShape | None = None, seed: int = 1) -> RibVault:
         if the webs meet behind the ribs, or the springers do not reach the walls
     """
     shape, rng = shape or RibVaultShape(), Random(seed)
-    _check(shape)
     cos, sin = math.cos(_AZIMUTH), math.sin(_AZIMUTH)
     axes = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
-    beds = shape.beds()
-    drafts = [
-        _web_draft(stone, _FOOT, axes)
-        for turns, name in enumerate(WEBS)
-        for stone in _web(name, _turn(turns), beds, shape, rng)
-    ]
-    ribs = [
-        SolidDraft(Solid(code, one.vertices @ axes + _FOOT, one.faces), kind)
-        for code, (kind, one) in _ribs(beds, shape)
-    ]
+    drafts, ribs = vault_drafts(shape, _FOOT, axes, rng)
     base = [draft.solid.code for draft in ribs if draft.kind == "rib_springer"]
     depths = {"web_stone": shape.thickness}
     building = measured_building("rib vault", drafts, depths, [observer(_FOOT)], base, rng, modelled=ribs)
     return RibVault(building, shape, _FOOT, axes)
+
+
+def vault_drafts(
+    shape: RibVaultShape, foot: Array, axes: Array, rng: Random
+) -> tuple[list[Draft], list[SolidDraft]]:
+    """Draft the stones of a rib vault in the site: its webs, and what is modelled as solids.
+
+    Parameters
+    ----------
+    shape : its dimensions
+    foot : (3,) centre of the arcs of both diagonal ribs [m]
+    axes : (3, 3) rows: along the walls S and W, and upwards [-]
+    rng : random numbers
+
+    Raises
+    ------
+    GeometryError
+        as `rib_vault`
+    """
+    _check(shape)
+    beds = shape.beds()
+    webs = [
+        _web_draft(stone, foot, axes)
+        for turns, name in enumerate(WEBS)
+        for stone in _web(name, _turn(turns), beds, shape, rng)
+    ]
+    ribs = [
+        SolidDraft(Solid(code, one.vertices @ axes + foot, one.faces), kind)
+        for code, (kind, one) in _ribs(beds, shape)
+    ]
+    return webs, ribs
 
 
 def _check(shape: RibVaultShape) -> None:
@@ -349,7 +379,7 @@ def _wall_segment(left: Bed, right: Bed, shape: RibVaultShape) -> Solid:
     planes = [
         (ends[0], float(ends[0] @ left.on_soffit())),
         (ends[1], float(ends[1] @ right.on_soffit())),
-        (np.array([0.0, 1.0, 0.0]), shape.half),
+        (np.array([0.0, 1.0, 0.0]), shape.half - shape.clear),
         (np.array([0.0, -1.0, 0.0]), -shape.reach),
         (-outward, shape.wall_drop - soffit),
         (outward, soffit + shape.thickness),

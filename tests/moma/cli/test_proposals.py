@@ -4,8 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from survey.formats.native.writer import write_moma
+from survey.formats.native.writer import write_head, write_moma
+from survey.formats.solids.obj_writer import write_obj
 from survey.synthetic.buildings.facings import two_facings
+from survey.synthetic.buildings.ribs import RibVaultShape, rib_vault
 from survey.synthetic.window_bay.sample import make_sample
 from tests.moma.commands import answer, fails, invoke, prints
 
@@ -113,6 +115,19 @@ def test_the_core_is_recorded_once(tmp_path):
     assert (second["proposals"], second["entry"]) == ([], None)
     # another shape of the same core is none that is missing
     assert proposals("infill", "--db", url, "--as", "storeys")["proposals"] == []
+
+
+def test_stones_of_a_vault_are_no_facing(tmp_path):
+    """Webs and ribs with their backs to each other have no core between them."""
+    building = rib_vault(RibVaultShape(segments=4, wall_rib=0.22)).building
+    write_moma(building.survey, tmp_path / "vault.moma")
+    write_obj(building.modelled, tmp_path / "solids.obj")
+    write_head(building.survey.head, tmp_path / "head.moma")
+    url = f"sqlite:///{tmp_path / 'vault.db'}"
+    prints("ingest", tmp_path / "vault.moma", "--db", url)
+    solids = ["--format", "solids", "--header", tmp_path / "head.moma"]
+    prints("ingest", tmp_path / "solids.obj", *solids, "--db", url)
+    assert proposals("infill", "--db", url)["proposals"] == []
 
 
 @pytest.mark.parametrize(

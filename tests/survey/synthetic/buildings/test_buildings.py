@@ -11,7 +11,8 @@ from survey.synthetic.buildings.assemblies import angled_pier, hexagonal_dome
 from survey.synthetic.buildings.facings import two_facings
 from survey.synthetic.buildings.openings import Arch
 from survey.synthetic.buildings.quoins import corner
-from survey.synthetic.buildings.tower import THICKNESS, TowerStorey, tower_storey
+from survey.synthetic.buildings.storey_walls import THICKNESS
+from survey.synthetic.buildings.tower import TowerStorey, tower_storey
 from survey.synthetic.buildings.vaults import barrel_vault, semicircular_arch
 from survey.synthetic.buildings.walls import wall
 from survey.synthetic.frame import RigidMotion
