@@ -140,11 +140,14 @@ def _simulate(
     run = _Run(model, begin, clock)
     if earlier is not None:
         run.restore(earlier)
-    elif settings.start == Start.EQUILIBRIUM and begin.memory is None:
-        run.begin_in_equilibrium(report)
+    else:
+        if settings.start == Start.EQUILIBRIUM and begin.memory is None:
+            run.begin_in_equilibrium(report)
+        with clock("stress"):
+            run.log.begin(run.simulation.state)
     log, watch = run.log, run.watch
     if archive is not None:
-        archive.begin(log.observer.bodies(begin.state, np.zeros(len(model.mass))), log.frames)
+        archive.begin(log.observer.bodies(log.frames[0], np.zeros(len(model.mass))), log.frames)
     total = scene.time.steps
     report(Progress("step", run.steps, total))
     for count in range(run.steps + 1, total + 1):

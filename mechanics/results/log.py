@@ -17,7 +17,7 @@ from mechanics.dynamics.stopping import LASTING, Verdict, balance_of
 from mechanics.model.model import Model
 from mechanics.results.peaks import PeakTracker
 from mechanics.results.postprocess import Observer
-from mechanics.results.result import Energies, Errors, History, Result
+from mechanics.results.result import Energies, Errors, Frame, History, Result
 from mechanics.results.stages import StageResult
 from mechanics.scene.scene import Fidelity
 from mechanics.scene.state import State
@@ -41,7 +41,7 @@ class Log(Carrier):
     def __init__(self, model: Model, start: State, first: State) -> None:
         self.model, self._start = model, start
         self.observer = Observer(model, start)
-        self.frames = Rows([self.observer.first_frame(first)])
+        self.frames: Rows[Frame] = Rows()
         self.peaks = PeakTracker(model, start)
         self.balance = np.zeros(len(model.mass))
         self.energy = EnergyBalance(model, first)
@@ -55,6 +55,10 @@ class Log(Carrier):
         self.solvers = Counter(self.solvers)
         if self.observer.joints is not None:
             self.peaks.begin(self.observer.joints)
+
+    def begin(self, state: State) -> None:
+        """Keep the frame of the start, before any contact force is known."""
+        self.frames.append(self.observer.first_frame(state))
 
     def __call__(self, step: Step) -> Array:
         """Account for one step, and return the imbalance of each body (nb,)."""
@@ -97,7 +101,7 @@ def result_of(
     model, observer, energy, history = log.model, log.observer, log.energy, log.history()
     support = support_reaction(model, last.contacts, last.force, last.kick.load, last.after.time)
     with clock("stress"):
-        bodies = observer.bodies(last.after, log.balance)
+        bodies = observer.bodies(log.frames[-1], log.balance)
         contacts, joints = observer.contacts_and_joints(last)
     errors = Errors(
         natural_map=float(history.natural_map[-LASTING:].max()),

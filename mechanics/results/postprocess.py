@@ -125,10 +125,10 @@ class Observer(Carrier):
         assert self._joints is not None
         return contacts, joint_results(self._model, self._joints, faces, interfaces.face, step, contacts)
 
-    def bodies(self, state: State, balance: Array) -> tuple[BodyResult, ...]:
-        """Return the result of each body; `balance` (nb,) as `imbalance` gives it."""
-        points = zip(positions(self._model, self._start), positions(self._model, state), strict=True)
-        return tuple(self._body(b, state, *both, float(balance[b])) for b, both in enumerate(points))
+    def bodies(self, frame: Frame, balance: Array) -> tuple[BodyResult, ...]:
+        """Return the result of each body at the time of a frame; `balance` (nb,) as `imbalance` gives it."""
+        before = positions(self._model, self._start)
+        return tuple(self._body(b, before[b], frame, float(balance[b])) for b in range(len(before)))
 
     def _frame(self, state: State, contacts: ContactResult) -> Frame:
         seen: list[tuple[Array | None, float | None]] = [(None, None)] * len(self._model.mass)
@@ -178,8 +178,8 @@ class Observer(Carrier):
         error = stress_error(stone.mesh, stone.material, displacement, local)
         return to_voigt(turn @ from_voigt(local) @ turn.T), error
 
-    def _body(self, body: int, state: State, before: Array, now: Array, balance: float) -> BodyResult:
-        block, stone = self._model.scene.blocks[body], self._model.stones[body]
+    def _body(self, body: int, before: Array, frame: Frame, balance: float) -> BodyResult:
+        block, stone, now = self._model.scene.blocks[body], self._model.stones[body], frame.positions[body]
         rigid = BodyResult(
             code=block.code,
             fidelity=block.fidelity,
@@ -203,9 +203,9 @@ class Observer(Carrier):
         elastic = replace(
             rigid, faces=surface_polygons(mesh), element=mesh.element, cells=mesh.cells, node_volume=volume
         )
-        if not block.stress:
+        stress, error = frame.stresses[body], frame.stress_errors[body]
+        if stress is None or error is None:
             return elastic
-        stress, error = self._stress(body, stone, state)
         return replace(
             elastic,
             stress=stress,

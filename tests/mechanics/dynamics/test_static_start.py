@@ -14,6 +14,7 @@ from mechanics.dynamics.static_start import static_start
 from mechanics.dynamics.warm_start import Memory
 from mechanics.model.model import build_model
 from mechanics.problem.problem import ContactSolution
+from mechanics.results.postprocess import Observer
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.law import STATE
 from mechanics.scene.loads.gravity import GravityRamp, TiltingTable
@@ -126,6 +127,22 @@ def test_the_clock_starts_at_zero_with_all_bodies_at_rest(name):
     assert simulation.state.time == 0.0
     assert not simulation.state.velocity.any()
     assert not simulation.state.node_velocity.any()
+
+
+def test_stresses_are_recovered_once_for_each_frame_of_a_run(monkeypatch):
+    """Those of the drawing, before the search, are not asked for, and the result has those of the last frame."""
+    made, recover = [], Observer._stress
+    monkeypatch.setattr(
+        Observer, "_stress", lambda own, *given: made.append(recover(own, *given)) or made[-1]
+    )
+    result = simulate(column(SOFT, HARD))
+    assert len(result.frames) == 2
+    assert len(made) == 2
+    assert result.bodies[1].stress is result.frames[-1].stresses[1]
+    assert result.bodies[1].values.error == result.frames[-1].stress_errors[1]
+    # the first frame is that of the search: of the drawing it would be without stress
+    pressure = 2000.0 * G * 0.6  # at the foot
+    assert np.abs(result.frames[0].stresses[1][:, 2]).max() > 0.5 * pressure
 
 
 def test_an_elastic_column_has_shortened_and_rigid_stones_have_not_moved():
