@@ -7,12 +7,12 @@ import numpy as np
 from mechanics.delassus.compliant import CompliantDelassus
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, Delassus
 from mechanics.problem.residual import residual
-from mechanics.solvers.first_order.body_admm import BodyADMM
+from mechanics.solvers.first_order.body_admm import BodyADMM, Stage
 from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.second_order.proximal_newton import ProximalNewton
 from mechanics.solvers.second_order.scaling import equilibrated
 from mechanics.solvers.strategies.elastic import Elastic
-from mechanics.solvers.strategies.rigid import TURNS, many_bodies
+from mechanics.solvers.strategies.rigid import TURNS, many_bodies, some_bodies
 
 __all__ = ["Compliant"]
 
@@ -29,6 +29,8 @@ _INTERIOR = 60
 # iterations with kept factors between many bodies, in the turns of rigid joints: forces of joints that yield do not
 # drift for long, so most steps end in the first turn, where each step of Newton's method factorises anew
 _MANY_ITERATIONS = 1000
+# stages for joints that yield next to nothing, extrapolated as soon as it is known what opens, slides and sticks
+_STAGES = (*TURNS[:2], *(4 * (Stage((1.0, 0.05, 0.02), 100, extrapolated=True),)))
 # compliance of most joints over W_αα below which these would take hundreds, as between rigid stones [-]
 _YIELDING = 5e-3
 
@@ -37,7 +39,8 @@ _YIELDING = 5e-3
 class Compliant:
     """Newton's method, from softer joints where it fails, then the interior point; with deformable stones as `Elastic`.
 
-    Many bodies on springs begin with ADMM, whose factors last for a step.
+    Some hundred bodies begin with ADMM, whose factors last for many iterations, and many bodies on springs end with it;
+    between others Newton's method goes on to where nothing creeps.
 
     With E the matrix W + E is regular, however many points stones share, so the method that solves it is fast; from
     contacts far from those of the solution it wanders, and softer joints bring it near. Where it is not solved, the
@@ -62,17 +65,19 @@ class Compliant:
         if problem.delassus.rigid is None:
             found = Elastic(self.tolerance, self.velocity_tolerance, self.max_iterations)(problem, start)
             return replace(found, why=f"compliant joints, {found.why}")
-        made = 0
-        if many_bodies(problem) and _yields(problem.delassus):
-            most = min(_MANY_ITERATIONS, self.max_iterations)
-            solver = BodyADMM(self.tolerance, self.velocity_tolerance, most, TURNS)
-            found = solver(problem, start)
-            if found.converged:
-                return replace(found, why="compliant joints, admm of bodies")
-            start, made = ContactStart(found.impulse, found.velocity), found.iterations
+        near, made = None, 0
+        if some_bodies(problem):
+            near = self._begun(problem, start)
+            if near.converged and many_bodies(problem) and _yields(problem.delassus):
+                return near
+            start, made = ContactStart(near.impulse, near.velocity), near.iterations
         found = self._newton(problem, start, "Newton", max(self.max_iterations - made, 1))
+        if near is not None and near.converged and not found.converged:
+            found = replace(near, iterations=found.iterations)
         found = replace(found, iterations=found.iterations + made)
-        if not found.converged and found.iterations < self.max_iterations:
+        # where ADMM does not lead near, softer joints seldom do, with a hundred factorisations
+        tried = near is not None and not self.thorough
+        if not (found.converged or tried) and found.iterations < self.max_iterations:
             found = self._softer(problem, start, found.iterations)
         left = self.max_iterations - found.iterations
         if not found.converged and self.thorough and left > 0:
@@ -82,6 +87,13 @@ class Compliant:
             path = replace(path, iterations=path.iterations + found.iterations)
             found = self._judged(problem, path, "interior point")
         return found
+
+    def _begun(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
+        """Return where ADMM leads, which has found most contacts, if not all."""
+        stages = TURNS if _yields(problem.delassus) else _STAGES
+        most = min(_MANY_ITERATIONS, self.max_iterations)
+        found = BodyADMM(self.tolerance, self.velocity_tolerance, most, stages)(problem, start)
+        return self._judged(problem, found, "admm of bodies")
 
     def _softer(self, problem: ContactProblem, start: ContactStart, count: int) -> ContactSolution:
         """Return the solution by way of softer joints, after `count` iterations."""

@@ -16,7 +16,7 @@ from mechanics.solvers.second_order.newton import Newton
 from mechanics.solvers.second_order.proximal_newton import ProximalNewton
 from mechanics.solvers.second_order.scaling import equilibrated
 
-__all__ = ["TURNS", "Alternating", "many_bodies", "moving_admm"]
+__all__ = ["TURNS", "Alternating", "many_bodies", "moving_admm", "some_bodies"]
 
 # sweeps with which every solution but the first begins: near a solution they suffice
 _FIRST_SWEEPS = 20
@@ -102,6 +102,8 @@ TURNS = (
     replace(_SORTED, iterations=80),
     *(50 * (_DRIFTED, _SORTED)),
 )
+# iterations of them where joints may yield instead
+_SORTED_ITERATIONS = 400
 # of few bodies: most walls need one penalty, in some 40 iterations; what wedges needs the turns
 _LOOSE_STAGES = (Stage(0.1, 80, extrapolated=True), *TURNS)
 # the same where errors may be many times those of the loosest tolerances: by how many, and σ, with which contacts that
@@ -283,6 +285,9 @@ class Alternating:
     def _turning(self, most: int) -> _Solver:
         return BodyADMM(self.tolerance, self.velocity_tolerance, most, TURNS)
 
+    def _sorted(self, most: int) -> _Solver:
+        return BodyADMM(self.tolerance, self.velocity_tolerance, min(_SORTED_ITERATIONS, most), TURNS)
+
     def _cold(self, most: int) -> _Solver:
         # the interior point has its turn where these are in vain
         return BodyADMM(*self._tight, max(most - _INTERIOR, 1), _COLD_STAGES)
@@ -318,7 +323,7 @@ class Alternating:
             yield "admm, small penalty", self._static, False
             later = [("admm, balanced penalty", self._moving, False)]
             if problem.delassus.rigid is not None:
-                some = _moving(problem) >= _SOME
+                some = some_bodies(problem)
                 if some and not (warm or many):
                     yield "admm of bodies", self._cold, False
                 if motion and not (warm or many):
@@ -332,7 +337,9 @@ class Alternating:
                 ]
                 if not self.thorough:
                     interior = [interior[0], interior[-1]]
-                if warm:
+                if warm and some and not self.thorough:
+                    later = [("admm of bodies", self._sorted, False), *newton]
+                elif warm:
                     later = newton + later + interior
                 elif some:
                     later = interior[:1] + newton + interior[1:] + later
@@ -414,6 +421,11 @@ class Alternating:
 def many_bodies(problem: ContactProblem) -> bool:
     """Return whether so many rigid bodies move that kept factors beat Newton's method."""
     return _moving(problem) >= _MANY
+
+
+def some_bodies(problem: ContactProblem) -> bool:
+    """Return whether so many rigid bodies move that Newton's method alone may wander."""
+    return _moving(problem) >= _SOME
 
 
 def _moving(problem: ContactProblem) -> int:
