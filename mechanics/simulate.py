@@ -158,8 +158,8 @@ def _simulate(
             balance = log(step)
             outcome = watch(step, balance)
         if outcome is Outcome.EQUILIBRIUM and (settings.stop_at_equilibrium or count == total):
-            # nothing but velocities of rest can have been halted since
-            at_once = count == LASTING and run.simulation.cold
+            # a relaxation that has rested in every step has halted no velocity above that of rest
+            at_once = count == LASTING and run.simulation.cold and not watch.yielded
             with clock("confirm"):
                 confirmed = at_once or lasts(run.simulation.released())
             if not confirmed:

@@ -46,7 +46,7 @@ class Simulation(Carrier):
     Attributes
     ----------
     state : at the end of the last step
-    cold : it has known no forces other than its own since it began at rest, and was not halted
+    cold : it has known no forces other than its own since it began at rest, and `halt` was not called
     """
 
     CARRIED = ("_first", "_freed", "_joints", "_memory", "_relax", "_sleepers", "cold", "state")

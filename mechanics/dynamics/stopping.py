@@ -121,6 +121,11 @@ class Watch(Carrier):
             return Outcome.COLLAPSED
         return Outcome.EQUILIBRIUM
 
+    @property
+    def yielded(self) -> bool:
+        """Joints have given way in some step."""
+        return self._compliant > 0
+
     def disproved(self) -> Outcome:
         """Take back a rest that did not last once its forces were forgotten."""
         self._quiet = 0

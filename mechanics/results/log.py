@@ -57,7 +57,7 @@ class Log(Carrier):
             self.peaks.begin(self.observer.joints)
 
     def begin(self, state: State) -> None:
-        """Keep the frame of the start, before any contact force is known."""
+        """Keep the frame of the start, before the first step."""
         self.frames.append(self.observer.first_frame(state))
 
     def __call__(self, step: Step) -> Array:

@@ -93,7 +93,7 @@ def _tower(courses: int, elaborate: bool) -> Callable[[], Sample]:
         storey = tower_storey(courses, elaborate=elaborate)
         building = storey.building
         vault = storey.vault
-        phases = _PHASES.format(last=storey.level_break, walls="" if vault is None else _WALLS)
+        phases = _PHASES.format(last=storey.level_break, walls="" if vault is None else _NOT_WEBS)
         knowledge = _KNOWN.format(what="building") + phases + "".join(_places(building))
         if vault is not None:
             knowledge += _OF_VAULT + _structures(vault)
@@ -144,7 +144,7 @@ phase = "2"
 stones = ["course > {last}{walls}"]
 text = "another height of the courses, above one that levels them"
 """
-_WALLS = " and kind != web_stone"  # courses of webs are numbered from their springers
+_NOT_WEBS = " and kind != web_stone"  # courses of webs are numbered from their springers
 _OF_VAULT = """
 [[correction]]
 stones = ["is_a(rib_segment)"]

@@ -26,21 +26,22 @@ _NEWTON_STEPS = 30
 _FURTHER = 1e-3
 # iterations of the interior point
 _INTERIOR = 60
-# iterations with kept factors between many bodies, in the turns of rigid joints: forces of joints that yield do not
-# drift for long, so most steps end in the first turn, where each step of Newton's method factorises anew
-_MANY_ITERATIONS = 1000
-# stages for joints that yield next to nothing, extrapolated as soon as it is known what opens, slides and sticks
-_STAGES = (*TURNS[:2], *(4 * (Stage((1.0, 0.05, 0.02), 100, extrapolated=True),)))
-# compliance of most joints over W_αα below which these would take hundreds, as between rigid stones [-]
+# iterations with kept factors between many bodies on springs, in the turns of rigid joints: forces of joints that yield
+# do not drift for long, so most steps end in the first turn, where each step of Newton's method factorises anew
+_ADMM_ITERATIONS = 1000
+# compliance of most joints over W_αα from which they are springs: below, as between rigid stones, those turns would
+# take hundreds of iterations [-]
 _YIELDING = 5e-3
+# stages below it, extrapolated as soon as it is known what opens, slides and sticks
+_STAGES = (*TURNS[:2], *(4 * (Stage((1.0, 0.05, 0.02), 100, extrapolated=True),)))
 
 
 @dataclass(frozen=True)
 class Compliant:
     """Newton's method, from softer joints where it fails, then the interior point; with deformable stones as `Elastic`.
 
-    Some hundred bodies begin with ADMM, whose factors last for many iterations, and many bodies on springs end with it;
-    between others Newton's method goes on to where nothing creeps.
+    Some hundred bodies, and many on springs, begin with ADMM, whose factors last for many iterations. What it leaves is
+    little enough on springs; between others it would be a creep, and Newton's method goes on.
 
     With E the matrix W + E is regular, however many points stones share, so the method that solves it is fast; from
     contacts far from those of the solution it wanders, and softer joints bring it near. Where it is not solved, the
@@ -50,7 +51,8 @@ class Compliant:
     ----------
     tolerance, velocity_tolerance : as in `NSGS`
     max_iterations : of all together
-    thorough : try the interior point, too, which takes as long as all the others
+    thorough : try the interior point, too, which takes as long as all the others, and softer joints also where ADMM
+        came first between joints that yield next to nothing
     """
 
     tolerance: float = 1e-6
@@ -65,19 +67,22 @@ class Compliant:
         if problem.delassus.rigid is None:
             found = Elastic(self.tolerance, self.velocity_tolerance, self.max_iterations)(problem, start)
             return replace(found, why=f"compliant joints, {found.why}")
-        near, made = None, 0
+        near, made, springs = None, 0, False
         if some_bodies(problem):
-            near = self._begun(problem, start)
-            if near.converged and many_bodies(problem) and _yields(problem.delassus):
-                return near
-            start, made = ContactStart(near.impulse, near.velocity), near.iterations
-        found = self._newton(problem, start, "Newton", max(self.max_iterations - made, 1))
+            springs = _yields(problem.delassus)
+            if many_bodies(problem) or not springs:
+                near = self._begun(problem, start, springs)
+                made = near.iterations
+                if (near.converged and springs) or made >= self.max_iterations:
+                    return near
+                start = ContactStart(near.impulse, near.velocity)
+        found = self._newton(problem, start, "Newton", self.max_iterations - made)
         if near is not None and near.converged and not found.converged:
             found = replace(near, iterations=found.iterations)
         found = replace(found, iterations=found.iterations + made)
-        # where ADMM does not lead near, softer joints seldom do, with a hundred factorisations
-        tried = near is not None and not self.thorough
-        if not (found.converged or tried) and found.iterations < self.max_iterations:
+        # where joints yield next to nothing and ADMM has not led near, softer ones seldom do, with 100 factorisations
+        softer = near is None or springs or self.thorough
+        if softer and not found.converged and found.iterations < self.max_iterations:
             found = self._softer(problem, start, found.iterations)
         left = self.max_iterations - found.iterations
         if not found.converged and self.thorough and left > 0:
@@ -88,10 +93,10 @@ class Compliant:
             found = self._judged(problem, path, "interior point")
         return found
 
-    def _begun(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
-        """Return where ADMM leads, which has found most contacts, if not all."""
-        stages = TURNS if _yields(problem.delassus) else _STAGES
-        most = min(_MANY_ITERATIONS, self.max_iterations)
+    def _begun(self, problem: ContactProblem, start: ContactStart, springs: bool) -> ContactSolution:
+        """Return where ADMM leads, which has found most of what opens and slides, if not all."""
+        most = min(_ADMM_ITERATIONS, self.max_iterations)
+        stages = TURNS if springs else _STAGES
         found = BodyADMM(self.tolerance, self.velocity_tolerance, most, stages)(problem, start)
         return self._judged(problem, found, "admm of bodies")
 

@@ -86,7 +86,8 @@ _EXACT = 1e-6
 # iterations from where ADMM with a small penalty stood, as it nearly always is close when it gives up
 _ENDING = (Stage(1e-3, 60, extrapolated=True),)
 # bodies from which a cold start asks ADMM and the interior point before Newton's method: where a tenth of 10⁴ contacts
-# slides or opens, this seldom finds them within its steps, of which each takes as long as an iteration of that
+# slides or opens, this seldom finds them within its steps, of which each takes as long as an iteration of that. Later
+# steps ask ADMM before joints may yield
 _SOME = 300
 # bodies from which Newton's steps in a motion, which factorise anew each, cost more than iterations with kept factors
 _MANY = 1000
@@ -103,7 +104,7 @@ TURNS = (
     *(50 * (_DRIFTED, _SORTED)),
 )
 # iterations of them where joints may yield instead
-_SORTED_ITERATIONS = 400
+_TURNS_ITERATIONS = 400
 # of few bodies: most walls need one penalty, in some 40 iterations; what wedges needs the turns
 _LOOSE_STAGES = (Stage(0.1, 80, extrapolated=True), *TURNS)
 # the same where errors may be many times those of the loosest tolerances: by how many, and σ, with which contacts that
@@ -111,8 +112,8 @@ _LOOSE_STAGES = (Stage(0.1, 80, extrapolated=True), *TURNS)
 _ROUGH = tuple(
     (times, (Stage(penalty, 80, extrapolated=False), *TURNS)) for times, penalty in ((4.0, 0.2), (2.0, 0.1))
 )
-# those with which forces of rest are found from nothing in joints as real ones are: once it is known what opens and
-# slides, a hundredth of the penalty suffices where contacts stick, so that their forces arrive in some 50 iterations
+# those with which forces of rest are found from nothing in irregular joints: once it is known what opens and slides, a
+# thousandth of the first penalty suffices where contacts stick, so that their forces arrive in some 50 iterations
 _COLD_STAGES = (
     TURNS[0],
     replace(TURNS[1], iterations=30),
@@ -140,7 +141,8 @@ class Alternating:
     Gauss–Seidel propagates information one stone per sweep, so it comes first only where the forces of the last step
     are known. ADMM with a small penalty solves the motion of all stones at once, and needs a dozen iterations as long
     as few contacts open or slide. Newton's method finds the contacts that do by a few factorisations. From a cold start
-    the interior point comes next, which converges whatever the height, the masses and the redundancy; in a motion, ADMM
+    of 300 bodies and more ADMM on their velocities comes next, and then, or at once of fewer, the interior point, which
+    converges whatever the height, the masses and the redundancy; in a motion, ADMM
     with a balanced penalty first. Methods that factorise work in units in which all contacts yield alike
     (`equilibrated`). docs/decisions/006-alternating-solver.md and 022-tall-and-heavy.md have the measurements.
 
@@ -285,8 +287,10 @@ class Alternating:
     def _turning(self, most: int) -> _Solver:
         return BodyADMM(self.tolerance, self.velocity_tolerance, most, TURNS)
 
-    def _sorted(self, most: int) -> _Solver:
-        return BodyADMM(self.tolerance, self.velocity_tolerance, min(_SORTED_ITERATIONS, most), TURNS)
+    def _in_turns(self, most: int) -> _Solver:
+        # Newton's method has its turn where these are in vain
+        most = min(_TURNS_ITERATIONS, max(most - _NEWTON_STEPS, 1))
+        return BodyADMM(self.tolerance, self.velocity_tolerance, most, TURNS)
 
     def _cold(self, most: int) -> _Solver:
         # the interior point has its turn where these are in vain
@@ -324,7 +328,7 @@ class Alternating:
             later = [("admm, balanced penalty", self._moving, False)]
             if problem.delassus.rigid is not None:
                 some = some_bodies(problem)
-                if some and not (warm or many):
+                if some and not (warm or motion):
                     yield "admm of bodies", self._cold, False
                 if motion and not (warm or many):
                     yield "admm of bodies", self._ended, True
@@ -338,7 +342,7 @@ class Alternating:
                 if not self.thorough:
                     interior = [interior[0], interior[-1]]
                 if warm and some and not self.thorough:
-                    later = [("admm of bodies", self._sorted, False), *newton]
+                    later = [("admm of bodies", self._in_turns, False), *newton]
                 elif warm:
                     later = newton + later + interior
                 elif some:
@@ -424,7 +428,7 @@ def many_bodies(problem: ContactProblem) -> bool:
 
 
 def some_bodies(problem: ContactProblem) -> bool:
-    """Return whether so many rigid bodies move that Newton's method alone may wander."""
+    """Return whether at least 300 rigid bodies move, among which Newton's method alone may wander."""
     return _moving(problem) >= _SOME
 
 

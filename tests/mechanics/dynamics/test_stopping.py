@@ -23,6 +23,27 @@ def test_a_wall_without_a_lintel_collapses_whatever_the_step_though_a_relaxation
     assert result.reason.startswith("stone 3-")
 
 
+def test_a_rest_from_the_first_step_on_is_not_solved_again_in_a_relaxation_either(monkeypatch):
+    asked = []
+    monkeypatch.setattr("mechanics.simulate.lasts", lambda one: asked.append(one) or True)
+    stones = [brick(str(k), (0, 0, k), (1, 0.5, k + 1)) for k in range(2)]
+    times = {"step": 5e-3, "duration": 0.5, "relaxation": True}
+    for start in Start:
+        assert simulate(scene(ground(), *stones, start=start, **times)).outcome is Outcome.EQUILIBRIUM
+    assert not asked
+    falling = brick("2", (0, 0, 2.001), (1, 0.5, 3.001))
+    assert simulate(scene(ground(), *stones, falling, **times)).outcome is Outcome.EQUILIBRIUM
+    assert len(asked) == 1
+
+
+def test_a_rest_on_joints_that_gave_way_is_solved_again(monkeypatch):
+    asked = []
+    monkeypatch.setattr("mechanics.simulate.lasts", lambda one: asked.append(one) or True)
+    monkeypatch.setattr("mechanics.dynamics.stopping.Watch.yielded", True)
+    simulate(scene(ground(), brick("0", (0, 0, 0), (1, 0.5, 1)), step=5e-3, duration=0.5, relaxation=True))
+    assert len(asked) == 1
+
+
 def slope(angle, velocity, **time):
     """A flat stone on a slope with friction 0.6, in motion."""
     turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])

@@ -1,15 +1,24 @@
 """The strategy for rigid scenes of many bodies: penalties in turn where forces change steadily."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from benchmarks.tower import tower_scene
+from mechanics.delassus.compliant import CompliantDelassus
 from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
+from mechanics.problem.problem import ContactStart
+from mechanics.problem.residual import residual
+from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.elastic_joint import ElasticJoint
-from mechanics.scene.scene import SolverSettings
+from mechanics.scene.scene import ContactSettings, Scene, SolverSettings, TimeSettings
+from mechanics.scene.shapes import bond, wall
 from mechanics.solvers.first_order.body_admm import BodyADMM, Stage
+from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.strategies import rigid
+from mechanics.solvers.strategies.compliant import Compliant
 
 _LIMITS = 1e-5, 1e-2
 _STEP = 5e-3  # [s]
@@ -121,3 +130,51 @@ def test_a_contact_that_sticks_has_the_last_of_three_penalties(many):
         for penalty in ((1.0, 1.0, 1e-3), (1e-3, 1.0, 1.0))
     )
     assert sticking.iterations < opening.iterations
+
+
+def leaning(sideways):
+    """A wall of 334 stones, pushed along its courses by a part of its weight, at rest or not."""
+    blocks = wall(bond(18, 18), 0.5, 0.25, 0.3)
+    gravity = (9.81 * sideways, 0.0, -9.81)
+    time = TimeSettings(step=_STEP, duration=_STEP, relaxation=True)
+    return Scene("leaning wall", blocks, gravity, ContactSettings(law=DryJoint(0.65)), time=time)
+
+
+def cold(scene):
+    """Return the problem of the first step, and nothing to begin with."""
+    step = Simulation(*build_model(scene)).step()
+    nothing = np.zeros_like(step.solution.impulse)
+    return step.problem, ContactStart(nothing, nothing)
+
+
+def test_forces_of_rest_are_found_from_nothing_without_the_interior_point(monkeypatch):
+    problem, nothing = cold(leaning(0.3))
+    path = InteriorPoint()(problem, nothing)
+    monkeypatch.setattr(rigid, "InteriorPoint", None)
+    found = rigid.Alternating()(problem, nothing)
+    assert found.why.startswith("admm of bodies: admm, small penalty stood at")
+    left = residual(problem, found.impulse)
+    assert left.within(3e-8, 3e-7)
+    assert found.iterations < 150
+    weigh = problem.delassus.rigid_change
+    assert weigh(found.impulse) == pytest.approx(weigh(path.impulse), abs=1e-5 * _STEP * 9.81)
+
+
+def test_where_they_are_in_vain_the_interior_point_has_its_iterations(monkeypatch):
+    problem, nothing = cold(leaning(0.4))
+    found = rigid.Alternating(max_iterations=rigid._INTERIOR + 12)(problem, nothing)
+    assert found.why.startswith("interior point: admm of bodies stood at")
+    assert found.converged
+
+
+@pytest.mark.parametrize("most", [100, 2000])
+def test_compliant_joints_of_some_hundred_bodies_are_solved_within_the_iterations(most):
+    problem, nothing = cold(leaning(0.4))
+    share = np.full((len(nothing.impulse), 3), 1e-3 * problem.delassus.scale)
+    soft = replace(problem, delassus=CompliantDelassus(problem.delassus, share))
+    found = Compliant(max_iterations=most)(soft, nothing)
+    assert found.iterations <= most
+    assert found.converged == (most == 2000)
+    if found.converged:
+        # further than ADMM goes: what it leaves would be a creep
+        assert residual(soft, found.impulse).within(1e-9, 1e-8)
