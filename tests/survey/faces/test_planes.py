@@ -250,9 +250,8 @@ def test_turned_moved_scaled_and_shuffled_points_have_the_turned_moved_and_scale
     fit = fit_plane(points, sigma, observer)
     moved = scale * (points @ turn.T) + away
     other = fit_plane(moved[order], scale * sigma[order], scale * (turn @ observer) + away)
-    if (
-        wrong == 0.0 or 0.8 < scale < 1.2
-    ):  # erosion is a length: smaller blunders count by the side they lie on
+    # erosion is a length: smaller blunders, and points beyond the limit by chance, count by the side they lie on
+    if 0.8 < scale < 1.2 or (wrong == 0.0 and np.abs(fit.standardised).max() < 3.29):
         assert {int(order[i]) for i in other.rejected} == set(fit.rejected)
         np.testing.assert_allclose(other.normal, turn @ fit.normal, atol=1e-9)
         np.testing.assert_allclose(other.centroid, scale * (turn @ fit.centroid) + away, atol=1e-8)
