@@ -37,8 +37,7 @@ def test_a_column_is_solved_in_under_a_hundred_iterations(count):
     """Each joint carries what lies above it; what velocities lack adds up from joint to joint. Statics."""
     problem = first_problem(column([STONE] * count))
     solution = solved(problem)
-    # ADMM, in vain, takes 200 iterations with three factorisations first
-    assert solution.iterations < 200 + 100
+    assert solution.iterations < 100
     assert "cold start" in solution.why or "stood at" in solution.why
     above = np.arange(count, 0, -1) * MASS * G
     np.testing.assert_allclose(carried(problem, solution.impulse), above, rtol=1e-5 * count)
@@ -118,7 +117,8 @@ def test_a_thick_wall_is_solved_in_under_a_hundred_iterations():
 def test_a_thick_wall_of_150_courses_is_solved_in_under_a_hundred_iterations_after_admm():
     problem = first_problem(thick_wall(4, 150))
     solution = solved(problem)
-    assert solution.iterations < 100
+    # ADMM, in vain, takes 200 iterations with three factorisations first
+    assert solution.iterations < 200 + 100
     weight = STONE * 4 * 0.3 * 3 * 0.15 * 150 * 0.1 * G
     grounded = (problem.delassus.body == 0).any(axis=1)
     assert solution.impulse[grounded, 0].sum() / STEP == pytest.approx(weight, rel=1e-5)
