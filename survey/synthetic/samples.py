@@ -12,7 +12,7 @@ from survey.synthetic.building import Building
 from survey.synthetic.buildings.facings import two_facings
 from survey.synthetic.buildings.openings import Arch
 from survey.synthetic.buildings.quoins import corner
-from survey.synthetic.buildings.ribs import WEBS, RibVaultShape, rib_vault
+from survey.synthetic.buildings.ribs import WALL_RIB, WEBS, RibVaultShape, rib_vault
 from survey.synthetic.buildings.storey_vault import STANDING
 from survey.synthetic.buildings.tower import tower_storey
 from survey.synthetic.buildings.vaults import barrel_vault, semicircular_arch
@@ -104,7 +104,7 @@ def _tower(courses: int, elaborate: bool) -> Callable[[], Sample]:
 
 def _places(building: Building) -> Iterator[str]:
     """Yield corrections that give modelled stones of the walls their zones and courses, which files of solids lack."""
-    rows: dict[tuple[str, int | None], list[str]] = {}
+    rows: dict[tuple[str, int], list[str]] = {}
     for one in building.modelled:
         if one.course is None:
             continue
@@ -159,7 +159,7 @@ text = "the rib vault, after the walls"
 
 
 def _rib_vault() -> Sample:
-    vault = rib_vault(RibVaultShape(wall_rib=_WALL_RIB))
+    vault = rib_vault(RibVaultShape(wall_rib=WALL_RIB))
     axes = {f"R{rib}": (np.round(vault.rib_axis(rib, 3), 6) + 0.0).tolist() for rib in range(1, 5)}
     truth = _truth_of(vault.building, axes=axes)
     knowledge = _KNOWN.format(what="rib vault") + _structures(vault.shape)
@@ -205,7 +205,6 @@ kind = "rib_vault"
 code = "VAULT"
 title = "Rib vault"
 """
-_WALL_RIB = 0.22  # width of the wall ribs of the sample [m]
 
 _PART = """
 [[structure]]

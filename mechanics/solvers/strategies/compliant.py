@@ -98,7 +98,7 @@ class Compliant:
         most = min(_ADMM_ITERATIONS, self.max_iterations)
         stages = TURNS if springs else _STAGES
         found = BodyADMM(self.tolerance, self.velocity_tolerance, most, stages)(problem, start)
-        return self._judged(problem, found, "admm of bodies")
+        return replace(found, why="compliant joints, admm of bodies")
 
     def _softer(self, problem: ContactProblem, start: ContactStart, count: int) -> ContactSolution:
         """Return the solution by way of softer joints, after `count` iterations."""

@@ -289,8 +289,7 @@ class Alternating:
 
     def _in_turns(self, most: int) -> _Solver:
         # Newton's method has its turn where these are in vain
-        most = min(_TURNS_ITERATIONS, max(most - _NEWTON_STEPS, 1))
-        return BodyADMM(self.tolerance, self.velocity_tolerance, most, TURNS)
+        return self._turning(min(_TURNS_ITERATIONS, max(most - _NEWTON_STEPS, 1)))
 
     def _cold(self, most: int) -> _Solver:
         # the interior point has its turn where these are in vain

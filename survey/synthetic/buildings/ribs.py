@@ -36,8 +36,10 @@ from survey.synthetic.bond import PlannedStone
 from survey.synthetic.building import Building, Draft, SolidDraft, measured_building, observer
 from survey.synthetic.frame import TrueStone, WallFrame
 
-__all__ = ["WEBS", "Bed", "RibVault", "RibVaultShape", "rib_vault", "vault_drafts"]
+__all__ = ["WALL_RIB", "WEBS", "Bed", "RibVault", "RibVaultShape", "rib_vault", "vault_drafts"]
 
+WALL_RIB = 0.22
+"""Width of wall ribs where a vault has them [m]."""
 WEBS = "NESW"
 """Names of the webs, by the walls that they meet."""
 

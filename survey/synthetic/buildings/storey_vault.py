@@ -18,7 +18,7 @@ import numpy as np
 from survey.arrays import Array
 from survey.extrusion.extrusion import prism
 from survey.synthetic.building import Draft, SolidDraft
-from survey.synthetic.buildings.ribs import RibVaultShape, vault_drafts
+from survey.synthetic.buildings.ribs import WALL_RIB, RibVaultShape, vault_drafts
 
 __all__ = ["PROJECTION", "STANDING", "StoreyVault", "plan_vault"]
 
@@ -29,7 +29,6 @@ STANDING = ("T1", "T4")
 
 _CORBELS = 0.5  # share of the courses up to the bed that the springers stand on
 _SPRINGER = 0.8  # height of a springer below the web's soffit at its rib's joint [m]
-_WALL_RIB = 0.22  # width of the wall ribs [m]
 _CLEAR = 0.06  # distance of the wall ribs from the walls, too wide for a joint [m]
 
 
@@ -86,7 +85,7 @@ def plan_vault(heights: Sequence[float], half: float, middle: Array, axes: Array
     axes : (3, 3) rows: along wall A, from it into the room, and upwards [-]
     """
     shape = RibVaultShape(
-        half=half, radius=math.sqrt(2.0) * half, springer=_SPRINGER, wall_rib=_WALL_RIB, clear=_CLEAR
+        half=half, radius=math.sqrt(2.0) * half, springer=_SPRINGER, wall_rib=WALL_RIB, clear=_CLEAR
     )
     foot, corner, top = shape.heights
     course = round(_CORBELS * (len(heights) - 1))

@@ -114,8 +114,7 @@ def corner_pieces(
     kinds = (("quoin", 0.0, _QUOIN),) if along else ((OTHER, 0.0, HALF), (beside, HALF, THICKNESS))
     for corner, place, right in zip(wall.corners, wall.ends, (1.0, -1.0), strict=True):
         for kind, start, stop in kinds if corner else ():
-            left, end = sorted((place + right * start, place + right * stop))
-            yield Piece(kind, upright(left, middle), upright(end, middle))
+            yield _between(kind, place + right * start, place + right * stop, middle)
 
 
 def corbel_pieces(wall: StoreyWall, ends: tuple[float, float], middle: float) -> Iterator[Piece]:
@@ -123,8 +122,7 @@ def corbel_pieces(wall: StoreyWall, ends: tuple[float, float], middle: float) ->
     for corner, end, right in zip(wall.corners[::-1], ends, (1.0, -1.0), strict=True):
         if corner:
             corbel = PROJECTION - (0.0 if wall.letter == "A" else _RELIEF)
-            left, stop = sorted((end, end + right * corbel))
-            yield Piece(OTHER, upright(left, middle), upright(stop, middle))
+            yield _between(OTHER, end, end + right * corbel, middle)
 
 
 def through_pieces(wall: StoreyWall, number: int, middle: float, opening: float) -> Iterator[Piece]:
@@ -140,11 +138,16 @@ def through_pieces(wall: StoreyWall, number: int, middle: float, opening: float)
     for start, stop in ((left, -opening), (opening, right)) if opening else ((left, right),):
         place = start + first + offset
         while place + length + first <= stop:
-            yield Piece("header", upright(place, middle), upright(place + length, middle))
+            yield _between("header", place, place + length, middle)
             place += apart
 
 
 def mirrored(piece: Piece) -> Piece:
     """Mirror a stone with upright ends, as seen from the other side."""
-    left, right = (-line.point[0] for line in (piece.right, piece.left))
-    return Piece(piece.kind, upright(left, piece.left.point[1]), upright(right, piece.left.point[1]))
+    return _between(piece.kind, -piece.left.point[0], -piece.right.point[0], piece.left.point[1])
+
+
+def _between(kind: str, one: float, other: float, middle: float) -> Piece:
+    """Return a stone with upright ends at two places, in either order."""
+    left, right = sorted((one, other))
+    return Piece(kind, upright(left, middle), upright(right, middle))

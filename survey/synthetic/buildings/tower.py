@@ -188,9 +188,9 @@ def _wall(
     outer, inner = (
         _opening(wall, half, heights, elaborate) if len(heights) > _OPEN else None for half in halves
     )
-    corbels = 0 if vault is None else vault.course
+    corbel_course = 0 if vault is None else vault.course
     corners = [
-        list(corner_pieces(wall, number, heights, corbel=number == corbels))
+        list(corner_pieces(wall, number, heights, corbel=number == corbel_course))
         for number in range(1, len(heights))
     ]
     widest = [_kept_clear(outer, inner, number) for number in range(1, len(heights))]
@@ -204,7 +204,7 @@ def _wall(
     ends = tuple(-end for end in wall.inner_ends[::-1])
     given = [[mirrored(piece) for piece in row] for row in through]
     if vault is not None:
-        given[corbels - 1] += corbel_pieces(wall, (ends[0], ends[1]), 0.5 * sum(vault.beds))
+        given[corbel_course - 1] += corbel_pieces(wall, (ends[0], ends[1]), 0.5 * sum(vault.beds))
     courses = plan_courses(rng, heights, (ends[0], ends[1]), inner, through=given)
     pieces = _with_springers(courses, inner, heights)
     own = [[p for p in one if p not in row] for one, row in zip(pieces, given, strict=True)]
