@@ -45,6 +45,7 @@ class StoredDelassus:
     plane = None
     joint_compliance = None
     mostly_rigid = False
+    as_rigid = None
 
     def __post_init__(self) -> None:
         nc, entries = len(self.indptr) - 1, len(self.indices)

@@ -1,6 +1,7 @@
 """Assembly of Delassus operators: Jacobians of rigid sides, compliance between elastic ones."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -26,11 +27,17 @@ def rigid_delassus(model: Model, state: State, contacts: Contacts, schedule: Sch
     points = material_points(contacts, state)
     point = 0.5 * (points[:, 0] + points[:, 1])
     arm = point[:, None] - state.centre[contacts.bodies]
-    turned = inverse_inertia_world(model.inertia, state.rotation).reshape(-1, 9)
+    return _rigid_delassus(model, model.inertia, state, contacts, arm, schedule)
+
+
+def _rigid_delassus(
+    model: Model, inertia: RigidInertia, state: State, contacts: Contacts, arm: Array, schedule: Schedule
+) -> RigidDelassus:
+    turned = inverse_inertia_world(inertia, state.rotation).reshape(-1, 9)
     return RigidDelassus(
         contacts.bodies,
         np.hstack([contacts.frame.reshape(-1, 9), arm.reshape(-1, 6)]),
-        np.hstack([model.inertia.inverse_mass[:, None], turned[:, [0, 1, 2, 4, 5, 8]]]),
+        np.hstack([inertia.inverse_mass[:, None], turned[:, [0, 1, 2, 4, 5, 8]]]),
         schedule,
         model.scene.solver.threads,
         state.centre,
@@ -48,9 +55,10 @@ def mixed_delassus(
     state: State,
     contacts: Contacts,
     compliance: Sequence[Compliance],
+    schedule: Schedule,
     elastic_scale: bool = False,
 ) -> MixedDelassus:
-    """Return W of the contacts at the configuration of `state`; condense each deformable body on its contact sides.
+    """Return W of contacts, already in the order of the schedule; condense each deformable body on its contact sides.
 
     With `elastic_scale`, r and u are measured against the elastic part of W alone. In steps so long that nothing but
     friction holds a stone back, W is nearly all rigid motion, and forces inside the joints would not count.
@@ -74,15 +82,42 @@ def mixed_delassus(
             block[bptr[b] : bptr[b + 1]] = square.ravel()
             n = np.arange(len(rows))
             diagonal[rows] = square.reshape(len(rows), 3, len(rows), 3)[n, :, n]
+    point = (contacts.weights @ state.node).reshape(-1, 2, 3)
     arm = np.einsum("csij,csj->csi", state.rotation[body], contacts.arm)
+    arm = np.where((kind == ELASTIC)[..., None], point - state.centre[body], arm)
     jacobian, response = _rigid_sides(model.inertia, state, contacts, arm)
     total = (diagonal.reshape(-1, 2, 3, 3) + jacobian @ response).sum(axis=1)
-    own_part = total - _rigid_share(model, state, contacts, kind) if elastic_scale else total
+    as_rigid = _rigid_delassus(model, _awake(model), state, contacts, arm, schedule)
+    # rigid sides move as they do
+    own_part = total - as_rigid.diagonal + (jacobian @ response).sum(axis=1) if elastic_scale else total
     scale = float(np.einsum("cii->", own_part) / max(3 * len(contacts), 1))
     threads = model.scene.solver.threads
     mass = _masses(model.inertia, state)
     return MixedDelassus(
-        body, kind, jacobian, response, slot, yptr, bptr, block, mass, state.centre, total, scale, threads
+        body,
+        kind,
+        jacobian,
+        response,
+        slot,
+        yptr,
+        bptr,
+        block,
+        mass,
+        state.centre,
+        total,
+        scale,
+        as_rigid,
+        threads,
+    )
+
+
+def _awake(model: Model) -> RigidInertia:
+    """Return the inertia of all bodies that impulses move, as if none deformed."""
+    flight, fixed = model.flight, model.fixed
+    return replace(
+        flight,
+        inverse_mass=np.where(fixed, 0.0, flight.inverse_mass),
+        inverse_inertia=np.where(fixed[:, None, None], 0.0, flight.inverse_inertia),
     )
 
 
@@ -93,14 +128,6 @@ def _masses(inertia: RigidInertia, state: State) -> Array:
     mass[:, 3:, 3:] = state.rotation @ inertia.inertia @ state.rotation.transpose(0, 2, 1)
     mass[~inertia.moving] = 0.0
     return mass
-
-
-def _rigid_share(model: Model, state: State, contacts: Contacts, kind: Ints) -> Array:
-    """Return the part of W_αα (nc, 3, 3) that is the motion of elastic stones as a whole, where a side is elastic."""
-    point = (contacts.weights @ state.node).reshape(-1, 2, 3)
-    jacobian, response = _rigid_sides(model.flight, state, contacts, point - state.centre[contacts.bodies])
-    share: Array = np.where((kind == ELASTIC)[..., None, None], jacobian @ response, 0.0).sum(axis=1)
-    return share
 
 
 def _rigid_sides(inertia: RigidInertia, state: State, contacts: Contacts, arm: Array) -> tuple[Array, Array]:

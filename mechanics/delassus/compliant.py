@@ -74,6 +74,11 @@ class CompliantDelassus:
         """As that of W."""
         return self.inner.mostly_rigid
 
+    @property
+    def as_rigid(self) -> Delassus | None:
+        """W if no body deformed, without E, or None."""
+        return self.inner.as_rigid
+
     @cached_property
     def diagonal(self) -> Array:
         """W_αα + E_α (nc, d, d) [1/kg]."""

@@ -10,6 +10,7 @@ from mechanics.delassus._kernels.mixed import ELASTIC, NONE, RIGID, Sides, apply
 from mechanics.delassus.condensed import CondensedForm
 from mechanics.delassus.mixed_form import MixedForm, MixedPattern
 from mechanics.delassus.multifrontal import Cliques
+from mechanics.delassus.rigid import RigidDelassus
 from mechanics.problem._kernels import Laws, local_factors
 from mechanics.problem.problem import GaussSeidel, ScaledDelassus
 
@@ -37,6 +38,7 @@ class MixedDelassus:
     centre : (nb, 3) of the bodies [m]
     diagonal : (nc, 3, 3) W_αα [1/kg]
     scale : reference against which u is measured over r [1/kg]
+    as_rigid : W of the same contacts if no body deformed
     threads : that factorise W
     """
 
@@ -52,6 +54,7 @@ class MixedDelassus:
     centre: Array
     diagonal: Array
     scale: float
+    as_rigid: RigidDelassus
     threads: int = 1
 
     rigid = None

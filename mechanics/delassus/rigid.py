@@ -87,6 +87,7 @@ class RigidDelassus:
     plane = None
     joint_compliance = None
     mostly_rigid = False
+    as_rigid = None
 
     @cached_property
     def rigid(self) -> RigidContacts:

@@ -61,12 +61,14 @@ class JointCompliance:
         to rigid joints alone, as compliant ones have failed, too
     wait : number of steps after the next failure of either
     softness : factor on ε with which the last step with compliant joints was solved [-]
+    lasting : once needed, joints stay compliant: where stones deform, too, by as much
     """
 
     value: float = 0.0
     left: int = 0
     wait: int = _FIRST_WAIT
     softness: float = 1.0
+    lasting: bool = False
 
     @property
     def rigid(self) -> bool:
@@ -76,7 +78,7 @@ class JointCompliance:
     def needed(self, operator: Delassus, share: float) -> "JointCompliance":
         """Return the state after a failure with rigid joints: ε is a share of the mean diagonal of W [-]."""
         value = self.value or share * mean_diagonal(operator.diagonal)
-        return JointCompliance(value, self.wait, 2 * self.wait)
+        return replace(self, value=value, left=self.wait, wait=2 * self.wait, softness=1.0)
 
     def softer(self, factor: float) -> "JointCompliance":
         """Return the state with joints that many times as compliant."""
@@ -84,7 +86,7 @@ class JointCompliance:
 
     def used(self, softness: float) -> "JointCompliance":
         """Return the state after a step with compliant joints."""
-        return replace(self, left=self.left - 1, softness=softness)
+        return replace(self, left=self.left - (not self.lasting), softness=softness)
 
     def failed(self) -> "JointCompliance":
         """Return the state after a step that could not be solved at all."""

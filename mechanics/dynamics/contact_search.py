@@ -75,14 +75,14 @@ def detection(
     compliance: Sequence[Compliance],
     elastic_scale: bool = False,
 ) -> Detection:
-    """Return the contacts of a state with their places, laws and W; rigid ones in the order of their schedule."""
+    """Return the contacts of a state with their places, laws and W, in the order of their schedule."""
+    plan = schedule(contacts.bodies, model.inertia.moving | (model.elastic & ~model.fixed))
+    contacts = take(contacts, plan.order)
     operator: RigidDelassus | MixedDelassus
     if model.rigid_only:
-        plan = schedule(contacts.bodies, model.inertia.moving)
-        contacts = take(contacts, plan.order)
         operator = rigid_delassus(model, state, contacts, plan)
     else:
-        operator = mixed_delassus(model, state, contacts, compliance, elastic_scale)
+        operator = mixed_delassus(model, state, contacts, compliance, plan, elastic_scale)
     side = contacts.bodies.argmin(axis=1)
     place = contacts.arm[np.arange(len(side)), side]
     return Detection(model, state, contacts, place, model.laws.of(contacts.bodies), operator)

@@ -16,7 +16,6 @@ from mechanics.scene.scene import TimeSettings
 from mechanics.scene.state import State
 from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.strategies.compliant import Compliant
-from mechanics.solvers.strategies.mixed import Mixed
 
 __all__ = ["static_start"]
 
@@ -28,7 +27,7 @@ _STEPS = 10  # most such steps; few scenes need more than three
 _YIELDING, _YIELDING_STEPS = 0.1, 40
 # the same where stones deform and more of them are rigid: a stone yields by a thousandth of what it moves as a whole
 # then, in steps of 1 s by a hundred millionth. Each step leaves a hundredth of the imbalance
-_MIXED, _MIXED_STEPS = 5e-3, 20
+_MIXED, _MIXED_STEPS = 5e-3, 50
 _UNSOLVED = 2  # such steps in a row that may be left unsolved
 _RELAXED = 1e-2  # shortest time step in which rigid stones settle [s]: they fall by a millimetre in it
 _RELAXED_STEPS = 50  # most of these; joints that are open by a millimetre need some ten
@@ -56,7 +55,7 @@ def static_start(
     search = _Search(model, halted(start), report)
     if model.rigid_only and not model.laws.sprung:
         return search.rigid()
-    if 0 < int(model.elastic.sum()) < int(model.inertia.moving.sum()) and not model.laws.sprung:
+    if model.mostly_rigid and not model.laws.sprung:
         told, found = search.mixed()
         if told.found:
             return told, found
@@ -98,17 +97,18 @@ class _Search:
         return self._told(found), search
 
     def mixed(self) -> tuple[StaticStart, Simulation]:
-        """Search in short steps, each to the tolerances of the run and from a halt."""
-        asked, own = self._model.scene.solver, self._model.scene.time.step
-        solver = Mixed(asked.tolerance, asked.velocity_tolerance)
-        search = Simulation(_still(self._model, _MIXED), self._start, solver=solver)
+        """Search by a relaxation in short steps, each to the tolerances of the run."""
+        own = self._model.scene.time.step
+        search = Simulation(_still(self._model, _MIXED), self._start)
         found, unsolved = False, 0
         while self._count < _MIXED_STEPS and not found and unsolved < _UNSOLVED and self._settles(search):
-            solved = self._step(search, _MIXED_STEPS).solution.converged
-            search.halt(self._start.time)
-            unsolved = 0 if solved else unsolved + 1
-            found = solved and self._largest <= self._model.scene.time.balance_tolerance
+            # the loads stay those of the first instant
+            search.state = replace(search.state, time=self._start.time)
+            made = self._step(search, _MIXED_STEPS)
+            unsolved = 0 if made.solution.converged else unsolved + 1
+            found = self._at_rest(made)
         found = found and self._settles(search)
+        search.halt(self._start.time)
         if found and own != _MIXED:
             search = _set_down(self._model, search)
         return self._told(found), search

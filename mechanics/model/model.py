@@ -96,6 +96,11 @@ class Model:
         """True if no body is deformable."""
         return not bool(self.elastic.any())
 
+    @property
+    def mostly_rigid(self) -> bool:
+        """True if some bodies deform, and more of those that move do not."""
+        return 0 < int(self.elastic.sum()) < int(self.inertia.moving.sum())
+
     def gravity(self, time: float) -> Array:
         """Return gravity (3,) at a time [m/s²]."""
         gravity = np.array(self.scene.gravity, dtype=float)

@@ -56,6 +56,7 @@ class PlanarDelassus:
     rigid = None
     joint_compliance = None
     mostly_rigid = False
+    as_rigid = None
 
     @property
     def plane(self) -> PlaneContacts:

@@ -91,6 +91,8 @@ class Delassus(Protocol):
     joint_compliance : (nc, d) diagonal of E where the operator is W + E (`CompliantDelassus`), which `rigid` leaves
         out; None for others [1/kg]
     mostly_rigid : some bodies deform, and more of those that move do not
+    as_rigid : W if no body deformed, where some do; W less it is what they yield, positive semidefinite. None for
+        others
     """
 
     @property
@@ -120,6 +122,10 @@ class Delassus(Protocol):
     @property
     def mostly_rigid(self) -> bool:
         """True where some bodies deform, and more do not."""
+
+    @property
+    def as_rigid(self) -> "Delassus | None":
+        """W if no body deformed, or None."""
 
     def apply(self, impulse: Array) -> Array:
         """Return W r (nc, d) [m/s]."""
@@ -172,6 +178,12 @@ class ScaledDelassus:
     def mostly_rigid(self) -> bool:
         """As that of the operator itself."""
         return self.inner.mostly_rigid
+
+    @cached_property
+    def as_rigid(self) -> Delassus | None:
+        """D W D if no body deformed, or None."""
+        rigid = self.inner.as_rigid
+        return None if rigid is None else rigid.scaled(self.unit)
 
     @cached_property
     def form(self) -> ScaledForm | None:

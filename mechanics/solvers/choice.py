@@ -18,6 +18,7 @@ from mechanics.solvers.strategies.auto import Auto
 from mechanics.solvers.strategies.compliant import Compliant
 from mechanics.solvers.strategies.planar import Planar
 from mechanics.solvers.strategies.rigid import moving_admm
+from mechanics.solvers.strategies.rigid_first import RigidFirst
 from moma.errors import SolverError
 
 __all__ = ["Solver", "Solvers", "choose_planar_solver", "choose_solver", "choose_solvers"]
@@ -58,6 +59,8 @@ class Solvers:
 # iterations in which rigid joints must be solved after they have failed: those that cost no more than a step with
 # compliant ones
 _BRIEF = 80
+# rigid stones that move beside deformable ones, from which the central path takes too long to fail
+_SOME = 300
 # factors on the compliance of joints, where a step cannot be solved with it either
 _SOFTNESS = (1.0, 3.0, 10.0)
 
@@ -85,12 +88,15 @@ def choose_solver(settings: SolverSettings, deformable: bool, duration: float = 
 
 
 def choose_solvers(
-    settings: SolverSettings, deformable: bool, time: TimeSettings, sprung: bool = False
+    settings: SolverSettings, deformable: bool, time: TimeSettings, sprung: bool = False, rigid: int = 0
 ) -> Solvers:
     """Return the solvers of a run: compliant joints are a way out for the automatic choice between rigid stones.
 
     They are one on the way to a rest alone: where a motion is followed they would decide it. Where the laws have
     springs of their own (`sprung`), joints are compliant in every step.
+
+    Where some stones deform among more that are rigid, of which `rigid` is the number that move, they are a way out,
+    too.
 
     Raises
     ------
@@ -99,8 +105,14 @@ def choose_solvers(
     if sprung:
         return Solvers(_sprung_solver(settings, deformable, time.duration))
     usual = choose_solver(settings, deformable, time.duration)
-    if deformable or not isinstance(usual, Auto) or settings.joint_compliance == 0 or not time.relaxation:
+    all_deform = deformable and rigid == 0
+    if all_deform or not isinstance(usual, Auto) or settings.joint_compliance == 0 or not time.relaxation:
         return Solvers(usual)
+    if deformable:
+        first = RigidFirst(usual.tolerance, usual.velocity_tolerance, usual.max_iterations)
+        return Solvers(
+            usual, usual if rigid < _SOME else first, first, tuple((factor, first) for factor in _SOFTNESS)
+        )
     quick = Compliant(usual.tolerance, usual.velocity_tolerance, usual.max_iterations)
     return Solvers(
         usual,

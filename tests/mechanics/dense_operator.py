@@ -20,6 +20,7 @@ class DenseDelassus:
     plane = None
     joint_compliance = None
     mostly_rigid = False
+    as_rigid = None
 
     @cached_property
     def diagonal(self):

@@ -1,20 +1,25 @@
-"""Newton's method for rigid bodies, however many contacts two of them share.
+"""Newton's method for rigid bodies, and deformable ones among them, however many contacts two of them share.
 
 W of rigid bodies is singular: four contacts hold a stone in place three times over. So W + α stands for W in the
 derivative of the non-smooth Newton method of Alart & Curnier (1991), with α as small as η, as in the method of
 Levenberg and Marquardt (Fan & Yuan 2005): the steps stay near to where they began, and near the solution nothing is
 lost. A line search keeps them from going astray; where it has to shorten steps, α grows. The equations of each step are
 those of the bodies (mechanics/solvers/_kernels/body_newton.py). Of compliant joints, W + E for W, E adds to α there.
+
+Where bodies deform, W is that of rigid ones and what they yield, whose blocks W_αα alone are, like E, a compliance of the
+joints. The equations with these are solved as above, and lead a Krylov method (GMRES, Saad & Schultz 1986) within some
+five products with W to the step.
 """
 
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.sparse.linalg import LinearOperator, gmres
 
 from mechanics.arrays import Array, Ints
 from mechanics.delassus.elimination import elimination
-from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, RigidContacts
+from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, Delassus, RigidContacts
 from mechanics.problem.residual import Residual, project_on_cone, residual
 from mechanics.solvers._kernels import block_fronts as fronts
 from mechanics.solvers._kernels import body_newton as bodies
@@ -46,11 +51,13 @@ _ROOM = 400_000_000
 _MANY = 300
 # shortest part of a step [-]
 _SHORTEST = 1e-3
+# error to which the equations of bodies that deform are solved, over their right side [-], and most products with W
+_INEXACT, _PRODUCTS = 1e-2, 60
 
 
 @dataclass(frozen=True)
 class ProximalNewton:
-    """Proximal Newton method for rigid bodies: high accuracy from any start.
+    """Proximal Newton method: high accuracy, between rigid bodies from any start.
 
     Attributes
     ----------
@@ -67,11 +74,11 @@ class ProximalNewton:
 
         Raises
         ------
-        SolverError : if W is not that of rigid bodies
+        SolverError : if W is not that of bodies
         """
-        if problem.delassus.rigid is None:
+        if problem.delassus.rigid is None and problem.delassus.as_rigid is None:
             raise SolverError(
-                "bodies are not all rigid", where="proximal Newton", remedy='use the method "interior-point"'
+                "W is not that of bodies", where="proximal Newton", remedy='use the method "interior-point"'
             )
         limits = self.tolerance, self.velocity_tolerance
         run = _Run(problem, start.impulse)
@@ -116,8 +123,10 @@ class _Run:
 
     @cached_property
     def _system(self) -> "_System":
-        assert self._delassus.rigid is not None
-        return _System(self._delassus.rigid, self._delassus.joint_compliance)
+        operator = self._delassus
+        if operator.rigid is None:
+            return _YieldingSystem(operator)
+        return _System(operator.rigid, operator.joint_compliance)
 
     def hold(self) -> None:
         """Begin as if every contact held.
@@ -194,17 +203,51 @@ class _System:
 
     def step(self, first: Array, second: Array, error: Array, alpha: float) -> Array | None:
         """Return Δr (nc, 3); None if the equations are singular, or their factors too large."""
-        contacts, place = self._contacts, self._blocks.place
+        return self._solve(second, error) if self._factorise(first, second, alpha) else None
+
+    def _factorise(self, first: Array, second: Array, alpha: float) -> bool:
         if not bodies.inverse_blocks(first, second, alpha + self._compliance, self._inverse, self._gain):
-            return None
-        bodies.body_matrix(contacts, self._gain, self._blocks, self._value)
-        if not self._factors.factorise(self._value):
-            return None
+            return False
+        bodies.body_matrix(self._contacts, self._gain, self._blocks, self._value)
+        return self._factors.factorise(self._value)
+
+    def _solve(self, second: Array, error: Array) -> Array:
+        contacts, place = self._contacts, self._blocks.place
         velocity, step = np.empty((2 * len(self._blocks.own), 3)), np.empty_like(error)
         bodies.body_load(contacts, self._inverse, error, place, velocity)
         self._factors.solve(velocity)
         bodies.contact_step(contacts, self._inverse, second, error, place, velocity, step)
         return step
+
+
+class _YieldingSystem(_System):
+    """Equations of bodies of which some deform: A Δr + B (W + α) Δr = -error."""
+
+    def __init__(self, operator: Delassus) -> None:
+        rigid = operator.as_rigid
+        assert rigid is not None
+        assert rigid.rigid is not None
+        yielding = np.einsum("cii->ci", operator.diagonal - rigid.diagonal)
+        super().__init__(rigid.rigid, np.maximum(yielding, 0.0))
+        self._operator = operator
+
+    def step(self, first: Array, second: Array, error: Array, alpha: float) -> Array | None:
+        """Return Δr (nc, 3); None if the equations are singular, or their factors too large."""
+        if not self._factorise(first, second, alpha):
+            return None
+
+        def before(y: Array) -> Array:
+            return self._solve(second, -y.reshape(-1, 3))
+
+        def product(y: Array) -> Array:
+            r = before(y)
+            u = self._operator.apply(r) + alpha * r
+            both: Array = np.matmul(first, r[:, :, None]) + np.matmul(second, u[:, :, None])
+            return both.ravel()
+
+        equations = LinearOperator((error.size, error.size), matvec=product, dtype=float)
+        y = gmres(equations, -error.ravel(), rtol=_INEXACT, restart=_PRODUCTS, maxiter=1)[0]
+        return before(y)
 
 
 class _Fronts:

@@ -14,7 +14,7 @@ from mechanics.solvers.second_order.scaling import equilibrated
 from mechanics.solvers.strategies.elastic import Elastic
 from mechanics.solvers.strategies.rigid import TURNS, many_bodies, some_bodies
 
-__all__ = ["Compliant"]
+__all__ = ["Compliant", "polished"]
 
 # factors of E, from soft joints to those asked for: each solution leads Newton's method to the next
 _HOMOTOPY = (100.0, 30.0, 10.0, 3.0, 1.0)
@@ -119,18 +119,37 @@ class Compliant:
         return replace(found, iterations=count)
 
     def _newton(self, problem: ContactProblem, start: ContactStart, name: str, most: int) -> ContactSolution:
-        even, each = equilibrated(problem)
-        unit = each[:, None]
-        further = _FURTHER * self.tolerance, _FURTHER * self.velocity_tolerance
-        solver = ProximalNewton(*further, min(_NEWTON_STEPS, most))
-        found = solver(even, ContactStart(start.impulse / unit, start.velocity * unit))
-        found = replace(found, impulse=found.impulse * unit, velocity=found.velocity / unit)
-        return self._judged(problem, found, name)
+        limits = self.tolerance, self.velocity_tolerance
+        found = polished(problem, start, limits, min(_NEWTON_STEPS, most))
+        return replace(found, why=f"compliant joints, {name}")
 
     def _judged(self, problem: ContactProblem, found: ContactSolution, name: str) -> ContactSolution:
         left = residual(problem, found.impulse)
         within = left.within(self.tolerance, self.velocity_tolerance)
         return replace(found, natural_map=left.natural_map, converged=within, why=f"compliant joints, {name}")
+
+
+def polished(
+    problem: ContactProblem,
+    start: ContactStart,
+    limits: tuple[float, float],
+    most: int,
+    further: float = _FURTHER,
+) -> ContactSolution:
+    """Return the solution by Newton's method in even units, to a part of the tolerances (η, velocities)."""
+    even, each = equilibrated(problem)
+    unit = each[:, None]
+    solver = ProximalNewton(further * limits[0], further * limits[1], most)
+    found = solver(even, ContactStart(start.impulse / unit, start.velocity * unit))
+    impulse = found.impulse * unit
+    left = residual(problem, impulse)
+    return replace(
+        found,
+        impulse=impulse,
+        velocity=left.dual,
+        natural_map=left.natural_map,
+        converged=left.within(*limits),
+    )
 
 
 def _yields(operator: Delassus) -> bool:
