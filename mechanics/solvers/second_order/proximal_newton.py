@@ -52,7 +52,7 @@ _MANY = 300
 # shortest part of a step [-]
 _SHORTEST = 1e-3
 # error to which the equations of bodies that deform are solved, over their right side [-], and most products with W
-_INEXACT, _PRODUCTS = 1e-2, 60
+_INEXACT, _PRODUCTS = 1e-2, 30
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from mechanics.solvers.second_order.newton import Newton
 from mechanics.solvers.second_order.proximal_newton import ProximalNewton
 from mechanics.solvers.second_order.scaling import equilibrated
 
-__all__ = ["TURNS", "Alternating", "many_bodies", "moving_admm", "some_bodies"]
+__all__ = ["FROM_NOTHING", "TURNS", "Alternating", "many_bodies", "moving_admm", "some_bodies"]
 
 # sweeps with which every solution but the first begins: near a solution they suffice
 _FIRST_SWEEPS = 20
@@ -114,7 +114,7 @@ _ROUGH = tuple(
 )
 # those with which forces of rest are found from nothing in irregular joints: once it is known what opens and slides, a
 # thousandth of the first penalty suffices where contacts stick, so that their forces arrive in some 50 iterations
-_COLD_STAGES = (
+FROM_NOTHING = (
     TURNS[0],
     replace(TURNS[1], iterations=30),
     Stage((1.0, 0.01, 1e-3), 150, extrapolated=True),
@@ -293,10 +293,10 @@ class Alternating:
 
     def _cold(self, most: int) -> _Solver:
         # the interior point has its turn where these are in vain
-        return BodyADMM(*self._tight, max(most - _INTERIOR, 1), _COLD_STAGES)
+        return BodyADMM(*self._tight, max(most - _INTERIOR, 1), FROM_NOTHING)
 
     def _cold_many(self, most: int) -> _Solver:
-        return BodyADMM(*self._tight, most, (_STICKING, *_COLD_STAGES))
+        return BodyADMM(*self._tight, most, (_STICKING, *FROM_NOTHING))
 
     def _slides(self, problem: ContactProblem, found: ContactSolution) -> bool:
         """Return whether a contact that carries a force moves by more than the solution leaves undecided."""

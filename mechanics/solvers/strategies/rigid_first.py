@@ -8,16 +8,19 @@ from mechanics.arrays import Array
 from mechanics.delassus.compliant import CompliantDelassus
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.problem.residual import residual
-from mechanics.solvers.strategies.compliant import Compliant, polished
+from mechanics.solvers.first_order.body_admm import BodyADMM
+from mechanics.solvers.strategies.compliant import polished
+from mechanics.solvers.strategies.rigid import FROM_NOTHING
 
 __all__ = ["RigidFirst"]
 
+_SOLVED = "the forces of the last step"
 # times that both are made, each from the best impulses so far
 _ROUNDS = 2
-# steps of Newton's method in each
-_NEWTON_STEPS = 30
-# tolerances of Newton's method over those asked for, of joints that yield, and of rigid ones, whose W is singular [-]
-_FURTHER, _RIGID_FURTHER = 1e-3, 0.1
+# steps of Newton's method in each, and tolerances over those asked for to which it goes: what it leaves would be a creep
+_STEPS, _FURTHER = 30, 1e-3
+# the same between rigid joints, whose W is singular, and tolerances over those asked for there [-]
+_RIGID_STEPS, _RIGID_FURTHER = 15, 0.1
 # η from which Newton's method goes on from the impulses of the last step [-]
 _NEAR = 1e-3
 # tolerances of the stones as rigid ones over those asked for [-]
@@ -55,33 +58,32 @@ class RigidFirst:
         """
         limits = self.tolerance, self.velocity_tolerance
         left = residual(problem, start.impulse)
-        best = ContactSolution(
-            start.impulse, left.dual, 0, left.natural_map, left.within(*limits), "nothing: it is solved"
-        )
+        best = ContactSolution(start.impulse, left.dual, 0, left.natural_map, left.within(*limits), _SOLVED)
         yields = problem.delassus.joint_compliance is not None
-        count, near = 0, bool(start.impulse.any()) and left.natural_map <= _NEAR
+        steps, further = (_STEPS, _FURTHER) if yields else (_RIGID_STEPS, _RIGID_FURTHER)
+        near, count = bool(start.impulse.any()) and left.natural_map <= _NEAR, 0
         for _ in range(_ROUNDS):
             if best.converged:
                 break
-            begin = ContactStart(best.impulse, best.velocity)
-            if not near:
-                found = self._as_rigid(problem, begin)
-                begin, count = ContactStart(found.impulse, found.velocity), count + found.iterations
-            near = False
-            most = min(_NEWTON_STEPS, self.max_iterations)
-            found = polished(problem, begin, limits, most, _FURTHER if yields else _RIGID_FURTHER)
+            begin = best if near and yields else self._as_rigid(problem, best)
+            near, count = False, count + begin.iterations
+            if not (begin.converged or yields):
+                break
+            found = polished(problem, ContactStart(begin.impulse, begin.velocity), limits, steps, further)
             count += found.iterations
             if found.converged or found.natural_map < best.natural_map:
                 best = replace(found, why="Newton: stones as rigid ones first")
         return replace(best, iterations=count)
 
-    def _as_rigid(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
+    def _as_rigid(self, problem: ContactProblem, begin: ContactSolution) -> ContactSolution:
         """Return the solution of the stones as rigid ones."""
         operator = problem.delassus
         rigid = operator.as_rigid
         assert rigid is not None
         yielding: Array = np.maximum(np.einsum("cii->ci", operator.diagonal - rigid.diagonal), 0.0)
         simple = CompliantDelassus(rigid, yielding)
-        late = operator.apply(start.impulse) - simple.apply(start.impulse)
-        solver = Compliant(_ROUGH * self.tolerance, _ROUGH * self.velocity_tolerance, self.max_iterations)
-        return solver(replace(problem, delassus=simple, u_free=problem.u_free + late), start)
+        late = operator.apply(begin.impulse) - simple.apply(begin.impulse)
+        stones = replace(problem, delassus=simple, u_free=problem.u_free + late)
+        limits = _ROUGH * self.tolerance, _ROUGH * self.velocity_tolerance
+        solver = BodyADMM(*limits, self.max_iterations, FROM_NOTHING)
+        return solver(stones, ContactStart(begin.impulse, begin.velocity))

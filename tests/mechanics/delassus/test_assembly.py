@@ -52,8 +52,9 @@ class Assembled:
         )
         self.compliance = compliances(self.model, STEP, THETA)
         find = Detector(self.model.surfaces, self.model.fixed, 0.05)
-        self.contacts = find(self.state, np.zeros(len(one.blocks)))
-        self.found = detection(self.model, self.state, self.contacts, self.compliance)
+        contacts = find(self.state, np.zeros(len(one.blocks)))
+        self.found = detection(self.model, self.state, contacts, self.compliance)
+        self.contacts = self.found.contacts
         self.operator = self.found.operator
         self.form = self.operator.form
         self.w_hat, self.transpose = dense_operator(self.model, self.state, self.contacts, self.compliance)

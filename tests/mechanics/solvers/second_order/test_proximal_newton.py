@@ -109,7 +109,7 @@ def test_a_mass_ratio_of_a_million_is_solved_to_rounding(heavy):
 def test_other_operators_are_refused():
     none = np.zeros(1)
     problem = ContactProblem(blocks_apart(np.eye(3)), np.array([[-1.0, 0.0, 0.0]]), none, none, none)
-    with pytest.raises(SolverError, match="not all rigid"):
+    with pytest.raises(SolverError, match="not that of bodies"):
         ProximalNewton()(problem, nothing(problem))
 
 
