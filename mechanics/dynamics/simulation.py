@@ -70,11 +70,10 @@ class Simulation(Carrier):
             self._compliance = compliances(model, self._step, self._theta)
         bed = begin.bed(model)
         self._detect = ContactSearch(model, self._compliance, self.clock, fresh_contacts, elastic_scale, bed)
-        rigid = int(model.inertia.moving.sum()) if model.mostly_rigid else 0
-        settings = model.scene.solver, not model.rigid_only, model.scene.time, model.laws.sprung
-        chosen = choose_solvers(*settings, rigid)
+        counts = int(model.elastic.sum()), int(model.inertia.moving.sum())
+        chosen = choose_solvers(model.scene.solver, *counts, model.scene.time, model.laws.sprung)
         self._solvers = chosen if solver is None else Solvers(solver)
-        self._joints = JointCompliance(lasting=rigid > 0)
+        self._joints = JointCompliance(lasting=model.mostly_rigid)
         self._relax = Relaxation(model)
         self._memory = begin.memory or Memory(follows=not model.scene.time.relaxation)
         self._sleepers = Sleepers(model, self.start, self._memory)

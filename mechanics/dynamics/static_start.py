@@ -30,8 +30,8 @@ _YIELDING, _YIELDING_STEPS = 0.1, 40
 # the same where stones deform and more of them are rigid: a stone yields by a thousandth of what it moves as a whole
 # then, in steps of 1 s by a hundred millionth
 _MIXED, _MIXED_STEPS = 5e-3, 50
-# part of the imbalance up to which a step of these is halted, which leaves a hundredth of vibrations; stones that have a
-# way to go, because joints that yield or open do not bear them yet, go on until they have passed a peak [-]
+# part of the last imbalance up to which such a step is halted, which leaves a hundredth of vibrations; stones that have
+# a way to go, as joints that yield or open do not bear them yet, go on until they have passed a peak [-]
 _PAYS = 0.5
 _UNSOLVED = 2  # such steps in a row that may be left unsolved
 _RELAXED = 1e-2  # shortest time step in which rigid stones settle [s]: they fall by a millimetre in it

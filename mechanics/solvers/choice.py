@@ -59,8 +59,9 @@ class Solvers:
 # iterations in which rigid joints must be solved after they have failed: those that cost no more than a step with
 # compliant ones
 _BRIEF = 80
-# rigid stones that move beside deformable ones, from which the central path takes too long to fail
-_SOME = 300
+# rigid stones that move, from which the central path between rigid joints takes too long to fail, where more than so
+# many stones deform
+_SOME, _FEW = 300, 20
 # factors on the compliance of joints, where a step cannot be solved with it either
 _SOFTNESS = (1.0, 3.0, 10.0)
 
@@ -88,31 +89,29 @@ def choose_solver(settings: SolverSettings, deformable: bool, duration: float = 
 
 
 def choose_solvers(
-    settings: SolverSettings, deformable: bool, time: TimeSettings, sprung: bool = False, rigid: int = 0
+    settings: SolverSettings, elastic: int, rigid: int, time: TimeSettings, sprung: bool = False
 ) -> Solvers:
-    """Return the solvers of a run: compliant joints are a way out for the automatic choice between rigid stones.
+    """Return the solvers of a run of so many deformable stones, and rigid ones that move.
 
-    They are one on the way to a rest alone: where a motion is followed they would decide it. Where the laws have
-    springs of their own (`sprung`), joints are compliant in every step.
-
-    Where some stones deform among more that are rigid, of which `rigid` is the number that move, they are a way out,
-    too.
+    Compliant joints are a way out for the automatic choice where more stones are rigid than deform. They are one on the
+    way to a rest alone: where a motion is followed they would decide it. Where the laws have springs of their own
+    (`sprung`), joints are compliant in every step.
 
     Raises
     ------
     SolverError : if the method does not solve compliant joints
     """
     if sprung:
-        return Solvers(_sprung_solver(settings, deformable, time.duration))
-    usual = choose_solver(settings, deformable, time.duration)
-    all_deform = deformable and rigid == 0
-    if all_deform or not isinstance(usual, Auto) or settings.joint_compliance == 0 or not time.relaxation:
+        return Solvers(_sprung_solver(settings, elastic > 0, time.duration))
+    usual = choose_solver(settings, elastic > 0, time.duration)
+    may_yield = isinstance(usual, Auto) and settings.joint_compliance > 0 and time.relaxation
+    if not may_yield or elastic >= max(rigid, 1):
         return Solvers(usual)
-    if deformable:
+    assert isinstance(usual, Auto)
+    if elastic:
         first = RigidFirst(usual.tolerance, usual.velocity_tolerance, usual.max_iterations)
-        return Solvers(
-            usual, usual if rigid < _SOME else first, first, tuple((factor, first) for factor in _SOFTNESS)
-        )
+        early = usual if rigid < _SOME or elastic <= _FEW else first
+        return Solvers(usual, early, first, tuple((factor, first) for factor in _SOFTNESS))
     quick = Compliant(usual.tolerance, usual.velocity_tolerance, usual.max_iterations)
     return Solvers(
         usual,

@@ -6,9 +6,9 @@ Levenberg and Marquardt (Fan & Yuan 2005): the steps stay near to where they beg
 lost. A line search keeps them from going astray; where it has to shorten steps, α grows. The equations of each step are
 those of the bodies (mechanics/solvers/_kernels/body_newton.py). Of compliant joints, W + E for W, E adds to α there.
 
-Where bodies deform, W is that of rigid ones and what they yield, whose blocks W_αα alone are, like E, a compliance of the
-joints. The equations with these are solved as above, and lead a Krylov method (GMRES, Saad & Schultz 1986) within some
-five products with W to the step.
+Where bodies deform, W is that of rigid ones and what they yield, of which the diagonal alone is, like E, a compliance
+of the joints. The equations with that are solved as above, and lead a Krylov method (GMRES, Saad & Schultz 1986) to the
+step within some five products with W.
 """
 
 from dataclasses import dataclass

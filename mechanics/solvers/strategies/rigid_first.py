@@ -11,20 +11,23 @@ from mechanics.problem.residual import residual
 from mechanics.solvers.first_order.body_admm import BodyADMM
 from mechanics.solvers.strategies.compliant import polished
 from mechanics.solvers.strategies.rigid import FROM_NOTHING
+from moma.errors import SolverError
 
 __all__ = ["RigidFirst"]
 
 _SOLVED = "the forces of the last step"
 # times that both are made, each from the best impulses so far
 _ROUNDS = 2
-# steps of Newton's method in each, and tolerances over those asked for to which it goes: what it leaves would be a creep
+# steps of Newton's method in each, and tolerances over those asked for to which it goes: the rest would be a creep
 _STEPS, _FURTHER = 30, 1e-3
 # the same between rigid joints, whose W is singular, and tolerances over those asked for there [-]
 _RIGID_STEPS, _RIGID_FURTHER = 15, 0.1
 # η from which Newton's method goes on from the impulses of the last step [-]
 _NEAR = 1e-3
-# tolerances of the stones as rigid ones over those asked for [-]
+# tolerances of the stones as rigid ones over those asked for [-], and the penalties with which they are solved, three
+# times by what contacts have come to do
 _ROUGH = 100.0
+_STAGES = (*FROM_NOTHING, FROM_NOTHING[-1], FROM_NOTHING[-1])
 
 
 @dataclass(frozen=True)
@@ -36,8 +39,8 @@ class RigidFirst:
 
         u = (W_r + D) r̂ + (u_free + (W_e - D) r)
 
-    is a problem between rigid stones, whose factors cost a fiftieth and which methods for many bodies solve from nothing.
-    It shows what opens, slides and sticks. Newton's method ends it; its equations have such factors, too.
+    is a problem between rigid stones, whose factors cost a fiftieth, and which ADMM on their velocities solves from
+    nothing. It shows what opens, slides and sticks. Newton's method ends it; its equations have such factors, too.
 
     Attributes
     ----------
@@ -54,7 +57,7 @@ class RigidFirst:
 
         Raises
         ------
-        SolverError : if W is not that of bodies
+        SolverError : if W is not that of bodies of which some deform
         """
         limits = self.tolerance, self.velocity_tolerance
         left = residual(problem, start.impulse)
@@ -79,11 +82,16 @@ class RigidFirst:
         """Return the solution of the stones as rigid ones."""
         operator = problem.delassus
         rigid = operator.as_rigid
-        assert rigid is not None
+        if rigid is None:
+            raise SolverError(
+                "W is not that of bodies of which some deform",
+                where="stones as rigid ones",
+                remedy='use "auto"',
+            )
         yielding: Array = np.maximum(np.einsum("cii->ci", operator.diagonal - rigid.diagonal), 0.0)
         simple = CompliantDelassus(rigid, yielding)
         late = operator.apply(begin.impulse) - simple.apply(begin.impulse)
         stones = replace(problem, delassus=simple, u_free=problem.u_free + late)
         limits = _ROUGH * self.tolerance, _ROUGH * self.velocity_tolerance
-        solver = BodyADMM(*limits, self.max_iterations, FROM_NOTHING)
+        solver = BodyADMM(*limits, self.max_iterations, _STAGES)
         return solver(stones, ContactStart(begin.impulse, begin.velocity))

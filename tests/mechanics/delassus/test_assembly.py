@@ -97,6 +97,26 @@ def test_diagonal_blocks_are_those_of_w(step):
     np.testing.assert_allclose(step.operator.diagonal, blocks, atol=1e-11 * np.abs(blocks).max())
 
 
+def test_what_stones_yield_is_w_less_that_of_rigid_ones(step):
+    size = 3 * len(step.contacts)
+    operator = step.operator.as_rigid
+    rigid = np.column_stack([operator.apply(e.reshape(-1, 3)).ravel() for e in np.eye(size)])
+    yielded, most = step.dense - rigid, np.abs(step.dense).max()
+    assert np.linalg.eigvalsh(yielded)[0] > -1e-9 * most
+    stiff = np.repeat((step.operator.kind != ELASTIC).all(axis=1), 3)
+    assert stiff.any()
+    assert np.abs(yielded[stiff]).max() <= 1e-12 * most
+    # no stone yields by as much as it moves, and those that deform yield
+    own = np.diag(yielded)[~stiff]
+    assert (own > 1e-6 * most).all()
+    unit = np.random.default_rng(3).uniform(0.5, 2.0, len(step.contacts))
+    scaled = step.operator.scaled(unit).as_rigid
+    each = np.repeat(unit, 3)
+    np.testing.assert_allclose(
+        scaled.apply(np.ones((len(unit), 3))).ravel(), each * (rigid @ each), atol=1e-10 * most
+    )
+
+
 @pytest.mark.parametrize("penalty", [1e-3, 0.1, 10.0])
 def test_condensed_form_solves_with_w_and_a_penalty(step, penalty):
     sigma = penalty * step.operator.scale

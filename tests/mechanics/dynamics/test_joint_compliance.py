@@ -24,7 +24,7 @@ ALWAYS = 10**9
 def yielding(simulation):
     """Let joints give way also where a motion is followed, in which the law is easier to see."""
     time = replace(simulation.model.scene.time, relaxation=True)
-    simulation._solvers = choose_solvers(simulation.model.scene.solver, False, time)
+    simulation._solvers = choose_solvers(simulation.model.scene.solver, 0, 1, time)
 
 
 def compliant(one, value):
@@ -163,6 +163,23 @@ def test_rigid_joints_that_fail_are_tried_again_after_ever_longer_waits():
     simulation._solvers = own
     simulation._joints = replace(simulation._joints, left=0)
     assert simulation.step().problem.delassus.joint_compliance is None
+
+
+def test_joints_that_had_to_yield_beside_deformable_stones_do_so_for_good():
+    stones = [
+        replace(one, fidelity=Fidelity.DEFORMABLE, mesh_size=0.5) if k == 3 else one
+        for k, one in enumerate(regular().blocks)
+    ]
+    model, start = build_model(replace(regular(), blocks=tuple(stones)))
+    simulation = Simulation(model, start)
+    time = replace(simulation.model.scene.time, relaxation=True)
+    own = choose_solvers(simulation.model.scene.solver, 1, 10, time)
+    early, brief = Failing(own.early), Failing(own.brief)
+    simulation._solvers = replace(own, early=early, brief=brief)
+    steps = [simulation.step() for _ in range(12)]
+    assert all(step.solution.converged for step in steps)
+    assert all(step.problem.delassus.joint_compliance is not None for step in steps)
+    assert (early.calls, brief.calls) == (1, 0)
 
 
 def test_joints_that_cannot_be_solved_either_way_are_left_to_the_rigid_methods():

@@ -9,8 +9,8 @@ from mechanics.delassus.rigid import RigidDelassus
 from mechanics.problem.problem import ContactStart
 from mechanics.problem.residual import natural_map, residual
 from mechanics.scene.laws.mortar import MortarJoint
-from mechanics.scene.scene import ContactSettings, Fidelity, Method, Placement, SolverSettings
-from mechanics.solvers.choice import choose_planar_solver, choose_solver
+from mechanics.scene.scene import ContactSettings, Fidelity, Method, Placement, SolverSettings, TimeSettings
+from mechanics.solvers.choice import choose_planar_solver, choose_solver, choose_solvers
 from mechanics.solvers.first_order.admm import ADMM
 from mechanics.solvers.first_order.anderson import Anderson
 from mechanics.solvers.first_order.apgd import APGD
@@ -21,6 +21,7 @@ from mechanics.solvers.second_order.newton import Newton
 from mechanics.solvers.strategies.auto import Auto
 from mechanics.solvers.strategies.planar import Planar
 from mechanics.solvers.strategies.rigid import Alternating
+from mechanics.solvers.strategies.rigid_first import RigidFirst
 from moma.errors import SolverError
 from tests.mechanics.dense_operator import products_alone
 from tests.mechanics.shapes import brick, ground, posed, scene
@@ -204,6 +205,27 @@ def test_the_scene_chooses_the_solver(method, deformable, expected):
     solver = choose_solver(SolverSettings(method, 1e-5, 1e-3, 77), deformable)
     assert isinstance(solver, expected)
     assert (solver.tolerance, solver.velocity_tolerance, solver.max_iterations) == (1e-5, 1e-3, 77)
+
+
+@pytest.mark.parametrize(
+    ("elastic", "rigid", "early", "yields"),
+    [
+        (0, 5000, Auto, True),
+        (3, 2, None, False),
+        (3, 0, None, False),
+        (3, 200, Auto, True),
+        (20, 5000, Auto, True),
+        (100, 200, Auto, True),
+        (100, 5000, RigidFirst, True),
+    ],
+)
+def test_joints_may_yield_on_the_way_to_a_rest_where_more_stones_are_rigid(elastic, rigid, early, yields):
+    rest, motion = TimeSettings(relaxation=True), TimeSettings(relaxation=False)
+    chosen = choose_solvers(SolverSettings(), elastic, rigid, rest)
+    assert bool(chosen.compliant) == yields
+    assert early is None or isinstance(chosen.early, early)
+    assert not choose_solvers(SolverSettings(), elastic, rigid, motion).compliant
+    assert not choose_solvers(SolverSettings(joint_compliance=0.0), elastic, rigid, rest).compliant
 
 
 @pytest.mark.parametrize("method", [one for one in Method if one is not Method.INTERIOR_POINT])

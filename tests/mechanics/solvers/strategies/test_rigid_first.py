@@ -1,0 +1,105 @@
+"""Deformable stones among many rigid ones: as if all were rigid first, then Newton's method for W itself."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from mechanics.delassus.compliant import CompliantDelassus
+from mechanics.problem.problem import ContactProblem, ContactStart
+from mechanics.problem.residual import residual
+from mechanics.scene.scene import Fidelity
+from mechanics.scene.shapes import wall
+from mechanics.solvers.second_order.interior_point import InteriorPoint
+from mechanics.solvers.second_order.proximal_newton import ProximalNewton
+from mechanics.solvers.second_order.scaling import equilibrated
+from mechanics.solvers.strategies.rigid_first import RigidFirst
+from moma.errors import SolverError
+from tests.mechanics.dense_operator import blocks_apart
+from tests.mechanics.shapes import posed, scene
+
+SOFT = {"2-2", "3-2", "3-3"}
+SHARE = 1e-3  # E over the mean diagonal of W
+
+
+@cache
+def rigid_joints():
+    """The first step of a wall of five courses on a slab; three stones of it deform."""
+    even, odd = [1.0, 1.0, 1.0], [0.5, 1.0, 1.0, 0.5]
+    blocks = wall([even, odd, even, odd, even], 3.0, 0.4, 0.5, mesh_size=0.5)
+    mixed = [replace(one, fidelity=Fidelity.DEFORMABLE) if one.code in SOFT else one for one in blocks]
+    return posed(scene(*mixed, friction=0.6), step=5e-3).problem
+
+
+@cache
+def problem():
+    """The same with joints that yield by as much as stones do."""
+    operator = rigid_joints().delassus
+    each = np.full_like(rigid_joints().u_free, SHARE * operator.scale)
+    return replace(rigid_joints(), delassus=CompliantDelassus(operator, each))
+
+
+def cold(one):
+    zero = np.zeros_like(one.u_free)
+    return ContactStart(zero, zero.copy())
+
+
+@cache
+def solved():
+    return RigidFirst()(problem(), cold(problem()))
+
+
+def test_a_cold_start_is_solved_far_beyond_the_tolerances():
+    left = residual(problem(), solved().impulse)
+    assert solved().converged
+    assert left.within(1e-9, 1e-8)
+    assert solved().natural_map == left.natural_map
+    np.testing.assert_array_equal(solved().velocity, left.dual)
+
+
+def test_forces_are_those_of_an_independent_method():
+    # with joints that yield they are determined, but for what slides
+    other = InteriorPoint(1e-10, 1e-9, 200)(problem(), cold(problem()))
+    assert other.converged
+    most = np.abs(other.impulse).max()
+    np.testing.assert_allclose(solved().impulse, other.impulse, atol=1e-3 * most)
+
+
+def test_a_solution_costs_nothing_and_what_is_near_no_stones_as_rigid_ones():
+    assert RigidFirst()(problem(), ContactStart(solved().impulse, solved().velocity)).iterations == 0
+    rng = np.random.default_rng(1)
+    near = solved().impulse * (1.0 + 1e-4 * rng.normal(size=solved().impulse.shape))
+    answer = RigidFirst()(problem(), ContactStart(near, np.zeros_like(near)))
+    assert answer.converged
+    assert 1 <= answer.iterations <= 8 < solved().iterations
+
+
+def test_equations_of_a_step_of_newton_are_solved_with_w_itself():
+    even, unit = equilibrated(problem())
+    start = cold(even)
+    found = ProximalNewton(1e-12, 1e-11, 60)(even, start)
+    assert found.converged
+    np.testing.assert_allclose(
+        found.impulse * unit[:, None], solved().impulse, atol=1e-6 * np.abs(solved().impulse).max()
+    )
+
+
+def test_rigid_joints_are_left_to_others_where_the_stones_as_rigid_ones_are_not_solved():
+    # ten iterations do not do
+    answer = RigidFirst(max_iterations=10)(rigid_joints(), cold(rigid_joints()))
+    assert not answer.converged
+    assert not answer.impulse.any()
+    assert answer.iterations <= 10
+
+
+def test_rigid_joints_are_solved_where_they_can_be():
+    answer = RigidFirst()(rigid_joints(), cold(rigid_joints()))
+    assert answer.converged == residual(rigid_joints(), answer.impulse).within(1e-6, 1e-5)
+
+
+def test_other_operators_are_refused():
+    none = np.zeros(1)
+    other = ContactProblem(blocks_apart(np.eye(3)), np.array([[-1.0, 0.0, 0.0]]), none, none, none)
+    with pytest.raises(SolverError, match="not that of bodies"):
+        RigidFirst()(other, cold(other))
