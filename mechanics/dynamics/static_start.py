@@ -60,7 +60,7 @@ def static_start(
     search = _Search(model, halted(start), report)
     if model.rigid_only and not model.laws.sprung:
         return search.rigid()
-    if model.mostly_rigid and not model.laws.sprung:
+    if model.mostly_rigid:
         told, found = search.mixed()
         if told.found:
             return told, found

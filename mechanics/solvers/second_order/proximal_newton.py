@@ -11,7 +11,7 @@ of the joints. The equations with that are solved as above, and lead a Krylov me
 step within some five products with W.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -23,12 +23,15 @@ from mechanics.problem.problem import ContactProblem, ContactSolution, ContactSt
 from mechanics.problem.residual import Residual, project_on_cone, residual
 from mechanics.solvers._kernels import block_fronts as fronts
 from mechanics.solvers._kernels import body_newton as bodies
+from mechanics.solvers.second_order.scaling import equilibrated
 from mechanics.solvers.second_order.sparse_blocks import SparseBlocks
 from moma.errors import SolverError
 
-__all__ = ["ProximalNewton"]
+__all__ = ["FURTHER", "ProximalNewton", "polished"]
 
 
+# tolerances to which solutions are polished, over those asked for: what they leave would be a creep [-]
+FURTHER = 1e-3
 # α over η and the scale of W, at first and at least [-]
 _SHARE = 0.1
 # α over the scale of W while a cold start holds every contact [-]
@@ -92,6 +95,29 @@ class ProximalNewton:
             best = run.left, run.r
         left, impulse = best
         return ContactSolution(impulse, left.dual, run.iterations, left.natural_map, left.within(*limits))
+
+
+def polished(
+    problem: ContactProblem,
+    start: ContactStart,
+    limits: tuple[float, float],
+    most: int,
+    further: float = FURTHER,
+) -> ContactSolution:
+    """Return the solution by Newton's method in even units, to a part of the tolerances (η, velocities)."""
+    even, each = equilibrated(problem)
+    unit = each[:, None]
+    solver = ProximalNewton(further * limits[0], further * limits[1], most)
+    found = solver(even, ContactStart(start.impulse / unit, start.velocity * unit))
+    impulse = found.impulse * unit
+    left = residual(problem, impulse)
+    return replace(
+        found,
+        impulse=impulse,
+        velocity=left.dual,
+        natural_map=left.natural_map,
+        converged=left.within(*limits),
+    )
 
 
 class _Run:

@@ -9,12 +9,12 @@ from mechanics.problem.problem import ContactProblem, ContactSolution, ContactSt
 from mechanics.problem.residual import residual
 from mechanics.solvers.first_order.body_admm import BodyADMM, Stage
 from mechanics.solvers.second_order.interior_point import InteriorPoint
-from mechanics.solvers.second_order.proximal_newton import ProximalNewton
-from mechanics.solvers.second_order.scaling import equilibrated
+from mechanics.solvers.second_order.proximal_newton import polished
 from mechanics.solvers.strategies.elastic import Elastic
 from mechanics.solvers.strategies.rigid import TURNS, many_bodies, some_bodies
+from mechanics.solvers.strategies.rigid_first import RigidFirst
 
-__all__ = ["Compliant", "polished"]
+__all__ = ["Compliant"]
 
 # factors of E, from soft joints to those asked for: each solution leads Newton's method to the next
 _HOMOTOPY = (100.0, 30.0, 10.0, 3.0, 1.0)
@@ -22,8 +22,6 @@ _HOMOTOPY = (100.0, 30.0, 10.0, 3.0, 1.0)
 _TOO_SOFT = 10.0
 # steps of Newton's method with each
 _NEWTON_STEPS = 30
-# tolerances of Newton's method over those asked for: what they leave would be a creep [-]
-_FURTHER = 1e-3
 # iterations of the interior point
 _INTERIOR = 60
 # iterations with kept factors between many bodies on springs, in the turns of rigid joints: forces of joints that yield
@@ -39,6 +37,8 @@ _STAGES = (*TURNS[:2], *(4 * (Stage((1.0, 0.05, 0.02), 100, extrapolated=True),)
 @dataclass(frozen=True)
 class Compliant:
     """Newton's method, from softer joints where it fails, then the interior point; with deformable stones as `Elastic`.
+
+    Some deformable stones among more rigid ones are solved as rigid ones first.
 
     Some hundred bodies, and many on springs, begin with ADMM, whose factors last for many iterations. What it leaves is
     little enough on springs; between others it would be a creep, and Newton's method goes on.
@@ -65,7 +65,9 @@ class Compliant:
         if len(start.impulse) == 0:
             return ContactSolution(start.impulse, start.velocity, 0, 0.0, True, "nothing: no contacts")
         if problem.delassus.rigid is None:
-            found = Elastic(self.tolerance, self.velocity_tolerance, self.max_iterations)(problem, start)
+            limits = self.tolerance, self.velocity_tolerance, self.max_iterations
+            first = RigidFirst(*limits)(problem, start) if problem.delassus.mostly_rigid else None
+            found = first if first is not None and first.converged else Elastic(*limits)(problem, start)
             return replace(found, why=f"compliant joints, {found.why}")
         near, made, springs = None, 0, False
         if some_bodies(problem):
@@ -127,29 +129,6 @@ class Compliant:
         left = residual(problem, found.impulse)
         within = left.within(self.tolerance, self.velocity_tolerance)
         return replace(found, natural_map=left.natural_map, converged=within, why=f"compliant joints, {name}")
-
-
-def polished(
-    problem: ContactProblem,
-    start: ContactStart,
-    limits: tuple[float, float],
-    most: int,
-    further: float = _FURTHER,
-) -> ContactSolution:
-    """Return the solution by Newton's method in even units, to a part of the tolerances (η, velocities)."""
-    even, each = equilibrated(problem)
-    unit = each[:, None]
-    solver = ProximalNewton(further * limits[0], further * limits[1], most)
-    found = solver(even, ContactStart(start.impulse / unit, start.velocity * unit))
-    impulse = found.impulse * unit
-    left = residual(problem, impulse)
-    return replace(
-        found,
-        impulse=impulse,
-        velocity=left.dual,
-        natural_map=left.natural_map,
-        converged=left.within(*limits),
-    )
 
 
 def _yields(operator: Delassus) -> bool:

@@ -9,7 +9,7 @@ from mechanics.delassus.compliant import CompliantDelassus
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.problem.residual import residual
 from mechanics.solvers.first_order.body_admm import BodyADMM
-from mechanics.solvers.strategies.compliant import polished
+from mechanics.solvers.second_order.proximal_newton import FURTHER, polished
 from mechanics.solvers.strategies.rigid import FROM_NOTHING
 from moma.errors import SolverError
 
@@ -18,8 +18,8 @@ __all__ = ["RigidFirst"]
 _SOLVED = "the forces of the last step"
 # times that both are made, each from the best impulses so far
 _ROUNDS = 2
-# steps of Newton's method in each, and tolerances over those asked for to which it goes: the rest would be a creep
-_STEPS, _FURTHER = 30, 1e-3
+# steps of Newton's method in each
+_STEPS = 30
 # the same between rigid joints, whose W is singular, and tolerances over those asked for there [-]
 _RIGID_STEPS, _RIGID_FURTHER = 15, 0.1
 # η from which Newton's method goes on from the impulses of the last step [-]
@@ -63,7 +63,7 @@ class RigidFirst:
         left = residual(problem, start.impulse)
         best = ContactSolution(start.impulse, left.dual, 0, left.natural_map, left.within(*limits), _SOLVED)
         yields = problem.delassus.joint_compliance is not None
-        steps, further = (_STEPS, _FURTHER) if yields else (_RIGID_STEPS, _RIGID_FURTHER)
+        steps, further = (_STEPS, FURTHER) if yields else (_RIGID_STEPS, _RIGID_FURTHER)
         near, count = bool(start.impulse.any()) and left.natural_map <= _NEAR, 0
         for _ in range(_ROUNDS):
             if best.converged:

@@ -12,7 +12,16 @@ NAME = "tower-small"
 ARCH, BAY = "kind = voussoir and code like 'AO%'", "code like 'A%' and course > 3"
 
 
-def summary_of(folder, stones):
+SPRINGS = """
+[[laws]]
+type = "elastic_joint"
+friction = 0.6
+normal_stiffness = 1e10
+shear_stiffness = 5e9
+"""
+
+
+def summary_of(folder, stones, laws=""):
     """Survey, ingest and run the storey with these stones deformable."""
     db = f"sqlite:///{folder / 'storey.db'}"
     for command in (
@@ -24,7 +33,7 @@ def summary_of(folder, stones):
     scene = folder / f"{NAME}.toml"
     rigid = 'default = "rigid"\n'
     text = scene.read_text(encoding="utf-8").replace(rigid, f'{rigid}deformable = ["{stones}"]\n')
-    scene.write_text(text, encoding="utf-8")
+    scene.write_text(text + laws, encoding="utf-8")
     run_scene(scene, db, folder / "results")
     return json.loads((folder / "results" / "summary.json").read_text(encoding="utf-8"))
 
@@ -50,3 +59,10 @@ def test_the_bay_about_it_does_and_says_what_its_joints_yield(tmp_path):
     rests(summary)
     assert summary["cautions"][0].startswith("joints gave way elastically in ")
     assert "stones overlap by at most 0.0" in summary["cautions"][0]
+
+
+@pytest.mark.slow
+def test_with_joints_of_a_stated_stiffness_nothing_else_yields(tmp_path):
+    summary = summary_of(tmp_path, BAY, SPRINGS)
+    rests(summary)
+    assert summary["cautions"] == []
