@@ -119,7 +119,10 @@ class Simulation(Carrier):
     def released(self) -> "Simulation":
         """Return a simulation that goes on from here, neither halted any more nor knowing a force between rigid stones.
 
-        A relaxation goes on with θ = 1, as its user does not ask for the motion.
+        A relaxation goes on with θ = 1, as its user does not ask for the motion, and begins with a last halt: forces
+        that also stop what is left of a motion would set stones in motion in the next step, in which they are kept.
+        Joints that yield would be loaded anew, and move; rigid ones bear the forces of a rest as they lie, and are
+        tried first.
         """
         time = self.model.scene.time
         free = replace(time, relaxation=False, theta=1.0 if time.relaxation else time.theta)
@@ -127,13 +130,16 @@ class Simulation(Carrier):
         other = copy(self)
         other.model, other._theta, other._relax, other._first = model, free.theta, Relaxation(model), False
         other._freed = True
+        other._joints = replace(self._joints, left=min(self._joints.left, 0))
+        if time.relaxation:
+            other.state = halted(self.state)
         if free.theta != time.theta:
             with self.clock("assemble"):
                 other._compliance = compliances(model, self._step, free.theta)
         other._detect = self._detect.continued(model, other._compliance)
         # forces of elastic stones come from their strain, which stays
         other._memory = self._memory.at_rest(0.0 if model.inertia.moving.any() else 1.0)
-        other._sleepers = Sleepers(model, self.state, other._memory)
+        other._sleepers = Sleepers(model, other.state, other._memory)
         return other
 
     def carried(self) -> dict[str, Any]:
@@ -200,7 +206,9 @@ class Simulation(Carrier):
         solvers, joints = self._solvers, self._joints
         if joints.rigid:
             alone = not solvers.compliant or joints.left < 0
-            solver = solvers.usual if alone else solvers.early if joints.value == 0 else solvers.brief
+            # rigid joints can bear the forces of a rest that are forgotten, if only they are found
+            first = joints.value == 0 or not warm.impulse.any()
+            solver = solvers.usual if alone else solvers.early if first else solvers.brief
             found = self._try(given, joints, solver, warm, warm)
             if found[2].converged or alone:
                 self._joints = joints.passed()

@@ -45,7 +45,8 @@ class Solvers:
     ----------
     usual : of rigid joints
     early : of rigid joints, where compliant ones are a way out: it fails sooner
-    brief : the same where rigid joints have failed before: it takes no longer than a step with compliant joints
+    brief : the same where rigid joints have failed before, and forces are known: it takes no longer than a step with
+        compliant joints
     compliant : of compliant joints: factors on their compliance, and the solvers with which these are tried one after
         the other; empty where joints stay rigid
     """

@@ -109,6 +109,36 @@ def test_forces_of_a_compliant_joint_lift_no_stone_when_the_joints_are_rigid_aga
     assert simulation.state.centre[1, 2] == pytest.approx(height, abs=1e-9)
 
 
+def test_a_rest_on_compliant_joints_that_is_released_bears_its_forces_on_rigid_ones_from_a_halt():
+    """Loaded anew, a compliant joint would let the block sink by ε h² F once more."""
+    simulation, _ = compliant(block(relaxation=True), 1e-3 / MASS)
+    for _ in range(60):
+        simulation.step()
+    speed = np.zeros_like(simulation.state.velocity)
+    speed[1, 2] = -1e-5
+    simulation.state = replace(simulation.state, velocity=speed)
+    again = simulation.released()
+    np.testing.assert_array_equal(again.state.velocity, 0.0)
+    step = again.step()
+    assert step.problem.delassus.joint_compliance is None
+    # held by its weight alone: forces that stopped a motion, too, would lift it in the next step
+    assert step.force[:, 2].sum() == pytest.approx(MASS * G, rel=1e-6)
+    np.testing.assert_allclose(step.after.centre, simulation.state.centre, rtol=0, atol=1e-10)
+
+
+def test_a_rest_that_is_released_is_worth_what_steps_are_before_joints_yield():
+    simulation, _ = compliant(block(relaxation=True), 1e-3 / MASS)
+    own = simulation._solvers
+    early, brief = Failing(own.early), Failing(own.brief)
+    simulation._solvers = replace(own, early=early, brief=brief)
+    for _ in range(20):
+        simulation.step()
+    again = simulation.released()
+    for _ in range(3):
+        again.step()
+    assert (early.calls, brief.calls) == (1, 0)
+
+
 def test_an_overlap_that_no_force_explains_pushes_nothing():
     """Two walls that a block overlaps by 1 mm; without friction from them, it falls as if they were not there."""
     walls = (
