@@ -163,6 +163,8 @@ def _simulate(
             with clock("confirm"):
                 confirmed = at_once or lasts(run.simulation.released())
             if not confirmed:
+                if settings.relaxation:
+                    log.energy.halted(run.simulation.state)
                 outcome, run.simulation = watch.disproved(), run.simulation.released()
         text = f"balance {balance.max():.1e}, η {step.solution.natural_map:.1e}"
         report(Progress("step", count, total, text))

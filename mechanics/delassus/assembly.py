@@ -87,7 +87,10 @@ def mixed_delassus(
     arm = np.where((kind == ELASTIC)[..., None], point - state.centre[body], arm)
     jacobian, response = _rigid_sides(model.inertia, state, contacts, arm)
     total = (diagonal.reshape(-1, 2, 3, 3) + jacobian @ response).sum(axis=1)
-    as_rigid = _rigid_delassus(model, _awake(model), state, contacts, arm, schedule)
+    drag = np.ones(len(model.mass))
+    for group, own in zip(model.elastic_stones.groups, compliance, strict=True):
+        drag[group.bodies] = own.drag
+    as_rigid = _rigid_delassus(model, _awake(model, drag), state, contacts, arm, schedule)
     # rigid sides move as they do
     own_part = total - as_rigid.diagonal + (jacobian @ response).sum(axis=1) if elastic_scale else total
     scale = float(np.einsum("cii->", own_part) / max(3 * len(contacts), 1))
@@ -111,13 +114,13 @@ def mixed_delassus(
     )
 
 
-def _awake(model: Model) -> RigidInertia:
-    """Return the inertia of all bodies that impulses move, as if none deformed."""
-    flight, fixed = model.flight, model.fixed
+def _awake(model: Model, drag: Array) -> RigidInertia:
+    """Return the inertia of all bodies that impulses move, as if none deformed; `drag` (nb,) as in `Compliance` [-]."""
+    flight, share = model.flight, np.where(model.fixed, 0.0, 1.0 / drag)
     return replace(
         flight,
-        inverse_mass=np.where(fixed, 0.0, flight.inverse_mass),
-        inverse_inertia=np.where(fixed[:, None, None], 0.0, flight.inverse_inertia),
+        inverse_mass=share * flight.inverse_mass,
+        inverse_inertia=share[:, None, None] * flight.inverse_inertia,
     )
 
 

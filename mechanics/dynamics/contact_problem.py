@@ -88,6 +88,10 @@ class JointCompliance:
         """Return the state after a step with compliant joints."""
         return replace(self, left=self.left - (not self.lasting), softness=softness)
 
+    def released(self) -> "JointCompliance":
+        """Return the state in which forces are forgotten, which rigid joints bear as they lie, if they may be tried."""
+        return self if self.lasting else replace(self, left=min(self.left, 0))
+
     def failed(self) -> "JointCompliance":
         """Return the state after a step that could not be solved at all."""
         return replace(self, left=-self.wait, wait=2 * self.wait)

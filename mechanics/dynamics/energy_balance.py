@@ -65,6 +65,12 @@ class EnergyBalance(Carrier):
         self._energy = energy - step.relaxed
         self.reference = max(self.reference, energy, abs(self.external), abs(self.contact), self.scheme)
 
+    def halted(self, state: State) -> None:
+        """Account for a halt between two steps, which the scheme makes."""
+        kinetic = kinetic_energy(self._model, state)
+        self.scheme += kinetic
+        self._energy -= kinetic
+
     def _load_work(self, step: Step, theta: float) -> float:
         """Return h P·v_θ: loads at the kick times the mean of the velocities before and after it [J]."""
         model = self._model

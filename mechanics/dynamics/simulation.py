@@ -130,7 +130,7 @@ class Simulation(Carrier):
         other = copy(self)
         other.model, other._theta, other._relax, other._first = model, free.theta, Relaxation(model), False
         other._freed = True
-        other._joints = replace(self._joints, left=min(self._joints.left, 0))
+        other._joints = self._joints.released()
         if time.relaxation:
             other.state = halted(self.state)
         if free.theta != time.theta:

@@ -14,7 +14,7 @@ from mechanics.dynamics.simulation import Simulation
 from mechanics.dynamics.step import Step
 from mechanics.dynamics.stopping import rests
 from mechanics.model.model import Model
-from mechanics.scene.scene import TimeSettings
+from mechanics.scene.scene import Method, TimeSettings
 from mechanics.scene.state import State
 from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.strategies.compliant import Compliant
@@ -103,8 +103,12 @@ class _Search:
 
     def mixed(self) -> tuple[StaticStart, Simulation]:
         """Search by a relaxation in short steps, each to the tolerances of the run."""
-        own = self._model.scene.time.step
-        search = Simulation(_still(self._model, _MIXED), self._start)
+        own, settings = self._model.scene.time, self._model.scene.solver
+        # joints that do not yield in the run do not do so here; a method that is asked for is that of the run
+        share = settings.joint_compliance if own.relaxation else 0.0
+        still = _still(self._model, _MIXED)
+        usual = replace(settings, method=Method.AUTO, joint_compliance=share)
+        search = Simulation(replace(still, scene=replace(still.scene, solver=usual)), self._start)
         found, unsolved, before = False, 0, np.inf
         while self._count < _MIXED_STEPS and not found and unsolved < _UNSOLVED and self._settles(search):
             # the loads stay those of the first instant
@@ -117,7 +121,7 @@ class _Search:
             before = self._largest
         found = found and self._settles(search)
         search.halt(self._start.time)
-        if found and own != _MIXED:
+        if found and own.step != _MIXED:
             search = _set_down(self._model, search)
         return self._told(found), search
 

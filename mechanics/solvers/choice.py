@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
+from mechanics.problem.residual import residual
 from mechanics.scene.scene import Method, SolverSettings, TimeSettings
 from mechanics.solvers.first_order.admm import ADMM
 from mechanics.solvers.first_order.apgd import APGD
@@ -111,7 +112,7 @@ def choose_solvers(
     assert isinstance(usual, Auto)
     if elastic:
         first = RigidFirst(usual.tolerance, usual.velocity_tolerance, usual.max_iterations)
-        early = usual if rigid < _SOME or elastic <= _FEW else first
+        early = usual if rigid < _SOME or elastic <= _FEW else _given_up
         return Solvers(usual, early, first, tuple((factor, first) for factor in _SOFTNESS))
     quick = Compliant(usual.tolerance, usual.velocity_tolerance, usual.max_iterations)
     return Solvers(
@@ -120,6 +121,12 @@ def choose_solvers(
         replace(usual, max_iterations=min(_BRIEF, usual.max_iterations), thorough=False),
         (*((factor, quick) for factor in _SOFTNESS), (_SOFTNESS[-1], replace(quick, thorough=True))),
     )
+
+
+def _given_up(problem: ContactProblem, start: ContactStart) -> ContactSolution:
+    """Return the start as it is: rigid joints that no method solves."""
+    left = residual(problem, start.impulse)
+    return ContactSolution(start.impulse, left.dual, 0, left.natural_map, len(start.impulse) == 0)
 
 
 def _sprung_solver(settings: SolverSettings, deformable: bool, duration: float) -> Solver:

@@ -27,11 +27,11 @@ from mechanics.solvers.second_order.scaling import equilibrated
 from mechanics.solvers.second_order.sparse_blocks import SparseBlocks
 from moma.errors import SolverError
 
-__all__ = ["FURTHER", "ProximalNewton", "polished"]
+__all__ = ["ProximalNewton", "polished"]
 
 
 # tolerances to which solutions are polished, over those asked for: what they leave would be a creep [-]
-FURTHER = 1e-3
+_FURTHER = 1e-3
 # α over η and the scale of W, at first and at least [-]
 _SHARE = 0.1
 # α over the scale of W while a cold start holds every contact [-]
@@ -60,7 +60,7 @@ _INEXACT, _PRODUCTS = 1e-2, 30
 
 @dataclass(frozen=True)
 class ProximalNewton:
-    """Proximal Newton method: high accuracy, between rigid bodies from any start.
+    """Proximal Newton method: high accuracy, between rigid bodies from any start, others from near a solution.
 
     Attributes
     ----------
@@ -98,16 +98,12 @@ class ProximalNewton:
 
 
 def polished(
-    problem: ContactProblem,
-    start: ContactStart,
-    limits: tuple[float, float],
-    most: int,
-    further: float = FURTHER,
+    problem: ContactProblem, start: ContactStart, limits: tuple[float, float], most: int
 ) -> ContactSolution:
-    """Return the solution by Newton's method in even units, to a part of the tolerances (η, velocities)."""
+    """Solve by so many steps of Newton's method at `most`, to a thousandth of the tolerances (η, velocities)."""
     even, each = equilibrated(problem)
     unit = each[:, None]
-    solver = ProximalNewton(further * limits[0], further * limits[1], most)
+    solver = ProximalNewton(_FURTHER * limits[0], _FURTHER * limits[1], most)
     found = solver(even, ContactStart(start.impulse / unit, start.velocity * unit))
     impulse = found.impulse * unit
     left = residual(problem, impulse)

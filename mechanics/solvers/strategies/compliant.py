@@ -65,9 +65,7 @@ class Compliant:
         if len(start.impulse) == 0:
             return ContactSolution(start.impulse, start.velocity, 0, 0.0, True, "nothing: no contacts")
         if problem.delassus.rigid is None:
-            limits = self.tolerance, self.velocity_tolerance, self.max_iterations
-            first = RigidFirst(*limits)(problem, start) if problem.delassus.mostly_rigid else None
-            found = first if first is not None and first.converged else Elastic(*limits)(problem, start)
+            found = self._deforming(problem, start)
             return replace(found, why=f"compliant joints, {found.why}")
         near, made, springs = None, 0, False
         if some_bodies(problem):
@@ -94,6 +92,16 @@ class Compliant:
             path = replace(path, iterations=path.iterations + found.iterations)
             found = self._judged(problem, path, "interior point")
         return found
+
+    def _deforming(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
+        limits, made = (self.tolerance, self.velocity_tolerance), 0
+        if problem.delassus.mostly_rigid:
+            first = RigidFirst(*limits, self.max_iterations)(problem, start)
+            made = first.iterations
+            if first.converged or made >= self.max_iterations:
+                return first
+        found = Elastic(*limits, self.max_iterations - made)(problem, start)
+        return replace(found, iterations=found.iterations + made)
 
     def _begun(self, problem: ContactProblem, start: ContactStart, springs: bool) -> ContactSolution:
         """Return where ADMM leads, which has found most of what opens and slides, if not all."""

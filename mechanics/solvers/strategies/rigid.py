@@ -121,6 +121,8 @@ FROM_NOTHING = (
 )
 # and what finds them at once where all contacts stick
 _STICKING = Stage(1e-3, 50, extrapolated=True)
+# tolerances to which it does, over those asked for: a motion at rest keeps these forces for hundreds of steps [-]
+_STICKING_FURTHER = 1e-4
 # stages that solve steps in which next to nothing moves
 _RESTING = ("sweeps", "admm, small penalty")
 
@@ -296,7 +298,7 @@ class Alternating:
         return BodyADMM(*self._tight, max(most - _INTERIOR, 1), FROM_NOTHING)
 
     def _cold_many(self, most: int) -> _Solver:
-        return BodyADMM(*self._tight, most, (_STICKING, *FROM_NOTHING))
+        return BodyADMM(*self._tight, most, (_STICKING, *FROM_NOTHING), further=_STICKING_FURTHER)
 
     def _slides(self, problem: ContactProblem, found: ContactSolution) -> bool:
         """Return whether a contact that carries a force moves by more than the solution leaves undecided."""

@@ -9,19 +9,18 @@ from mechanics.delassus.compliant import CompliantDelassus
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.problem.residual import residual
 from mechanics.solvers.first_order.body_admm import BodyADMM
-from mechanics.solvers.second_order.proximal_newton import FURTHER, polished
+from mechanics.solvers.second_order.proximal_newton import polished
 from mechanics.solvers.strategies.rigid import FROM_NOTHING
 from moma.errors import SolverError
 
 __all__ = ["RigidFirst"]
 
-_SOLVED = "the forces of the last step"
+# what `why` tells
+_WARM, _COLD = "warm start", "stones as rigid ones first"
 # times that both are made, each from the best impulses so far
 _ROUNDS = 2
 # steps of Newton's method in each
 _STEPS = 30
-# the same between rigid joints, whose W is singular, and tolerances over those asked for there [-]
-_RIGID_STEPS, _RIGID_FURTHER = 15, 0.1
 # η from which Newton's method goes on from the impulses of the last step [-]
 _NEAR = 1e-3
 # tolerances of the stones as rigid ones over those asked for [-], and the penalties with which they are solved, three
@@ -41,11 +40,12 @@ class RigidFirst:
 
     is a problem between rigid stones, whose factors cost a fiftieth, and which ADMM on their velocities solves from
     nothing. It shows what opens, slides and sticks. Newton's method ends it; its equations have such factors, too.
+    Joints must yield: where stones touch in more points than they need, W is singular, and Newton's method does not end.
 
     Attributes
     ----------
     tolerance, velocity_tolerance : as in `NSGS`
-    max_iterations : of each part
+    max_iterations : of ADMM and of Newton's method, each time
     """
 
     tolerance: float = 1e-6
@@ -61,21 +61,22 @@ class RigidFirst:
         """
         limits = self.tolerance, self.velocity_tolerance
         left = residual(problem, start.impulse)
-        best = ContactSolution(start.impulse, left.dual, 0, left.natural_map, left.within(*limits), _SOLVED)
-        yields = problem.delassus.joint_compliance is not None
-        steps, further = (_STEPS, FURTHER) if yields else (_RIGID_STEPS, _RIGID_FURTHER)
+        best = ContactSolution(start.impulse, left.dual, 0, left.natural_map, left.within(*limits), _WARM)
         near, count = bool(start.impulse.any()) and left.natural_map <= _NEAR, 0
         for _ in range(_ROUNDS):
             if best.converged:
                 break
-            begin = best if near and yields else self._as_rigid(problem, best)
-            near, count = False, count + begin.iterations
-            if not (begin.converged or yields):
-                break
-            found = polished(problem, ContactStart(begin.impulse, begin.velocity), limits, steps, further)
+            kept, near = near, False
+            begin = best if kept else self._as_rigid(problem, best)
+            count += 0 if kept else begin.iterations
+            start = ContactStart(begin.impulse, begin.velocity)
+            found = polished(problem, start, limits, min(_STEPS, self.max_iterations))
             count += found.iterations
             if found.converged or found.natural_map < best.natural_map:
-                best = replace(found, why="Newton: stones as rigid ones first")
+                best = replace(found, why=f"Newton: {_WARM if kept else _COLD}")
+            elif not kept:
+                # another round would be the same
+                break
         return replace(best, iterations=count)
 
     def _as_rigid(self, problem: ContactProblem, begin: ContactSolution) -> ContactSolution:

@@ -97,7 +97,16 @@ def test_diagonal_blocks_are_those_of_w(step):
     np.testing.assert_allclose(step.operator.diagonal, blocks, atol=1e-11 * np.abs(blocks).max())
 
 
-def test_what_stones_yield_is_w_less_that_of_rigid_ones(step):
+@pytest.fixture(scope="module")
+def damped():
+    one = mixed()
+    slow = [replace(b, material=replace(b.material, mass_damping=30.0)) for b in one.blocks]
+    return Assembled(replace(one, blocks=tuple(slow)))
+
+
+@pytest.mark.parametrize("name", ["step", "damped"])
+def test_what_stones_yield_is_w_less_that_of_rigid_ones(name, request):
+    step = request.getfixturevalue(name)
     size = 3 * len(step.contacts)
     operator = step.operator.as_rigid
     rigid = np.column_stack([operator.apply(e.reshape(-1, 3)).ravel() for e in np.eye(size)])
