@@ -73,7 +73,7 @@ def apply_delassus(r, sides):  # pragma: no cover - compiled
             sign = -1.0
     for b in range(nb):
         first, n = yptr[b], yptr[b + 1] - yptr[b]
-        # by columns, which are the rows of a symmetric block: sums side by side take a quarter of the time
+        # by columns, which are the rows of a symmetric block: sums side by side take half the time
         for k in range(n):
             push = p[first + k]
             if push != 0.0:

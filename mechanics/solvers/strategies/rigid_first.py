@@ -40,7 +40,7 @@ class RigidFirst:
 
     is a problem between rigid stones, whose factors cost a fiftieth, and which ADMM on their velocities solves from
     nothing. It shows what opens, slides and sticks. Newton's method ends it; its equations have such factors, too.
-    Joints must yield: where stones touch in more points than they need, W is singular, and Newton's method does not end.
+    Joints must yield: where stones touch in more points than they need, W is singular, and Newton's method goes astray.
 
     Attributes
     ----------
