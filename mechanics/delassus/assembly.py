@@ -90,9 +90,9 @@ def mixed_delassus(
     drag = np.ones(len(model.mass))
     for group, own in zip(model.elastic_stones.groups, compliance, strict=True):
         drag[group.bodies] = own.drag
-    as_rigid = _rigid_delassus(model, _awake(model, drag), state, contacts, arm, schedule)
-    # rigid sides move as they do
-    own_part = total - as_rigid.diagonal + (jacobian @ response).sum(axis=1) if elastic_scale else total
+    awake = _awake(model, drag)
+    as_rigid = _rigid_delassus(model, awake, state, contacts, arm, schedule)
+    own_part = total - _rigid_share(awake, state, contacts, kind, arm) if elastic_scale else total
     scale = float(np.einsum("cii->", own_part) / max(3 * len(contacts), 1))
     threads = model.scene.solver.threads
     mass = _masses(model.inertia, state)
@@ -131,6 +131,13 @@ def _masses(inertia: RigidInertia, state: State) -> Array:
     mass[:, 3:, 3:] = state.rotation @ inertia.inertia @ state.rotation.transpose(0, 2, 1)
     mass[~inertia.moving] = 0.0
     return mass
+
+
+def _rigid_share(inertia: RigidInertia, state: State, contacts: Contacts, kind: Ints, arm: Array) -> Array:
+    """Return the part of W_αα (nc, 3, 3) that is the motion of elastic stones as a whole, where a side is elastic."""
+    jacobian, response = _rigid_sides(inertia, state, contacts, arm)
+    share: Array = np.where((kind == ELASTIC)[..., None, None], jacobian @ response, 0.0).sum(axis=1)
+    return share
 
 
 def _rigid_sides(inertia: RigidInertia, state: State, contacts: Contacts, arm: Array) -> tuple[Array, Array]:

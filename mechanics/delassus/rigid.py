@@ -14,7 +14,7 @@ from mechanics.delassus.body_space import BodyForm, scaled_frames
 from mechanics.problem._kernels import Laws
 from mechanics.problem.problem import GaussSeidel, RigidContacts, mean_diagonal
 
-__all__ = ["RigidDelassus", "Schedule", "schedule"]
+__all__ = ["RigidDelassus", "Schedule", "in_order", "schedule"]
 
 
 # fewer contacts are swept by one thread: more threads would gain nothing
@@ -40,6 +40,11 @@ class Schedule:
     order: Ints
     group: Ints
     part: Ints
+
+
+def in_order(count: int) -> Schedule:
+    """Return the schedule of so many contacts that are swept as they are, by one thread."""
+    return Schedule(np.arange(count), np.arange(count + 1), np.array([0, count]))
 
 
 def schedule(bodies: Ints, moving: Bools) -> Schedule:

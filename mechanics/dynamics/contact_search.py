@@ -11,7 +11,7 @@ from mechanics.contact.contacts import Contacts, take
 from mechanics.contact.detection import Detector
 from mechanics.delassus.assembly import mixed_delassus, rigid_delassus
 from mechanics.delassus.mixed import MixedDelassus
-from mechanics.delassus.rigid import RigidDelassus, schedule
+from mechanics.delassus.rigid import RigidDelassus, in_order, schedule
 from mechanics.dynamics.observers.equilibrium import displacement, speed
 from mechanics.dynamics.progress import Clock
 from mechanics.model.deformable import Compliance
@@ -75,9 +75,12 @@ def detection(
     compliance: Sequence[Compliance],
     elastic_scale: bool = False,
 ) -> Detection:
-    """Return the contacts of a state with their places, laws and W, in the order of their schedule."""
-    plan = schedule(contacts.bodies, model.inertia.moving | (model.elastic & ~model.fixed))
-    contacts = take(contacts, plan.order)
+    """Return the contacts of a state with their places, laws and W, in the order of a schedule if rigid bodies move."""
+    if model.rigid_only or model.inertia.moving.any():
+        plan = schedule(contacts.bodies, model.inertia.moving | (model.elastic & ~model.fixed))
+        contacts = take(contacts, plan.order)
+    else:
+        plan = in_order(len(contacts))
     operator: RigidDelassus | MixedDelassus
     if model.rigid_only:
         operator = rigid_delassus(model, state, contacts, plan)

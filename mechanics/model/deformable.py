@@ -128,10 +128,6 @@ class Compliance:
     ----------
     stone : the stone
     step, theta : h [s] and θ
-
-    Attributes
-    ----------
-    drag : 1 + h θ α, by which ŵ moves the stone as a whole less than without damping [-]
     """
 
     def __init__(self, stone: Deformable, step: float, theta: float) -> None:
@@ -148,10 +144,14 @@ class Compliance:
         self._modes, self._projector = stone.modes, stone.projector
         momentum = operators.mass @ stone.modes
         # V acts on rigid motion by its part α M alone
-        self.drag = 1.0 + h * stone.material.mass_damping
         self._whole = np.linalg.inv(stone.modes.T @ momentum) / self.drag
         self._nodes = self._batch = np.zeros(0, dtype=np.int64)
         self._condensed = np.zeros((0, 0))
+
+    @property
+    def drag(self) -> float:
+        """1 + h θ α, by which ŵ moves the stone as a whole less than without damping [-]."""
+        return 1.0 + self._duration * self._stone.material.mass_damping
 
     @property
     def matrix(self) -> "csc_array[np.float64]":
