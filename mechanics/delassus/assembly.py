@@ -72,7 +72,9 @@ def mixed_delassus(
     first = np.concatenate([[0], np.cumsum(count)])
     # all at once, as SciPy takes longer to take the rows of a stone than its block takes
     weights = contacts.weights[sides]
+    drag = np.ones(len(model.mass))
     for group, own in zip(model.elastic_stones.groups, compliance, strict=True):
+        drag[group.bodies] = own.drag
         for b in group.bodies[count[group.bodies] > 0]:
             rows, pointer = sides[first[b] : first[b + 1]], weights.indptr[first[b] : first[b + 1] + 1]
             entries = slice(pointer[0], pointer[-1])
@@ -87,9 +89,6 @@ def mixed_delassus(
     arm = np.where((kind == ELASTIC)[..., None], point - state.centre[body], arm)
     jacobian, response = _rigid_sides(model.inertia, state, contacts, arm)
     total = (diagonal.reshape(-1, 2, 3, 3) + jacobian @ response).sum(axis=1)
-    drag = np.ones(len(model.mass))
-    for group, own in zip(model.elastic_stones.groups, compliance, strict=True):
-        drag[group.bodies] = own.drag
     awake = _awake(model, drag)
     as_rigid = _rigid_delassus(model, awake, state, contacts, arm, schedule)
     own_part = total - _rigid_share(awake, state, contacts, kind, arm) if elastic_scale else total

@@ -11,7 +11,7 @@ from mechanics.arrays import Array
 from mechanics.problem.forms import Form
 from mechanics.problem.problem import Delassus, GaussSeidel, RigidContacts
 
-__all__ = ["CompliantDelassus", "CompliantForm"]
+__all__ = ["CompliantDelassus", "CompliantForm", "simplified"]
 
 
 class CompliantForm:
@@ -108,6 +108,15 @@ class CompliantDelassus:
     def scaled(self, unit: Array) -> "CompliantDelassus":
         """Return D (W + E) D with the units (nc,) of the contacts on the diagonal of D."""
         return CompliantDelassus(self.inner.scaled(unit), self.joint_compliance * (unit**2)[:, None])
+
+
+def simplified(operator: Delassus) -> CompliantDelassus | None:
+    """Return W if no body deformed, and as E the diagonal of all that bodies and joints yield; None if not known."""
+    rigid = operator.as_rigid
+    if rigid is None:
+        return None
+    yielding = np.einsum("cii->ci", operator.diagonal - rigid.diagonal)
+    return CompliantDelassus(rigid, np.maximum(yielding, 0.0))
 
 
 def _blocks(diagonal: Array) -> Array:

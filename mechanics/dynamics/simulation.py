@@ -122,7 +122,7 @@ class Simulation(Carrier):
         A relaxation goes on with θ = 1, as its user does not ask for the motion, and begins with a last halt: forces
         that also stop what is left of a motion would set stones in motion in the next step, in which they are kept.
         Joints that yield would be loaded anew, and move; rigid ones bear the forces of a rest as they lie, and are
-        tried first.
+        tried first, but beside deformable stones.
         """
         time = self.model.scene.time
         free = replace(time, relaxation=False, theta=1.0 if time.relaxation else time.theta)

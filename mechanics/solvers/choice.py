@@ -107,7 +107,7 @@ def choose_solvers(
         return Solvers(_sprung_solver(settings, elastic > 0, time.duration))
     usual = choose_solver(settings, elastic > 0, time.duration)
     may_yield = isinstance(usual, Auto) and settings.joint_compliance > 0 and time.relaxation
-    if not may_yield or elastic >= max(rigid, 1):
+    if not may_yield or 0 < elastic >= rigid:
         return Solvers(usual)
     assert isinstance(usual, Auto)
     if elastic:

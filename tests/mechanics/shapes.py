@@ -20,7 +20,7 @@ from mechanics.problem.problem import ContactProblem
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.law import STATE
 from mechanics.scene.scene import Block, ContactSettings, Fidelity, Part, Placement, Scene, TimeSettings
-from mechanics.scene.shapes import drum
+from mechanics.scene.shapes import drum, wall
 from mechanics.scene.state import State
 from mechanics.stones.materials import Material
 from tests.pipelines.results_by_hand import BOX_FACES, box
@@ -240,6 +240,14 @@ class Posed:
     @property
     def operator(self):
         return self.found.operator
+
+
+def partly_deformable_wall():
+    """A wall of five courses on a slab; three stones of it deform."""
+    soft, even, odd = {"2-2", "3-2", "3-3"}, [1.0, 1.0, 1.0], [0.5, 1.0, 1.0, 0.5]
+    blocks = wall([even, odd, even, odd, even], 3.0, 0.4, 0.5, mesh_size=0.5)
+    mixed = [replace(one, fidelity=Fidelity.DEFORMABLE) if one.code in soft else one for one in blocks]
+    return scene(*mixed, friction=0.6)
 
 
 def posed(one, step=2e-3, theta=1.0):

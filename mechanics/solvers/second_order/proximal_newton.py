@@ -18,12 +18,13 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from mechanics.arrays import Array, Ints
+from mechanics.delassus.compliant import CompliantDelassus, simplified
 from mechanics.delassus.elimination import elimination
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, Delassus, RigidContacts
 from mechanics.problem.residual import Residual, project_on_cone, residual
 from mechanics.solvers._kernels import block_fronts as fronts
 from mechanics.solvers._kernels import body_newton as bodies
-from mechanics.solvers.second_order.scaling import equilibrated
+from mechanics.solvers.second_order.scaling import solved_evenly
 from mechanics.solvers.second_order.sparse_blocks import SparseBlocks
 from moma.errors import SolverError
 
@@ -101,19 +102,11 @@ def polished(
     problem: ContactProblem, start: ContactStart, limits: tuple[float, float], most: int
 ) -> ContactSolution:
     """Solve by so many steps of Newton's method at `most`, to a thousandth of the tolerances (η, velocities)."""
-    even, each = equilibrated(problem)
-    unit = each[:, None]
     solver = ProximalNewton(_FURTHER * limits[0], _FURTHER * limits[1], most)
-    found = solver(even, ContactStart(start.impulse / unit, start.velocity * unit))
-    impulse = found.impulse * unit
-    left = residual(problem, impulse)
-    return replace(
-        found,
-        impulse=impulse,
-        velocity=left.dual,
-        natural_map=left.natural_map,
-        converged=left.within(*limits),
-    )
+    found = solved_evenly(solver, problem, start)
+    left = residual(problem, found.impulse)
+    within = left.within(*limits)
+    return replace(found, velocity=left.dual, natural_map=left.natural_map, converged=within)
 
 
 class _Run:
@@ -146,9 +139,11 @@ class _Run:
     @cached_property
     def _system(self) -> "_System":
         operator = self._delassus
-        if operator.rigid is None:
-            return _YieldingSystem(operator)
-        return _System(operator.rigid, operator.joint_compliance)
+        if operator.rigid is not None:
+            return _System(operator.rigid, operator.joint_compliance)
+        simple = simplified(operator)
+        assert simple is not None
+        return _YieldingSystem(operator, simple)
 
     def hold(self) -> None:
         """Begin as if every contact held.
@@ -243,14 +238,11 @@ class _System:
 
 
 class _YieldingSystem(_System):
-    """Equations of bodies of which some deform: A Δr + B (W + α) Δr = -error."""
+    """Equations of bodies of which some deform, A Δr + B (W + α) Δr = -error, led by those of W in simple terms."""
 
-    def __init__(self, operator: Delassus) -> None:
-        rigid = operator.as_rigid
-        assert rigid is not None
-        assert rigid.rigid is not None
-        yielding = np.einsum("cii->ci", operator.diagonal - rigid.diagonal)
-        super().__init__(rigid.rigid, np.maximum(yielding, 0.0))
+    def __init__(self, operator: Delassus, simple: CompliantDelassus) -> None:
+        assert simple.rigid is not None
+        super().__init__(simple.rigid, simple.joint_compliance)
         self._operator = operator
 
     def step(self, first: Array, second: Array, error: Array, alpha: float) -> Array | None:

@@ -14,7 +14,7 @@ from mechanics.solvers.first_order.nsgs import NSGS
 from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.second_order.newton import Newton
 from mechanics.solvers.second_order.proximal_newton import ProximalNewton
-from mechanics.solvers.second_order.scaling import equilibrated
+from mechanics.solvers.second_order.scaling import solved_evenly
 
 __all__ = ["FROM_NOTHING", "TURNS", "Alternating", "many_bodies", "moving_admm", "some_bodies"]
 
@@ -461,10 +461,7 @@ def _even(solver: _Solver) -> _Solver:
     def solve(problem: ContactProblem, start: ContactStart) -> ContactSolution:
         if problem.delassus.rigid is None:
             return solver(problem, start)
-        even, each = equilibrated(problem)
-        unit = each[:, None]
-        found = solver(even, ContactStart(start.impulse / unit, start.velocity * unit))
-        return replace(found, impulse=found.impulse * unit, velocity=found.velocity / unit)
+        return solved_evenly(solver, problem, start)
 
     return solve
 

@@ -2,10 +2,7 @@
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from mechanics.arrays import Array
-from mechanics.delassus.compliant import CompliantDelassus
+from mechanics.delassus.compliant import simplified
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.problem.residual import residual
 from mechanics.solvers.first_order.body_admm import BodyADMM
@@ -15,10 +12,8 @@ from moma.errors import SolverError
 
 __all__ = ["RigidFirst"]
 
-# what `why` tells
+# ways to begin, as `why` tells them; the second is gone twice, from the best impulses so far
 _WARM, _COLD = "warm start", "stones as rigid ones first"
-# times that both are made, each from the best impulses so far
-_ROUNDS = 2
 # steps of Newton's method in each
 _STEPS = 30
 # η from which Newton's method goes on from the impulses of the last step [-]
@@ -63,34 +58,30 @@ class RigidFirst:
         left = residual(problem, start.impulse)
         best = ContactSolution(start.impulse, left.dual, 0, left.natural_map, left.within(*limits), _WARM)
         near, count = bool(start.impulse.any()) and left.natural_map <= _NEAR, 0
-        for _ in range(_ROUNDS):
+        for way in (_WARM if near else _COLD, _COLD):
             if best.converged:
                 break
-            kept, near = near, False
-            begin = best if kept else self._as_rigid(problem, best)
-            count += 0 if kept else begin.iterations
+            begin = best if way == _WARM else self._as_rigid(problem, best)
             start = ContactStart(begin.impulse, begin.velocity)
             found = polished(problem, start, limits, min(_STEPS, self.max_iterations))
-            count += found.iterations
+            count += begin.iterations + found.iterations
             if found.converged or found.natural_map < best.natural_map:
-                best = replace(found, why=f"Newton: {_WARM if kept else _COLD}")
-            elif not kept:
-                # another round would be the same
+                best = replace(found, why=f"Newton: {way}")
+            elif way == _COLD:
+                # another time it would be the same
                 break
         return replace(best, iterations=count)
 
     def _as_rigid(self, problem: ContactProblem, begin: ContactSolution) -> ContactSolution:
         """Return the solution of the stones as rigid ones."""
         operator = problem.delassus
-        rigid = operator.as_rigid
-        if rigid is None:
+        simple = simplified(operator)
+        if simple is None:
             raise SolverError(
                 "W is not that of bodies of which some deform",
                 where="stones as rigid ones",
                 remedy='use "auto"',
             )
-        yielding: Array = np.maximum(np.einsum("cii->ci", operator.diagonal - rigid.diagonal), 0.0)
-        simple = CompliantDelassus(rigid, yielding)
         late = operator.apply(begin.impulse) - simple.apply(begin.impulse)
         stones = replace(problem, delassus=simple, u_free=problem.u_free + late)
         limits = _ROUGH * self.tolerance, _ROUGH * self.velocity_tolerance

@@ -1,6 +1,5 @@
 """Few deformable stones among many rigid ones: the central path to its end, begun near the last step."""
 
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -8,26 +7,17 @@ import pytest
 
 from mechanics.problem.problem import ContactStart
 from mechanics.problem.residual import residual
-from mechanics.scene.scene import Fidelity
-from mechanics.scene.shapes import wall
 from mechanics.solvers.second_order.central_path import CentralPath
 from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.second_order.scaling import equilibrated
 from mechanics.solvers.strategies.elastic import Elastic
 from mechanics.solvers.strategies.mixed import Mixed
-from tests.mechanics.shapes import posed, scene
-
-SOFT = {"2-2", "3-2", "3-3"}
+from tests.mechanics.shapes import partly_deformable_wall, posed
 
 
 @cache
 def problem():
-    """The first step of a wall of five courses on a slab; three stones of it deform."""
-    even, odd = [1.0, 1.0, 1.0], [0.5, 1.0, 1.0, 0.5]
-    blocks = wall([even, odd, even, odd, even], 3.0, 0.4, 0.5, mesh_size=0.5)
-    mixed = [replace(one, fidelity=Fidelity.DEFORMABLE) if one.code in SOFT else one for one in blocks]
-    one = scene(*mixed, friction=0.6)
-    return posed(one, step=5e-3).problem
+    return posed(partly_deformable_wall(), step=5e-3).problem
 
 
 def cold():

@@ -9,35 +9,23 @@ import pytest
 from mechanics.delassus.compliant import CompliantDelassus
 from mechanics.problem.problem import ContactProblem, ContactStart
 from mechanics.problem.residual import residual
-from mechanics.scene.scene import Fidelity
-from mechanics.scene.shapes import wall
 from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.second_order.proximal_newton import ProximalNewton
 from mechanics.solvers.second_order.scaling import equilibrated
 from mechanics.solvers.strategies.rigid_first import RigidFirst
 from moma.errors import SolverError
 from tests.mechanics.dense_operator import blocks_apart
-from tests.mechanics.shapes import posed, scene
+from tests.mechanics.shapes import partly_deformable_wall, posed
 
-SOFT = {"2-2", "3-2", "3-3"}
 SHARE = 1e-3  # E over the mean diagonal of W
 
 
 @cache
-def rigid_joints():
-    """The first step of a wall of five courses on a slab; three stones of it deform."""
-    even, odd = [1.0, 1.0, 1.0], [0.5, 1.0, 1.0, 0.5]
-    blocks = wall([even, odd, even, odd, even], 3.0, 0.4, 0.5, mesh_size=0.5)
-    mixed = [replace(one, fidelity=Fidelity.DEFORMABLE) if one.code in SOFT else one for one in blocks]
-    return posed(scene(*mixed, friction=0.6), step=5e-3).problem
-
-
-@cache
 def problem():
-    """The same with joints that yield by as much as stones do."""
-    operator = rigid_joints().delassus
-    each = np.full_like(rigid_joints().u_free, SHARE * operator.scale)
-    return replace(rigid_joints(), delassus=CompliantDelassus(operator, each))
+    """The first step of a wall in which three stones deform, with joints that yield by as much as they do."""
+    rigid_joints = posed(partly_deformable_wall(), step=5e-3).problem
+    each = np.full_like(rigid_joints.u_free, SHARE * rigid_joints.delassus.scale)
+    return replace(rigid_joints, delassus=CompliantDelassus(rigid_joints.delassus, each))
 
 
 def cold(one):
