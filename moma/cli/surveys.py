@@ -46,6 +46,7 @@ class SampleName(StrEnum):
     SETTLED_SMALL = "settled-small"
     SHAKEN = "shaken"
     TOWER = "tower"
+    TOWER_SETTLED = "tower-settled"
     TOWER_SETTLED_SMALL = "tower-settled-small"
     TOWER_SMALL = "tower-small"
     VAULT = "vault"
@@ -65,7 +66,8 @@ def sample(
     from moma.cli.text.formats import as_json
     from pipelines.scene.sample import write_sample
 
-    written = write_sample(kind.value, out or Path(kind.value))
+    with progress_bars() as listener:
+        written = write_sample(kind.value, out or Path(kind.value), listener)
     lines = [
         f"{written.title}: a synthetic survey of {written.stones} stones",
         *(f"  {path}" for path in written.files),

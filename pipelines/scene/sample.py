@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from mechanics.dynamics.progress import Listener, silent
 from moma.errors import UsageError
 from pipelines.arrays import Array
 from pipelines.scene.true_movement import true_movement
@@ -212,7 +213,7 @@ class WrittenSample:
     commands: tuple[str, ...]
 
 
-def write_sample(kind: str, folder: Path) -> WrittenSample:
+def write_sample(kind: str, folder: Path, progress: Listener = silent) -> WrittenSample:
     """Write KIND.moma, truth.json and KIND.toml into a folder, created if necessary.
 
     Some come with knowledge.toml, with solids.obj and its head.moma, or with diagnosis.toml.
@@ -221,6 +222,7 @@ def write_sample(kind: str, folder: Path) -> WrittenSample:
     ----------
     kind : name of the sample
     folder : in which none of these files exists; created if necessary
+    progress : called at every step of the simulation that moves the stones of some
 
     Raises
     ------
@@ -229,27 +231,27 @@ def write_sample(kind: str, folder: Path) -> WrittenSample:
     """
     if kind not in SAMPLES:
         raise UsageError(f"no sample {kind!r}", remedy=f"the samples are {', '.join(SAMPLES)}")
-    return write_recipe(kind, SAMPLES[kind], folder)
+    return write_recipe(kind, SAMPLES[kind], folder, progress)
 
 
-def write_recipe(kind: str, recipe: SampleRecipe, folder: Path) -> WrittenSample:
+def write_recipe(kind: str, recipe: SampleRecipe, folder: Path, progress: Listener = silent) -> WrittenSample:
     """Write a sample of a recipe, its files named after `kind`; as `write_sample`."""
     cause = recipe.cause
-    sample = recipe.make() if cause is None else moved_sample(cause, true_movement(cause))
-    survey, scene = folder / f"{kind}.moma", folder / f"{kind}.toml"
+    survey, scene, truth = folder / f"{kind}.moma", folder / f"{kind}.toml", folder / "truth.json"
+    diagnosis = None if cause is None else folder / "diagnosis.toml"
+    # before a simulation that takes minutes
+    _must_be_new(survey, truth, scene, *([] if diagnosis is None else [diagnosis]))
+    sample = recipe.make() if cause is None else moved_sample(cause, true_movement(cause, progress))
     knowledge = folder / "knowledge.toml" if sample.knowledge else None
     solids = folder / "solids.obj" if sample.modelled else None
-    diagnosis = None if cause is None else folder / "diagnosis.toml"
     commands = tuple(_commands(recipe, survey, solids, knowledge, scene, diagnosis))
-    texts = {folder / "truth.json": sample.truth, scene: _scene(recipe, commands)}
+    texts = {truth: sample.truth, scene: _scene(recipe, commands)}
     if diagnosis is not None and cause is not None:
         texts[diagnosis] = _diagnosis(kind, recipe.fixed, cause, commands)
     if knowledge is not None:
         texts[knowledge] = sample.knowledge
     extra = () if solids is None else (solids, solids.with_name(_HEAD))
-    for path in (survey, *texts, *extra):
-        if path.exists():
-            raise UsageError(f"{path} exists", remedy="name another folder: --out DIR")
+    _must_be_new(*texts, *extra)
     folder.mkdir(parents=True, exist_ok=True)
     write_moma(sample.survey, survey)
     for path, text in texts.items():
@@ -261,6 +263,12 @@ def write_recipe(kind: str, recipe: SampleRecipe, folder: Path) -> WrittenSample
     files = tuple(str(path) for path in (survey, *texts, *extra))
     stones = len(sample.survey.blocks) + len(sample.modelled)
     return WrittenSample(kind, recipe.title, stones, files, commands)
+
+
+def _must_be_new(*paths: Path) -> None:
+    for path in paths:
+        if path.exists():
+            raise UsageError(f"{path} exists", remedy="name another folder: --out DIR")
 
 
 def _scene(recipe: SampleRecipe, commands: Sequence[str]) -> str:

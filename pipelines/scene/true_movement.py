@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from mechanics.dynamics.progress import Listener, silent
 from mechanics.results.result import Outcome
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.elastic_joint import ElasticJoint
@@ -25,8 +26,13 @@ __all__ = ["true_movement"]
 _LONGEST = 3.0  # duration of the simulation [s]
 
 
-def true_movement(cause: Cause) -> Movement:
+def true_movement(cause: Cause, progress: Listener = silent) -> Movement:
     """Simulate how the true stones of a building move by a cause.
+
+    Parameters
+    ----------
+    cause : with the building that it moves
+    progress : called at every step
 
     Raises
     ------
@@ -74,7 +80,7 @@ def true_movement(cause: Cause) -> Movement:
         time=time,
         loads=Loads(motions=tuple(motions), forces=tuple(forces)),
     )
-    result = simulate(scene)
+    result = simulate(scene, progress)
     if result.outcome is not Outcome.EQUILIBRIUM:
         raise SolverError(
             f"the stones of the sample do not come to rest: {result.outcome}", remedy="choose another sample"

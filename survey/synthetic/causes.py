@@ -21,6 +21,7 @@ __all__ = [
     "SETTLED_PHASES",
     "SETTLED_SMALL",
     "SHAKEN",
+    "TOWER_SETTLED",
     "TOWER_SMALL_SETTLED",
     "Cause",
     "Site",
@@ -229,6 +230,6 @@ SHAKEN = Cause(
     battered=False,
     true_step=0.01,
 )
-TOWER_SMALL_SETTLED = Cause(
-    0.030, _moved_tower(12), 0.2, 0.05, battered=False, true_duration=0.2, true_step=0.025
-)
+TOWER_SETTLED = Cause(0.030, _moved_tower(40), 0.2, 0.025, battered=False, true_duration=0.2, true_step=0.025)
+# what joints give way is larger in longer steps: the scene's are those of the truth
+TOWER_SMALL_SETTLED = replace(TOWER_SETTLED, build=_moved_tower(12))

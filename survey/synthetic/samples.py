@@ -24,6 +24,7 @@ from survey.synthetic.causes import (
     SETTLED_PHASES,
     SETTLED_SMALL,
     SHAKEN,
+    TOWER_SETTLED,
     TOWER_SMALL_SETTLED,
     Cause,
 )
@@ -292,6 +293,7 @@ SAMPLES: Mapping[str, SampleRecipe] = MappingProxyType(
         "settled-small": _moved("Small wall whose left corner settled", SETTLED_SMALL),
         "shaken": _moved("Small wall shaken by an earthquake pulse", SHAKEN),
         "tower": storey_recipe(40, "Storey of a tower"),
+        "tower-settled": _moved("Storey of a tower whose left corner settled", TOWER_SETTLED),
         "tower-settled-small": _moved(
             "Storey of a tower, of twelve courses, whose left corner settled", TOWER_SMALL_SETTLED
         ),

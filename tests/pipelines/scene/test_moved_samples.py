@@ -20,7 +20,7 @@ SMALL = "tower-settled-small"
 @pytest.fixture
 def written(tmp_path, monkeypatch):
     """A function that writes a sample whose stones stay where they were laid, which takes no simulation."""
-    monkeypatch.setattr(sample, "true_movement", lambda cause: {})
+    monkeypatch.setattr(sample, "true_movement", lambda cause, progress: {})
 
     def write(kind):
         sample.write_sample(kind, tmp_path)
