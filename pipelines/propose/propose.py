@@ -11,7 +11,8 @@ from archmodel.query.api import find
 from archmodel.store.hypotheses import store_hypotheses
 from archmodel.store.stone_record import StoneRecord
 from archmodel.store.stones import load_stones
-from archmodel.tables.entities import Entity
+from archmodel.tables.entities import Entity, Infill, Joint, RibSegment, Support, WebStone
+from archmodel.tables.hierarchy import kinds_below
 from moma.errors import UsageError
 from pipelines.ingest.records import stone_record, surveyed_block
 from pipelines.ingest.relate import relate
@@ -26,8 +27,9 @@ from survey.unseen.missing.settings import MissingSettings
 __all__ = ["Facings", "Proposal", "ProposalReport", "Recording", "propose_core", "propose_stones"]
 
 _SIZE = ("code", "kind", "course", "zone", "length", "height", "depth")
-_NO_STONES = frozenset({"infill", "joint", "support"})
-_OF_VAULTS = frozenset({"boss", "rib_segment", "web_stone"})  # which stand in no facing
+# kinds that are no stones, and those of vaults, which stand in no facing; their subkinds, too
+_NO_STONES = (Infill, Joint, Support)
+_OF_VAULTS = (RibSegment, WebStone)
 
 Facings = tuple[str, str]
 """Expressions for the stones of the two facings of a wall."""
@@ -155,10 +157,11 @@ def propose_core(
         records = _stones(session, where)
         blocks = [surveyed_block(record) for record in records]
         closed = close_joints(blocks).solids
+        vaults = _names(_OF_VAULTS)
         stones = [
             facing_stone(block, solid)
             for block, solid in zip(blocks, closed, strict=True)
-            if block.kind not in _OF_VAULTS
+            if block.kind not in vaults
         ]
         named = None if facings is None else _named(session, where, facings)
         found = propose_infill(stones, settings, facings=named, taken=_codes(session))
@@ -171,8 +174,13 @@ def propose_core(
 
 def _stones(session: Session, where: Sequence[str]) -> list[StoneRecord]:
     """Load the measured stones, including hypotheses, without the core."""
-    found = find(session, "entity", where)
-    return _measured(session, [entity for entity in found if entity.kind not in _NO_STONES])
+    found, without = find(session, "entity", where), _names(_NO_STONES)
+    return _measured(session, [entity for entity in found if entity.kind not in without])
+
+
+def _names(kinds: Sequence[type[Entity]]) -> set[str]:
+    """Return the names of kinds and of their subkinds."""
+    return {name for kind in kinds for name in kinds_below(kind)}
 
 
 def _measured(session: Session, entities: Sequence[Entity]) -> list[StoneRecord]:

@@ -117,13 +117,27 @@ def test_the_core_is_recorded_once(tmp_path):
     assert proposals("infill", "--db", url, "--as", "storeys")["proposals"] == []
 
 
-def test_stones_of_a_vault_are_no_facing(tmp_path):
-    """Webs and ribs with their backs to each other have no core between them."""
+@pytest.mark.parametrize("kind", ["web_stone", "severy"])
+def test_stones_of_a_vault_are_no_facing(tmp_path, kind):
+    """Webs and ribs with their backs to each other have no core between them, nor have subkinds of a user."""
     building = rib_vault(RibVaultShape(segments=4, wall_rib=0.22)).building
-    write_moma(building.survey, tmp_path / "vault.moma")
+    named = tuple(
+        replace(one, kind=kind if one.kind == "web_stone" else one.kind) for one in building.survey.blocks
+    )
+    head = building.survey.head
+    rules = tuple(
+        replace(one, kind=kind if one.kind == "web_stone" else one.kind) for one in head.depth_rules
+    )
+    survey = replace(building.survey, head=replace(head, depth_rules=rules), blocks=named)
+    write_moma(survey, tmp_path / "vault.moma")
     write_obj(building.modelled, tmp_path / "solids.obj")
-    write_head(building.survey.head, tmp_path / "head.moma")
+    write_head(head, tmp_path / "head.moma")
+    (tmp_path / "kinds.toml").write_text(
+        "[[kind]]\nname = 'severy'\nparent = 'web_stone'\ndefinition = 'A web stone of chalk.'\n",
+        encoding="utf-8",
+    )
     url = f"sqlite:///{tmp_path / 'vault.db'}"
+    prints("record", tmp_path / "kinds.toml", "--db", url)
     prints("ingest", tmp_path / "vault.moma", "--db", url)
     solids = ["--format", "solids", "--header", tmp_path / "head.moma"]
     prints("ingest", tmp_path / "solids.obj", *solids, "--db", url)
