@@ -51,6 +51,8 @@ _LEAST_LOOK = 5
 _LATE_LOOK = 0.2
 # part of the change at which the residual is expected to be small enough, at which it is looked at [-]
 _EARLY = 0.8
+# errors over their tolerances up to which a first stage has come near [-]
+_NEAR = 1e3
 # iterates from which is extrapolated
 _DEPTH = 6
 # distance of x from its cone, over the impulse, beyond which a contact slides: less is rounding [-]
@@ -68,11 +70,13 @@ class Stage:
         slide and stick as the stage begins, which cost a factorisation of their own [-]
     iterations : their number
     extrapolated : from the iterates before (Anderson 1965)
+    longer : iterations more of a first stage that has come near at its end
     """
 
     penalty: float | tuple[float, float, float]
     iterations: int
     extrapolated: bool
+    longer: int = 0
 
 
 STAGES = (Stage(0.02, 150, False), Stage(0.05, 150, True), Stage(0.2, 250, True))
@@ -160,14 +164,13 @@ class _Run:
         self._stages = list(settings.stages)
         self._factors: kernel.Factors | None = None
         self._memory = _acceleration(0, 0)
-        self._until = 0
+        self._until, self._first, self._longer = 0, settings.stages[0].iterations, settings.stages[0].longer
         self.iterations, self.excess, self._change, self._limit = 0, np.inf, np.inf, 0.0
 
     @property
     def goal(self) -> float:
         """Errors over their tolerances at which the iteration ends [-]."""
-        settings = self._settings
-        return settings.further if self.iterations < settings.stages[0].iterations else 1.0
+        return self._settings.further if self.iterations < self._first else 1.0
 
     def iterate(self) -> None:
         """Make iterations until the next look."""
@@ -263,6 +266,9 @@ class _Run:
         if self.iterations == 0 or excess < self.excess:
             found = self._iterate.x.copy(), self._z.copy(), self._soft
             self.excess, self._best = float(excess), found
+        if self.iterations == self._first and excess <= _NEAR:
+            self._first = self._until = self._first + self._longer
+            self._longer = 0
 
     def end(self) -> None:
         """Let go of factors that are too large to be kept."""

@@ -120,7 +120,7 @@ FROM_NOTHING = (
     Stage((1.0, 0.01, 1e-3), 150, extrapolated=True),
 )
 # and what finds them at once where all contacts stick
-_STICKING = Stage(1e-3, 50, extrapolated=True)
+_STICKING = Stage(1e-3, 50, extrapolated=True, longer=100)
 # tolerances to which it does, over those asked for: a motion at rest keeps these forces for hundreds of steps [-]
 _STICKING_FURTHER = 1e-4
 # stages that solve steps in which next to nothing moves
