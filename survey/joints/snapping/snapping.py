@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from moma.errors import UsageError
 from survey.arrays import Array, Ints
 from survey.geometry.convexity import is_convex, reflex_edges
 from survey.geometry.folds import fold
@@ -40,7 +41,15 @@ def snap(solids: Sequence[Solid], tolerance: float) -> tuple[tuple[Solid, ...], 
     Returns
     -------
     the solids, with the same corners in the same order, and a report of the changes
+
+    Raises
+    ------
+    UsageError : if the tolerance is not positive
     """
+    if not tolerance > 0.0:
+        raise UsageError(
+            f"the tolerance of snapping is {tolerance:g} m", remedy="give a positive one, or leave it out"
+        )
     assembly = _Assembly(solids, tolerance)
     assembly.settle()
     return assembly.solids(), assembly.report()

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog, minimize
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
+from moma.errors import UsageError
 from survey.arrays import Array
 from survey.formats.options import ReadingOptions
 from survey.formats.solids.reader import open_solids
@@ -118,6 +119,12 @@ def box(code: str, low: tuple[float, float, float], high: tuple[float, float, fl
     x, y, z = zip(low, high, strict=True)
     front = np.array([(x[0], y[0], z[0]), (x[1], y[0], z[0]), (x[1], y[0], z[1]), (x[0], y[0], z[1])])
     return prism(code, front, front + [0.0, y[1] - y[0], 0.0])  # noqa: RUF005
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -0.001, float("nan")])
+def test_a_tolerance_is_positive(tolerance: float) -> None:
+    with pytest.raises(UsageError, match="the tolerance of snapping is"):
+        snap(wall(2, 2), tolerance)
 
 
 def test_two_stones_meet_half_way() -> None:
