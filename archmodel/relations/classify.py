@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import connected_components
 
 from archmodel.arrays import Array, Bools, Ints
 from archmodel.tables.entities import Entity, Header, Quoin, RibSegment, Voussoir, WebStone
-from archmodel.tables.hierarchy import kinds_below
+from archmodel.tables.hierarchy import names_below
 from archmodel.tables.relations import RELATIONS
 from moma.errors import UsageError
 
@@ -193,7 +193,7 @@ class _Faces:
 
 def _is_one_of(names: Sequence[str], *classes: type[Entity]) -> Bools:
     """Return a mask of the stones that are of a kind or its subkinds."""
-    wanted = {name for cls in classes for name in kinds_below(cls)}
+    wanted = names_below(*classes)
     return np.fromiter((name in wanted for name in names), dtype=np.bool_, count=len(names))
 
 

@@ -11,7 +11,16 @@ from sqlalchemy.orm import Session
 
 from moma.errors import UsageError
 
-__all__ = ["Kind", "definition_of", "kind_among", "kind_chain", "kind_of", "kinds_below", "kinds_in"]
+__all__ = [
+    "Kind",
+    "definition_of",
+    "kind_among",
+    "kind_chain",
+    "kind_of",
+    "kinds_below",
+    "kinds_in",
+    "names_below",
+]
 
 
 class Kind:
@@ -54,6 +63,11 @@ def kind_chain(cls: type[K]) -> tuple[type[K], ...]:
 def kinds_below(cls: type[K]) -> dict[str, type[K]]:
     """Return a kind and its subkinds by name, general before particular."""
     return {kind_of(one): one for one in _descend(cls)}
+
+
+def names_below(*classes: type[K]) -> set[str]:
+    """Return the names of kinds and of all their subkinds."""
+    return {name for cls in classes for name in kinds_below(cls)}
 
 
 def _descend(cls: type[K]) -> Iterator[type[K]]:

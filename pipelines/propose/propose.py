@@ -12,7 +12,7 @@ from archmodel.store.hypotheses import store_hypotheses
 from archmodel.store.stone_record import StoneRecord
 from archmodel.store.stones import load_stones
 from archmodel.tables.entities import Entity, Infill, Joint, RibSegment, Support, WebStone
-from archmodel.tables.hierarchy import kinds_below
+from archmodel.tables.hierarchy import names_below
 from moma.errors import UsageError
 from pipelines.ingest.records import stone_record, surveyed_block
 from pipelines.ingest.relate import relate
@@ -157,7 +157,7 @@ def propose_core(
         records = _stones(session, where)
         blocks = [surveyed_block(record) for record in records]
         closed = close_joints(blocks).solids
-        vaults = _names(_OF_VAULTS)
+        vaults = names_below(*_OF_VAULTS)
         stones = [
             facing_stone(block, solid)
             for block, solid in zip(blocks, closed, strict=True)
@@ -174,13 +174,8 @@ def propose_core(
 
 def _stones(session: Session, where: Sequence[str]) -> list[StoneRecord]:
     """Load the measured stones, including hypotheses, without the core."""
-    found, without = find(session, "entity", where), _names(_NO_STONES)
+    found, without = find(session, "entity", where), names_below(*_NO_STONES)
     return _measured(session, [entity for entity in found if entity.kind not in without])
-
-
-def _names(kinds: Sequence[type[Entity]]) -> set[str]:
-    """Return the names of kinds and of their subkinds."""
-    return {name for kind in kinds for name in kinds_below(kind)}
 
 
 def _measured(session: Session, entities: Sequence[Entity]) -> list[StoneRecord]:
