@@ -10,6 +10,10 @@ rows, so that loops run along the long side. Panels are made from left to right,
 place, and no solution waits for a triangle. Six rows are then laid out one after the other as a solution reads them:
 D⁻¹, and what is to the right of it in tiles of 16 columns, row by row. A solution costs the memory that it reads; so
 factors may be of single precision, where the equation that they solve is one for a correction.
+
+Far from a load, and between velocities that hardly feel each other, numbers fade below the least normal one, 1e-38 in
+single precision. Products of such take ten times as long; so entries of L below its third root r, and velocities
+below r², are taken as 0.
 """
 
 from typing import NamedTuple
@@ -324,6 +328,18 @@ def _subtract_rows(source, which, panel, spot, row, space):
                     line[at + a] -= less[come + a]
 
 
+@njit(cache=True)
+def _least(dtype, power):
+    """Return a power of the least normal number of a precision, below which a product would be subnormal."""
+    return dtype.type(np.float64(np.finfo(dtype).tiny) ** power)
+
+
+@njit(cache=True, inline="always")
+def _kept(number, least):
+    """Return a number, or 0 where it is less; what is no number stays so."""
+    return number if abs(number) >= least else number - number
+
+
 @njit(cache=True, fastmath={"contract"})
 def _divide(panel, n, inverse, spare):
     """Divide the blocks of a panel by those on its diagonal, which D⁻¹ replaces, and lay it out as it is read.
@@ -331,7 +347,7 @@ def _divide(panel, n, inverse, spare):
     In the plane two bodies share a block, and the last of an odd number has its own. `panel` (w n,) is flat; `inverse`
     (6, 6) and `spare` are overwritten.
     """
-    zero, one = panel.dtype.type(0.0), panel.dtype.type(1.0)
+    zero, one, least = panel.dtype.type(0.0), panel.dtype.type(1.0), _least(panel.dtype, 1 / 3)
     w = panel.shape[0] // n
     for k in range(0, w, 6):
         m = min(6, w - k)
@@ -355,11 +371,16 @@ def _divide(panel, n, inverse, spare):
                 for c in range(max(b, d), m):
                     total += inverse[b, c] * inverse[d, c]
                 spare[m * b + d] = total
+        for b in range(m):
+            for d in range(b):
+                # in whatever units
+                small = least * np.sqrt(spare[m * b + b]) * np.sqrt(spare[m * d + d])
+                spare[m * b + d] = spare[m * d + b] = _kept(spare[m * b + d], small)
         at = m * m
         for begin in range(k + m, n, _TILE):
             for b in range(m):
                 for x in range(begin, min(begin + _TILE, n)):
-                    spare[at] = block[b, x]
+                    spare[at] = _kept(block[b, x], least)
                     at += 1
         panel[k * n : k * n + at] = spare[:at]
 
@@ -588,7 +609,7 @@ def _collect(tile, h, rest, sums):
 
 
 @njit(cache=True, inline="always")
-def _forward(block, x, work):
+def _forward(block, x, work, least):
     """Take from a block of rows and its velocities x (6,), or (3,), what they contribute to those that follow.
 
     `work` holds what the rows before contribute, to these velocities first.
@@ -596,16 +617,15 @@ def _forward(block, x, work):
     m = x.shape[0]
     rest = work[m:]
     n = rest.shape[0]
+    for a in range(m):
+        x[a] = _kept(x[a] - work[a], least)
     if m == 6:
         whole, tiles = n - n % _TILE, block[36:]
-        f = x[0] - work[0], x[1] - work[1], x[2] - work[2], x[3] - work[3], x[4] - work[4], x[5] - work[5]
-        x[0], x[1], x[2], x[3], x[4], x[5] = f
+        f = x[0], x[1], x[2], x[3], x[4], x[5]
         for i in range(0, whole, _TILE):
             _spread(tiles[6 * i : 6 * (i + _TILE)], _TILE, f, rest[i : i + _TILE])
         _spread(tiles[6 * whole :], n - whole, f, rest[whole:])
         return
-    for a in range(3):
-        x[a] -= work[a]
     for i in range(0, n, _TILE):
         h, tile, to = min(_TILE, n - i), block[9 + 3 * i :], rest[i:]
         for k in range(h):
@@ -613,7 +633,7 @@ def _forward(block, x, work):
 
 
 @njit(cache=True, inline="always")
-def _backward(block, x, work):
+def _backward(block, x, work, least):
     """Solve for the velocities x (6,), or (3,), of a block of rows, from those that follow; all join in `work`."""
     m, zero = x.shape[0], block.dtype.type(0.0)
     rest = work[m:]
@@ -627,8 +647,8 @@ def _backward(block, x, work):
         t = x[0], x[1], x[2], x[3], x[4], x[5]
         for a in range(6):
             d = block[6 * a : 6 * a + 6]
-            x[a] = d[0] * t[0] + d[1] * t[1] + d[2] * t[2] + d[3] * t[3] + d[4] * t[4] + d[5] * t[5] - sums[a]
-            work[a] = x[a]
+            own = d[0] * t[0] + d[1] * t[1] + d[2] * t[2] + d[3] * t[3] + d[4] * t[4] + d[5] * t[5]
+            x[a] = work[a] = _kept(own - sums[a], least)
         return
     s0 = s1 = s2 = zero
     for i in range(0, n, _TILE):
@@ -640,8 +660,7 @@ def _backward(block, x, work):
     t, ends = (x[0], x[1], x[2]), (s0, s1, s2)
     for a in range(3):
         d = block[3 * a : 3 * a + 3]
-        x[a] = d[0] * t[0] + d[1] * t[1] + d[2] * t[2] - ends[a]
-        work[a] = x[a]
+        x[a] = work[a] = _kept(d[0] * t[0] + d[1] * t[1] + d[2] * t[2] - ends[a], least)
 
 
 @njit(cache=True, fastmath={"contract", "reassoc"})
@@ -662,7 +681,7 @@ def forward(panels, value, x, work, begin, end, place):  # pragma: no cover - co
     x : y, and at places of later bodies what these panels contribute
     """
     body, first, start, size = panels.body, panels.first, panels.start, panels.size
-    zero = value.dtype.type(0.0)
+    zero, least = value.dtype.type(0.0), _least(value.dtype, 2 / 3)
     for s in range(begin, end):
         width, height, at = body[s + 1] - body[s], first[s + 1] - first[s], size * body[s]
         w, n = size * width, size * height
@@ -671,7 +690,7 @@ def forward(panels, value, x, work, begin, end, place):  # pragma: no cover - co
             work[i] = zero
         for k in range(0, w, 6):
             end_k = min(k + 6, w)
-            _forward(panel[k * n : end_k * n], x[at + k : at + end_k], work[k:n])
+            _forward(panel[k * n : end_k * n], x[at + k : at + end_k], work[k:n], least)
         for p in range(width, height):
             to, come = size * place[first[s] + p], size * p
             for a in range(3):
@@ -690,6 +709,7 @@ def backward(panels, value, x, work, begin, end):  # pragma: no cover - compiled
     x : the solution
     """
     body, first, row, start, size = panels.body, panels.first, panels.row, panels.start, panels.size
+    least = _least(value.dtype, 2 / 3)
     for s in range(end - 1, begin - 1, -1):
         width, height, at = body[s + 1] - body[s], first[s + 1] - first[s], size * body[s]
         w, n = size * width, size * height
@@ -703,7 +723,7 @@ def backward(panels, value, x, work, begin, end):  # pragma: no cover - compiled
                     work[to + a] = x[come + a]
         for k in range(w - 1 - (w - 1) % 6, -1, -6):
             end_k = min(k + 6, w)
-            _backward(panel[k * n : end_k * n], x[at + k : at + end_k], work[k:n])
+            _backward(panel[k * n : end_k * n], x[at + k : at + end_k], work[k:n], least)
 
 
 @njit(cache=True)

@@ -88,3 +88,39 @@ def test_a_matrix_that_is_not_positive_definite_is_refused(bad):
     dense = random_matrix(pairs, 2, np.random.default_rng(1))
     dense[7, 7] = bad
     assert not factors(dense, pairs, 2, 0.2)[2]
+
+
+@pytest.mark.parametrize("size", [3, 6])
+def test_no_product_of_a_solution_is_subnormal_as_they_take_ten_times_as_long(size):
+    # what a load at one end does fades by 1e-3 from body to body, across the chain as well as along it
+    count, tiny = 60, float(np.finfo(np.float32).tiny)
+    pairs = np.column_stack([np.arange(count - 1), np.arange(1, count)])
+    dense = np.eye(size * count)
+    for i, j in pairs:
+        block = 1e-3 * np.geomspace(1.0, 1e-36, size * size).reshape(size, size)
+        dense[size * i : size * (i + 1), size * j : size * (j + 1)] = block
+        dense[size * j : size * (j + 1), size * i : size * (i + 1)] = block.T
+    panels, value, _ = factors(dense, pairs, count, 0.0, size, np.float32)
+    # each body but the last two has a panel of its own, of which all is read
+    read = value[: panels.start[count - 2]]
+    assert len(panels.body) == count
+    for end in (0, -1):
+        load = np.zeros(size * count)
+        load[end] = 1.0
+        found = load.astype(np.float32)
+        solve(panels, value, found, np.empty(size * count, np.float32))
+        np.testing.assert_allclose(found, np.linalg.solve(dense, load), rtol=0.0, atol=1e-6)
+        least = np.abs(read[read != 0]).min() * np.abs(found[found != 0]).min()
+        assert least >= 0.999 * tiny
+
+
+def test_what_is_too_small_to_count_does_not_depend_on_units():
+    rng, count = np.random.default_rng(5), 8
+    pairs = np.column_stack([np.arange(count - 1), np.arange(1, count)])
+    dense, load = random_matrix(pairs, count, rng), rng.normal(size=6 * count)
+    # grams and millimetres instead of kilograms and metres
+    unit = np.tile([1e-1, 1e-1, 1e-1, 1e-4, 1e-4, 1e-4], count)
+    panels, value, _ = factors(unit[:, None] * dense * unit, pairs, count, 0.2, 6, np.float32)
+    found = (unit * load).astype(np.float32)
+    solve(panels, value, found, np.empty(6 * count, np.float32))
+    np.testing.assert_allclose(unit * found, np.linalg.solve(dense, load), rtol=0.0, atol=1e-6)
