@@ -57,6 +57,9 @@ _MANY = 300
 _SHORTEST = 1e-3
 # error to which the equations of bodies that deform are solved, over their right side [-], and most products with W
 _INEXACT, _PRODUCTS = 1e-2, 30
+# change of a contact's derivatives that makes it unlike before [-], contacts that may be so while the factors of an
+# earlier step lead, and most products with W then, which take as long as a factorisation
+_UNLIKE, _TURNED, _AGAIN = 0.3, 3, 12
 
 
 @dataclass(frozen=True)
@@ -244,24 +247,46 @@ class _YieldingSystem(_System):
         assert simple.rigid is not None
         super().__init__(simple.rigid, simple.joint_compliance)
         self._operator = operator
+        self._led: tuple[Array, Array] | None = None
+        self._products = 0
 
     def step(self, first: Array, second: Array, error: Array, alpha: float) -> Array | None:
         """Return Δr (nc, 3); None if the equations are singular, or their factors too large."""
+        led, new = self._led, (first, second)
+        if led is not None and self._products <= _AGAIN and _turned(led, new) <= _TURNED:
+            found = self._found(first, second, error, alpha, _AGAIN)
+            if self._products <= _AGAIN:
+                return found
         if not self._factorise(first, second, alpha):
             return None
+        self._led = first.copy(), second.copy()
+        return self._found(first, second, error, alpha, _PRODUCTS)
+
+    def _found(self, first: Array, second: Array, error: Array, alpha: float, most: int) -> Array:
+        """Return Δr (nc, 3) after so many products at most; count one more where they did not suffice."""
+        assert self._led is not None
+        leading, self._products = self._led[1], 0
 
         def before(y: Array) -> Array:
-            return self._solve(second, -y.reshape(-1, 3))
+            return self._solve(leading, -y.reshape(-1, 3))
 
         def product(y: Array) -> Array:
+            self._products += 1
             r = before(y)
             u = self._operator.apply(r) + alpha * r
             both: Array = np.matmul(first, r[:, :, None]) + np.matmul(second, u[:, :, None])
             return both.ravel()
 
         equations = LinearOperator((error.size, error.size), matvec=product, dtype=float)
-        y = gmres(equations, -error.ravel(), rtol=_INEXACT, restart=_PRODUCTS, maxiter=1)[0]
+        y, unsolved = gmres(equations, -error.ravel(), rtol=_INEXACT, restart=most, maxiter=1)
+        self._products += unsolved > 0
         return before(y)
+
+
+def _turned(old: tuple[Array, Array], new: tuple[Array, Array]) -> int:
+    """Return the number of contacts that open, slide or stick unlike before."""
+    change = sum(np.abs(a - b).max(axis=(1, 2)) for a, b in zip(old, new, strict=True))
+    return int(np.count_nonzero(change > _UNLIKE))
 
 
 class _Fronts:

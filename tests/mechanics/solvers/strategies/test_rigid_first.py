@@ -9,6 +9,7 @@ import pytest
 from mechanics.delassus.compliant import CompliantDelassus
 from mechanics.problem.problem import ContactProblem, ContactStart
 from mechanics.problem.residual import residual
+from mechanics.solvers.second_order import proximal_newton
 from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.second_order.proximal_newton import ProximalNewton
 from mechanics.solvers.second_order.scaling import equilibrated
@@ -21,10 +22,10 @@ SHARE = 1e-3  # E over the mean diagonal of W
 
 
 @cache
-def problem():
-    """The first step of a wall in which three stones deform, with joints that yield by as much as they do."""
+def problem(share=SHARE):
+    """The first step of a wall in which three stones deform, with joints that yield by as much as they do, or more."""
     rigid_joints = posed(partly_deformable_wall(), step=5e-3).problem
-    each = np.full_like(rigid_joints.u_free, SHARE * rigid_joints.delassus.scale)
+    each = np.full_like(rigid_joints.u_free, share * rigid_joints.delassus.scale)
     return replace(rigid_joints, delassus=CompliantDelassus(rigid_joints.delassus, each))
 
 
@@ -71,6 +72,31 @@ def test_equations_of_a_step_of_newton_are_solved_with_w_itself():
     np.testing.assert_allclose(
         found.impulse * unit[:, None], solved().impulse, atol=1e-6 * np.abs(solved().impulse).max()
     )
+
+
+@pytest.mark.parametrize(("share", "again", "fewer"), [(1.0, 12, True), (1.0, 1, False), (SHARE, 12, False)])
+def test_factors_of_an_earlier_step_lead_where_few_products_suffice(monkeypatch, share, again, fewer):
+    made, factorise = [], proximal_newton._YieldingSystem._factorise
+
+    def counted(system, *given):
+        made.append(1)
+        return factorise(system, *given)
+
+    monkeypatch.setattr(proximal_newton._YieldingSystem, "_factorise", counted)
+    even, _ = equilibrated(problem(share))
+    anew = ProximalNewton(1e-12, 1e-11, 60)
+    with monkeypatch.context() as patch:
+        patch.setattr(proximal_newton, "_TURNED", -1)
+        wanted = anew(even, cold(even))
+    assert wanted.converged
+    assert len(made) == wanted.iterations
+    made.clear()
+    monkeypatch.setattr(proximal_newton, "_AGAIN", again)
+    found = anew(even, cold(even))
+    assert found.converged
+    assert (len(made) < found.iterations) == fewer
+    most = np.abs(wanted.impulse).max()
+    np.testing.assert_allclose(found.impulse, wanted.impulse, atol=1e-6 * most)
 
 
 def test_iterations_of_newton_are_limited_too():
