@@ -249,6 +249,7 @@ class _YieldingSystem(_System):
         self._operator = operator
         self._led: tuple[Array, Array] | None = None
         self._products = 0
+        self._factors.single = isinstance(self._factors, SparseBlocks)
 
     def step(self, first: Array, second: Array, error: Array, alpha: float) -> Array | None:
         """Return Δr (nc, 3); None if the equations are singular, or their factors too large."""
@@ -257,10 +258,17 @@ class _YieldingSystem(_System):
             found = self._found(first, second, error, alpha, _AGAIN)
             if self._products <= _AGAIN:
                 return found
-        if not self._factorise(first, second, alpha):
+        self._led = None
+        if self._factorise(first, second, alpha):
+            self._led = first.copy(), second.copy()
+            found = self._found(first, second, error, alpha, _PRODUCTS)
+            if self._products <= _PRODUCTS or not self._factors.single:
+                return found
+        if not self._factors.single:
             return None
-        self._led = first.copy(), second.copy()
-        return self._found(first, second, error, alpha, _PRODUCTS)
+        # joints are too stiff for it
+        self._factors.single = False
+        return self.step(first, second, error, alpha)
 
     def _found(self, first: Array, second: Array, error: Array, alpha: float, most: int) -> Array:
         """Return Δr (nc, 3) after so many products at most; count one more where they did not suffice."""
@@ -291,6 +299,8 @@ def _turned(old: tuple[Array, Array], new: tuple[Array, Array]) -> int:
 
 class _Fronts:
     """Dense fronts of few bodies, in the order of least degree."""
+
+    single = False
 
     def __init__(self, indices: Ints, indptr: Ints) -> None:
         self._plan = fronts.analyse(indices, indptr)

@@ -25,7 +25,13 @@ class SparseBlocks:
     indices : (nnz,) columns of the blocks, row by row
     indptr : (n + 1,) where each row begins
     rank : (n,) place of each row of blocks in the order of elimination
+
+    Attributes
+    ----------
+    single : factors of single precision, which take 0.6 of the time, and only lead to a solution
     """
+
+    single = False
 
     def __init__(self, indices: Ints, indptr: Ints, rank: Ints) -> None:
         row, column = np.repeat(rank, np.diff(indptr)), rank[indices]
@@ -43,7 +49,7 @@ class SparseBlocks:
         """Factorise the matrix of these blocks (nnz, 3, 3); return whether it is regular."""
         # those of the matrix before make room for them
         self._factors = None
-        data = value.ravel()[self._source]
+        data = value.ravel()[self._source].astype(self._precision, copy=False)
         if not np.isfinite(data).all():
             return False
         matrix = csc_array((data, self._rows, self._starts), shape=(self._size, self._size))
@@ -61,4 +67,9 @@ class SparseBlocks:
     def solve(self, x: Array) -> None:
         """Replace a right side (n, 3) by the solution."""
         assert self._factors is not None
-        x[self._place] = self._factors.solve(x[self._place].ravel()).reshape(-1, 3)
+        right = x[self._place].ravel().astype(self._precision, copy=False)
+        x[self._place] = self._factors.solve(right).reshape(-1, 3)
+
+    @property
+    def _precision(self) -> type[np.floating]:
+        return np.float32 if self.single else np.float64

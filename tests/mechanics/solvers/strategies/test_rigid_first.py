@@ -13,6 +13,7 @@ from mechanics.solvers.second_order import proximal_newton
 from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.second_order.proximal_newton import ProximalNewton
 from mechanics.solvers.second_order.scaling import equilibrated
+from mechanics.solvers.second_order.sparse_blocks import SparseBlocks
 from mechanics.solvers.strategies.rigid_first import RigidFirst
 from moma.errors import SolverError
 from tests.mechanics.dense_operator import blocks_apart
@@ -95,6 +96,27 @@ def test_factors_of_an_earlier_step_lead_where_few_products_suffice(monkeypatch,
     found = anew(even, cold(even))
     assert found.converged
     assert (len(made) < found.iterations) == fewer
+    most = np.abs(wanted.impulse).max()
+    np.testing.assert_allclose(found.impulse, wanted.impulse, atol=1e-6 * most)
+
+
+@pytest.mark.parametrize(("share", "ends"), [(1.0, True), (1e-4, False)])
+def test_factors_of_many_bodies_are_single_unless_joints_are_too_stiff(monkeypatch, share, ends):
+    single, factorise = [], SparseBlocks.factorise
+
+    def noted(factors, value):
+        single.append(factors.single)
+        return factorise(factors, value)
+
+    even, _ = equilibrated(problem(share))
+    wanted = ProximalNewton(1e-12, 1e-11, 60)(even, cold(even))
+    monkeypatch.setattr(SparseBlocks, "factorise", noted)
+    monkeypatch.setattr(proximal_newton, "_MANY", 1)
+    found = ProximalNewton(1e-12, 1e-11, 60)(even, cold(even))
+    assert wanted.converged
+    assert found.converged
+    assert single[0]
+    assert single[-1] == ends
     most = np.abs(wanted.impulse).max()
     np.testing.assert_allclose(found.impulse, wanted.impulse, atol=1e-6 * most)
 
