@@ -8,7 +8,8 @@ those of the bodies (mechanics/solvers/_kernels/body_newton.py). Of compliant jo
 
 Where bodies deform, W is that of rigid ones and what they yield, of which the diagonal alone is, like E, a compliance
 of the joints. The equations with that are solved as above, and lead a Krylov method (GMRES, Saad & Schultz 1986) to the
-step within some five products with W.
+step within some five products with W. Factors that only lead may be of single precision, and those of an earlier step
+as long as next to no contact has turned since.
 """
 
 from dataclasses import dataclass, replace

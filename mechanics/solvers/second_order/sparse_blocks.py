@@ -49,7 +49,8 @@ class SparseBlocks:
         """Factorise the matrix of these blocks (nnz, 3, 3); return whether it is regular."""
         # those of the matrix before make room for them
         self._factors = None
-        data = value.ravel()[self._source].astype(self._precision, copy=False)
+        with np.errstate(over="ignore"):
+            data = value.ravel()[self._source].astype(self._precision, copy=False)
         if not np.isfinite(data).all():
             return False
         matrix = csc_array((data, self._rows, self._starts), shape=(self._size, self._size))
