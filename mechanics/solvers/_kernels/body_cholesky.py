@@ -12,8 +12,9 @@ D⁻¹, and what is to the right of it in tiles of 16 columns, row by row. A sol
 factors may be of single precision, where the equation that they solve is one for a correction.
 
 Far from a load, and between velocities that hardly feel each other, numbers fade below the least normal one, 1e-38 in
-single precision. Products of such take ten times as long; so entries of L below its third root r, and velocities
-below r², are taken as 0.
+single precision. Products of such take ten times as long. So entries of L below its third root r are taken as 0, those
+beside the diagonal of a block of D⁻¹ below r times the geometric mean of their diagonal ones, and loads and velocities
+below r².
 """
 
 from typing import NamedTuple

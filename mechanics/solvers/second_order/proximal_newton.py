@@ -59,7 +59,7 @@ _SHORTEST = 1e-3
 # error to which the equations of bodies that deform are solved, over their right side [-], and most products with W
 _INEXACT, _PRODUCTS = 1e-2, 30
 # change of a contact's derivatives that makes it unlike before [-], contacts that may be so while the factors of an
-# earlier step lead, and most products with W then, which take as long as a factorisation
+# earlier step lead, and most products with W then, which take as long as a factorisation and the products after it
 _UNLIKE, _TURNED, _AGAIN = 0.3, 3, 12
 
 
@@ -70,7 +70,7 @@ class ProximalNewton:
     Attributes
     ----------
     tolerance, velocity_tolerance : as in `NSGS`
-    max_iterations : limit of the steps, with a factorisation each
+    max_iterations : limit of the steps, with a factorisation each as a rule
     """
 
     tolerance: float = 1e-6
@@ -249,38 +249,38 @@ class _YieldingSystem(_System):
         super().__init__(simple.rigid, simple.joint_compliance)
         self._operator = operator
         self._led: tuple[Array, Array] | None = None
-        self._products = 0
+        self._few = True
         self._factors.single = isinstance(self._factors, SparseBlocks)
 
     def step(self, first: Array, second: Array, error: Array, alpha: float) -> Array | None:
         """Return Δr (nc, 3); None if the equations are singular, or their factors too large."""
-        led, new = self._led, (first, second)
-        if led is not None and self._products <= _AGAIN and _turned(led, new) <= _TURNED:
-            found = self._found(first, second, error, alpha, _AGAIN)
-            if self._products <= _AGAIN:
+        if self._few and self._led is not None and _turned(self._led[0], first) <= _TURNED:
+            found, self._few = self._found(first, second, error, alpha, _AGAIN)
+            if self._few:
                 return found
         self._led = None
         if self._factorise(first, second, alpha):
             self._led = first.copy(), second.copy()
-            found = self._found(first, second, error, alpha, _PRODUCTS)
-            if self._products <= _PRODUCTS or not self._factors.single:
+            found, solved = self._found(first, second, error, alpha, _PRODUCTS)
+            if solved or not self._factors.single:
                 return found
         if not self._factors.single:
             return None
-        # joints are too stiff for it
+        # the matrix may be too badly conditioned for it, as where joints hardly yield
         self._factors.single = False
         return self.step(first, second, error, alpha)
 
-    def _found(self, first: Array, second: Array, error: Array, alpha: float, most: int) -> Array:
-        """Return Δr (nc, 3) after so many products at most; count one more where they did not suffice."""
+    def _found(
+        self, first: Array, second: Array, error: Array, alpha: float, most: int
+    ) -> tuple[Array, bool]:
+        """Return Δr (nc, 3) after so many products at most, and whether these sufficed."""
         assert self._led is not None
-        leading, self._products = self._led[1], 0
+        leading = self._led[1]
 
         def before(y: Array) -> Array:
             return self._solve(leading, -y.reshape(-1, 3))
 
         def product(y: Array) -> Array:
-            self._products += 1
             r = before(y)
             u = self._operator.apply(r) + alpha * r
             both: Array = np.matmul(first, r[:, :, None]) + np.matmul(second, u[:, :, None])
@@ -288,14 +288,12 @@ class _YieldingSystem(_System):
 
         equations = LinearOperator((error.size, error.size), matvec=product, dtype=float)
         y, unsolved = gmres(equations, -error.ravel(), rtol=_INEXACT, restart=most, maxiter=1)
-        self._products += unsolved > 0
-        return before(y)
+        return before(y), unsolved == 0
 
 
-def _turned(old: tuple[Array, Array], new: tuple[Array, Array]) -> int:
-    """Return the number of contacts that open, slide or stick unlike before."""
-    change = sum(np.abs(a - b).max(axis=(1, 2)) for a, b in zip(old, new, strict=True))
-    return int(np.count_nonzero(change > _UNLIKE))
+def _turned(old: Array, new: Array) -> int:
+    """Return the number of contacts that open, slide or stick unlike before, by derivatives (nc, 3, 3) for impulses."""
+    return int(np.count_nonzero(np.abs(new - old).max(axis=(1, 2)) > _UNLIKE))
 
 
 class _Fronts:

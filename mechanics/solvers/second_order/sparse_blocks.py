@@ -44,13 +44,14 @@ class SparseBlocks:
         self._rows, self._starts, self._size = numbers.indices, numbers.indptr, size
         self._place = np.argsort(rank)
         self._factors: SuperLU | None = None
+        self._precision: type[np.floating] = np.float64
 
     def factorise(self, value: Array) -> bool:
         """Factorise the matrix of these blocks (nnz, 3, 3); return whether it is regular."""
         # those of the matrix before make room for them
         self._factors = None
-        with np.errstate(over="ignore"):
-            data = value.ravel()[self._source].astype(self._precision, copy=False)
+        self._precision = np.float32 if self.single else np.float64
+        data = self._rounded(value.ravel()[self._source])
         if not np.isfinite(data).all():
             return False
         matrix = csc_array((data, self._rows, self._starts), shape=(self._size, self._size))
@@ -68,9 +69,9 @@ class SparseBlocks:
     def solve(self, x: Array) -> None:
         """Replace a right side (n, 3) by the solution."""
         assert self._factors is not None
-        right = x[self._place].ravel().astype(self._precision, copy=False)
-        x[self._place] = self._factors.solve(right).reshape(-1, 3)
+        x[self._place] = self._factors.solve(self._rounded(x[self._place].ravel())).reshape(-1, 3)
 
-    @property
-    def _precision(self) -> type[np.floating]:
-        return np.float32 if self.single else np.float64
+    def _rounded(self, numbers: Array) -> Array:
+        """Return numbers with the precision of the factors."""
+        with np.errstate(over="ignore"):
+            return numbers.astype(self._precision, copy=False)
