@@ -59,8 +59,9 @@ _SHORTEST = 1e-3
 # error to which the equations of bodies that deform are solved, over their right side [-], and most products with W
 _INEXACT, _PRODUCTS = 1e-2, 30
 # change of a contact's derivatives that makes it unlike before [-], contacts that may be so while the factors of an
-# earlier step lead, and most products with W then, which take as long as a factorisation and the products after it
-_UNLIKE, _TURNED, _AGAIN = 0.3, 3, 12
+# earlier step lead, most products with W that those took when they were new, and then, which take as long as a
+# factorisation and the products after it
+_UNLIKE, _TURNED, _NEW, _AGAIN = 0.3, 3, 6, 12
 
 
 @dataclass(frozen=True)
@@ -249,38 +250,39 @@ class _YieldingSystem(_System):
         super().__init__(simple.rigid, simple.joint_compliance)
         self._operator = operator
         self._led: tuple[Array, Array] | None = None
-        self._few = True
+        self._lasts = True
         self._factors.single = isinstance(self._factors, SparseBlocks)
 
     def step(self, first: Array, second: Array, error: Array, alpha: float) -> Array | None:
         """Return Δr (nc, 3); None if the equations are singular, or their factors too large."""
-        if self._few and self._led is not None and _turned(self._led[0], first) <= _TURNED:
-            found, self._few = self._found(first, second, error, alpha, _AGAIN)
-            if self._few:
+        if self._lasts and self._led is not None and _turned(self._led[0], first) <= _TURNED:
+            found, products = self._found(first, second, error, alpha, _AGAIN)
+            if products <= _AGAIN:
                 return found
+            self._lasts = False
         self._led = None
         if self._factorise(first, second, alpha):
             self._led = first.copy(), second.copy()
-            found, solved = self._found(first, second, error, alpha, _PRODUCTS)
-            if solved or not self._factors.single:
-                return found
+            found, products = self._found(first, second, error, alpha, _PRODUCTS)
+            self._lasts &= products <= _NEW
+            # the matrix may be too badly conditioned for single precision, as where joints hardly yield
+            self._factors.single &= products <= _PRODUCTS
+            return found
         if not self._factors.single:
             return None
-        # the matrix may be too badly conditioned for it, as where joints hardly yield
         self._factors.single = False
         return self.step(first, second, error, alpha)
 
-    def _found(
-        self, first: Array, second: Array, error: Array, alpha: float, most: int
-    ) -> tuple[Array, bool]:
-        """Return Δr (nc, 3) after so many products at most, and whether these sufficed."""
+    def _found(self, first: Array, second: Array, error: Array, alpha: float, most: int) -> tuple[Array, int]:
+        """Return Δr (nc, 3) and the products that it took; one more than `most` where these did not suffice."""
         assert self._led is not None
-        leading = self._led[1]
+        leading, made = self._led[1], [0]
 
         def before(y: Array) -> Array:
             return self._solve(leading, -y.reshape(-1, 3))
 
         def product(y: Array) -> Array:
+            made[0] += 1
             r = before(y)
             u = self._operator.apply(r) + alpha * r
             both: Array = np.matmul(first, r[:, :, None]) + np.matmul(second, u[:, :, None])
@@ -288,7 +290,7 @@ class _YieldingSystem(_System):
 
         equations = LinearOperator((error.size, error.size), matvec=product, dtype=float)
         y, unsolved = gmres(equations, -error.ravel(), rtol=_INEXACT, restart=most, maxiter=1)
-        return before(y), unsolved == 0
+        return before(y), min(made[0], most) if unsolved == 0 else most + 1
 
 
 def _turned(old: Array, new: Array) -> int:
