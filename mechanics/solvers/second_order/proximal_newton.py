@@ -199,6 +199,8 @@ class _Run:
 class _System:
     """Equations of the bodies' velocities: pattern, matrix, factors."""
 
+    _single = False  # precision of the factors
+
     def __init__(self, contacts: RigidContacts, compliance: Array | None) -> None:
         self._contacts, inertia = contacts, contacts.inertia
         self._compliance = np.zeros((len(contacts.body), 3)) if compliance is None else compliance
@@ -231,7 +233,10 @@ class _System:
         if not bodies.inverse_blocks(first, second, alpha + self._compliance, self._inverse, self._gain):
             return False
         bodies.body_matrix(self._contacts, self._gain, self._blocks, self._value)
-        return self._factors.factorise(self._value)
+        if not self._single:
+            return self._factors.factorise(self._value)
+        with np.errstate(over="ignore"):
+            return self._factors.factorise(self._value.astype(np.float32))
 
     def _solve(self, second: Array, error: Array) -> Array:
         contacts, place = self._contacts, self._blocks.place
@@ -251,7 +256,7 @@ class _YieldingSystem(_System):
         self._operator = operator
         self._led: tuple[Array, Array] | None = None
         self._lasts = True
-        self._factors.single = isinstance(self._factors, SparseBlocks)
+        self._single = isinstance(self._factors, SparseBlocks)
 
     def step(self, first: Array, second: Array, error: Array, alpha: float) -> Array | None:
         """Return Δr (nc, 3); None if the equations are singular, or their factors too large."""
@@ -266,23 +271,24 @@ class _YieldingSystem(_System):
             found, products = self._found(first, second, error, alpha, _PRODUCTS)
             self._lasts &= products <= _NEW
             # the matrix may be too badly conditioned for single precision, as where joints hardly yield
-            self._factors.single &= products <= _PRODUCTS
+            self._single &= products <= _PRODUCTS
             return found
-        if not self._factors.single:
+        if not self._single:
             return None
-        self._factors.single = False
+        self._single = False
         return self.step(first, second, error, alpha)
 
     def _found(self, first: Array, second: Array, error: Array, alpha: float, most: int) -> tuple[Array, int]:
         """Return Δr (nc, 3) and the products that it took; one more than `most` where these did not suffice."""
         assert self._led is not None
-        leading, made = self._led[1], [0]
+        leading, made = self._led[1], 0
 
         def before(y: Array) -> Array:
             return self._solve(leading, -y.reshape(-1, 3))
 
         def product(y: Array) -> Array:
-            made[0] += 1
+            nonlocal made
+            made += 1
             r = before(y)
             u = self._operator.apply(r) + alpha * r
             both: Array = np.matmul(first, r[:, :, None]) + np.matmul(second, u[:, :, None])
@@ -290,7 +296,8 @@ class _YieldingSystem(_System):
 
         equations = LinearOperator((error.size, error.size), matvec=product, dtype=float)
         y, unsolved = gmres(equations, -error.ravel(), rtol=_INEXACT, restart=most, maxiter=1)
-        return before(y), min(made[0], most) if unsolved == 0 else most + 1
+        # the last product checks what the others found
+        return before(y), min(made, most) if unsolved == 0 else most + 1
 
 
 def _turned(old: Array, new: Array) -> int:
@@ -300,8 +307,6 @@ def _turned(old: Array, new: Array) -> int:
 
 class _Fronts:
     """Dense fronts of few bodies, in the order of least degree."""
-
-    single = False
 
     def __init__(self, indices: Ints, indptr: Ints) -> None:
         self._plan = fronts.analyse(indices, indptr)
