@@ -34,7 +34,7 @@
 
 To add a kind, write one class with a docstring. To add an attribute of a kind, and of its subkinds, write one column
 with `attribute`. All kinds live in one table and differ in the column `kind` (single-table inheritance, see
-``docs/decisions/015-one-table-of-entities.md``). A query of a kind finds its subkinds too. Kinds that a user registers
+``docs/design/architectural-model.md``). A query of a kind finds its subkinds too. Kinds that a user registers
 in a database (``archmodel.tables.registered``) become classes of this hierarchy while it is open.
 """
 

@@ -36,7 +36,7 @@ def dissection(pairs: Ints, place: Array) -> Ints:
     """Return the rank (n,) of each body: those of one side of a cut, of the other, then those between; so in each side.
 
     No body of one side touches one of the other, so factors fill in less than by least degree. Cuts are planes across
-    any axis, where they part the bodies by the fewest. docs/decisions/049-factors-of-many-bodies.md has numbers.
+    any axis, where they part the bodies by the fewest. docs/design/solvers.md has numbers.
 
     Parameters
     ----------

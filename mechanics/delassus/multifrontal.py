@@ -4,7 +4,7 @@ W is a sum of dense blocks, one for each stone that moves, between the contacts 
 two stones are eliminated together, in the order of least degree, and so are fronts that hold the same unknowns
 (supernodes; Ashcraft & Grimes 1989): the fronts are dense matrices of a size that suits BLAS, few numbers pass from one
 to the next, and nothing is sought among single entries. Θ has a block for each contact and need not be symmetric; rows
-are exchanged within a front (docs/decisions/009-factors-by-stones.md, 035-elastic-factors.md).
+are exchanged within a front (docs/design/solvers.md).
 """
 
 from collections.abc import Callable, Iterable, Sequence

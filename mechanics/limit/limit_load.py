@@ -18,7 +18,7 @@ et al. 2014). A small charge on the sum of the normal forces takes away those wi
 one on the squares of f_N - n̄ keeps each programme near the one before, so that the iteration comes to rest. It begins
 twice: from the forces of the bound, and from the least that carry the dead load. In the plane both come to one λ; in
 space the loads may lie apart by a fifth, and Coulomb's law holds at both. The lower is the candidate: the stones may
-fall at less (docs/decisions/045-limit-loads.md, 061-two-candidates.md).
+fall at less (docs/design/limit-loads.md).
 """
 
 from dataclasses import dataclass, replace

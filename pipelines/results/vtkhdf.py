@@ -5,7 +5,8 @@ places in every frame; rigid stones are polygons, as polyhedra need VTK 9.6. Bot
 that does not makes the other unreadable.
 
 HDF5 leaves a file that no library opens if its writer dies with it open. So no file under the name that users see is
-ever open for writing: each frame is added to a second copy, which then takes the name (docs/decisions/037).
+ever open for writing: each frame is added to a second copy, which then takes the name
+(docs/design/runs-and-checkpoints.md).
 """
 
 import os

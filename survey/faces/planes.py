@@ -14,7 +14,7 @@ a time: a point enters, or leaves again, by the test of its standardised residua
 one with the least truncated squares is kept, where a point that lies a little in front of the face counts twice:
 stones erode and mortar recedes behind the face, and nothing grows out of it. Points far beside the face are left
 out first, unless all points lie on one plane to rounding: where they happen to lie near the prolonged plane, they
-would outvote all others. Other estimators are compared on such faces in docs/decisions/012-robust-planes.md.
+would outvote all others. Other estimators are compared on such faces in docs/design/survey-planes.md.
 """
 
 import math

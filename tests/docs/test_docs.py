@@ -137,6 +137,16 @@ def test_the_links_of_the_pages_lead_somewhere():
                 assert (page.parent / link).exists(), (page.name, link)
 
 
+def test_the_design_pages_name_files_that_exist_and_all_stand_in_the_index():
+    pages = sorted((ROOT / "docs/design").glob("[a-z]*.md"))
+    index = (ROOT / "docs/design/README.md").read_text(encoding="utf-8")
+    assert pages
+    for page in pages:
+        assert f"]({page.name})" in index, page.name
+        for path in re.findall(r"`(\w+(?:/\w+)+(?:\.\w+)?)`", page.read_text(encoding="utf-8")):
+            assert (ROOT / path).exists(), (page.name, path)
+
+
 def test_the_makefile_makes_what_the_readme_says():
     targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
     asked = {

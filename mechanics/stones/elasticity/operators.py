@@ -49,7 +49,7 @@ class ElasticOperators:
 def elastic_operators(mesh: SolidMesh, material: Material, lumped: bool = False) -> ElasticOperators:
     """Assemble M and K of the weak form ∫ρ v̇·w + ∫σ(u):ε(w) (Zienkiewicz & Taylor, vol. 1).
 
-    docs/decisions/029 compares with assembly by scikit-fem.
+    docs/design/deformable-stones.md compares with assembly by scikit-fem.
 
     Parameters
     ----------
