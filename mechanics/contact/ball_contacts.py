@@ -14,8 +14,8 @@ from mechanics.scene.state import State
 __all__ = ["FaceCells", "ball_contacts", "face_cells"]
 
 
-# part of the radius: where a ball would sink deeper before the nodes see it, or rises by more over the area of a node,
-# the mesh is too coarse
+# share of the radius: where a ball would penetrate deeper before a node sees it, or its surface rises by more over the
+# area of a node, the mesh is too coarse
 _UNSEEN = 1e-3
 _WIDEST = 0.1  # cosine of the widest angle between the normals of ball and face
 
@@ -91,7 +91,7 @@ def ball_contacts(
     limit: Array,
     gap: Array,
 ) -> tuple[list[Contacts], Bools]:
-    """Make weighted contacts of pairs (np, 2) of a ball and a deformable shape; return the pairs that have them too.
+    """Make weighted contacts of pairs (np, 2) of a ball and a deformable shape; return their pairs too.
 
     Of the face that lies farthest under the ball, every node within reach makes a contact; the meshed face is the
     candidate. Over its ψ the distance to the ball's centre has the mean |x̄ - c| + s²/2|x̄ - c| with s² the spread of
@@ -152,7 +152,7 @@ def _pair(
     weights = cells.weights[rows]
     middle = weights @ state.node
     gap, n = _gaps(middle, cells.spread[rows], centre, radius)
-    # t1 along an axis of the block that lies in the face, so that the frame turns with it
+    # t1 along a block axis within the face, so that the frame turns with the block
     face = int(np.searchsorted(cells.pointer, rows.start, side="right") - 1)
     corners = placed.shapes.vertex[
         surfaces.shapes.corner[surfaces.shapes.cptr[face] : surfaces.shapes.cptr[face] + 2]

@@ -1,4 +1,4 @@
-"""Contact points as a structure of arrays, and the material points that they tie together."""
+"""Contact points as a structure of arrays, and the material points that they couple."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,8 +14,8 @@ from mechanics.scene.state import State
 __all__ = ["NODE", "PAIR_BIT", "Contacts", "gaps", "joined", "material_points", "take"]
 
 
-# A contact's key names the pair of shapes in its high bits; below them the node that carries the contact, or the name
-# of a single point within the pair.
+# The high bits of a key name the pair of shapes; the low bits the node that carries the contact, or a single point
+# within the pair.
 NODE = 1 << NAME_BITS
 PAIR_BIT = NAME_BITS + 1
 
@@ -33,7 +33,7 @@ class Contacts:
     Attributes
     ----------
     bodies : (nc, 2) candidate and antagonist
-    key : (nc,) names the contact from step to step
+    key : (nc,) identifies the contact from step to step
     frame : (nc, 3, 3) rows n, t1, t2; n points from antagonist to candidate
     area : (nc,) tributary area; the areas of an interface add up to its own; zero between edges [m²]
     arm : (nc, 2, 3) place of a rigid body's material point, body axes [m]
@@ -52,7 +52,7 @@ class Contacts:
 
 
 def take(contacts: Contacts, rows: Ints) -> Contacts:
-    """Return some contacts, in the order of `rows` (n,)."""
+    """Return the selected contacts, in the order of `rows` (n,)."""
     weights = contacts.weights
     if weights.nnz:
         weights = weights[(2 * rows[:, None] + np.arange(2)).ravel()]
@@ -69,7 +69,7 @@ def take(contacts: Contacts, rows: Ints) -> Contacts:
 
 
 def joined(parts: Sequence[Contacts]) -> Contacts:
-    """Join the contacts of all parts, one after the other."""
+    """Concatenate the contacts of all parts."""
     return Contacts(
         np.concatenate([part.bodies for part in parts]),
         np.concatenate([part.key for part in parts]),

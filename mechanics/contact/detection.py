@@ -37,7 +37,7 @@ __all__ = ["FLAT", "THIN", "Detector"]
 
 
 FLAT = float(np.cos(np.radians(5.0)))  # cosine of the angle within which faces lie flat on one another
-# pairs, or boxes, of a part from which another thread pays: 0.5 ms of work
+# number of pairs or boxes from which another thread pays: 0.5 ms of work
 _PART = 500
 THIN = 1e-6  # flat faces that overlap by less than this part of the smaller one do not touch
 
@@ -52,14 +52,14 @@ class _Singles:
     area: Array
 
     def without(self, rows: Ints) -> "_Singles":
-        """Return all points except some."""
+        """Return all points but the excluded ones."""
         keep = np.delete(np.arange(len(self.place)), rows)
         return _Singles(self.place[keep], self.frame[keep], self.nearest[keep], self.area[keep])
 
 
 @dataclass
 class _Hints:
-    """Faces that kept pairs apart in the last detection: they save time, and never change a result."""
+    """Separating faces of the last detection: they save time and never change a result."""
 
     key: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     face: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
@@ -79,11 +79,11 @@ class Detector:
     Attributes
     ----------
     surfaces : the bodies' polyhedra and face meshes
-    fixed : (nb,) bodies that no contact moves; pairs of them are left out
+    fixed : (nb,) fixed bodies; pairs of them are left out
     alert : gap below which a contact is watched, relative to the smaller stone [-]
-    points, placement : how many contact points two rigid faces have at least where these describe them, and where
+    points, placement : minimum number of contact points of two rigid faces, and where they lie
     distance : gap up to which some law acts, whatever the size of the stones [m]
-    threads : that look at pairs at once, at most; the result is the same to the last bit
+    threads : maximum number of concurrent threads; the result is the same to the last bit
     """
 
     surfaces: Surfaces
@@ -152,7 +152,7 @@ class Detector:
         return Pairs(shapes, limit, balls, kind, feature, axis)
 
     def _flat_and_meshed(self, pairs: Pairs, placed: Placed) -> Bools:
-        """Choose the pairs of flat faces of which one has finite elements."""
+        """Choose the pairs of flat faces, at least one with finite elements."""
         meshed = self.surfaces.meshes.of_face >= 0
         if not meshed.any():
             return np.zeros(len(pairs.kind), dtype=bool)
@@ -176,7 +176,7 @@ class Detector:
         key = _pair_key(pairs.shapes, len(own.body))[pair] + found[:, 2]
         if not nodes:
             return Contacts(body, key, frame, area, arm, csr_array((2 * len(pair), 0)))
-        # the antagonist owns the reference face; edges lie on the faces that look along the axis, balls on none
+        # the antagonist owns the reference face; edges lie on the faces that face along the axis, balls on none
         faces = (pairs.kind[pair] != EDGES) & (np.arange(len(pair)) < count)
         feature = np.where(faces[:, None], pairs.feature[pair][:, ::-1], -1)
         sides = pairs.shapes[pair[:, None], np.column_stack([found[:, 1], 1 - found[:, 1]])]
@@ -203,7 +203,7 @@ class Detector:
         return points.place, points.frame, points.area, body, arm
 
     def _in_parts(self, count: int, work: Callable[[int, int], tuple[Any, ...]]) -> tuple[Any, ...]:
-        """Return what `work` makes of all pairs or boxes: each thread takes those from one to another; in order."""
+        """Return the results of `work` for all pairs or boxes, in order; each thread takes a range of them."""
         parts = min(self.threads, count // _PART)
         if parts < 2:
             return work(0, count)
@@ -211,7 +211,7 @@ class Detector:
         return _joined(at_once(self.threads)(work, end[:-1], end[1:]))
 
     def _balls(self, pairs: Pairs, placed: Placed) -> _Singles:
-        """Find the single points of the pairs in which a ball takes part."""
+        """Find the single points of pairs with a ball."""
         own, balls = self.surfaces, np.flatnonzero(pairs.balls)
         place, frame, nearest, area = ball_points(
             pairs.shapes[balls],
@@ -225,7 +225,7 @@ class Detector:
         return _Singles(place, frame, nearest, area)
 
     def _curved(self, pairs: Pairs, placed: Placed, state: State) -> tuple[list[Contacts], _Singles | None]:
-        """Return weighted contacts of balls with meshes that see them, and single points of all other balls."""
+        """Return weighted contacts of balls with meshes that see them, and single points of the other balls."""
         if not pairs.balls.any():
             return [], None
         own, points = self.surfaces, self._balls(pairs, placed)

@@ -1,4 +1,4 @@
-"""Finite elements on the faces of deformable bodies, one by one and packed in flat arrays."""
+"""Finite elements on the faces of deformable bodies, singly and packed in flat arrays."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from mechanics.contact._kernels.facets import FacetMeshes
 __all__ = ["FaceMesh", "packed_meshes"]
 
 
-_WIDEST = 9  # most nodes of a facet
+_WIDEST = 9  # maximum number of nodes of a facet
 
 
 @dataclass(frozen=True)

@@ -14,11 +14,9 @@ __all__ = ["mortar_contacts", "surface_weights"]
 
 
 _ALIKE = 1e-6  # relative difference up to which two faces are equally fine or large
-# a direction in which faces of stones are unlikely to look
+# a direction to which faces of stones are unlikely to be normal
 _ASKEW = np.array([0.3015113446, 0.5381, 0.7870])
-_BESIDE = (
-    1e-3  # of a shape's width: a point farther from all finite elements lies between the parts of a stone
-)
+_BESIDE = 1e-3  # share of a shape's width: a point farther from all finite elements lies between the parts of a stone
 
 
 def surface_weights(
@@ -29,7 +27,7 @@ def surface_weights(
     Parameters
     ----------
     sides, face : (nc, 2) shapes of candidate and antagonist, and the faces on which the points lie; -1: the face
-        that looks most towards the other side
+        that faces the other side most
     normal : (nc, 3) from antagonist to candidate
     arm : (nc, 2, 3) the points in body axes [m]
 
@@ -73,7 +71,7 @@ def mortar_contacts(
     ----------
     shapes, faces : (np, 2) those of the reference and of the incident face; at least one is deformable
     key, limit : (np,) first key and alert distance of each interface
-    thin : faces that overlap by less than this part of the smaller one do not touch
+    thin : faces that overlap by less than this share of the smaller one do not touch
     """
     first = np.where(_first_is_candidate(surfaces, placed, shapes, faces), 0, 1)
     order, rows = np.column_stack([first, 1 - first]), np.arange(len(first))[:, None]
@@ -83,7 +81,7 @@ def mortar_contacts(
     least = thin * surfaces.shapes.face_area[face].min(axis=1)
     interfaces = Interfaces(meshes.of_face[face], face, body, frame, origin, least)
     bodies = Bodies(placed.centre, placed.rotation)
-    # where a face lies on one other alone, all its nodes have contacts
+    # where a face lies on a single other face, all its nodes have contacts
     plane = surfaces.plane[face[:, 0]]
     several = np.flatnonzero(np.bincount(plane)[plane] > 1)
     own = Interfaces._make(array[several] for array in interfaces)
@@ -116,11 +114,11 @@ def mortar_contacts(
 def _first_is_candidate(surfaces: Surfaces, placed: Placed, shapes: Ints, faces: Ints) -> Bools:
     """Decide whether the first face of each pair (np, 2) carries the contacts, whatever the order in the scene.
 
-    The finer mesh does; of equally fine ones the smaller face, then that of the smaller part, then the face that looked
-    more against an askew direction when the run began, or does now if both looked the same way.
+    The finer mesh does; of equally fine ones the smaller face, then that of the smaller part, then the face whose
+    normal opposed an oblique direction more when the run began, or does now if both agreed then.
     """
     count = len(surfaces.body)
-    # the smaller number wins
+    # the smaller value wins
     judges = (
         (-surfaces.meshes.fineness[faces], _ALIKE),
         (surfaces.shapes.face_area[faces], _ALIKE),
@@ -138,11 +136,11 @@ def _first_is_candidate(surfaces: Surfaces, placed: Placed, shapes: Ints, faces:
 
 
 def _kept(surfaces: Surfaces, face: Ints, several: Ints, start: Ints, share: Array) -> tuple[Ints, Bools]:
-    """Keep the contact of each node of candidate faces (ni,) in the interfaces where its share is the largest.
+    """Keep the contact of each node of candidate faces (ni,) in the interface where its share is largest.
 
-    Otherwise a node beside the seam of two antagonists would have one with each: more contacts than nodes, whose forces
-    are not unique. Faces of parts in one plane count as one face. Shares are those of all nodes of each candidate in
-    `several` interfaces, which begin at `start`.
+    Otherwise a node beside the seam of two antagonists would have a contact with each: more contacts than nodes, so
+    forces would not be unique. Faces of parts in one plane count as one face. Shares are those of all nodes of each
+    candidate in `several` interfaces, which begin at `start`.
     """
     meshes = surfaces.meshes
     size = np.diff(meshes.node_ptr)[meshes.of_face[face]]

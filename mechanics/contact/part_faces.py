@@ -14,8 +14,8 @@ __all__ = ["face_meshes", "part_face_meshes"]
 
 Faces = Sequence[Sequence[int]]
 
-_NEAR = 1e-6  # of the block's size: a facet nearer to the plane of a face lies in it
-_SAME_AREA = 1e-6  # of a facet's area: a smaller overlap comes from rounding
+_NEAR = 1e-6  # share of the block's size: a facet nearer than this to the plane of a face lies in it
+_SAME_AREA = 1e-6  # share of a facet's area: a smaller overlap is due to rounding
 
 
 def face_meshes(mesh: SolidMesh, faces: int, start: int) -> list[FaceMesh]:
@@ -26,7 +26,7 @@ def face_meshes(mesh: SolidMesh, faces: int, start: int) -> list[FaceMesh]:
 def part_face_meshes(mesh: SolidMesh, vertices: Array, faces: Faces, start: int) -> list[FaceMesh]:
     """Return the meshes of the faces of a convex part, whose corners are given in the axes of the mesh (nv, 3) [m].
 
-    A facet belongs to each face with which it shares area, and such a face may cut through it. A face between two
+    A facet belongs to each face that shares area with it; such a face may cut through it. A face between two
     parts has no facets.
     """
     corners = 3 if mesh.element.is_tetrahedron else 4

@@ -16,8 +16,8 @@ __all__ = ["Placed", "Surfaces", "middles", "surfaces"]
 
 
 # faces of the parts of a body are in one plane
-_SAME_WAY = 1.0 - 1e-12  # if their normals have at least this cosine
-_SAME_PLANE = 1e-6  # and they lie off each other by no more than this part of its size
+_SAME_WAY = 1.0 - 1e-12  # if the cosine between their normals is at least this
+_SAME_PLANE = 1e-6  # and their offset is at most this share of its size
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Surfaces:
     sptr : (nb+1,) shapes of each body
     shapes : all shapes, in the axes of their bodies, from their centres of mass
     radius : (ns,) of balls, zero for polyhedra [m]
-    size : (nb,) smallest width of each body, that of all its parts together [m]
+    size : (nb,) smallest width of each body, over all its parts [m]
     plane : (nf,) a number that faces of one body share if they lie in one plane
     face_mesh : per face, its finite elements; None for rigid bodies
     meshes : the same, packed
@@ -138,7 +138,7 @@ def middles(vptr: Ints, vertex: Array) -> Array:
 
 
 def _widths(body: Ints, sptr: Ints, vptr: Ints, vertex: Array, size: Array) -> Array:
-    """Return the smallest width (nb,) of each body: of one shape its own, of several that of their convex hull [m]."""
+    """Return the smallest width (nb,) of each body: that of its shape, or of the convex hull of several [m]."""
     width = size[sptr[:-1]]
     for b in np.flatnonzero(np.bincount(body) > 1):
         corners = vertex[vptr[sptr[b]] : vptr[sptr[b + 1]]]
@@ -151,7 +151,7 @@ def _pointer(counts: Sequence[int] | Ints) -> Ints:
 
 
 def _planes(body: Ints, count: Ints, normal: Array, corner: Array) -> Ints:
-    """Find for each face the first face of its body that lies in the same plane; one shape has no two of them."""
+    """Find for each face the first face of its body that lies in the same plane; a single shape has no two of them."""
     plane, start = np.arange(len(normal)), np.cumsum(count) - count
     for b in np.flatnonzero(np.bincount(body) > 1):
         shapes = np.flatnonzero(body == b)

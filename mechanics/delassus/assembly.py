@@ -60,8 +60,8 @@ def mixed_delassus(
 ) -> MixedDelassus:
     """Return W of contacts, already in the order of the schedule; condense each deformable body on its contact sides.
 
-    With `elastic_scale`, r and u are measured against the elastic part of W alone. In steps so long that nothing but
-    friction holds a stone back, W is nearly all rigid motion, and forces inside the joints would not count.
+    With `elastic_scale`, r and u are measured against the elastic part of W alone. In steps so long that only
+    friction resists, W is dominated by rigid motion, and forces within joints would not count.
     """
     body = contacts.bodies
     kind = side_kinds(model, body)
@@ -70,7 +70,7 @@ def mixed_delassus(
     bptr = np.concatenate([[0], np.cumsum((3 * count) ** 2)]).astype(np.int64)
     block, diagonal = np.zeros(int(bptr[-1])), np.zeros((2 * len(contacts), 3, 3))
     first = np.concatenate([[0], np.cumsum(count)])
-    # all at once, as SciPy takes longer to take the rows of a stone than its block takes
+    # all at once: slicing the rows of a stone costs SciPy more than its block does
     weights = contacts.weights[sides]
     drag = np.ones(len(model.mass))
     for group, own in zip(model.elastic_stones.groups, compliance, strict=True):
@@ -114,7 +114,7 @@ def mixed_delassus(
 
 
 def _awake(model: Model, drag: Array) -> RigidInertia:
-    """Return the inertia of all bodies that impulses move, as if none deformed; `drag` (nb,) as in `Compliance` [-]."""
+    """Return the inertia of all bodies that move, as if rigid; `drag` (nb,) as in `Compliance` [-]."""
     flight, share = model.flight, np.where(model.fixed, 0.0, 1.0 / drag)
     return replace(
         flight,
@@ -133,7 +133,7 @@ def _masses(inertia: RigidInertia, state: State) -> Array:
 
 
 def _rigid_share(inertia: RigidInertia, state: State, contacts: Contacts, kind: Ints, arm: Array) -> Array:
-    """Return the part of W_αα (nc, 3, 3) that is the motion of elastic stones as a whole, where a side is elastic."""
+    """Return the rigid-body part of W_αα (nc, 3, 3) of elastic sides."""
     jacobian, response = _rigid_sides(inertia, state, contacts, arm)
     share: Array = np.where((kind == ELASTIC)[..., None, None], jacobian @ response, 0.0).sum(axis=1)
     return share
@@ -154,7 +154,7 @@ def _rigid_sides(inertia: RigidInertia, state: State, contacts: Contacts, arm: A
 
 
 def _slots(body: Ints, kind: Ints, bodies: int) -> tuple[Ints, Ints, Ints]:
-    """Return the number of elastic sides of each body, the place of each side among them, and the sides by body."""
+    """Return the number of elastic sides of each body, the index of each side among them, and the sides by body."""
     flat_body, elastic = body.ravel(), kind.ravel() == ELASTIC
     count = np.bincount(flat_body[elastic], minlength=bodies)
     order = np.flatnonzero(elastic)[np.argsort(flat_body[elastic], kind="stable")]
@@ -165,12 +165,12 @@ def _slots(body: Ints, kind: Ints, bodies: int) -> tuple[Ints, Ints, Ints]:
 
 
 class _Touched(NamedTuple):
-    """Nodes that the contact sides of a body touch, side by side.
+    """Nodes that carry the contact sides of a body, side by side.
 
     Attributes
     ----------
-    node, weight : of each touch
-    number : of each side, its touches
+    node, weight : of each entry
+    number : entries of each side
     """
 
     node: Ints
@@ -179,12 +179,12 @@ class _Touched(NamedTuple):
 
 
 def _compliance_block(touched: _Touched, turn: Array, compliance: Compliance, first: int) -> Array:
-    """Return T C Tᵀ of one body: C between the nodes that its contact sides touch, T their weights in local frames.
+    """Return T C Tᵀ of one body: C between the nodes of its contact sides, T their weights in local frames.
 
-    `turn` (s, 3, 3) has the frames in the axes of the body, whose `first` node is the number 0 of its compliance.
+    `turn` (s, 3, 3) has the frames in body axes; node `first` is node 0 of the compliance.
     """
     nodes, column = np.unique(touched.node, return_inverse=True)
-    # stones have few nodes beside: dense products are faster than sparse ones
+    # stones have few other nodes: dense products are faster than sparse ones
     own = np.zeros((len(turn), len(nodes)))
     own[np.repeat(np.arange(len(turn)), touched.number), column] = touched.weight
     half = _condensed(own, turn, compliance.between(nodes - first))

@@ -19,13 +19,13 @@ from moma.errors import SolverError
 __all__ = ["BodyForm", "scaled_frames"]
 
 
-# rounds of refinement, at most
+# refinement steps, at most
 _ROUNDS = 2
-# change of velocities, over their size, that is rounding alone [-]
+# relative change of velocities due to rounding alone [-]
 _ROUNDING = 1e-14
-# smallest pivot over the largest of its column that is still taken, so that the order of elimination stays [-]
+# smallest pivot accepted, over the largest of its column, so that the elimination order stays [-]
 _THRESHOLD = 0.01
-# largest part of the right side that a solution may leave [-]
+# largest relative residual of a solution [-]
 _LOST = 1e-9
 
 
@@ -34,10 +34,10 @@ class BodyForm(SparseForm):
 
         (M + H Θ⁻¹ Hᵀ) v = H Θ⁻¹ b,     r = Θ⁻¹ (b - Hᵀ v)
 
-    so six unknowns for each body are solved for, however many contacts it has, and W may be singular. Where Θ is small
-    that subtraction cancels, so the result is refined in v and r (Björck 1967). The bodies are ordered by least degree
-    of their own graph, which takes a hundredth of the time that an ordering of all unknowns takes and fills in less;
-    many bodies by dissection, where their places are known.
+    so each body has six unknowns whatever the number of its contacts, and W may be singular. Where Θ is small the
+    subtraction cancels, so the result is refined in v and r (Björck 1967). Bodies are ordered by least degree on
+    their own graph, in a hundredth of the time of an ordering of all unknowns and with less fill-in; many bodies by
+    nested dissection, where their centres are known.
 
     Parameters
     ----------
@@ -127,8 +127,8 @@ class BodyForm(SparseForm):
     def shifted(self, theta: Array, exact: bool = True) -> Callable[[Array], Array]:
         """Return (W + Θ)⁻¹ as a function of b (3 nc,); `theta` (nc, 3, 3), invertible, not always symmetric [1/kg].
 
-        Elimination on bodies loses accuracy where parts of Θ are next to nothing beside others; `exact` checks each
-        solution, and where it lacks more than rounding takes that of the larger system of velocities and impulses.
+        Elimination on bodies loses accuracy where entries of Θ differ by many orders; `exact` checks each
+        solution, and where its residual exceeds rounding solves the larger system of velocities and impulses.
 
         Raises
         ------
@@ -185,7 +185,7 @@ class _Factors:
     lu: SuperLU
 
     def once(self, b: Array) -> tuple[Array, Array]:
-        """Return v (nm, 6) and r (nc, 3) for one b (nc, 3), as the factors give them."""
+        """Return v (nm, 6) and r (nc, 3) for one b (nc, 3), without refinement."""
         side = self.pattern.side
         load = kernel.pushed(self.soft, b, side, self.geometry, len(self.pattern.mass))
         v = self.lu.solve(load.ravel()).reshape(-1, 6)
@@ -208,7 +208,7 @@ class _Factors:
 
 
 def scaled_frames(geometry: Array, unit: Array) -> Array:
-    """Return the geometry (nc, 15) with each frame in a unit (nc,) of its own: W becomes D W D."""
+    """Return the geometry (nc, 15) with each frame scaled by a unit (nc,): W becomes D W D."""
     scaled = geometry.copy()
     scaled[:, :9] *= unit[:, None]
     return scaled

@@ -15,7 +15,7 @@ __all__ = ["CompliantDelassus", "CompliantForm", "simplified"]
 
 
 class CompliantForm:
-    """W + E of any form; E is part of Θ, so that nothing else changes.
+    """W + E in any form; E is added to Θ.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class CompliantForm:
 
 @dataclass(frozen=True)
 class CompliantDelassus:
-    """W + E: impulses move the stones, and the sides of their joints towards each other.
+    """W + E: impulses move the stones and compress their joints.
 
     Attributes
     ----------
@@ -71,12 +71,12 @@ class CompliantDelassus:
 
     @property
     def mostly_rigid(self) -> bool:
-        """As that of W."""
+        """That of W."""
         return self.inner.mostly_rigid
 
     @property
     def as_rigid(self) -> Delassus | None:
-        """W if no body deformed, without E, or None."""
+        """W with all bodies rigid, without E, or None."""
         return self.inner.as_rigid
 
     @cached_property
@@ -87,7 +87,7 @@ class CompliantDelassus:
 
     @cached_property
     def form(self) -> CompliantForm | None:
-        """W + E ready to be factorised, where W is."""
+        """W + E for methods that factorise, where W has such a form."""
         inner = self.inner.form
         return None if inner is None else CompliantForm(inner, self.joint_compliance)
 
@@ -96,7 +96,7 @@ class CompliantDelassus:
         return self.inner.apply(impulse) + self.joint_compliance * impulse
 
     def gauss_seidel(self, shift: Array, friction: Array, cohesion: Array) -> GaussSeidel:
-        """Return sweeps of W with E r of the last sweep; they converge where joints yield less than stones."""
+        """Return sweeps of W with E r lagged by one sweep; they converge where E is smaller than W."""
 
         def sweeps(impulse: Array, count: int, /) -> None:
             for _ in range(count):
@@ -111,7 +111,7 @@ class CompliantDelassus:
 
 
 def simplified(operator: Delassus) -> CompliantDelassus | None:
-    """Return W if no body deformed, and as E the diagonal of all that bodies and joints yield; None if not known."""
+    """Return W with all bodies rigid, and E as the diagonal compliance of bodies and joints; None if not known."""
     rigid = operator.as_rigid
     if rigid is None:
         return None

@@ -13,7 +13,7 @@ __all__ = ["CondensedForm", "assembled"]
 
 
 class CondensedForm:
-    """W + Θ, factorised by stones; where stones have more nodes than contacts, far smaller than a system of nodes.
+    """W + Θ, factorised by stones; far smaller than a nodal system where stones have more nodes than contacts.
 
     Parameters
     ----------

@@ -10,11 +10,11 @@ from mechanics.delassus._kernels.dissection import dissect
 __all__ = ["dissection", "elimination", "least_degree"]
 
 
-# bodies from which dissection fills in less than least degree
+# number of bodies from which dissection fills in less than least degree
 _MANY = 1000
-# bodies of a part that is not divided further
+# size of a part that is not divided further
 _LEAF = 8
-# difference of places below which bodies lie in one course [m]
+# distance along an axis below which bodies lie in one course [m]
 _SAME = 1e-6
 
 
@@ -33,10 +33,10 @@ def elimination(pairs: Ints, moving: Ints, centre: Array) -> Ints:
 
 
 def dissection(pairs: Ints, place: Array) -> Ints:
-    """Return the rank (n,) of each body: those of one side of a cut, of the other, then those between; so in each side.
+    """Return the rank (n,) of each body: one side of a cut, the other, then the separator; recursively in each side.
 
-    No body of one side touches one of the other, so factors fill in less than by least degree. Cuts are planes across
-    any axis, where they part the bodies by the fewest. docs/design/solvers.md has numbers.
+    Bodies of one side do not touch those of the other, so factors fill in less than by least degree. Cuts are planes
+    across any axis, placed where the separator is smallest. docs/design/solvers.md has numbers.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def dissection(pairs: Ints, place: Array) -> Ints:
     body, other = np.concatenate([pairs, pairs[:, ::-1]]).T
     start = np.searchsorted(np.sort(body), np.arange(count + 1))
     near = other[np.argsort(body, kind="stable")]
-    # bodies of a course in the order along the other axes
+    # within a course, sort along the other axes
     axes = np.round(place.T / _SAME)
     along = np.array([np.lexsort((*np.delete(axes, k, axis=0), axes[k])) for k in range(len(axes))])
     rank: Ints = dissect(start, near, along, _LEAF)
@@ -55,7 +55,7 @@ def dissection(pairs: Ints, place: Array) -> Ints:
 
 
 def least_degree(pairs: Ints, count: int) -> Ints:
-    """Return the rank (count,) of each body in SuperLU's order of least degree: fewest neighbours left, first out."""
+    """Return the rank (count,) of each body in SuperLU's order of least degree: fewest remaining neighbours first."""
     ones, each = np.ones(len(pairs)), np.arange(count)
     row, column = np.concatenate([pairs[:, 0], each]), np.concatenate([pairs[:, 1], each])
     graph = coo_array((np.concatenate([ones, np.zeros(count)]), (row, column)), shape=(count, count)).tocsc()

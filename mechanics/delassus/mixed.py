@@ -21,8 +21,8 @@ __all__ = ["ELASTIC", "NONE", "RIGID", "MixedDelassus"]
 class MixedDelassus:
     """W = Hᵀ ŵ H in factored form; side 0 (candidate) counts positive, side 1 (antagonist) negative.
 
-    A rigid body answers through its six velocities; a deformable one through the dense compliance between the
-    contact sides that lie on it.
+    A rigid body responds with its six velocities, a deformable one with the dense compliance between its contact
+    sides.
 
     Attributes
     ----------
@@ -30,15 +30,15 @@ class MixedDelassus:
     kind : (nc, 2) NONE (fixed), RIGID or ELASTIC
     jacobian : (nc, 2, 3, 6) local velocity of a rigid side from its body's velocity
     response : (nc, 2, 6, 3) body velocity from the local impulse, ŵ times the transpose of `jacobian`
-    slot : (nc, 2) place of an elastic side among those of its body
-    yptr : (nb+1,) where each body's elastic velocities begin (three for each side)
-    bptr : (nb+1,) where each body's compliance block begins
+    slot : (nc, 2) index of an elastic side among those of its body
+    yptr : (nb+1,) offset of each body's elastic velocities (three for each side)
+    bptr : (nb+1,) offset of each body's compliance block
     block : flat symmetric compliance blocks of the elastic bodies, between their contact sides [1/kg]
     mass : (nb, 6, 6) of the rigid bodies that move, world axes; zero for others [kg, kg m²]
     centre : (nb, 3) of the bodies [m]
     diagonal : (nc, 3, 3) W_αα [1/kg]
-    scale : reference against which u is measured over r [1/kg]
-    as_rigid : W of the same contacts if no body deformed
+    scale : reference for u over r [1/kg]
+    as_rigid : W of the same contacts with all bodies rigid
     threads : that factorise W
     """
 
@@ -95,7 +95,7 @@ class MixedDelassus:
         return MixedForm(pattern, self.jacobian, mass, blocks, self.threads)
 
     def _signed(self, sides: Ints) -> Array:
-        """Return the compliance (3s, 3s) of a deformable body between its sides, which ascend as their slots do."""
+        """Return the compliance (3s, 3s) of a deformable body between its sides, in the order of their slots."""
         sign = np.where(sides % 2 == 0, 1.0, -1.0).repeat(3)
         b = self.body.ravel()[sides[0]]
         square = self.block[self.bptr[b] : self.bptr[b + 1]].reshape(len(sign), -1)
@@ -107,7 +107,7 @@ class MixedDelassus:
         return ScaledDelassus(self, unit)
 
     def gauss_seidel(self, shift: Array, friction: Array, cohesion: Array) -> GaussSeidel:
-        """Return sweeps forth and back; running velocities are computed afresh on each call, against rounding."""
+        """Return sweeps forth and back; each call recomputes velocities, so that rounding does not accumulate."""
         laws = Laws(shift, friction, cohesion, local_factors(self.diagonal))
 
         def sweeps(impulse: Array, count: int) -> None:

@@ -16,16 +16,16 @@ from mechanics.delassus.multifrontal import Cliques, Factors, Fronts, fronts, fr
 __all__ = ["MixedForm", "MixedPattern", "mixed_fronts"]
 
 
-# rounds of refinement, at most
+# refinement steps, at most
 _ROUNDS = 2
-# change of velocities, over their size, that is rounding alone [-]
+# relative change of velocities due to rounding alone [-]
 _ROUNDING = 1e-14
 
 
 class MixedPattern:
-    """Unknowns of W + Θ in groups, and the order in which they are eliminated.
+    """Unknowns of W + Θ in groups, and their elimination order.
 
-    Groups are the contacts of two stones of which one at least is deformable, and rigid bodies.
+    A group holds the contacts of two stones, at least one of them deformable, or one rigid body.
 
     Parameters
     ----------
@@ -37,11 +37,11 @@ class MixedPattern:
     ----------
     soft, hard : contacts with a deformable side, and the others
     moving : (nm,) rigid bodies that move
-    place : (nc, 2) of the body of a side among them; -1 where it is fixed or deformable
+    place : (nc, 2) index of the body of a side among them; -1 where it is fixed or deformable
     elastic : contacts of each deformable body
-    own : of each rigid body, its sides of soft contacts, of two for each contact
-    pair : place of each hard contact among the pairs of bodies
-    pairs : (np, 2) places of two bodies, in order; -1 as in `place`
+    own : of each rigid body, its sides of soft contacts (two sides a contact)
+    pair : index of each hard contact among the pairs of bodies
+    pairs : (np, 2) indices of two bodies, in order; -1 as in `place`
     unknowns : of the blocks of deformable bodies, of rigid ones with their soft contacts, and of pairs
     """
 
@@ -81,7 +81,7 @@ def mixed_fronts(bodies: Ints, kind: Ints, centre: Array) -> Fronts:
 
 
 def _by_body(body: Ints, sides: Ints) -> list[Ints]:
-    """Return some of the sides by their body (2 nc,), ascending."""
+    """Return the selected sides by body (2 nc,), ascending."""
     sides = sides[np.argsort(body[sides], kind="stable")]
     return np.split(sides, np.flatnonzero(np.diff(body[sides])) + 1) if len(sides) else []
 
@@ -89,14 +89,14 @@ def _by_body(body: Ints, sides: Ints) -> list[Ints]:
 class MixedForm:
     """Elimination with few unknowns for W = W_e + A M⁻¹ Aᵀ, W_e that of deformable stones.
 
-    Impulses r between rigid stones (h) follow from the velocities v of these, so that only those of other contacts (s)
-    stay. With (W + Θ) r = b,
+    Impulses r between rigid stones (h) follow from their velocities v, so that only those of other contacts (s)
+    remain. With (W + Θ) r = b,
 
         [ W_e + Θ_s   A_s               ] [ r_s ]   [ b_s           ]
         [ -A_sᵀ       M + A_hᵀ Θ_h⁻¹ A_h ] [ v   ] = [ A_hᵀ Θ_h⁻¹ b_h ],     r_h = Θ_h⁻¹ (b_h - A_h v)
 
-    six unknowns for each rigid stone, however many contacts it has. In r and -v it is as symmetric as Θ. The result is
-    refined in r and v, as in `BodyForm`.
+    six unknowns for each rigid stone, whatever the number of its contacts. In r and -v it is as symmetric as Θ. The
+    result is refined in r and v, as in `BodyForm`.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ class MixedForm:
 
     @cached_property
     def _paired(self) -> Array:
-        """Rows (nh, 3, 12) of A of the hard contacts, bodies of a pair in the order of their places."""
+        """Rows (nh, 3, 12) of A of the hard contacts, bodies of a pair in the order of their indices."""
         pattern = self._pattern
         across = self._jacobian[pattern.hard].transpose(0, 2, 1, 3)
         turn = np.argsort(pattern.place[pattern.hard], axis=1, kind="stable")

@@ -1,10 +1,9 @@
 """Factors of W + Θ, front by front (Duff & Reid 1983; Liu 1992).
 
 W is a sum of dense blocks, one for each stone that moves, between the contacts of that stone. All contacts of the same
-two stones are eliminated together, in the order of least degree, and so are fronts that hold the same unknowns
-(supernodes; Ashcraft & Grimes 1989): the fronts are dense matrices of a size that suits BLAS, few numbers pass from one
-to the next, and nothing is sought among single entries. Θ has a block for each contact and need not be symmetric; rows
-are exchanged within a front (docs/design/solvers.md).
+two stones are eliminated together, in the order of least degree, and so are fronts with the same unknowns (supernodes;
+Ashcraft & Grimes 1989): fronts are dense matrices of a size that suits BLAS, and little data passes between them. Θ has
+a block for each contact and need not be symmetric; rows are exchanged within a front (docs/design/solvers.md).
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -26,9 +25,9 @@ __all__ = ["Cliques", "Factors", "Fronts", "fronts", "fronts_of_graph"]
 
 # columns of a front that one thread takes at a time
 _PANEL = 192
-# pivots of a front, in contacts, beyond which it takes in no more: a wider one is eliminated by a single thread
+# pivots of a front, in contacts, beyond which no more are merged: a wider one is eliminated by a single thread
 _WIDEST = 96
-# largest work of a subtree that one thread eliminates alone, over that of all [-]
+# largest share of the work in a subtree that one thread eliminates alone [-]
 _SUBTREE = 0.1
 
 
@@ -54,7 +53,7 @@ class Fronts:
     ----------
     layout : order, unknowns of each front, and places of its factors
     cliques : of each front, the cliques that are assembled there, and the runs of their unknowns (`add_into`)
-    children : of each front, the fronts whose updates it takes in, and the runs of their unknowns
+    children : of each front, the fronts whose updates it assembles, and the runs of their unknowns
     """
 
     layout: Layout
@@ -87,7 +86,7 @@ class Fronts:
 
     @cached_property
     def _split(self) -> tuple[list[list[int]], list[int]]:
-        """Fronts of small subtrees, which need nothing of each other, largest first; and the fronts above them."""
+        """Fronts of small independent subtrees, largest first, and the fronts above them."""
         width, whole = self.layout.width.astype(float), np.diff(self.layout.dptr).astype(float)
         own = width**3 / 1.5 + 2.0 * width * (whole - width) * whole
         work, above = own.copy(), np.full(len(own), -1)
@@ -124,7 +123,7 @@ class _Elimination:
             self.eliminate(f, map)
 
     def eliminate(self, f: int, each: Callable[..., Iterable[None]]) -> None:
-        """Eliminate the pivots of a front, with `each` applied to parts of its columns, which are always the same."""
+        """Eliminate the pivots of a front, with `each` applied to fixed parts of its columns."""
         layout = self._fronts.layout
         k, at = int(layout.width[f]), int(layout.fptr[f])
         m = int(layout.dptr[f + 1] - layout.dptr[f]) - k
@@ -145,7 +144,7 @@ class _Elimination:
 
         def reduce(first: int) -> None:
             last = min(first + _PANEL, m)
-            # SciPy's wrapper counts the exchanges from 1 while LAPACK runs, in the array itself: one for each thread
+            # SciPy's wrapper makes the pivots 1-based in the array itself while LAPACK runs: one copy for each thread
             across, _ = dgetrs(lu, exchanged.copy(), pivot[:, k + first : k + last], overwrite_b=True)
             # transposed, as the product is made by rows
             update[:, first:last] -= (across.T @ below.T).T
@@ -244,9 +243,9 @@ def _fronts_in_order(
 
 
 def _runs(place: Ints, width: int) -> Ints:
-    """Return runs of neighbours (nr, 3): place in the front, place in the block, and length.
+    """Return runs of consecutive unknowns (nr, 3): offset in the front, offset in the block, and length.
 
-    `place` are the places of the block's unknowns in a front of `width` pivots; no run reaches beyond these.
+    `place` are the positions of the block's unknowns in a front of `width` pivots; no run crosses the last pivot.
     """
     order = np.argsort(place)
     there = place[order]
@@ -256,10 +255,10 @@ def _runs(place: Ints, width: int) -> Ints:
 
 
 def _merged(order: Ints, later: list[list[int]], size: Ints) -> tuple[Ints, list[list[int]], list[list[int]]]:
-    """Merge fronts with the parents that hold nothing else than what they leave: the factors stay as large as they are.
+    """Merge fronts with parents that hold just their update; factors do not grow.
 
-    Return the order of the merged fronts, and of each its groups and those of its front that come later, in the order
-    of elimination.
+    Return the order of the merged fronts, and of each its groups and the later groups of its front, in elimination
+    order.
     """
     pivots: dict[int, list[int]] = {}
     rest = {int(f): int(size[later[f]].sum()) for f in order}
@@ -267,7 +266,7 @@ def _merged(order: Ints, later: list[list[int]], size: Ints) -> tuple[Ints, list
     children: dict[int, list[int]] = {int(f): [] for f in order}
     for f in order.tolist():
         pivots[f] = [f]
-        # as long as nothing else has joined it, wide ones first
+        # as long as nothing else has been merged into it, wide ones first
         for child in sorted(children[f], key=wide.__getitem__, reverse=True):
             if rest[child] != wide[f] + rest[f] or wide[child] + wide[f] > _WIDEST:
                 continue
@@ -291,7 +290,7 @@ def _unknowns(members: Sequence[Ints]) -> Ints:
 
 
 def _places(front: Ints, unknowns: Ints) -> Ints:
-    """Return the place of each of the unknowns in a front."""
+    """Return the position of each of the unknowns in a front."""
     order = np.argsort(front)
     places: Ints = order[np.searchsorted(front, unknowns, sorter=order)]
     return places
@@ -322,7 +321,7 @@ def _least_degree(count: int, size: Ints, around: Sequence[Ints]) -> tuple[Ints,
 
 
 def _left_in_fronts(pairs: Ints, rank: Ints) -> list[list[int]]:
-    """Return the groups left in each front, in order; `pairs` (m, 2) of groups couple, `rank` (n,) is their order."""
+    """Return the groups left in each front, in order; `pairs` (m, 2) are coupled groups, `rank` (n,) orders them."""
     order = np.argsort(rank)
     first = np.where(rank[pairs[:, 0]] < rank[pairs[:, 1]], 0, 1)
     left: list[set[int]] = [set() for _ in rank]

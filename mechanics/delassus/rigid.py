@@ -17,9 +17,9 @@ from mechanics.problem.problem import GaussSeidel, RigidContacts, mean_diagonal
 __all__ = ["RigidDelassus", "Schedule", "in_order", "schedule"]
 
 
-# fewer contacts are swept by one thread: more threads would gain nothing
+# below this number of contacts one thread sweeps: more would gain nothing
 _WORTH_PARTS = 2000
-# contacts from which there are four parts, before that two: the contacts between them take a larger share
+# contacts from which there are four parts instead of two: their share of crossing contacts is larger
 _MANY = 16_000
 # change of a body's velocity, over the largest shift, below which its contacts sleep [-]
 _CALM = 1e-9
@@ -32,8 +32,8 @@ class Schedule:
     Attributes
     ----------
     order : (nc,) contacts in sweep order: those with the same candidate and antagonist follow one another
-    group : (ng+1,) where, in that order, each such group begins
-    part : (k+1,) where each part begins among the groups. All parts but the last share no moving body with each
+    group : (ng+1,) offset of each such group in that order
+    part : (k+1,) offset of each part among the groups. All parts but the last share no moving body with each
         other; the last holds the contacts between them. One part alone for few contacts, which are swept by one thread
     """
 
@@ -50,7 +50,7 @@ def in_order(count: int) -> Schedule:
 def schedule(bodies: Ints, moving: Bools) -> Schedule:
     """Group the contacts (nc, 2) by candidate and antagonist, in the order of the bodies, cut into parts if many.
 
-    Stones of several parts may be either to one another; they have two groups then.
+    Two stones of several parts may each be the candidate of the other; they then have two groups.
     """
     count = len(bodies)
     if count == 0:
@@ -63,7 +63,7 @@ def schedule(bodies: Ints, moving: Bools) -> Schedule:
     sizes = np.diff(starts, append=count)
     if count < _WORTH_PARTS:
         return Schedule(order, np.append(starts, count), np.array([0, len(starts)]))
-    # the order of the bodies, course by course as a rule, takes half the sweeps of any other
+    # body order, usually course by course, halves the number of sweeps
     by_part, part, _ = cut(bodies[order[starts]], moving, 2 if count < _MANY else 4, False)
     sizes, starts = sizes[by_part], starts[by_part]
     group = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
@@ -138,7 +138,7 @@ class RigidDelassus:
 
     @cached_property
     def memo(self) -> dict[str, Any]:
-        """Results of solvers from W alone, by name; they can be made again with the same bits."""
+        """Results that solvers derived from W alone, by name; they can be recomputed with the same bits."""
         return {}
 
     def scaled(self, unit: Array) -> "RigidDelassus":
@@ -150,7 +150,7 @@ class RigidDelassus:
         if kept is not None and np.array_equal(kept[0], unit):
             return kept[1]
         other = replace(self, geometry=scaled_frames(self.geometry, unit))
-        # the kernel of the diagonal takes frames to be of length one
+        # the kernel of the diagonal assumes frames of unit length
         other.__dict__["diagonal"] = self.diagonal * (unit**2)[:, None, None]
         other.__dict__["form"] = self.form.scaled(unit)
         self.__dict__["_scaled"] = unit, other
@@ -159,10 +159,10 @@ class RigidDelassus:
     def gauss_seidel(self, shift: Array, friction: Array, cohesion: Array) -> GaussSeidel:
         """Return sweeps in the order of the schedule; the same bits for any number of threads.
 
-        Each call visits every contact at least once; those whose bodies hardly change then sleep until these do. The
-        running velocities are computed afresh on each call, so that rounding cannot accumulate.
+        Each call visits every contact at least once; contacts whose bodies hardly change then sleep until they do.
+        Velocities are recomputed on each call, so that rounding cannot accumulate.
         """
-        # contacts that open need no impulse, however fast
+        # opening contacts need no impulse, however fast
         calm = _CALM * max(float(np.abs(shift[:, 1:]).max(initial=0.0)), float(-shift[:, 0].min(initial=0.0)))
         threads = min(self.threads, numba.config.NUMBA_NUM_THREADS)
         laws, plan = Laws(shift, friction, cohesion, self._factors), self.schedule

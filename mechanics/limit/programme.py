@@ -163,9 +163,9 @@ class Programme:
         return Answer(Ending.FOUND, multiplier, self._unit * x[:count].reshape(-1, 3), velocity)
 
     def shortfall(self, strength: Strength) -> Answer:
-        """Return the forces that come nearest to balancing the dead load; `multiplier` is what they lack.
+        """Return the forces that come nearest to balancing the dead load; `multiplier` is the residual imbalance.
 
-        It is the largest component of what is left, over the largest load on a stone, with moments over widths [-].
+        It is the largest component of the imbalance, over the largest load on a stone, with moments over widths [-].
 
         Raises
         ------

@@ -84,7 +84,7 @@ def _broken_velocity(problem: ContactProblem, impulse: Array, largest: float, pa
     diagonal = problem.delassus.diagonal
     hidden = _EPSILON * float(diagonal.max()) * float(np.abs(impulse).max()) / max(pace, bias)
     if hidden > _NOTHING:
-        # that product is of the largest of all contacts, which may be different ones
+        # the maxima may come from different contacts
         own = np.einsum("cij,cj->ci", np.abs(diagonal), np.abs(impulse))
         hidden = _EPSILON * float(own.max()) / max(pace, bias)
     return max(largest / slowest, hidden)

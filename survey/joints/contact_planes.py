@@ -313,11 +313,11 @@ def _joints(faces: StoneFaces, facing: FacingFaces, settings: JointSettings) -> 
 def _through_core(
     faces: StoneFaces, facing: FacingFaces, label: Ints, core: Ints, settings: JointSettings
 ) -> Ints:
-    """Return the joints (m,) of all pairs, with the beds of two facings that the core ties as one where one plane fits.
+    """Return the joints (m,) of all pairs, merging the bed joints of both facings across the core.
 
-    How a bed slopes into a wall is not measured at all: where the course is the same on both sides, one plane goes
-    through both visible edges, as where a stone passes through. Of two planes, one above the other by a millimetre, the
-    core could bear on one alone.
+    Beds merge where one plane fits both. How a bed slopes into a wall is not measured at all: where the course is the
+    same on both sides, one plane goes through both visible edges, as where a stone passes through. Of two planes, one
+    above the other by a millimetre, the core could bear on one alone.
     """
     count, joints = len(faces.planes.areas), int(label.max()) + 1
     level = (np.abs(faces.planes.normals[core][:, :, 2]) > _ALIKE).all(axis=1)

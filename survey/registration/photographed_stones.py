@@ -220,7 +220,7 @@ def _moved(
     per_height = rays / slant[:, None]  # movement of a corner as the plane rises by 1 m
     corners = on_marks - per_height * down[:, None]
     scale = 1.0 if wall.viewpoint is None else 1.0 - down / slant
-    # derivative of corners by their places on the plane of the marks, in the axes of either plane
+    # Jacobian of corners with respect to their coordinates on the marker plane, in the axes of either plane
     follow = plane.axes @ (np.eye(3) - per_height[:, :, None] * plane.normal) @ wall.fit.axes.T
     own = scale * scale * np.trace(follow @ covariances @ follow.transpose(0, 2, 1), axis1=1, axis2=2)
     height = plane.height_sigma(corners) ** 2

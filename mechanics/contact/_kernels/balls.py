@@ -1,4 +1,4 @@
-"""Contacts in which a ball takes part: with another ball, or with a convex polyhedron."""
+"""Contacts of a ball with another ball or a convex polyhedron."""
 
 import numpy as np
 from numba import njit
@@ -71,7 +71,7 @@ def _nearest(c, s, shapes):
 
 @njit(cache=True)
 def _frame(n, axes, frame):
-    """Write rows n, t1, t2, with t1 along the axis of the antagonist farthest from n, so that it turns with it."""
+    """Write rows n, t1, t2, with t1 along the antagonist's axis farthest from n, so that the frame turns with it."""
     axis, least = 0, np.inf
     for k in range(3):
         cosine = abs(dot(n, column(axes, k)))
@@ -83,7 +83,7 @@ def _frame(n, axes, frame):
 
 @njit(cache=True)
 def ball_points(pair, limit, radius, middle, axes, shapes):  # pragma: no cover - compiled
-    """Find the contacts of pairs of which one or both are balls; the candidate is a ball, of two balls the first.
+    """Find the contacts of pairs with at least one ball; the candidate is a ball, of two balls the first.
 
     Inputs
     ------
@@ -110,7 +110,7 @@ def ball_points(pair, limit, radius, middle, axes, shapes):  # pragma: no cover 
             o = row(middle, other)
             away = minus(c, o)
             far = norm(away)
-            # balls with one centre: any direction separates them
+            # concentric balls: any direction separates them
             n = over(away, far) if far > 0.0 else column(axes[other], 2)
             point = along(o, radius[other], n)
             gap = far - radius[other] - radius[ball]

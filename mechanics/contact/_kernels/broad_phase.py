@@ -25,7 +25,7 @@ def _placed(centre, rotation, local):
 
 @njit(cache=True)
 def place(pointer, local, centre, rotation):  # pragma: no cover - compiled
-    """Put points of bodies in place: centre + rotation · local.
+    """Transform points of bodies to world axes: centre + rotation · local.
 
     Inputs
     ------
@@ -208,7 +208,7 @@ class Grid(NamedTuple):
 
 @njit(cache=True)
 def grid_of(low, high):  # pragma: no cover - compiled
-    """Sort boxes into a grid, d = 2 or 3: the cost grows linearly with their number, and not with the space between.
+    """Sort boxes into a grid, d = 2 or 3: the cost is linear in their number, whatever the space between.
 
     Inputs
     ------
@@ -236,9 +236,9 @@ def grid_of(low, high):  # pragma: no cover - compiled
 
 @njit(cache=True, nogil=True)
 def close_pairs(low, high, owner, fixed, grid, begin, end):  # pragma: no cover - compiled
-    """Find pairs of boxes that overlap: those that the slots of a share of the grid show, and a share of large boxes.
+    """Find pairs of overlapping boxes, from a share of the grid's slots and of the large boxes.
 
-    Large boxes are compared with all others. Shares from 0 to n find all pairs, each of them once.
+    Large boxes are compared with all others. Shares that cover 0 to n find each pair once.
 
     Inputs
     ------
@@ -254,14 +254,14 @@ def close_pairs(low, high, owner, fixed, grid, begin, end):  # pragma: no cover 
     """
     nb, d = low.shape
     first, large, start, box, cell = grid
-    pairs, count = np.empty((8 * (end - begin) + 8, 2), dtype=np.int64), np.int64(0)  # of no literal type
+    pairs, count = np.empty((8 * (end - begin) + 8, 2), dtype=np.int64), np.int64(0)  # not a literal type
     slots = start.shape[0] - 1
     for s in range(begin * slots // max(nb, 1), end * slots // max(nb, 1)):
         for a in range(start[s], start[s + 1]):
             i = box[a]
             for b in range(a + 1, start[s + 1]):
                 j = box[b]
-                # in the lowest cell that both touch, and nowhere else
+                # only in the lowest cell that both touch
                 here = cell[a, 0] == cell[b, 0] and cell[a, 1] == cell[b, 1]
                 here = here and cell[a, 2] == cell[b, 2]
                 for k in range(d):
@@ -284,7 +284,7 @@ def close_pairs(low, high, owner, fixed, grid, begin, end):  # pragma: no cover 
 
 @njit(cache=True, nogil=True)
 def single_points(shapes, place, point, owner, centre, rotation):  # pragma: no cover - compiled
-    """Turn single contact points into the axes of their bodies.
+    """Transform single contact points to the axes of their bodies.
 
     Inputs
     ------

@@ -36,7 +36,7 @@ class FacetMeshes(NamedTuple):
     facet_ptr : (nm+1,) int64
     facet : (·, 9) int64, facets of each mesh as indices into its nodes, padded with -1
     kind : (nm,) int64, nodes of a facet of each mesh
-    cut : (nm,) bool, the face, one of several parts, cuts through some facets, so that they reach beyond it
+    cut : (nm,) bool, whether the face, one of several parts, cuts through facets, so that they extend beyond it
     fineness : (nf,) float64, triangles (a quadrilateral counts for two) per area of each face; 0 without facets, -1 if
         rigid [1/m²]
     """
@@ -109,7 +109,7 @@ def degree(kind):
 
 @njit(cache=True)
 def rule_of(wanted):
-    """Return the first and last row of the quadrature on triangles that is exact to this degree."""
+    """Return the first and last row of the triangle quadrature exact to this degree."""
     k = 0 if wanted <= 2 else 1 if wanted <= 4 else 2 if wanted == 5 else 3
     return QUADRATURE_START[k], QUADRATURE_START[k + 1]
 
@@ -153,7 +153,7 @@ def shape_functions(kind, r, s, out):
 def locate(corner, count, x, y):
     """Return the reference coordinates of a point of the plane in a facet with corners (≥ count, 2).
 
-    Newton's method for quadrilaterals; one step of it is exact on a parallelogram.
+    Newton's method on quadrilaterals; one step is exact on a parallelogram.
     """
     if count == 3:
         ax, ay = corner[1, 0] - corner[0, 0], corner[1, 1] - corner[0, 1]

@@ -12,7 +12,7 @@ from mechanics.contact._kernels.vectors import dot, minus, row
 
 __all__ = ["Bodies", "Interfaces", "mortar_rows"]
 
-_SLIVER = 1e-2  # a node whose share of the overlap is below this part of a neighbour's is joined to it
+_SLIVER = 1e-2  # a node whose share of the overlap is below this fraction of a neighbour's is merged into it
 
 
 class Interfaces(NamedTuple):
@@ -43,7 +43,7 @@ class Bodies(NamedTuple):
 
 
 class _Side(NamedTuple):
-    """Nodes of a mesh: their numbers over all bodies, and the places that they have in the sparse row at work."""
+    """Nodes of a mesh: their numbers over all bodies, and their positions in the current sparse row."""
 
     node: Ints
     slot: Ints
@@ -51,9 +51,9 @@ class _Side(NamedTuple):
 
 @njit(cache=True)
 def _join(facet, used, corners, share, kept):
-    """Return the node for which each node counts: itself, or a neighbour that is kept; -1 where nothing is covered.
+    """Return the representative of each node: itself, or a kept neighbour; -1 where nothing is covered.
 
-    Nodes join a neighbour that are not `kept`, or whose share is a sliver of the neighbour's.
+    Nodes that are not `kept`, or whose share is a sliver of a neighbour's, are merged into that neighbour.
     """
     best, seen = np.full(share.shape[0], -1), np.zeros(share.shape[0], dtype=np.bool_)
     for t in used:
@@ -128,7 +128,7 @@ def _flat_mesh(m, b, p, interfaces, bodies, meshes):
 
 @njit(cache=True)
 def _bare(p, interfaces, meshes):
-    """Return whether a face of the interface is a deformable body's, but has no facets."""
+    """Return whether a face of the interface belongs to a deformable body but has no facets."""
     m, a = interfaces.mesh[p, 0], interfaces.mesh[p, 1]
     start = meshes.facet_ptr
     return start[m] == start[m + 1] or (a >= 0 and start[a] == start[a + 1])
@@ -139,7 +139,7 @@ def mortar_rows(kept_ptr, kept, interfaces, bodies, meshes, shapes, shares):  # 
     """Make weighted points of flat interfaces: one per corner node of the candidate's facets.
 
     ψ_α is linear or bilinear on the facets of the candidate: the hat, one at its node α and zero at the other corners,
-    or where the overlap covers a facet the function dual to it. Where a node is not kept, or has next to no share of
+    or where the overlap covers a facet the function dual to it. Where a node is not kept, or has a negligible share of
     the overlap, its ψ is added to a neighbour's. Quadrature has the degree of ψ times a shape function, 2 to 6, so it
     is exact on triangles and parallelograms; on other quadrilaterals both sides still see the same points, and so the
     same constants and places.
@@ -170,9 +170,9 @@ def mortar_rows(kept_ptr, kept, interfaces, bodies, meshes, shapes, shares):  # 
     largest = 0
     for m in range(meshes.node_ptr.shape[0] - 1):
         largest = max(largest, meshes.node_ptr[m + 1] - meshes.node_ptr[m])
-    # where a node has its place in the row at work; places only grow, so old entries need no clearing
+    # position of a node in the current row; positions only grow, so old entries need no clearing
     slot_c, slot_a = np.full(largest, -1), np.full(largest, -1)
-    # of no literal type, for each of which numba would compile the callees once more
+    # not a literal type, for which numba would compile the callees again
     count, end = np.int64(0), np.int64(0)
     for p in range(interfaces.mesh.shape[0]):
         if _bare(p, interfaces, meshes):
@@ -242,7 +242,7 @@ def mortar_rows(kept_ptr, kept, interfaces, bodies, meshes, shapes, shares):  # 
 
 @njit(cache=True)
 def _outlines(p, bounded, interfaces, shapes):
-    """Return the polygons, of those two faces that are `bounded` by more than their meshes, and their sizes."""
+    """Return the polygons of those of the two faces that are `bounded` beyond their meshes, and their sizes."""
     size = np.zeros(2, dtype=np.int64)
     for s in range(2):
         if bounded[s]:

@@ -44,7 +44,7 @@ SEPARATED, FACE_FIRST, FACE_SECOND, EDGES = 0, 1, 2, 3
 # than the first shape's face to be preferred, so that the choice between equally good features does not flicker
 _PREFERENCE = 1e-3
 _SAME_PLANE = 1.0 - 5e-13  # cosine of 10⁻⁶ rad: two faces at a smaller angle are one plane
-_PARALLEL = 0.999999  # cosine of the angle below which faces need no look at edges
+_PARALLEL = 0.999999  # cosine of the angle below which edges need no test
 # distance from a side, relative to the size of the smaller shape, within which a corner is on it, so that faces that
 # end together clip cleanly
 _ON_SIDE = 1e-7
@@ -113,7 +113,7 @@ class Pairs(NamedTuple):
 
 
 class Polygon(NamedTuple):
-    """Room for the corners of a polygon, given in the frame of a face.
+    """Buffer for the corners of a polygon in the frame of a face.
 
     Attributes
     ----------
@@ -141,7 +141,7 @@ class _Moments(NamedTuple):
 
 @njit(cache=True)
 def _face_gap(f, other, shapes):
-    """Return the distance by which face f keeps another shape away [m]."""
+    """Return the separation of another shape from face f [m]."""
     n, nearest = row(shapes.normal, f), np.inf
     for v in range(shapes.vptr[other], shapes.vptr[other + 1]):
         nearest = min(nearest, dot(n, row(shapes.vertex, v)))
@@ -163,7 +163,7 @@ def _deepest_face(s, other, limit, shapes):
 
 @njit(cache=True)
 def _opposite_face(s, n, shapes):
-    """Return the face of shape s that looks most against a direction."""
+    """Return the face of shape s most opposed to a direction."""
     lowest, face = np.inf, -1
     for f in range(shapes.fptr[s], shapes.fptr[s + 1]):
         d = dot(row(shapes.normal, f), n)
@@ -217,7 +217,7 @@ def separating_axes(pair, limit, hint, shapes):  # pragma: no cover - compiled
     ------
     pair : (np, 2) int64, shapes
     limit : (np,) float64, gap beyond which a pair is apart [m]
-    hint : (np,) int64, a face that kept the pair apart before, or -1; it is tried first, and written for the next time
+    hint : (np,) int64, the face that separated the pair before, or -1; it is tried first, and updated
     shapes : Polyhedra
 
     Outputs

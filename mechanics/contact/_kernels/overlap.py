@@ -19,9 +19,9 @@ from mechanics.contact._kernels.vectors import column, dot, minus, row
 
 __all__ = ["FlatMesh", "flattened", "overlap_area", "overlap_integrals", "room"]
 
-_HATS = 0.8  # part of a facet up to which it is tested by hats, which stay within the overlap
-_DUAL = 0.98  # part of a facet from which it is tested by dual functions
-# part of a facet's area that rounding leaves as overlap where a joint ends at a node: no pressure follows from it
+_HATS = 0.8  # covered share of a facet up to which hats are used, which stay within the overlap
+_DUAL = 0.98  # covered share of a facet from which dual functions are used
+# share of a facet's area that rounding leaves as overlap where a joint ends at a node: it carries no pressure
 _NOTHING = 1e-12
 
 
@@ -59,9 +59,9 @@ class _Integrals(NamedTuple):
 
 @njit(cache=True)
 def _clip_flat(polygon, count, cutter, corners, kept):
-    """Keep what lies inside a convex polygon `cutter` of either sense of `polygon`, in place; return its corners.
+    """Clip `polygon` by a convex polygon `cutter` of either orientation, in place; return its number of corners.
 
-    There must be room for the corners of both.
+    The buffer must hold the corners of both.
     """
     turn = 0.0
     for k in range(1, corners - 1):
@@ -192,7 +192,7 @@ def _cells(low, high, origin, size, nx, ny):
     """Return the first and last cell of a box along both axes; none where it lies beside the grid."""
     x0, x1 = int(np.floor((low[0] - origin[0]) / size[0])), int(np.floor((high[0] - origin[0]) / size[0]))
     y0, y1 = int(np.floor((low[1] - origin[1]) / size[1])), int(np.floor((high[1] - origin[1]) / size[1]))
-    # what ends at the far side of the grid lies in its last cell
+    # a box that ends at the far side of the grid lies in its last cell
     return max(min(x0, nx - 1), 0), min(x1, nx - 1), max(min(y0, ny - 1), 0), min(y1, ny - 1)
 
 
@@ -228,7 +228,7 @@ def _close_facets(low, high, low_a, high_a):
 
 @njit(cache=True)
 def room(array, needed):
-    """Return the array, or a copy with at least this many places."""
+    """Return the array, or a copy with at least this many entries."""
     if needed <= array.shape[0]:
         return array
     grown = np.empty(max(needed, 2 * array.shape[0]), dtype=array.dtype)
@@ -333,8 +333,8 @@ def _turn_dual(own, kind, share, moment, mass, cross):
     """Turn integrals with the hats of a facet into those with functions dual to them where it is nearly all covered.
 
     The dual functions φ are combinations of the hats, T ψ with T ∫ψψᵀ = diag ∫ψ. They have the same integrals and the
-    same sum, one; φ_i meets no other node's hat, so that on linear facets a contact is its node alone (Wohlmuth 2000),
-    and pressures do not swing where a contact ends.
+    same sum, one; φ_i is orthogonal to the hats of other nodes, so that on linear facets a contact is its node alone
+    (Wohlmuth 2000), and pressures do not oscillate where a contact ends.
     """
     corners = corner_count(kind)
     whole = covered = 0.0
@@ -359,7 +359,7 @@ def _turn_dual(own, kind, share, moment, mass, cross):
     for e in range(cross.shape[0]):
         _turn_rows(turn, corners, cross[e])
     if kind == corners and dual == 1.0:
-        # set zeros exactly, so that they take no place
+        # exact zeros, so that they are not stored
         for i in range(corners):
             for k in range(corners):
                 mass[i, k] = share[i] if i == k else 0.0

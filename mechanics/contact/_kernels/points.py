@@ -11,7 +11,7 @@ __all__ = ["surface_points"]
 
 @njit(cache=True)
 def _depth(corner, count, x, y):
-    """Return the depth of a point of the plane inside the sides of a facet, counter-clockwise [m]."""
+    """Return the depth of a point inside the sides of a facet, counter-clockwise [m]."""
     least = np.inf
     for a in range(count):
         b = a + 1 if a + 1 < count else 0
@@ -50,7 +50,7 @@ def _nearest_facet(point, nodes, facets, count, n, corner, best_corner):
 
 @njit(cache=True)
 def _into(count, r, s):
-    """Return about the nearest point of the reference facet."""
+    """Return an approximation to the nearest point of the reference facet."""
     if count == 4:
         return min(max(r, -1.0), 1.0), min(max(s, -1.0), 1.0)
     r, s = max(r, 0.0), max(s, 0.0)
@@ -67,7 +67,7 @@ def surface_points(shape, face, arm, towards, shapes, meshes):  # pragma: no cov
     face : (n,) int64, the face on which it lies; -1: unknown
     arm : (n, 3) float64, the point, body axes [m]
     towards : (n, 3) float64, direction towards the other side, body axes; of equally near faces, the one that
-        looks most that way is taken [-]
+        faces that way most is taken [-]
     shapes : Polyhedra, body axes
     meshes : FacetMeshes
 
@@ -75,7 +75,7 @@ def surface_points(shape, face, arm, towards, shapes, meshes):  # pragma: no cov
     -------
     column : (n, 9) int64, nodes
     value : (n, 9) float64, shape functions [-]
-    size : (n,) int64, how many of them count
+    size : (n,) int64, how many of them are used
     off : (n,) float64, distance of each point from its facet; infinite where the shape has no facets [m]
     """
     count = shape.shape[0]
@@ -99,7 +99,7 @@ def surface_points(shape, face, arm, towards, shapes, meshes):  # pragma: no cov
             facets = meshes.facet[meshes.facet_ptr[m] : meshes.facet_ptr[m + 1]]
             t, far, x, y = _nearest_facet(point, nodes, facets, corners, n, corner, best)
             look = dot(n, way)
-            # an edge lies on two faces: a difference of rounding does not choose between them
+            # an edge lies on two faces: rounding must not choose between them
             scale = 1e-9 * np.sqrt(abs((best[1, 0] - best[0, 0]) ** 2 + (best[1, 1] - best[0, 1]) ** 2))
             if far > off[p] + scale or (far > off[p] - scale and look <= facing):
                 continue

@@ -1,6 +1,6 @@
 """Numba kernels of W + Θ between rigid bodies, written with the velocities of the bodies.
 
-`side` (nc, 2) int64 holds the places of the two bodies of a contact in the order of elimination, -1 for a body that
+`side` (nc, 2) int64 holds the places of the two bodies of a contact in elimination order, -1 for a body that
 does not move; `geometry` (nc, 15) float64 is that of `RigidContacts`. Velocities (nm, 6) are those of the nm bodies
 that move.
 """
@@ -18,16 +18,16 @@ __all__ = ["Pattern", "across", "assemble", "corrected", "inverses", "lift", "pu
 
 
 class Pattern(NamedTuple):
-    """Blocks (6, 6) of M + H Θ⁻¹ Hᵀ, bodies in the order of their elimination.
+    """Blocks (6, 6) of M + H Θ⁻¹ Hᵀ, bodies in elimination order.
 
     Attributes
     ----------
     mass : (nm, 6, 6) float64, M [kg], [kg m²]
-    side : (nc, 2) int64, place of each contact's bodies in that order, -1: does not move
+    side : (nc, 2) int64, rank of each contact's bodies, -1: fixed
     indptr, indices : int32, of the matrix by columns
     own : (nm,) int64, the block of each body on the diagonal
     block : (nc, 2, 2) int64, the blocks of each contact
-    start, stride : int64, of each block, where it begins among the values and how far apart its columns are
+    start, stride : int64, offset of each block among the values, and stride between its columns
     """
 
     mass: NDArray[np.float64]

@@ -5,13 +5,13 @@ from numba import njit
 
 __all__ = ["dissect"]
 
-# part of the bodies that a cut leaves on either side, at least: where a wall narrows, an uneven cut is the better one
+# smallest share of the bodies on either side of a cut: where a wall narrows, an uneven cut is better
 _SIDE = 0.2
 
 
 @njit(cache=True)
 def _separators(along, start, near, part, place, low, high):
-    """Write the number of bodies that separate the first r of a part from its others, for each r.
+    """Write the size of the separator between the first r bodies of a part and its others, for each r.
 
     Either those among the first that touch one of the others, or those among the others that touch one of the first.
     """
@@ -25,7 +25,7 @@ def _separators(along, start, near, part, place, low, high):
         for p in range(start[along[k]], start[along[k] + 1]):
             if part[near[p]] == name:
                 least, most = min(least, place[near[p]]), max(most, place[near[p]])
-        # as one of the first, for k < r <= most; as one of the others, for least < r <= k
+        # in the first set for k < r <= most, in the other for least < r <= k
         low[k + 1] += 1
         low[most + 1] -= 1
         high[least + 1] += 1
@@ -37,9 +37,9 @@ def _separators(along, start, near, part, place, low, high):
 
 @njit(cache=True)
 def _best(low, high, m):
-    """Return the cost of the best cut of m bodies, where it is, and whether the first ones separate there.
+    """Return the cost of the best cut of m bodies, its place, and whether its separator lies in the first set.
 
-    Few bodies between large sides: their number over the root of those of the smaller side.
+    The cost is the size of the separator over the root of the size of the smaller side.
     """
     cost, cut, first = np.inf, 0, True
     margin = max(1, int(_SIDE * m))
@@ -54,7 +54,7 @@ def _best(low, high, m):
 
 @njit(cache=True)
 def _sides(own, cut, first, start, near, part, place, side):
-    """Write the side of each body of a part: 0 and 1 of its cut, 2 between them; return the number of each."""
+    """Write the side of each body of a part (0 or 1; 2: separator); return the number of each."""
     name, count = part[own[0]], np.zeros(3, np.int64)
     for k in range(own.shape[0]):
         place[own[k]] = k
@@ -71,13 +71,13 @@ def _sides(own, cut, first, start, near, part, place, side):
 
 @njit(cache=True)
 def dissect(start, near, along, leaf):  # pragma: no cover - compiled
-    """Return the rank (n,) of each body: those of one side of a cut, of the other, then those between; so in each side.
+    """Return the rank (n,) of each body: one side of a cut, the other, then the separator; recursively in each side.
 
     Inputs
     ------
     start : (n + 1,) int64, where the neighbours of each body begin
     near : int64, neighbours
-    along : (d, n) int64, bodies in their order along each axis, overwritten
+    along : (d, n) int64, bodies sorted along each axis, overwritten
     leaf : int64, bodies of a part that is not divided further
     """
     axes, n = along.shape

@@ -1,4 +1,4 @@
-"""Numba kernels of the multifrontal factors: assembly of fronts, and the solves forth and back."""
+"""Numba kernels of the multifrontal factors: assembly of fronts, and forward and backward substitution."""
 
 from typing import NamedTuple
 
@@ -14,9 +14,9 @@ class Layout(NamedTuple):
 
     Attributes
     ----------
-    order : (nf,) int64, fronts (groups of contacts) as they are eliminated
+    order : (nf,) int64, fronts (groups of contacts) in elimination order
     width : (nf,) int64, pivots of each front, three for each contact of its group
-    dptr, dof : int64, unknowns of each front, pivots first, the others in the order of their elimination
+    dptr, dof : int64, unknowns of each front, pivots first, the others in elimination order
     fptr, pptr : (nf+1,) int64, where the factors and the row exchanges of each front begin
     """
 
@@ -34,14 +34,14 @@ def add_into(pivot, below, update, runs, columns, block):  # pragma: no cover - 
 
     Inputs
     ------
-    runs : (nr, 3) int64, of each run of neighbouring unknowns its place in the front, its place in the block, and its
-        length; none reaches from the pivots into the rest
+    runs : (nr, 3) int64, for each run of consecutive unknowns its offset in the front, its offset in the block, and
+        its length; none crosses from the pivots into the rest
     columns : (nc, 3) int64, those of the runs whose columns are added
     block : (n, n) float64, by columns
 
     Outputs
     -------
-    pivot, below, update : (k, k+m), (m, k) and (m, m) float64, by columns: the rows of the pivots, what is below the
+    pivot, below, update : (k, k+m), (m, k) and (m, m) float64, by columns: pivot rows, rows below the
         pivots, and the rest
     """
     k = pivot.shape[0]
@@ -63,7 +63,7 @@ def add_into(pivot, below, update, runs, columns, block):  # pragma: no cover - 
 
 @njit(cache=True, fastmath={"contract"})
 def _subtract(target, columns, x):
-    """Let target -= Σ x[j] columns[j], four columns at a time, which reads and writes target once for them."""
+    """Subtract Σ x[j] columns[j] from target, four columns for each pass over it."""
     whole = len(x) - len(x) % 4
     for j in range(0, whole, 4):
         x0, x1, x2, x3 = x[j], x[j + 1], x[j + 2], x[j + 3]

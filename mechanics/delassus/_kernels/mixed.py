@@ -16,7 +16,7 @@ NONE, RIGID, ELASTIC = 0, 1, 2
 
 
 class Sides(NamedTuple):
-    """Sides of the contacts and their bodies' answers; candidates count positive, antagonists negative.
+    """Sides of the contacts and the responses of their bodies; candidates count positive, antagonists negative.
 
     Attributes
     ----------
@@ -24,7 +24,7 @@ class Sides(NamedTuple):
     kind : (nc, 2) int64, NONE, RIGID or ELASTIC
     jacobian : (nc, 2, 3, 6) float64, local velocity of a rigid side by its body's velocity
     response : (nc, 2, 6, 3) float64, body velocity by the local impulse
-    slot : (nc, 2) int64, place of an elastic side among those of its body
+    slot : (nc, 2) int64, index of an elastic side among those of its body
     yptr, bptr : (nb+1,) int64, first elastic velocity and first compliance entry of each body
     block : float64, flat symmetric compliance blocks [1/kg]
     """
@@ -73,7 +73,7 @@ def apply_delassus(r, sides):  # pragma: no cover - compiled
             sign = -1.0
     for b in range(nb):
         first, n = yptr[b], yptr[b + 1] - yptr[b]
-        # by columns, which are the rows of a symmetric block: sums side by side take half the time
+        # by columns, equal to the rows of a symmetric block: contiguous sums take half the time
         for k in range(n):
             push = p[first + k]
             if push != 0.0:
@@ -115,7 +115,7 @@ def _give_way(c, step, v, y, sides):
                 v[a, i] += dot(row(sides.response[c, s], i), step)
         elif sides.kind[c, s] == ELASTIC:
             start, size = yptr[a], yptr[a + 1] - yptr[a]
-            # the block is symmetric: rows, which lie together in memory, serve as columns
+            # the block is symmetric: rows, which are contiguous, serve as columns
             at = sides.bptr[a] + 3 * sides.slot[c, s] * size
             for k in range(size):
                 y[start + k] += dot((block[at + k], block[at + size + k], block[at + 2 * size + k]), step)
@@ -129,7 +129,7 @@ def sweep(count, r, v, y, laws, diagonal, sides):  # pragma: no cover - compiled
     Inputs
     ------
     count : int64
-    r, v, y : as in `apply_delassus`, of the same impulses
+    r, v, y : consistent, as in `apply_delassus`
     laws : Laws
     diagonal : (nc, 3, 3) float64, W_αα [1/kg]
     sides : Sides

@@ -38,8 +38,8 @@ class Running(NamedTuple):
     ----------
     impulse : (nc, 3) float64, r [N s]
     velocity : (nb, 6) float64, velocities that r gives to the bodies [m/s, rad/s]
-    path : (nb,) float64, changes of each body added up, 0 at first [m/s]
-    seen : (ng, 2) float64, path of a group's two bodies after its last solution, -∞ at first [m/s]
+    path : (nb,) float64, accumulated change of each body, 0 at first [m/s]
+    seen : (ng, 2) float64, path of a group's two bodies at its last solution, -∞ at first [m/s]
     """
 
     impulse: NDArray[np.float64]
@@ -207,14 +207,14 @@ def _slide(f, u, bn, r, mu, k):
     t1 = u[1] - w.n1 * along - h0 * r[1] - h1 * r[2]
     t2 = u[2] - w.n2 * along - h1 * r[1] - h2 * r[2]
     held = r[1] * r[1] + r[2] * r[2]
-    # λ = ‖u_T‖/‖r_T‖ where it slid before
+    # λ = ‖u_T‖/‖r_T‖ of the previous slip
     guess = np.sqrt((u[1] * u[1] + u[2] * u[2]) / held) if held > 0.0 else 0.0
     return slip(w, (bn, t1, t2), mu, k, guess)
 
 
 @njit(cache=True)
 def _moved(v, p, a):
-    """Return how much a body's velocity has changed from v (6,) to p (6), at the arm a [m/s]."""
+    """Return the change of a body's velocity from v (6,) to p (6), at the arm a [m/s]."""
     moved = abs(p[0] - v[0]) + abs(p[1] - v[1]) + abs(p[2] - v[2])
     size = abs(a[0]) + abs(a[1]) + abs(a[2])
     return moved + size * (abs(p[3] - v[3]) + abs(p[4] - v[4]) + abs(p[5] - v[5]))
@@ -222,9 +222,9 @@ def _moved(v, p, a):
 
 @njit(cache=True)
 def _solve_group(first, last, running, laws, contacts):
-    """Solve the contacts first:last, those of one pair of bodies, one after the other.
+    """Solve the contacts first:last of one pair of bodies, in order.
 
-    Returns how much the velocities of the two bodies, at the first contact, have changed.
+    Returns the changes of the velocities of both bodies at the first contact.
     """
     r, v, geometry = running.impulse, running.velocity, contacts.geometry
     shift, friction, cohesion, factors = laws
@@ -264,7 +264,7 @@ def _solve_group(first, last, running, laws, contacts):
         return 0.0, 0.0
     g = geometry[first]
     moved_i = moved_j = 0.0
-    # bodies that do not move are shared between parts: they are only read
+    # fixed bodies are shared between parts: they are only read
     if inertia_i[0] > 0.0:
         moved_i = _moved(v[i], p, arm(g, 0))
         v[i, 0], v[i, 1], v[i, 2], v[i, 3], v[i, 4], v[i, 5] = p
@@ -276,7 +276,7 @@ def _solve_group(first, last, running, laws, contacts):
 
 @njit(cache=True)
 def _visit(g, calm, running, laws, contacts, group):
-    """Solve a group unless it sleeps: its bodies have hardly changed since it was last solved.
+    """Solve a group unless it sleeps, its bodies having hardly changed since its last solution.
 
     Any change of a body beyond `calm` wakes all its groups.
     """
@@ -286,12 +286,12 @@ def _visit(g, calm, running, laws, contacts, group):
     if path[i] - seen[g, 0] + path[j] - seen[g, 1] <= calm:
         return
     moved_i, moved_j = _solve_group(start, stop, running, laws, contacts)
-    # bodies that do not move have no path: parts may share them
+    # fixed bodies have no path: parts may share them
     if moved_i > 0.0:
         path[i] += moved_i
     if moved_j > 0.0:
         path[j] += moved_j
-    # more than one contact: solved once more, the group would change again
+    # with more than one contact, solving the group again would change it
     seen[g, 0] = path[i] - (moved_i if stop - start > 1 else 0.0)
     seen[g, 1] = path[j] - (moved_j if stop - start > 1 else 0.0)
 

@@ -1,7 +1,7 @@
 """Sides of one contact between rigid bodies, in the geometry row (15,) of `RigidContacts`.
 
-Vectors and velocities are tuples (`mechanics.contact._kernels.vectors`). Sums keep the order in which they are written
-here, so that all kernels find the same bits.
+Vectors and velocities are tuples (`mechanics.contact._kernels.vectors`). Sums keep the order written here, so that all
+kernels find the same bits.
 """
 
 from numba import njit
@@ -37,7 +37,7 @@ def times(m, x):  # pragma: no cover - compiled
 
 @njit(cache=True)
 def inverse_columns(a, b, c):  # pragma: no cover - compiled
-    """Return the columns of the inverse of the matrix with rows a, b, c, times its determinant; and that."""
+    """Return the columns of the inverse of the matrix with rows a, b, c, times its determinant, and the determinant."""
     first = cross(b, c)
     return first, cross(c, a), cross(a, b), dot(a, first)
 

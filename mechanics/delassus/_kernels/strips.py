@@ -8,7 +8,7 @@ __all__ = ["cut"]
 
 @njit(cache=True)
 def cut(bodies, moving, parts, along):  # pragma: no cover - compiled
-    """Order contacts so that parts of them share no moving body, in the order of the bodies or their own.
+    """Order contacts so that parts of them share no moving body, in body order or their own.
 
     The bodies are numbered breadth first from one end of each connected assembly (Cuthill & McKee 1969). Their numbers
     are cut into strips of as many contacts each, one for each part. Contacts between strips come last.
@@ -18,23 +18,23 @@ def cut(bodies, moving, parts, along):  # pragma: no cover - compiled
     bodies : (nc, 2) int64
     moving : (nb,) bool
     parts : int64
-    along : bool, whether contacts within a part follow the numbers of their bodies; otherwise they keep their order
+    along : bool, whether contacts within a part follow the body numbers; otherwise they keep their order
 
     Outputs
     -------
     order : (nc,) int64, contacts
-    start : (parts + 2,) int64, where each part begins in that order, and the contacts between strips
+    start : (parts + 2,) int64, offset of each part in that order, and of the contacts between strips
     rank : (nb,) int64, number of each moving body; -1 of the others
     """
     nc = bodies.shape[0]
     rank = _breadth_first(bodies, moving)
-    # contacts by the later one of their bodies
+    # contacts by the larger rank of their bodies
     later, first = np.empty(nc, dtype=np.int64), np.zeros(rank.shape[0] + 1, dtype=np.int64)
     for c in range(nc):
         later[c] = max(rank[bodies[c, 0]], rank[bodies[c, 1]], 0)
         first[later[c] + 1] += 1
     first = np.cumsum(first)
-    # part k holds the bodies whose contacts begin in its share of them all
+    # part k holds the bodies whose contacts begin in its share of all contacts
     part = np.minimum(first * parts // max(nc, 1), parts - 1)
     follow, put = np.arange(nc), first.copy()
     start = np.zeros(parts + 2, dtype=np.int64)
@@ -75,7 +75,7 @@ def _breadth_first(bodies, moving):
     for body in range(nb):
         if not moving[body] or seen[body] > 0:
             continue
-        # the last one that a search finds is at an end, from which the second search begins
+        # the last body that a search reaches is peripheral; the second search begins there
         source = body
         for search in range(1, 3):
             queue[done], head, tail = source, done, done + 1

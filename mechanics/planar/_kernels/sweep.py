@@ -34,9 +34,9 @@ __all__ = [
 
 # columns of a record: n (2), κ ℓ_t of both sides, shift (2), μ, k, r (2), 1/W_NN, 1/W_TT
 _LT_I, _LT_J, _SHIFT, _MU, _K, _R, _INV_NN, _INV_TT, _COLUMNS = 2, 3, 4, 6, 7, 8, 10, 11, 12
-# contacts among which those of a group are looked for
+# contacts searched for those of a group
 _AHEAD = 64
-# groups before it whose bodies a group leaves alone where it can: the results of these are still on their way
+# preceding groups whose bodies a group avoids if it can: a gap that hides store latency
 _RECENT = 2
 
 

@@ -1,9 +1,9 @@
 """A building with closed joints under its own weight, beside the same building as it truly is.
 
 What each stone on the ground bears is compared: the vertical force from the stones on it, over the mean of all, and
-over its own. Forces between elastic stones are unique but for what friction holds, if the mesh lets a joint bear as a
-plane does. Those between rigid stones are not: where they are compared, both buildings are relaxed from rest in the
-same way; a wall with an arch in it bears otherwise by another solver, though it is the same wall.
+over its own. Forces between elastic stones are unique up to frictional self-stress, if the mesh lets a joint
+bear as a plane does. Those between rigid stones are not: where they are compared, both buildings are relaxed from rest
+in the same way; a wall with an arch in it bears otherwise by another solver, though it is the same wall.
 No stone rests on a strip of 3 cm or less: of that, noise and open joints leave anything between nothing and all.
 """
 
