@@ -1,7 +1,7 @@
 """Single-table or joined inheritance, measured: `python -m benchmarks.inheritance [--entities N] [--json]`.
 
 The same entities in four layouts of tables, on SQLite and, where a server can be started, on PostgreSQL. What came out
-is in docs/decisions/015-one-table-of-entities.md.
+is in docs/design/architectural-model.md.
 """
 
 import argparse

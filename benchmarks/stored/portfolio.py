@@ -27,7 +27,7 @@ class StoredAuto:
 
     Sweeps go on as long as, by the fall of η, they end sooner than methods that factorise would; then ADMM with a
     single factorisation, as long as η falls fast; then Newton's method on regularised problems, with sweeps between its
-    attempts (docs/decisions/021-a-portfolio-for-stored-problems.md). `Alternating` has the last word, and solves
+    attempts (docs/design/solvers.md). `Alternating` has the last word, and solves
     problems with adhesion and those of other operators.
 
     Attributes

@@ -10,7 +10,7 @@ and overlaps. A compliant joint is an elastic layer of stiffness 1/(ε h²), the
     0 ≤ u_N + g/h + ε r_N ⊥ r_N ≥ 0,      u_T + ε (r_T - r_T of the last step) in Coulomb's law
 
 so that W + ε stands for W, and stones overlap by ε h r_N = ε h² F. The gap g is signed: where forces stay the same
-nothing moves, neither across the joint nor along it (docs/decisions/034-joint-compliance.md).
+nothing moves, neither across the joint nor along it (docs/design/joints-that-yield.md).
 """
 
 from dataclasses import dataclass, replace

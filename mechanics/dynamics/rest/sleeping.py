@@ -4,7 +4,7 @@ A sleeping stone has no velocity and keeps the forces with which it fell asleep;
 Forces that lie in their cones, with u = 0, solve the contact problem of a step as far as they balance the loads, so the
 error is known: the force and moment by which a sleeping stone is out of balance. Where that exceeds the scene's
 `sleep`, over the stone's weight, the stone is woken within the same step, with those around it, and the step is solved
-again. So no step ends with a sleeping stone that is further out of balance (docs/decisions/027-sleeping.md).
+again. So no step ends with a sleeping stone that is further out of balance (docs/design/rest-and-verdicts.md).
 """
 
 from dataclasses import replace

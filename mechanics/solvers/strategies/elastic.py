@@ -29,8 +29,8 @@ class Elastic:
 
     ADMM factorises once for as long as contacts persist, so where little changes from step to step a few of its cheap
     iterations suffice, and where they do not, Newton's method, with which the interior point begins, ends it. The
-    interior point factorises in each of some 30 iterations, whatever the state (docs/decisions/010-interior-point.md
-    and 035-elastic-factors.md have the measurements). Warped stones that settle ask for more now and then: cone
+    interior point factorises in each of some 30 iterations, whatever the state (docs/design/solvers.md has
+    measurements). Warped stones that settle ask for more now and then: cone
     programmes, slow and sure, solve what neither did. Where most stones are rigid, `Mixed` comes before all of them.
 
     Attributes

@@ -37,7 +37,7 @@ class Mixed:
     In a step of some milliseconds a deformable stone yields by a thousandth of what it moves as a whole. Newton's
     method on the natural map, which ends the path between elastic stones, wanders between rigid ones that touch in
     more points than they need, so the path is followed until the laws hold
-    (docs/decisions/069-deformable-stones-in-a-rigid-rest.md has the measurements).
+    (docs/design/solvers.md has measurements).
 
     Attributes
     ----------

@@ -46,7 +46,7 @@ class Planar:
     and small heaps. Compiled ADMM follows, from where the last step ended: it solves heaps that settle, and gets slow
     flows of thousands of disks, with a larger penalty, farther than any other method. Stacks, and heavy disks on light
     ones, need ADMM with a balanced penalty, or Newton's method.
-    docs/decisions/036-plane-sweeps.md has the measurements.
+    docs/design/disks.md has measurements.
 
     Attributes
     ----------

@@ -146,7 +146,7 @@ class Alternating:
     of 300 bodies and more ADMM on their velocities comes next, and then, or at once of fewer, the interior point, which
     converges whatever the height, the masses and the redundancy; in a motion, ADMM
     with a balanced penalty first. Methods that factorise work in units in which all contacts yield alike
-    (`equilibrated`). docs/decisions/006-alternating-solver.md and 022-tall-and-heavy.md have the measurements.
+    (`equilibrated`). docs/design/solvers.md has measurements.
 
     Attributes
     ----------
