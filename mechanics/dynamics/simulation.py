@@ -8,9 +8,10 @@ import numpy as np
 
 from mechanics.arrays import Array, Bools
 from mechanics.carried import Carried, Carrier
-from mechanics.dynamics.contact_problem import JointCompliance, contact_problem, shifted, unshifted
+from mechanics.dynamics.contact_problem import contact_problem, shifted, unshifted
 from mechanics.dynamics.contact_search import ContactSearch, Detection
 from mechanics.dynamics.handover import Beginning, Handover, of_run
+from mechanics.dynamics.joint_compliance import SOFTNESS, JointCompliance, may_yield
 from mechanics.dynamics.observers.energy import kinetic_energy
 from mechanics.dynamics.progress import Clock
 from mechanics.dynamics.rest.relaxation import Relaxation, halted
@@ -22,7 +23,8 @@ from mechanics.model.model import Model
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.scene.laws.law import Approach
 from mechanics.scene.state import State
-from mechanics.solvers.choice import Solver, Solvers, choose_solvers
+from mechanics.solvers.chain import Solver
+from mechanics.solvers.choice import choose_solver
 from moma.errors import SolverError
 
 __all__ = ["Simulation"]
@@ -51,7 +53,7 @@ class Simulation(Carrier):
 
     CARRIED = ("_first", "_freed", "_joints", "_memory", "_relax", "_sleepers", "cold", "state")
     REBUILT = (
-        "_begin", "_compliance", "_detect", "_solvers", "_step", "_theta", "clock", "model", "start",
+        "_begin", "_compliance", "_detect", "_may_yield", "_solve", "_step", "_theta", "clock", "model", "start",
     )  # fmt: skip
 
     def __init__(
@@ -70,9 +72,9 @@ class Simulation(Carrier):
             self._compliance = compliances(model, self._step, self._theta)
         bed = begin.bed(model)
         self._detect = ContactSearch(model, self._compliance, self.clock, fresh_contacts, elastic_scale, bed)
-        counts = int(model.elastic.sum()), int(model.inertia.moving.sum())
-        chosen = choose_solvers(model.scene.solver, *counts, model.scene.time, model.laws.sprung)
-        self._solvers = chosen if solver is None else Solvers(solver)
+        deforms, sprung = bool(model.elastic.any()), model.laws.sprung
+        self._solve = solver or choose_solver(model.scene.solver, deforms, sprung, model.scene.time.duration)
+        self._may_yield = solver is None and may_yield(model)
         self._joints = JointCompliance(lasting=model.mostly_rigid)
         self._relax = Relaxation(model)
         self._memory = begin.memory or Memory(follows=not model.scene.time.relaxation)
@@ -203,44 +205,34 @@ class Simulation(Carrier):
 
     def _solved(self, given: _Given, warm: ContactStart) -> _Solved:
         """Return the problem of a step and its solution: with rigid joints, or compliant ones where these fail."""
-        solvers, joints = self._solvers, self._joints
+        joints, rigid = self._joints, None
         if joints.rigid:
-            alone = not solvers.compliant or joints.left < 0
-            # rigid joints can bear the forces of a rest that are forgotten, if only they are found
-            first = joints.value == 0 or not warm.impulse.any()
-            solver = solvers.usual if alone else solvers.early if first else solvers.brief
-            found = self._try(given, joints, solver, warm, warm)
-            if found[2].converged or alone:
+            rigid = self._try(given, joints, warm, warm)
+            if rigid[2].converged or not self._may_yield or joints.left < 0:
                 self._joints = joints.passed()
-                return found
-            joints = joints.needed(found[0].delassus, self.model.scene.solver.joint_compliance)
+                return rigid
+            joints = joints.needed(rigid[0].delassus, self.model.scene.solver.joint_compliance)
         begin = warm
-        for factor, solver in solvers.compliant:
+        for factor in SOFTNESS:
             if factor < joints.softness:
-                # so soft they could not be solved in the last step
+                # so hard they could not be solved in the last step
                 continue
-            problem, approach, solution = self._try(given, joints.softer(factor), solver, warm, begin)
+            problem, approach, solution = self._try(given, joints.softer(factor), warm, begin)
             if solution.converged:
                 self._joints = joints.used(factor)
                 return problem, approach, solution
             begin = ContactStart(unshifted(problem, solution.impulse), solution.velocity)
         self._joints = self._joints.failed()
-        return self._try(given, self._joints, solvers.usual, warm, warm)
+        return rigid or self._try(given, self._joints, warm, warm)
 
     def _try(
-        self,
-        given: _Given,
-        joints: JointCompliance,
-        solver: Solver | None,
-        warm: ContactStart,
-        begin: ContactStart,
+        self, given: _Given, joints: JointCompliance, warm: ContactStart, begin: ContactStart
     ) -> _Solved:
         """State the problem after a step with the impulses of `warm`, and solve it from `begin`."""
-        assert solver is not None
         with self.clock("assemble"):
             problem, approach = contact_problem(self.model, *given, joints, warm.impulse)
         with self.clock("solve"):
-            return problem, approach, solver(problem, shifted(problem, begin))
+            return problem, approach, self._solve(problem, shifted(problem, begin))
 
     def _conclude(self, step: Step) -> Step:
         """Remember a step for the next one, and halt the bodies that relaxation or sleep halts after it."""

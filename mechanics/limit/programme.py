@@ -14,7 +14,6 @@ from scipy.sparse import block_array, csc_array, csr_array, diags_array, vstack
 
 from mechanics.arrays import Array
 from mechanics.limit.assembly import Assembly, Strength
-from mechanics.solvers.second_order.cone_program import load_clarabel
 from moma.errors import SolverError
 
 __all__ = ["Answer", "Ending", "Programme"]
@@ -203,7 +202,8 @@ class Programme:
 
         What cannot be solved roughly is solved with care.
         """
-        clarabel = load_clarabel("limit load", "pip install clarabel")
+        import clarabel
+
         first = clarabel.ZeroConeT if kind == "zero" else clarabel.NonnegativeConeT
         settings = clarabel.DefaultSettings()
         settings.verbose, settings.max_threads = False, 1

@@ -255,10 +255,8 @@ class Method(StrEnum):
     AUTO = "auto"
     NSGS = "nsgs"
     ADMM = "admm"
-    APGD = "apgd"
     INTERIOR_POINT = "interior-point"
     NEWTON = "newton"
-    CONE = "cone"
 
 
 @dataclass(frozen=True)
@@ -274,8 +272,7 @@ class SolverSettings:
     method: Annotated[
         Method,
         Setting(
-            "auto chooses; nsgs: Gauss–Seidel; admm: alternating directions; apgd: accelerated gradients; "
-            "interior-point; newton; cone: cone programmes, the reference."
+            "auto chooses; nsgs: Gauss–Seidel; admm: alternating directions between rigid stones; interior-point; newton."
         ),
     ] = Method.AUTO
     tolerance: Annotated[

@@ -23,7 +23,7 @@ from mechanics.solvers._kernels.body_parts import Parts, parts_of
 from mechanics.solvers.first_order.body_factors import factorise
 from moma.errors import SolverError
 
-__all__ = ["BodyADMM", "Stage"]
+__all__ = ["STAGES", "BodyADMM", "Stage"]
 
 
 # overshoot of the impulses [-]

@@ -1,0 +1,77 @@
+"""Automatic choice: the chain of the kind of problem, at rest or in motion."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
+from mechanics.problem.residual import residual
+from mechanics.solvers.chain import KEPT, follow
+from mechanics.solvers.kinds import POLISH, chain_of
+
+__all__ = ["Auto"]
+
+# steps without any slip after which chains of rest are tried again; where they fail, they cost as much as one step
+_MOTION = 20
+# loosest tolerances of a motion, of velocities and of η: beyond, contacts no longer obey their laws [-]
+_LOOSEST, _LOOSEST_MAP = 0.025, 1e-2
+# velocity of a contact that moves, over the velocity tolerance, and over the fastest u_free, at most [-]
+_MOVES, _MOST = 10.0, 1e-2
+
+
+@dataclass(frozen=True)
+class Auto:
+    """Solver of every kind of problem: forces of the last step where they solve it still, else its chain.
+
+    Attributes
+    ----------
+    tolerance, velocity_tolerance : as in `NSGS`
+    max_iterations : of all methods together
+    motion_speed : velocity by which contacts may break their laws in the steps of a motion [m/s]; None: as in others
+    """
+
+    tolerance: float = 1e-6
+    velocity_tolerance: float = 1e-5
+    max_iterations: int = 2000
+    motion_speed: float | None = None
+
+    def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
+        """Solve from `start`; `why` of the solution names the method, and what the one before left."""
+        limits, most = (self.tolerance, self.velocity_tolerance), self.max_iterations
+        if len(start.impulse) == 0:
+            return ContactSolution(start.impulse, start.velocity, 0, 0.0, True, "nothing: no contacts")
+        warm, steps = bool(start.impulse.any()), start.motion
+        if warm and not steps:
+            left = residual(problem, start.impulse)
+            if left.within(*limits):
+                return ContactSolution(start.impulse.copy(), left.dual, 0, left.natural_map, True, KEPT)
+        follows = steps is not None and problem.delassus.rigid is not None
+        # a motion that has long been still may have come to rest: one step brakes it, one finds its forces
+        moving = warm and follows and steps not in (1, 2)
+        asked = self._in_motion(problem) if moving else limits
+        links = chain_of(problem, follows, moving, asked[1])
+        found = follow(links, problem, start, asked, most)
+        if not follows or steps is None:
+            return found
+        if not (found.converged and self._rests(problem, found)):
+            return replace(found, motion=_MOTION)
+        if not moving:
+            # what forces lack that are kept for hundreds of steps would add up
+            exact = follow((POLISH,), problem, ContactStart(found.impulse, found.velocity), limits, most)
+            found = replace(exact, iterations=found.iterations + exact.iterations, why=found.why)
+        return replace(found, motion=steps - 1 if steps else _MOTION * warm)
+
+    def _in_motion(self, problem: ContactProblem) -> tuple[float, float]:
+        """Return the tolerances of a step of a motion, of η and of velocities."""
+        pace = float(np.abs(problem.u_free).max())
+        if self.motion_speed is None or pace == 0.0:
+            return self.tolerance, self.velocity_tolerance
+        velocity = min(max(self.motion_speed / pace, self.velocity_tolerance), _LOOSEST)
+        # η says next to nothing of a motion: the forces of the step before have one of 10⁻⁴
+        return max(self.tolerance, min(velocity, _LOOSEST_MAP)), velocity
+
+    def _rests(self, problem: ContactProblem, found: ContactSolution) -> bool:
+        """Return whether no contact moves, neither one that carries a force nor one that opens."""
+        u = problem.delassus.apply(found.impulse) + problem.u_free
+        pace = min(_MOVES * self.velocity_tolerance, _MOST) * float(np.abs(problem.u_free).max())
+        return bool(np.abs(u).max() <= pace)

@@ -1,0 +1,113 @@
+"""Chain of methods: the one driver of every automatic choice.
+
+A link is a method, its budget of iterations, and where it starts. The links are tried in order until one has solved the
+problem; the best iterate so far is kept, iterations are counted, and the reason stated here alone.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from enum import Enum, auto
+from typing import Protocol
+
+import numpy as np
+
+from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
+from mechanics.problem.residual import residual
+from moma.errors import SolverError
+
+__all__ = ["KEPT", "Begin", "Link", "Solver", "follow"]
+
+KEPT = "forces of the last step"
+"""Reason of a solution that no method had to find."""
+
+
+class Solver(Protocol):
+    """Solver of contact problems."""
+
+    def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
+        """Solve from `start`."""
+
+
+class Begin(Enum):
+    """Start of a link."""
+
+    GIVEN = auto()  # forces of the last step
+    AHEAD = auto()  # forces of the last two steps, extrapolated
+    NOTHING = auto()  # no force
+    BEST = auto()  # best iterate of the links before
+
+
+@dataclass(frozen=True)
+class Link:
+    """One method of a chain.
+
+    Attributes
+    ----------
+    name : of the method, as the solution states it
+    method : solver from a tolerance of η, of velocities, and a number of iterations
+    iterations : at most
+    begin : where it starts
+    further : tolerances over those asked for; going further costs little and spares later steps their work [-]
+    near : η of the best iterate from which it is too far for the method [-]
+    """
+
+    name: str
+    method: Callable[[float, float, int], Solver]
+    iterations: int
+    begin: Begin = Begin.BEST
+    further: float = 1.0
+    near: float = np.inf
+
+
+def follow(
+    links: Sequence[Link],
+    problem: ContactProblem,
+    start: ContactStart,
+    limits: tuple[float, float],
+    most: int,
+) -> ContactSolution:
+    """Try the links in order until one solves the problem; return the best iterate of all.
+
+    Parameters
+    ----------
+    limits : tolerances of η and of velocities [-]
+    most : iterations of all links together
+    """
+    left = residual(problem, start.impulse)
+    best = ContactSolution(start.impulse.copy(), left.dual, 0, left.natural_map, left.within(*limits), KEPT)
+    before, count = "warm start" if start.impulse.any() else "cold start", 0
+    for link in links:
+        if count >= most:
+            break
+        if best.natural_map > link.near:
+            continue
+        tight = link.further * limits[0], link.further * limits[1]
+        solver = link.method(*tight, min(link.iterations, most - count))
+        try:
+            found = solver(problem, _begun(link.begin, start, best))
+        except SolverError as error:
+            before = f"{link.name} failed: {error.what}"
+            continue
+        count += found.iterations
+        left = residual(problem, found.impulse)
+        found = replace(
+            found,
+            natural_map=left.natural_map,
+            converged=left.within(*limits),
+            why=f"{link.name}: {before}",
+        )
+        before = f"{link.name} stood at η {found.natural_map:.0e}"
+        best = min(found, best, key=lambda one: (not one.converged, one.natural_map))
+        if best.converged:
+            break
+    return replace(best, iterations=count)
+
+
+def _begun(begin: Begin, start: ContactStart, best: ContactSolution) -> ContactStart:
+    if begin is Begin.BEST:
+        return ContactStart(best.impulse, best.velocity)
+    if begin is Begin.NOTHING:
+        return ContactStart(np.zeros_like(start.impulse), np.zeros_like(start.velocity))
+    if begin is Begin.AHEAD and start.ahead is not None:
+        return start.ahead
+    return start

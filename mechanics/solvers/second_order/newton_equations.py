@@ -1,0 +1,207 @@
+"""Equations of a step of Newton's method: those of rigid bodies, of bodies of which some deform, or of W itself.
+
+    A Δr + B (W + α) Δr = -F
+
+Between rigid bodies they are those of the bodies' velocities, however many contacts two of them share
+(mechanics/solvers/_kernels/body_newton.py). Where bodies deform, W is that of rigid ones and what they yield, of which
+the diagonal alone is a compliance of the joints: the equations with that lead a Krylov method (GMRES, Saad & Schultz
+1986) to the step within some five products with W. Factors that only lead may be of single precision, and those of an
+earlier step as long as next to no contact has changed since. Where most bodies deform, W + B⁻¹ A + α is factorised.
+"""
+
+from typing import Protocol
+
+import numpy as np
+from scipy.sparse.linalg import LinearOperator, gmres
+
+from mechanics.arrays import Array, Ints
+from mechanics.delassus.compliant import CompliantDelassus, simplified
+from mechanics.delassus.elimination import elimination
+from mechanics.problem.forms import Form
+from mechanics.problem.problem import ContactProblem, Delassus, RigidContacts
+from mechanics.solvers._kernels import body_newton as bodies
+from mechanics.solvers.second_order.sparse_blocks import SparseBlocks
+from moma.errors import SolverError
+
+__all__ = ["Equations", "equations_of"]
+
+
+# error to which the equations of bodies that deform are solved, over their right side [-], and most products with W
+_INEXACT, _PRODUCTS = 1e-2, 30
+# change of a contact's derivatives that makes it unlike before [-], contacts that may be so while the factors of an
+# earlier step lead, most products with W that those took when they were new, and then, which take as long as a
+# factorisation and the products after it
+_UNLIKE, _TURNED, _NEW, _AGAIN = 0.3, 3, 6, 12
+# part of ρ added to B, which keeps it invertible where a contact is open [-]
+_SOFT = 1e-7
+
+
+class Equations(Protocol):
+    """Linear equations of a step."""
+
+    def step(self, first: Array, second: Array, error: Array, alpha: float) -> Array | None:
+        """Return Δr (nc, 3) from A, B and F; None if the equations are singular."""
+
+
+def equations_of(problem: ContactProblem, rho: Array) -> Equations:
+    """Return the equations of a problem; ρ (nc, 2) are those of Alart and Curnier [kg].
+
+    Raises
+    ------
+    SolverError : if W is known by its products alone
+    """
+    operator = problem.delassus
+    if operator.rigid is not None:
+        return _BodyEquations(operator.rigid, operator.joint_compliance)
+    # joints that do not yield leave W singular between rigid stones: factors in simple terms would lead astray
+    if operator.mostly_rigid and operator.joint_compliance is not None:
+        simple = simplified(operator)
+        if simple is not None:
+            return _YieldingEquations(operator, simple)
+    return _FormEquations(problem.form("Newton's method"), rho)
+
+
+class _FormEquations:
+    """Equations of the impulses, (W + B⁻¹ A + α) Δr = -B⁻¹ F."""
+
+    def __init__(self, form: Form, rho: Array) -> None:
+        self._form, self._rho = form, rho
+
+    def step(self, first: Array, second: Array, error: Array, alpha: float) -> Array | None:
+        """Return Δr (nc, 3); None if the equations are singular."""
+        unit = np.eye(error.shape[1])
+        inverse = np.linalg.inv(second + _SOFT * self._rho[:, [0, 1, 1]][:, : len(unit), None] * unit)
+        theta, right = inverse @ first + alpha * unit, -np.einsum("cij,cj->ci", inverse, error)
+        try:
+            return self._form.shifted(theta)(right.ravel()).reshape(error.shape)
+        except SolverError:
+            return None
+
+
+class _BodyEquations:
+    """Equations of the bodies' velocities: pattern, matrix, factors."""
+
+    _single = False  # precision of the factors
+
+    def __init__(self, contacts: RigidContacts, compliance: Array | None) -> None:
+        self._contacts, inertia = contacts, contacts.inertia
+        self._compliance = np.zeros((len(contacts.body), 3)) if compliance is None else compliance
+        moving = np.flatnonzero(inertia[:, 0] > 0)
+        place = np.full(len(inertia), -1)
+        place[moving] = np.arange(len(moving))
+        own = np.zeros((len(moving), 2, 3, 3))
+        own[:, 0] = np.eye(3) / inertia[moving, 0][:, None, None]
+        upper = inertia[moving][:, [1, 2, 3, 2, 4, 5, 3, 5, 6]].reshape(-1, 3, 3)
+        own[:, 1] = np.linalg.inv(upper)
+        side = place[contacts.body]
+        blocks, width, indices, indptr = _pattern(side, len(moving))
+        self._blocks = bodies.BodyBlocks(place, blocks, own, width)
+        nc = len(contacts.body)
+        self._inverse, self._gain = np.empty((2, nc, 3, 3))
+        self._value = np.empty((len(indices), 3, 3))
+        rank = elimination(side[(side >= 0).all(axis=1)], moving, contacts.centre)
+        self._factors = SparseBlocks(indices, indptr, (2 * rank[:, None] + np.arange(2)).ravel())
+
+    def step(self, first: Array, second: Array, error: Array, alpha: float) -> Array | None:
+        """Return Δr (nc, 3); None if the equations are singular."""
+        return self._solve(second, error) if self._factorise(first, second, alpha) else None
+
+    def _factorise(self, first: Array, second: Array, alpha: float) -> bool:
+        if not bodies.inverse_blocks(first, second, alpha + self._compliance, self._inverse, self._gain):
+            return False
+        bodies.body_matrix(self._contacts, self._gain, self._blocks, self._value)
+        if not self._single:
+            return self._factors.factorise(self._value)
+        with np.errstate(over="ignore"):
+            return self._factors.factorise(self._value.astype(np.float32))
+
+    def _solve(self, second: Array, error: Array) -> Array:
+        contacts, place = self._contacts, self._blocks.place
+        velocity, step = np.empty((2 * len(self._blocks.own), 3)), np.empty_like(error)
+        bodies.body_load(contacts, self._inverse, error, place, velocity)
+        self._factors.solve(velocity)
+        bodies.contact_step(contacts, self._inverse, second, error, place, velocity, step)
+        return step
+
+
+class _YieldingEquations(_BodyEquations):
+    """Equations of bodies of which some deform, A Δr + B (W + α) Δr = -error, led by those of W in simple terms."""
+
+    def __init__(self, operator: Delassus, simple: CompliantDelassus) -> None:
+        assert simple.rigid is not None
+        super().__init__(simple.rigid, simple.joint_compliance)
+        self._operator = operator
+        self._led: tuple[Array, Array] | None = None
+        self._lasts = True
+        self._single = True
+
+    def step(self, first: Array, second: Array, error: Array, alpha: float) -> Array | None:
+        """Return Δr (nc, 3); None if the equations are singular."""
+        if self._lasts and self._led is not None and _turned(self._led[0], first) <= _TURNED:
+            found, products = self._found(first, second, error, alpha, _AGAIN)
+            if products <= _AGAIN:
+                return found
+            self._lasts = False
+        self._led = None
+        if self._factorise(first, second, alpha):
+            self._led = first.copy(), second.copy()
+            found, products = self._found(first, second, error, alpha, _PRODUCTS)
+            self._lasts &= products <= _NEW
+            # the matrix may be too badly conditioned for single precision, as where joints hardly yield
+            self._single &= products <= _PRODUCTS
+            return found
+        if not self._single:
+            return None
+        self._single = False
+        return self.step(first, second, error, alpha)
+
+    def _found(self, first: Array, second: Array, error: Array, alpha: float, most: int) -> tuple[Array, int]:
+        """Return Δr (nc, 3) and the products that it took; one more than `most` where these did not suffice."""
+        assert self._led is not None
+        leading, made = self._led[1], 0
+
+        def before(y: Array) -> Array:
+            return self._solve(leading, -y.reshape(-1, 3))
+
+        def product(y: Array) -> Array:
+            nonlocal made
+            made += 1
+            r = before(y)
+            u = self._operator.apply(r) + alpha * r
+            both: Array = np.matmul(first, r[:, :, None]) + np.matmul(second, u[:, :, None])
+            return both.ravel()
+
+        equations = LinearOperator((error.size, error.size), matvec=product, dtype=float)
+        y, unsolved = gmres(equations, -error.ravel(), rtol=_INEXACT, restart=most, maxiter=1)
+        # the last product checks what the others found
+        return before(y), min(made, most) if unsolved == 0 else most + 1
+
+
+def _turned(old: Array, new: Array) -> int:
+    """Return the number of contacts that open, slide or stick unlike before, by derivatives (nc, 3, 3) for impulses."""
+    return int(np.count_nonzero(np.abs(new - old).max(axis=(1, 2)) > _UNLIKE))
+
+
+def _pattern(side: Ints, count: int) -> tuple[Ints, Ints, Ints, Ints]:
+    """Return `blocks` and `width` of `BodyBlocks`, and the block rows (indices, indptr) of all bodies.
+
+    `side` (nc, 2) are the places of the bodies of each contact among the `count` that move.
+    """
+    s, t = np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1])
+    row, column = side[:, s], side[:, t]
+    known = (row >= 0) & (column >= 0)
+    own = np.arange(count) * (count + 1)
+    keys, where = np.unique(np.concatenate([own, (row * count + column)[known]]), return_inverse=True)
+    degree = np.bincount(keys // count, minlength=count)
+    before = np.concatenate([[0], np.cumsum(degree)[:-1]]).astype(np.int64)
+    within = np.arange(len(keys)) - before[keys // count]
+    at = 4 * before[keys // count] + 2 * within
+    blocks = np.full((len(side), 4), -1)
+    blocks[known] = at[where[count:]]
+    width = np.column_stack([2 * degree, at[where[:count]]]).astype(np.int64)
+    columns = 2 * (keys % count)
+    both = np.column_stack([columns, columns + 1]).ravel()
+    parts = np.split(both, 2 * before[1:])
+    indices = np.concatenate([part for part in parts for _ in range(2)]).astype(np.int64)
+    indptr = np.concatenate([[0], np.cumsum(np.repeat(2 * degree, 2))]).astype(np.int64)
+    return blocks, width, indices, indptr
