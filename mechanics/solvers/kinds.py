@@ -116,8 +116,10 @@ _SPRINGS_OF_SOME = (
     *_SPRINGS[1:],
 )
 _DEFORMABLE = (
-    Link("Newton", Newton, 20, Begin.GIVEN),
+    Link("Newton", Newton, 20, Begin.GIVEN, near=_NEARER),
     replace(_PATH, iterations=100),
+    _NEWTON,
+    replace(_PATH, iterations=100, begin=Begin.BEST),
     _NEWTON,
 )
 # between rigid stones Newton's method wanders, so the path is followed until the laws hold, again from where it stalled

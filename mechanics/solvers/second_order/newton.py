@@ -14,7 +14,7 @@ import numpy as np
 
 from mechanics.arrays import Array
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
-from mechanics.problem.residual import Residual, project_on_cone, residual
+from mechanics.problem.residual import Residual, residual
 from mechanics.solvers._kernels.body_newton import alart_curnier
 from mechanics.solvers.second_order.newton_equations import Equations, equations_of
 from mechanics.solvers.second_order.scaling import solved_evenly
@@ -125,15 +125,14 @@ class _Run:
 
         At rest without impulses only the lowest contact is seen to be pressed, and each step would find one more.
         """
-        problem = self._problem
         self._first[:], self._second[:] = 0.0, np.eye(3)
         step = self._system.step(self._first, self._second, self._free, _HOLD * self._scale)
         if step is None:
             return
         self.iterations += 1
-        held = project_on_cone(step, problem.friction, problem.cohesion)
+        # not projected on the cones, which would break the balance: it tells the states apart
         self._merits.clear()
-        self._take(held, residual(problem, held))
+        self._take(step, residual(self._problem, step))
 
     def step(self) -> bool:
         """Make one step of Newton's method; return whether there was one."""
