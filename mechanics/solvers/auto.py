@@ -12,7 +12,7 @@ from mechanics.solvers.kinds import POLISH, chain_of
 __all__ = ["Auto"]
 
 # steps without any slip after which chains of rest are tried again; where they fail, they cost as much as one step
-_MOTION = 20
+_MOTION = 40
 # loosest tolerances of a motion, of velocities and of η: beyond, contacts no longer obey their laws [-]
 _LOOSEST, _LOOSEST_MAP = 0.025, 1e-2
 # velocity of a contact that moves, over the velocity tolerance, and over the fastest u_free, at most [-]

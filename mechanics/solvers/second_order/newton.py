@@ -40,6 +40,8 @@ _MEMORY = 5
 _GAIN = 1e-4
 # shortest part of a step [-]
 _SHORTEST = 1e-3
+# steps with the least α that may gain nothing
+_IDLE = 1
 _SPACE = 3  # components of an impulse in space
 
 
@@ -71,15 +73,18 @@ class Newton:
     def _solved(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         limits = self.tolerance, self.velocity_tolerance
         run = _Run(problem, start.impulse)
-        best = run.left, run.r
+        best, idle = (run.left, run.r), 0
         if not run.left.within(*limits) and not start.impulse.any():
             run.hold()
-        while not run.left.within(*limits) and run.iterations < self.max_iterations and run.step():
-            if run.left.natural_map < best[0].natural_map:
-                best = run.left, run.r
-        if run.left.natural_map < best[0].natural_map:
-            best = run.left, run.r
-        left, impulse = best
+        while True:
+            gains = run.left.natural_map < best[0].natural_map
+            best = (run.left, run.r) if gains else best
+            # where α is least each step gains until rounding wins
+            idle = 0 if gains or not run.exact else idle + 1
+            solved = run.left.within(*limits)
+            if solved or idle > _IDLE or run.iterations >= self.max_iterations or not run.step():
+                break
+        left, impulse = (run.left, run.r) if run.left.within(*limits) else best
         return ContactSolution(impulse, left.dual, run.iterations, left.natural_map, left.within(*limits))
 
 
@@ -91,9 +96,11 @@ class _Run:
     r : (nc, 3) impulses [N s]
     left : their residual
     iterations : steps so far
+    exact : the last one had the least α
     """
 
     def __init__(self, problem: ContactProblem, impulse: Array) -> None:
+        self.exact = False
         self._problem, self._delassus = problem, problem.delassus
         self._free = problem.biased
         self._scale = problem.delassus.scale
@@ -136,7 +143,9 @@ class _Run:
 
     def step(self) -> bool:
         """Make one step of Newton's method; return whether there was one."""
-        alpha = max(self._share * min(self.left.natural_map, 1.0), _LEAST) * self._scale
+        alpha = max(self._share * min(self.left.natural_map, 1.0), _LEAST)
+        self.exact = alpha == _LEAST
+        alpha *= self._scale
         step = self._system.step(self._first, self._second, self._error, alpha)
         if step is None:
             return False
