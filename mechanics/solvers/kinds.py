@@ -67,7 +67,11 @@ POLISH = replace(_newton, further=_EXACT)
 _REST = (replace(POLISH, begin=Begin.GIVEN), replace(_admm, begin=Begin.GIVEN), _newton, _path, _newton)
 _REST_OF_SOME = (replace(_admm, method=_rest, begin=Begin.GIVEN), _newton, _path, _newton)
 _REST_OF_MANY = (replace(_endless, method=_rest, begin=Begin.GIVEN),)
-_MOTION = (replace(_admm, method=_motion, begin=Begin.AHEAD), *(3 * (replace(_newton, iterations=100), _admm)), _path)
+_MOTION = (
+    replace(_admm, method=_motion, begin=Begin.AHEAD),
+    *(3 * (replace(_newton, iterations=100), _admm)),
+    _path,
+)
 # errors that are allowed would be extrapolated with the rest
 _LOOSE_MOTION = (replace(_endless, method=_loosely, begin=Begin.GIVEN),)
 _MOTION_OF_MANY = (replace(_endless, begin=Begin.AHEAD),)
@@ -75,7 +79,7 @@ _SOFTER = Link("Newton from softer joints", SofterJoints, 150, Begin.GIVEN, _EXA
 _SPRINGS = (replace(POLISH, begin=Begin.GIVEN), _SOFTER, _path)
 _SPRINGS_OF_SOME = (replace(_admm, begin=Begin.GIVEN), POLISH, _SOFTER, _path)
 _DEFORMABLE = (
-    replace(_newton, begin=Begin.GIVEN, near=_NEARER, further=1.0),
+    replace(_newton, method=partial(Newton, hopeless=0.3), begin=Begin.GIVEN, further=1.0),
     *(_path, _newton),
     *(_from_best, _newton),
 )

@@ -24,8 +24,12 @@ __all__ = ["Newton"]
 
 # α over η and the scale of W, at first and at least [-]
 _SHARE = 0.1
-# α over the scale of W while a cold start holds every contact [-]
+# η from which the contacts that bear are held first [-]
+_FAR = 0.3
+# α over the scale of W meanwhile [-]
 _HOLD = 1e-4
+# impulse over the largest from which a contact bears [-]
+_BEARS = 1e-6
 # smallest α over the scale of W; below it rounding keeps η at 10⁻⁹ [-]
 _LEAST = 1e-8
 # part of a step below which α counts as too small [-]
@@ -53,11 +57,13 @@ class Newton:
     ----------
     tolerance, velocity_tolerance : as in `NSGS`
     max_iterations : limit of the steps, with a factorisation each as a rule
+    hopeless : η from which it gives up, as its steps would wander [-]
     """
 
     tolerance: float = 1e-6
     velocity_tolerance: float = 1e-5
     max_iterations: int = 100
+    hopeless: float = np.inf
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from the impulses of `start`; return the best of all iterates.
@@ -74,9 +80,9 @@ class Newton:
         limits = self.tolerance, self.velocity_tolerance
         run = _Run(problem, start.impulse)
         best, idle = (run.left, run.r), 0
-        if not run.left.within(*limits) and not start.impulse.any():
+        if run.left.natural_map > _FAR:
             run.hold()
-        while True:
+        while run.left.natural_map <= self.hopeless:
             gains = run.left.natural_map < best[0].natural_map
             best = (run.left, run.r) if gains else best
             # where α is least each step gains until rounding wins
@@ -128,18 +134,23 @@ class _Run:
         return equations_of(self._problem, self._rho)
 
     def hold(self) -> None:
-        """Begin as if every contact held.
+        """Begin as if each contact that bears held with a little compliance: all of them from nothing.
 
-        At rest without impulses only the lowest contact is seen to be pressed, and each step would find one more.
+        At rest without impulses only the lowest contact is seen to be pressed, and each step would find one more. In a
+        later step of 1 s the impulses are right, but whole stones would fly off by the next to nothing that these lack.
         """
-        self._first[:], self._second[:] = 0.0, np.eye(3)
-        step = self._system.step(self._first, self._second, self._free, _HOLD * self._scale)
+        size = np.sqrt((self.r**2).sum(axis=1))
+        bears = (size >= _BEARS * size.max())[:, None]
+        unit = np.eye(self.r.shape[1])
+        self._first[:], self._second[:] = ~bears[:, :, None] * unit, bears[:, :, None] * unit
+        step = self._system.step(self._first, self._second, bears * self._u, _HOLD * self._scale)
         if step is None:
             return
         self.iterations += 1
         # not projected on the cones, which would break the balance: it tells the states apart
         self._merits.clear()
-        self._take(step, residual(self._problem, step))
+        impulse = self.r + step
+        self._take(impulse, residual(self._problem, impulse))
 
     def step(self) -> bool:
         """Make one step of Newton's method; return whether there was one."""
