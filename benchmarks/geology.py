@@ -98,7 +98,7 @@ class _Case:
 
 
 # radii of the fold of Renouf, Dubois & Alart (2006), and as far apart as in most of the literature [m]
-_FOLD, _GRADED = {"smallest": 0.42, "largest": 0.56}, {"smallest": 0.3, "largest": 0.66}
+_EVEN, _GRADED = {"smallest": 0.42, "largest": 0.56}, {"smallest": 0.3, "largest": 0.66}
 _DENSE, _LOOSE = {"falling_friction": 0.05}, {"falling_friction": 0.4}
 _ROLLING, _BLOCKED = {"friction": 0.4}, {"rolling": False, "friction": 0.5}
 
@@ -116,13 +116,13 @@ def _cases() -> tuple[_Case, ...]:
     biaxial, heap = (_with(_shipped(name), contact=_ROLLING) for name in ("biaxial", "repose"))
     stiff = "0.42 to 0.56 m, cannot turn, μ = 0.5"
     return (
-        _Case("friction", "fold", "0.42 to 0.56 m", "biaxial", _with(biaxial, sample=_FOLD | _LOOSE)),
+        _Case("friction", "fold", "0.42 to 0.56 m", "biaxial", _with(biaxial, sample=_EVEN | _LOOSE)),
         _Case(
             "friction",
             "fold-dense",
             "0.42 to 0.56 m, dense",
             "biaxial",
-            _with(biaxial, sample=_FOLD | _DENSE),
+            _with(biaxial, sample=_EVEN | _DENSE),
         ),
         _Case("friction", "graded", "0.3 to 0.66 m", "biaxial", _with(biaxial, sample=_GRADED | _LOOSE)),
         _Case(
@@ -130,11 +130,11 @@ def _cases() -> tuple[_Case, ...]:
             "blocked-dense",
             f"{stiff}, dense",
             "biaxial",
-            _with(biaxial, sample=_FOLD | _DENSE, contact=_BLOCKED),
+            _with(biaxial, sample=_EVEN | _DENSE, contact=_BLOCKED),
         ),
-        _Case("heaps", "heap-fold", "0.42 to 0.56 m", "repose", _with(heap, sample=_FOLD)),
+        _Case("heaps", "heap-fold", "0.42 to 0.56 m", "repose", _with(heap, sample=_EVEN)),
         _Case("heaps", "heap-graded", "0.3 to 0.66 m", "repose", _with(heap, sample=_GRADED)),
-        _Case("heaps", "heap-blocked", stiff, "repose", _with(heap, sample=_FOLD, contact=_BLOCKED)),
+        _Case("heaps", "heap-blocked", stiff, "repose", _with(heap, sample=_EVEN, contact=_BLOCKED)),
         _Case("taper", "taper", "wedge", "wedge", _shipped("taper")),
         _Case("sandbox", "sandbox", "level layer", "wedge", _shipped("sandbox")),
     )

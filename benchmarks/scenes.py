@@ -223,7 +223,7 @@ def _wall(count: int) -> tuple[list[Array], int]:
 
 def _cuts(bricks: int, halves: bool) -> Array:
     """Ends of the bricks of a course, with half bricks at its edges or without [m]."""
-    joints: Array = np.arange(bricks + 1) * _BRICK[0]
+    joints: Array = _BRICK[0] * np.arange(bricks + 1.0)
     return np.concatenate([[0.0], joints[:-1] + _BRICK[0] / 2, joints[-1:]]) if halves else joints
 
 
