@@ -5,7 +5,6 @@ hypothesis are made once, on the stones of the sample, for a row of amplitudes; 
 A few whole diagnoses, each with runs on the stones of its own survey, tell whether that matters.
 """
 
-import argparse
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -14,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
+from benchmarks.report import Row, columns, guarded, options_of, progress, show
 from pipelines.assess.compare import facades_of
 from pipelines.assess.diagnosis.file import DiagnosisFile, read_diagnosis
 from pipelines.assess.diagnosis.measurements import Measurements, measure, measurements
@@ -45,20 +44,11 @@ _TRUE = {
 
 _GRID = {"core-sunk": 12, "shaken": 12}  # intervals of the range of an unknown, at whose ends runs are made
 _FINE = 24  # of other samples
-_TABLE: Table = (
-    ("sample", "sample", ""),
-    ("runs", "runs", ""),
-    ("draws", "draws", "d"),
-    ("first", "true cause first", "d"),
-    ("explains", "and explains", "d"),
-    ("covered", "truth within its 95 %", "d"),
-    ("truth", "truth", ".3g"),
-    ("mean", "mean amount", ".4g"),
-    ("scatter", "its scatter", ".2g"),
-    ("half", "half interval", ".3g"),
-    ("unit", "unit", ""),
-    ("none", "without the true cause: none explains", "d"),
-    ("dated", "dated right", "d"),
+_TABLE = columns(
+    "sample sample | runs runs | draws draws :d | first true cause first :d | "
+    "explains and explains :d | covered truth within its 95 % :d | truth truth :.3g | "
+    "mean mean amount :.4g | scatter its scatter :.2g | half half interval :.3g | unit unit | "
+    "none without the true cause: none explains :d | dated dated right :d"
 )
 
 
@@ -229,11 +219,10 @@ def whole(place: Laboratory, draws: int, folder: Path) -> list[Row]:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.diagnosis", description=__doc__)
+    parser = options_of("diagnosis", __doc__)
     parser.add_argument("--draws", type=int, default=100, help="surveys with the runs of one")
     parser.add_argument("--whole", type=int, default=10, help="surveys with runs of their own")
     parser.add_argument("--samples", nargs="+", choices=_TRUE, default=list(_TRUE))
-    parser.add_argument("--json", action="store_true", help="print an array of objects, one for each row")
     options = parser.parse_args()
     rows = []
     for kind in options.samples:
@@ -246,11 +235,7 @@ def main() -> None:
             ):
                 if count:
                     rows.append(_summed(kind, runs, found(draws=count)))
-    if options.json:
-        print_json(rows)
-        return
-    print(f"{machine()}, {environment('numpy', 'numba')}\n")
-    print_table(rows, _TABLE)
+    show(rows, _TABLE, as_json=options.json)
 
 
 if __name__ == "__main__":

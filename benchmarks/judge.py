@@ -1,19 +1,82 @@
 """One judge for every program: how well a run solved its contact problems, from its motion and its contacts alone."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from benchmarks.scenes import BlockScene
-from benchmarks.trace import Touch, Trace
-from mechanics.arrays import Array
+from mechanics.arrays import Array, Bools, Ints
 from mechanics.delassus.rigid import RigidDelassus, schedule
 from mechanics.problem.problem import ContactProblem
 from mechanics.problem.residual import natural_map
 from mechanics.stones.polyhedra import mass_properties
 
-__all__ = ["Judge", "Verdict"]
+__all__ = ["Judge", "Touch", "Trace", "Verdict", "read_trace"]
+
+
+_ARRAYS = ("cpu", "sweeps", "centre", "frame", "contacts", "solved", "compliant")
+
+
+@dataclass(frozen=True)
+class Touch:
+    """The contacts of one step, at the instant where they were found.
+
+    Attributes
+    ----------
+    body : (nc, 2) candidate and antagonist
+    point : (nc, 3) [m]
+    frame : (nc, 3, 3) rows n and two tangents; n points from the antagonist to the candidate
+    gap : (nc,) [m]
+    force : (nc, 3) mean force of the step on the candidate, in that frame [N]
+    """
+
+    body: Ints
+    point: Array
+    frame: Array
+    gap: Array
+    force: Array
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One run.
+
+    Attributes
+    ----------
+    cpu : (n,) processor time of each step, user and system [s]
+    sweeps : (n,) passes of Gauss–Seidel in each step; -1 unknown
+    centre : (n+1, nb, 3) a point of each body at the start and after each step [m]
+    frame : (n+1, nb, 3, 3) three axes of each body in rows, turning with it; that of the start alone if unknown [-]
+    kept : contacts of some steps, counted from 1
+    program : name and version of what ran
+    contacts : (n,) their number in each step; -1 unknown
+    solved : (n,) steps that met their tolerance within their limit of sweeps
+    compliant : (n,) steps that needed compliant joints
+    """
+
+    cpu: Array
+    sweeps: Ints
+    centre: Array
+    frame: Array
+    kept: dict[int, Touch]
+    program: str
+    contacts: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    solved: Bools = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    compliant: Bools = field(default_factory=lambda: np.zeros(0, dtype=bool))
+
+
+def read_trace(path: Path) -> Trace:
+    """Read what a run has written."""
+    with np.load(path) as data:
+        kept = {
+            int(n): Touch(*(data[f"{key}_{n}"] for key in ("body", "point", "frame", "gap", "force")))
+            for n in data["kept"]
+        }
+        arrays = {key: data[key] for key in _ARRAYS}
+        return Trace(kept=kept, program=str(data["program"]), **arrays)
 
 
 @dataclass(frozen=True)
@@ -63,6 +126,9 @@ class Judge:
     scene : the blocks
     step, theta : h [s] and θ
     """
+
+    MEASURES: ClassVar = tuple(one.name for one in fields(Verdict))
+    """Names of what is judged."""
 
     def __init__(self, scene: BlockScene, step: float, theta: float) -> None:
         properties = [

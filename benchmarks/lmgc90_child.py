@@ -3,13 +3,14 @@
 It needs numpy and that package alone, so that interpreter need not have MOMA. LMGC90 keeps one simulation
 per process and ends the process where it is used wrongly; so each run is one process, and leaves one .npz file behind.
 
-The package drives LMGC90's Fortran routines, which its library also exports: `--relaxation` calls them one by one, in
+The package drives LMGC90's Fortran routines, which its library also exports: `relaxation` calls them one by one, in
 the order of the package's own step, with another relaxation of the sweeps than the 0.1 that the package fixes.
-`--gravity` gives each step a gravity of its own, as the scene is felt in the frame of a support that shakes.
+`gravity`, a .npy (steps, 3), gives each step a gravity of its own [m/s²].
 """
 
-import argparse
 import ctypes
+import json
+import sys
 import time
 from collections.abc import Callable
 from importlib.metadata import version
@@ -23,21 +24,22 @@ _CHECK_EVERY, _CHECKS = 50, 500
 
 
 def main() -> None:
-    """Run, and write cpu, sweeps, motion and the contacts of some steps to OUT."""
-    options = _options()
-    solver = _solver(options)
+    """`lmgc90_child.py SCENE OUT SETTINGS`: run, and write times, motion and contacts to OUT."""
+    path, out, settings = sys.argv[1], sys.argv[2], json.loads(sys.argv[3])
+    solver = _solver(path, settings)
     from compas_lmgc90 import _lmgc90
 
     library = ctypes.CDLL(_lmgc90.__file__)
     step = solver.lmgc90.compute_one_step
-    if options.relaxation is not None:
-        step = _Driven(library, options.relaxation, options.tolerance)
-    gravity = None if options.gravity is None else np.load(options.gravity)
+    if "relaxation" in settings:
+        step = _Driven(library, settings["relaxation"], _TOLERANCE)
+    gravity = np.load(settings["gravity"]) if "gravity" in settings else None
+    steps, keep = settings["steps"], settings.get("keep", 0)
     result = solver.lmgc90.get_initial_state()
     centre = [np.array(result.init_bodies)]
     frame = [_frames(result.init_body_frames)]
     cpu, sweeps, contacts, kept = [], [], [], {}
-    for n in range(1, options.steps + 1):
+    for n in range(1, steps + 1):
         if gravity is not None:
             library["__bulk_behaviour_MOD_set_gravity"]((ctypes.c_double * 3)(*gravity[n - 1]))
         start = time.process_time()
@@ -50,12 +52,11 @@ def main() -> None:
         if result is None:  # routine by routine there are no axes and no contacts to read back
             continue
         frame.append(_frames(result.body_frames))
-        if n == 1 or n > options.steps - options.keep:
+        if keep and (n == 1 or n > steps - keep):
             kept[n] = _contacts(result)
-    program = f"compas_lmgc90 {version('compas_lmgc90')}"
     np.savez(
-        options.out,
-        program=program,
+        out,
+        program=f"compas_lmgc90 {version('compas_lmgc90')}",
         cpu=cpu,
         sweeps=sweeps,
         contacts=contacts,
@@ -64,33 +65,17 @@ def main() -> None:
         centre=centre,
         frame=frame,
         kept=list(kept),
-        **_flat(kept),
+        **{f"{key}_{n}": value for n, contacts in kept.items() for key, value in contacts.items()},
     )
 
 
-def _options() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("scene")
-    parser.add_argument("out")
-    parser.add_argument("--steps", type=int, required=True)
-    parser.add_argument("--keep", type=int, required=True)
-    parser.add_argument("--step", type=float, required=True)
-    parser.add_argument("--theta", type=float, required=True)
-    parser.add_argument("--relaxation", type=float)
-    parser.add_argument(
-        "--tolerance", type=float, default=_TOLERANCE, help="of the sweeps, with --relaxation"
-    )
-    parser.add_argument("--gravity", help=".npy (steps, 3): gravity in each step, in its middle [m/s²]")
-    return parser.parse_args()
-
-
-def _solver(options: argparse.Namespace) -> Any:
+def _solver(path: str, settings: dict[str, Any]) -> Any:
     """The package's solver with the scene in it, ready to step."""
     from compas_lmgc90.solver import Solver
 
-    with np.load(options.scene) as data:
+    with np.load(path) as data:
         scene = {key: data[key] for key in data.files}
-    solver = Solver(dt=options.step, theta=options.theta, density=float(scene["density"]))
+    solver = Solver(dt=settings["step"], theta=settings["theta"], density=float(scene["density"]))
     vptr, fptr = scene["vptr"], scene["fptr"]
     solver.geometry_from_v_f(
         [
@@ -136,10 +121,6 @@ def _contacts(result: Any) -> dict[str, Any]:
         "gap": np.array(result.interaction_gap),
         "force": np.array(result.interaction_rloc)[:, [1, 0, 2]],
     }
-
-
-def _flat(kept: dict[int, dict[str, Any]]) -> dict[str, Any]:
-    return {f"{key}_{n}": value for n, contacts in kept.items() for key, value in contacts.items()}
 
 
 def _sweeps(library: ctypes.CDLL) -> tuple[int, int]:

@@ -4,15 +4,15 @@ Time and quality of each mesher on boxes, voussoirs, slender, flat and leaning h
 processor time for many distinct stones. See benchmarks/README.md for what the columns mean.
 """
 
-import argparse
 import time
 from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
+from benchmarks.report import Row, columns, guarded, options_of, progress, show
 from mechanics.scene.scene import Block, Fidelity
+from mechanics.scene.shapes import BOX_FACES, box_corners
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.meshers.choice import Mesher
@@ -24,8 +24,6 @@ __all__ = ["main"]
 
 
 _LIMESTONE = Material("limestone", density=2000.0, young=1e10, poisson=0.2)
-_FACES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
-_UNIT = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)])
 # edge length over the cube root of the volume with which meshes have about 200 nodes
 _SIZES = {"box": 0.245, "voussoir": 0.235, "leaning": 0.245, "slender 1:20": 0.28, "flat 1:20": 0.41}
 _MESHERS: dict[str, tuple[Mesher, Element]] = {
@@ -33,57 +31,36 @@ _MESHERS: dict[str, tuple[Mesher, Element]] = {
     "gmsh": (Mesher.GMSH, Element.TET4),
     "grid of hexahedra": (Mesher.AUTO, Element.HEX8),
 }
-_TABLE: Table = (
-    ("shape", "shape", ""),
-    ("mesher", "mesher", ""),
-    ("stones", "stones", "d"),
-    ("nodes", "nodes", ".0f"),
-    ("cells", "cells", ".0f"),
-    ("ms", "ms per stone", ".1f"),
-    ("quadratic_ms", "second order", ".1f"),
-    ("angle", "dihedral angle, smallest", ".1f"),
-    ("angle_median", "median stone", ".1f"),
-    ("jacobian", "scaled Jacobian, smallest", ".2f"),
-    ("jacobian_median", "median stone", ".2f"),
+_TABLE = columns(
+    "shape shape | mesher mesher | stones stones :d | nodes nodes :.0f | cells cells :.0f | "
+    "ms ms per stone :.1f | quadratic_ms second order :.1f | angle dihedral angle, smallest :.1f | "
+    "angle_median median stone :.1f | jacobian scaled Jacobian, smallest :.2f | "
+    "jacobian_median median stone :.2f"
 )
-_MANY: Table = (
-    ("stones", "distinct stones", "d"),
-    ("mesher", "mesher", ""),
-    ("seconds", "seconds", ".1f"),
-    ("ms", "ms per stone", ".2f"),
-    ("nodes", "nodes per stone", ".0f"),
-    ("angle", "dihedral angle, smallest", ".1f"),
-    ("jacobian", "scaled Jacobian, smallest", ".2f"),
+_MANY = columns(
+    "stones distinct stones :d | mesher mesher | seconds seconds :.1f | ms ms per stone :.2f | "
+    "nodes nodes per stone :.0f | angle dihedral angle, smallest :.1f | "
+    "jacobian scaled Jacobian, smallest :.2f"
 )
 
 
 def main() -> None:
     """Run all shapes and sizes and print."""
-    options = _options()
+    parser = options_of("meshing", __doc__)
+    numbers, kinds = [1000, 10_000], list(_SIZES)
+    parser.add_argument("--stones", type=int, nargs="*", default=numbers, help="how many distinct stones")
+    parser.add_argument("--shapes", type=int, default=50, help="stones of each shape (50)")
+    parser.add_argument("--meshers", nargs="+", choices=_MESHERS, default=list(_MESHERS))
+    parser.add_argument("--kinds", nargs="*", choices=kinds, default=kinds, help="of the first table")
+    options = parser.parse_args()
     rows = [_shape(shape, mesher, options.shapes) for shape in options.kinds for mesher in options.meshers]
     many = [_many(count, mesher) for count in options.stones for mesher in options.meshers]
     if options.json:
-        print_json(rows + many)
+        show(rows + many, as_json=True)
         return
-    print(f"{machine()}; {environment('moma-masonry', 'gmsh', 'scipy', 'numpy')}\n")
     for found, table in ((rows, _TABLE), (many, _MANY)):
         if found:
-            print_table(found, table)
-            print()
-
-
-def _options() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.meshing", description=__doc__)
-    parser.add_argument(
-        "--stones", type=int, nargs="*", default=[1000, 10_000], help="how many distinct stones"
-    )
-    parser.add_argument("--shapes", type=int, default=50, help="stones of each shape (50)")
-    parser.add_argument("--meshers", nargs="+", choices=_MESHERS, default=list(_MESHERS))
-    parser.add_argument(
-        "--kinds", nargs="*", choices=_SIZES, default=list(_SIZES), help="shapes of the first table"
-    )
-    parser.add_argument("--json", action="store_true", help="print an array of objects, one for each row")
-    return parser.parse_args()
+            show(found, table, as_json=False)
 
 
 def _stone(shape: str, rng: np.random.Generator, code: str) -> Block:
@@ -92,14 +69,14 @@ def _stone(shape: str, rng: np.random.Generator, code: str) -> Block:
         "slender 1:20": [1.0, 0.05, 0.05],
         "flat 1:20": [0.6, 0.6, 0.03],
     }.get(shape, [0.4, 0.3, 0.25])
-    corners = _UNIT - 0.5
+    corners = box_corners((0, 0, 0), (1, 1, 1)) - 0.5
     if shape == "voussoir":
         corners = corners * np.where(corners[:, 2:] > 0, [1.0, 1.0, 1.0], [0.75, 1.0, 1.0])
     if shape == "leaning":  # a box seen in perspective: all its faces lean, and stay planar
         corners = corners / (1.0 + corners @ rng.uniform(-0.3, 0.3, 3))[:, None]
     corners = (corners * extent) @ Rotation.random(random_state=rng).as_matrix().T + rng.uniform(-10, 10, 3)
-    size = _SIZES[shape] * mass_properties(corners, _FACES).volume ** (1 / 3)
-    return Block(code, corners, _FACES, _LIMESTONE, Fidelity.DEFORMABLE, size)
+    size = _SIZES[shape] * mass_properties(corners, BOX_FACES).volume ** (1 / 3)
+    return Block(code, corners, BOX_FACES, _LIMESTONE, Fidelity.DEFORMABLE, size)
 
 
 def _meshing(stones: list[Block], mesher: str, second: bool = False) -> tuple[float, Row]:
@@ -123,7 +100,6 @@ def _meshing(stones: list[Block], mesher: str, second: bool = False) -> tuple[fl
         "angle_median": float(np.median(angle)),
         "jacobian": min(jacobian),
         "jacobian_median": float(np.median(jacobian)),
-        "machine": machine(),
     }
 
 

@@ -8,11 +8,10 @@ import argparse
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
-from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
+from benchmarks.report import ROOT, Row, columns, guarded, options_of, progress, show
 from mechanics.results.result import BodyResult, Result
 from mechanics.scene.scene import Block, Fidelity, Scene, SolverSettings, Start, TimeSettings
 from mechanics.simulate import simulate
@@ -32,25 +31,14 @@ from survey.synthetic.buildings.walls import wall
 
 __all__ = ["main"]
 
-_SAMPLE = Path(__file__).resolve().parents[1] / "data/samples/window/window.moma"
+_SAMPLE = ROOT / "data/samples/window/window.moma"
 _STONE = Material("limestone", density=2350.0, young=12e9, poisson=0.2)
 _RINGS = (0, 1, 2, 3)
-_TABLE: Table = (
-    ("structure", "structure", ""),
-    ("region", "region", ""),
-    ("ring", "ring", ""),
-    ("coarser", "mesh of the ring", ""),
-    ("deformable", "deformable", "d"),
-    ("mean", "mean %", ".1f"),
-    ("p99", "1 % above, %", ".1f"),
-    ("max", "largest %", ".1f"),
-    ("each", "mean of each stone %", ".1f"),
-    ("reactions", "reactions %", ".1f"),
-    ("forces", "joint forces %", ".1f"),
-    ("moved", "displacement %", ".1f"),
-    ("unknowns", "unknowns", "d"),
-    ("cpu_s", "CPU s", ".3g"),
-    ("outcome", "outcome", ""),
+_TABLE = columns(
+    "structure structure | region region | ring ring | coarser mesh of the ring | "
+    "deformable deformable :d | mean mean % :.1f | p99 1 % above, % :.1f | max largest % :.1f | "
+    "each mean of each stone % :.1f | reactions reactions % :.1f | forces joint forces % :.1f | "
+    "moved displacement % :.1f | unknowns unknowns :d | cpu_s CPU s :.3g | outcome outcome"
 )
 
 
@@ -66,7 +54,7 @@ class Structure:
 
 def main() -> None:
     """Run every region of every structure with every ring, and print."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.region", description=__doc__)
+    parser = options_of("region", __doc__)
     parser.add_argument("--structures", nargs="+", choices=list(_STRUCTURES), default=list(_STRUCTURES))
     parser.add_argument("--regions", nargs="+", help="their names, e.g. keystone (all)")
     parser.add_argument("--rings", nargs="+", type=int, default=_RINGS, help="joints (0 1 2 3)")
@@ -76,15 +64,10 @@ def main() -> None:
     parser.add_argument(
         "--coarser", nargs="+", type=float, default=[1.0], help="edge lengths in the ring, over that (1)"
     )
-    parser.add_argument("--json", action="store_true", help="print an array of objects, one for each run")
     options = parser.parse_args()
     simulate(_scene(_STRUCTURES["arch"](), {}, options.size, 1.0))  # compiles the kernels
     rows = [row for name in options.structures for row in _rows(name, options)]
-    if options.json:
-        print_json([row | {"machine": machine()} for row in rows])
-        return
-    print(f"{machine()}; {environment('moma-masonry', 'numba', 'numpy', 'scipy')}\n")
-    print_table(rows, _TABLE)
+    show(rows, _TABLE, as_json=options.json)
 
 
 def _sample() -> Structure:

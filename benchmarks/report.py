@@ -1,4 +1,4 @@
-"""Output of every benchmark: a table or JSON, and the machine."""
+"""What benchmarks share: options, tables and JSON, the machine, time and memory, and processes of their own."""
 
 import argparse
 import json
@@ -7,60 +7,105 @@ import platform
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import fields, is_dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from statistics import fmean, stdev
 from typing import Any
 
-from moma.errors import MomaError, UsageError
+import numpy as np
+from scipy.sparse import issparse
+
+from mechanics.dynamics.progress import Clock
+from moma.errors import MomaError, SolverError, UsageError
 
 __all__ = [
+    "ROOT",
+    "ProcessorClock",
     "Row",
     "Table",
+    "alone",
+    "arrays_bytes",
+    "columns",
     "commit",
     "environment",
     "guarded",
     "machine",
+    "one_thread",
     "options_of",
+    "peak_bytes",
     "print_json",
     "print_table",
     "progress",
+    "show",
     "spread",
     "table_lines",
     "write_between",
 ]
 
+ROOT = Path(__file__).resolve().parents[1]
+"""Root of the project."""
+
 Row = dict[str, Any]
 # per column: key of the row, heading, format
 Table = Sequence[tuple[str, str, str]]
 
-_ROOT = Path(__file__).resolve().parents[1]
 # time between two lines on an error stream that is no terminal [s], and when the last one was written
 _PAUSE = 10.0
 _said = [time.monotonic()]
+_THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+def columns(text: str) -> Table:
+    """Return the columns that a text describes: `key heading :format`, with bars between them."""
+    table = []
+    for column in text.split(" | "):
+        words, _, form = column.partition(" :")
+        key, _, heading = words.strip().partition(" ")
+        table.append((key, heading.strip(), form.strip()))
+    return table
+
+
+def options_of(name: str, description: str | None) -> argparse.ArgumentParser:
+    """Return the options of a benchmark, to which it adds its own."""
+    parser = argparse.ArgumentParser(prog=f"python -m benchmarks.{name}", description=description)
+    parser.add_argument("--json", action="store_true", help="print an array of objects, one for each row")
+    return parser
+
+
+def show(rows: Sequence[Row], *tables: Table, as_json: bool) -> None:
+    """Print rows as JSON, or in one table after the other, with the machine."""
+    if as_json:
+        print_json([row | {"machine": machine()} for row in rows])
+        return
+    print(f"{commit()}; {machine()}; {environment('moma-masonry', 'numba', 'numpy', 'scipy')}")
+    for table in tables:
+        print()
+        print_table(rows, table)
 
 
 def print_json(rows: Sequence[Row]) -> None:
-    """One array of objects, nothing else."""
+    """Print one array of objects, nothing else."""
     json.dump([{key: _plain(value) for key, value in row.items()} for row in rows], sys.stdout, indent=1)
     print()
 
 
 def _plain(value: Any) -> Any:
     """JSON knows no infinity and no NaN."""
-    if isinstance(value, float) and (value != value or value in (float("inf"), float("-inf"))):
+    if isinstance(value, float) and not np.isfinite(value):
         return None
     return value.item() if hasattr(value, "item") else value
 
 
 def print_table(rows: Sequence[Row], table: Table) -> None:
-    """Markdown, aligned; – where a row has no value."""
+    """Print a table in Markdown, aligned; – where a row has no value."""
     print("\n".join(table_lines(rows, table)))
 
 
 def table_lines(rows: Sequence[Row], table: Table) -> list[str]:
-    """Lines of a table in Markdown, aligned; – where a row has no value."""
+    """Return the lines of a table in Markdown, aligned; – where a row has no value."""
     cells = [[heading for _, heading, _ in table]]
     cells += [[_cell(row.get(key), form) for key, _, form in table] for row in rows]
     widths = [max(len(line[k]) for line in cells) for k in range(len(table))]
@@ -71,14 +116,20 @@ def table_lines(rows: Sequence[Row], table: Table) -> list[str]:
     return [lines[0], "|" + "|".join("-" * (width + 2) for width in widths) + "|", *lines[1:]]
 
 
+def _cell(value: Any, form: str) -> str:
+    if value is None or (isinstance(value, float) and value != value):
+        return "–"
+    return format(value, form)
+
+
 def spread(values: Iterable[float], digits: int) -> str:
-    """Mean ± standard deviation; one value has none."""
+    """Return mean ± standard deviation; one value has none."""
     found = list(values)
     deviation = f" ± {stdev(found):.{digits}f}" if len(found) > 1 else ""
     return f"{fmean(found):.{digits}f}{deviation}"
 
 
-def write_between(name: str, lines: Sequence[str], path: Path = _ROOT / "benchmarks" / "README.md") -> None:
+def write_between(name: str, lines: Sequence[str], path: Path = ROOT / "benchmarks" / "README.md") -> None:
     """Replace what stands in a file between the comments `<!-- NAME -->` and `<!-- /NAME -->`.
 
     Raises
@@ -97,10 +148,10 @@ def write_between(name: str, lines: Sequence[str], path: Path = _ROOT / "benchma
 
 
 def commit() -> str:
-    """Short name of the commit that is measured, and whether files have changed since."""
+    """Return the short name of the commit that is measured, and whether files have changed since."""
 
     def git(*arguments: str) -> str:
-        done = subprocess.run(["git", *arguments], cwd=_ROOT, capture_output=True, text=True, check=False)
+        done = subprocess.run(["git", *arguments], cwd=ROOT, capture_output=True, text=True, check=False)
         return done.stdout.strip() if done.returncode == 0 else ""
 
     name = git("rev-parse", "--short=9", "HEAD")
@@ -111,24 +162,8 @@ def commit() -> str:
     )
 
 
-def _cell(value: Any, form: str) -> str:
-    if value is None or (isinstance(value, float) and value != value):
-        return "–"
-    return format(value, form)
-
-
-def options_of(name: str, description: str | None) -> argparse.ArgumentParser:
-    """Return the options of a benchmark of disks, to which it adds its own."""
-    parser = argparse.ArgumentParser(prog=f"python -m benchmarks.{name}", description=description)
-    parser.add_argument("--threads", type=int, default=1)
-    parser.add_argument(
-        "--json", action="store_true", help="print an array of objects, one for each row or run"
-    )
-    return parser
-
-
 def machine() -> str:
-    """Processor, its number of cores, and the system."""
+    """Return the processor, its number of cores, and the system."""
     name = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
     if info.exists():
@@ -140,7 +175,7 @@ def machine() -> str:
 
 
 def environment(*packages: str) -> str:
-    """Versions of packages, as installed."""
+    """Return the versions of packages, as installed."""
     found = []
     for package in packages:
         try:
@@ -165,3 +200,94 @@ def guarded(run: Callable[[], None]) -> None:
     except MomaError as error:
         print(f"error: {error}", file=sys.stderr)
         sys.exit(error.exit_code)
+
+
+def one_thread() -> dict[str, str]:
+    """Return the environment of a process with one thread."""
+    return os.environ | dict.fromkeys(_THREADS, "1")
+
+
+def alone(function: Callable[..., Row], *arguments: Any, threads: int = 1) -> Row:
+    """Call a function of a module in a process of its own, with arguments and a result that JSON can carry.
+
+    Parameters
+    ----------
+    threads : that numba may use; BLAS has one
+
+    Raises
+    ------
+    SolverError : if it fails, with the last line of what it said
+    """
+    module = function.__module__
+    if module == "__main__":
+        module = sys.modules["__main__"].__spec__.name  # type: ignore[union-attr]
+    name = function.__name__
+    call = (
+        f"import json, sys\nfrom {module} import {name}\nprint(json.dumps({name}(*json.loads(sys.argv[1]))))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", call, json.dumps(arguments)],
+        cwd=ROOT,
+        env=one_thread() | {"NUMBA_NUM_THREADS": str(threads)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode:
+        said = done.stderr.strip().splitlines()
+        raise SolverError(said[-1] if said else "no word", where=f"{name}{arguments}")
+    row: Row = json.loads(done.stdout.splitlines()[-1])
+    return row
+
+
+class ProcessorClock(Clock):
+    """Processor seconds by stage of a run: the machine may have other work."""
+
+    @contextmanager
+    def __call__(self, stage: str) -> Iterator[None]:
+        """Add the time of a with-block to a stage."""
+        start = time.process_time()
+        try:
+            yield
+        finally:
+            self.seconds[stage] = self.seconds.get(stage, 0.0) + time.process_time() - start
+
+
+def peak_bytes() -> int:
+    """Return the most memory that this process ever had; 0 where the system does not say."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return 0
+    unit = 1 if sys.platform == "darwin" else 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit
+
+
+def arrays_bytes(root: Any) -> int:
+    """Return the bytes of all numpy arrays that can be reached from an object, each buffer once."""
+    seen: set[int] = set()
+    buffers: dict[int, int] = {}
+    waiting = [root]
+    while waiting:
+        one = waiting.pop()
+        if id(one) in seen:
+            continue
+        seen.add(id(one))
+        if isinstance(one, np.ndarray):
+            owner = one
+            while isinstance(owner.base, np.ndarray):
+                owner = owner.base
+            buffers[id(owner)] = owner.nbytes
+            waiting += [owner]
+        elif issparse(one):
+            waiting += [one.data, *(getattr(one, key) for key in ("indices", "indptr") if hasattr(one, key))]
+        elif isinstance(one, dict):
+            waiting += list(one.values())
+        elif isinstance(one, list | tuple):
+            waiting += list(one)
+        elif is_dataclass(one) and not isinstance(one, type):
+            waiting += [getattr(one, field.name) for field in fields(one)]
+            waiting += list(getattr(one, "__dict__", {}).values())
+        elif type(one).__module__.startswith("mechanics"):
+            waiting += list(getattr(one, "__dict__", {}).values())
+    return sum(buffers.values())

@@ -5,9 +5,7 @@ above is laid. The corner and the settled wall lose support before or after the 
 Joints are rigid, or springs of 10 and 4 GPa/m across and along them, with which forces are unique.
 """
 
-import argparse
 import json
-import sys
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -18,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from archmodel.database.session import open_database
+from benchmarks.report import columns, guarded, options_of, progress, show
 from mechanics.results.result import Result
 from mechanics.simulate import simulate_stages
 from pipelines.arrays import Array
@@ -26,7 +25,14 @@ from pipelines.run.assemble import assemble
 from pipelines.scene.file import parse_scene
 from pipelines.scene.sample import write_sample
 
-__all__ = ["CASES", "main"]
+__all__ = ["CASES", "main", "rows"]
+
+_TABLE = columns(
+    "words case, joints | order order | thrust_shown thrust [kN] :.2f | "
+    "supports_shown on other supports, % :.1f | joints_differ_shown change of joints, % :.1f | "
+    "top_shown top [mm] :.2f | bed_shown bed [mm] :+.1f | reaction_error reaction :.1e | seconds s :.0f | "
+    "outcome outcome"
+)
 
 _SCENE = """
 [materials.limestone]
@@ -135,6 +141,7 @@ def rows(names: tuple[str, ...], folder: Path) -> Iterator[dict[str, Any]]:
                 first: Result | None = None
                 for order, stages in case.orders.items():
                     built = assemble(parse_scene(_SCENE + law + stages, f"{name}.toml"), session)
+                    progress(f"{name}, {joints}: {order}")
                     began = time.process_time()
                     result = simulate_stages(built.stages)
                     first = first or result
@@ -201,33 +208,25 @@ def _top(result: Result) -> float:
     return max(float(np.linalg.norm(body.displacement, axis=1).max()) for body in last)
 
 
-def main(arguments: list[str]) -> None:
+def main() -> None:
     """Print a table, or JSON."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
+    parser = options_of("stages", __doc__)
     parser.add_argument("--cases", nargs="+", default=list(CASES), choices=list(CASES))
-    parser.add_argument("--json", action="store_true")
-    asked = parser.parse_args(arguments)
+    options = parser.parse_args()
     with TemporaryDirectory() as folder:
-        found = rows(tuple(asked.cases), Path(folder))
-        if asked.json:
-            print(json.dumps(list(found), indent=2))
-            return
-        print(
-            "| case, joints | order | thrust [kN] | on other supports | change of joints | top [mm] | bed [mm] |"
-        )
-        print("|---|---|---|---|---|---|---|")
-        for one in found:
-            thrust = "" if one["thrust"] is None else f"{one['thrust'] / 1e3:.2f}"
-            print(
-                f"| {one['case']}, {one['joints']} | {one['order']} | {thrust} | {100 * one['supports']:.1f} % | "
-                f"{100 * one['joints_differ']:.1f} % | {1e3 * one['top']:.2f} | {1e3 * one['bed']:+.1f} |",
-                flush=True,
-            )
-            print(
-                f"{one['outcome']}, reaction {one['reaction_error']:.1e}, {one['seconds']:.0f} s",
-                file=sys.stderr,
-            )
+        found = list(rows(tuple(options.cases), Path(folder)))
+    for one in found:
+        one |= {"words": f"{one['case']}, {one['joints']}"}
+        for key, unit in (
+            ("thrust", 1e-3),
+            ("supports", 100.0),
+            ("joints_differ", 100.0),
+            ("top", 1e3),
+            ("bed", 1e3),
+        ):
+            one[f"{key}_shown"] = None if one[key] is None else unit * one[key]
+    show(found, _TABLE, as_json=options.json)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    guarded(main)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from benchmarks.extremes.stones import G
-from benchmarks.stored.operator import StoredDelassus
+from benchmarks.stored import StoredDelassus
 from mechanics.arrays import Array
 from mechanics.delassus.rigid import RigidDelassus, schedule
 from mechanics.problem.problem import ContactProblem

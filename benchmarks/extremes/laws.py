@@ -7,7 +7,7 @@ time other equations; what it breaks is the least that one of these states leave
 
 import numpy as np
 
-from benchmarks.stored.operator import StoredDelassus
+from benchmarks.stored import StoredDelassus
 from mechanics.arrays import Array
 from mechanics.delassus.rigid import RigidDelassus
 from mechanics.problem.problem import ContactProblem

@@ -25,13 +25,13 @@ from benchmarks.extremes.stones import (
     G,
     column,
     elastic_column,
-    first_problem,
     moved,
     slabs,
     standing,
     volume,
     wall,
 )
+from benchmarks.scenes import problem_of
 from mechanics.arrays import Array
 from mechanics.delassus.rigid import RigidDelassus
 from mechanics.problem.problem import ContactProblem
@@ -88,7 +88,7 @@ def _stands(group: str, name: str, scene: Scene, joints: int, quick: bool = True
     return Row(
         group,
         name,
-        lambda: first_problem(scene),
+        lambda: problem_of(scene),
         lambda problem, impulse: _lost_weight(scene, problem, impulse),
         # each joint from the ground to the top may let a little of the velocity through
         2.0 * (1.0 + friction) * joints * VELOCITY_TOLERANCE,
@@ -158,7 +158,7 @@ def _settings() -> list[Row]:
 def _elastic(young: float) -> Row:
     """Its ground does not bear the whole weight before waves have run through it: the laws alone judge."""
     scene = standing(elastic_column(young))
-    return Row("stiffness", f"E = {young:.0e} Pa", lambda: first_problem(scene), deformable=True)
+    return Row("stiffness", f"E = {young:.0e} Pa", lambda: problem_of(scene), deformable=True)
 
 
 def _faces() -> list[Row]:

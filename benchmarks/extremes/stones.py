@@ -1,4 +1,4 @@
-"""Stones of the matrix, their scenes, and the contact problem of a scene's first step."""
+"""Stones of the matrix, and their scenes."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -7,9 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.dynamics.simulation import Simulation
-from mechanics.model.model import build_model
-from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.scene import shapes
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.law import Law
@@ -22,7 +19,6 @@ __all__ = [
     "box",
     "column",
     "elastic_column",
-    "first_problem",
     "ground",
     "moved",
     "slabs",
@@ -137,16 +133,3 @@ def standing(
         contact=ContactSettings(law or DryJoint(friction)),
         time=replace(settings, duration=steps * settings.step),
     )
-
-
-def first_problem(scene: Scene) -> ContactProblem:
-    """The contact problem of the first step of a scene."""
-    taken: list[ContactProblem] = []
-
-    def take(problem: ContactProblem, start: ContactStart) -> ContactSolution:
-        taken.append(problem)
-        return ContactSolution(start.impulse, start.velocity, 0, 0.0, True)
-
-    model, start = build_model(scene)
-    Simulation(model, start, solver=take).step()
-    return taken[0]

@@ -43,4 +43,4 @@ COLLAPSE: Mapping[str, float] = {
     "balanced": 0.0129,
     "accurate": 0.00595,
 }
-"""By profile: the largest error of a load of collapse, or of a least thickness (benchmarks.collapse)."""
+"""By profile: the largest error of a load of collapse, or of a least thickness (benchmarks.profiles)."""

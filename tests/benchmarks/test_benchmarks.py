@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from benchmarks import fc3d, geology, lmgc90, report
-from benchmarks.generated import rigid_scenes, running_bond
-from benchmarks.report import commit, progress, table_lines, write_between
-from benchmarks.scenes import write_scene
+from benchmarks.lmgc90 import gravity_of, traced
+from benchmarks.report import columns, commit, progress, table_lines, write_between
+from benchmarks.scenes import BlockScene, rigid_scenes, running_bond, write_scene
 from benchmarks.siconos_child import timed
 from moma.errors import UsageError
 from pipelines.geology.file import read_geology
@@ -88,7 +88,7 @@ def test_the_tables_have_one_line_for_each_setting(scenes):
 
 def test_missing_things_are_named(scenes, tmp_path, monkeypatch):
     for module, options, said in (
-        (lmgc90, ("--scenes", tmp_path / "nowhere"), "nowhere: no such folder"),
+        (lmgc90, ("--scenes", tmp_path / "nowhere", "--ours-only"), "nowhere: no such folder"),
         (lmgc90, ("--scenes", scenes, "--only", "large", "--ours-only"), "no scene large; it has small"),
         (lmgc90, ("--scenes", scenes, "--lmgc90-python", tmp_path / "python"), "no such interpreter"),
         (lmgc90, ("--scenes", scenes, "--ours-only", "--steps", 1), "--steps: 1 steps"),
@@ -174,7 +174,7 @@ def test_scenes_are_made_where_none_are_given():
 def test_tables_are_written_between_their_marks_with_the_commit(tmp_path):
     page = tmp_path / "README.md"
     page.write_text("before\n<!-- t -->\nold\n<!-- /t -->\nafter\n", encoding="utf-8")
-    lines = table_lines([{"a": 1.0}, {"a": None}], (("a", "A", ".1f"),))
+    lines = table_lines([{"a": 1.0}, {"a": None}], columns("a A :.1f"))
     write_between("t", [f"Measured at {commit()}.", "", *lines], page)
     text = page.read_text(encoding="utf-8")
     assert text.startswith("before\n<!-- t -->\n\nMeasured at ")
@@ -210,14 +210,6 @@ def test_faults_have_the_cohesion_of_the_paper_for_the_weight_of_their_cover(
 
 
 @pytest.mark.slow
-def test_two_threads_are_compared_with_one():
-    (row,) = rows("threads", "--only", "sweeps in the plane", "--size", 12, "--repeats", 1, "--turns", 1)
-    assert row["contacts"] > 300
-    assert row["same_bits"] == "yes"
-    assert row["ratio"] == pytest.approx(row["wall_1"] / row["wall_2"])
-
-
-@pytest.mark.slow
 def test_cost_is_given_for_each_size():
     first, *_ = found = rows("scaling", "--largest", 350, "--threads", 2)
     assert [row["kind"] for row in found] == ["wall", "disks", "disks"]
@@ -228,19 +220,17 @@ def test_cost_is_given_for_each_size():
 
 
 @pytest.mark.slow
-def test_deformable_bricks_are_timed_and_judged():
-    """The wall as LMGC90 was timed on it: 28 bodies with 4 × 2 × 2 linear hexahedra a brick."""
-    (row,) = rows("deformable_wall", "--steps", 4, "--warm-up", 1, "--starts", "rest")
-    assert row["bodies"] == 28
+def test_a_wall_of_deformable_bricks_is_taken_to_its_rest():
+    (row,) = rows("scaling", "--kinds", "deformable", "--largest", 1200, "--threads", 1)
+    assert (row["bodies"], row["outcome"]) == (4 * 3 + 5 * 3, "equilibrium")
     assert row["eta"] <= 1e-6
-    assert row["unconverged"] == 0
-    assert row["step_ms"] > 0
+    assert row["reaction"] < 1e-4
 
 
-def test_unknown_sizes_of_deformable_walls_are_refused():
-    done = run("deformable_scaling", "--stones", 7)
-    assert done.returncode == 2
-    assert "invalid choice: 7" in done.stderr
+def test_cold_scenes_are_solved():
+    found = rows("scaling", "--kinds", "cold", "--largest", 200)
+    assert [row["scene"] for row in found][:2] == ["column of 10", "1,000 t on 1 kg"]
+    assert {row["converged"] for row in found} == {"yes"}
 
 
 def test_a_run_whose_output_is_redirected_says_now_and_then_how_far_it_is(capsys, monkeypatch):
@@ -250,3 +240,47 @@ def test_a_run_whose_output_is_redirected_says_now_and_then_how_far_it_is(capsys
     for step in range(5):
         progress(f"step {step}")
     assert capsys.readouterr().err.split("\n") == ["step 2", "step 4", ""]
+
+
+def test_shaking_is_felt_as_gravity_the_other_way():
+    """a(t) = 0.3 g sin(2π 5 t) peaks at t = 50 ms, between steps 50 and 51."""
+    for motion, component in (("in plane", 0), ("out of plane", 1)):
+        gravity = gravity_of(motion, 200)
+        assert gravity[:, 2] == pytest.approx(-9.81)
+        assert gravity[:, 1 - component] == pytest.approx(0.0)
+        assert gravity[:, component].argmin() in (49, 50)
+        assert gravity[49, component] == pytest.approx(-0.3 * 9.81, rel=1e-3)
+        # a whole period leaves no momentum
+        assert gravity[:, component].sum() == pytest.approx(0.0, abs=1e-9)
+    assert gravity_of("tilted", 3) == pytest.approx(np.tile([-0.2 * 9.81, 0.0, -9.81], (3, 1)))
+
+
+def test_each_step_has_the_gravity_of_its_own(tmp_path):
+    """A brick far above its support flies: v_n = h Σ g_i, x_n = Σ h (v_n-1 + v_n) / 2 with θ = ½."""
+    wall, step = running_bond(1, 1), 1e-3
+    lifted = (wall.vertices[0], wall.vertices[1] + [0.0, 0.0, 5.0])
+    write_scene(BlockScene("flight", lifted, wall.faces, wall.support), tmp_path / "flight.npz")
+    gravity = np.random.default_rng(1).normal(size=(6, 3))
+    np.save(tmp_path / "gravity.npy", gravity)
+    trace = traced(
+        tmp_path / "flight.npz", steps=6, tolerance=1e-6, sweeps=100, gravity=str(tmp_path / "gravity.npy")
+    )
+    speed = step * np.concatenate([np.zeros((1, 3)), gravity.cumsum(axis=0)])
+    way = (step * (speed[:-1] + speed[1:]) / 2).cumsum(axis=0)
+    assert trace.centre[1:, 1] - trace.centre[0, 1] == pytest.approx(way, abs=1e-12)
+    assert trace.solved.tolist() == [True] * 6
+    assert trace.contacts.tolist() == [0] * 6
+
+
+@pytest.mark.slow
+def test_our_rows_of_moving_walls_are_measured_against_the_finest():
+    options = ("--moving", "--ours-only", "--only", "wall_10x10", "--motions", "in plane", "--steps", 3)
+    finest, default, asked = rows("lmgc90", *options)
+    assert [row["run"] for row in (finest, default, asked)] == ["finest", "default", "motion_error = 0.001 m"]
+    # 10 bricks on 10 below, shifted by half: 10 beds of the first course, 9 × 20 others, 5 × 9 and 5 × 10 head joints
+    assert {row["contacts"] for row in (finest, default, asked)} == {4 * (10 + 9 * 20 + 95)}
+    assert finest["error"] is None
+    assert default["error"] < 1e-9
+    assert asked["error"] < 1e-3
+    assert default["unsolved"] == default["compliant"] == 0
+    assert default["ratio_mean"] is None

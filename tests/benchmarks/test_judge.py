@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 
 from benchmarks.fc3d import siconos_error
-from benchmarks.generated import running_bond
-from benchmarks.judge import Judge
-from benchmarks.memory import arrays_bytes
-from benchmarks.scenes import read_scene, write_scene
-from benchmarks.trace import Touch, Trace
+from benchmarks.judge import Judge, Touch, Trace
+from benchmarks.report import arrays_bytes
+from benchmarks.scenes import read_scene, running_bond, write_scene
 from mechanics.problem.problem import ContactProblem
 from tests.mechanics.dense_operator import blocks_apart
 

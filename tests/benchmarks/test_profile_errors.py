@@ -5,9 +5,8 @@ import re
 
 import pytest
 
-from benchmarks import collapse
-from benchmarks.profile_scenes import HELD_OUT, REFERENCE
-from benchmarks.profiles import measured_rows, ratios
+from benchmarks import profiles
+from benchmarks.profiles import HELD_OUT, REFERENCE, measured_rows, ratios
 from pipelines.tuning.expected_errors import BOUNDS, TYPICAL
 from pipelines.tuning.measured_errors import COLLAPSE
 from pipelines.tuning.profiles import PROFILES
@@ -15,7 +14,7 @@ from tests.paths import ROOT
 
 # less is what solver and balance leave
 LEAST = 1e-4
-CASES = {case.name: case for case in collapse.CASES}
+CASES = {case.name: case for case in profiles.CASES}
 
 
 def beyond_a_factor_of_two(row):
@@ -75,7 +74,7 @@ def test_ratios_are_means_of_typical_errors_and_the_largest_of_bounds():
 def test_loads_of_collapse_lie_in_their_bands(name, profile):
     """W01, W02: 0.97 non-associative to 1.01 associative; A02: 0.97 to 1.03 of the least thickness."""
     case = CASES[name]
-    found = collapse.search(case, PROFILES[profile])
+    found = profiles.search(case, PROFILES[profile])
     assert case.low <= min(found.stood, found.fell)
     assert max(found.stood, found.fell) <= case.high
     assert found.undecided == 0

@@ -13,8 +13,8 @@ from archmodel.tables.entities import Entity
 from archmodel.tables.relations import Relation
 from archmodel.tables.runs import ContactPoint, EntityResult, JointResult
 from archmodel.tables.structures import Arch
-from benchmarks import query_child
-from benchmarks.building import COURSES, RUNS
+from benchmarks import query
+from benchmarks.query import COURSES, RUNS
 from tests.paths import ROOT
 
 STONES = 2000
@@ -31,7 +31,7 @@ def run(module, *words):
 def building(tmp_path_factory):
     url = f"sqlite:///{tmp_path_factory.mktemp('db') / 'building.db'}"
     with open_database(url) as database:
-        for step in query_child.STEPS.values():
+        for step in query.STEPS.values():
             step(database, STONES)
         yield database
 
@@ -53,14 +53,14 @@ def test_the_building_has_all_that_it_says(building):
         assert count(Arch) == STONES // 2000
 
 
-@pytest.mark.parametrize("name", query_child.QUESTIONS)
+@pytest.mark.parametrize("name", query.QUESTIONS)
 def test_every_question_has_an_answer(building, name):
     with building.session(read_only=True) as session:
-        assert query_child.QUESTIONS[name].ask(session, STONES) >= 0
+        assert query.QUESTIONS[name].ask(session, STONES) >= 0
 
 
 def test_a_question_is_timed_and_its_plans_are_told(building):
-    found = query_child._ask(building, "kind", STONES)
+    found = query.asked(str(building.engine.url), "kind", STONES)
     assert all(math.isfinite(found[key]) and found[key] > 0 for key in ("cold", "warm", "used"))
     assert any("ix_entity_kind_depth" in plan for plan in found["plans"])
 
@@ -68,9 +68,5 @@ def test_a_question_is_timed_and_its_plans_are_told(building):
 @pytest.mark.slow
 def test_the_benchmarks_run_and_print_every_row():
     rows = run("benchmarks.query", "--stones", 2000, "--json")
-    per_database = len(query_child.STEPS) + len(query_child.QUESTIONS)
+    per_database = len(query.STEPS) + len(query.QUESTIONS)
     assert len(rows) in (per_database, 2 * per_database)
-    rows = run("benchmarks.inheritance", "--entities", 1000, "--json")
-    assert len(rows) in (4, 8)
-    # every layout gives the same answers
-    assert len({row["rows"] for row in rows}) == 1

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.sparse import bsr_array
 
-from benchmarks.stored.operator import StoredDelassus
+from benchmarks.stored import StoredDelassus
 from mechanics.problem.problem import ContactProblem, ContactStart
 from mechanics.problem.residual import natural_map
 from mechanics.solvers.first_order.admm import ADMM

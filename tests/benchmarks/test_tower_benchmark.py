@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks import tower as benchmark
-from benchmarks.tower_masonry import BASE, earthquake, expected_contacts, strongest, tower, tower_blocks
+from benchmarks.tower import BASE, earthquake, expected_contacts, strongest, tower, tower_blocks
 from mechanics.dynamics.contact_search import detector
 from mechanics.model.model import build_model
 from mechanics.scene.scene import Scene

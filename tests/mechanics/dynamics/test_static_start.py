@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from benchmarks.deformable_wall import wall_scene
+from benchmarks.scenes import wall_scene
 from mechanics.dynamics.contact_search import ContactSearch
 from mechanics.dynamics.observers.equilibrium import speed, support_reaction
 from mechanics.dynamics.simulation import Simulation

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from benchmarks.extremes.contacts import grid, patch, squeezed, stored
 from benchmarks.extremes.laws import broken, judge, velocity_of
-from benchmarks.extremes.stones import first_problem, standing, wall
+from benchmarks.extremes.stones import standing, wall
+from benchmarks.scenes import problem_of
 
 TOLERANCE, VELOCITY_TOLERANCE = 1e-8, 1e-5
 
@@ -91,7 +92,7 @@ def test_it_is_zero_only_where_all_laws_hold(u_free, friction, impulse):
 
 def test_its_w_is_that_of_the_engine_written_anew():
     """u of stones through their bodies in numpy, against the operators' kernels, to rounding."""
-    for problem in (first_problem(standing(wall(3, 3))), squeezed(0.5), patch(grid(4), (-1, 2, 3))):
+    for problem in (problem_of(standing(wall(3, 3))), squeezed(0.5), patch(grid(4), (-1, 2, 3))):
         impulse = np.random.default_rng(5).normal(size=problem.u_free.shape)
         u, terms = velocity_of(problem, impulse)
         expected = problem.delassus.apply(impulse) + problem.u_free

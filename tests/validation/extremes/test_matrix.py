@@ -10,14 +10,14 @@ import pytest
 
 from benchmarks.extremes.cells import Outcome, refused_cell, solved_cells
 from benchmarks.extremes.problems import Row, rows
-from benchmarks.extremes.published import published
-from benchmarks.extremes.refusals import refusals
 from benchmarks.extremes.scenes import run_cells, scene_rows
-from benchmarks.extremes.wild import wild_problem
-from benchmarks.fc3d import read_problem
+from benchmarks.stored import read_problem
 from mechanics.scene.scene import Method
 from moma.errors import SolverError
 from tests.paths import ROOT
+from tests.validation.extremes.published import published
+from tests.validation.extremes.refusals import refusals
+from tests.validation.extremes.wild import wild_problem
 
 # a row that no method solves, whatever it tries, has no solution or is refused where it is stated
 UNSOLVABLE = ("conflict", "no number", "negative", "no compliance", "shape", "mass", "velocity")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.limit_scenes import FRICTION, WALLS
+from benchmarks.limit import FRICTION, WALLS
 from mechanics.limit.assembly import assembly
 from mechanics.limit.limit_load import Flow, limit_load
 from mechanics.limit.live_loads import Acceleration, PointForce

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.limit_scenes import FACADES
+from benchmarks.limit import FACADES
 from mechanics.limit.assembly import assembly
 from mechanics.limit.confirm import confirm, likeness
 from mechanics.limit.joints import resultants

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.limit_scenes import WALLS
+from benchmarks.limit import WALLS
 from mechanics.limit.assembly import assembly
 from mechanics.limit.kinematic import kinematics
 from mechanics.limit.limit_load import Flow, limit_load

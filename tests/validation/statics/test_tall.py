@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.tall import column, first_problem, thick_wall
+from benchmarks.scenes import column, first_problem, thick_wall
 from mechanics.problem.problem import ContactStart
 from mechanics.problem.residual import residual
 from mechanics.solvers.second_order.interior_point import InteriorPoint

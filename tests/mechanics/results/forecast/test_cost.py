@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.cost import fitted
-from benchmarks.cost_scenes import KINDS, Case
+from benchmarks.cost import KINDS, Case, fitted
 from mechanics.results.forecast.cost import expected_cost, machine_slowness, measures
 from mechanics.results.forecast.cost_rates import RATES, Rate
 from mechanics.results.forecast.plan import Amounts, plan

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.generated import running_bond
-from benchmarks.scenes import engine_scene
+from benchmarks.scenes import engine_scene, running_bond
 from mechanics.delassus.compliant import CompliantDelassus
 from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model

@@ -5,9 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.generated import running_bond
-from benchmarks.scenes import engine_scene
-from benchmarks.tall import column, first_problem
+from benchmarks.scenes import column, engine_scene, first_problem, running_bond
 from mechanics.contact.contacts import gaps
 from mechanics.delassus.rigid import RigidDelassus
 from mechanics.dynamics.simulation import Simulation

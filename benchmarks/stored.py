@@ -1,22 +1,46 @@
-"""Delassus operator stored in blocks, for contact problems of other programs."""
+"""Contact problems with a stored W, as other programs write them."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csc_array, csr_array, eye_array
 from scipy.sparse.linalg import SuperLU, splu
 
-from benchmarks.stored._kernels.sweeps import Blocks, apply, sweep
 from mechanics.arrays import Array
-from mechanics.problem._kernels import Laws, local_factors
+from mechanics.problem._kernels import Laws, local_factors, solve_contact
 from mechanics.problem.forms import block_diagonal
-from mechanics.problem.problem import GaussSeidel, ScaledDelassus, mean_diagonal
-from moma.errors import SolverError
+from mechanics.problem.problem import ContactProblem, GaussSeidel, ScaledDelassus, mean_diagonal
+from moma.errors import SolverError, UsageError
 
-__all__ = ["StoredDelassus", "StoredForm"]
+__all__ = ["StoredDelassus", "StoredForm", "read_problem"]
+
+
+def read_problem(path: Path) -> ContactProblem:
+    """Read `data` (nnz, 3, 3), `indices`, `indptr`, `q` (3 nc), `mu` (nc).
+
+    Raises
+    ------
+    UsageError : if one of them is missing
+    """
+    with np.load(path) as data:
+        try:
+            operator = StoredDelassus(
+                np.ascontiguousarray(data["data"], dtype=float),
+                data["indices"].astype(np.int64),
+                data["indptr"].astype(np.int64),
+            )
+            q, mu = data["q"].astype(float).reshape(-1, 3), data["mu"].astype(float)
+        except KeyError as missing:
+            remedy = "see benchmarks/README.md for what a problem holds"
+            raise UsageError(str(missing.args[0]), where=str(path), remedy=remedy) from None
+    none = np.zeros(len(mu))
+    return ContactProblem(operator, q, none, mu, none)
 
 
 @dataclass(frozen=True)
@@ -39,8 +63,8 @@ class StoredDelassus:
     """
 
     block: Array
-    indices: NDArray[np.integer]
-    indptr: NDArray[np.integer]
+    indices: NDArray[np.int64]
+    indptr: NDArray[np.int64]
     rigid = None
     plane = None
     joint_compliance = None
@@ -67,7 +91,7 @@ class StoredDelassus:
                 where="stored W",
                 remedy="correct what it was made from",
             )
-        lowest = np.linalg.eigvalsh(self._local())[:, 0]
+        lowest = np.linalg.eigvalsh(self._local)[:, 0]
         if (lowest <= 0).any():
             bad = int(np.argmin(lowest))
             raise SolverError(
@@ -87,10 +111,15 @@ class StoredDelassus:
         return diagonal
 
     @cached_property
-    def blocks(self) -> Blocks:
-        """W for compiled loops."""
-        indices = self.indices.astype(np.int64, copy=False)
-        return Blocks(self.block, indices, self.indptr.astype(np.int64, copy=False))
+    def _local(self) -> Array:
+        """Symmetric parts of W_αα (nc, 3, 3) [1/kg]."""
+        symmetric: Array = 0.5 * (self.diagonal + self.diagonal.transpose(0, 2, 1))
+        return symmetric
+
+    @cached_property
+    def _matrix(self) -> "csr_array[np.float64]":
+        size = 3 * (len(self.indptr) - 1)
+        return bsr_array((self.block, self.indices, self.indptr), shape=(size, size)).tocsr()
 
     @cached_property
     def scale(self) -> float:
@@ -99,14 +128,16 @@ class StoredDelassus:
 
     def apply(self, impulse: Array) -> Array:
         """Return W r (nc, 3) [m/s]."""
-        velocity: Array = apply(impulse, self.blocks)
+        velocity: Array = (self._matrix @ impulse.ravel()).reshape(impulse.shape)
         return velocity
 
     def gauss_seidel(self, shift: Array, friction: Array, cohesion: Array) -> GaussSeidel:
         """Return sweeps in the order of the contacts: on most problems forth and back takes twice as many."""
-        local = self._local()
+        local = self._local
         laws = Laws(shift, friction, cohesion, local_factors(local))
-        return lambda impulse, count, /: sweep(count, impulse, laws, local, self.blocks)
+        return lambda impulse, count, /: _sweep(
+            count, impulse, laws, local, self.block, self.indices, self.indptr
+        )
 
     def scaled(self, unit: Array) -> ScaledDelassus:
         """Return D W D with the units (nc,) of the contacts on the diagonal of D."""
@@ -115,13 +146,7 @@ class StoredDelassus:
     @cached_property
     def form(self) -> "StoredForm":
         """W for methods that factorise; its factors are kept as long as this operator is."""
-        size = 3 * (len(self.indptr) - 1)
-        return StoredForm(bsr_array((self.block, self.indices, self.indptr), shape=(size, size)).tocsr())
-
-    def _local(self) -> Array:
-        own = self.diagonal
-        symmetric: Array = 0.5 * (own + own.transpose(0, 2, 1))
-        return symmetric
+        return StoredForm(self._matrix)
 
 
 class StoredForm:
@@ -164,3 +189,23 @@ class StoredForm:
             raise SolverError("W + Θ is singular", where="solver", remedy="use another method") from error
         solve: Callable[[Array], Array] = factor.solve
         return solve
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _sweep(
+    count: int, r: Array, laws: Laws, local: Array, block: Array, indices: Any, indptr: Any
+) -> None:  # pragma: no cover - compiled
+    """Make `count` passes of non-smooth Gauss–Seidel over impulses r (nc, 3), which are written [N s]."""
+    b, new = np.empty(3), np.empty(3)
+    for _ in range(count):
+        for c in range(len(r)):
+            for k in range(3):
+                b[k] = laws.shift[c, k]
+                for i in range(3):
+                    b[k] -= local[c, k, i] * r[c, i]
+            for p in range(indptr[c], indptr[c + 1]):
+                other = r[indices[p]]
+                for k in range(3):
+                    b[k] += block[p, k, 0] * other[0] + block[p, k, 1] * other[1] + block[p, k, 2] * other[2]
+            solve_contact(laws.factors[c], b, laws.friction[c], laws.cohesion[c], new)
+            r[c, 0], r[c, 1], r[c, 2] = new[0], new[1], new[2]
