@@ -52,8 +52,8 @@ __all__ = ["main", "siconos_error"]
 _LOOSEST, _LOOSER, _TIGHTER, _SMALLEST = 1e-2, 1e5, 10.0, 1e-14
 # solves between an η that suffices and one that does not
 _BISECTIONS = 3
-# methods before the automatic choice, with their iterations: sweeps suffice for few contacts, ADMM where all stick
-_CHAIN = ((Method.NSGS, 60), (Method.ADMM, 60), (Method.NEWTON, 100))
+# methods before the automatic choice, with their iterations: sweeps suffice for few contacts
+_CHAIN = ((Method.NSGS, 60), (Method.NEWTON, 100))
 # scene, angle by which gravity is tilted along it [°], step whose problem is kept
 _PROBLEMS = (
     ("column_10", 0.0, 1),

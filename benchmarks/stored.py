@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy.sparse import bsr_array, csc_array, csr_array, eye_array
-from scipy.sparse.linalg import SuperLU, splu
+from scipy.sparse import bsr_array, csc_array, csr_array
+from scipy.sparse.linalg import splu
 
 from mechanics.arrays import Array
 from mechanics.problem._kernels import Laws, local_factors, solve_contact
@@ -150,31 +150,15 @@ class StoredDelassus:
 
 
 class StoredForm:
-    """Assembled W, which need not be symmetric.
-
-    (W/σ + 1)⁻¹ b is b - W (W/σ + 1)⁻¹ b/σ, which keeps the digits of W r.
-    """
+    """Assembled W, which need not be symmetric."""
 
     def __init__(self, matrix: "csr_array[np.float64]") -> None:
         self._matrix = matrix
-        self._lu: dict[float, SuperLU] = {}
 
     @property
     def matrix(self) -> "csc_array[np.float64]":
         """Symmetric part of W (3 nc, 3 nc) [1/kg]."""
         return csc_array(0.5 * (self._matrix + self._matrix.T))
-
-    def factor(self, sigma: float) -> SuperLU:
-        """Return sparse factors of W/σ + 1, kept for the next call."""
-        if sigma not in self._lu:
-            identity = eye_array(self._matrix.shape[0], format="csc")
-            self._lu[sigma] = splu((self._matrix / sigma + identity).tocsc())
-        return self._lu[sigma]
-
-    def relaxed(self, sigma: float) -> Callable[[Array], Array]:
-        """Return (W/σ + 1)⁻¹ as a function of b (3 nc,)."""
-        factor = self.factor(sigma)
-        return lambda b: b - (self._matrix @ factor.solve(b)) / sigma
 
     def shifted(self, theta: Array, exact: bool = True) -> Callable[[Array], Array]:
         """Return (W + Θ)⁻¹ as a function of b (3 nc,).

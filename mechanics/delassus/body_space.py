@@ -52,13 +52,12 @@ class BodyForm(SparseForm):
         self._mass = np.zeros((len(self._moving), 6, 6))
         self._mass[:, [0, 1, 2], [0, 1, 2]] = 1.0 / inertia[self._moving, :1]
         self._mass[:, 3:, 3:] = np.linalg.inv(upper)
-        self._relaxed: dict[float, Callable[[Array], Array]] = {}
 
     def scaled(self, unit: Array) -> "BodyForm":
         """Return D W D with the units (nc,) on the diagonal of D; the pattern is shared."""
         other = BodyForm.__new__(BodyForm)
         other._contacts = self._contacts._replace(geometry=scaled_frames(self._contacts.geometry, unit))
-        other._moving, other._mass, other._relaxed = self._moving, self._mass, {}
+        other._moving, other._mass = self._moving, self._mass
         other.__dict__["_pattern"] = self._pattern
         return other
 
@@ -147,13 +146,6 @@ class BodyForm(SparseForm):
             return super(BodyForm, self).shifted(theta)(b)
 
         return solve
-
-    def relaxed(self, sigma: float) -> Callable[[Array], Array]:
-        """Return (W/σ + 1)⁻¹ as a function of b (3 nc,); its factors are kept for the next call."""
-        if sigma not in self._relaxed:
-            factors = self._factorised(np.tile(sigma * np.eye(3), (len(self._contacts.body), 1, 1)), 0.0)
-            self._relaxed[sigma] = lambda b: factors.once(sigma * b.reshape(-1, 3))[1].ravel()
-        return self._relaxed[sigma]
 
     def _factorised(self, theta: Array, threshold: float) -> "_Factors":
         pattern, soft = self._pattern, kernel.inverses(theta)

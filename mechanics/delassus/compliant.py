@@ -25,7 +25,6 @@ class CompliantForm:
 
     def __init__(self, inner: Form, compliance: Array) -> None:
         self._inner, self._compliance = inner, compliance
-        self._relaxed: dict[float, Callable[[Array], Array]] = {}
 
     @property
     def matrix(self) -> "csc_array[np.float64] | None":
@@ -36,13 +35,6 @@ class CompliantForm:
     def shifted(self, theta: Array, exact: bool = True) -> Callable[[Array], Array]:
         """Return (W + E + Θ)⁻¹ as a function of b (d nc,)."""
         return self._inner.shifted(theta + _blocks(self._compliance), exact)
-
-    def relaxed(self, sigma: float) -> Callable[[Array], Array]:
-        """Return ((W + E)/σ + 1)⁻¹ as a function of b (d nc,); its factors are kept for the next call."""
-        if sigma not in self._relaxed:
-            solve = self._inner.shifted(_blocks(self._compliance + sigma))
-            self._relaxed[sigma] = lambda b: solve(sigma * b)
-        return self._relaxed[sigma]
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,6 @@ class CondensedForm:
 
     def __init__(self, bodies: Ints, cliques: Cliques, threads: int = 1) -> None:
         self._bodies, self._cliques, self._threads = bodies, cliques, threads
-        self._relaxed: dict[float, Callable[[Array], Array]] = {}
 
     @property
     def matrix(self) -> "csc_array[np.float64]":
@@ -43,13 +42,6 @@ class CondensedForm:
         SolverError : if W + Θ is singular
         """
         return self._fronts.factorise(self._cliques, theta, self._threads).solve
-
-    def relaxed(self, sigma: float) -> Callable[[Array], Array]:
-        """Return (W/σ + 1)⁻¹ as a function of b (3 nc,); its factors are kept for the next call."""
-        if sigma not in self._relaxed:
-            solve = self.shifted(np.tile(sigma * np.eye(3), (len(self._bodies), 1, 1)))
-            self._relaxed[sigma] = lambda b: solve(sigma * b)
-        return self._relaxed[sigma]
 
 
 def assembled(cliques: Cliques, count: int) -> "csc_array[np.float64]":

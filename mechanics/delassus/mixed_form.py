@@ -114,7 +114,6 @@ class MixedForm:
         sign = np.array([1.0, -1.0])[:, None, None]
         self._jacobian = np.where(pattern.place[..., None, None] >= 0, sign * jacobian, 0.0)
         self._elastic = Cliques([own // 2 for own in pattern.elastic], blocks)
-        self._relaxed: dict[float, Callable[[Array], Array]] = {}
 
     @cached_property
     def _across(self) -> "csr_array[np.float64]":
@@ -154,14 +153,6 @@ class MixedForm:
         SolverError : if Θ or the whole is singular
         """
         return self._factorised(theta).refined
-
-    def relaxed(self, sigma: float) -> Callable[[Array], Array]:
-        """Return (W/σ + 1)⁻¹ as a function of b (3 nc,); its factors are kept for the next call."""
-        if sigma not in self._relaxed:
-            factors = self._factorised(np.tile(sigma * np.eye(3), (len(self._pattern.place), 1, 1)))
-            still = np.zeros(6 * len(self._mass))
-            self._relaxed[sigma] = lambda b: factors.once(sigma * b, still)[0]
-        return self._relaxed[sigma]
 
     def _factorised(self, theta: Array) -> "_Factors":
         pattern = self._pattern

@@ -45,8 +45,8 @@ class _Way:
 _DEFORMING = _Way(1.0, 10, np.inf, tightened=True)
 # joints that yield between rigid stones: in longer steps those that slide do so too far before they are seen again
 _YIELDING = _Way(0.1, 40, np.inf, tightened=True)
-# deformable stones among more rigid ones: in steps of 1 s a stone would yield by a hundred millionth of what it moves as
-# a whole. Stones that have a way to go, as joints that open do not bear them yet, go on until they have passed a peak
+# deformable stones among more rigid ones: in steps of 1 s a stone would yield by a hundred millionth of what it moves
+# as a whole. Stones that have a way to go, as joints that open do not bear them yet, go on until they have passed a peak
 _AMONG_RIGID = _Way(5e-3, 50, 0.5, unsolved=2)
 # rigid stones, which fall by a millimetre in a step; joints that are open by a millimetre need some ten
 _SETTLING = _Way(1e-2, 50)
@@ -114,7 +114,8 @@ class _Search:
     ) -> None:
         self._model, self._start, self._report, self._way = model, start, report, way
         self.count, self.iterations, self.found = count, iterations, False
-        self._balance, self._eta, self._first = np.full(1, np.inf), 0.0, count
+        self._balance: Array = np.full(1, np.inf)
+        self._eta, self._first = 0.0, count
         asked = model.scene.solver
         self._goal = max(asked.tolerance, _ROUNDING)
         self._search = Simulation(
@@ -186,7 +187,7 @@ class _Search:
         """Take a step, and look at its balance under the loads of the first instant."""
         made = self._search.step()
         after = replace(made.after, time=self._start.time)
-        self._balance: Array = imbalance(self._search.model, after, made.contacts, made.force, made.kick.load)
+        self._balance = imbalance(self._search.model, after, made.contacts, made.force, made.kick.load)
         self.count, self.iterations = self.count + 1, self.iterations + made.solution.iterations
         self._eta = made.solution.natural_map
         text = f"balance {self._largest:.1e}, η {self._eta:.1e}"

@@ -31,7 +31,7 @@ from mechanics.planar.scene import PlanarScene
 from mechanics.planar.simulation import PlanarSimulation, PlanarStep
 from mechanics.results.result import Errors
 from mechanics.scene.laws.status import contact_status
-from mechanics.solvers.choice import Solver
+from mechanics.solvers.chain import Solver
 from moma.errors import SceneError
 
 __all__ = ["PlanarRun"]

@@ -15,7 +15,8 @@ from mechanics.planar.overlaps import Apart, Overlaps
 from mechanics.planar.stepping import Drive, fly, load_velocity, load_work
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.scene.laws.law import Approach, Terms
-from mechanics.solvers.choice import Solver, choose_planar_solver
+from mechanics.solvers.chain import Solver
+from mechanics.solvers.choice import choose_planar_solver
 from mechanics.solvers.first_order.disk_admm import DiskADMM
 from moma.errors import SolverError
 

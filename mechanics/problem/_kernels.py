@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 __all__ = [
     "Laws",
     "LocalCompliance",
-    "admm_right_side",
-    "admm_update",
     "local_factors",
     "natural_errors",
     "onto_cone",
@@ -269,57 +267,6 @@ def natural_errors(r, u, bias, mu, k, rho):  # pragma: no cover - compiled
         largest = max(largest, e)
         projected += height * height + radius * radius
     return error, np.sqrt(whole), np.sqrt(largest), np.sqrt(total), np.sqrt(projected)
-
-
-@njit(cache=True)
-def admm_right_side(z, y, shift, lag, sigma, right):  # pragma: no cover - compiled
-    """Write z - y - (u_free + bias n)/σ - lag n into `right`.
-
-    Inputs
-    ------
-    z, y : (nc, d) float64 [N s]
-    shift : (nc, d) float64, u_free + bias n [m/s]
-    lag : (nc,) float64, μ‖u_T‖/σ of some earlier u_T [N s]
-    sigma : float64, σ [1/kg]
-
-    Outputs
-    -------
-    right : (nc, d) float64, written [N s]
-    """
-    for c in range(z.shape[0]):
-        for i in range(z.shape[1]):
-            right[c, i] = z[c, i] - y[c, i] - shift[c, i] / sigma
-        right[c, 0] -= lag[c]
-
-
-@njit(cache=True)
-def admm_update(r, z, y, mu, k, over):  # pragma: no cover - compiled
-    """Let z ← P_K(r' + y), y ← y + r' - z, with r' = over r + (1 - over) z.
-
-    Inputs
-    ------
-    r, z, y : (nc, d) float64 [N s]
-    mu, k : (nc,) float64, friction [-] and cohesion [N s]
-    over : float64, over-relaxation [-]
-
-    Outputs
-    -------
-    z, y : written
-    """
-    for c in range(z.shape[0]):
-        tangential = 0.0
-        for i in range(z.shape[1]):
-            y[c, i] += over * r[c, i] + (1.0 - over) * z[c, i]
-            if i > 0:
-                tangential += y[c, i] * y[c, i]
-        tangential = np.sqrt(tangential)
-        height, radius = onto_cone(y[c, 0], tangential, mu[c], k[c])
-        shrink = radius / tangential if tangential > 0.0 else 0.0
-        z[c, 0] = height
-        y[c, 0] -= height
-        for i in range(1, z.shape[1]):
-            z[c, i] = shrink * y[c, i]
-            y[c, i] -= z[c, i]
 
 
 @njit(cache=True)

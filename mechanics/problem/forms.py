@@ -5,7 +5,7 @@ from typing import Protocol
 
 import numpy as np
 from scipy.sparse import block_array, bsr_array, csc_array, diags_array
-from scipy.sparse.linalg import SuperLU, splu
+from scipy.sparse.linalg import splu
 
 from mechanics.arrays import Array
 from moma.errors import SolverError
@@ -24,9 +24,6 @@ class Form(Protocol):
     @property
     def matrix(self) -> "csc_array[np.float64] | None":
         """W (d nc, d nc), or None."""
-
-    def relaxed(self, sigma: float) -> Callable[[Array], Array]:
-        """Return (W/σ + 1)⁻¹ as a function of b (d nc,); its factors are kept for the next call."""
 
     def shifted(self, theta: Array, exact: bool = True) -> Callable[[Array], Array]:
         """Return (W + Θ)⁻¹ as a function of b (d nc,); W may be singular where Θ holds it.
@@ -55,22 +52,6 @@ class SparseForm:
 
     def __init__(self, inertia: "csc_array[np.float64]", lift: "csc_array[np.float64]") -> None:
         self.inertia, self.lift, self.across = inertia, lift, lift.T.tocsr()
-        self._factors: dict[float, SuperLU] = {}
-
-    def factor(self, sigma: float) -> SuperLU:
-        """Return sparse factors of Â + H Hᵀ/σ, kept for the next call."""
-        if sigma not in self._factors:
-            matrix = (self.inertia + self.lift @ self.across / sigma).tocsc()
-            # symmetric positive definite: order A + Aᵀ and do not pivot
-            self._factors[sigma] = splu(
-                matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-            )
-        return self._factors[sigma]
-
-    def relaxed(self, sigma: float) -> Callable[[Array], Array]:
-        """Return (W/σ + 1)⁻¹ as a function of b (d nc,), by the Woodbury identity."""
-        factor = self.factor(sigma)
-        return lambda b: b - (self.across @ factor.solve(self.lift @ b)) / sigma
 
     def shifted(self, theta: Array, exact: bool = True) -> Callable[[Array], Array]:
         """Return (W + Θ)⁻¹ as a function of b (d nc,).
@@ -103,7 +84,6 @@ class ScaledForm:
 
     def __init__(self, inner: Form, unit: Array, axes: int) -> None:
         self._inner, self._unit, self._axes = inner, unit, axes
-        self._relaxed: dict[float, Callable[[Array], Array]] = {}
 
     @property
     def matrix(self) -> "csc_array[np.float64] | None":
@@ -116,13 +96,6 @@ class ScaledForm:
         solve = self._inner.shifted(theta / (self._unit**2)[:, None, None], exact)
         unit = np.repeat(self._unit, self._axes)
         return lambda b: solve(b / unit) / unit
-
-    def relaxed(self, sigma: float) -> Callable[[Array], Array]:
-        """Return (D W D/σ + 1)⁻¹ as a function of b (d nc,); its factors are kept for the next call."""
-        if sigma not in self._relaxed:
-            solve = self.shifted(np.tile(sigma * np.eye(self._axes), (len(self._unit), 1, 1)))
-            self._relaxed[sigma] = lambda b: solve(sigma * b)
-        return self._relaxed[sigma]
 
 
 def block_diagonal(blocks: Array) -> "bsr_array[np.float64]":

@@ -272,7 +272,7 @@ class SolverSettings:
     method: Annotated[
         Method,
         Setting(
-            "auto chooses; nsgs: Gauss–Seidel; admm: alternating directions between rigid stones; interior-point; newton."
+            "auto chooses; nsgs: Gauss–Seidel; admm: alternating directions, rigid stones; interior-point; newton."
         ),
     ] = Method.AUTO
     tolerance: Annotated[

@@ -61,10 +61,6 @@ class DenseForm:
     def matrix(self):
         return csc_array(self.w)
 
-    def relaxed(self, sigma):
-        inverse = np.linalg.inv(self.w / sigma + np.eye(len(self.w)))
-        return lambda b: inverse @ b
-
     def shifted(self, theta, exact=True):
         matrix = self.w.copy()
         for c, block in enumerate(theta):

@@ -32,8 +32,8 @@ _WORTHLESS = 1e30
 class InteriorPoint:
     """Central path, from near the impulses of the start, or from far inside the cones where there are none.
 
-    Each iteration factorises W + Θ in units in which all contacts yield alike (`equilibrated`): masses may differ by any
-    factor. W may be singular, as between rigid stones that touch in more points than they need.
+    Each iteration factorises W + Θ in units in which all contacts yield alike (`equilibrated`): masses may differ by
+    any factor. W may be singular, as between rigid stones that touch in more points than they need.
 
     Attributes
     ----------
