@@ -14,13 +14,13 @@ from mechanics.scene.scene import Block, Fidelity
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.meshers.mesher import mesh_block
+from pipelines.samples.buildings.openings import Arch
+from pipelines.samples.buildings.walls import wall
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.solids import Solid
 from survey.joints.close import ClosedStones, close_joints
 from survey.joints.settings import JointSettings
 from survey.simplify.simplify import BlockyStone, simplify
-from survey.synthetic.buildings.openings import Arch
-from survey.synthetic.buildings.walls import wall
 
 __all__ = ["main"]
 

@@ -16,16 +16,16 @@ from archmodel.tables.entries import Entry, new_entry
 from archmodel.tables.surveys import Measurement
 from moma.errors import DatabaseError, UsageError
 from pipelines.ingest.records import stone_record, surveyed_block
+from pipelines.samples.buildings.window import make_window
 from survey.extrusion.depth import depth_for
 from survey.extrusion.extrusion import extrude
 from survey.faces.faces import outline_face
-from survey.synthetic.window_bay.sample import make_sample
 from survey.unseen.missing.propose import propose_missing
 
 
 @pytest.fixture(scope="module")
 def records():
-    survey = make_sample().survey
+    survey = make_window().survey
     blocks = [
         extrude(outline_face(one, survey.head.viewpoint(None)), depth_for(one, survey.head.depth_rules))
         for one in survey.blocks

@@ -10,6 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from pipelines.samples.buildings.openings import Arch
+from pipelines.samples.buildings.quoins import corner
+from pipelines.samples.buildings.vaults import barrel_vault, semicircular_arch
+from pipelines.samples.buildings.walls import wall
+from pipelines.samples.buildings.window import make_window
+from pipelines.samples.true_joints import TrueJoint, true_joints
 from survey.extrusion.depth import depth_for
 from survey.extrusion.extrusion import SurveyedBlock, extrude
 from survey.faces.faces import outline_face
@@ -17,12 +23,6 @@ from survey.formats.native.reader import read_moma
 from survey.joints.close import ClosedStones, close_joints
 from survey.joints.settings import JointMode, JointSettings
 from survey.simplify.simplify import simplify
-from survey.synthetic.buildings.openings import Arch
-from survey.synthetic.buildings.quoins import corner
-from survey.synthetic.buildings.vaults import barrel_vault, semicircular_arch
-from survey.synthetic.buildings.walls import wall
-from survey.synthetic.shared_faces import TrueJoint, true_joints
-from survey.synthetic.window_bay.sample import make_sample
 from tests.paths import ROOT
 from tests.validation.closing.closing_truth import Verdict, judge
 
@@ -75,7 +75,7 @@ def closing(request: pytest.FixtureRequest) -> Case:
             extrude(outline_face(one, head.viewpoint(None)), depth_for(one, head.depth_rules))
             for one in survey.blocks
         ]
-        return case(blocks, true_joints([stone.solid for stone in make_sample().stones]))
+        return case(blocks, true_joints([stone.solid for stone in make_window().stones]))
     building = (SMALL | LARGE)[request.param]()
     return case(building.blocks(), building.joints)
 

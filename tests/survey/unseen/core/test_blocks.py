@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 from moma.errors import GeometryError, UsageError
 from pipelines.ingest.records import surveyed_block
 from pipelines.propose.records import core_record
+from pipelines.samples.buildings.facings import two_facings
+from pipelines.samples.buildings.tower import tower_storey
 from survey.geometry.solids import volume_of
 from survey.geometry.watertight import check_watertight
 from survey.joints.close import close_joints
 from survey.joints.settings import JointSettings
-from survey.synthetic.buildings.facings import two_facings
-from survey.synthetic.buildings.tower import tower_storey
 from survey.unseen.core.facings import facing_stone
 from survey.unseen.core.propose import propose_infill
 from survey.unseen.core.settings import InfillSettings

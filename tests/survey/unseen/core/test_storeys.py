@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from pipelines.samples.buildings.facings import two_facings
 from survey.geometry.solids import Solid, volume_of
 from survey.geometry.stone_parts import grid_parts
 from survey.geometry.watertight import check_watertight
-from survey.synthetic.buildings.facings import two_facings
 from survey.unseen.core.cells import CellGrid, grid_solids
 from survey.unseen.core.facings import facing_stone
 from survey.unseen.core.propose import propose_infill
