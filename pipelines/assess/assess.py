@@ -20,8 +20,8 @@ from moma.errors import MissingLibraryError, UsageError
 from pipelines.assess.answers import FALLS, Answer, answer, confirmer, leader, refuse_unanswerable
 from pipelines.assess.codes.check import CODES
 from pipelines.assess.questions import LoadQuestion, Question, parse_question, scene_questions
-from pipelines.draw.capacity_plot import draw_capacity
 from pipelines.draw.mechanism import draw_mechanisms
+from pipelines.draw.plots import draw_capacity
 from pipelines.reports.assessment import write_assessment
 from pipelines.results.folder import check_replaceable, replacing
 from pipelines.results.summary import as_json

@@ -10,7 +10,7 @@ import numpy as np
 from archmodel.store.run_record import StoneResult
 from mechanics.results.result import Result
 from pipelines.arrays import Array
-from pipelines.draw.history_plot import history_svg
+from pipelines.draw.plots import history_svg
 from pipelines.reports.html import (
     kilonewtons,
     kilopascals,

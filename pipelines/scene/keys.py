@@ -1,6 +1,6 @@
 """Keys of a scene file from the settings that dataclasses declare: name, type, default, unit, bounds and meaning.
 
-A new setting of a dataclass is a new key; `python -m pipelines.scene.reference docs/scene.md` documents it.
+A new setting of a dataclass is a new key; `python -m tests.pipelines.scene.reference docs/scene.md` documents it.
 """
 
 from collections.abc import Mapping

@@ -11,7 +11,7 @@ from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene, Start
 from mechanics.simulate import simulate
 from mechanics.stones.materials import Material
 from pipelines.ingest.records import surveyed_block
-from pipelines.propose.records import core_record
+from pipelines.propose.propose import core_record
 from pipelines.samples.buildings.facings import two_facings
 from survey.joints.close import close_joints
 from survey.joints.settings import JointSettings

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from moma.errors import GeometryError, UsageError
 from pipelines.ingest.records import surveyed_block
-from pipelines.propose.records import core_record
+from pipelines.propose.propose import core_record
 from pipelines.samples.buildings.facings import two_facings
 from pipelines.samples.buildings.tower import tower_storey
 from survey.geometry.solids import volume_of

@@ -1,4 +1,4 @@
-"""Tables of docs/scene.md, generated from the keys: `python -m pipelines.scene.reference docs/scene.md`."""
+"""Tables of docs/scene.md, generated from the keys: `python -m tests.pipelines.scene.reference docs/scene.md`."""
 
 import re
 import sys
