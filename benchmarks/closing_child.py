@@ -14,7 +14,7 @@ from mechanics.scene.scene import Block, Fidelity
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.meshers.mesher import mesh_block
-from pipelines.samples.buildings.openings import Arch
+from pipelines.samples.buildings.openings import ArchShape
 from pipelines.samples.buildings.walls import wall
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.solids import Solid
@@ -36,7 +36,7 @@ def main() -> None:
 
 
 def _wall(stones: int) -> list[SurveyedBlock]:
-    return wall(stones, arch=Arch.SEGMENTAL).blocks()
+    return wall(stones, arch=ArchShape.SEGMENTAL).blocks()
 
 
 def _run(blocks: list[SurveyedBlock], size: float) -> list[Row]:

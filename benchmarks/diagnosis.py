@@ -26,7 +26,7 @@ from pipelines.assess.motions import Motions
 from pipelines.ingest.ingest import ingest
 from pipelines.propose.propose import Recording, propose_core
 from pipelines.record.record import record
-from pipelines.samples.building import Building
+from pipelines.samples.building import SyntheticBuilding
 from pipelines.samples.samples import recipe_of
 from pipelines.samples.true_movement import true_movement
 from pipelines.samples.write import write_sample
@@ -91,7 +91,7 @@ class Laboratory:
     cases: tuple[Case, ...]
     url: str
     phases: dict[str, str]
-    moved: Callable[[int], Building]
+    moved: Callable[[int], SyntheticBuilding]
     core: bool
     true: str
     amount: float

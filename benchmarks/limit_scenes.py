@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from mechanics.limit.assembly import Assembly, assembly
+from mechanics.limit.assembly import RigidAssembly, assembly
 from mechanics.limit.live_loads import Acceleration
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene
@@ -50,7 +50,7 @@ class LimitCase:
         """Load whose multiple is sought."""
         return Acceleration(self.direction)
 
-    def assembly(self) -> Assembly:
+    def assembly(self) -> RigidAssembly:
         """Return the stones and their joints."""
         contact = ContactSettings(DryJoint(self.friction))
         return assembly(Scene("limit", tuple(self.blocks()), contact=contact))

@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 
 from archmodel.database.session import open_database
+from mechanics.arrays import Array
 from mechanics.results.result import Result
 from mechanics.simulate import simulate_stages
-from pipelines.arrays import Array
 from pipelines.ingest.ingest import ingest
 from pipelines.run.assemble import assemble
 from pipelines.samples.write import write_sample

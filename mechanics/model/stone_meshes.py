@@ -15,7 +15,7 @@ from mechanics.arrays import Array
 from mechanics.model.deformable import Deformable, deformable
 from mechanics.scene.scene import Block, Fidelity
 from mechanics.stones.convex_polygons import moments, overlaps
-from mechanics.stones.meshing.congruence import Motion, classes, motion, translation
+from mechanics.stones.meshing.congruence import Congruence, classes, motion, translation
 from mechanics.stones.meshing.mesh import SolidMesh
 from mechanics.stones.meshing.meshers.mesher import Meshed, meshed_block
 from mechanics.stones.meshing.quality import MeshQuality, MeshReport, StoneMesh, mesh_quality
@@ -42,7 +42,7 @@ class StoneWorkshop:
         self._soft = [b for b, block in enumerate(blocks) if block.fidelity is Fidelity.DEFORMABLE]
         graded = [b for b in self._soft if _is_graded(blocks[b])]
         self._contact = touching_faces(blocks, graded, near) if graded else {}
-        self._motions: dict[int, Motion] = {}
+        self._motions: dict[int, Congruence] = {}
         self._meshed: dict[int, Meshed] = {}
         self._made: dict[int, tuple[Deformable, Array]] = {}
         in_order = sorted(self._soft, key=lambda b: blocks[b].code)

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mechanics.results.result import History
-from pipelines.arrays import Array
+from mechanics.arrays import Array
+from mechanics.results.result import RunHistory
 from pipelines.draw.elevations.sheet import new_sheet
 
 __all__ = ["draw_capacity", "history_svg"]
@@ -22,7 +22,7 @@ _CURVES = (
 )
 
 
-def history_svg(history: History) -> str:
+def history_svg(history: RunHistory) -> str:
     """Plot speed, balance and residual against time; return an SVG element."""
     figure = new_sheet((8.5, 3.6))
     axes = figure.subplots()

@@ -25,7 +25,7 @@ from moma.errors import SceneError
 from pipelines.geology.experiments.experiment import Setup
 from pipelines.geology.experiments.membrane import Membrane
 from pipelines.geology.file import GeologyScene, read_geology
-from pipelines.geology.observe import Observation
+from pipelines.geology.observe import ObservedRun
 from pipelines.geology.results import write_results
 from pipelines.geology.sample import PreparedSample, prepare
 from pipelines.geology.settings import Layer
@@ -217,10 +217,10 @@ def _followed_layers(scene: GeologyScene, sample: PreparedSample) -> Ints | None
 
 def _observation(
     scene: GeologyScene, sample: PreparedSample, planar: PlanarScene, place: Path
-) -> Observation:
+) -> ObservedRun:
     layer = _followed_layers(scene, sample)
     try:
-        return Observation(place, scene.cells, sample.centre, sample.radius, planar.thickness, layer)
+        return ObservedRun(place, scene.cells, sample.centre, sample.radius, planar.thickness, layer)
     except SceneError as error:
         scene.document.fail(f"{error.where}: {error.what}", "cells", remedy=error.remedy)
 

@@ -25,7 +25,7 @@ from archmodel.assertions.withdraw import withdraw_members, withdraw_relations, 
 from archmodel.query.api import find
 from archmodel.store.find_by_code import Subjects, entity_numbers, held_or_none, subjects
 from archmodel.store.hypotheses import withdraw_hypotheses
-from archmodel.store.revisions import NOTHING, Outcome, withdraw
+from archmodel.store.revisions import NOTHING, RowCounts, withdraw
 from archmodel.tables.entries import Entry
 from archmodel.tables.knowledge import (
     Document,
@@ -87,7 +87,7 @@ class _Work:
         return Remark(self["text"], self["document"], self["locator"], seen)
 
 
-def record_table(session: Session, entry: Entry, file: RecordFile, table: Table) -> Outcome:
+def record_table(session: Session, entry: Entry, file: RecordFile, table: Table) -> RowCounts:
     """Record one table within an entry.
 
     Raises
@@ -99,7 +99,7 @@ def record_table(session: Session, entry: Entry, file: RecordFile, table: Table)
         return _RECORDERS[table.name](_Work(session, entry, file, table))
 
 
-def _kind(work: _Work) -> Outcome:
+def _kind(work: _Work) -> RowCounts:
     own = {name: (one["unit"], one["definition"]) for name, one in work["attributes"].items()}
     return register_kind(
         work.session,
@@ -112,19 +112,19 @@ def _kind(work: _Work) -> Outcome:
     )
 
 
-def _material(work: _Work) -> Outcome:
+def _material(work: _Work) -> RowCounts:
     properties = {name: PropertyValue(**one) for name, one in work["properties"].items()}
     with work.file.at(*work.table.path, "properties"):
         return declare_material(work.session, work.entry, work["name"], work["description"], properties)
 
 
-def _phase(work: _Work) -> Outcome:
+def _phase(work: _Work) -> RowCounts:
     return declare_phase(
         work.session, work.entry, work["name"], work["begins"], work["ends"], work["description"]
     )
 
 
-def _document(work: _Work) -> Outcome:
+def _document(work: _Work) -> RowCounts:
     return declare_document(
         work.session,
         work.entry,
@@ -137,7 +137,7 @@ def _document(work: _Work) -> Outcome:
     )
 
 
-def _structure(work: _Work) -> Outcome:
+def _structure(work: _Work) -> RowCounts:
     with work.file.at(*work.table.path, "kind"):
         # also of the kinds that the database, or this file, registers
         structure_kind_named(work["kind"])
@@ -155,17 +155,17 @@ def _structure(work: _Work) -> Outcome:
     return outcome + declare_members(work.session, work.entry, work["code"], stones, ordered=work["ordered"])
 
 
-def _relation(work: _Work) -> Outcome:
+def _relation(work: _Work) -> RowCounts:
     of, to = (list(_named_stones(work.session, work.file, work.table, key).values()) for key in ("of", "to"))
     return declare_relation(work.session, work.entry, work["kind"], of, to)
 
 
-def _depth(work: _Work) -> Outcome:
+def _depth(work: _Work) -> RowCounts:
     codes = list(_named_stones(work.session, work.file, work.table))
     return record_depth(work.session, work.entry, codes, work["value"], work["sigma"], work.remark())
 
 
-def _statement(work: _Work) -> Outcome:
+def _statement(work: _Work) -> RowCounts:
     """Record a statement about stones and structures."""
     session, entry, remark = work.session, work.entry, work.remark()
     about = _named_subjects(session, work.file, work.table)
@@ -185,7 +185,7 @@ def _statement(work: _Work) -> Outcome:
             return say_note(session, entry, about, work["key"], remark)
 
 
-def _correction(work: _Work) -> Outcome:
+def _correction(work: _Work) -> RowCounts:
     values = {**work["set"], **dict.fromkeys(work["unset"])}
     if not values:
         raise UsageError("empty correction", remedy='give set = { kind = "quoin" }, for example')
@@ -196,7 +196,7 @@ def _correction(work: _Work) -> Outcome:
     return outcome
 
 
-def _withdraw(work: _Work) -> Outcome:
+def _withdraw(work: _Work) -> RowCounts:
     what = work["what"]
     if what in _NAMED:
         return _withdraw_named(work, what)
@@ -216,7 +216,7 @@ def _withdraw(work: _Work) -> Outcome:
     return withdraw_statements(work.session, work.entry, _STATEMENTS[what], about, work["match"])
 
 
-def _withdraw_named(work: _Work, what: str) -> Outcome:
+def _withdraw_named(work: _Work, what: str) -> RowCounts:
     """Withdraw a material, one of its properties, a phase, a document or a structure, permanently."""
     cls, name = _NAMED[what], work["name"]
     if name is None:
@@ -237,10 +237,10 @@ def _withdraw_named(work: _Work, what: str) -> Outcome:
         raise UsageError(
             f"there has never been a {cls.__name__.lower()} {name[:40]!r}", remedy="check its name"
         )
-    return Outcome(unchanged=1)
+    return RowCounts(unchanged=1)
 
 
-_RECORDERS: Mapping[str, Callable[[_Work], Outcome]] = {
+_RECORDERS: Mapping[str, Callable[[_Work], RowCounts]] = {
     "kind": _kind,
     "withdraw": _withdraw,
     "correction": _correction,

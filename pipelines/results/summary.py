@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from mechanics.arrays import Bools, Ints
 from mechanics.model.model import laws_between
 from mechanics.results.contact_result import JointResult
 from mechanics.results.joints import SLIVER
@@ -15,7 +16,6 @@ from mechanics.results.result import Result
 from mechanics.results.stages import StageResult
 from mechanics.scene.laws.elastic_joint import ElasticJoint
 from mechanics.scene.scene import Fidelity
-from pipelines.arrays import Bools, Ints
 from pipelines.results.peaks import peak_records
 from pipelines.results.quantities import quantities
 from pipelines.results.stone_values import stress_statistics

@@ -7,14 +7,14 @@ import numpy as np
 from sqlalchemy.orm import Session
 
 from archmodel.store.stone_record import StoneRecord
+from mechanics.arrays import Array
 from mechanics.scene.scene import Block, Fidelity, LawRule, Part, Scene
 from mechanics.scene.stages import Stage
-from pipelines.arrays import Array
 from pipelines.draw.catalogue import PICTURES
 from pipelines.ingest.records import surveyed_block
 from pipelines.run.fidelity import Modelled, Wishes, modelled, neighbours
 from pipelines.run.remarks import remarks, remarks_on_laws, remarks_on_stones
-from pipelines.scene.array_tables import Entry
+from pipelines.scene.array_tables import ArrayTable
 from pipelines.scene.file import SceneFile
 from pipelines.scene.keys import typed_values
 from pipelines.scene.laws import law_rules
@@ -254,7 +254,7 @@ def stone_about(stone: StoneRecord, origin: Array) -> StoneRecord:
     )
 
 
-def _entry_about(entry: Entry, origin: Array) -> Entry:
+def _entry_about(entry: ArrayTable, origin: Array) -> ArrayTable:
     """Return the entry of a scene file with its points relative to `origin`."""
     places = {name: entry.values[name] for name in _PLACES if entry.values.get(name) is not None}
     if not origin.any() or not places:

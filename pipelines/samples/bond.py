@@ -13,14 +13,14 @@ from random import Random
 import numpy as np
 
 from moma.errors import GeometryError
-from pipelines.arrays import Array
+from survey.arrays import Array
 
 __all__ = [
     "CLEARANCES",
     "WIDTHS",
     "Bed",
-    "Line",
     "Piece",
+    "PlanLine",
     "PlannedStone",
     "crossing",
     "fill",
@@ -38,7 +38,7 @@ _TILT = math.radians(0.8)  # largest tilt of a head joint off the perpendicular
 
 
 @dataclass(frozen=True)
-class Line:
+class PlanLine:
     """Straight line through `point` along `direction` in the wall plane."""
 
     point: tuple[float, float]
@@ -67,18 +67,18 @@ class PlannedStone:
     joint: tuple[bool, bool, bool, bool]
 
 
-def level(t: float) -> Line:
+def level(t: float) -> PlanLine:
     """Return the bed line at height t."""
-    return Line((0.0, t), (1.0, 0.0))
+    return PlanLine((0.0, t), (1.0, 0.0))
 
 
-def upright(s: float, t: float, rng: Random | None = None) -> Line:
+def upright(s: float, t: float, rng: Random | None = None) -> PlanLine:
     """Return the head joint through (s, t): up to 0.8° off with `rng`, as masons work; exactly upright without."""
     tilt = 0.0 if rng is None else rng.uniform(-_TILT, _TILT)
-    return Line((s, t), (math.sin(tilt), math.cos(tilt)))
+    return PlanLine((s, t), (math.sin(tilt), math.cos(tilt)))
 
 
-def crossing(a: Line, b: Line) -> tuple[float, float]:
+def crossing(a: PlanLine, b: PlanLine) -> tuple[float, float]:
     """Return the point in which two lines cross."""
     (px, py), (ux, uy) = a.point, a.direction
     (qx, qy), (vx, vy) = b.point, b.direction
@@ -126,8 +126,8 @@ class Piece:
     """One stone of a course: its kind, and the lines that it lies between."""
 
     kind: str
-    left: Line
-    right: Line
+    left: PlanLine
+    right: PlanLine
 
 
 @dataclass(frozen=True)
@@ -143,21 +143,23 @@ class Bed:
     height: float
     corners: tuple[tuple[float, float], ...] = ()
 
-    def crossing(self, line: Line) -> tuple[float, float]:
+    def crossing(self, line: PlanLine) -> tuple[float, float]:
         """Return the point where a nearly upright line meets the bed."""
         if not self.corners:
             return crossing(line, level(self.height))
         before = bisect_left(self.corners, (line.at(self.height), 0.0)) - 1
         before = min(max(before, 0), len(self.corners) - 2)
         (s, t), (to_s, to_t) = self.corners[before : before + 2]
-        return crossing(line, Line((s, t), (to_s - s, to_t - t)))
+        return crossing(line, PlanLine((s, t), (to_s - s, to_t - t)))
 
     def bends(self, start: float, stop: float) -> list[tuple[float, float]]:
         """Return the corners of the bed strictly between two places."""
         return [(s, t) for s, t in self.corners if start + 1e-6 < s < stop - 1e-6]
 
 
-def fill_run(rng: Random, start: Line, stop: Line, height: float, below: Sequence[float]) -> list[Piece]:
+def fill_run(
+    rng: Random, start: PlanLine, stop: PlanLine, height: float, below: Sequence[float]
+) -> list[Piece]:
     """Fill a run of a course, of any length.
 
     Parameters

@@ -7,11 +7,18 @@ from types import MappingProxyType
 
 import numpy as np
 
-from pipelines.arrays import Array
 from pipelines.samples.bond import PlannedStone
 from pipelines.samples.frame import Movement, RigidMotion, TrueStone, WallFrame
-from pipelines.samples.measure import HALF_JOINT, SIGMA, Measured, add_blunders, measure_stone, modelled_solid
+from pipelines.samples.measure import (
+    HALF_JOINT,
+    SIGMA,
+    MeasuredStone,
+    add_blunders,
+    measure_stone,
+    modelled_solid,
+)
 from pipelines.samples.true_joints import TrueJoint, true_joints
+from survey.arrays import Array
 from survey.extrusion.depth import depth_for
 from survey.extrusion.extrusion import SurveyedBlock, extrude, prism
 from survey.extrusion.imported_solids import block_of_solid
@@ -19,7 +26,7 @@ from survey.faces.faces import outline_face
 from survey.geometry.solids import Solid
 from survey.records.survey import OBSERVER, DepthRule, SolidRecord, Station, Survey, SurveyHead
 
-__all__ = ["Building", "Draft", "SolidDraft", "flat_stone", "measured_building", "observer"]
+__all__ = ["Draft", "SolidDraft", "SyntheticBuilding", "flat_stone", "measured_building", "observer"]
 
 
 SOURCE = "synthetic value, chosen for this building"
@@ -68,7 +75,7 @@ class SolidDraft:
 
 
 @dataclass(frozen=True)
-class Building:
+class SyntheticBuilding:
     """A synthetic building.
 
     Attributes
@@ -118,7 +125,7 @@ def measured_building(
     blunders: int = 0,
     movement: Movement = _NONE,
     modelled: Sequence[SolidDraft] = (),
-) -> Building:
+) -> SyntheticBuilding:
     """Measure a building; sides in contact with another stone are surveyed half a joint inside.
 
     Parameters
@@ -141,7 +148,7 @@ def measured_building(
     measured = add_blunders(measured, [draft.stone.normal for draft in drafts], blunders, rng)
     rules = tuple(DepthRule(kind, depth, DEPTH_SIGMA, SOURCE) for kind, depth in sorted(depths.items()))
     head = SurveyHead(f"{name} (synthetic)", f"{name}.moma", tuple(stations), depth_rules=rules)
-    return Building(
+    return SyntheticBuilding(
         name,
         Survey(head, tuple(one.record for one in measured)),
         tuple(_modelled(draft, touched, rng) for draft in modelled),
@@ -176,7 +183,7 @@ def _modelled(draft: SolidDraft, touched: set[tuple[str, int]], rng: Random) -> 
     return SolidRecord(code, draft.kind, draft.course, np.round(seen.vertices, _DECIMALS) + 0.0, seen.faces)
 
 
-def _measured(draft: Draft, touched: set[tuple[str, int]], rng: Random) -> Measured:
+def _measured(draft: Draft, touched: set[tuple[str, int]], rng: Random) -> MeasuredStone:
     """Measure one face, and the depth where it is visible."""
     stone, code = draft.stone, draft.stone.plan.code
     touching = {side for i, side in enumerate(draft.side_of) if (code, 2 + i) in touched}

@@ -6,12 +6,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pipelines.arrays import Array
-from pipelines.samples.building import Building
+from pipelines.samples.building import SyntheticBuilding
 from pipelines.samples.buildings.facings import two_facings
 from pipelines.samples.buildings.tower import tower_storey
 from pipelines.samples.buildings.walls import wall
 from pipelines.samples.frame import Movement, wall_frame
+from survey.arrays import Array
 
 __all__ = [
     "CORE_SUNK",
@@ -22,7 +22,7 @@ __all__ = [
     "SETTLED_SMALL",
     "SHAKEN",
     "Cause",
-    "Site",
+    "MovedBuilding",
     "tower_settled",
 ]
 
@@ -38,7 +38,7 @@ _TIED = 1.0  # depth beyond which a stone goes through the wall [m]
 
 
 @dataclass(frozen=True)
-class Site:
+class MovedBuilding:
     """A building at the time of its movement, with what may have moved it.
 
     Attributes
@@ -55,7 +55,7 @@ class Site:
     level_break : last course of the first phase of a building that stood as a whole; None: it has one phase
     """
 
-    building: Building
+    building: SyntheticBuilding
     settled: Mapping[str, float]
     rival: Mapping[str, float]
     axis: Array
@@ -77,9 +77,9 @@ class Cause:
     step : of the scene [s]
     stood : last course that stood when the ground settled; those above were laid later, level, in a phase of their
         own; None: all stood
-    thrust : with which a vault pushes each of `Site.pushed` [N]
+    thrust : with which a vault pushes each of `MovedBuilding.pushed` [N]
     most : thrust that a diagnosis considers [N]
-    pulse : peak velocity of the ground along `Site.jerked`; the motion itself is followed then [m/s]
+    pulse : peak velocity of the ground along `MovedBuilding.jerked`; the motion itself is followed then [m/s]
     friction : of all joints [-]
     stiffness : across and along the joints, per area; None: rigid joints [Pa/m]
     battered : the walls may have been built leaning
@@ -87,7 +87,7 @@ class Cause:
     """
 
     settlement: float
-    build: Callable[[Movement, int | None], Site]
+    build: Callable[[Movement, int | None], MovedBuilding]
     duration: float = 1.0
     step: float = 0.005
     stood: int | None = None
@@ -105,20 +105,20 @@ class Cause:
         """Amount of the cause, in the unit of the true hypothesis."""
         return self.pulse or self.thrust or self.settlement
 
-    def heights(self, site: Site) -> dict[str, float]:
+    def heights(self, site: MovedBuilding) -> dict[str, float]:
         """Return by code of a stone on the ground its displacement upwards [m]."""
         if not self.settlement:
             return {}
         return {code: round(-self.settlement * share, 6) for code, share in site.settled.items()}
 
-    def forces(self, site: Site) -> dict[str, tuple[float, float, float]]:
+    def forces(self, site: MovedBuilding) -> dict[str, tuple[float, float, float]]:
         """Return by code of a stone the force of the vault [N]."""
         if not self.thrust:
             return {}
         outward = {code: np.round(self.thrust * out, 3) + 0.0 for code, out in site.pushed.items()}
         return {code: (float(x), float(y), float(z)) for code, (x, y, z) in outward.items()}
 
-    def jerk(self, site: Site) -> tuple[float, float, float] | None:
+    def jerk(self, site: MovedBuilding) -> tuple[float, float, float] | None:
         """Return the peak velocity (3,) of the ground, if it has jerked [m/s]."""
         if not self.pulse or site.jerked is None:
             return None
@@ -126,36 +126,36 @@ class Cause:
         return x, y, z
 
 
-def _moved_wall(stones: int, shares: Sequence[float]) -> Callable[[Movement, int | None], Site]:
+def _moved_wall(stones: int, shares: Sequence[float]) -> Callable[[Movement, int | None], MovedBuilding]:
     """Return the generator of a wall that has moved, with shares of the settlement from its corner inwards."""
 
-    def build(movement: Movement, measured: int | None) -> Site:
+    def build(movement: Movement, measured: int | None) -> MovedBuilding:
         built = wall(stones, movement=movement, measured=measured)
         settled, rival = (dict(zip(codes, shares, strict=False)) for codes in (built.base, built.base[::-1]))
-        return Site(built, settled, rival, wall_frame().axes[2])
+        return MovedBuilding(built, settled, rival, wall_frame().axes[2])
 
     return build
 
 
-def _pushed_wall(stones: int, shaken: bool = False) -> Callable[[Movement, int | None], Site]:
+def _pushed_wall(stones: int, shaken: bool = False) -> Callable[[Movement, int | None], MovedBuilding]:
     """Return the generator of a plumb wall against which a vault leans below its uppermost course."""
 
-    def build(movement: Movement, measured: int | None) -> Site:
+    def build(movement: Movement, measured: int | None) -> MovedBuilding:
         built = wall(stones, batter=0.0, movement=movement, measured=measured)
         frame = wall_frame(0.0)
         last = max(one.course or 0 for one in built.survey.blocks)
         pushed = {one.code: frame.axes[2] for one in built.survey.blocks if one.course == last - 1}
         settled = dict(zip(built.base, (1.0, 0.5), strict=False))
         inward = -frame.axes[2] if shaken else None
-        return Site(built, settled, {}, frame.axes[0], pushed, inward)
+        return MovedBuilding(built, settled, {}, frame.axes[0], pushed, inward)
 
     return build
 
 
-def _core_sunk(length: float, lower: int, upper: int) -> Callable[[Movement, int | None], Site]:
+def _core_sunk(length: float, lower: int, upper: int) -> Callable[[Movement, int | None], MovedBuilding]:
     """Return the generator of a plumb wall whose upper courses stand on a facing and on a core that has sunk."""
 
-    def build(movement: Movement, measured: int | None) -> Site:
+    def build(movement: Movement, measured: int | None) -> MovedBuilding:
         built = two_facings(
             length,
             lower + upper,
@@ -170,12 +170,12 @@ def _core_sunk(length: float, lower: int, upper: int) -> Callable[[Movement, int
         core = {f"kind = infill and course = {lower}": 1.0}
         corner = [code for code in ground if code.startswith(f"F{lower:02d}")][:2]
         rival = dict(zip(corner, (1.0, 0.5), strict=False))
-        return Site(replace(built, base=ground), core, rival, wall_frame(0.0).axes[0], core=lower)
+        return MovedBuilding(replace(built, base=ground), core, rival, wall_frame(0.0).axes[0], core=lower)
 
     return build
 
 
-def _around(building: Building, corner: Array) -> dict[str, float]:
+def _around(building: SyntheticBuilding, corner: Array) -> dict[str, float]:
     """Return shares of a settlement that falls off linearly from a corner of a building."""
     solids = {solid.code: solid for solid in building.solids}
     shares = {}
@@ -219,14 +219,16 @@ SHAKEN = Cause(
 def tower_settled(courses: int) -> Cause:
     """Return the settlement of the left corner of a storey of the tower."""
 
-    def build(movement: Movement, measured: int | None) -> Site:
+    def build(movement: Movement, measured: int | None) -> MovedBuilding:
         storey = tower_storey(courses, movement=movement, measured=measured)
         # through stones below the uppermost courses, which alone tie the facings
         tied = f"depth > {_TIED} and course > {round(_HEADS * courses)}"
         pushed = {f"zone = '{letter} outer' and {tied}": storey.outward[letter] for letter in "BC"}
         laid = tower_storey(courses) if movement else storey
         settled = _around(laid.building, storey.corners[0])
-        return Site(storey.building, settled, {}, storey.outward["A"], pushed, level_break=storey.level_break)
+        return MovedBuilding(
+            storey.building, settled, {}, storey.outward["A"], pushed, level_break=storey.level_break
+        )
 
     # what joints give way is larger in longer steps: the scene's are those of the truth
     return Cause(0.030, build, 0.2, 0.025, battered=False, true_duration=0.2, true_step=0.025)

@@ -7,8 +7,8 @@ from random import Random
 
 import numpy as np
 
-from pipelines.arrays import Array
 from pipelines.samples.bond import PlannedStone
+from survey.arrays import Array
 from survey.extrusion.extrusion import prism
 from survey.geometry.solids import Solid
 

@@ -7,14 +7,14 @@ from random import Random
 
 import numpy as np
 
-from pipelines.arrays import Array
-from pipelines.samples.bond import Line, crossing
+from pipelines.samples.bond import PlanLine, crossing
 from pipelines.samples.frame import TrueStone, WallFrame
+from survey.arrays import Array
 from survey.geometry.half_spaces import intersection
 from survey.geometry.solids import Solid, planes_of_solid
 from survey.records.survey import BlockRecord
 
-__all__ = ["HALF_JOINT", "SIGMA", "Measured", "add_blunders", "measure_stone", "modelled_solid"]
+__all__ = ["HALF_JOINT", "SIGMA", "MeasuredStone", "add_blunders", "measure_stone", "modelled_solid"]
 
 
 # of one coordinate [m]: 3 mm in space (√3 · 1.73 mm), the mean error of a photogrammetric point
@@ -34,7 +34,7 @@ _ROUNDING = 1e-9  # distance of corners that lie on one plane [m]
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredStone:
     """A stone's record and its truth.
 
     Attributes
@@ -57,7 +57,7 @@ class Measured:
     blunders: tuple[int, ...] = ()
 
 
-def measure_stone(stone: TrueStone, frame: WallFrame, rng: Random) -> Measured:
+def measure_stone(stone: TrueStone, frame: WallFrame, rng: Random) -> MeasuredStone:
     """Measure one face: its corners and 17 to 20 points along its margin."""
     halves = tuple(rng.uniform(*HALF_JOINT) if joint else 0.0 for joint in stone.plan.joint)
     visible = _inset(stone.plan.corners, halves)
@@ -83,7 +83,7 @@ def measure_stone(stone: TrueStone, frame: WallFrame, rng: Random) -> Measured:
         sigma=SIGMA,
         notes={"edge": worn} if worn else {},
     )
-    return Measured(
+    return MeasuredStone(
         record=record,
         half_joints=halves,
         worn=worn,
@@ -93,7 +93,9 @@ def measure_stone(stone: TrueStone, frame: WallFrame, rng: Random) -> Measured:
     )
 
 
-def add_blunders(measured: list[Measured], normals: list[Array], count: int, rng: Random) -> list[Measured]:
+def add_blunders(
+    measured: list[MeasuredStone], normals: list[Array], count: int, rng: Random
+) -> list[MeasuredStone]:
     """Spoil `count` sound points of the whole survey by 3 to 30 cm along the line of sight."""
     out = list(measured)
     for _ in range(count):
@@ -147,7 +149,7 @@ def _inset(corners: Array, distances: tuple[float, ...]) -> Array:
         (x, y), (to_x, to_y) = corners[k], corners[(k + 1) % len(corners)]
         length = math.hypot(to_x - x, to_y - y)
         u, v = (to_x - x) / length, (to_y - y) / length
-        lines.append(Line((x - distance * v, y + distance * u), (u, v)))
+        lines.append(PlanLine((x - distance * v, y + distance * u), (u, v)))
     return np.array([crossing(lines[k - 1], lines[k]) for k in range(len(lines))])
 
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from mechanics.dynamics.progress import Listener, silent
 from moma.errors import UsageError
-from pipelines.samples.building import Building
+from pipelines.samples.building import SyntheticBuilding
 from pipelines.samples.buildings.facings import two_facings
-from pipelines.samples.buildings.openings import Arch
+from pipelines.samples.buildings.openings import ArchShape
 from pipelines.samples.buildings.quoins import corner
 from pipelines.samples.buildings.ribs import WALL_RIB, WEBS, RibVaultShape, rib_vault
 from pipelines.samples.buildings.storey_vault import STANDING
@@ -119,7 +119,7 @@ def recipe_of(
     return _tower_settled(courses) if moved else _tower(courses, elaborate=not small)
 
 
-def _places(building: Building) -> Iterator[str]:
+def _places(building: SyntheticBuilding) -> Iterator[str]:
     """Yield corrections that give modelled stones of the walls their zones and courses, which files of solids lack."""
     rows: dict[tuple[str, int], list[str]] = {}
     for one in building.modelled:
@@ -240,7 +240,7 @@ ordered = {ordered}
 
 
 def _truth_of(
-    building: Building,
+    building: SyntheticBuilding,
     causes: Mapping[str, object] = MappingProxyType({}),
     axes: Mapping[str, object] = MappingProxyType({}),
 ) -> str:
@@ -261,7 +261,7 @@ def _truth_of(
     return f'{{\n"about": {about},\n{cause}{curves}"stones": [\n{lines}\n]\n}}\n'
 
 
-def _motion_of(building: Building, code: str) -> dict[str, object]:
+def _motion_of(building: SyntheticBuilding, code: str) -> dict[str, object]:
     """Return the motion x → rotation x + shift of a stone since it was laid, if it has moved."""
     motion = building.movement.get(code)
     if motion is None:
@@ -269,7 +269,7 @@ def _motion_of(building: Building, code: str) -> dict[str, object]:
     return {name: (np.round(getattr(motion, name), 9) + 0.0).tolist() for name in ("rotation", "shift")}
 
 
-def _built(title: str, fixed: str, build: Callable[[], Building], core: bool = False) -> Recipe:
+def _built(title: str, fixed: str, build: Callable[[], SyntheticBuilding], core: bool = False) -> Recipe:
     """Return the recipe of a building as it was laid."""
 
     def make(progress: Listener = silent) -> Sample:
@@ -337,7 +337,9 @@ SAMPLES: Mapping[str, Recipe] = MappingProxyType(
         "tower --moved settlement": _tower_settled(_COURSES),
         "tower --moved settlement --small": _tower_settled(_SMALL),
         "vault": _built("Barrel vault", "kind = springer", lambda: barrel_vault(seed=2)),
-        "wall": _built("Wall with an arched opening", "course = 1", lambda: wall(80, arch=Arch.SEGMENTAL)),
+        "wall": _built(
+            "Wall with an arched opening", "course = 1", lambda: wall(80, arch=ArchShape.SEGMENTAL)
+        ),
         "wall --moved settlement": _moved("Wall whose left corner settled", SETTLED),
         "wall --moved settlement --small": _moved("Small wall whose left corner settled", SETTLED_SMALL),
         "wall --moved settlement --phases": _moved(

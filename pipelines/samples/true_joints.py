@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from pipelines.arrays import Array
+from survey.arrays import Array
 from survey.geometry.solids import Solid, area_vector
 
 __all__ = ["TrueJoint", "true_joints"]

@@ -14,9 +14,9 @@ from mechanics.scene.scene import Block, ContactSettings, Fidelity, Placement, S
 from mechanics.simulate import simulate
 from mechanics.stones.materials import Material
 from moma.errors import SolverError
-from pipelines.arrays import Array
-from pipelines.samples.causes import PULSE, Cause, Site
+from pipelines.samples.causes import PULSE, Cause, MovedBuilding
 from pipelines.samples.frame import Movement, RigidMotion
+from survey.arrays import Array
 from survey.geometry.solids import Solid, planes_of_solid
 from survey.unseen.core.facings import FacingStone
 from survey.unseen.core.propose import propose_infill
@@ -92,7 +92,7 @@ def true_movement(cause: Cause, progress: Listener = silent) -> Movement:
     }
 
 
-def _core(site: Site) -> list[Solid]:
+def _core(site: MovedBuilding) -> list[Solid]:
     """Return the true core on which stones stand, between the hidden sides of two facings, if there is one."""
     if site.core is None:
         return []

@@ -6,9 +6,9 @@ from pathlib import Path
 
 from mechanics.dynamics.progress import Listener, silent
 from moma.errors import UsageError
-from pipelines.arrays import Array
 from pipelines.samples.causes import PULSE, Cause
 from pipelines.samples.samples import Recipe, recipe_of
+from survey.arrays import Array
 from survey.formats.native.writer import write_head, write_moma
 from survey.formats.solids.obj_writer import write_obj
 

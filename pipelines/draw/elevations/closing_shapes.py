@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipelines.arrays import Array
+from mechanics.arrays import Array
 from survey.geometry.solids import Solid, area_vector
-from survey.joints.report import ClosingReport, Joint
+from survey.joints.report import ClosingReport, StoneJoint
 
 __all__ = [
     "ClosingShapes",
@@ -68,7 +68,7 @@ class DrawnJoint:
     polygon : (k, 3) [m]; None where it is not known
     """
 
-    joint: Joint
+    joint: StoneJoint
     polygon: Array | None
 
 

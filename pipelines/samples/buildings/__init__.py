@@ -1,5 +1,6 @@
 """Synthetic walls, vaults and towers.
 
 Public: `wall` (walls); `corner` (quoins); `two_facings` (facings); `barrel_vault`, `semicircular_arch` (vaults);
-`RibVault`, `RibVaultShape`, `rib_vault` (ribs); `tower_storey` (tower); `make_window` (window); `Arch` (openings).
+`SyntheticRibVault`, `RibVaultShape`, `rib_vault` (ribs); `tower_storey` (tower); `make_window` (window);
+`ArchShape` (openings).
 """

@@ -8,10 +8,9 @@ from types import MappingProxyType
 import numpy as np
 
 from pipelines.samples.bond import Bed, Piece, PlannedStone, planned, upright
-from pipelines.samples.building import Building, Draft, flat_stone, measured_building
+from pipelines.samples.building import Draft, SyntheticBuilding, flat_stone, measured_building
 from pipelines.samples.buildings.walls import bed_heights, plan_courses
 from pipelines.samples.frame import BATTER, Movement, WallFrame, build_stone, wall_frame
-from survey.geometry.solids import Solid, area_vector
 from survey.records.survey import OBSERVER, Station
 
 __all__ = ["BACK", "TwoFacings", "two_facings"]
@@ -27,7 +26,7 @@ _LENGTH = 0.40  # of a through stone along the wall [m]
 
 @dataclass(frozen=True)
 class TwoFacings:
-    """A synthetic wall of two facings, and the truth about its core.
+    """A synthetic wall of two facings.
 
     Attributes
     ----------
@@ -36,21 +35,14 @@ class TwoFacings:
     through : codes of the through stones
     thickness : from face to face [m]
     storeys : first and last course of each storey
-    core_volumes : volume of the core in each storey, between the stones [m³]
     """
 
-    building: Building
+    building: SyntheticBuilding
     first: tuple[str, ...]
     second: tuple[str, ...]
     through: tuple[str, ...]
     thickness: float
     storeys: tuple[tuple[int, int], ...]
-    core_volumes: tuple[float, ...]
-
-    @property
-    def core_volume(self) -> float:
-        """Volume of the whole core [m³]."""
-        return sum(self.core_volumes)
 
 
 def two_facings(
@@ -124,7 +116,6 @@ def two_facings(
         through=codes["T"],
         thickness=thickness,
         storeys=tuple(spans),
-        core_volumes=tuple(_core(building.solids, front, span, thickness) for span in spans),
     )
 
 
@@ -155,33 +146,3 @@ def _draft(plan: PlannedStone, frame: WallFrame, zone: str, through: float | Non
     )
     station = BACK if plan.code.startswith("B") else None
     return Draft(stone, frame, plan.corners, zone=zone, station=station, seen_depth=through is not None)
-
-
-def _core(solids: Sequence[Solid], frame: WallFrame, span: tuple[int, int], thickness: float) -> float:
-    """Compute the volume between the hidden sides of the two facings over some courses [m³].
-
-    Behind each stone, from its hidden side to the middle of the wall, lies a prism square to the wall: its
-    section times the length at the section's centroid, since both ends are planes.
-    """
-    volume = 0.0
-    for solid in solids:
-        if not span[0] <= int(solid.code[1:3]) <= span[1] or solid.code.startswith("T"):
-            continue
-        hidden = solid.vertices[list(solid.faces[1])]
-        heights_over_middle = (hidden - frame.origin) @ frame.axes[2] + 0.5 * thickness
-        if solid.code.startswith("B"):
-            heights_over_middle = -heights_over_middle
-        section = abs(float(area_vector(hidden) @ frame.axes[2]))
-        volume += section * _mean_over(hidden, heights_over_middle)
-    return volume
-
-
-def _mean_over(polygon: np.ndarray, values: np.ndarray) -> float:
-    """Average over a plane polygon a linear function that is known at its corners."""
-    areas, means = [], []
-    normal = area_vector(polygon)
-    for k in range(1, len(polygon) - 1):
-        triangle = polygon[[0, k, k + 1]]
-        areas.append(float(area_vector(triangle) @ normal))
-        means.append(float(values[[0, k, k + 1]].mean()))
-    return float(np.average(means, weights=areas))

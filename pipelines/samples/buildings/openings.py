@@ -12,16 +12,16 @@ from itertools import pairwise
 
 import numpy as np
 
-from pipelines.samples.bond import Line, PlannedStone, crossing, level, upright
+from pipelines.samples.bond import PlanLine, PlannedStone, crossing, level, upright
 
-__all__ = ["Arch", "Opening", "plan_opening"]
+__all__ = ["ArchShape", "Opening", "plan_opening"]
 
 _CROWN = 0.3  # least thickness of an arch [m]
 _INTRADOS = 0.2  # length of a voussoir's face below, about [m]
 _JAMBS = (0.42, 0.62)  # short and long in turn, so that the jambs bond with the wall [m]
 
 
-class Arch(StrEnum):
+class ArchShape(StrEnum):
     """Shape of an arch."""
 
     SEGMENTAL = "segmental"
@@ -46,13 +46,13 @@ class Opening:
     half: float
     jambs: tuple[int, int]
     arch: tuple[int, int]
-    radials: tuple[Line, ...]
+    radials: tuple[PlanLine, ...]
     upright_ends: bool
     reach: float
     springing: float
     back: float
 
-    def edges(self, course: int, height: float) -> tuple[Line, Line, str] | None:
+    def edges(self, course: int, height: float) -> tuple[PlanLine, PlanLine, str] | None:
         """Return the lines where a course ends at the opening, and the kind of stone there; None if it runs through."""
         if self.jambs[0] <= course <= self.jambs[1]:
             return upright(-self.half, height), upright(self.half, height), "jamb"
@@ -76,7 +76,7 @@ class Opening:
             stones.append(PlannedStone(f"V{rank}", kind, None, corners, (True,) * 4))
         return stones
 
-    def _outer(self, radial: Line) -> tuple[float, float]:
+    def _outer(self, radial: PlanLine) -> tuple[float, float]:
         """Return the outer end of a joint of the arch."""
         if self.upright_ends:
             side = math.copysign(self.reach, radial.point[0])
@@ -90,7 +90,7 @@ class Opening:
         return crossing(radial, level(self.back))
 
 
-def plan_opening(shape: Arch, half: float, heights: Sequence[float], jambs: int) -> Opening:
+def plan_opening(shape: ArchShape, half: float, heights: Sequence[float], jambs: int) -> Opening:
     """Lay out an opening.
 
     Parameters
@@ -101,10 +101,10 @@ def plan_opening(shape: Arch, half: float, heights: Sequence[float], jambs: int)
     jambs : courses from its sill, the top of course 1, to the springing
     """
     foot = 1 + jambs
-    rise = half if shape is Arch.SEMICIRCULAR else half / 3.0
+    rise = half if shape is ArchShape.SEMICIRCULAR else half / 3.0
     top = next(k for k in range(foot + 1, len(heights)) if heights[k] >= heights[foot] + rise + _CROWN)
     springing, back = heights[foot], heights[top]
-    if shape is Arch.SEMICIRCULAR:
+    if shape is ArchShape.SEMICIRCULAR:
         reach = half + _CROWN
         radials = _semicircle(half, reach, springing, heights[foot : top + 1])
     else:
@@ -115,14 +115,14 @@ def plan_opening(shape: Arch, half: float, heights: Sequence[float], jambs: int)
         jambs=(2, foot),
         arch=(foot + 1, top),
         radials=tuple(radials),
-        upright_ends=shape is Arch.SEMICIRCULAR,
+        upright_ends=shape is ArchShape.SEMICIRCULAR,
         reach=reach,
         springing=springing,
         back=back,
     )
 
 
-def _segment(half: float, rise: float, springing: float) -> list[Line]:
+def _segment(half: float, rise: float, springing: float) -> list[PlanLine]:
     radius = (half**2 + rise**2) / (2.0 * rise)
     widest = math.asin(half / radius)
     count = round(2.0 * widest * radius / _INTRADOS) // 2 * 2 + 1
@@ -130,7 +130,7 @@ def _segment(half: float, rise: float, springing: float) -> list[Line]:
     return [_radial(angle, radius, springing + rise - radius) for angle in angles]
 
 
-def _semicircle(half: float, reach: float, springing: float, beds: Sequence[float]) -> list[Line]:
+def _semicircle(half: float, reach: float, springing: float, beds: Sequence[float]) -> list[PlanLine]:
     """Lay out joints through the ends of the beds, and between the corners of the arch's back."""
     sides = [math.pi / 2.0 - math.atan2(bed - springing, reach) for bed in beds]
     corner = sides[-1]
@@ -139,7 +139,7 @@ def _semicircle(half: float, reach: float, springing: float, beds: Sequence[floa
     return [_radial(angle, half, springing) for angle in (*(-a for a in sides), *crown, *sides[::-1])]
 
 
-def _radial(angle: float, radius: float, centre: float) -> Line:
+def _radial(angle: float, radius: float, centre: float) -> PlanLine:
     """Return the joint at an angle from upright, positive to the right, with its point on the intrados."""
     direction = (math.sin(angle), math.cos(angle))
-    return Line((radius * direction[0], centre + radius * direction[1]), direction)
+    return PlanLine((radius * direction[0], centre + radius * direction[1]), direction)

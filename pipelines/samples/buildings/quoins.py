@@ -7,7 +7,7 @@ from random import Random
 import numpy as np
 
 from pipelines.samples.bond import Bed, Piece, fill_run, planned, upright
-from pipelines.samples.building import Building, Draft, flat_stone, measured_building
+from pipelines.samples.building import Draft, SyntheticBuilding, flat_stone, measured_building
 from pipelines.samples.buildings.walls import bed_heights
 from pipelines.samples.frame import WallFrame, build_stone
 from survey.records.survey import OBSERVER, Station
@@ -23,7 +23,7 @@ _FOOT = np.array([21.3, 17.9, 4.2])  # of the corner in the site [m]
 _AZIMUTH = math.radians(11.0)  # of the first wall against the x axis
 
 
-def corner(courses: int = 8, length: float = 3.0, seed: int = 1) -> Building:
+def corner(courses: int = 8, length: float = 3.0, seed: int = 1) -> SyntheticBuilding:
     """Build two walls that meet at a right angle, and measure their outer faces.
 
     Quoins lie with their long side in either wall in turn. They are surveyed by their face in the first wall, with the

@@ -28,15 +28,15 @@ from random import Random
 import numpy as np
 
 from moma.errors import GeometryError
-from pipelines.arrays import Array
 from pipelines.samples.bond import PlannedStone
-from pipelines.samples.building import Building, Draft, SolidDraft, measured_building, observer
+from pipelines.samples.building import Draft, SolidDraft, SyntheticBuilding, measured_building, observer
 from pipelines.samples.frame import TrueStone, WallFrame
+from survey.arrays import Array
 from survey.extrusion.extrusion import prism
 from survey.geometry.half_spaces import intersection
 from survey.geometry.solids import Solid
 
-__all__ = ["WALL_RIB", "WEBS", "Bed", "RibVault", "RibVaultShape", "rib_vault", "vault_drafts"]
+__all__ = ["WALL_RIB", "WEBS", "RibVaultShape", "SyntheticRibVault", "WebBed", "rib_vault", "vault_drafts"]
 
 WALL_RIB = 0.22
 """Width of wall ribs where a vault has them [m]."""
@@ -103,13 +103,13 @@ class RibVaultShape:
         """Angles of the joints of a rib from the vertical, from the springer up [rad]."""
         return np.linspace(self.springing, self.crown, self.segments + 1)
 
-    def beds(self) -> list["Bed"]:
+    def beds(self) -> list["WebBed"]:
         """Return the beds of the webs, from the springers up."""
-        return [Bed.of(angle, self) for angle in self.angles.tolist()]
+        return [WebBed.of(angle, self) for angle in self.angles.tolist()]
 
 
 @dataclass(frozen=True)
-class Bed:
+class WebBed:
     """A bed of a web and the joint of the rib that it meets, in the bay: x and y level from the axis, z upwards.
 
     Attributes
@@ -131,7 +131,7 @@ class Bed:
     rise: Array
 
     @classmethod
-    def of(cls, angle: float, shape: RibVaultShape) -> "Bed":
+    def of(cls, angle: float, shape: RibVaultShape) -> "WebBed":
         """Return the bed at an angle of the rib from the vertical [rad]."""
         x = (shape.radius * math.sin(angle) - 0.5 * shape.width) / math.sqrt(2.0)
         slope = math.atan(math.sqrt(2.0) * math.tan(angle))
@@ -152,7 +152,7 @@ class Bed:
 
 
 @dataclass(frozen=True)
-class RibVault:
+class SyntheticRibVault:
     """A synthetic rib vault.
 
     Attributes
@@ -163,7 +163,7 @@ class RibVault:
     axes : (3, 3) rows: along the walls S and W, and upwards [-]
     """
 
-    building: Building
+    building: SyntheticBuilding
     shape: RibVaultShape
     foot: Array
     axes: Array
@@ -182,7 +182,7 @@ class RibVault:
         return out
 
 
-def rib_vault(shape: RibVaultShape | None = None, seed: int = 1) -> RibVault:
+def rib_vault(shape: RibVaultShape | None = None, seed: int = 1) -> SyntheticRibVault:
     """Build a rib vault over a square bay and measure its webs from below.
 
     Parameters
@@ -192,7 +192,7 @@ def rib_vault(shape: RibVaultShape | None = None, seed: int = 1) -> RibVault:
 
     Returns
     -------
-    RibVault, whose codes are <web><course>-<number>, with l or r after the course for the halves of a web;
+    SyntheticRibVault, whose codes are <web><course>-<number>, with l or r after the course for the halves of a web;
     R<rib>-<number> for the segments of the four half ribs, T<rib> for their springers, B for the boss, and
     F<web>-<number> for the segments of the wall rib beside a web, from left to right as seen from inside
 
@@ -208,7 +208,7 @@ def rib_vault(shape: RibVaultShape | None = None, seed: int = 1) -> RibVault:
     base = [draft.solid.code for draft in ribs if draft.kind == "rib_springer"]
     depths = {"web_stone": shape.thickness}
     building = measured_building("rib vault", drafts, depths, [observer(_FOOT)], base, rng, modelled=ribs)
-    return RibVault(building, shape, _FOOT, axes)
+    return SyntheticRibVault(building, shape, _FOOT, axes)
 
 
 def vault_drafts(
@@ -273,14 +273,14 @@ def _turn(quarters: int) -> Array:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def _mirrored(bed: Bed) -> Bed:
+def _mirrored(bed: WebBed) -> WebBed:
     """Return the bed of the other half of a web, whose joint and rise stay those of this half's rib."""
     mirror = np.diag([-1.0, 1.0, 1.0])
-    return Bed(-bed.x, bed.z, bed.end, mirror @ bed.along, mirror @ bed.up, bed.joint, bed.rise)
+    return WebBed(-bed.x, bed.z, bed.end, mirror @ bed.along, mirror @ bed.up, bed.joint, bed.rise)
 
 
 def _web(
-    name: str, turn: Array, beds: Sequence[Bed], shape: RibVaultShape, rng: Random
+    name: str, turn: Array, beds: Sequence[WebBed], shape: RibVaultShape, rng: Random
 ) -> Iterator[_WebStone]:
     """Lay the courses of a web, those of both halves up to the course at its crown."""
     mirror = np.diag([-1.0, 1.0, 1.0])
@@ -304,7 +304,7 @@ def _heads(course: int, end: float, seat: float, wall: float, rng: Random) -> li
 
 
 def _course(
-    code: str, course: int, beds: tuple[Bed, Bed], heads: list[float], into: Array, shape: RibVaultShape
+    code: str, course: int, beds: tuple[WebBed, WebBed], heads: list[float], into: Array, shape: RibVaultShape
 ) -> Iterator[_WebStone]:
     """Lay the stones of a course between two beds of the web over +y, turned or mirrored by `into`."""
     low, high = beds
@@ -334,7 +334,7 @@ def _web_draft(stone: _WebStone, foot: Array, axes: Array) -> Draft:
     return Draft(true, frame, stone.plan.corners, zone=f"web {stone.plan.code[0]}")
 
 
-def _ribs(beds: Sequence[Bed], shape: RibVaultShape) -> Iterator[tuple[str, tuple[str, Solid]]]:
+def _ribs(beds: Sequence[WebBed], shape: RibVaultShape) -> Iterator[tuple[str, tuple[str, Solid]]]:
     """Cut springers, segments of the ribs and the wall ribs, and boss in the bay; yield code, kind and solid."""
     for rib in range(4):
         turn = _turn(rib)
@@ -356,7 +356,7 @@ def _turned(solid: Solid, turn: Array) -> Solid:
     return Solid(solid.code, solid.vertices @ turn.T, solid.faces)
 
 
-def _segment(low: Bed, high: Bed, shape: RibVaultShape) -> Solid:
+def _segment(low: WebBed, high: WebBed, shape: RibVaultShape) -> Solid:
     """Cut the rib segment over +x and +y between two joints; its seats lie in the upper beds."""
     soffit = _on_soffit(low, shape), _on_soffit(high, shape)
     back = low.rise + high.rise
@@ -372,7 +372,7 @@ def _segment(low: Bed, high: Bed, shape: RibVaultShape) -> Solid:
     return _cut("segment", planes, shape)
 
 
-def _wall_segment(left: Bed, right: Bed, shape: RibVaultShape) -> Solid:
+def _wall_segment(left: WebBed, right: WebBed, shape: RibVaultShape) -> Solid:
     """Cut the segment of the wall rib over +y between two beds of the web, as thick as the web and its drop."""
     chord = np.array([right.x - left.x, 0.0, right.z - left.z])
     outward = np.array([-chord[2], 0.0, chord[0]]) / float(np.linalg.norm(chord))
@@ -389,7 +389,7 @@ def _wall_segment(left: Bed, right: Bed, shape: RibVaultShape) -> Solid:
     return _cut("segment", planes, shape)
 
 
-def _springer(bed: Bed, shape: RibVaultShape) -> Solid:
+def _springer(bed: WebBed, shape: RibVaultShape) -> Solid:
     """Cut the springer: below the first joint of its rib and the first beds of two webs, up to the walls."""
     soffit = _on_soffit(bed, shape)
     # its sides go down from the corners of the rib's soffit, along the webs
@@ -407,7 +407,7 @@ def _springer(bed: Bed, shape: RibVaultShape) -> Solid:
     return _cut("springer", planes, shape)
 
 
-def _boss(bed: Bed, shape: RibVaultShape) -> Solid:
+def _boss(bed: WebBed, shape: RibVaultShape) -> Solid:
     """Cut the boss between the last joints of four ribs and the ends of four courses at the crowns of the webs."""
     joint, offset = bed.joint, float(bed.joint @ bed.on_soffit())
     bottom = (_on_soffit(bed, shape) - _PENDANT * np.array([0.0, 0.0, 1.0]))[2]
@@ -421,7 +421,7 @@ def _boss(bed: Bed, shape: RibVaultShape) -> Solid:
     return _cut("boss", planes, shape)
 
 
-def _on_soffit(bed: Bed, shape: RibVaultShape) -> Array:
+def _on_soffit(bed: WebBed, shape: RibVaultShape) -> Array:
     """Return where a joint of the rib meets its soffit, in the plane of the rib (3,) [m]."""
     middle = 0.5 * (bed.x + bed.end)
     out: Array = np.array([middle, middle, bed.z]) - shape.drop * bed.rise

@@ -15,9 +15,9 @@ from random import Random
 
 import numpy as np
 
-from pipelines.arrays import Array
 from pipelines.samples.building import Draft, SolidDraft
 from pipelines.samples.buildings.ribs import WALL_RIB, RibVaultShape, vault_drafts
+from survey.arrays import Array
 from survey.extrusion.extrusion import prism
 
 __all__ = ["PROJECTION", "STANDING", "StoreyVault", "plan_vault"]

@@ -18,10 +18,16 @@ from types import MappingProxyType
 
 import numpy as np
 
-from pipelines.arrays import Array
 from pipelines.samples.bond import Bed, Piece, PlannedStone, planned
-from pipelines.samples.building import Building, Draft, SolidDraft, flat_stone, measured_building, observer
-from pipelines.samples.buildings.openings import Arch, Opening, plan_opening
+from pipelines.samples.building import (
+    Draft,
+    SolidDraft,
+    SyntheticBuilding,
+    flat_stone,
+    measured_building,
+    observer,
+)
+from pipelines.samples.buildings.openings import ArchShape, Opening, plan_opening
 from pipelines.samples.buildings.ribs import RibVaultShape
 from pipelines.samples.buildings.storey_vault import STANDING, StoreyVault, plan_vault
 from pipelines.samples.buildings.storey_walls import (
@@ -36,8 +42,9 @@ from pipelines.samples.buildings.storey_walls import (
     storey_walls,
     through_pieces,
 )
-from pipelines.samples.buildings.walls import Course, plan_courses
+from pipelines.samples.buildings.walls import LaidCourse, plan_courses
 from pipelines.samples.frame import Movement, build_stone
+from survey.arrays import Array
 from survey.extrusion.extrusion import prism
 from survey.records.survey import Station
 
@@ -80,7 +87,7 @@ class TowerStorey:
     vault : dimensions of the rib vault over its room; None: there is none
     """
 
-    building: Building
+    building: SyntheticBuilding
     level_break: int
     corners: Array
     outward: Mapping[str, Array]
@@ -228,16 +235,16 @@ def _opening(wall: StoreyWall, half: float, heights: Sequence[float], elaborate:
     """Lay out a window between a quarter and half of the height, or the passage from the second course."""
     courses = len(heights) - 1
     if wall.passage and elaborate:
-        return plan_opening(Arch.SEMICIRCULAR, half, heights, min(7, courses - 8))
+        return plan_opening(ArchShape.SEMICIRCULAR, half, heights, min(7, courses - 8))
     if wall.passage:
-        return plan_opening(Arch.SEGMENTAL, half, heights, min(7, courses - 6))
+        return plan_opening(ArchShape.SEGMENTAL, half, heights, min(7, courses - 6))
     sill = max(2, round(0.25 * courses))
-    opening = plan_opening(Arch.SEGMENTAL, half, heights, sill + min(6, courses - 7) - 1)
+    opening = plan_opening(ArchShape.SEGMENTAL, half, heights, sill + min(6, courses - 7) - 1)
     return replace(opening, jambs=(sill + 1, opening.jambs[1]))
 
 
 def _with_springers(
-    courses: Sequence[Course], opening: Opening | None, heights: Sequence[float]
+    courses: Sequence[LaidCourse], opening: Opening | None, heights: Sequence[float]
 ) -> list[list[Piece]]:
     """Return the stones of the courses; those beside an arch are springers, which bear its thrust in half the wall."""
     out = []

@@ -8,7 +8,7 @@ from random import Random
 import numpy as np
 
 from pipelines.samples.bond import PlannedStone
-from pipelines.samples.building import Building, Draft, flat_stone, measured_building, observer
+from pipelines.samples.building import Draft, SyntheticBuilding, flat_stone, measured_building, observer
 from pipelines.samples.frame import TrueStone, WallFrame
 from survey.extrusion.extrusion import prism
 
@@ -29,7 +29,7 @@ def barrel_vault(
     radius: float = 2.0,
     thickness: float = 0.35,
     length: float = 0.55,
-) -> Building:
+) -> SyntheticBuilding:
     """Build a semicircular barrel vault and measure its intrados from below.
 
     The stones are wedges between planes through the axis; their faces are chords of the intrados, plane and of four
@@ -46,7 +46,7 @@ def barrel_vault(
 
     Returns
     -------
-    Building, whose codes are C<course>-<number>
+    SyntheticBuilding, whose codes are C<course>-<number>
     """
     rng = Random(seed)
     along = np.array([math.cos(_AZIMUTH), math.sin(_AZIMUTH), 0.0])
@@ -73,7 +73,7 @@ def barrel_vault(
 
 def semicircular_arch(
     voussoirs: int = 17, seed: int = 1, *, radius: float = 2.0, thickness: float = 0.5, depth: float = 0.6
-) -> Building:
+) -> SyntheticBuilding:
     """Build a free-standing semicircular arch and measure one face of it.
 
     Parameters
@@ -85,7 +85,7 @@ def semicircular_arch(
 
     Returns
     -------
-    Building, whose codes are A<number> from the left springing
+    SyntheticBuilding, whose codes are A<number> from the left springing
     """
     rng = Random(seed)
     along = np.array([math.cos(_AZIMUTH), math.sin(_AZIMUTH), 0.0])

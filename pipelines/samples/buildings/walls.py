@@ -14,18 +14,18 @@ from pipelines.samples.bond import (
     CLEARANCES,
     WIDTHS,
     Bed,
-    Line,
     Piece,
+    PlanLine,
     PlannedStone,
     fill_run,
     planned,
     upright,
 )
-from pipelines.samples.building import Building, Draft, measured_building, observer
-from pipelines.samples.buildings.openings import Arch, Opening, plan_opening
+from pipelines.samples.building import Draft, SyntheticBuilding, measured_building, observer
+from pipelines.samples.buildings.openings import ArchShape, Opening, plan_opening
 from pipelines.samples.frame import BATTER, Movement, build_stone, wall_frame
 
-__all__ = ["DEPTHS", "Course", "bed_heights", "plan_courses", "wall"]
+__all__ = ["DEPTHS", "LaidCourse", "bed_heights", "plan_courses", "wall"]
 
 DEPTHS = {
     "header": 0.50,
@@ -42,7 +42,7 @@ _APART = 0.95  # distance of stones that span two courses, and from the ends of 
 
 
 @dataclass(frozen=True)
-class Course:
+class LaidCourse:
     """The stones of a course.
 
     Attributes
@@ -59,13 +59,13 @@ def wall(
     stones: int,
     seed: int = 1,
     *,
-    arch: Arch | None = None,
+    arch: ArchShape | None = None,
     sag: float = 0.0,
     snecked: float = 0.0,
     batter: float = BATTER,
     movement: Movement = MappingProxyType({}),
     measured: int | None = None,
-) -> Building:
+) -> SyntheticBuilding:
     """Build a wall of a single leaf and measure its face.
 
     Parameters
@@ -81,7 +81,7 @@ def wall(
 
     Returns
     -------
-    Building, whose stones of kinds other than voussoirs and keystones have the code W<course>-<number>
+    SyntheticBuilding, whose stones of kinds other than voussoirs and keystones have the code W<course>-<number>
     """
     if arch is not None and sag:
         raise GeometryError("beds that sag and an arch in one wall", remedy="build one of the two")
@@ -91,7 +91,7 @@ def wall(
     half = 0.6 if stones < 400 else 1.2
     opening = None
     if arch is not None:
-        spans = math.ceil(((half if arch is Arch.SEMICIRCULAR else half / 3.0) + 0.3) / _COURSE[0])
+        spans = math.ceil(((half if arch is ArchShape.SEMICIRCULAR else half / 3.0) + 0.3) / _COURSE[0])
         opening = plan_opening(arch, half, heights, min(7, max(1, len(heights) - 3 - spans)))
     length = stones * _STONE / heights[-1] + (2.0 * half if opening else 0.0)
     ends = (-0.49 * length, 0.51 * length)
@@ -128,7 +128,7 @@ def plan_courses(
     opening: Opening | None = None,
     snecked: float = 0.0,
     through: Sequence[Sequence[Piece]] = (),
-) -> list[Course]:
+) -> list[LaidCourse]:
     """Fill the courses of a wall from the ground.
 
     Parameters
@@ -140,12 +140,12 @@ def plan_courses(
     snecked : share of the stones that are two courses high [-]
     through : by course, stones that are already in place; courses beyond its length have none
     """
-    courses: list[Course] = []
+    courses: list[LaidCourse] = []
     below: list[float] = []
     for number, (low, high) in enumerate(pairwise(heights), start=1):
         middle = 0.5 * (low + high)
         given = list(through[number - 1]) if number <= len(through) else []
-        before = courses[-1] if courses else Course((), frozenset())
+        before = courses[-1] if courses else LaidCourse((), frozenset())
         blocked = [before.pieces[k] for k in sorted(before.tall)] + given
         pieces = list(given)
         if opening is not None and number == opening.jambs[0] - 1:  # no jamb on a sliver of the next stone
@@ -156,7 +156,7 @@ def plan_courses(
         tall = frozenset[int]()
         if snecked and number < len(heights) - 1:
             tall = _tall(rng, pieces, snecked, middle, _forbidden(ends, opening, blocked, middle))
-        courses.append(Course(tuple(pieces), tall))
+        courses.append(LaidCourse(tuple(pieces), tall))
         tops = [p for k, p in enumerate(pieces) if k not in tall] + blocked
         below = sorted({line.at(high) for piece in tops for line in (piece.left, piece.right)})
         if opening is not None and number == opening.arch[1]:
@@ -166,7 +166,7 @@ def plan_courses(
 
 def _runs(
     blocked: Sequence[Piece], opening: Opening | None, number: int, middle: float, ends: tuple[float, float]
-) -> list[tuple[Line, Line]]:
+) -> list[tuple[PlanLine, PlanLine]]:
     """Return the stretches of a course to be filled, between stones already in place."""
     gaps = [(piece.left, piece.right) for piece in blocked]
     edges = opening.edges(number, middle) if opening is not None else None
@@ -184,8 +184,8 @@ def _runs(
 
 def _fill_beside(
     rng: Random,
-    start: Line,
-    stop: Line,
+    start: PlanLine,
+    stop: PlanLine,
     opening: Opening | None,
     number: int,
     middle: float,
@@ -263,7 +263,7 @@ def _tall(
 
 
 def _outlines(
-    courses: Sequence[Course], heights: Sequence[float], sag: float
+    courses: Sequence[LaidCourse], heights: Sequence[float], sag: float
 ) -> list[tuple[PlannedStone, tuple[int, ...]]]:
     """Outline all stones of the courses, once the beds are known."""
     beds = _beds(courses, heights, sag)
@@ -280,7 +280,7 @@ def _outlines(
     ]
 
 
-def _beds(courses: Sequence[Course], heights: Sequence[float], sag: float) -> list[Bed]:
+def _beds(courses: Sequence[LaidCourse], heights: Sequence[float], sag: float) -> list[Bed]:
     """Lay out the beds: level, or bent at the head joints of the stones that end below them."""
     if not sag:
         return [Bed(height) for height in heights]

@@ -13,9 +13,9 @@ from random import Random
 
 import numpy as np
 
-from pipelines.samples.bond import Line, PlannedStone, crossing, fill, level, upright
+from pipelines.samples.bond import PlanLine, PlannedStone, crossing, fill, level, upright
 from pipelines.samples.frame import TrueStone, WallFrame, build_stone, wall_frame
-from pipelines.samples.measure import SIGMA, Measured, add_blunders, measure_stone
+from pipelines.samples.measure import SIGMA, MeasuredStone, add_blunders, measure_stone
 from survey.records.survey import OBSERVER, DepthRule, Station, Survey, SurveyHead
 
 __all__ = ["WindowBay", "make_window", "truth_text"]
@@ -62,7 +62,7 @@ class WindowBay:
     survey: Survey
     frame: WallFrame
     stones: tuple[TrueStone, ...]
-    measured: tuple[Measured, ...]
+    measured: tuple[MeasuredStone, ...]
 
 
 def make_window(seed: int = SEED) -> WindowBay:
@@ -112,7 +112,7 @@ class _Piece:
     """One stone of a course: its kind, and its right end."""
 
     kind: str
-    end: Line
+    end: PlanLine
 
 
 def _plan(rng: Random) -> tuple[PlannedStone, ...]:
@@ -137,7 +137,7 @@ def _bed_heights(rng: Random) -> list[float]:
     return [sum(heights[:k]) * scale for k in range(COURSES + 1)]
 
 
-def _radials(springing: float) -> list[Line]:
+def _radials(springing: float) -> list[PlanLine]:
     """Lay out the radial joints of the arch from left to right, the two springings included."""
     radius = (HALF_OPENING**2 + RISE**2) / (2.0 * RISE)
     half_angle = math.asin(HALF_OPENING / radius)
@@ -146,13 +146,15 @@ def _radials(springing: float) -> list[Line]:
     out = []
     for angle in angles:
         direction = (math.sin(angle), math.cos(angle))
-        out.append(Line((centre[0] + radius * direction[0], centre[1] + radius * direction[1]), direction))
+        out.append(
+            PlanLine((centre[0] + radius * direction[0], centre[1] + radius * direction[1]), direction)
+        )
     return out
 
 
 def _runs(
-    rng: Random, course: int, low: float, high: float, radials: list[Line], below: list[float]
-) -> list[tuple[Line, list[_Piece]]]:
+    rng: Random, course: int, low: float, high: float, radials: list[PlanLine], below: list[float]
+) -> list[tuple[PlanLine, list[_Piece]]]:
     """Fill the unbroken runs of stones of one course; return the line that each begins at, and its stones."""
     middle = 0.5 * (low + high)
     left, right = upright(LEFT, middle), upright(RIGHT, middle)
@@ -186,7 +188,7 @@ def _runs(
 
 
 def _plain(
-    rng: Random, start: Line, stop: Line, low: float, middle: float, below: list[float]
+    rng: Random, start: PlanLine, stop: PlanLine, low: float, middle: float, below: list[float]
 ) -> list[_Piece]:
     over_arch = len(below) > VOUSSOIRS + 12
     clearance = CLEARANCE_OVER_ARCH if over_arch else CLEARANCE
@@ -197,7 +199,7 @@ def _plain(
 
 
 def _course_stones(
-    course: int, low: float, high: float, runs: list[tuple[Line, list[_Piece]]]
+    course: int, low: float, high: float, runs: list[tuple[PlanLine, list[_Piece]]]
 ) -> list[PlannedStone]:
     bottom, top = level(low), level(high)
     stones: list[PlannedStone] = []
@@ -217,12 +219,12 @@ def _course_stones(
     return stones
 
 
-def _is_free(line: Line, ends: tuple[float, ...]) -> bool:
+def _is_free(line: PlanLine, ends: tuple[float, ...]) -> bool:
     """Return whether a line is an end of the panel or a reveal of the opening; only those are exactly upright."""
     return line.direction == (0.0, 1.0) and line.point[0] in ends
 
 
-def _arch(radials: list[Line], springing: float, back: float) -> list[PlannedStone]:
+def _arch(radials: list[PlanLine], springing: float, back: float) -> list[PlannedStone]:
     stones = []
     for rank, (left, right) in enumerate(pairwise(radials), start=1):
         corners = np.array(
@@ -233,7 +235,7 @@ def _arch(radials: list[Line], springing: float, back: float) -> list[PlannedSto
     return stones
 
 
-def _with_own_depth(measured: Measured, stone: TrueStone) -> Measured:
+def _with_own_depth(measured: MeasuredStone, stone: TrueStone) -> MeasuredStone:
     """Add the depth of a header at the open end of the panel, where it is visible and measured."""
     return replace(
         measured,
@@ -243,7 +245,7 @@ def _with_own_depth(measured: Measured, stone: TrueStone) -> Measured:
     )
 
 
-def _stone_truth(stone: TrueStone, measured: Measured) -> dict[str, object]:
+def _stone_truth(stone: TrueStone, measured: MeasuredStone) -> dict[str, object]:
     return {
         "code": stone.plan.code,
         "kind": stone.plan.kind,

@@ -9,7 +9,7 @@ from sqlalchemy import func, select
 from archmodel.database.session import open_database
 from archmodel.query.api import find, find_faces, find_rows
 from archmodel.store.hypotheses import store_hypotheses, withdraw_hypotheses
-from archmodel.store.revisions import Outcome
+from archmodel.store.revisions import RowCounts
 from archmodel.store.stones import load_stones
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Entry, new_entry
@@ -78,8 +78,8 @@ def test_all_or_nothing(session, records):
 def test_one_that_is_withdrawn_is_found_no_more_and_forgotten_not(session, records):
     _, numbers = store_hypotheses(session, "test", records, "thought")
     entry = new_entry(session, "declaration", "seen", author="A. Mason")
-    assert withdraw_hypotheses(session, entry, numbers[:1]) == Outcome(withdrawn=1)
-    assert withdraw_hypotheses(session, entry, numbers) == Outcome(withdrawn=1, unchanged=1)
+    assert withdraw_hypotheses(session, entry, numbers[:1]) == RowCounts(withdrawn=1)
+    assert withdraw_hypotheses(session, entry, numbers) == RowCounts(withdrawn=1, unchanged=1)
     assert find(session, "entity") == []
     assert find_rows(session, "entity", ["hypothesis = true"]) == find_faces(session, "entity") == []
     assert count(session, Entity) == 2

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from pipelines.samples.buildings.openings import Arch
+from pipelines.samples.buildings.openings import ArchShape
 from pipelines.samples.buildings.quoins import corner
 from pipelines.samples.buildings.vaults import barrel_vault, semicircular_arch
 from pipelines.samples.buildings.walls import wall
@@ -31,8 +31,8 @@ SETTINGS = JointSettings()
 
 SMALL = {
     "wall": lambda: wall(40),
-    "segmental arch": lambda: wall(80, arch=Arch.SEGMENTAL),
-    "semicircular arch": lambda: wall(98, arch=Arch.SEMICIRCULAR),
+    "segmental arch": lambda: wall(80, arch=ArchShape.SEGMENTAL),
+    "semicircular arch": lambda: wall(98, arch=ArchShape.SEMICIRCULAR),
     "sagging 5 cm": lambda: wall(90, seed=3, sag=0.05),
     "snecked": lambda: wall(90, snecked=0.1),
     "corner": lambda: corner(6),
@@ -42,8 +42,8 @@ SMALL = {
     "free arch": lambda: semicircular_arch(17),
 }
 LARGE = {
-    "1,000 stones": lambda: wall(1000, arch=Arch.SEGMENTAL),
-    "1,000 stones, semicircular": lambda: wall(1000, seed=2, arch=Arch.SEMICIRCULAR, snecked=0.05),
+    "1,000 stones": lambda: wall(1000, arch=ArchShape.SEGMENTAL),
+    "1,000 stones, semicircular": lambda: wall(1000, seed=2, arch=ArchShape.SEMICIRCULAR, snecked=0.05),
     "sagging 10 cm": lambda: wall(500, seed=4, sag=0.10),
     "long corner": lambda: corner(16, 8.0, seed=2),
     "wide vault": lambda: barrel_vault(25, 12, seed=2, radius=3.0),

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from moma.errors import GeometryError
-from pipelines.samples.buildings.ribs import RibVault, RibVaultShape, rib_vault
+from pipelines.samples.buildings.ribs import RibVaultShape, SyntheticRibVault, rib_vault
 from survey.geometry.solids import planes_of_solid
 from survey.geometry.watertight import check_watertight
 from survey.joints.close import close_joints
@@ -15,11 +15,11 @@ from tests.survey.unseen.statics import near_pairs, overlap_depth
 
 
 @pytest.fixture(scope="module")
-def vault() -> RibVault:
+def vault() -> SyntheticRibVault:
     return rib_vault()
 
 
-def test_stones_are_convex_and_do_not_overlap(vault: RibVault) -> None:
+def test_stones_are_convex_and_do_not_overlap(vault: SyntheticRibVault) -> None:
     solids = vault.building.solids
     for solid in solids:
         check_watertight(solid, convex=True)
@@ -28,7 +28,7 @@ def test_stones_are_convex_and_do_not_overlap(vault: RibVault) -> None:
     assert max(overlap_depth(some[i], some[j]) for i, j in near_pairs(some)) < 1e-9
 
 
-def test_each_course_ends_on_a_seat_in_the_plane_of_its_bed(vault: RibVault) -> None:
+def test_each_course_ends_on_a_seat_in_the_plane_of_its_bed(vault: SyntheticRibVault) -> None:
     """The first stone of a half course rests on the segment below, or on the springer, square to its thrust."""
     joints = {frozenset(joint.stones): joint for joint in vault.building.joints}
     for web, right, left in (("N", 1, 4), ("E", 2, 1), ("S", 3, 2), ("W", 4, 3)):
@@ -55,7 +55,7 @@ def test_bed_joint_of_the_rib_and_end_of_the_course_meet_in_one_line() -> None:
         assert line / np.linalg.norm(line) == pytest.approx(bed.up * np.sign(line @ bed.up), abs=1e-12)
 
 
-def test_ribs_have_an_axis_of_their_own(vault: RibVault) -> None:
+def test_ribs_have_an_axis_of_their_own(vault: SyntheticRibVault) -> None:
     """An arc of a circle in an upright plane, which runs inside the segments."""
     shape = vault.shape
     for rib in range(1, 5):
@@ -129,7 +129,7 @@ def test_shapes_whose_stones_would_lie_in_each_other_are_refused() -> None:
         rib_vault(RibVaultShape(wall_rib=0.25))
 
 
-def test_a_vault_is_the_same_for_the_same_seed(vault: RibVault) -> None:
+def test_a_vault_is_the_same_for_the_same_seed(vault: SyntheticRibVault) -> None:
     again, other = rib_vault(), rib_vault(seed=2)
     for a, b in zip(vault.building.modelled, again.building.modelled, strict=True):
         np.testing.assert_array_equal(a.vertices, b.vertices)

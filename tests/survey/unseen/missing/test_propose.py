@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from pipelines.samples.buildings.facings import two_facings
-from pipelines.samples.buildings.openings import Arch
+from pipelines.samples.buildings.openings import ArchShape
 from pipelines.samples.buildings.walls import wall
 from pipelines.samples.buildings.window import make_window
 from survey.extrusion.depth import depth_for
@@ -70,8 +70,8 @@ def inner_codes():
         lambda: wall(150, 2).survey,
         lambda: wall(150, 3, sag=0.03).survey,
         lambda: wall(150, 4, snecked=0.1).survey,
-        lambda: wall(150, 5, arch=Arch.SEGMENTAL).survey,
-        lambda: wall(150, 6, arch=Arch.SEMICIRCULAR).survey,
+        lambda: wall(150, 5, arch=ArchShape.SEGMENTAL).survey,
+        lambda: wall(150, 6, arch=ArchShape.SEMICIRCULAR).survey,
         lambda: two_facings(4.0, 6, 1).building.survey,
     ],
 )
@@ -233,7 +233,7 @@ def test_proposals_turn_with_the_wall(turn, shift):
 @cache
 def arched():
     """Return a wall with an arch."""
-    return blocks_of(wall(90, 5, arch=Arch.SEGMENTAL).survey)
+    return blocks_of(wall(90, 5, arch=ArchShape.SEGMENTAL).survey)
 
 
 @settings(max_examples=12, deadline=None)
