@@ -93,94 +93,28 @@ without = ["loads"]  # the scene knows the cause; a diagnosis is to find it
 
 _BATTERED = "battered = true\n"
 
-_SETTLED = """
+_HYPOTHESIS = """
 [[hypotheses]]
-name = "the {what}"
+name = "{name}"
 
 [[hypotheses.unknowns]]
-name = "settlement"
-unit = "m"
-start = 0.010
-low = 0.0
-high = 0.060
-"""
+name = "{unknown}"
+unit = "{unit}"
+start = {start}
+low = {low}
+high = {high}
+{scan}{loads}"""
 
-_TILTED = """
-[[hypotheses]]
-name = "the base tilted"
-
-[[hypotheses.unknowns]]
-name = "tilt"
-unit = "degrees"
-start = 0.1
-low = -1.0
-high = 1.0
-
-[[hypotheses.scene.loads]]
+_TILT = """
+[[loads]]
 type = "motion"
 stones = ["{fixed}"]
 spin = {{ time = [0.0, {duration}, {after}], value = ["= tilt / {duration}", "= tilt / {duration}", 0.0] }}
 axis = [{axis[0]:.6f}, {axis[1]:.6f}, 0.0]
 pivot = [{pivot[0]:.3f}, {pivot[1]:.3f}, {pivot[2]:.3f}]
 """
-
-_LOADED = """
-[[hypotheses]]
-name = "a load stood on the upper left corner"
-
-[[hypotheses.unknowns]]
-name = "load"
-unit = "N"
-start = 5000.0
-low = 0.0
-high = 50000.0
-
-[[hypotheses.scene.loads]]
-type = "force"
-stones = ["{top}"]
-force = [0.0, 0.0, "= -load"]
-"""
-
-_PUSHED = """
-[[hypotheses]]
-name = "the thrust of a vault pushed the walls out"
-
-[[hypotheses.unknowns]]
-name = "thrust"  # on each of the stones below
-unit = "N"
-start = {start}
-low = 0.0
-high = {most}
-"""
-
-_PUSHING = """
-[[hypotheses.scene.loads]]
-type = "force"
-stones = ["{stones}"]
-force = ["= thrust * {out[0]:.6f}", "= thrust * {out[1]:.6f}", 0.0]
-"""
-
-_JERKED = """
-[[hypotheses]]
-name = "an earthquake pulse jerked the ground {way}"
-
-[[hypotheses.unknowns]]
-name = "peak"
-unit = "m/s"
-start = 0.1
-low = 0.0
-high = 1.0
-scan = 5  # stones slide from a threshold on
-"""
-
-_SETTLING = """
-[[hypotheses.scene.loads]]
-type = "settlement"
-stones = ["{code}"]
-displacement = [0.0, 0.0, "= -settlement * {share:.4g}"]
-duration = {duration}
-"""
 _INSTANT = 1e-6  # in which the tilt of the base ends [s]
+_SCAN = "scan = 5  # stones slide from a threshold on\n"
 
 _CORE = """
 # Mortar and small stones between the facings.
@@ -299,23 +233,41 @@ def _diagnosis(kind: str, fixed: str, cause: Cause, commands: Sequence[str]) -> 
     """Return hypotheses on the movement of a building, the true one first."""
     site = cause.build({}, None)
     first, second = ("core decayed and sank", "left corner settled") if site.core else _CORNERS
-    hypotheses = [_SETTLED.format(what=first) + _settling(cause, site.settled)]
+    hypotheses = [_settled(first, cause, site.settled)]
     if site.rival:
-        hypotheses.append(_SETTLED.format(what=second) + _settling(cause, site.rival))
-    tilted = _TILTED.format(
+        hypotheses.append(_settled(second, cause, site.rival))
+    tilt = _TILT.format(
         fixed=fixed,
         duration=cause.duration,
         after=cause.duration + _INSTANT,
         axis=site.axis,
         pivot=site.building.solids[0].vertices[0],
     )
-    pushed = _PUSHED.format(start=0.25 * cause.most, most=cause.most)
-    pushing = [_PUSHING.format(stones=stones, out=out) for stones, out in site.pushed.items()]
-    top = max(site.building.survey.blocks, key=lambda one: one.course or 0).code  # the first of its course
-    hypotheses += [tilted, "".join([pushed, *pushing]) if pushing else _LOADED.format(top=top)]
+    hypotheses.append(_hypothesis("the base tilted", "tilt", "degrees", (0.1, -1.0, 1.0), tilt))
+    if site.pushed:
+        thrusts = [
+            _FORCE.format(code=stones, force=_formulas("thrust", out)) for stones, out in site.pushed.items()
+        ]
+        name, values = "the thrust of a vault pushed the walls out", (0.25 * cause.most, 0.0, cause.most)
+        hypotheses.append(_hypothesis(name, "thrust", "N", values, "".join(thrusts)))
+    else:
+        top = max(
+            site.building.survey.blocks, key=lambda one: one.course or 0
+        ).code  # the first of its course
+        load = _FORCE.format(code=top, force='[0.0, 0.0, "= -load"]')
+        name = "a load stood on the upper left corner"
+        hypotheses.append(_hypothesis(name, "load", "N", (5000.0, 0.0, 50000.0), load))
     if site.jerked is not None:
         jerks = [
-            _jerked(way, sign * site.jerked, fixed) for way, sign in (("inwards", 1.0), ("outwards", -1.0))
+            _hypothesis(
+                f"an earthquake pulse jerked the ground {way}",
+                "peak",
+                "m/s",
+                (0.1, 0.0, 1.0),
+                _jerk(fixed, _formulas("peak", sign * site.jerked)),
+                _SCAN,
+            )
+            for way, sign in (("inwards", 1.0), ("outwards", -1.0))
         ]
         hypotheses = [jerks[0], *hypotheses, jerks[1]]
     dated = cause.stood is not None
@@ -333,22 +285,34 @@ _CORNERS = ("left corner settled", "right corner settled")
 _COUNTS = {3: "Three", 4: "Four", 5: "Five"}
 
 
-def _settling(cause: Cause, shares: Mapping[str, float]) -> str:
-    return "".join(
-        _SETTLING.format(code=code, share=share, duration=cause.duration) for code, share in shares.items()
+def _hypothesis(
+    name: str, unknown: str, unit: str, values: tuple[float, float, float], loads: str, scan: str = ""
+) -> str:
+    """Return a hypothesis with an unknown, of which start, least and largest value are given."""
+    start, low, high = values
+    loads = loads.replace("[[loads]]", "[[hypotheses.scene.loads]]")
+    return _HYPOTHESIS.format(
+        name=name, unknown=unknown, unit=unit, start=start, low=low, high=high, scan=scan, loads=loads
     )
 
 
-def _jerked(way: str, direction: Array, fixed: str) -> str:
-    """Return the hypothesis of an earthquake pulse."""
-    x, y = (f"= peak * {part:.6f}" for part in direction[:2])
-    load = _JERK.replace("loads", "hypotheses.scene.loads").format(**_jerk(fixed, f'["{x}", "{y}", 0.0]'))
-    return _JERKED.format(way=way) + load
+def _settled(what: str, cause: Cause, shares: Mapping[str, float]) -> str:
+    loads = [
+        _SETTLEMENT.format(code=code, height=f'"= -settlement * {share:.4g}"', duration=cause.duration)
+        for code, share in shares.items()
+    ]
+    return _hypothesis(f"the {what}", "settlement", "m", (0.010, 0.0, 0.060), "".join(loads))
 
 
-def _jerk(fixed: str, velocity: str) -> dict[str, object]:
+def _formulas(unknown: str, direction: Array) -> str:
+    """Return the horizontal components of a vector of unknown length."""
+    x, y = (f"= {unknown} * {part:.6f}" for part in direction[:2])
+    return f'["{x}", "{y}", 0.0]'
+
+
+def _jerk(fixed: str, velocity: str) -> str:
     peak, end = PULSE
-    return {"fixed": fixed, "peak": peak, "end": end, "velocity": velocity}
+    return _JERK.format(fixed=fixed, peak=peak, end=end, velocity=velocity)
 
 
 def _loads(cause: Cause, fixed: str) -> Iterator[str]:
@@ -360,7 +324,7 @@ def _loads(cause: Cause, fixed: str) -> Iterator[str]:
         yield _FORCE.format(code=code, force=list(force))
     jerk = cause.jerk(site)
     if jerk is not None:
-        yield _JERK.format(**_jerk(fixed, str(list(jerk))))
+        yield _jerk(fixed, str(list(jerk)))
 
 
 def _commands(
