@@ -103,7 +103,7 @@ def recipe_of(
     options = [f"--moved {moved}"] * (moved is not None) + ["--small"] * small + ["--phases"] * phases
     name = " ".join([kind, *options])
     if kind in _RENAMED:
-        raise UsageError(f"no sample {kind!r} any more", remedy=f"moma sample {_RENAMED[kind]}")
+        raise UsageError(f"no sample {kind!r} any more", remedy=f"it is now: moma sample {_RENAMED[kind]}")
     if kind not in SAMPLES:
         kinds = [one for one in SAMPLES if " " not in one]
         raise UsageError(f"no sample {kind!r}", remedy=f"the samples are {', '.join(kinds)}")

@@ -53,14 +53,14 @@ def test_samples_and_options_that_there_are_not_are_refused(tmp_path, monkeypatc
 
 def test_former_names_are_refused_with_the_new_ones():
     for name, now in FORMER.items():
-        assert f"no sample '{name}' any more; moma sample {now}" in fails(2, "sample", name)
+        assert f"no sample '{name}' any more; it is now: moma sample {now}" in fails(2, "sample", name)
     assert set(FORMER.values()) <= set(SAMPLES)
 
 
 def test_a_tower_has_as_many_courses_as_are_asked_for(tmp_path):
     assert "Storey of a tower, of 5 courses:" in prints("sample", "tower", "--courses", 5, "--out", tmp_path)
     survey = (tmp_path / "tower.moma").read_text(encoding="utf-8")
-    assert {int(found) for found in re.findall(r"^course (\d+)$", survey, re.MULTILINE)} == {1, 2, 3, 4, 5}
+    assert {int(found) for found in re.findall(r" course (\d+) ", survey)} == {1, 2, 3, 4, 5}
 
 
 @pytest.mark.parametrize(
