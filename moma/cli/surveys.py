@@ -48,14 +48,15 @@ def sample(
     moved: Annotated[
         Moved | None,
         typer.Option(
-            help="What has moved it since, simulated; of the wall, with settlement of facings and the tower too."
+            help="Move its stones by a simulation, then measure: the wall by any cause, facings and tower by settlement."
         ),
     ] = None,
     small: Annotated[
-        bool, typer.Option("--small", help="A smaller one: of the tower and of the wall that settled.")
+        bool, typer.Option("--small", help="Smaller: the tower, and the wall with --moved settlement.")
     ] = False,
     phases: Annotated[
-        bool, typer.Option("--phases", help="Upper courses were laid after the wall had settled.")
+        bool,
+        typer.Option("--phases", help="Upper courses were laid later: the wall with --moved settlement."),
     ] = False,
     courses: Annotated[
         int | None, typer.Option(help="Courses of the tower; default: 40, or 12 with --small.")
