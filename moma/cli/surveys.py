@@ -48,7 +48,7 @@ def sample(
     moved: Annotated[
         Moved | None,
         typer.Option(
-            help="Move its stones by a simulation, then measure: the wall by any cause, facings and tower by settlement."
+            help="Move its stones by a simulation: the wall by any cause, facings and tower by settlement."
         ),
     ] = None,
     small: Annotated[
