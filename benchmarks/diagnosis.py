@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -24,12 +25,12 @@ from pipelines.assess.motions import Motions
 from pipelines.ingest.ingest import ingest
 from pipelines.propose.propose import Recording, propose_core
 from pipelines.record.record import record
-from pipelines.scene.sample import write_sample
-from pipelines.scene.true_movement import true_movement
+from pipelines.samples.building import SyntheticBuilding
+from pipelines.samples.samples import recipe_of
+from pipelines.samples.true_movement import true_movement
+from pipelines.samples.write import write_sample
 from survey.formats.native.writer import write_moma
 from survey.quality.precision import appraise
-from survey.synthetic.building import Building
-from survey.synthetic.samples import SAMPLES
 
 __all__ = ["Laboratory", "drawn", "laboratory", "main", "outcome"]
 
@@ -41,6 +42,13 @@ _TRUE = {
     "shaken": "an earthquake pulse jerked the ground inwards",
 }
 """True hypothesis of each sample."""
+_SAMPLES: dict[str, dict[str, Any]] = {
+    "core-sunk": {"kind": "facings", "moved": "settlement"},
+    "settled-small": {"kind": "wall", "moved": "settlement", "small": True},
+    "settled-phases": {"kind": "wall", "moved": "settlement", "phases": True},
+    "shaken": {"kind": "wall", "moved": "earthquake"},
+}
+"""What each is written with."""
 
 _GRID = {"core-sunk": 12, "shaken": 12}  # intervals of the range of an unknown, at whose ends runs are made
 _FINE = 24  # of other samples
@@ -73,7 +81,7 @@ class Laboratory:
     cases: tuple[Case, ...]
     url: str
     phases: dict[str, str]
-    moved: Callable[[int], Building]
+    moved: Callable[[int], SyntheticBuilding]
     core: bool
     true: str
     amount: float
@@ -88,16 +96,17 @@ class Laboratory:
 
 def laboratory(kind: str, folder: Path) -> Laboratory:
     """Write a sample and take it into a database."""
-    write_sample(kind, folder)
+    recipe = recipe_of(**_SAMPLES[kind])
+    write_sample(folder=folder, **_SAMPLES[kind])
     url = f"sqlite:///{folder / 'stones.db'}"
-    ingest([folder / f"{kind}.moma"], url)
-    if SAMPLES[kind].core:
+    ingest(list(folder.glob("*.moma")), url)
+    if recipe.core:
         propose_core(url, recording=Recording())
     knowledge = folder / "knowledge.toml"
     if knowledge.exists():
         record([knowledge], url)
     file = read_diagnosis(folder / "diagnosis.toml")
-    found, cause = measurements(file, url), SAMPLES[kind].cause
+    found, cause = measurements(file, url), recipe.cause
     assert cause is not None
     cases = cases_of(file, found.phases)
     possible = tuple(one for one in cases if not check_case(file, one, url, False))
@@ -108,7 +117,7 @@ def laboratory(kind: str, folder: Path) -> Laboratory:
         url,
         dict(found.phases),
         lambda seed: cause.build(movement, seed).building,
-        SAMPLES[kind].core,
+        recipe.core,
         _TRUE[kind],
         cause.amount,
         _GRID.get(kind, _FINE),

@@ -19,15 +19,15 @@ from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
 from pipelines.results.quantities import Quantities, differences, quantities
 from pipelines.run.fidelity import Wishes, modelled, neighbours
+from pipelines.samples.buildings.openings import ArchShape
+from pipelines.samples.buildings.vaults import semicircular_arch
+from pipelines.samples.buildings.walls import wall
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.formats.reading import open_survey
 from survey.geometry.solids import Solid
 from survey.joints.close import close_joints
-from survey.joints.report import Joint
+from survey.joints.report import StoneJoint
 from survey.stones import survey_stones
-from survey.synthetic.buildings.openings import Arch
-from survey.synthetic.buildings.vaults import semicircular_arch
-from survey.synthetic.buildings.walls import wall
 
 __all__ = ["main"]
 
@@ -47,7 +47,7 @@ class Structure:
     """Closed stones, their joints, which of them are the ground, and regions of interest by name."""
 
     solids: tuple[Solid, ...]
-    joints: tuple[Joint, ...]
+    joints: tuple[StoneJoint, ...]
     ground: frozenset[str]
     regions: Mapping[str, frozenset[str]]
 
@@ -92,7 +92,7 @@ def _arch() -> Structure:
 
 
 def _opening() -> Structure:
-    building = wall(60, seed=2, arch=Arch.SEGMENTAL)
+    building = wall(60, seed=2, arch=ArchShape.SEGMENTAL)
     stones = building.blocks()
     arch = {one.code for one in stones if one.kind in ("voussoir", "keystone", "springer")}
     third = [one.code for one in stones if one.course == 3]

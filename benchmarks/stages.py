@@ -17,13 +17,13 @@ import numpy as np
 
 from archmodel.database.session import open_database
 from benchmarks.report import columns, guarded, options_of, progress, show
+from mechanics.arrays import Array
 from mechanics.results.result import Result
 from mechanics.simulate import simulate_stages
-from pipelines.arrays import Array
 from pipelines.ingest.ingest import ingest
 from pipelines.run.assemble import assemble
+from pipelines.samples.write import write_sample
 from pipelines.scene.file import parse_scene
-from pipelines.scene.sample import write_sample
 
 __all__ = ["CASES", "main", "rows"]
 
@@ -69,6 +69,7 @@ class Case:
     Attributes
     ----------
     kind : of the sample
+    moved : what has moved it; None: nothing
     orders : by name the TOML text of the stages and loads
     arch : codes of the stones whose thrust on all others is told; empty: none
     """
@@ -76,6 +77,7 @@ class Case:
     kind: str
     orders: Mapping[str, str]
     arch: tuple[str, ...] = ()
+    moved: str | None = None
 
 
 def _stage(name: str, lay: str = "", hold: tuple[str, ...] = ()) -> str:
@@ -124,7 +126,9 @@ CASES = {
         tuple(f"V{number}" for number in range(1, 8)),
     ),
     "corner": Case("corner", _two_phases({"Q01": 0.010, "A01-01": 0.005, "B01-01": 0.005})),
-    "settled": Case("settled", _two_phases({"W01-01": 0.030, "W01-02": 0.020, "W01-03": 0.010})),
+    "settled": Case(
+        "wall", _two_phases({"W01-01": 0.030, "W01-02": 0.020, "W01-03": 0.010}), moved="settlement"
+    ),
 }
 
 
@@ -132,8 +136,8 @@ def rows(names: tuple[str, ...], folder: Path) -> Iterator[dict[str, Any]]:
     """Yield the numbers of each order of each case, with rigid joints and with springs."""
     for name in names:
         case = CASES[name]
-        place = folder / case.kind
-        write_sample(case.kind, place)
+        place = folder / name
+        write_sample(case.kind, place, moved=case.moved)
         url = f"sqlite:///{place}/sample.db"
         ingest([place / f"{case.kind}.moma"], url)
         with open_database(url, create=False) as database, database.session(read_only=True) as session:

@@ -10,5 +10,4 @@ simplify      solid block → hexahedron, wedge or prism
 joints        blocks a joint apart → stones that share contact planes
 quality       report on precision, courses and contradictions
 unseen        proposals for the core of walls and for missing stones
-synthetic     buildings with known truth, for tests and examples
 """

@@ -12,7 +12,7 @@ from archmodel.assertions.declare import declare_named
 from archmodel.assertions.validation import checked_choice, checked_label, checked_text, checked_whole
 from archmodel.store.bulk import batches
 from archmodel.store.find_by_code import held_named
-from archmodel.store.revisions import NOTHING, Outcome, end_rows, table_of
+from archmodel.store.revisions import NOTHING, RowCounts, end_rows, table_of
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Entry
 from archmodel.tables.hierarchy import kind_of
@@ -33,7 +33,7 @@ def declare_structure(
     parent: str | None = None,
     number: int | None = None,
     side: str | None = None,
-) -> Outcome:
+) -> RowCounts:
     """Declare a part of the building, within another one perhaps; its members are declared by `declare_members`."""
     cls = structure_kind_named(kind)
     if side is not None:
@@ -55,7 +55,7 @@ def declare_structure(
 
 def declare_members(
     session: Session, entry: Entry, code: str, entities: Sequence[int], *, ordered: bool = False
-) -> Outcome:
+) -> RowCounts:
     """Declare entities, by their numbers, members of a structure; earlier declarations stay.
 
     Parameters
@@ -72,7 +72,7 @@ def declare_members(
 
 def declare_relation(
     session: Session, entry: Entry, kind: str, of: Sequence[int], to: Sequence[int]
-) -> Outcome:
+) -> RowCounts:
     """Declare a relation of each of some entities, by their numbers, to each of others.
 
     A relation that was computed from the geometry stays beside the declared one.
@@ -109,7 +109,7 @@ def _refuse_circle(code: str, above: Structure | None) -> None:
 
 def _declare_members(
     session: Session, entry: Entry, structure: int, ranks: Mapping[int, int | None]
-) -> Outcome:
+) -> RowCounts:
     table = table_of(Membership)
     held = select(table).where(
         table.c.structure_id == structure, table.c.entity_id.in_(ranks), table.c.superseded_id.is_(None)
@@ -135,12 +135,12 @@ def _declare_members(
     ]
     if rows:
         session.execute(insert(table), rows)
-    return Outcome(new=len(rows) - len(other), replaced=len(other), unchanged=len(same))
+    return RowCounts(new=len(rows) - len(other), replaced=len(other), unchanged=len(same))
 
 
 def _declare_relations(
     session: Session, entry: Entry, kind: str, pairs: Sequence[tuple[int, int]]
-) -> Outcome:
+) -> RowCounts:
     table = table_of(Relation)
     held = select(table.c.subject_id, table.c.object_id).where(
         table.c.kind == kind,
@@ -156,4 +156,4 @@ def _declare_relations(
     ]
     if rows:
         session.execute(insert(table), rows)
-    return Outcome(new=len(rows), unchanged=len(same))
+    return RowCounts(new=len(rows), unchanged=len(same))

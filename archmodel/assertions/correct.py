@@ -20,7 +20,7 @@ from archmodel.assertions.validation import (
 )
 from archmodel.store.find_by_code import no_such_code
 from archmodel.store.remeasuring import MEASURED
-from archmodel.store.revisions import Outcome, table_of
+from archmodel.store.revisions import RowCounts, table_of
 from archmodel.store.stone_record import StoneRecord
 from archmodel.store.stone_rows import entity_rows, measurement_row
 from archmodel.tables.base import StoneAttribute
@@ -36,7 +36,7 @@ __all__ = ["correct", "replace_measurement"]
 _GEOMETRY = ("depth", "depth_sigma", "depth_source", "depth_origin", "volume", "x", "y", "z")
 
 
-def correct(session: Session, entry: Entry, code: str, values: Mapping[str, object]) -> Outcome:
+def correct(session: Session, entry: Entry, code: str, values: Mapping[str, object]) -> RowCounts:
     """Give an entity other values of its attributes.
 
     Parameters
@@ -57,7 +57,7 @@ def correct(session: Session, entry: Entry, code: str, values: Mapping[str, obje
     checked |= dict.fromkeys(_lost(row, own) - checked.keys()) if kind != row["kind"] else {}
     changes = {name: (old, new) for name, new in checked.items() if (old := _value(row, name)) != new}
     if not changes:
-        return Outcome(unchanged=1)
+        return RowCounts(unchanged=1)
     if "code" in changes:
         _refuse_taken(session, str(checked["code"]))
     after = {name: new for name, (_, new) in changes.items()}
@@ -67,10 +67,10 @@ def correct(session: Session, entry: Entry, code: str, values: Mapping[str, obje
         kept = {**(row["own"] or {}), **registered}
         columns["own"] = {name: one for name, one in kept.items() if one is not None} or None
     _change(session, entry, row["id"], columns, changes)
-    return Outcome(replaced=1)
+    return RowCounts(replaced=1)
 
 
-def replace_measurement(session: Session, entry: Entry, stone: StoneRecord, place: str) -> Outcome:
+def replace_measurement(session: Session, entry: Entry, stone: StoneRecord, place: str) -> RowCounts:
     """Replace an entity's solid, depth and what follows from them with those of a record.
 
     Parameters
@@ -87,14 +87,14 @@ def replace_measurement(session: Session, entry: Entry, stone: StoneRecord, plac
     made = entity_rows([stone], [place])[0]
     changes = {name: (row[name], made[name]) for name in _GEOMETRY if row[name] != made[name]}
     if not changes:
-        return Outcome(unchanged=1)
+        return RowCounts(unchanged=1)
     held.superseded_id = entry.id
     session.flush()
     values = measurement_row(stone, place)
     owner = {"entity_id": row["id"], "survey_id": held.survey_id, "entry_id": entry.id}
     session.execute(insert(table_of(Measurement)).values({**values, **owner, "superseded_id": None}))
     _change(session, entry, row["id"], {name: new for name, (_, new) in changes.items()}, changes)
-    return Outcome(replaced=1)
+    return RowCounts(replaced=1)
 
 
 def _row(session: Session, code: str) -> Mapping[str, Any]:

@@ -18,7 +18,7 @@ from archmodel.assertions.validation import (
     checked_years,
 )
 from archmodel.store.find_by_code import held_named, held_or_none
-from archmodel.store.revisions import Outcome, revise, supersede
+from archmodel.store.revisions import RowCounts, revise, supersede
 from archmodel.tables.entries import Entry
 from archmodel.tables.knowledge import Document, Material, MaterialProperty, Phase
 from archmodel.tables.structures import Structure
@@ -76,7 +76,7 @@ def declare_material(
     name: str,
     description: str | None = None,
     properties: Mapping[str, PropertyValue] | None = None,
-) -> Outcome:
+) -> RowCounts:
     """Declare a stone or a mortar under one name, with its properties; properties not named stay as they are."""
     values = {"description": checked_text("description", description)}
     outcome = declare_named(session, entry, Material, {"name": checked_label("name", name)}, values)
@@ -87,7 +87,7 @@ def declare_material(
 
 def declare_property(
     session: Session, entry: Entry, material: str, name: str, given: PropertyValue
-) -> Outcome:
+) -> RowCounts:
     """Declare one property of a declared material.
 
     Raises
@@ -116,16 +116,16 @@ def declare_property(
         )
     )
     if held is not None and all(one in (None, getattr(held, key)) for key, one in values.items()):
-        return Outcome(unchanged=1)
+        return RowCounts(unchanged=1)
     values["source"] = values["source"] or entry.source
     new = MaterialProperty(material_id=owner.id, name=checked_label("property", name), **values)
     if held is None:
         new.entry_id = entry.id
         session.add(new)
         session.flush()
-        return Outcome(new=1)
+        return RowCounts(new=1)
     supersede(session, entry, held, new)
-    return Outcome(replaced=1)
+    return RowCounts(replaced=1)
 
 
 def declare_phase(
@@ -135,7 +135,7 @@ def declare_phase(
     begins: int | None = None,
     ends: int | None = None,
     description: str | None = None,
-) -> Outcome:
+) -> RowCounts:
     """Declare a time of building or repair; years at the earliest and at the latest."""
     held = held_or_none(session, Phase, name)
     if held is not None:
@@ -156,7 +156,7 @@ def declare_document(
     place: str | None = None,
     author: str | None = None,
     dated: str | None = None,
-) -> Outcome:
+) -> RowCounts:
     """Declare a document, drawing or photograph, by reference: `place` is where it can be found."""
     values = {
         "type": checked_choice("type of document", type, DOCUMENT_TYPES),
@@ -175,7 +175,7 @@ def declare_named(
     key: Mapping[str, str],
     values: Mapping[str, object],
     made: type[Structure] | None = None,
-) -> Outcome:
+) -> RowCounts:
     """Declare a row under a name: new, unchanged, or with new contents."""
     (name,) = key.values()
     held = held_or_none(session, cls, name)  # type: ignore[type-var]
@@ -184,7 +184,7 @@ def declare_named(
     own = {column: value for column, value in values.items() if column != "kind"}
     session.add((made or cls)(**key, **own, entry_id=entry.id))
     session.flush()
-    return Outcome(new=1)
+    return RowCounts(new=1)
 
 
 def _unit(name: str, given: str | None) -> str:

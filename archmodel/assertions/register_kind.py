@@ -12,7 +12,7 @@ from archmodel.query.compile import condition
 from archmodel.query.functions.registry import FUNCTIONS, STRUCTURE_FUNCTIONS
 from archmodel.query.grammar import Call, parse
 from archmodel.query.tokens import KEYWORDS, Token, complaint
-from archmodel.store.revisions import Outcome
+from archmodel.store.revisions import RowCounts
 from archmodel.tables.base import StoneAttribute
 from archmodel.tables.entities import Entity, kinds, own_attributes
 from archmodel.tables.entries import Entry
@@ -37,7 +37,7 @@ def register_kind(
     *,
     canon: str | None = None,
     attributes: Mapping[str, tuple[str | None, str]] | None = None,
-) -> Outcome:
+) -> RowCounts:
     """Register a kind in this database; it is a class of the hierarchy from now on.
 
     Parameters
@@ -74,7 +74,7 @@ def register_kind(
     known = session.get(RegisteredKind, name)
     if known is not None:
         if known.says() == row.says():
-            return Outcome(unchanged=1)
+            return RowCounts(unchanged=1)
         remedy = "give the new one another name; definitions of kinds do not change"
         raise UsageError(f"the kind {name} is registered already, with another definition", remedy=remedy)
     if name in all_kinds():
@@ -94,7 +94,7 @@ def register_kind(
     except QueryError:
         declare_registered(session)
         raise
-    return Outcome(new=1)
+    return RowCounts(new=1)
 
 
 def _check_attributes(

@@ -20,7 +20,7 @@ from archmodel.assertions.validation import (
 )
 from archmodel.store.bulk import batches
 from archmodel.store.find_by_code import Subjects, held_named
-from archmodel.store.revisions import NOTHING, Outcome, end_rows, table_of
+from archmodel.store.revisions import NOTHING, RowCounts, end_rows, table_of
 from archmodel.tables.entries import Entry
 from archmodel.tables.knowledge import (
     OBSERVATIONS,
@@ -77,7 +77,7 @@ PLAIN = Remark()
 
 def say_made_of(
     session: Session, entry: Entry, about: Subjects, material: str, remark: Remark = PLAIN
-) -> Outcome:
+) -> RowCounts:
     """State their material, which must have been declared."""
     number = held_named(session, Material, material).id
     return _say(session, entry, MadeOf, about, {"material_id": number}, remark)
@@ -85,7 +85,7 @@ def say_made_of(
 
 def say_of_phase(
     session: Session, entry: Entry, about: Subjects, phase: str, remark: Remark = PLAIN
-) -> Outcome:
+) -> RowCounts:
     """State the phase in which they were built or put in place; it must have been declared."""
     number = held_named(session, Phase, phase).id
     return _say(session, entry, OfPhase, about, {"phase_id": number}, remark)
@@ -98,7 +98,7 @@ def say_mason_mark(
     sign: str,
     place: str | None = None,
     remark: Remark = PLAIN,
-) -> Outcome:
+) -> RowCounts:
     """State a mason's mark; `sign` is the same for the same mark, `place` is where on the stone, in words."""
     values = {"sign": checked_label("sign", sign), "place": checked_text("place", place)}
     return _say(session, entry, MasonMark, about, values, remark)
@@ -114,7 +114,7 @@ def say_observation(
     place: str | None = None,
     at: Sequence[float] | None = None,
     remark: Remark = PLAIN,
-) -> Outcome:
+) -> RowCounts:
     """State an observation made on them.
 
     Parameters
@@ -143,7 +143,7 @@ def say_depth(
     value: float,
     sigma: float | None = None,
     remark: Remark = PLAIN,
-) -> Outcome:
+) -> RowCounts:
     """State their depth [m], with its standard deviation [m].
 
     This is the statement alone; ``pipelines.record.depth`` makes the solid follow it.
@@ -155,14 +155,14 @@ def say_depth(
     return _say(session, entry, DepthEvidence, about, values, remark)
 
 
-def say_reference(session: Session, entry: Entry, about: Subjects, remark: Remark) -> Outcome:
+def say_reference(session: Session, entry: Entry, about: Subjects, remark: Remark) -> RowCounts:
     """State a document or photograph, named in the remark, that treats or shows them."""
     if remark.document is None:
         raise UsageError("a reference names no document", remedy="give the code of a document")
     return _say(session, entry, Reference, about, {}, remark)
 
 
-def say_note(session: Session, entry: Entry, about: Subjects, key: str, remark: Remark) -> Outcome:
+def say_note(session: Session, entry: Entry, about: Subjects, key: str, remark: Remark) -> RowCounts:
     """State a note, the text of the remark, under a key such as "edge"."""
     if remark.text is None:
         raise UsageError(f"the note {key[:40]!r} says nothing", remedy="give its text")
@@ -176,7 +176,7 @@ def _say(
     about: Subjects,
     values: Mapping[str, object],
     remark: Remark,
-) -> Outcome:
+) -> RowCounts:
     """Store one statement about each subject that lacks it."""
     full = {**values, **_remark_row(session, remark)}
     outcome = NOTHING
@@ -193,7 +193,7 @@ def _say_of_batch(
     owner: str,
     numbers: Sequence[int],
     values: Mapping[str, object],
-) -> Outcome:
+) -> RowCounts:
     session.flush()
     table = table_of(Statement)
     held = select(table).where(
@@ -216,7 +216,7 @@ def _say_of_batch(
     ]
     if rows:
         session.execute(insert(table), rows)
-    return Outcome(new=len(rows) - len(others), replaced=len(others), unchanged=len(same))
+    return RowCounts(new=len(rows) - len(others), replaced=len(others), unchanged=len(same))
 
 
 def _remark_row(session: Session, remark: Remark) -> dict[str, object]:

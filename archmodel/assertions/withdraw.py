@@ -9,7 +9,7 @@ from archmodel.assertions.plain_values import statement_values
 from archmodel.assertions.validation import checked_choice
 from archmodel.store.bulk import batches
 from archmodel.store.find_by_code import Subjects
-from archmodel.store.revisions import NOTHING, Outcome, end_rows
+from archmodel.store.revisions import NOTHING, RowCounts, end_rows
 from archmodel.tables.entries import Entry
 from archmodel.tables.knowledge import DepthEvidence, Statement
 from archmodel.tables.relations import INVERSE, RELATIONS, SYMMETRIC, Membership, Relation
@@ -24,7 +24,7 @@ def withdraw_statements(
     cls: type[Statement],
     about: Subjects,
     match: Mapping[str, object] | None = None,
-) -> Outcome:
+) -> RowCounts:
     """Withdraw the statements of a kind about some subjects.
 
     Parameters
@@ -47,11 +47,11 @@ def withdraw_statements(
                 if one.superseded_id is None:
                     held.append(one.id)
                 else:
-                    outcome += Outcome(unchanged=1)
+                    outcome += RowCounts(unchanged=1)
     return _ended(session, entry, Statement, held, outcome, cls.__kind__)
 
 
-def withdraw_members(session: Session, entry: Entry, about: Subjects) -> Outcome:
+def withdraw_members(session: Session, entry: Entry, about: Subjects) -> RowCounts:
     """Withdraw declared memberships of entities in structures; computed ones stay."""
     outcome, held = NOTHING, []
     for batch in batches(about.entities):
@@ -64,13 +64,13 @@ def withdraw_members(session: Session, entry: Entry, about: Subjects) -> Outcome
             if one.superseded_id is None:
                 held.append(one.id)
             else:
-                outcome += Outcome(unchanged=1)
+                outcome += RowCounts(unchanged=1)
     return _ended(session, entry, Membership, held, outcome, "declared membership")
 
 
 def withdraw_relations(
     session: Session, entry: Entry, kind: str, of: Sequence[int], to: Sequence[int]
-) -> Outcome:
+) -> RowCounts:
     """Withdraw declared relations of a kind between entities, by their numbers; computed ones stay."""
     checked_choice("relation", kind, (*RELATIONS, "supports"))
     if kind not in RELATIONS:
@@ -89,7 +89,7 @@ def withdraw_relations(
             if relation.superseded_id is None:
                 held.append(relation.id)
             else:
-                outcome += Outcome(unchanged=1)
+                outcome += RowCounts(unchanged=1)
     return _ended(session, entry, Relation, held, outcome, f"declared relation {kind}")
 
 
@@ -103,12 +103,12 @@ def _ended(
     entry: Entry,
     cls: type[Statement] | type[Membership] | type[Relation],
     held: Sequence[int],
-    before: Outcome,
+    before: RowCounts,
     thing: str,
-) -> Outcome:
+) -> RowCounts:
     """End rows that are held; rows withdrawn already stay, and rows that never were are an error."""
     if not held and not before.unchanged:
         raise UsageError(f"there is no such {thing} to withdraw", remedy="look at it by: moma show CODE")
     for batch in batches(held):
         end_rows(session, entry, cls, batch)
-    return Outcome(withdrawn=len(held)) if held else before
+    return RowCounts(withdrawn=len(held)) if held else before

@@ -3,21 +3,20 @@
 import math
 from typing import Any
 
-from sqlalchemy import select
+from sqlalchemy import or_, select
 from sqlalchemy.orm import Session, joinedload
 
 from archmodel.assertions.plain_values import entry_values
 from archmodel.describe.as_of import entity_at, structures_named, version_at
 from archmodel.describe.knowledge import knowledge, memberships, owners_of, owners_of_structure
-from archmodel.describe.relations import joints, relations
 from archmodel.store.find_by_code import check_entry, no_such_code
 from archmodel.tables.entities import Entity, canon_of, kind_named, own_attributes
 from archmodel.tables.entries import held_at
 from archmodel.tables.hierarchy import definition_of, kind_chain, kind_of
 from archmodel.tables.knowledge import Correction
 from archmodel.tables.registered import refuse_unknown_kinds
-from archmodel.tables.relations import Membership
-from archmodel.tables.runs import EntityResult, Run
+from archmodel.tables.relations import INVERSE, Membership, Relation
+from archmodel.tables.runs import EntityResult, JointResult, Run
 from archmodel.tables.structures import Structure
 from archmodel.tables.surveys import Measurement, Survey
 from moma.errors import UsageError
@@ -91,13 +90,13 @@ def _entity(session: Session, number: int, code: str, at: int | None) -> Values:
             "origin": row["depth_origin"],
         },
         "structures": [_membership(session, one, at) for one in members],
-        "relations": relations(session, number, at),
+        "relations": _relations(session, number, at),
         "knowledge": knowledge(session, "entity_id", number, owners_of(session, members, at), at),
         "survey": None if measured is None else _survey(measured),
         "measured": None if measured is None else _measured(measured),
         "notes": {} if measured is None else dict(measured.notes),
         "runs": [_result(result) for result in results],
-        "joints": joints(session, number, results[0].run_id) if results else [],
+        "joints": _joints(session, number, results[0].run_id) if results else [],
         "corrections": _corrections(session, number, at),
     }
 
@@ -248,3 +247,64 @@ def _result(result: EntityResult) -> dict[str, object]:
         "contact_force_max": result.contact_force_max,
         "values": dict(result.values),
     }
+
+
+def _relations(session: Session, entity: int, at: int | None) -> dict[str, list[Values]]:
+    """List the relations of an entity by kind as seen from it: rests on, supports, beside, …
+
+    Returns
+    -------
+    dict
+        of lists of code, declared, area [m²], gap [m], entry
+    """
+    statement = (
+        select(Relation)
+        .where(or_(Relation.subject_id == entity, Relation.object_id == entity), held_at(Relation, at))
+        .options(joinedload(Relation.subject), joinedload(Relation.object))
+        .order_by(Relation.id)
+    )
+    told: dict[str, dict[str, Values]] = {name: {} for name in INVERSE}
+    for one in session.scalars(statement):
+        name = one.kind if one.subject_id == entity else INVERSE[one.kind]
+        other = one.object if one.subject_id == entity else one.subject
+        values = {
+            "code": other.code,
+            "declared": one.declared,
+            "area": one.area,
+            "gap": one.gap,
+            "entry": one.entry_id,
+        }
+        # computed and declared: one relation, of which the geometry gives the numbers
+        before = told[name].get(other.code)
+        if before is not None:
+            numbers = before if before["area"] is not None else values
+            values = {**numbers, "declared": True}
+        told[name][other.code] = values
+    return {name: [ones[code] for code in sorted(ones)] for name, ones in told.items() if ones}
+
+
+def _joints(session: Session, entity: int, run: int) -> list[Values]:
+    """List the results of a run for the joints of an entity; forces in N, pressures in Pa, lengths in m."""
+    statement = (
+        select(JointResult)
+        .where(
+            or_(JointResult.first_id == entity, JointResult.second_id == entity), JointResult.run_id == run
+        )
+        .options(joinedload(JointResult.first), joinedload(JointResult.second))
+        .order_by(JointResult.number)
+    )
+    return [
+        {
+            "neighbour": (one.second if one.first_id == entity else one.first).code,
+            "area": one.area,
+            "width": one.width,
+            "force_normal": one.force_normal,
+            "force_shear": one.force_shear,
+            "pressure_max": one.pressure_max,
+            "kern": one.kern,
+            "friction_use": one.friction_use,
+            "opening": one.opening,
+            "sliding": one.sliding,
+        }
+        for one in session.scalars(statement)
+    ]

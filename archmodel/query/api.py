@@ -21,7 +21,7 @@ from moma.errors import DatabaseError, QueryError, UsageError
 
 __all__ = [
     "MAX_EXPRESSIONS",
-    "Face",
+    "FoundFace",
     "asked_columns",
     "attributes",
     "condition",
@@ -41,7 +41,7 @@ BATCH = 500
 
 
 @dataclass(frozen=True)
-class Face:
+class FoundFace:
     """Face of an entity that a query found.
 
     Attributes
@@ -117,7 +117,7 @@ def find_faces(
     where: Sequence[str] = (),
     run: int | None = None,
     columns: Sequence[str] = ("code",),
-) -> list[Face]:
+) -> list[FoundFace]:
     """Return rows as `find_rows` does, with the face of each entity."""
 
     def chosen(scope: Scope) -> list[ColumnElement[Any]]:
@@ -125,7 +125,9 @@ def find_faces(
         return [measurement.c.outline, measurement.c.normal, *_columns(scope, columns)]
 
     found = _select(session, kind, where, run, chosen)
-    return [Face(outline, normal, dict(zip(columns, row, strict=True))) for outline, normal, *row in found]
+    return [
+        FoundFace(outline, normal, dict(zip(columns, row, strict=True))) for outline, normal, *row in found
+    ]
 
 
 def asked_columns(where: Sequence[str], session: Session | None = None, kind: str = "entity") -> list[str]:

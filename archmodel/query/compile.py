@@ -21,9 +21,9 @@ from archmodel.query.grammar import (
     AnyOf,
     Call,
     Comparison,
+    IsIn,
     IsNull,
     Like,
-    Membership,
     Node,
     Not,
     parse,
@@ -129,7 +129,7 @@ def condition_in(scope: Where, node: Node) -> ColumnElement[bool]:
                 raise complaint(name, what, f"write {attribute.name} = true")
             # With an escape character of our own: databases differ in the one that they assume.
             return column.ilike(pattern.text.replace("~", "~~"), escape="~")
-        case Membership(name, values):
+        case IsIn(name, values):
             attribute, column = _column(scope, name)
             return column.in_([_constant(scope, attribute, value) for value in values])
         case Comparison(name, sign, value):

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from archmodel.arrays import Array
-from archmodel.query.api import Face
+from archmodel.query.api import FoundFace
 from moma.errors import UsageError
 
 __all__ = ["MAX_ANGLE", "feature_collection", "flattened"]
@@ -26,12 +26,12 @@ DECIMALS = 6
 """Of coordinates: micrometres."""
 
 
-def feature_collection(faces: Iterable[Face]) -> dict[str, object]:
+def feature_collection(faces: Iterable[FoundFace]) -> dict[str, object]:
     """Make one feature for each face, with its attributes as properties; no geometry where none was measured."""
     return {"type": "FeatureCollection", "features": [_feature(face) for face in faces]}
 
 
-def flattened(faces: Sequence[Face]) -> list[Face]:
+def flattened(faces: Sequence[FoundFace]) -> list[FoundFace]:
     """Return the faces with outlines (nv, 2) in the plane of the wall [m]: u along it, v upwards.
 
     For a wall without slope, v is the height z. Level faces (a paving) have u = x, v = y if they look up.
@@ -60,7 +60,8 @@ def flattened(faces: Sequence[Face]) -> list[Face]:
         )
     axes = _axes(normal)
     return [
-        face if face.outline is None else Face(face.outline @ axes.T, face.normal, face.row) for face in faces
+        face if face.outline is None else FoundFace(face.outline @ axes.T, face.normal, face.row)
+        for face in faces
     ]
 
 
@@ -74,7 +75,7 @@ def _axes(normal: Array) -> Array:
     return np.array([along, up / np.linalg.norm(up)])
 
 
-def _feature(face: Face) -> dict[str, object]:
+def _feature(face: FoundFace) -> dict[str, object]:
     geometry: dict[str, object] | None = None
     if face.outline is not None:
         # A ring ends where it began; -0.0 is 0.

@@ -38,9 +38,9 @@ __all__ = [
     "AnyOf",
     "Call",
     "Comparison",
+    "IsIn",
     "IsNull",
     "Like",
-    "Membership",
     "Node",
     "Not",
     "attributes_in",
@@ -97,7 +97,7 @@ class AmountComparison:
 
 
 @dataclass(frozen=True)
-class Membership:
+class IsIn:
     """Node: attribute in (values)."""
 
     attribute: Token
@@ -148,7 +148,7 @@ class AnyOf:
     operands: "tuple[Node, ...]"
 
 
-Node = Comparison | AmountComparison | Membership | Like | Call | IsNull | Not | All | AnyOf
+Node = Comparison | AmountComparison | IsIn | Like | Call | IsNull | Not | All | AnyOf
 
 
 def parse(text: str) -> Node:
@@ -176,7 +176,7 @@ def attributes_in(node: Node) -> Iterator[Token]:
                 yield value
         case AmountComparison(left, _, right):
             yield from (token for _, token in (*left.terms, *right.terms) if token is not None)
-        case IsNull(Token() as attribute) | Like(attribute, _) | Membership(attribute, _):
+        case IsNull(Token() as attribute) | Like(attribute, _) | IsIn(attribute, _):
             yield attribute
 
 
@@ -345,7 +345,7 @@ class _Parser:
         while self.taken("sign", ","):
             values.append(self.value())
         self.close()
-        return Membership(attribute, tuple(values))
+        return IsIn(attribute, tuple(values))
 
     def value(self) -> Token:
         token = self.take()

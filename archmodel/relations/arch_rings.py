@@ -15,7 +15,7 @@ import numpy as np
 from archmodel.arrays import Array
 from archmodel.store.stone_arrays import StoneColumns
 
-__all__ = ["Arch", "ArchJoint", "ArchStone", "arches_among"]
+__all__ = ["ArchJoint", "ArchRings", "ArchStone", "arches_among"]
 
 
 _ONE_WAY = 0.9  # length of the mean of unit normals of faces that look one way
@@ -48,7 +48,7 @@ class ArchStone:
 
 
 @dataclass(frozen=True)
-class Arch:
+class ArchRings:
     """Row, or rings of rows, of voussoirs.
 
     Attributes
@@ -82,7 +82,7 @@ class ArchJoint:
         return self.normal if stone == self.first else -self.normal
 
 
-def arches_among(stones: StoneColumns, feet: Sequence[bool], joints: Iterable[ArchJoint]) -> list[Arch]:
+def arches_among(stones: StoneColumns, feet: Sequence[bool], joints: Iterable[ArchJoint]) -> list[ArchRings]:
     """Return the arches that voussoirs form, by the smallest number of their stones.
 
     Parameters
@@ -120,7 +120,7 @@ def _groups(members: Sequence[int], touching: Mapping[int, Sequence[ArchJoint]])
 
 def _arch(
     group: Sequence[int], touching: Mapping[int, Sequence[ArchJoint]], stones: StoneColumns
-) -> Arch | None:
+) -> ArchRings | None:
     """Return the arch of connected stones; None if they form none: one stone, or a web of a vault."""
     mean = stones.normals[list(group)].mean(axis=0)
     if not float(np.linalg.norm(mean)) >= _ONE_WAY:
@@ -145,7 +145,7 @@ def _arch(
     for number, row in enumerate(rows, start=1):
         for stone in _placed(number, row, crossed, inside, stones, view):
             found.setdefault(stone.entity, stone)
-    return Arch(tuple(found.values())) if len(found) >= _FEWEST else None
+    return ArchRings(tuple(found.values())) if len(found) >= _FEWEST else None
 
 
 class _View:

@@ -9,8 +9,8 @@ import numpy as np
 from sqlalchemy import select
 from sqlalchemy.orm import Session, aliased
 
-from archmodel.relations.arch_rings import Arch, ArchJoint, arches_among
-from archmodel.relations.zones_and_courses import Part
+from archmodel.relations.arch_rings import ArchJoint, ArchRings, arches_among
+from archmodel.relations.zones_and_courses import StructurePart
 from archmodel.store.stone_arrays import stone_columns
 from archmodel.tables.entities import Entity, Springer, Voussoir
 from archmodel.tables.hierarchy import kinds_below
@@ -20,7 +20,7 @@ from archmodel.tables.structures import Structure, structure_kind_named
 __all__ = ["arch_parts", "find_arches"]
 
 
-def find_arches(session: Session) -> list[Arch]:
+def find_arches(session: Session) -> list[ArchRings]:
     """Find the arches that the relations of the voussoirs form, by the smallest number of their stones."""
     stones = stone_columns(session, Entity.kind.in_(kinds_below(Voussoir)))
     if len(stones) == 0:
@@ -53,7 +53,7 @@ def _touching_voussoirs(session: Session) -> Iterable[Any]:
     )
 
 
-def arch_parts(session: Session, arches: Sequence[Arch]) -> list[Part]:
+def arch_parts(session: Session, arches: Sequence[ArchRings]) -> list[StructurePart]:
     """Return the arches as structures; one that shares most of its stones with a stored arch keeps its code."""
     number = {stone.entity: i for i, arch in enumerate(arches) for stone in arch.stones}
     votes: Counter[tuple[int, str]] = Counter()
@@ -77,7 +77,7 @@ def arch_parts(session: Session, arches: Sequence[Arch]) -> list[Part]:
     taken = {*codes.values(), *session.scalars(select(Structure.code).where(Structure.code.like("arch %")))}
     fresh = (code for k in count(1) if (code := f"arch {k}") not in taken)
     return [
-        Part(
+        StructurePart(
             "arch",
             codes[i] if i in codes else next(fresh),
             None,

@@ -17,7 +17,7 @@ from archmodel.tables.hierarchy import names_below
 from archmodel.tables.relations import RELATIONS
 from moma.errors import UsageError
 
-__all__ = ["Contacts", "FoundRelations", "RelationSettings", "StonesOf", "relations_between"]
+__all__ = ["FoundRelations", "RelationSettings", "StoneContacts", "StonesOf", "relations_between"]
 
 
 _RESTS_ON, _BESIDE, _BONDED, _ACROSS = (
@@ -75,7 +75,7 @@ class StonesOf:
 
 
 @dataclass(frozen=True)
-class Contacts:
+class StoneContacts:
     """Contacts between stones.
 
     Attributes
@@ -119,7 +119,7 @@ class FoundRelations:
 
 
 def relations_between(
-    contacts: Contacts, stones: StonesOf, settings: RelationSettings | None = None
+    contacts: StoneContacts, stones: StonesOf, settings: RelationSettings | None = None
 ) -> FoundRelations:
     """Classify the contacts of stones.
 
@@ -167,7 +167,7 @@ class _Faces:
     back: Bools
 
     @classmethod
-    def of(cls, contacts: Contacts, stones: StonesOf, settings: RelationSettings) -> "_Faces":
+    def of(cls, contacts: StoneContacts, stones: StonesOf, settings: RelationSettings) -> "_Faces":
         near = np.cos(np.radians(settings.along))
         one, two = stones.normals[contacts.pairs[:, 0]], stones.normals[contacts.pairs[:, 1]]
         steepest = np.sin(np.radians(settings.bed))
@@ -197,7 +197,7 @@ def _is_one_of(names: Sequence[str], *classes: type[Entity]) -> Bools:
     return np.fromiter((name in wanted for name in names), dtype=np.bool_, count=len(names))
 
 
-def _rests(contacts: Contacts, stones: StonesOf, settings: RelationSettings) -> Bools:
+def _rests(contacts: StoneContacts, stones: StonesOf, settings: RelationSettings) -> Bools:
     """Return the contacts by which one stone rests on the other."""
     first, second = contacts.pairs[:, 0], contacts.pairs[:, 1]
     arch = _is_one_of(stones.kinds, Voussoir, RibSegment)
@@ -216,7 +216,7 @@ def _rests(contacts: Contacts, stones: StonesOf, settings: RelationSettings) -> 
 def _contradicted(
     upper: Ints,
     lower: Ints,
-    contacts: Contacts,
+    contacts: StoneContacts,
     rests: Bools,
     count: int,
     settings: RelationSettings,
@@ -241,7 +241,7 @@ def _contradicted(
         given_up[inside[order[first]]] = True
 
 
-def _merged(contacts: Contacts, parts: Sequence[tuple[int, Bools, Ints, Ints, Array]]) -> FoundRelations:
+def _merged(contacts: StoneContacts, parts: Sequence[tuple[int, Bools, Ints, Ints, Array]]) -> FoundRelations:
     """Merge relations to one of a kind for each pair, with the area of all its contacts."""
     rows = np.concatenate([np.flatnonzero(mask) for _, mask, _, _, _ in parts])
     kind = np.concatenate([np.full(int(mask.sum()), number) for number, mask, _, _, _ in parts])

@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from sqlalchemy import ColumnElement, bindparam, func, select, update
 from sqlalchemy.orm import Session, aliased
 
-from archmodel.relations.arch_rings import Arch
+from archmodel.relations.arch_rings import ArchRings
 from archmodel.relations.store import Act
 from archmodel.store.bulk import batches, insert_rows
 from archmodel.store.revisions import table_of
@@ -21,7 +21,7 @@ __all__ = ["arch_values", "give_values", "tail_lengths"]
 _SAME = 1e-9  # values that differ by less, in m or rad, are one value computed twice
 
 
-def arch_values(arches: Sequence[Arch]) -> dict[int, dict[str, float | None]]:
+def arch_values(arches: Sequence[ArchRings]) -> dict[int, dict[str, float | None]]:
     """Return ring, rank and angle of the stones of arches, by entity; a springer of two belongs to the first."""
     values: dict[int, dict[str, float | None]] = {}
     for arch in arches:

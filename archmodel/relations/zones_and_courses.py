@@ -16,7 +16,14 @@ from archmodel.tables.hierarchy import kinds_below
 from archmodel.tables.relations import Membership
 from archmodel.tables.structures import Course, Structure, structure_kind_named
 
-__all__ = ["Part", "along_the_wall", "course_code", "parts_of_survey", "store_parts", "whole_courses"]
+__all__ = [
+    "StructurePart",
+    "along_the_wall",
+    "course_code",
+    "parts_of_survey",
+    "store_parts",
+    "whole_courses",
+]
 
 
 _ONE_WAY = 0.5  # length of the mean of the faces' directions in plan from which on they look one way
@@ -24,7 +31,7 @@ _LONG = 3.0  # a course so many times as long as wide is a wall, else it runs ar
 
 
 @dataclass(frozen=True)
-class Part:
+class StructurePart:
     """Structure with its members, from the survey or from the geometry.
 
     Attributes
@@ -49,7 +56,7 @@ def course_code(zone: str | None, course: int) -> str:
     return f"course {course}" if zone is None else f"{zone}/course {course}"
 
 
-def parts_of_survey(stones: StoneColumns) -> list[Part]:
+def parts_of_survey(stones: StoneColumns) -> list[StructurePart]:
     """Return the zones and courses of some stones; members of a zone are its stones without a course.
 
     Parameters
@@ -66,7 +73,7 @@ def parts_of_survey(stones: StoneColumns) -> list[Part]:
         elif zone is not None:
             zones[zone].append(i)
     parts = [
-        Part("structure", zone, None, None, tuple(stones.ids[rows].tolist()), (None,) * len(rows))
+        StructurePart("structure", zone, None, None, tuple(stones.ids[rows].tolist()), (None,) * len(rows))
         for zone, rows in sorted(zones.items())
     ]
     for zone, course in sorted(courses, key=lambda key: (key[0] or "", key[1])):
@@ -74,7 +81,7 @@ def parts_of_survey(stones: StoneColumns) -> list[Part]:
         order = rows[along_the_wall(stones.centres[rows], stones.normals[rows])]
         ranks = tuple(range(1, len(rows) + 1))
         members = tuple(stones.ids[order].tolist())
-        parts.append(Part("course", course_code(zone, course), course, zone, members, ranks))
+        parts.append(StructurePart("course", course_code(zone, course), course, zone, members, ranks))
     return parts
 
 
@@ -153,7 +160,7 @@ def _around(flat: Array) -> Array:
 
 def store_parts(
     session: Session,
-    parts: Sequence[Part],
+    parts: Sequence[StructurePart],
     act: Act,
     *,
     kinds: Iterable[str],
@@ -203,7 +210,7 @@ def _row(entity: int, structure: int, rank: int | None, entry: int) -> dict[str,
     }
 
 
-def _structures(session: Session, parts: Sequence[Part], act: Act) -> tuple[dict[str, int], Changes]:
+def _structures(session: Session, parts: Sequence[StructurePart], act: Act) -> tuple[dict[str, int], Changes]:
     """Return the numbers of the structures by code; make those that are missing."""
     numbers: dict[str, int] = {}
     for batch in batches({code for part in parts for code in (part.code, part.parent) if code is not None}):

@@ -13,7 +13,7 @@ from sqlalchemy.orm import Session
 
 from archmodel.store.bulk import batches
 from archmodel.store.remeasuring import MEASURED
-from archmodel.store.revisions import NOTHING, Outcome, end_rows
+from archmodel.store.revisions import NOTHING, RowCounts, end_rows
 from archmodel.store.stone_record import StoneRecord
 from archmodel.store.stones import insert_stones
 from archmodel.tables.entities import Entity
@@ -72,7 +72,7 @@ def store_hypotheses(
         return entry, tuple(numbers)
 
 
-def withdraw_hypotheses(session: Session, entry: Entry, entities: Iterable[int]) -> Outcome:
+def withdraw_hypotheses(session: Session, entry: Entry, entities: Iterable[int]) -> RowCounts:
     """Withdraw hypothetical stones.
 
     Parameters
@@ -91,7 +91,7 @@ def withdraw_hypotheses(session: Session, entry: Entry, entities: Iterable[int])
         if seen is not None:
             raise UsageError(f"{seen.code} is no hypothesis: it was surveyed", remedy="leave it out")
         held = [one for one in found if one.x is not None]
-        outcome += Outcome(withdrawn=len(held), unchanged=len(found) - len(held))
+        outcome += RowCounts(withdrawn=len(held), unchanged=len(found) - len(held))
         _end_geometry(session, entry, held)
     return outcome
 

@@ -29,11 +29,11 @@ from archmodel.tables.relations import Membership
 from archmodel.tables.structures import Structure
 from moma.errors import DatabaseError, UsageError
 
-__all__ = ["NOTHING", "Outcome", "end_rows", "revise", "supersede", "table_of", "withdraw"]
+__all__ = ["NOTHING", "RowCounts", "end_rows", "revise", "supersede", "table_of", "withdraw"]
 
 
 @dataclass(frozen=True)
-class Outcome:
+class RowCounts:
     """Numbers of rows that were new, replaced others, were there already, or were withdrawn."""
 
     new: int = 0
@@ -41,8 +41,8 @@ class Outcome:
     unchanged: int = 0
     withdrawn: int = 0
 
-    def __add__(self, other: "Outcome") -> "Outcome":
-        return Outcome(
+    def __add__(self, other: "RowCounts") -> "RowCounts":
+        return RowCounts(
             self.new + other.new,
             self.replaced + other.replaced,
             self.unchanged + other.unchanged,
@@ -55,7 +55,7 @@ class Outcome:
         return self.new + self.replaced + self.withdrawn
 
 
-NOTHING = Outcome()
+NOTHING = RowCounts()
 
 
 def table_of(cls: type[Base]) -> Table:
@@ -85,7 +85,7 @@ def supersede(session: Session, entry: Entry, old: Any, new: Any) -> None:
     session.flush()
 
 
-def withdraw(session: Session, entry: Entry, row: Any) -> Outcome:
+def withdraw(session: Session, entry: Entry, row: Any) -> RowCounts:
     """Withdraw a row without replacing it, with the properties of a material or the memberships of a structure.
 
     Raises
@@ -105,10 +105,10 @@ def withdraw(session: Session, entry: Entry, row: Any) -> Outcome:
         parts = _end_where(session, entry, Membership, structure_id=row.id)
     row.superseded_id = entry.id
     session.flush()
-    return Outcome(withdrawn=1 + parts)
+    return RowCounts(withdrawn=1 + parts)
 
 
-def revise(session: Session, entry: Entry, row: Any, values: Mapping[str, object]) -> Outcome:
+def revise(session: Session, entry: Entry, row: Any, values: Mapping[str, object]) -> RowCounts:
     """Give a row new contents, and keep the old ones in a row of their own.
 
     Parameters
@@ -120,7 +120,7 @@ def revise(session: Session, entry: Entry, row: Any, values: Mapping[str, object
     table, number = table_of(type(row)), row.id
     old = dict(session.execute(select(table).where(table.c.id == number)).mappings().one())
     if all(old[name] == value for name, value in values.items()):
-        return Outcome(unchanged=1)
+        return RowCounts(unchanged=1)
     kept = {name: value for name, value in old.items() if name != "id"} | {"superseded_id": entry.id}
     key = session.execute(insert(table).values(kept).returning(table.c.id)).scalar_one()
     session.execute(
@@ -130,7 +130,7 @@ def revise(session: Session, entry: Entry, row: Any, values: Mapping[str, object
     )
     # its class may have changed with its kind
     session.expunge(row)
-    return Outcome(replaced=1)
+    return RowCounts(replaced=1)
 
 
 def end_rows(session: Session, entry: Entry, cls: type[Base], numbers: list[int]) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.sparse import csr_array, vstack
 
 from mechanics.arrays import Array, Bools, Ints
-from mechanics.contact._kernels.mortar import Bodies, Interfaces, mortar_rows
+from mechanics.contact._kernels.mortar import Bodies, FacePairs, mortar_rows
 from mechanics.contact.contacts import NODE, Contacts
 from mechanics.contact.surfaces import Placed, Surfaces
 from mechanics.scene.state import State
@@ -53,7 +53,7 @@ def face_cells(surfaces: Surfaces, nodes: int) -> FaceCells:
     t1 = t1 / np.linalg.norm(t1, axis=1)[:, None]
     frame = np.stack([n, t1, np.cross(n, t1)], axis=1)
     size = np.diff(meshes.node_ptr)[meshes.of_face[face]]
-    still = Interfaces(
+    still = FacePairs(
         np.column_stack([meshes.of_face[face], np.full(len(face), -1)]),
         np.column_stack([face, face]),
         np.zeros((len(face), 2), dtype=np.int64),

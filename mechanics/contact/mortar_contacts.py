@@ -5,7 +5,7 @@ from scipy.sparse import csr_array
 
 from mechanics.arrays import Array, Bools, Ints
 from mechanics.contact._kernels.facets import FacetMeshes
-from mechanics.contact._kernels.mortar import Bodies, Interfaces, mortar_rows
+from mechanics.contact._kernels.mortar import Bodies, FacePairs, mortar_rows
 from mechanics.contact._kernels.points import surface_points
 from mechanics.contact.contacts import NODE, Contacts
 from mechanics.contact.surfaces import Placed, Surfaces
@@ -79,12 +79,12 @@ def mortar_contacts(
     frame, origin = _frames(surfaces, placed, face)
     meshes = surfaces.meshes
     least = thin * surfaces.shapes.face_area[face].min(axis=1)
-    interfaces = Interfaces(meshes.of_face[face], face, body, frame, origin, least)
+    interfaces = FacePairs(meshes.of_face[face], face, body, frame, origin, least)
     bodies = Bodies(placed.centre, placed.rotation)
     # where a face lies on a single other face, all its nodes have contacts
     plane = surfaces.plane[face[:, 0]]
     several = np.flatnonzero(np.bincount(plane)[plane] > 1)
-    own = Interfaces._make(array[several] for array in interfaces)
+    own = FacePairs._make(array[several] for array in interfaces)
     pointer = _starts(meshes, own.mesh[:, 0])
     share = np.zeros(int(pointer[-1]))
     mortar_rows(pointer, np.empty(0, dtype=bool), own, bodies, meshes, placed.shapes, share)

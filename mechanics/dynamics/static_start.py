@@ -46,7 +46,7 @@ _DEFORMING = _Way(1.0, 10, np.inf, tightened=True)
 # joints that yield between rigid stones: in longer steps those that slide do so too far before they are seen again
 _YIELDING = _Way(0.1, 40, np.inf, tightened=True)
 # deformable stones among more rigid ones: in steps of 1 s a stone would yield by a hundred millionth of what it moves
-# as a whole. Stones that have a way to go, as joints that open do not bear them yet, go on until they have passed a peak
+# as a whole. Stones that have a way to go, as open joints do not bear them yet, go on until they have passed a peak
 _AMONG_RIGID = _Way(5e-3, 50, 0.5, unsolved=2)
 # rigid stones, which fall by a millimetre in a step; joints that are open by a millimetre need some ten
 _SETTLING = _Way(1e-2, 50)

@@ -1,6 +1,6 @@
 """Limit analysis of rigid stones: how far a load may grow before they move, how they would, and what holds them.
 
-Public: `Assembly`, `Strength`, `assembly` (assembly); `Acceleration`, `LiveLoad`, `PointForce`, `SpreadForce`
+Public: `RigidAssembly`, `Strength`, `assembly` (assembly); `Acceleration`, `LiveLoad`, `PointForce`, `SpreadForce`
 (live_loads); `Flow`, `LimitLoad`, `Mechanism`, `limit_load` (limit_load); `Thrust`, `thrust` (thrust);
 `GeometricSafety`, `geometric_safety` (thickness); `Kinematics`, `kinematics` (kinematic); `Confirmation`, `confirm`
 (confirm); `Pushover`, `pushover` (pushover); `Joints`, `resultants` (joints).

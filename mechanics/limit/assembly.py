@@ -27,7 +27,7 @@ from mechanics.scene.scene import Fidelity, Scene
 from mechanics.scene.state import State
 from moma.errors import SceneError
 
-__all__ = ["Assembly", "Strength", "assembly"]
+__all__ = ["RigidAssembly", "Strength", "assembly"]
 
 
 # gap up to which a joint counts as closed, over the width of the smaller stone: a thousandth is a survey's error [-]
@@ -55,7 +55,7 @@ class Strength:
 
 
 @dataclass(frozen=True)
-class Assembly:
+class RigidAssembly:
     """Rigid stones and the joints that are closed.
 
     Attributes
@@ -115,7 +115,7 @@ class Assembly:
         return np.array(sorted(known[code] for code in codes), dtype=np.int64)
 
 
-def assembly(scene: Scene) -> Assembly:
+def assembly(scene: Scene) -> RigidAssembly:
     """Return the equilibrium of a scene as it stands at its start; deformable stones count as rigid.
 
     Raises
@@ -145,7 +145,7 @@ def assembly(scene: Scene) -> Assembly:
     assert isinstance(form, SparseForm)
     joints = find_joints(model, state, found.contacts)
     crushes = [block.material.compressive_strength for block in blocks]
-    return Assembly(
+    return RigidAssembly(
         model=model,
         state=state,
         contacts=found.contacts,

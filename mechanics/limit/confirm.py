@@ -18,13 +18,13 @@ import numpy as np
 from mechanics.arrays import Array, Bools
 from mechanics.dynamics.outcome import Outcome
 from mechanics.dynamics.progress import Listener, silent
-from mechanics.limit.assembly import Assembly
+from mechanics.limit.assembly import RigidAssembly
 from mechanics.limit.limit_load import Mechanism
 from mechanics.limit.live_loads import LiveLoad
 from mechanics.scene.scene import TimeSettings
 from mechanics.simulate import simulate
 
-__all__ = ["Confirmation", "Likeness", "Trial", "confirm", "likeness"]
+__all__ = ["Confirmation", "ConfirmationRun", "Likeness", "confirm", "likeness"]
 
 
 # load over the candidate of the first two runs, and by how much each further one goes on [-]
@@ -38,7 +38,7 @@ _BELONGS = 0.1
 
 
 @dataclass(frozen=True)
-class Trial:
+class ConfirmationRun:
     """One run.
 
     Attributes
@@ -70,10 +70,10 @@ class Confirmation:
 
     held: float
     lost: float
-    trials: tuple[Trial, ...]
+    trials: tuple[ConfirmationRun, ...]
 
     @property
-    def collapse(self) -> Trial | None:
+    def collapse(self) -> ConfirmationRun | None:
         """Run of the least load that is lost; None where none is."""
         return next((one for one in self.trials if one.multiplier == self.lost), None)
 
@@ -101,7 +101,7 @@ class Likeness:
     common: float
 
 
-def likeness(on: Assembly, mechanism: Mechanism, displacement: Array) -> Likeness:
+def likeness(on: RigidAssembly, mechanism: Mechanism, displacement: Array) -> Likeness:
     """Return how alike a mechanism and the displacements (nb, 3) of a collapse [m] are."""
     mass, centre = on.model.mass[on.free], on.state.centre[on.free]
     corners = [on.model.scene.blocks[body].vertices.mean(axis=0) for body in on.free]
@@ -125,7 +125,7 @@ def _belongs(motion: Array) -> Bools:
 
 
 def confirm(
-    on: Assembly,
+    on: RigidAssembly,
     live: LiveLoad,
     candidate: float,
     runs: int = 6,
@@ -145,7 +145,7 @@ def confirm(
     ------
     SceneError, SolverError : see `simulate`
     """
-    trials: list[Trial] = []
+    trials: list[ConfirmationRun] = []
     low, high = 1.0 - _NEAR, 1.0 + _NEAR
     held, lost = 0.0, np.inf
     while len(trials) < runs and not stop():
@@ -165,16 +165,18 @@ def confirm(
 
 
 def _trial(
-    on: Assembly,
+    on: RigidAssembly,
     live: LiveLoad,
     multiplier: float,
     progress: Listener,
     stop: Callable[[], bool],
-) -> Trial:
+) -> ConfirmationRun:
     width = float(on.model.surfaces.size[on.free].min())
     step = float(np.sqrt(2.0 * _FALL * width / np.linalg.norm(on.model.gravity(0.0))))
     time = TimeSettings(step, theta=1.0, duration=_STEPS * step, collapse_displacement=_MOVED)
     loaded = replace(live.applied(on, multiplier), time=time)
     result = simulate(loaded, progress, stop=stop)
     displacement = np.array([body.displacement.mean(axis=0) for body in result.bodies])
-    return Trial(multiplier, result.outcome, result.steps, result.errors.unconverged_steps, displacement)
+    return ConfirmationRun(
+        multiplier, result.outcome, result.steps, result.errors.unconverged_steps, displacement
+    )

@@ -18,7 +18,7 @@ from mechanics.arrays import Array, Ints
 from mechanics.contact.contacts import Contacts, material_points
 from mechanics.model.model import Model
 from mechanics.results.interfaces import find_interfaces, placed_faces
-from mechanics.results.joint_sections import Section, eccentricity, sections
+from mechanics.results.joint_sections import JointPolygons, eccentricity, sections
 from mechanics.results.joints import resultants as summed
 from mechanics.scene.state import State
 
@@ -42,7 +42,7 @@ class Joints:
     """
 
     bodies: Ints
-    section: Section
+    section: JointPolygons
     joint: Ints
     point: Array
 

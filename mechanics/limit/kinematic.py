@@ -23,7 +23,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial.transform import Rotation
 
 from mechanics.arrays import Array, Ints
-from mechanics.limit.assembly import Assembly
+from mechanics.limit.assembly import RigidAssembly
 from mechanics.limit.limit_load import LimitLoad, Mechanism
 from mechanics.limit.live_loads import Acceleration
 from moma.errors import SolverError
@@ -69,7 +69,7 @@ class Kinematics:
         return self.multiplier * self.weight / (self.mass * confidence)
 
 
-def kinematics(on: Assembly, live: Acceleration, found: LimitLoad) -> Kinematics:
+def kinematics(on: RigidAssembly, live: Acceleration, found: LimitLoad) -> Kinematics:
     """Return the kinematic analysis of the mechanism of a limit load.
 
     Raises
@@ -142,7 +142,7 @@ def _end(multiplier: Callable[[float], float], fastest: float) -> tuple[float, b
     return float(brentq(multiplier, times[first - 1], times[first])), True
 
 
-def _blocks(on: Assembly, mechanism: Mechanism) -> Ints:
+def _blocks(on: RigidAssembly, mechanism: Mechanism) -> Ints:
     """Return the block (nb,) of each stone: those that touch and move as one; -1 where it stands."""
     velocity, centre = mechanism.velocity, on.state.centre
     moves = mechanism.speed > _STANDS

@@ -27,9 +27,9 @@ from enum import StrEnum
 import numpy as np
 
 from mechanics.arrays import Array, Bools
-from mechanics.limit.assembly import Assembly, Strength
+from mechanics.limit.assembly import RigidAssembly, Strength
 from mechanics.limit.live_loads import LiveLoad
-from mechanics.limit.programme import Answer, Programme
+from mechanics.limit.programme import Optimum, Programme
 
 __all__ = ["Flow", "LimitLoad", "Mechanism", "limit_load", "mechanism"]
 
@@ -117,7 +117,7 @@ class LimitLoad:
 
 
 def limit_load(
-    on: Assembly, live: LiveLoad, flow: Flow = Flow.ASSOCIATIVE, bound: LimitLoad | None = None
+    on: RigidAssembly, live: LiveLoad, flow: Flow = Flow.ASSOCIATIVE, bound: LimitLoad | None = None
 ) -> LimitLoad:
     """Return the limit load of an assembly with its mechanism.
 
@@ -146,7 +146,7 @@ def limit_load(
     return _candidate(on, programme, bound)
 
 
-def mechanism(on: Assembly, velocity: Array, moving: Array | None = None) -> Mechanism:
+def mechanism(on: RigidAssembly, velocity: Array, moving: Array | None = None) -> Mechanism:
     """Return the mechanism of velocities of any length.
 
     Parameters
@@ -179,7 +179,7 @@ class _Ending:
     beyond: float
 
 
-def _candidate(on: Assembly, programme: Programme, bound: LimitLoad) -> LimitLoad:
+def _candidate(on: RigidAssembly, programme: Programme, bound: LimitLoad) -> LimitLoad:
     """Return the lower of the loads to which the iteration comes from the bound, and from the dead load.
 
     Its mechanism is that of the last strength without the charges, which would open joints a little.
@@ -192,7 +192,7 @@ def _candidate(on: Assembly, programme: Programme, bound: LimitLoad) -> LimitLoa
     found = [first, _iterated(on, programme, resting.force, 0, known)]
     ended = [one for one in found if one.converged] or [one for one in found if np.isfinite(one.multiplier)]
     lowest = min(ended or found[:1], key=lambda one: one.multiplier)
-    moving: Answer = programme.solve(lowest.strength)
+    moving: Optimum = programme.solve(lowest.strength)
     return LimitLoad(
         flow=Flow.COULOMB,
         load=bound.load,
@@ -207,7 +207,7 @@ def _candidate(on: Assembly, programme: Programme, bound: LimitLoad) -> LimitLoa
 
 
 def _iterated(
-    on: Assembly, programme: Programme, begin: Array, far: int, known: float | None = None
+    on: RigidAssembly, programme: Programme, begin: Array, far: int, known: float | None = None
 ) -> _Ending:
     """Iterate the fictitious strength from forces (nc, 3), its slope falling to almost zero.
 
@@ -241,7 +241,7 @@ def _normal(strength: Strength, force: Array) -> Array:
     return np.maximum(force[:, 0] + strength.tension, 0.0)
 
 
-def _beyond(on: Assembly, force: Array) -> float:
+def _beyond(on: RigidAssembly, force: Array) -> float:
     """Return the friction beyond Coulomb's law of forces (nc, 3), over the strength of all contacts."""
     most = on.strength.shear(force)
     over = np.maximum(np.linalg.norm(force[:, 1:], axis=1) - most, 0.0)

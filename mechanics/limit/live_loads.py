@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from mechanics.arrays import Array, Ints
-from mechanics.limit.assembly import Assembly
+from mechanics.limit.assembly import RigidAssembly
 from mechanics.scene.loads.forces import StoneForce
 from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import Scene
@@ -19,10 +19,10 @@ __all__ = ["Acceleration", "LiveLoad", "PointForce", "SpreadForce", "levers"]
 class LiveLoad(Protocol):
     """A load of which λ times is added to the dead load."""
 
-    def __call__(self, on: Assembly) -> Array:
+    def __call__(self, on: RigidAssembly) -> Array:
         """Return force and moment (6 n,) about their centres of all free stones at λ = 1 [N, N m]."""
 
-    def applied(self, on: Assembly, multiplier: float) -> Scene:
+    def applied(self, on: RigidAssembly, multiplier: float) -> Scene:
         """Return the assembly's scene with λ times the load, which acts from the start and stays."""
 
     def __str__(self) -> str:
@@ -57,7 +57,7 @@ class Acceleration:
     def __post_init__(self) -> None:
         _unit(self.direction, "acceleration")
 
-    def __call__(self, on: Assembly) -> Array:
+    def __call__(self, on: RigidAssembly) -> Array:
         """Return the load (6 n,) at λ = 1 [N, N m]."""
         size = float(np.linalg.norm(on.model.gravity(0.0)))
         if size == 0:
@@ -74,7 +74,7 @@ class Acceleration:
             load[others] = 0.0
         return load[on.free].ravel()
 
-    def applied(self, on: Assembly, multiplier: float) -> Scene:
+    def applied(self, on: RigidAssembly, multiplier: float) -> Scene:
         """Return the scene with λ times the load: as a part of gravity where it acts on all stones."""
         if self.stones:
             return _with_forces(on, multiplier * self(on))
@@ -101,7 +101,7 @@ class SpreadForce:
     stones: frozenset[str]
     force: tuple[float, float, float]
 
-    def __call__(self, on: Assembly) -> Array:
+    def __call__(self, on: RigidAssembly) -> Array:
         """Return the load (6 n,) at λ = 1 [N, N m].
 
         Raises
@@ -114,7 +114,7 @@ class SpreadForce:
         load[bodies, :3] = on.model.mass[bodies, None] / on.model.mass[bodies].sum() * np.asarray(self.force)
         return load[on.free].ravel()
 
-    def applied(self, on: Assembly, multiplier: float) -> Scene:
+    def applied(self, on: RigidAssembly, multiplier: float) -> Scene:
         """Return the scene with λ times the load."""
         return _with_forces(on, multiplier * self(on))
 
@@ -137,7 +137,7 @@ class PointForce:
     force: tuple[float, float, float]
     point: tuple[float, float, float] | None = None
 
-    def __call__(self, on: Assembly) -> Array:
+    def __call__(self, on: RigidAssembly) -> Array:
         """Return the load (6 n,) at λ = 1 [N, N m].
 
         Raises
@@ -153,7 +153,7 @@ class PointForce:
             load[row, 3:] = np.cross(np.asarray(self.point) - on.state.centre[body], self.force)
         return load.ravel()
 
-    def applied(self, on: Assembly, multiplier: float) -> Scene:
+    def applied(self, on: RigidAssembly, multiplier: float) -> Scene:
         """Return the scene with λ times the load."""
         return _with_forces(on, multiplier * self(on))
 
@@ -161,7 +161,7 @@ class PointForce:
         return f"force on {self.stone}, in units of {np.linalg.norm(self.force):g} N"
 
 
-def _free(on: Assembly, codes: Collection[str], where: str) -> Ints:
+def _free(on: RigidAssembly, codes: Collection[str], where: str) -> Ints:
     """Return the bodies with these codes, all of which may move.
 
     Raises
@@ -186,7 +186,7 @@ def levers(load: Array) -> tuple[Ints, Array, Array]:
     return pushed, force, np.cross(force, moment) / np.einsum("ni,ni->n", force, force)[:, None]
 
 
-def _with_forces(on: Assembly, load: Array) -> Scene:
+def _with_forces(on: RigidAssembly, load: Array) -> Scene:
     """Return the scene with forces on its stones that are a load (6 n,), each at a place of its stone."""
     scene, forces = on.model.scene, list[StoneForce]()
     for row, force, (x, y, z) in zip(*levers(load.reshape(-1, 6)), strict=True):

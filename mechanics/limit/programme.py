@@ -13,10 +13,10 @@ import numpy as np
 from scipy.sparse import block_array, csc_array, csr_array, diags_array, vstack
 
 from mechanics.arrays import Array
-from mechanics.limit.assembly import Assembly, Strength
+from mechanics.limit.assembly import RigidAssembly, Strength
 from moma.errors import SolverError
 
-__all__ = ["Answer", "Ending", "Programme"]
+__all__ = ["Ending", "Optimum", "Programme"]
 
 
 # friction from which a contact has a cone [-]
@@ -42,7 +42,7 @@ class Ending(StrEnum):
 
 
 @dataclass(frozen=True)
-class Answer:
+class Optimum:
     """Answer of one programme.
 
     Attributes
@@ -92,7 +92,7 @@ class Programme:
     SolverError : the live load is zero
     """
 
-    def __init__(self, on: Assembly, live: Array | None, name: str) -> None:
+    def __init__(self, on: RigidAssembly, live: Array | None, name: str) -> None:
         self._on, self._name = on, name
         load = np.zeros_like(on.dead) if live is None else live
         if live is not None and not load.any():
@@ -117,7 +117,7 @@ class Programme:
         cost: Array | None = None,
         near: Array | None = None,
         pull: float = 0.0,
-    ) -> Answer:
+    ) -> Optimum:
         """Return the answer for a strength of the contacts.
 
         Parameters
@@ -151,17 +151,17 @@ class Programme:
         )
         velocity, none = (self._row * z[: len(self._row)]).reshape(-1, 6), np.zeros((count // 3, 3))
         if status in _ENDLESS:
-            return Answer(Ending.ENDLESS, float("inf"), none, np.zeros_like(velocity))
+            return Optimum(Ending.ENDLESS, float("inf"), none, np.zeros_like(velocity))
         if live or status in _NO_BALANCE:
             # the loads do work on the mechanism
             driving = self._on.dead if self._live is None or status in _NO_BALANCE else self._live
             velocity = velocity if velocity.ravel() @ driving >= 0 else -velocity
         if status in _NO_BALANCE:
-            return Answer(Ending.NO_BALANCE, float("nan"), none, velocity)
+            return Optimum(Ending.NO_BALANCE, float("nan"), none, velocity)
         multiplier = float(x[-1]) / self._live_unit if live else float("nan")
-        return Answer(Ending.FOUND, multiplier, self._unit * x[:count].reshape(-1, 3), velocity)
+        return Optimum(Ending.FOUND, multiplier, self._unit * x[:count].reshape(-1, 3), velocity)
 
-    def shortfall(self, strength: Strength) -> Answer:
+    def shortfall(self, strength: Strength) -> Optimum:
         """Return the forces that come nearest to balancing the dead load; `multiplier` is the residual imbalance.
 
         It is the largest component of the imbalance, over the largest load on a stone, with moments over widths [-].
@@ -186,7 +186,7 @@ class Programme:
         half = len(self._row)
         velocity = (self._row * (z[half : 2 * half] - z[:half])).reshape(-1, 6)
         velocity = velocity if velocity.ravel() @ self._on.dead >= 0 else -velocity
-        return Answer(Ending.FOUND, float(x[-1]), self._unit * x[:-1].reshape(-1, 3), velocity)
+        return Optimum(Ending.FOUND, float(x[-1]), self._unit * x[:-1].reshape(-1, 3), velocity)
 
     def _solved(
         self,

@@ -24,7 +24,7 @@ from mechanics.arrays import Array, Bools
 from mechanics.dynamics.observers.energy import mass_norm
 from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.dynamics.simulation import Simulation
-from mechanics.limit.assembly import Assembly
+from mechanics.limit.assembly import RigidAssembly
 from mechanics.limit.limit_load import LimitLoad
 from mechanics.limit.live_loads import LiveLoad, levers
 from mechanics.model.model import build_model
@@ -143,7 +143,7 @@ class _Standing:
 
 
 def pushover(
-    on: Assembly,
+    on: RigidAssembly,
     live: LiveLoad,
     found: LimitLoad,
     reach: float | None = None,
@@ -195,7 +195,7 @@ class _Run:
     """
 
     def __init__(
-        self, on: Assembly, load: Array, led: int, way: Array, interval: float, speed: float
+        self, on: RigidAssembly, load: Array, led: int, way: Array, interval: float, speed: float
     ) -> None:
         self._load, self._free, self._led, self._way = load, on.free, led, way
         self._interval, self._speed = interval, speed
@@ -285,7 +285,7 @@ class _Run:
         return mass_norm(self._model, state.rotation, velocity, state.node_velocity)
 
 
-def _scene(on: Assembly, load: Array, step: float) -> Scene:
+def _scene(on: RigidAssembly, load: Array, step: float) -> Scene:
     """Return the scene of the steps: of its loads none changes with the clock but the one that λ multiplies."""
     scene = on.model.scene
     pushed, force, arm = levers(load)

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.sparse import csc_array, csr_array
 
 from mechanics.arrays import Array
-from mechanics.limit.assembly import Assembly
+from mechanics.limit.assembly import RigidAssembly
 from mechanics.limit.limit_load import Mechanism, mechanism
 from mechanics.limit.programme import Programme
 
@@ -49,7 +49,7 @@ class GeometricSafety:
         return float("inf") if self.share == 0.0 else 1.0 / self.share
 
 
-def geometric_safety(on: Assembly) -> GeometricSafety:
+def geometric_safety(on: RigidAssembly) -> GeometricSafety:
     """Return the geometric factor of safety of an assembly under its dead load.
 
     Raises
@@ -73,13 +73,13 @@ def geometric_safety(on: Assembly) -> GeometricSafety:
     return GeometricSafety(high, force, fallen)
 
 
-def _stands(on: Assembly, share: float) -> tuple[Array, Mechanism | None]:
+def _stands(on: RigidAssembly, share: float) -> tuple[Array, Mechanism | None]:
     """Return forces that balance the dead load with joints of a share of their widths; else how the stones fall."""
     found = Programme(_shrunk(on, share), None, "geometric safety").shortfall(on.strength)
     return found.force, mechanism(on, found.velocity) if found.multiplier > _LACKING else None
 
 
-def _shrunk(on: Assembly, share: float) -> Assembly:
+def _shrunk(on: RigidAssembly, share: float) -> RigidAssembly:
     """Return the assembly with the points of each joint drawn towards its centroid; points without a joint stay."""
     joints, contacts = on.joints, on.contacts
     shift = (share - 1.0) * (joints.point - joints.section.centroid[joints.joint])

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechanics.arrays import Array
-from mechanics.limit.assembly import Assembly
+from mechanics.limit.assembly import RigidAssembly
 from mechanics.limit.limit_load import Mechanism, mechanism
 from mechanics.limit.programme import Ending, Programme
 from moma.errors import SceneError
@@ -58,7 +58,7 @@ class Thrust:
     greatest: Extreme
 
 
-def thrust(on: Assembly, supports: Sequence[str], direction: tuple[float, float, float]) -> Thrust:
+def thrust(on: RigidAssembly, supports: Sequence[str], direction: tuple[float, float, float]) -> Thrust:
     """Return the range of the thrust that stones give to some fixed ones, along a direction of any length.
 
     Raises
@@ -92,7 +92,9 @@ def thrust(on: Assembly, supports: Sequence[str], direction: tuple[float, float,
     )
 
 
-def _extreme(on: Assembly, programme: Programme, cost: Array, moving: Array, sign: float = 1.0) -> Extreme:
+def _extreme(
+    on: RigidAssembly, programme: Programme, cost: Array, moving: Array, sign: float = 1.0
+) -> Extreme:
     """Minimise cost · f; the supports move by `moving` (nb, 6) then."""
     found = programme.solve(on.strength, cost=cost)
     # what rounding leaves of the weight is no thrust

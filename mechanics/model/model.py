@@ -30,7 +30,7 @@ from mechanics.stones.polyhedra import (
 )
 from moma.errors import GeometryError, SceneError
 
-__all__ = ["Model", "Outline", "build_model", "laws_between"]
+__all__ = ["BodyCorners", "Model", "build_model", "laws_between"]
 
 
 _PLANE = 1e-6  # largest height of a corner ahead of a face, over the size of its shape [-]; as for meshes
@@ -40,7 +40,7 @@ _SAME_VOLUME = (
 
 
 @dataclass(frozen=True)
-class Outline:
+class BodyCorners:
     """Corners of all bodies as the scene gives them, from their centres of mass.
 
     Attributes
@@ -86,7 +86,7 @@ class Model:
     mass: Array
     volume: Array
     surfaces: Surfaces
-    outline: Outline
+    outline: BodyCorners
     stones: tuple[Deformable | None, ...]
     elastic_stones: ElasticStones
     meshes: MeshReport
@@ -222,11 +222,11 @@ def _of_parts(block: Block) -> MassProperties:
     return whole
 
 
-def _outline(blocks: Sequence[Block], centres: Array) -> Outline:
+def _outline(blocks: Sequence[Block], centres: Array) -> BodyCorners:
     count = np.array([len(block.vertices) for block in blocks])
     first = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
     corner = np.concatenate([block.vertices for block in blocks]) - np.repeat(centres, count, axis=0)
-    return Outline(first, corner)
+    return BodyCorners(first, corner)
 
 
 def _surfaces(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechanics.arrays import Array, Bools, Ints
-from mechanics.planar._kernels.disks import Disks, Watch, find_disks, sort_contacts
+from mechanics.planar._kernels.disks import Disks, GapWatch, find_disks, sort_contacts
 from mechanics.planar._kernels.grid import build_grid
 from mechanics.planar._kernels.walls import EndNeighbours, end_neighbours, find_walls
 from mechanics.planar.model import PlanarModel, PlanarState
@@ -68,7 +68,7 @@ class PlanarDetector:
         the disks that are `asked` for (nd,) are found, if it is given.
         """
         model, nd = self._model, len(self._model.radius)
-        watch = Watch(model.scene.alert_distance, self._reach, model.scene.time.step)
+        watch = GapWatch(model.scene.alert_distance, self._reach, model.scene.time.step)
         centre, velocity = state.centre[:nd], state.velocity[:nd]
         # without walls relative to the mean, so that disks that travel together are no harder than disks at rest
         common = np.zeros(2) if len(model.scene.walls) else velocity[:, :2].mean(axis=0)

@@ -10,7 +10,7 @@ from scipy.sparse import csr_array, diags_array
 from mechanics.arrays import Array, Ints
 from mechanics.delassus._kernels.strips import cut
 from mechanics.planar._kernels.sweep import (
-    Layout,
+    SweepOrder,
     apply,
     diagonals,
     layout_of,
@@ -86,11 +86,11 @@ class PlanarDelassus:
         return result
 
     @cached_property
-    def layout(self) -> Layout:
+    def layout(self) -> SweepOrder:
         """Order of the sweeps; it depends on the contacts alone, never on the number of threads."""
         parts = min(max(len(self.bodies) // _PART, 1), _PARTS)
         order, start, rank = cut(self.bodies, self.inertia[:, 0] > 0, parts, True)
-        made: Layout = layout_of(order, start, rank, self.bodies, self.inertia)
+        made: SweepOrder = layout_of(order, start, rank, self.bodies, self.inertia)
         return made
 
     @cached_property
@@ -144,7 +144,7 @@ class PlanarGaussSeidel:
     threads : that may sweep at once, at most
     """
 
-    layout: Layout
+    layout: SweepOrder
     record: Array
     other: Array
     threads: int = 1

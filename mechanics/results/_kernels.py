@@ -5,12 +5,12 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-__all__ = ["JointCorners", "facing", "joint_motion", "keep_largest", "patch_pressures"]
+__all__ = ["StartCorners", "facing", "joint_motion", "keep_largest", "patch_pressures"]
 
 _ONE_PLANE = 0.999  # cosine of the angle between two contacts of one joint [-]
 
 
-class JointCorners(NamedTuple):
+class StartCorners(NamedTuple):
     """Corners of the joints of the start, on both stones.
 
     Attributes

@@ -18,14 +18,14 @@ from mechanics.arrays import Array, Bools, Ints
 from mechanics.results.interfaces import Faces
 from mechanics.stones.convex_polygons import following, moments, overlaps
 
-__all__ = ["Section", "eccentricity", "sections"]
+__all__ = ["JointPolygons", "eccentricity", "sections"]
 
 
 _THIN = 1e-6  # least overlap of the faces of a joint, over the area of the smaller one [-]
 
 
 @dataclass(frozen=True)
-class Section:
+class JointPolygons:
     """Polygons of joints.
 
     Attributes
@@ -59,7 +59,7 @@ class Section:
         return tuple(corner[a:b] for a, b in pairwise([0, *np.cumsum(self.count).tolist()]))
 
 
-def sections(faces: Faces, pair: Ints) -> Section:
+def sections(faces: Faces, pair: Ints) -> JointPolygons:
     """Return the common polygons of pairs of faces (nj, 2), in the plane between them."""
     a, b = pair.T
     n = faces.normal[b] - faces.normal[a]
@@ -80,7 +80,7 @@ def sections(faces: Faces, pair: Ints) -> Section:
     heights = [_heights(faces, one, origin, n, flat, corner) for one in (a, b)]
     levels = [_heights(faces, one, origin, n, flat, middle[:, None])[:, 0] for one in (a, b)]
     level = 0.5 * (levels[0] + levels[1])
-    return Section(
+    return JointPolygons(
         frame=np.concatenate([n[:, None], axes @ flat], axis=1),
         centroid=origin + np.einsum("jd,jdi->ji", middle, flat) + level[:, None] * n,
         area=np.where(area > _THIN * smaller, area, 0.0),
@@ -109,7 +109,9 @@ def _heights(faces: Faces, face: Ints, origin: Array, n: Array, flat: Array, pla
     return height
 
 
-def eccentricity(section: Section, force: Array, moment: Array, least: float) -> tuple[Array, Array, Array]:
+def eccentricity(
+    section: JointPolygons, force: Array, moment: Array, least: float
+) -> tuple[Array, Array, Array]:
     """Locate the resultants on the joints, relative to kern and edge.
 
     Parameters

@@ -9,10 +9,10 @@ from mechanics.arrays import Array, Bools, Ints
 from mechanics.contact.contacts import Contacts, material_points
 from mechanics.dynamics.step import Step
 from mechanics.model.model import Model
-from mechanics.results._kernels import JointCorners
+from mechanics.results._kernels import StartCorners
 from mechanics.results.contact_result import ContactResult, JointResult
 from mechanics.results.interfaces import Faces, find_interfaces, placed_faces
-from mechanics.results.joint_sections import Section, eccentricity, sections
+from mechanics.results.joint_sections import JointPolygons, eccentricity, sections
 from mechanics.results.patch_pressure import patch_pressure
 from mechanics.scene.state import State
 
@@ -54,7 +54,7 @@ class StartingJoints:
     state: State
     face: Ints
     bodies: Ints
-    section: Section
+    section: JointPolygons
     closed: Bools
 
 
@@ -76,7 +76,7 @@ def largest_faces(model: Model) -> Array:
     return _largest(owner, faces.shapes.face_area, len(model.mass))
 
 
-def joint_corners(start: StartingJoints) -> JointCorners:
+def joint_corners(start: StartingJoints) -> StartCorners:
     """Return the corners of the joints of the start in the axes of their stones, by which their motion is followed."""
     section, state = start.section, start.state
     meant = np.arange(section.corner.shape[1]) < section.count[:, None]
@@ -88,7 +88,7 @@ def joint_corners(start: StartingJoints) -> JointCorners:
         place: Array = np.einsum("kji,kj->ki", state.rotation[body], point - state.centre[body])
         return place
 
-    return JointCorners(
+    return StartCorners(
         bodies=start.bodies,
         first=np.concatenate([[0], np.cumsum(section.count)]).astype(np.int64),
         own=in_axes(a, first),
@@ -167,7 +167,12 @@ def joint_results(
 
 
 def _movement(
-    section: Section, start: StartingJoints, bodies: Ints, state: State, contacts: ContactResult, own: Ints
+    section: JointPolygons,
+    start: StartingJoints,
+    bodies: Ints,
+    state: State,
+    contacts: ContactResult,
+    own: Ints,
 ) -> tuple[Array, Array]:
     """Return opening and sliding (nj,) since the start, the largest of corners and contact points [m]."""
     joint, count = contacts.joint[own], len(bodies)
@@ -183,7 +188,7 @@ def _movement(
 
 
 def resultants(
-    section: Section, bodies: Ints, joint: Ints, candidate: Ints, point: Array, force: Array
+    section: JointPolygons, bodies: Ints, joint: Ints, candidate: Ints, point: Array, force: Array
 ) -> tuple[Array, Array]:
     """Return the resultants of joints: forces (nj, 3) on the first stones, and moments about the centroids.
 
@@ -219,8 +224,8 @@ def _shear_capacity(step: Step) -> Array:
 
 
 def _with_parted(
-    section: Section, start: StartingJoints, bodies: Ints, state: State, parted: Ints
-) -> Section:
+    section: JointPolygons, start: StartingJoints, bodies: Ints, state: State, parted: Ints
+) -> JointPolygons:
     """Return the sections, those of parted joints as at the start but carried along by the second stone."""
     if not len(parted):
         return section
@@ -244,7 +249,7 @@ def _with_parted(
     return _merged(section, moved, parted)
 
 
-def _sides(section: Section, rows: Ints) -> tuple[Array, Array]:
+def _sides(section: JointPolygons, rows: Ints) -> tuple[Array, Array]:
     """Return the corners (n, m, 3) of some sections on the faces of the first and of the second stones [m]."""
     n = section.frame[rows, 0][:, None]
     middle = section.centroid[rows, None] + np.einsum(
@@ -255,7 +260,7 @@ def _sides(section: Section, rows: Ints) -> tuple[Array, Array]:
     )
 
 
-def _moved_apart(section: Section, start: State, state: State, bodies: Ints) -> tuple[Array, Array]:
+def _moved_apart(section: JointPolygons, start: State, state: State, bodies: Ints) -> tuple[Array, Array]:
     """Return opening and sliding (nj,) of each joint since the start, the largest at its corners [m].
 
     The stones count as rigid; the opening is not less than zero.
@@ -283,7 +288,7 @@ def _moved(start: State, state: State, body: Ints, point: Array) -> Array:
     return moved
 
 
-def _merged(section: Section, other: Section, rows: Ints) -> Section:
+def _merged(section: JointPolygons, other: JointPolygons, rows: Ints) -> JointPolygons:
     """Return a section with some rows of another one."""
     most = max(section.corner.shape[1], other.corner.shape[1])
     wide, narrow = (
@@ -297,9 +302,9 @@ def _merged(section: Section, other: Section, rows: Ints) -> Section:
     )
     values: dict[str, Any] = {
         one.name: _put(getattr(wide, one.name), rows, getattr(narrow, one.name)[rows])
-        for one in fields(Section)
+        for one in fields(JointPolygons)
     }
-    return Section(**values)
+    return JointPolygons(**values)
 
 
 def _padded(values: Array, most: int) -> Array:
@@ -319,7 +324,7 @@ def _across(normal: Array, vector: Array) -> Array:
     return across
 
 
-def _at_most(section: Section, values: Array) -> Array:
+def _at_most(section: JointPolygons, values: Array) -> Array:
     """Return the largest of the values (nj, m) at the corners of each joint, not less than zero."""
     meant = np.arange(values.shape[1]) < section.count[:, None]
     largest: Array = np.where(meant, values, 0.0).max(axis=1, initial=0.0)

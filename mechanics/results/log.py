@@ -17,7 +17,7 @@ from mechanics.dynamics.stopping import LASTING, Verdict, balance_of
 from mechanics.model.model import Model
 from mechanics.results.peaks import PeakTracker
 from mechanics.results.postprocess import Observer
-from mechanics.results.result import Energies, Errors, Frame, History, Result
+from mechanics.results.result import Energies, Errors, Frame, Result, RunHistory
 from mechanics.results.stages import StageResult
 from mechanics.scene.scene import Fidelity
 from mechanics.scene.state import State
@@ -86,12 +86,12 @@ class Log(Carrier):
         )
         return balance
 
-    def history(self) -> History:
+    def history(self) -> RunHistory:
         """Return one array for each quantity."""
-        names = (field.name for field in fields(History))
+        names = (field.name for field in fields(RunHistory))
         columns = dict(zip(names, np.array(self._rows).T, strict=True))
         counts = {name: columns.pop(name).astype(np.int64) for name in ("iterations", "contacts")}
-        return History(**columns, **counts)
+        return RunHistory(**columns, **counts)
 
 
 def result_of(

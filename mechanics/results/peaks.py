@@ -10,7 +10,7 @@ from mechanics.contact.contacts import material_points
 from mechanics.dynamics.observers.equilibrium import displacement, seen_from_supports
 from mechanics.dynamics.step import Step
 from mechanics.model.model import Model
-from mechanics.results._kernels import JointCorners, joint_motion, keep_largest, patch_pressures
+from mechanics.results._kernels import StartCorners, joint_motion, keep_largest, patch_pressures
 from mechanics.results.contact_result import JointResult
 from mechanics.results.joints import SLIVER, StartingJoints, joint_corners, largest_faces
 from mechanics.results.patch_pressure import REACH
@@ -48,7 +48,7 @@ class PeakTracker(Carrier):
         self._sign = np.zeros(count)
         self._sign[model.fixed] = 1.0
         self._reaction: Rows[tuple[float, Array]] = Rows()
-        self._joints: JointCorners | None = None
+        self._joints: StartCorners | None = None
         self._series = Recorder(model, start) if model.scene.series else None
 
     def restore(self, carried: Carried) -> None:

@@ -17,13 +17,13 @@ __all__ = [
     "Energies",
     "Errors",
     "Frame",
-    "History",
     "JointSeries",
     "Largest",
     "Outcome",
     "Peak",
     "Peaks",
     "Result",
+    "RunHistory",
     "Series",
     "StaticStart",
 ]
@@ -118,7 +118,7 @@ class Frame:
 
 
 @dataclass(frozen=True)
-class History:
+class RunHistory:
     """One value per step.
 
     Attributes
@@ -301,7 +301,7 @@ class Result:
     reaction: float
     weight: float
     frames: tuple[Frame, ...]
-    history: History
+    history: RunHistory
     wall_time: dict[str, float]
     static: StaticStart | None = None
     solvers: Mapping[str, int] = field(default_factory=dict)

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from mechanics.arrays import Array
 from moma.errors import SceneError
 
-__all__ = ["LARGEST", "SMALLEST", "Rule", "check_corners", "finite", "refuse_unless", "sane"]
+__all__ = ["LARGEST", "SMALLEST", "Rule", "check_corners", "finite", "refuse_unless"]
 
 # numbers between these bounds, and their quotients, can still be squared and added
 LARGEST = 1e75
@@ -32,11 +32,6 @@ def refuse_unless(where: str, rules: Iterable[Rule]) -> None:
     for quantity, value, right, remedy in rules:
         if not right:
             raise SceneError(f"{quantity} = {value!r}", where=where, remedy=remedy)
-
-
-def sane(value: float) -> bool:
-    """Return True if a number is greater than zero and can be computed with."""
-    return bool(SMALLEST <= value <= LARGEST)
 
 
 def finite(values: ArrayLike, count: int) -> bool:

@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from moma.cli.console import reporting, say, short_lived
-from moma.cli.options import DEFAULT_DB, Db, Json, ListFormat, Verbose
+from moma.cli.options import DEFAULT_DB, At, Db, Json, ListFormat, Verbose
 from moma.errors import UsageError
 
 __all__ = ["query", "schema", "show"]
@@ -105,10 +105,7 @@ def show(
     history: Annotated[
         bool, typer.Option("--history", help="Show everything recorded about it, in order.")
     ] = False,
-    at: Annotated[
-        int | None,
-        typer.Option("--at", metavar="ENTRY", help="Show what was known when this entry was made."),
-    ] = None,
+    at: At = None,
     db: Db = DEFAULT_DB,
     json: Json = False,
     verbose: Verbose = False,

@@ -10,10 +10,10 @@ from moma.cli.console import reporting, say
 from moma.cli.options import Json, Out, Resume, SceneArgument, StoreDb
 from moma.cli.progress import Interruption, progress_bars
 
-__all__ = ["Experiment", "geology"]
+__all__ = ["ExperimentName", "geology"]
 
 
-class Experiment(StrEnum):
+class ExperimentName(StrEnum):
     """Experiments with disks."""
 
     DEPOSIT = "deposit"
@@ -26,7 +26,9 @@ class Experiment(StrEnum):
 
 @reporting
 def geology(
-    experiment: Annotated[Experiment, typer.Argument(help="Experiment; the scene has a table of its name.")],
+    experiment: Annotated[
+        ExperimentName, typer.Argument(help="Experiment; the scene has a table of its name.")
+    ],
     scene: SceneArgument,
     out: Out = None,
     samples: Annotated[

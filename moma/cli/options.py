@@ -9,6 +9,7 @@ import typer
 __all__ = [
     "DEFAULT_DB",
     "AcceptUnsound",
+    "At",
     "Codes",
     "Db",
     "Format",
@@ -107,6 +108,9 @@ Codes = Annotated[
 ]
 Kind = Annotated[
     str | None, typer.Option("--kind", metavar="KIND", help="Kind of stones without one; default: ashlar.")
+]
+At = Annotated[
+    int | None, typer.Option("--at", metavar="ENTRY", help="Show what was known when this entry was made.")
 ]
 Sigma = Annotated[
     float | None,

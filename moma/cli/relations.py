@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from moma.cli.console import reporting, say
-from moma.cli.options import DEFAULT_DB, Db, Json, Verbose
+from moma.cli.options import DEFAULT_DB, At, Db, Json, Verbose
 
 if TYPE_CHECKING:
     from pipelines.ingest.relate import RelationReport
@@ -69,10 +69,7 @@ def load_path(
     up: Annotated[
         bool, typer.Option("--up", help="Show the stones that it carries, not those that carry it.")
     ] = False,
-    at: Annotated[
-        int | None,
-        typer.Option("--at", metavar="ENTRY", help="Show what was known when this entry was made."),
-    ] = None,
+    at: At = None,
     db: Db = DEFAULT_DB,
     json: Json = False,
     verbose: Verbose = False,

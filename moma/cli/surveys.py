@@ -29,34 +29,38 @@ from moma.cli.options import (
 from moma.cli.progress import progress_bars
 from moma.errors import UsageError
 
-__all__ = ["SampleName", "ingest", "sample", "survey_report"]
+__all__ = ["Moved", "ingest", "sample", "survey_report"]
 
 
-class SampleName(StrEnum):
-    """Names in survey.synthetic.samples, which is not loaded for a help text."""
+class Moved(StrEnum):
+    """Causes of movement of samples."""
 
-    ARCH = "arch"
-    CORE_SUNK = "core-sunk"
-    CORNER = "corner"
-    FACINGS = "facings"
-    PUSHED = "pushed"
-    RIBVAULT = "ribvault"
-    SETTLED = "settled"
-    SETTLED_PHASES = "settled-phases"
-    SETTLED_SMALL = "settled-small"
-    SHAKEN = "shaken"
-    TOWER = "tower"
-    TOWER_SETTLED = "tower-settled"
-    TOWER_SETTLED_SMALL = "tower-settled-small"
-    TOWER_SMALL = "tower-small"
-    VAULT = "vault"
-    WALL = "wall"
-    WINDOW = "window"
+    SETTLEMENT = "settlement"
+    THRUST = "thrust"
+    EARTHQUAKE = "earthquake"
 
 
 @reporting
 def sample(
-    kind: Annotated[SampleName, typer.Argument(help="Building that is made up.")],
+    kind: Annotated[
+        str, typer.Argument(help="arch, corner, facings, ribvault, tower, vault, wall or window.")
+    ],
+    moved: Annotated[
+        Moved | None,
+        typer.Option(
+            help="Move its stones by a simulation: the wall by any cause, facings and tower by settlement."
+        ),
+    ] = None,
+    small: Annotated[
+        bool, typer.Option("--small", help="Smaller: the tower, and the wall with --moved settlement.")
+    ] = False,
+    phases: Annotated[
+        bool,
+        typer.Option("--phases", help="Upper courses were laid later: the wall with --moved settlement."),
+    ] = False,
+    courses: Annotated[
+        int | None, typer.Option(help="Courses of the tower; default: 40, or 12 with --small.")
+    ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="DIR", help="Folder for the files; default: KIND.")
     ] = None,
@@ -64,10 +68,12 @@ def sample(
 ) -> None:
     """Write a synthetic survey with its truth and a scene that runs, to start from."""
     from moma.cli.text.formats import as_json
-    from pipelines.scene.sample import write_sample
+    from pipelines.samples.write import write_sample
 
     with progress_bars() as listener:
-        written = write_sample(kind.value, out or Path(kind.value), listener)
+        written = write_sample(
+            kind, out or Path(kind), listener, moved=moved, small=small, phases=phases, courses=courses
+        )
     lines = [
         f"{written.title}: a synthetic survey of {written.stones} stones",
         *(f"  {path}" for path in written.files),

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from mechanics.arrays import Array
 from mechanics.dynamics.outcome import Outcome
-from mechanics.limit.assembly import Assembly
+from mechanics.limit.assembly import RigidAssembly
 from mechanics.limit.confirm import Confirmation, confirm, likeness
 from mechanics.limit.kinematic import Kinematics, kinematics
 from mechanics.limit.limit_load import Flow, LimitLoad, Mechanism, limit_load
@@ -16,7 +17,6 @@ from mechanics.limit.pushover import Pushover, pushover
 from mechanics.limit.thickness import geometric_safety
 from mechanics.limit.thrust import thrust
 from moma.errors import SolverError
-from pipelines.arrays import Array
 from pipelines.assess.codes.check import check_code
 from pipelines.assess.questions import LoadQuestion, Question, Thickness, ThrustQuestion
 from pipelines.scene.site import Site
@@ -65,7 +65,9 @@ class Answer:
     curve: Pushover | None = None
 
 
-def answer(on: Assembly, question: Question, confirming: Confirm, leading: Lead, site: Site | None) -> Answer:
+def answer(
+    on: RigidAssembly, question: Question, confirming: Confirm, leading: Lead, site: Site | None
+) -> Answer:
     """Answer a question about an assembly.
 
     Parameters
@@ -87,7 +89,7 @@ def answer(on: Assembly, question: Question, confirming: Confirm, leading: Lead,
             return _thickness(on, question)
 
 
-def refuse_unanswerable(on: Assembly, question: Question) -> None:
+def refuse_unanswerable(on: RigidAssembly, question: Question) -> None:
     """Refuse a question about stones that the scene does not have, or that it may not load.
 
     Raises
@@ -103,18 +105,18 @@ def refuse_unanswerable(on: Assembly, question: Question) -> None:
             pass
 
 
-def confirmer(on: Assembly, runs: int, **listeners: Any) -> Confirm:
+def confirmer(on: RigidAssembly, runs: int, **listeners: Any) -> Confirm:
     """Return what confirms a candidate by runs of the stones, all rigid."""
     return lambda live, candidate: confirm(on, live, candidate, runs, **listeners)
 
 
-def leader(on: Assembly, **listeners: Any) -> Lead:
+def leader(on: RigidAssembly, **listeners: Any) -> Lead:
     """Return what leads a mechanism to collapse by runs of the stones, all rigid."""
     return lambda live, found, reach: pushover(on, live, found, reach, **listeners)
 
 
 def _load(
-    on: Assembly, question: LoadQuestion, confirming: Confirm, leading: Lead, site: Site | None
+    on: RigidAssembly, question: LoadQuestion, confirming: Confirm, leading: Lead, site: Site | None
 ) -> Answer:
     live = question.live
     bound = limit_load(on, live)
@@ -183,7 +185,7 @@ def _capacity(curve: Pushover) -> dict[str, Any]:
     }
 
 
-def _candidate(on: Assembly, live: LiveLoad, bound: LimitLoad) -> LimitLoad | None:
+def _candidate(on: RigidAssembly, live: LiveLoad, bound: LimitLoad) -> LimitLoad | None:
     """Return the candidate of Coulomb's friction; None where there is none to be found."""
     if not np.isfinite(bound.multiplier):
         return None
@@ -194,7 +196,7 @@ def _candidate(on: Assembly, live: LiveLoad, bound: LimitLoad) -> LimitLoad | No
     return candidate if np.isfinite(candidate.multiplier) else None
 
 
-def _confirmed(on: Assembly, found: Confirmation, candidate: LimitLoad) -> dict[str, Any]:
+def _confirmed(on: RigidAssembly, found: Confirmation, candidate: LimitLoad) -> dict[str, Any]:
     fallen = found.collapse
     alike = None if fallen is None else likeness(on, candidate.mechanism, fallen.displacement)
     return {
@@ -218,7 +220,7 @@ def _confirmed(on: Assembly, found: Confirmation, candidate: LimitLoad) -> dict[
 
 
 def _kinematics(
-    on: Assembly, live: Acceleration, found: LimitLoad, code: tuple[str, Site] | None
+    on: RigidAssembly, live: Acceleration, found: LimitLoad, code: tuple[str, Site] | None
 ) -> tuple[dict[str, Any] | None, dict[str, Any] | None]:
     """Return the equivalent oscillator of a mechanism, and its check by a code."""
     try:
@@ -240,7 +242,7 @@ def _kinematics(
     return told, None if code is None else _checked(on, oscillator, *code)
 
 
-def _checked(on: Assembly, oscillator: Kinematics, code: str, site: Site) -> dict[str, Any]:
+def _checked(on: RigidAssembly, oscillator: Kinematics, code: str, site: Site) -> dict[str, Any]:
     found = check_code(code, site, oscillator, float(np.linalg.norm(on.model.gravity(0.0))))
     return {
         "code": found.code,
@@ -251,7 +253,7 @@ def _checked(on: Assembly, oscillator: Kinematics, code: str, site: Site) -> dic
     }
 
 
-def _thrust(on: Assembly, question: ThrustQuestion) -> Answer:
+def _thrust(on: RigidAssembly, question: ThrustQuestion) -> Answer:
     found = thrust(on, question.supports, question.direction)
     x, y, z = found.direction
     told: dict[str, Any] = {
@@ -268,7 +270,7 @@ def _thrust(on: Assembly, question: ThrustQuestion) -> Answer:
     return Answer(told, found.least.mechanism, found.least.force)
 
 
-def _thickness(on: Assembly, question: Thickness) -> Answer:
+def _thickness(on: RigidAssembly, question: Thickness) -> Answer:
     found = geometric_safety(on)
     falls = np.isnan(found.share)
     told: dict[str, Any] = {
@@ -287,7 +289,7 @@ def _thickness(on: Assembly, question: Thickness) -> Answer:
     return Answer(told, found.mechanism, found.force)
 
 
-def _moving(on: Assembly, mechanism: Mechanism) -> dict[str, Any]:
+def _moving(on: RigidAssembly, mechanism: Mechanism) -> dict[str, Any]:
     """Return the stones that move, the fastest first, and how many joints open and slide."""
     moves = np.flatnonzero(mechanism.speed > _MOVES)
     return {
@@ -304,7 +306,7 @@ def _moving(on: Assembly, mechanism: Mechanism) -> dict[str, Any]:
     }
 
 
-def _joints(on: Assembly, chosen: Any) -> int:
+def _joints(on: RigidAssembly, chosen: Any) -> int:
     return len(np.unique(np.sort(on.contacts.bodies[chosen], axis=1), axis=0))
 
 

@@ -12,7 +12,7 @@ from archmodel.database.session import open_database
 from archmodel.store.run_record import MovingStone, RunRecord
 from archmodel.tables.entries import latest_entry
 from mechanics.dynamics.progress import Listener, Progress, silent
-from mechanics.limit.assembly import Assembly, assembly
+from mechanics.limit.assembly import RigidAssembly, assembly
 from mechanics.limit.joints import Resultants, resultants
 from mechanics.results.forecast.plan import loose_blocks
 from mechanics.scene.scene import Fidelity
@@ -20,13 +20,12 @@ from moma.errors import MissingLibraryError, UsageError
 from pipelines.assess.answers import FALLS, Answer, answer, confirmer, leader, refuse_unanswerable
 from pipelines.assess.codes.check import CODES
 from pipelines.assess.questions import LoadQuestion, Question, parse_question, scene_questions
-from pipelines.draw.capacity_plot import draw_capacity
 from pipelines.draw.mechanism import draw_mechanisms
+from pipelines.draw.plots import draw_capacity
 from pipelines.reports.assessment import write_assessment
 from pipelines.results.folder import check_replaceable, replacing
 from pipelines.results.summary import as_json
-from pipelines.run.assemble import Assembly as Assembled
-from pipelines.run.assemble import assemble_stones
+from pipelines.run.assemble import Assembly, assemble_stones
 from pipelines.run.record import store_record, versions
 from pipelines.run.soundness import problems_of, refuse_unsound
 from pipelines.scene.file import SceneFile, read_scene
@@ -189,7 +188,7 @@ def _refuse_code(code: str, scene: SceneFile) -> None:
 
 
 def _summary(
-    assembled: Assembled, on: Assembly, answers: Sequence[Answer], unchecked: Sequence[str]
+    assembled: Assembly, on: RigidAssembly, answers: Sequence[Answer], unchecked: Sequence[str]
 ) -> dict[str, Any]:
     """Return all answers; `unchecked` are the loads that the code of the option --code does not take."""
     soft = sum(block.fidelity is Fidelity.DEFORMABLE for block in assembled.scene.blocks)
@@ -231,7 +230,7 @@ def _headline(loads: Sequence[dict[str, Any]]) -> str:
     return str(loads[0]["headline"]) if loads[0]["kind"] != "load" else "nothing limits its loads"
 
 
-def _carried(on: Assembly, found: Answer) -> Resultants | None:
+def _carried(on: RigidAssembly, found: Answer) -> Resultants | None:
     """Return the resultants of all joints at a limit; None where nothing balances."""
     if not found.force.any():
         return None
@@ -239,7 +238,7 @@ def _carried(on: Assembly, found: Answer) -> Resultants | None:
 
 
 def _write_forces(
-    folder: Path, on: Assembly, assembled: Assembled, carried: Sequence[Resultants | None]
+    folder: Path, on: RigidAssembly, assembled: Assembly, carried: Sequence[Resultants | None]
 ) -> list[str]:
     """Write the resultants of all joints at each limit, with places in the frame of the site; return file names."""
     codes, names = [block.code for block in on.model.scene.blocks], []
@@ -281,7 +280,7 @@ def _write_curves(folder: Path, answers: Sequence[Answer], titles: Sequence[str]
 
 
 def _record(
-    scene: SceneFile, on: Assembly, answers: Sequence[Answer], summary: dict[str, Any], as_of: int | None
+    scene: SceneFile, on: RigidAssembly, answers: Sequence[Answer], summary: dict[str, Any], as_of: int | None
 ) -> RunRecord:
     """Return the record of an assessment: its summary, and the stones that move."""
     return RunRecord(
@@ -296,7 +295,7 @@ def _record(
     )
 
 
-def _moving(on: Assembly, found: Answer) -> tuple[MovingStone, ...]:
+def _moving(on: RigidAssembly, found: Answer) -> tuple[MovingStone, ...]:
     speed = {
         block.code: float(one)
         for block, one in zip(on.model.scene.blocks, found.mechanism.speed, strict=True)

@@ -39,7 +39,7 @@ from survey.quality.movement import (
 )
 from survey.quality.precision import StoneQuality, appraise
 
-__all__ = ["INDEX", "Comparison", "compare", "facades_of", "measured_stones"]
+__all__ = ["INDEX", "SurveyComparison", "compare", "facades_of", "measured_stones"]
 
 INDEX = "comparison.json"
 """Index of the results of a comparison."""
@@ -49,7 +49,7 @@ _WORST = 5.0  # standard deviations at which the colours of a map of misfits end
 
 
 @dataclass(frozen=True)
-class Comparison:
+class SurveyComparison:
     """A scene beside its survey.
 
     Attributes
@@ -71,7 +71,7 @@ def compare(
     progress: Listener = silent,
     accept_unsound: bool = False,
     battered: bool = False,
-) -> Comparison:
+) -> SurveyComparison:
     """Run a scene and compare the movement of its stones with their measured departure from level and plumb.
 
     Parameters
@@ -120,7 +120,7 @@ def compare(
         results = tuple(_with_values(one, values.get(one.code, {})) for one in stone_results(result))
         run = store_record(database, folder, run_record(result, results, scene, assembly, kept, as_of))
     progress(Progress("write", 1, 1))
-    return Comparison(folder, summary, run)
+    return SurveyComparison(folder, summary, run)
 
 
 def measured_stones(models: Sequence[StoneModel]) -> tuple[tuple[StoneQuality, ...], tuple[Facade, ...]]:

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mechanics.arrays import Array
 from mechanics.results.result import BodyResult
-from pipelines.arrays import Array
 
 __all__ = ["Motions", "stone_motions"]
 

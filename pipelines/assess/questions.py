@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from mechanics.arrays import Array
 from mechanics.limit.live_loads import Acceleration, LiveLoad, PointForce, SpreadForce
 from moma.errors import SceneError, UsageError
-from pipelines.arrays import Array
 from pipelines.assess.codes.check import CODES
-from pipelines.scene.array_tables import Entry
+from pipelines.scene.array_tables import ArrayTable
 from pipelines.scene.file import SceneFile
 from pipelines.scene.selection import Groups
 
@@ -142,7 +142,7 @@ def scene_questions(scene: SceneFile, groups: Groups, origin: Array) -> tuple[Qu
     return tuple(found)
 
 
-def _refuse_code(scene: SceneFile, entry: Entry, question: LoadQuestion) -> None:
+def _refuse_code(scene: SceneFile, entry: ArrayTable, question: LoadQuestion) -> None:
     """Refuse a check by a code that cannot be made."""
     what, remedy = "", ""
     if question.code not in CODES:
@@ -155,7 +155,7 @@ def _refuse_code(scene: SceneFile, entry: Entry, question: LoadQuestion) -> None
         scene.document.fail(what, *entry.path, "code", remedy=remedy)
 
 
-def _codes(entry: Entry, groups: Groups) -> frozenset[str]:
+def _codes(entry: ArrayTable, groups: Groups) -> frozenset[str]:
     """Return the codes of the only group of stones that a table names; none without one."""
     named = groups[entry.path]
     return named[0] if named else frozenset()
@@ -174,21 +174,21 @@ def _downhill(axis: Vector) -> Vector:
     return x + 0.0, y + 0.0, z + 0.0
 
 
-def _acceleration(entry: Entry, codes: frozenset[str], origin: Array) -> Question:
+def _acceleration(entry: ArrayTable, codes: frozenset[str], origin: Array) -> Question:
     direction = entry.values["direction"]
     return LoadQuestion(_named(entry, direction), Acceleration(direction, codes))
 
 
-def _tilt(entry: Entry, codes: frozenset[str], origin: Array) -> Question:
+def _tilt(entry: ArrayTable, codes: frozenset[str], origin: Array) -> Question:
     axis = entry.values["axis"]
     return LoadQuestion(_named(entry, axis), Acceleration(_downhill(axis)))
 
 
-def _weight(entry: Entry, codes: frozenset[str], origin: Array) -> Question:
+def _weight(entry: ArrayTable, codes: frozenset[str], origin: Array) -> Question:
     return LoadQuestion(f"weight of {_listed(codes)}", Acceleration(_DOWN, codes))
 
 
-def _force(entry: Entry, codes: frozenset[str], origin: Array) -> Question:
+def _force(entry: ArrayTable, codes: frozenset[str], origin: Array) -> Question:
     values, point = entry.values, entry.values["point"]
     if point is None:
         return LoadQuestion(f"force on {_listed(codes)}", SpreadForce(codes, values["force"]))
@@ -199,14 +199,14 @@ def _force(entry: Entry, codes: frozenset[str], origin: Array) -> Question:
     return LoadQuestion(f"force on {stone}", PointForce(stone, values["force"], (x, y, z)))
 
 
-def _thrust(entry: Entry, codes: frozenset[str], origin: Array) -> Question:
+def _thrust(entry: ArrayTable, codes: frozenset[str], origin: Array) -> Question:
     name = (
         f"{entry.type} of {_listed(codes)}" if entry.type == "settlement" else f"thrust on {_listed(codes)}"
     )
     return ThrustQuestion(name, tuple(sorted(codes)), entry.values["direction"], entry.type == "settlement")
 
 
-def _thickness(entry: Entry, codes: frozenset[str], origin: Array) -> Question:
+def _thickness(entry: ArrayTable, codes: frozenset[str], origin: Array) -> Question:
     return Thickness()
 
 
@@ -215,11 +215,11 @@ def _listed(codes: frozenset[str]) -> str:
     return ", ".join(few) if len(few) <= 3 else f"{few[0]}, {few[1]} and {len(few) - 2} more"
 
 
-def _named(entry: Entry, vector: Any) -> str:
+def _named(entry: ArrayTable, vector: Any) -> str:
     return f"{entry.type} ({', '.join(f'{one:g}' for one in vector)})"
 
 
-_TYPES: Mapping[str, Callable[[Entry, frozenset[str], Array], Question]] = {
+_TYPES: Mapping[str, Callable[[ArrayTable, frozenset[str], Array], Question]] = {
     "horizontal": _acceleration,
     "tilt": _tilt,
     "weight": _weight,

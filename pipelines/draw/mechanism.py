@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.limit.assembly import Assembly
+from mechanics.arrays import Array
+from mechanics.limit.assembly import RigidAssembly
 from mechanics.limit.joints import Resultants
 from mechanics.limit.limit_load import Mechanism
 from mechanics.scene.scene import Block
-from pipelines.arrays import Array
 from pipelines.draw.offscreen.mechanism import MechanismSurface
 from pipelines.draw.pictures import draw_apart
 from survey.geometry.solids import Solid
@@ -24,7 +24,7 @@ _WAY = 0.06  # of the fastest corner over the extent of the scene [-]
 def draw_mechanisms(
     folder: Path,
     blocks: Sequence[Block],
-    on: Assembly,
+    on: RigidAssembly,
     limits: Sequence[tuple[str, Mechanism, Resultants | None]],
     towards: Array,
 ) -> list[str]:

@@ -201,7 +201,7 @@ def draw_curves(
     Parameters
     ----------
     path : of the picture
-    rows : columns by cell (`Observation.rows`)
+    rows : columns by cell (`ObservedRun.rows`)
     phases : instants at which a phase ends [s]
     quality : a line about overlaps and residuals
     """

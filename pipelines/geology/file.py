@@ -18,10 +18,10 @@ from pipelines.geology.experiments.fold import Fold
 from pipelines.geology.experiments.repose import Repose
 from pipelines.geology.experiments.wedge import Wedge
 from pipelines.geology.observe import WHOLE
-from pipelines.geology.settings import Layer, Material, Recording, Sample, Stepping, Sweeping
+from pipelines.geology.settings import DiskContact, GeologyOutput, Layer, SampleSettings, Stepping, Sweeping
 from pipelines.scene.keys import build, keys_of
 from pipelines.toml.lines import key_lines, parse_toml, read_text
-from pipelines.toml.schema import REQUIRED, Document, Key, Kind, check_table, nearest
+from pipelines.toml.schema import REQUIRED, Key, TomlDocument, ValueKind, check_table, nearest
 
 __all__ = ["EXPERIMENTS", "GeologyScene", "parse_geology", "read_geology"]
 
@@ -36,17 +36,17 @@ EXPERIMENTS: Mapping[str, type[Any]] = {
 """Experiments by the name of their table, which is that of their command."""
 
 _TABLES: Mapping[str, type[Any]] = {
-    "sample": Sample,
-    "contact": Material,
+    "sample": SampleSettings,
+    "contact": DiskContact,
     "time": Stepping,
     "solver": Sweeping,
-    "output": Recording,
+    "output": GeologyOutput,
 }
-_TITLE = (Key("name", Kind.TEXT, "Title; by default the name of the file.", "", None),)
+_TITLE = (Key("name", ValueKind.TEXT, "Title; by default the name of the file.", "", None),)
 _CELL = (
-    Key("name", Kind.TEXT, "Name of the cell.", "", REQUIRED),
-    Key("centre", Kind.NUMBERS, "x and y at the start.", "m", REQUIRED),
-    Key("radius", Kind.NUMBER, "Radius at the start.", "m", REQUIRED, above=0),
+    Key("name", ValueKind.TEXT, "Name of the cell.", "", REQUIRED),
+    Key("centre", ValueKind.NUMBERS, "x and y at the start.", "m", REQUIRED),
+    Key("radius", ValueKind.NUMBER, "Radius at the start.", "m", REQUIRED, above=0),
 )
 _CORNERS = 73  # of the polygon that stands for a cell
 _START = "see docs/howto/geology.md for a scene to start from"
@@ -66,15 +66,15 @@ class GeologyScene:
     layers : of other materials than `[sample]` and `[contact]` say, from below; () if there are none
     """
 
-    document: Document
+    document: TomlDocument
     text: str
     name: str
     kind: str
-    sample: Sample
-    contact: Material
+    sample: SampleSettings
+    contact: DiskContact
     time: Stepping
     solver: Sweeping
-    output: Recording
+    output: GeologyOutput
     experiment: Experiment
     cells: tuple[Cell, ...]
     layers: tuple[Layer, ...] = ()
@@ -104,7 +104,7 @@ def read_geology(path: str | Path, kind: str) -> GeologyScene:
 def parse_geology(text: str, path: str, kind: str) -> GeologyScene:
     """Check the text of the scene file of an experiment; `path` is for the messages."""
     given = parse_toml(text, path, SceneError, _START)
-    document = Document(path, key_lines(text))
+    document = TomlDocument(path, key_lines(text))
     known = ["scene", *_TABLES, kind, "cells", "layers"]
     for name in given:
         if name not in known:
@@ -167,20 +167,20 @@ def _check_motion(scene: GeologyScene) -> None:
             )
 
 
-def _table(document: Document, given: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+def _table(document: TomlDocument, given: Mapping[str, Any], name: str) -> Mapping[str, Any]:
     content = given.get(name, {})
     if not isinstance(content, dict):
         document.fail(f"{name!r} is not a table", name, remedy=f"write [{name}] on a line of its own")
     return content
 
 
-def _built(document: Document, given: Mapping[str, Any], name: str, owner: type[Any]) -> Any:
+def _built(document: TomlDocument, given: Mapping[str, Any], name: str, owner: type[Any]) -> Any:
     values = check_table(document, (name,), _table(document, given, name), keys_of(owner))
     with document.at(name):
         return build(owner, values)
 
 
-def _entries(document: Document, given: Any, name: str) -> list[dict[str, Any]]:
+def _entries(document: TomlDocument, given: Any, name: str) -> list[dict[str, Any]]:
     if not isinstance(given, list) or not all(isinstance(one, dict) for one in given):
         document.fail(
             f"{name!r} is not an array of tables", name, remedy=f"write [[{name}]] before each of them"
@@ -188,7 +188,7 @@ def _entries(document: Document, given: Any, name: str) -> list[dict[str, Any]]:
     return given
 
 
-def _layers(document: Document, given: Any) -> tuple[Layer, ...]:
+def _layers(document: TomlDocument, given: Any) -> tuple[Layer, ...]:
     layers: list[Layer] = []
     for number, content in enumerate(_entries(document, given, "layers")):
         place = ("layers", str(number))
@@ -204,7 +204,7 @@ def _layers(document: Document, given: Any) -> tuple[Layer, ...]:
     return tuple(layers)
 
 
-def _cells(document: Document, given: Any) -> tuple[Cell, ...]:
+def _cells(document: TomlDocument, given: Any) -> tuple[Cell, ...]:
     cells: dict[str, Cell] = {}
     for number, content in enumerate(_entries(document, given, "cells")):
         place = ("cells", str(number))

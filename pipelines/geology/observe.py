@@ -16,7 +16,7 @@ from mechanics.planar.measures.stress import mean_stress, moments
 from mechanics.planar.measures.tessellation import Tessellation, tessellation
 from mechanics.planar.result import PlanarInstant
 
-__all__ = ["CELL_COLUMNS", "WHOLE", "Fields", "Instants", "Observation", "read_rows"]
+__all__ = ["CELL_COLUMNS", "WHOLE", "Fields", "Instants", "ObservedRun", "read_rows"]
 
 WHOLE = "whole sample"
 """Name of the rows of all disks."""
@@ -54,7 +54,7 @@ class Fields:
     step, time : number of the step, [s]
     position, velocity : (nb, 3) of disks, then walls
     pressure : (nd,) mean pressure in the share of each disk, 0 where it has none [Pa]
-    volume, shear : (nd,) local deformation since the start (`Deformation`) [-]
+    volume, shear : (nd,) local deformation since the start (`DiskDeformation`) [-]
     bodies : (n, 2) of contacts that transmit a force: candidate and antagonist, numbered as the rows of `position`
     point, normal : (n, 2) of these [m], and from antagonist to candidate [-]
     force : (n, 2) mean force over the step on the candidate, in x and y [N]
@@ -93,7 +93,7 @@ class Fields:
         return np.stack([self.position[first, :2], far], axis=1)
 
 
-class Observation:
+class ObservedRun:
     """Rows and instants of a run, written as it goes on; a resumed run writes those after its checkpoint again.
 
     Parameters

@@ -9,7 +9,7 @@ from mechanics.arrays import Array
 from mechanics.planar.measures.cells import Cell
 from pipelines.geology.observe import CELL_COLUMNS, Fields
 from pipelines.geology.sample import PreparedSample
-from pipelines.results.vtu import LINE, POLYGON, VERTEX, Grid, cells_of, write_pvd, write_vtu
+from pipelines.results.vtu import LINE, POLYGON, VERTEX, UnstructuredGrid, cells_of, write_pvd, write_vtu
 
 __all__ = ["write_series"]
 
@@ -69,7 +69,7 @@ def _space(vectors: Array) -> Array:
     return np.column_stack([vectors, np.zeros(len(vectors))])
 
 
-def _disks(fields: Fields, sample: PreparedSample) -> Grid:
+def _disks(fields: Fields, sample: PreparedSample) -> UnstructuredGrid:
     """Return a point for each disk."""
     count = len(sample.radius)
     data = {
@@ -83,10 +83,10 @@ def _disks(fields: Fields, sample: PreparedSample) -> Grid:
         "shear": fields.shear,
     }
     cells = cells_of(VERTEX, np.arange(count)[:, None].tolist())
-    return Grid(_space(fields.position[:count, :2]), cells, data, {}, _UNITS)
+    return UnstructuredGrid(_space(fields.position[:count, :2]), cells, data, {}, _UNITS)
 
 
-def _contacts(fields: Fields) -> Grid:
+def _contacts(fields: Fields) -> UnstructuredGrid:
     """Return a line for each contact, with its values at both ends, as tubes of force chains need them."""
     count = len(fields.bodies)
     data = {
@@ -97,10 +97,14 @@ def _contacts(fields: Fields) -> Grid:
     }
     lines = cells_of(LINE, np.arange(2 * count).reshape(-1, 2).tolist())
     ends = {name: np.repeat(values, 2, axis=0) for name, values in data.items()}
-    return Grid(_space(fields.branches.reshape(-1, 2)), lines, ends, {"bodies": fields.bodies}, _UNITS)
+    return UnstructuredGrid(
+        _space(fields.branches.reshape(-1, 2)), lines, ends, {"bodies": fields.bodies}, _UNITS
+    )
 
 
-def _cells(fields: Fields, cells: Sequence[Cell], rows: Mapping[str, Mapping[str, Array]]) -> Grid:
+def _cells(
+    fields: Fields, cells: Sequence[Cell], rows: Mapping[str, Mapping[str, Array]]
+) -> UnstructuredGrid:
     """Return an ellipse for each cell, its circle at the start stretched by λx and λy, with its row."""
     turn = np.linspace(0.0, 2.0 * np.pi, _CORNERS, endpoint=False)
     points, data = [], {column: np.zeros(len(cells)) for column in CELL_COLUMNS}
@@ -113,4 +117,4 @@ def _cells(fields: Fields, cells: Sequence[Cell], rows: Mapping[str, Mapping[str
         middle = np.array([data["x"][number], data["y"][number]])
         points.append(middle + axes * np.column_stack([np.cos(turn), np.sin(turn)]))
     corners = np.arange(len(cells) * _CORNERS).reshape(len(cells), _CORNERS).tolist()
-    return Grid(_space(np.vstack(points)), cells_of(POLYGON, corners), {}, data, _UNITS)
+    return UnstructuredGrid(_space(np.vstack(points)), cells_of(POLYGON, corners), {}, data, _UNITS)

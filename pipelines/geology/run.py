@@ -1,8 +1,8 @@
 """Run of a geological scene: sample, motion, rows and fields, results, record."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from itertools import combinations_with_replacement
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from archmodel.database.session import open_database
+from archmodel.store.run_record import RunRecord
 from mechanics.arrays import Array, Ints
 from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.planar.result import PlanarResult
@@ -24,14 +25,13 @@ from moma.errors import SceneError
 from pipelines.geology.experiments.experiment import Setup
 from pipelines.geology.experiments.membrane import Membrane
 from pipelines.geology.file import GeologyScene, read_geology
-from pipelines.geology.observe import Observation
-from pipelines.geology.record import geology_record
+from pipelines.geology.observe import ObservedRun
 from pipelines.geology.results import write_results
 from pipelines.geology.sample import PreparedSample, prepare
 from pipelines.geology.settings import Layer
 from pipelines.results.folder import UNFINISHED, check_replaceable
 from pipelines.run.planar import run_planar
-from pipelines.run.record import store_record
+from pipelines.run.record import error_measures, store_record, versions
 from pipelines.run.unfinished import UnfinishedRun
 
 __all__ = ["GeologyReport", "planar_scene", "run_geology"]
@@ -204,7 +204,7 @@ def run_geology(
                 planar, folder, resume, scene.output.checkpoint, progress, stop, observers, write
             )
         if database is not None:
-            number = store_record(database, folder, geology_record(scene, result, summary, rows))
+            number = store_record(database, folder, _geology_record(scene, result, summary, rows))
     return GeologyReport(folder, summary, tuple(summary["warnings"]), number)
 
 
@@ -217,9 +217,42 @@ def _followed_layers(scene: GeologyScene, sample: PreparedSample) -> Ints | None
 
 def _observation(
     scene: GeologyScene, sample: PreparedSample, planar: PlanarScene, place: Path
-) -> Observation:
+) -> ObservedRun:
     layer = _followed_layers(scene, sample)
     try:
-        return Observation(place, scene.cells, sample.centre, sample.radius, planar.thickness, layer)
+        return ObservedRun(place, scene.cells, sample.centre, sample.radius, planar.thickness, layer)
     except SceneError as error:
         scene.document.fail(f"{error.where}: {error.what}", "cells", remedy=error.remedy)
+
+
+def _geology_record(
+    scene: GeologyScene,
+    result: PlanarResult,
+    summary: Mapping[str, Any],
+    rows: Mapping[str, Mapping[str, Array]],
+) -> RunRecord:
+    """Return the record of a run: settings, quality, measures, and the rows of its cells.
+
+    Parameters
+    ----------
+    summary : the contents of summary.json
+    rows : columns by cell
+    """
+    return RunRecord(
+        scene=scene.name,
+        scene_text=scene.text,
+        outcome=str(result.outcome),
+        summary=summary,
+        versions=versions(),
+        results=(),
+        settings={
+            "kind": scene.kind,
+            **{name: asdict(table) for name, table in scene.tables.items()},
+            "layers": [asdict(layer) for layer in scene.layers],
+        },
+        steps=result.steps,
+        simulated=result.time,
+        wall=summary["time"]["wall"],
+        errors=error_measures(result.errors),
+        cells=rows,
+    )

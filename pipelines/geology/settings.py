@@ -6,11 +6,11 @@ from typing import Annotated
 from mechanics.stones.settings import Setting
 from moma.errors import SceneError
 
-__all__ = ["Layer", "Material", "Recording", "Sample", "Stepping", "Sweeping"]
+__all__ = ["DiskContact", "GeologyOutput", "Layer", "SampleSettings", "Stepping", "Sweeping"]
 
 
 @dataclass(frozen=True)
-class Sample:
+class SampleSettings:
     """`[sample]`: the disks, and how they are prepared."""
 
     smallest: Annotated[float, Setting("Smallest radius.", "m", above=0)]
@@ -44,7 +44,7 @@ class Sample:
 
 
 @dataclass(frozen=True)
-class Material:
+class DiskContact:
     """`[contact]`: the laws of the contacts."""
 
     friction: Annotated[float, Setting("Between disks.", "-", at_least=0, at_most=2)] = 0.4
@@ -113,7 +113,7 @@ class Sweeping:
 
 
 @dataclass(frozen=True)
-class Recording:
+class GeologyOutput:
     """`[output]`: what is kept, and how often."""
 
     every: Annotated[int, Setting("Steps between two rows of the measures.", at_least=1)] = 20

@@ -11,7 +11,7 @@ import operator
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from archmodel.query.grammar import All, AnyOf, Call, Comparison, IsNull, Like, Membership, Node, Not, parse
+from archmodel.query.grammar import All, AnyOf, Call, Comparison, IsIn, IsNull, Like, Node, Not, parse
 from archmodel.query.tokens import Token, complaint
 from archmodel.tables.entities import kind_named
 from moma.errors import UsageError
@@ -160,7 +160,7 @@ def _check(node: Node) -> None:
         case Comparison(attribute, _, value):
             _check_attribute(attribute)
             _check_value(attribute, value)
-        case Membership(attribute, values):
+        case IsIn(attribute, values):
             _check_attribute(attribute)
             for value in values:
                 _check_value(attribute, value)
@@ -199,7 +199,7 @@ def _holds(node: Node, values: Mapping[str, Value]) -> bool | None:
             return bool(_matches(str(values[attribute.text]), pattern.text))
         case Comparison(attribute, sign, value):
             return _compared(sign, values[attribute.text], _value(attribute, value, values))
-        case Membership(attribute, members):
+        case IsIn(attribute, members):
             found = [
                 _compared("=", values[attribute.text], _value(attribute, one, values)) for one in members
             ]

@@ -9,9 +9,9 @@ from sqlalchemy.orm import Session
 
 from archmodel.relations.arches import arch_parts, find_arches
 from archmodel.relations.classify import (
-    Contacts,
     FoundRelations,
     RelationSettings,
+    StoneContacts,
     StonesOf,
     relations_between,
 )
@@ -29,8 +29,8 @@ from archmodel.store.stone_arrays import (
 from archmodel.tables.entities import Entity
 from archmodel.tables.hierarchy import kinds_below
 from archmodel.tables.structures import structure_kind_named, structure_kinds
-from pipelines.arrays import Array, Ints
-from survey.geometry.adjacency import Polyhedra, PolyhedraBuilder, find_touching
+from mechanics.arrays import Array, Ints
+from survey.geometry.adjacency import PolyhedraBuilder, SolidArrays, find_touching
 
 __all__ = ["KnownSolids", "RelationReport", "relate"]
 
@@ -54,7 +54,7 @@ class KnownSolids:
     def __len__(self) -> int:
         return len(self.ids)
 
-    def build(self) -> Polyhedra:
+    def build(self) -> SolidArrays:
         """Assemble all solids in the order of `ids`."""
         return self._builder.build()
 
@@ -190,7 +190,7 @@ def _relations(
     rank[order] = np.arange(len(ids))
     ids = ids[order]
     held = wanted[touching.pairs].all(axis=1)
-    contacts = Contacts(
+    contacts = StoneContacts(
         rank[touching.pairs[held]],
         touching.area[held],
         touching.gap[held],

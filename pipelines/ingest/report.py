@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.arrays import Array
+from mechanics.arrays import Array
 from pipelines.ingest.records import frame_record
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.convexity import is_convex

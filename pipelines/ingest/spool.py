@@ -15,8 +15,8 @@ from typing import Any, Self
 import numpy as np
 
 from archmodel.store.stone_record import StoneRecord
+from mechanics.arrays import Array
 from moma.errors import SurveyError
-from pipelines.arrays import Array
 
 __all__ = ["Spool"]
 

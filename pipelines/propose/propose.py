@@ -1,8 +1,9 @@
 """Proposals of unseen stones: missing ones and the core of walls, from the database and optionally recorded in it."""
 
 from collections.abc import Collection, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
+import numpy as np
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
@@ -13,18 +14,34 @@ from archmodel.store.stone_record import StoneRecord
 from archmodel.store.stones import load_stones
 from archmodel.tables.entities import Entity, Infill, Joint, RibSegment, Support, WebStone
 from archmodel.tables.hierarchy import names_below
+from mechanics.arrays import Array
 from moma.errors import UsageError
 from pipelines.ingest.records import stone_record, surveyed_block
 from pipelines.ingest.relate import relate
-from pipelines.propose.records import core_record, is_known, record_volume
+from survey.extrusion.imported_solids import block_of_solid
+from survey.faces.faces import Provenance
+from survey.geometry.solids import Solid, volume_of
+from survey.geometry.watertight import triangulate
 from survey.joints.close import close_joints
+from survey.records.survey import SolidRecord
 from survey.unseen.core.facings import facing_stone
-from survey.unseen.core.propose import propose_infill
+from survey.unseen.core.propose import InfillProposal, propose_infill
 from survey.unseen.core.settings import InfillSettings
 from survey.unseen.missing.propose import propose_missing
 from survey.unseen.missing.settings import MissingSettings
 
-__all__ = ["Facings", "Proposal", "ProposalReport", "Recording", "propose_core", "propose_stones"]
+__all__ = [
+    "Facings",
+    "Proposal",
+    "ProposalReport",
+    "Recording",
+    "core_record",
+    "propose_core",
+    "propose_stones",
+]
+
+_FAR = 1000.0  # distance of the viewpoint in front of the wall [m], large enough to see it squarely
+_SAME = 1e-3  # largest difference of equal proposals, in position [m] and relative volume [-]
 
 _SIZE = ("code", "kind", "course", "zone", "length", "height", "depth")
 # kinds that are no stones, and those of vaults, which stand in no facing; their subkinds, too
@@ -166,7 +183,7 @@ def propose_core(
         named = None if facings is None else _named(session, where, facings)
         found = propose_infill(stones, settings, facings=named, taken=_codes(session))
         known = _measured(session, find(session, "infill"))
-        new = [one for one in found if not is_known(one, known)]
+        new = [one for one in found if not _is_known(one, known)]
         pairs: list[tuple[StoneRecord, tuple[str, ...]]] = [(core_record(one), ()) for one in new]
         given = {**asdict(settings), "facings": None if facings is None else list(facings)}
         return _report("infill", session, len(records), pairs, given, recording)
@@ -235,9 +252,53 @@ def _report(
 def _proposal(record: StoneRecord, notes: tuple[str, ...]) -> Proposal:
     return Proposal(
         **{name: getattr(record, name) for name in _SIZE},
-        volume=record_volume(record),
+        volume=_record_volume(record),
         outline=tuple((x, y, z) for x, y, z in record.outline.tolist()),
         evidence=record.provenance_text,
         depth_source=record.depth_source,
         notes=notes,
     )
+
+
+def core_record(proposal: InfillProposal) -> StoneRecord:
+    """Make the record of a part of the core: kind infill, its face being the side towards the first facing."""
+    solid = proposal.solid
+    record = SolidRecord(proposal.code, "infill", proposal.course, solid.vertices, solid.faces)
+    viewpoint = solid.vertices.mean(axis=0) + _FAR * proposal.normal
+    block = block_of_solid(record, viewpoint, "the proposal")
+    face = replace(block.face, provenance=Provenance("hypothesis", proposal.evidence))
+    depth = replace(block.depth, source=f"hypothesis: {proposal.evidence}")
+    return stone_record(replace(block, face=face, depth=depth))
+
+
+def _record_volume(record: StoneRecord) -> float:
+    """Compute the volume of a recorded stone [m³]."""
+    return volume_of(Solid(record.code, record.solid_vertices, record.solid_faces))
+
+
+def _is_known(proposal: InfillProposal, known: Sequence[StoneRecord]) -> bool:
+    """Return True if a part of the core is already in the database, or another part shares its middle."""
+    middle = proposal.solid.vertices.mean(axis=0)
+    low, high = proposal.solid.vertices.min(axis=0), proposal.solid.vertices.max(axis=0)
+    for record in known:
+        corners = record.solid_vertices
+        if (corners.min(axis=0) >= high).any() or (corners.max(axis=0) <= low).any():
+            continue
+        other = Solid(record.code, corners, record.solid_faces)
+        near = float(np.abs(corners.mean(axis=0) - middle).max()) < _SAME
+        if near and abs(volume_of(other) / proposal.volume - 1.0) < _SAME:
+            return True
+        if _contains(other, middle) or _contains(proposal.solid, corners.mean(axis=0)):
+            return True
+    return False
+
+
+def _contains(solid: Solid, point: Array) -> bool:
+    """Test a point for being in a closed solid, by the solid angle of its faces: 4π inside, 0 outside."""
+    if (point < solid.vertices.min(axis=0)).any() or (point > solid.vertices.max(axis=0)).any():
+        return False
+    a, b, c = np.moveaxis(solid.vertices[triangulate(solid)] - point, 1, 0)
+    la, lb, lc = (np.linalg.norm(one, axis=1) for one in (a, b, c))
+    volume = (a * np.cross(b, c)).sum(axis=1)
+    scale = la * lb * lc + (a * b).sum(axis=1) * lc + (b * c).sum(axis=1) * la + (c * a).sum(axis=1) * lb
+    return abs(2.0 * float(np.arctan2(volume, scale).sum())) > 2.0 * np.pi

@@ -10,7 +10,7 @@ from archmodel.assertions.correct import replace_measurement
 from archmodel.assertions.statements import PLAIN, Remark, say_depth
 from archmodel.store.bulk import batches
 from archmodel.store.find_by_code import subjects
-from archmodel.store.revisions import NOTHING, Outcome
+from archmodel.store.revisions import NOTHING, RowCounts
 from archmodel.store.stones import load_stones
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Entry
@@ -27,7 +27,7 @@ def record_depth(
     value: float,
     sigma: float | None = None,
     remark: Remark = PLAIN,
-) -> Outcome:
+) -> RowCounts:
     """Record the depth of stones, and extrude their measured faces to it.
 
     Parameters
@@ -52,7 +52,7 @@ def record_depth(
 
 def _extrude(
     session: Session, entry: Entry, codes: Sequence[str], value: float, sigma: float | None, evidence: str
-) -> Outcome:
+) -> RowCounts:
     """Extrude solids to a depth; those of this depth, on whatever evidence, stay as they are."""
     outcome = NOTHING
     entities = session.scalars(select(Entity).where(Entity.code.in_(codes)).order_by(Entity.id)).all()

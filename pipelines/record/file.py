@@ -18,7 +18,7 @@ from moma.errors import (
 )
 from pipelines.record.keys import ARRAYS, ATTRIBUTE, PROPERTY, RECORD
 from pipelines.toml.lines import Path, key_lines, parse_toml, read_text
-from pipelines.toml.schema import Document, Key, check_table, nearest
+from pipelines.toml.schema import Key, TomlDocument, check_table, nearest
 
 __all__ = ["RecordFile", "Table", "parse_record", "read_record"]
 
@@ -54,7 +54,7 @@ class RecordFile:
     tables : all others, in the order of recording
     """
 
-    document: Document
+    document: TomlDocument
     sha256: str
     record: Mapping[str, Any]
     tables: tuple[Table, ...]
@@ -85,7 +85,7 @@ def read_record(path: str | FilePath) -> RecordFile:
 def parse_record(text: str, path: str) -> RecordFile:
     """Check the text of a file of knowledge; `path` appears in messages."""
     given = parse_toml(text, path, UsageError, "see docs/knowledge.md for a file to start from")
-    document = Document(path, key_lines(text))
+    document = TomlDocument(path, key_lines(text))
     try:
         record, tables = _checked(document, given)
     except SceneError as error:
@@ -93,7 +93,7 @@ def parse_record(text: str, path: str) -> RecordFile:
     return RecordFile(document, hashlib.sha256(text.encode()).hexdigest(), record, tables)
 
 
-def _checked(document: Document, given: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[Table, ...]]:
+def _checked(document: TomlDocument, given: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[Table, ...]]:
     known = ["record", *ARRAYS]
     for name, content in given.items():
         if name not in known:
@@ -108,7 +108,9 @@ def _checked(document: Document, given: Mapping[str, Any]) -> tuple[dict[str, An
     return check_table(document, ("record",), record, RECORD), tuple(tables)
 
 
-def _array(document: Document, given: Mapping[str, Any], name: str, keys: tuple[Key, ...]) -> Iterator[Table]:
+def _array(
+    document: TomlDocument, given: Mapping[str, Any], name: str, keys: tuple[Key, ...]
+) -> Iterator[Table]:
     """Check all tables [[name]]."""
     content = given.get(name, [])
     if not isinstance(content, list) or not all(isinstance(one, dict) for one in content):
@@ -122,7 +124,9 @@ def _array(document: Document, given: Mapping[str, Any], name: str, keys: tuple[
         yield Table(path, values)
 
 
-def _inner(document: Document, path: Path, given: Any, keys: tuple[Key, ...]) -> dict[str, dict[str, object]]:
+def _inner(
+    document: TomlDocument, path: Path, given: Any, keys: tuple[Key, ...]
+) -> dict[str, dict[str, object]]:
     """Check the tables in a table; a plain value stands for its first key."""
     return {
         name: check_table(

@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 
 from archmodel.assertions.validation import checked_text
 from archmodel.database.session import open_database
-from archmodel.store.revisions import NOTHING, Outcome
+from archmodel.store.revisions import NOTHING, RowCounts
 from archmodel.store.stone_rows import storable
 from archmodel.tables.entries import Entry, new_entry
 from archmodel.tables.knowledge import Correction
@@ -36,12 +36,12 @@ class FileRecorded:
     """
 
     path: str
-    tables: dict[str, Outcome]
+    tables: dict[str, RowCounts]
     entries: tuple[int, ...] = ()
     recorded_before: int | None = None
 
     @property
-    def outcome(self) -> Outcome:
+    def outcome(self) -> RowCounts:
         """Outcome of all its tables."""
         return sum(self.tables.values(), NOTHING)
 
@@ -102,7 +102,7 @@ def _record_file(session: Session, file: RecordFile, author: str | None) -> File
     if (before := session.scalar(same.limit(1))) is not None:
         return FileRecorded(path, {}, recorded_before=before)
     entries, changes = _Entries(session, file, author), dict[int, int]()
-    tables: dict[str, Outcome] = {}
+    tables: dict[str, RowCounts] = {}
     for table in file.tables:
         entry = entries.of(table)
         outcome = record_table(session, entry, file, table)

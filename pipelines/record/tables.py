@@ -1,6 +1,7 @@
 """Recording of each table of a file of knowledge."""
 
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,9 +22,10 @@ from archmodel.assertions.statements import (
     say_reference,
 )
 from archmodel.assertions.withdraw import withdraw_members, withdraw_relations, withdraw_statements
-from archmodel.store.find_by_code import held_or_none
+from archmodel.query.api import find
+from archmodel.store.find_by_code import Subjects, entity_numbers, held_or_none, subjects
 from archmodel.store.hypotheses import withdraw_hypotheses
-from archmodel.store.revisions import NOTHING, Outcome, withdraw
+from archmodel.store.revisions import NOTHING, RowCounts, withdraw
 from archmodel.tables.entries import Entry
 from archmodel.tables.knowledge import (
     Document,
@@ -42,9 +44,10 @@ from archmodel.tables.structures import Structure, structure_kind_named
 from moma.errors import UsageError
 from pipelines.record.depth import record_depth
 from pipelines.record.file import RecordFile, Table
-from pipelines.record.stones import named_stones, named_subjects
 
 __all__ = ["record_table"]
+
+_CODE = re.compile(r"[\w.:/+-]+")  # a text without blanks or comparison is a code
 
 _STATEMENTS: Mapping[str, type[Statement]] = {
     "made_of": MadeOf,
@@ -84,7 +87,7 @@ class _Work:
         return Remark(self["text"], self["document"], self["locator"], seen)
 
 
-def record_table(session: Session, entry: Entry, file: RecordFile, table: Table) -> Outcome:
+def record_table(session: Session, entry: Entry, file: RecordFile, table: Table) -> RowCounts:
     """Record one table within an entry.
 
     Raises
@@ -96,7 +99,7 @@ def record_table(session: Session, entry: Entry, file: RecordFile, table: Table)
         return _RECORDERS[table.name](_Work(session, entry, file, table))
 
 
-def _kind(work: _Work) -> Outcome:
+def _kind(work: _Work) -> RowCounts:
     own = {name: (one["unit"], one["definition"]) for name, one in work["attributes"].items()}
     return register_kind(
         work.session,
@@ -109,19 +112,19 @@ def _kind(work: _Work) -> Outcome:
     )
 
 
-def _material(work: _Work) -> Outcome:
+def _material(work: _Work) -> RowCounts:
     properties = {name: PropertyValue(**one) for name, one in work["properties"].items()}
     with work.file.at(*work.table.path, "properties"):
         return declare_material(work.session, work.entry, work["name"], work["description"], properties)
 
 
-def _phase(work: _Work) -> Outcome:
+def _phase(work: _Work) -> RowCounts:
     return declare_phase(
         work.session, work.entry, work["name"], work["begins"], work["ends"], work["description"]
     )
 
 
-def _document(work: _Work) -> Outcome:
+def _document(work: _Work) -> RowCounts:
     return declare_document(
         work.session,
         work.entry,
@@ -134,7 +137,7 @@ def _document(work: _Work) -> Outcome:
     )
 
 
-def _structure(work: _Work) -> Outcome:
+def _structure(work: _Work) -> RowCounts:
     with work.file.at(*work.table.path, "kind"):
         # also of the kinds that the database, or this file, registers
         structure_kind_named(work["kind"])
@@ -148,24 +151,24 @@ def _structure(work: _Work) -> Outcome:
         number=work["number"],
         side=work["side"],
     )
-    stones = list(named_stones(work.session, work.file, work.table).values())
+    stones = list(_named_stones(work.session, work.file, work.table).values())
     return outcome + declare_members(work.session, work.entry, work["code"], stones, ordered=work["ordered"])
 
 
-def _relation(work: _Work) -> Outcome:
-    of, to = (list(named_stones(work.session, work.file, work.table, key).values()) for key in ("of", "to"))
+def _relation(work: _Work) -> RowCounts:
+    of, to = (list(_named_stones(work.session, work.file, work.table, key).values()) for key in ("of", "to"))
     return declare_relation(work.session, work.entry, work["kind"], of, to)
 
 
-def _depth(work: _Work) -> Outcome:
-    codes = list(named_stones(work.session, work.file, work.table))
+def _depth(work: _Work) -> RowCounts:
+    codes = list(_named_stones(work.session, work.file, work.table))
     return record_depth(work.session, work.entry, codes, work["value"], work["sigma"], work.remark())
 
 
-def _statement(work: _Work) -> Outcome:
+def _statement(work: _Work) -> RowCounts:
     """Record a statement about stones and structures."""
     session, entry, remark = work.session, work.entry, work.remark()
-    about = named_subjects(session, work.file, work.table)
+    about = _named_subjects(session, work.file, work.table)
     match work.table.name:
         case "made_of":
             return say_made_of(session, entry, about, work["material"], remark)
@@ -182,38 +185,38 @@ def _statement(work: _Work) -> Outcome:
             return say_note(session, entry, about, work["key"], remark)
 
 
-def _correction(work: _Work) -> Outcome:
+def _correction(work: _Work) -> RowCounts:
     values = {**work["set"], **dict.fromkeys(work["unset"])}
     if not values:
         raise UsageError("empty correction", remedy='give set = { kind = "quoin" }, for example')
     outcome = NOTHING
-    for code in named_stones(work.session, work.file, work.table):
+    for code in _named_stones(work.session, work.file, work.table):
         with work.file.at(*work.table.path, "set"):
             outcome += correct(work.session, work.entry, code, values)
     return outcome
 
 
-def _withdraw(work: _Work) -> Outcome:
+def _withdraw(work: _Work) -> RowCounts:
     what = work["what"]
     if what in _NAMED:
         return _withdraw_named(work, what)
     if what == "relation":
-        of, to = (named_stones(work.session, work.file, work.table, key) for key in ("stones", "to"))
+        of, to = (_named_stones(work.session, work.file, work.table, key) for key in ("stones", "to"))
         if work["kind"] is None:
             raise UsageError("the relation has no kind", remedy='give kind = "beside", for example')
         return withdraw_relations(
             work.session, work.entry, work["kind"], list(of.values()), list(to.values())
         )
     if what == "hypothesis":
-        named = named_stones(work.session, work.file, work.table)
+        named = _named_stones(work.session, work.file, work.table)
         return withdraw_hypotheses(work.session, work.entry, named.values())
-    about = named_subjects(work.session, work.file, work.table)
+    about = _named_subjects(work.session, work.file, work.table)
     if what == "member":
         return withdraw_members(work.session, work.entry, about)
     return withdraw_statements(work.session, work.entry, _STATEMENTS[what], about, work["match"])
 
 
-def _withdraw_named(work: _Work, what: str) -> Outcome:
+def _withdraw_named(work: _Work, what: str) -> RowCounts:
     """Withdraw a material, one of its properties, a phase, a document or a structure, permanently."""
     cls, name = _NAMED[what], work["name"]
     if name is None:
@@ -234,10 +237,10 @@ def _withdraw_named(work: _Work, what: str) -> Outcome:
         raise UsageError(
             f"there has never been a {cls.__name__.lower()} {name[:40]!r}", remedy="check its name"
         )
-    return Outcome(unchanged=1)
+    return RowCounts(unchanged=1)
 
 
-_RECORDERS: Mapping[str, Callable[[_Work], Outcome]] = {
+_RECORDERS: Mapping[str, Callable[[_Work], RowCounts]] = {
     "kind": _kind,
     "withdraw": _withdraw,
     "correction": _correction,
@@ -249,3 +252,46 @@ _RECORDERS: Mapping[str, Callable[[_Work], Outcome]] = {
     "depth": _depth,
     **dict.fromkeys(_STATEMENTS, _statement),
 }
+
+
+def _named_stones(session: Session, file: RecordFile, table: Table, key: str = "stones") -> dict[str, int]:
+    """Find the numbers, by code, of the stones that a key names, each once, in the order of the list.
+
+    Raises
+    ------
+    UsageError
+        at the key, if an expression cannot be parsed or names no stone
+    """
+    found: dict[str, int] = {}
+    items: Sequence[str] = table.values[key]
+    codes = [item for item in items if _CODE.fullmatch(item)]
+    with file.at(*table.path, key):
+        known = entity_numbers(session, codes)
+        for item in items:
+            if item in known:
+                found[item] = known[item]
+                continue
+            matching = find(session, "entity", [item])
+            if not matching:
+                raise UsageError(f"no stone satisfies {item!r}", remedy="try it with: moma query")
+            found.update((one.code, one.id) for one in matching)
+    return found
+
+
+def _named_subjects(session: Session, file: RecordFile, table: Table) -> Subjects:
+    """Find the stones and structures of a table, at least one.
+
+    Raises
+    ------
+    UsageError
+        at the key, if it names none
+    """
+    stones = _named_stones(session, file, table)
+    with file.at(*table.path, "structures"):
+        structures = subjects(session, structures=table.values["structures"])
+    about = Subjects(tuple(stones.values()), structures.structures)
+    with file.at(*table.path):
+        if not len(about):
+            remedy = "give stones = […] or structures = […]"
+            raise UsageError(f"[[{table.name}]] has no subject", remedy=remedy)
+    return about

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from archmodel.store.run_record import StoneResult
+from mechanics.arrays import Array
 from mechanics.results.result import Result
-from pipelines.arrays import Array
-from pipelines.draw.history_plot import history_svg
+from pipelines.draw.plots import history_svg
 from pipelines.reports.html import (
     kilonewtons,
     kilopascals,

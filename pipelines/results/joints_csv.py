@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from mechanics.arrays import Array
 from mechanics.results.contact_result import JointResult
 from mechanics.results.result import Result
-from pipelines.arrays import Array
 
 __all__ = ["JOINT_COLUMNS", "normal_and_shear", "write_joints"]
 

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from mechanics.arrays import Array, Bools
 from mechanics.results.result import Largest, Peaks, Result
 from mechanics.scene.scene import Fidelity
-from pipelines.arrays import Array, Bools
 
 __all__ = ["PEAKS", "peak_records"]
 

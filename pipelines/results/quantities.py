@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from mechanics.arrays import Array
 from mechanics.results.result import BodyResult, Result
 from mechanics.scene.scene import Fidelity
-from pipelines.arrays import Array
 from pipelines.results.stone_values import stress_statistics
 
 __all__ = ["QUANTITIES", "Quantities", "StoneQuantities", "differences", "quantities", "quantities_from"]

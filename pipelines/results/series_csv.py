@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from mechanics.arrays import Array
 from mechanics.results.result import Result
-from pipelines.arrays import Array
 
 __all__ = ["SERIES_COLUMNS", "write_series"]
 

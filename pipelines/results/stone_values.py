@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from archmodel.store.run_record import StoneResult
+from mechanics.arrays import Array, Ints
 from mechanics.results.contact_result import JointResult
 from mechanics.results.result import BodyResult, Peaks, Result
 from mechanics.results.stress_values import volume_quantile
-from pipelines.arrays import Array, Ints
 
 __all__ = ["StressStatistics", "stone_results", "stress_statistics"]
 

@@ -5,20 +5,20 @@ from pathlib import Path
 
 import numpy as np
 
+from mechanics.arrays import Array, Ints
 from mechanics.results.contact_result import ContactResult, JointResult
 from mechanics.results.result import BodyResult, Frame, Result
 from mechanics.results.stress_values import utilisation
 from mechanics.scene.laws.status import STATUSES
 from mechanics.scene.scene import Block, Fidelity
 from mechanics.stones.elasticity.tensors import principal, von_mises
-from pipelines.arrays import Array, Ints
 from pipelines.results.vtu import (
     CELL_TYPES,
     POLYGON,
     POLYHEDRON,
     VERTEX,
     Cells,
-    Grid,
+    UnstructuredGrid,
     cells_of,
     write_pvd,
     write_vtu,
@@ -119,7 +119,7 @@ def _stream(body: BodyResult, offset: int) -> Iterator[int]:
         yield from (node + offset for node in face)
 
 
-def body_grid(result: Result, frame: Frame, cells: Cells) -> Grid:
+def body_grid(result: Result, frame: Frame, cells: Cells) -> UnstructuredGrid:
     """Make the grid of all stones in one frame, in single precision, which halves the files.
 
     Point data: displacement [m], velocity [m/s]; stress (xx, yy, zz, xy, yz, zx), von_mises, principal (σ1 ≥ σ2 ≥ σ3),
@@ -130,7 +130,7 @@ def body_grid(result: Result, frame: Frame, cells: Cells) -> Grid:
     stone = np.repeat(np.arange(len(bodies)), [max(len(body.cells), 1) for body in bodies])
     fidelity = np.array([FIDELITIES.index(body.fidelity) for body in bodies])
     error = np.array([np.nan if one is None else one for one in frame.stress_errors])
-    return Grid(
+    return UnstructuredGrid(
         points=np.concatenate(frame.positions),
         cells=cells,
         point_data={
@@ -182,10 +182,10 @@ def _stresses(blocks: Sequence[Block], frame: Frame) -> dict[str, Array]:
     }
 
 
-def contact_grid(contacts: ContactResult) -> Grid:
+def contact_grid(contacts: ContactResult) -> UnstructuredGrid:
     """Make the grid of contact points: force [N], pressure [Pa], lengths [m], area [m²], status, bodies, joint."""
     count = len(contacts.gap)
-    return Grid(
+    return UnstructuredGrid(
         points=contacts.point,
         cells=cells_of(VERTEX, [[index] for index in range(count)]),
         point_data={
@@ -204,7 +204,7 @@ def status_numbers(contacts: ContactResult) -> Ints:
     return np.array([STATUSES.index(str(one)) for one in contacts.status], dtype=np.int64)
 
 
-def joint_grid(joints: JointResult) -> Grid:
+def joint_grid(joints: JointResult) -> UnstructuredGrid:
     """Make the grid of the joints' polygons, with the values of `JointResult`."""
     # where faces no longer overlap, the polygon shrinks to a point
     polygons = [
@@ -213,7 +213,7 @@ def joint_grid(joints: JointResult) -> Grid:
     ]
     sizes = np.array([len(one) for one in polygons], dtype=np.int64)
     ends = np.cumsum(sizes)
-    return Grid(
+    return UnstructuredGrid(
         points=np.concatenate([*polygons, np.zeros((0, 3))]),
         cells=cells_of(POLYGON, [range(end - size, end) for size, end in zip(sizes, ends, strict=True)]),
         point_data={},

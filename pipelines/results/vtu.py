@@ -11,8 +11,8 @@ from xml.sax.saxutils import escape, quoteattr
 import numpy as np
 from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Ints
 from mechanics.stones.meshing.elements import Element
-from pipelines.arrays import Array, Ints
 
 __all__ = [
     "CELL_TYPES",
@@ -21,7 +21,7 @@ __all__ = [
     "POLYHEDRON",
     "VERTEX",
     "Cells",
-    "Grid",
+    "UnstructuredGrid",
     "cells_of",
     "write_pvd",
     "write_vtu",
@@ -63,7 +63,7 @@ class Cells:
 
 
 @dataclass(frozen=True)
-class Grid:
+class UnstructuredGrid:
     """Unstructured grid.
 
     Attributes
@@ -90,7 +90,7 @@ def cells_of(kind: int, rows: Sequence[Sequence[int]]) -> Cells:
     )
 
 
-def write_vtu(path: Path, grid: Grid) -> None:
+def write_vtu(path: Path, grid: UnstructuredGrid) -> None:
     """Write one unstructured grid, binary, readable by any ParaView since 4."""
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',

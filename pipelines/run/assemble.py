@@ -6,14 +6,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from sqlalchemy.orm import Session
 
+from archmodel.store.stone_record import StoneRecord
+from mechanics.arrays import Array
 from mechanics.scene.scene import Block, Fidelity, LawRule, Part, Scene
 from mechanics.scene.stages import Stage
-from pipelines.arrays import Array
 from pipelines.draw.catalogue import PICTURES
 from pipelines.ingest.records import surveyed_block
 from pipelines.run.fidelity import Modelled, Wishes, modelled, neighbours
-from pipelines.run.local_frame import entry_about, local_origin, stone_about
 from pipelines.run.remarks import remarks, remarks_on_laws, remarks_on_stones
+from pipelines.scene.array_tables import ArrayTable
 from pipelines.scene.file import SceneFile
 from pipelines.scene.keys import typed_values
 from pipelines.scene.laws import law_rules
@@ -28,7 +29,14 @@ from survey.joints.close import close_joints
 from survey.joints.report import ClosingReport
 from survey.simplify.simplify import BlockyStone
 
-__all__ = ["Assembly", "assemble", "assemble_stones", "wishes_of"]
+__all__ = ["Assembly", "assemble", "assemble_stones", "local_origin", "stone_about", "wishes_of"]
+
+_FAR = 10_000.0
+"""Largest coordinates that are exact enough without a shift [m]."""
+_GRID = 1_000.0
+"""Origins are multiples of this, so that the shift is easy to read [m]."""
+_PLACES = ("point", "pivot")
+"""Values of a scene's entries that are points in the frame of the site."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +129,7 @@ def _scene(scene: SceneFile, blocks: Sequence[Block], groups: Groups, origin: Ar
     """Return the scene of the blocks, with the laws and loads of the file; loads of a building in stages are theirs."""
     document, by_code = scene.document, {block.code: block for block in blocks}
     materials = {block.code: block.material.name for block in blocks}
-    loads = [entry_about(entry, origin) for entry in scene.loads if not scene.stages]
+    loads = [_entry_about(entry, origin) for entry in scene.loads if not scene.stages]
     velocity = thrown(document, scene.throws, groups, by_code)
     return Scene(
         name=scene.name,
@@ -157,7 +165,7 @@ def _stage(scene: SceneFile, whole: Scene, groups: Groups, origin: Array, stones
         if block.code in stones.standing
     )
     own = {path: tuple(codes & stones.standing for codes in of) for path, of in groups.items()}
-    acting = [entry_about(one, origin) for one in scene.loads if stones.name in one.values[ACTS_IN.name]]
+    acting = [_entry_about(one, origin) for one in scene.loads if stones.name in one.values[ACTS_IN.name]]
     rules = (
         LawRule(one.first & stones.standing, one.second & stones.standing, one.law)
         for one in whole.contact.rules
@@ -213,3 +221,43 @@ def _facing(stones: Sequence[SurveyedBlock]) -> Array:
         total += stone.face.measures.area * stone.face.fit.normal
     length = float(np.linalg.norm(total))
     return total / length if length > 0.0 else stones[0].face.fit.normal
+
+
+def local_origin(stones: Sequence[StoneRecord]) -> Array:
+    """Return the point (3,) of the site's frame that is the origin of a scene of these stones [m].
+
+    National grids have coordinates of 10⁶ m, which float64 resolves to a nanometre: too coarse for faces that are to
+    meet. Measurements lose nothing by a shift, so they are shifted before anything is computed from them.
+    """
+    if not stones:
+        return np.zeros(3)
+    centres = np.array([stone.centroid for stone in stones])
+    if np.abs(centres).max() <= _FAR:
+        return np.zeros(3)
+    out: Array = _GRID * np.round(np.median(centres, axis=0) / _GRID)
+    return out
+
+
+def stone_about(stone: StoneRecord, origin: Array) -> StoneRecord:
+    """Return the stone with all its coordinates relative to `origin`."""
+    if not origin.any():
+        return stone
+    centroid = stone.centroid - origin
+    return replace(
+        stone,
+        vertices=stone.vertices - origin,
+        points=stone.points - origin,
+        outline=stone.outline - origin,
+        solid_vertices=stone.solid_vertices - origin,
+        centroid=centroid,
+        offset=float(stone.normal @ centroid),
+    )
+
+
+def _entry_about(entry: ArrayTable, origin: Array) -> ArrayTable:
+    """Return the entry of a scene file with its points relative to `origin`."""
+    places = {name: entry.values[name] for name in _PLACES if entry.values.get(name) is not None}
+    if not origin.any() or not places:
+        return entry
+    moved = {name: tuple((np.array(place) - origin).tolist()) for name, place in places.items()}
+    return replace(entry, values={**entry.values, **moved})

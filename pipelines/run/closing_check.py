@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.arrays import Array
+from mechanics.arrays import Array
 from survey.joints.report import ClosingReport
 from survey.simplify.simplify import BlockyStone
 

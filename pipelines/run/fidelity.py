@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 
 from mechanics.scene.scene import Fidelity
-from survey.joints.report import Joint
+from survey.joints.report import StoneJoint
 
 __all__ = ["Modelled", "Wishes", "modelled", "neighbours"]
 
@@ -81,7 +81,7 @@ def modelled(codes: Sequence[str], neighbours: Neighbours, wishes: Wishes) -> di
     }
 
 
-def neighbours(joints: Iterable[Joint]) -> dict[str, set[str]]:
+def neighbours(joints: Iterable[StoneJoint]) -> dict[str, set[str]]:
     """Return, by code, the stones that face it across a joint; stones without joints are left out."""
     found: dict[str, set[str]] = {}
     for joint in joints:

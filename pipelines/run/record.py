@@ -23,15 +23,15 @@ from archmodel.store.run_record import (
 )
 from archmodel.store.runs import store_run
 from archmodel.store.stone_rows import solid_volume
+from mechanics.arrays import Array
 from mechanics.results.contact_result import ContactResult, JointResult
 from mechanics.results.result import Errors, Result
 from mechanics.scene.scene import Scene
 from moma.errors import DatabaseError
-from pipelines.arrays import Array
 from pipelines.results.joints_csv import normal_and_shear
 from pipelines.run.assemble import Assembly
 from pipelines.scene.file import SceneFile
-from survey.joints.report import ClosingReport, Joint
+from survey.joints.report import ClosingReport, StoneJoint
 
 __all__ = [
     "contact_arrays",
@@ -124,7 +124,7 @@ def surveyed_widths(joints: JointResult, codes: Sequence[str], closing: ClosingR
     codes : of its stones, in the order of their numbers
     closing : joints before the run. Of several joints of two stones, the one of most similar orientation counts
     """
-    known: dict[frozenset[str], list[Joint]] = defaultdict(list)
+    known: dict[frozenset[str], list[StoneJoint]] = defaultdict(list)
     for one in closing.joints:
         known[frozenset(one.stones)].append(one)
     widths = np.full(len(joints.area), np.nan)

@@ -1,7 +1,6 @@
 """Scene files: settings, keys, selection of stones, laws and loads.
 
 Public: `read_scene`, `parse_scene`, `SceneFile` (file); `select_stones`, `select_groups` (selection); `law_rules`
-(laws); `build_loads`, `thrown` (loads); `keys_of`, `build` (keys); `TABLES` (tables); `with_tables` (reference);
-`fingerprint`, `changes` (fingerprint); `standing_stones`, `refuse_stages` (stages); `write_recipe`,
-`write_sample` (sample).
+(laws); `build_loads`, `thrown` (loads); `keys_of`, `build` (keys); `TABLES` (tables);
+`fingerprint`, `changes` (fingerprint); `standing_stones`, `refuse_stages` (stages).
 """

@@ -10,16 +10,18 @@ from mechanics.scene.loads.ground_motion import braking_time
 from mechanics.scene.loads.tables import read_history
 from mechanics.scene.loads.time_series import History
 from pipelines.toml.lines import Path
-from pipelines.toml.schema import Document, Key, Kind, check_table
+from pipelines.toml.schema import Key, TomlDocument, ValueKind, check_table
 
-__all__ = ["Entry", "describe", "file_beside", "read_entries"]
+__all__ = ["ArrayTable", "describe", "file_beside", "read_entries"]
 
 # alternative to time and value in the inline table of a time series
-_FILE = Key("file", Kind.TEXT, "Text file with a column of times and one of values, or three.", default=None)
+_FILE = Key(
+    "file", ValueKind.TEXT, "Text file with a column of times and one of values, or three.", default=None
+)
 
 
 @dataclass(frozen=True)
-class Entry:
+class ArrayTable:
     """One table of an array.
 
     Attributes
@@ -37,12 +39,12 @@ class Entry:
 
 
 def read_entries(
-    document: Document,
+    document: TomlDocument,
     given: Mapping[str, Any],
     name: str,
     types: Mapping[str, tuple[Key, ...]],
     common: tuple[Key, ...] = (),
-) -> tuple[Entry, ...]:
+) -> tuple[ArrayTable, ...]:
     """Check all tables [[name]]; an array of a single type has no key `type`."""
     tables = given.get(name, [])
     if not isinstance(tables, list) or not all(isinstance(one, dict) for one in tables):
@@ -52,7 +54,7 @@ def read_entries(
     )
 
 
-def describe(entry: Entry, groups: Mapping[Path, Sequence[frozenset[str]]]) -> str:
+def describe(entry: ArrayTable, groups: Mapping[Path, Sequence[frozenset[str]]]) -> str:
     """Return an entry in words: its type, its stones, and the values that it gives."""
     stones = " and ".join(f"{len(codes)} stones" for codes in groups[entry.path])
     values = ", ".join(
@@ -83,22 +85,22 @@ def _shown(value: Any) -> str:
             return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def file_beside(document: Document, name: str) -> FilePath:
+def file_beside(document: TomlDocument, name: str) -> FilePath:
     """Return the path of a file that a scene names, relative to the scene file."""
     return FilePath(document.path).parent / name
 
 
 def _entry(
-    document: Document,
+    document: TomlDocument,
     path: Path,
     table: Mapping[str, Any],
     types: Mapping[str, tuple[Key, ...]],
     common: tuple[Key, ...],
-) -> Entry:
+) -> ArrayTable:
     title, given = f"[[{path[0]}]]", dict(table)
     kind = next(iter(types))
     if len(types) > 1:
-        which = Key("type", Kind.TEXT, "Type.", choices=tuple(types))
+        which = Key("type", ValueKind.TEXT, "Type.", choices=tuple(types))
         kind = str(
             check_table(document, path, {k: v for k, v in table.items() if k == "type"}, [which], title)[
                 "type"
@@ -109,33 +111,33 @@ def _entry(
     keys = (*types[kind], *common)
     values = check_table(document, path, given, keys, title)
     for key in keys:
-        if key.kind in (Kind.HISTORY, Kind.VECTOR_HISTORY) and values[key.name] is not None:
+        if key.kind in (ValueKind.HISTORY, ValueKind.VECTOR_HISTORY) and values[key.name] is not None:
             values[key.name] = _history(document, (*path, key.name), values[key.name], key)
-    return Entry(path, kind, values, tuple(_groups(keys, values)))
+    return ArrayTable(path, kind, values, tuple(_groups(keys, values)))
 
 
 def _groups(keys: Iterable[Key], values: Mapping[str, Any]) -> Iterable[tuple[str, tuple[str, ...]]]:
     for key in keys:
-        if key.kind is Kind.STONES:
+        if key.kind is ValueKind.STONES:
             yield key.name, values[key.name]
-        elif key.kind is Kind.GROUPS:
+        elif key.kind is ValueKind.GROUPS:
             for group in values[key.name]:
                 yield key.name, group
 
 
-def _history(document: Document, path: Path, value: Any, key: Key) -> History:
+def _history(document: TomlDocument, path: Path, value: Any, key: Key) -> History:
     """Return the time series of a constant, of { time, value }, or of { file }."""
     if not isinstance(value, dict):
         return History.constant(value)
-    vector = key.kind is Kind.VECTOR_HISTORY
+    vector = key.kind is ValueKind.VECTOR_HISTORY
     title = f"{key.name} = {{ … }}"
     if "file" in value:
         checked = check_table(document, path, value, [_FILE], title)
         parts = ("x", "y", "z") if vector else (key.name,)
         columns = ", ".join(["time [s]", *(f"{part} [{key.unit}]" for part in parts)])
         return read_history(file_beside(document, str(checked["file"])), columns)
-    values = Key("value", Kind.ROWS if vector else Kind.NUMBERS, "Values.", key.unit)
-    time = Key("time", Kind.NUMBERS, "Instants.", "s", at_least=0)
+    values = Key("value", ValueKind.ROWS if vector else ValueKind.NUMBERS, "Values.", key.unit)
+    time = Key("time", ValueKind.NUMBERS, "Instants.", "s", at_least=0)
     checked = check_table(document, path, value, [time, values], title)
     with document.at(*path):
         return History(checked["time"], checked["value"])  # type: ignore[arg-type]

@@ -15,7 +15,7 @@ from mechanics.scene.scene import ContactSettings, SolverSettings, TimeSettings
 from mechanics.stones.materials import Material, Orthotropy
 from moma.errors import SceneError
 from pipelines.draw.catalogue import PICTURES
-from pipelines.scene.array_tables import Entry, read_entries
+from pipelines.scene.array_tables import ArrayTable, read_entries
 from pipelines.scene.keys import build, typed_values
 from pipelines.scene.laws import BONDS, JointLaw, read_laws
 from pipelines.scene.loads import ASSESS_TYPES, read_loads, read_throws
@@ -24,7 +24,7 @@ from pipelines.scene.site import Site
 from pipelines.scene.stages import read_stages
 from pipelines.scene.tables import ARRAYS, AUTO, MATERIAL_KEYS, MESH_KEYS, ORTHOTROPY_KEYS, SITE_KEYS, TABLES
 from pipelines.toml.lines import key_lines, parse_toml, read_text
-from pipelines.toml.schema import Document, check_table, nearest
+from pipelines.toml.schema import TomlDocument, check_table, nearest
 from survey.joints.settings import JointMode, JointSettings
 
 __all__ = ["BESIDE", "SceneFile", "parse_scene", "read_scene"]
@@ -52,7 +52,7 @@ class SceneFile:
     site : seismic action for the check by a code; None: not stated
     """
 
-    document: Document
+    document: TomlDocument
     text: str
     name: str
     selection: Selection
@@ -62,15 +62,15 @@ class SceneFile:
     contact: ContactSettings
     gravity: tuple[float, float, float]
     mesh: MeshSettings
-    meshes: tuple[Entry, ...]
+    meshes: tuple[ArrayTable, ...]
     time: TimeSettings
     solver: SolverSettings
     output: Output
     laws: tuple[JointLaw, ...]
-    loads: tuple[Entry, ...]
-    throws: tuple[Entry, ...]
-    stages: tuple[Entry, ...]
-    assess: tuple[Entry, ...]
+    loads: tuple[ArrayTable, ...]
+    throws: tuple[ArrayTable, ...]
+    stages: tuple[ArrayTable, ...]
+    assess: tuple[ArrayTable, ...]
     site: Site | None
 
 
@@ -101,7 +101,7 @@ def parse_scene(text: str, path: str) -> SceneFile:
     ('tower', 0.6, 0.001)
     """
     given = parse_toml(text, path, SceneError, "see docs/scene.md for a scene to start from")
-    document = Document(path, key_lines(text))
+    document = TomlDocument(path, key_lines(text))
     tables = _checked_tables(document, given)
     laws = read_laws(document, given)
     loads, throws = read_loads(document, given), read_throws(document, given)
@@ -134,7 +134,7 @@ def _fidelities(values: dict[str, Any]) -> Fidelities:
     return build(Fidelities, values | {"default": default})
 
 
-def _checked_tables(document: Document, given: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+def _checked_tables(document: TomlDocument, given: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     known = [*TABLES, "materials", "site", *ARRAYS, *BESIDE]
     for name, content in given.items():
         if name in (*ARRAYS, *BESIDE):
@@ -147,7 +147,7 @@ def _checked_tables(document: Document, given: Mapping[str, Any]) -> dict[str, d
     return {name: check_table(document, (name,), given.get(name, {}), keys) for name, keys in TABLES.items()}
 
 
-def _site(document: Document, given: Mapping[str, Any]) -> Site | None:
+def _site(document: TomlDocument, given: Mapping[str, Any]) -> Site | None:
     if "site" not in given:
         return None
     values: dict[str, Any] = check_table(document, ("site",), given["site"], SITE_KEYS)
@@ -155,7 +155,7 @@ def _site(document: Document, given: Mapping[str, Any]) -> Site | None:
         return Site(**typed_values(Site, values))
 
 
-def _materials(document: Document, given: Mapping[str, Any]) -> tuple[MaterialRule, ...]:
+def _materials(document: TomlDocument, given: Mapping[str, Any]) -> tuple[MaterialRule, ...]:
     tables = given.get("materials", {})
     if not tables:
         document.fail("no material", "materials", remedy="add a table such as [materials.limestone]")
@@ -182,7 +182,7 @@ def _materials(document: Document, given: Mapping[str, Any]) -> tuple[MaterialRu
     return tuple(rules)
 
 
-def _orthotropy(document: Document, material: str, content: Any) -> Orthotropy:
+def _orthotropy(document: TomlDocument, material: str, content: Any) -> Orthotropy:
     path = ("materials", material, "orthotropy")
     if not isinstance(content, dict):
         document.fail("'orthotropy' is not a table", *path, remedy=f"write [{'.'.join(path)}]")
@@ -196,7 +196,7 @@ def _orthotropy(document: Document, material: str, content: Any) -> Orthotropy:
     return Orthotropy(**values, axes=tuple(map(tuple, (axes / lengths[:, None]).tolist())))
 
 
-def _joints(document: Document, laws: Sequence[JointLaw], values: Mapping[str, Any]) -> JointSettings:
+def _joints(document: TomlDocument, laws: Sequence[JointLaw], values: Mapping[str, Any]) -> JointSettings:
     settings = build(JointSettings, values)
     if settings.mode is JointMode.MORTAR and not any(one.entry.type in BONDS for one in laws):
         document.fail(
@@ -208,14 +208,14 @@ def _joints(document: Document, laws: Sequence[JointLaw], values: Mapping[str, A
     return settings
 
 
-def _contact(document: Document, values: Mapping[str, Any]) -> ContactSettings:
+def _contact(document: TomlDocument, values: Mapping[str, Any]) -> ContactSettings:
     with document.at("contact", "dynamic_friction"):
         law = build(DryJoint, values)
     return replace(build(ContactSettings, values), law=law)
 
 
 def _gravity(
-    document: Document, magnitude: float, direction: tuple[float, float, float]
+    document: TomlDocument, magnitude: float, direction: tuple[float, float, float]
 ) -> tuple[float, float, float]:
     length = float(np.linalg.norm(direction))
     if length == 0.0:
@@ -224,7 +224,7 @@ def _gravity(
     return x, y, z
 
 
-def _time(document: Document, values: dict[str, Any]) -> TimeSettings:
+def _time(document: TomlDocument, values: dict[str, Any]) -> TimeSettings:
     if values["duration"] < values["step"]:
         document.fail(
             f"duration = {values['duration']:g} s is shorter than step = {values['step']:g} s",
@@ -235,7 +235,7 @@ def _time(document: Document, values: dict[str, Any]) -> TimeSettings:
     return build(TimeSettings, values)
 
 
-def _output(document: Document, values: Mapping[str, Any]) -> Output:
+def _output(document: TomlDocument, values: Mapping[str, Any]) -> Output:
     for name in values["pictures"] or ():
         if name not in PICTURES:
             document.fail(f"unknown picture {name!r}", "output", "pictures", remedy=nearest(name, PICTURES))

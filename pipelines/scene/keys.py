@@ -1,6 +1,6 @@
 """Keys of a scene file from the settings that dataclasses declare: name, type, default, unit, bounds and meaning.
 
-A new setting of a dataclass is a new key; `python -m pipelines.scene.reference docs/scene.md` documents it.
+A new setting of a dataclass is a new key; `python -m tests.pipelines.scene.reference docs/scene.md` documents it.
 """
 
 from collections.abc import Mapping
@@ -10,21 +10,21 @@ from types import NoneType
 from typing import Any, TypeVar, get_args, get_type_hints
 
 from mechanics.stones.settings import Setting as MechanicsSetting
-from pipelines.toml.schema import REQUIRED, Key, Kind
+from pipelines.toml.schema import REQUIRED, Key, ValueKind
 from survey.joints.settings import Setting as SurveySetting
 
 __all__ = ["build", "keys_of", "typed_values"]
 
 Settings = TypeVar("Settings")
 
-_KINDS: Mapping[Any, Kind] = {
-    float: Kind.NUMBER,
-    int: Kind.INTEGER,
-    bool: Kind.BOOLEAN,
-    str: Kind.TEXT,
-    tuple[str, ...]: Kind.TEXTS,
-    tuple[float, float, float]: Kind.VECTOR,
-    tuple[tuple[float, float, float], ...]: Kind.ROWS,
+_KINDS: Mapping[Any, ValueKind] = {
+    float: ValueKind.NUMBER,
+    int: ValueKind.INTEGER,
+    bool: ValueKind.BOOLEAN,
+    str: ValueKind.TEXT,
+    tuple[str, ...]: ValueKind.TEXTS,
+    tuple[float, float, float]: ValueKind.VECTOR,
+    tuple[tuple[float, float, float], ...]: ValueKind.ROWS,
 }
 
 
@@ -53,7 +53,7 @@ def keys_of(owner: type[Any], *required: str) -> tuple[Key, ...]:
         keys.append(
             Key(
                 one.name,
-                Kind.TEXT if _is_enum(hint) else _KINDS[hint],
+                ValueKind.TEXT if _is_enum(hint) else _KINDS[hint],
                 setting.doc,
                 setting.unit,
                 REQUIRED if default is MISSING or one.name in required else default,

@@ -11,9 +11,9 @@ from mechanics.scene.laws.law import Law
 from mechanics.scene.laws.lennard_jones import LennardJones
 from mechanics.scene.laws.mortar import MortarJoint
 from mechanics.scene.scene import LawRule
-from pipelines.scene.array_tables import Entry, read_entries
+from pipelines.scene.array_tables import ArrayTable, read_entries
 from pipelines.scene.keys import build, keys_of
-from pipelines.toml.schema import Document, Key, Kind, nearest
+from pipelines.toml.schema import Key, TomlDocument, ValueKind, nearest
 
 __all__ = ["BONDS", "LAW_KEYS", "LAW_TYPES", "JointLaw", "law_rules", "read_laws"]
 
@@ -35,10 +35,15 @@ LAW_TYPES: Mapping[str, tuple[Key, ...]] = {
 }
 
 LAW_KEYS = (
-    Key("materials", Kind.TEXTS, "Two names of materials: the law holds between their stones.", default=()),
+    Key(
+        "materials",
+        ValueKind.TEXTS,
+        "Two names of materials: the law holds between their stones.",
+        default=(),
+    ),
     Key(
         "between",
-        Kind.GROUPS,
+        ValueKind.GROUPS,
         "Two lists of codes or expressions: the law holds between the stones of the one and those of the other.",
         default=(),
     ),
@@ -50,11 +55,11 @@ LAW_KEYS = (
 class JointLaw:
     """A law and its table, which names two materials, two groups of stones, or neither."""
 
-    entry: Entry
+    entry: ArrayTable
     law: Law
 
 
-def read_laws(document: Document, given: Mapping[str, Any]) -> tuple[JointLaw, ...]:
+def read_laws(document: TomlDocument, given: Mapping[str, Any]) -> tuple[JointLaw, ...]:
     """Check and build all laws; the stones between which they hold are still expressions."""
     materials = tuple(given.get("materials", {}))
     return tuple(
@@ -63,7 +68,7 @@ def read_laws(document: Document, given: Mapping[str, Any]) -> tuple[JointLaw, .
     )
 
 
-def _law(document: Document, entry: Entry, materials: Sequence[str]) -> JointLaw:
+def _law(document: TomlDocument, entry: ArrayTable, materials: Sequence[str]) -> JointLaw:
     named = entry.values["materials"]
     if named and entry.values["between"]:
         remedy = "give one of them, or neither for all joints"
@@ -80,7 +85,7 @@ def _law(document: Document, entry: Entry, materials: Sequence[str]) -> JointLaw
 
 
 def law_rules(
-    document: Document,
+    document: TomlDocument,
     laws: Iterable[JointLaw],
     groups: Mapping[tuple[str, ...], Sequence[frozenset[str]]],
     materials: Mapping[str, str],

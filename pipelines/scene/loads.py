@@ -17,10 +17,10 @@ from mechanics.scene.loads.record_processing import band_pass, without_drift
 from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import Block, Fidelity
 from mechanics.stones.polyhedra import mass_properties
-from pipelines.scene.array_tables import Entry, file_beside, read_entries
+from pipelines.scene.array_tables import ArrayTable, file_beside, read_entries
 from pipelines.scene.keys import keys_of
 from pipelines.scene.stages import ACTS_IN
-from pipelines.toml.schema import Document, Key, Kind
+from pipelines.toml.schema import Key, TomlDocument, ValueKind
 
 __all__ = [
     "ASSESS_TYPES",
@@ -38,26 +38,26 @@ Codes = frozenset[str]
 Groups = Mapping[tuple[str, ...], Sequence[Codes]]
 Blocks = Mapping[str, Block]
 
-_STONES = Key("stones", Kind.STONES, "Codes or expressions of the stones on which it acts.")
-_SUPPORTS = Key("stones", Kind.STONES, "Codes or expressions of the fixed stones that move.")
-_START = Key("start", Kind.NUMBER, "Start time.", "s", 0.0, at_least=0)
-_DURATION = Key("duration", Kind.NUMBER, "Duration.", "s", above=0)
+_STONES = Key("stones", ValueKind.STONES, "Codes or expressions of the stones on which it acts.")
+_SUPPORTS = Key("stones", ValueKind.STONES, "Codes or expressions of the fixed stones that move.")
+_START = Key("start", ValueKind.NUMBER, "Start time.", "s", 0.0, at_least=0)
+_DURATION = Key("duration", ValueKind.NUMBER, "Duration.", "s", above=0)
 
 LOAD_TYPES: Mapping[str, tuple[Key, ...]] = {
     "gravity_ramp": keys_of(GravityRamp),
     "tilt": (
-        Key("axis", Kind.VECTOR, "Axis about which the table turns, right-handed.", "-"),
-        Key("rate", Kind.NUMBER, "Constant rate; or give `angle`.", "°/s", None, above=0),
-        Key("limit", Kind.NUMBER, "Angle at which a constant rate ends.", "°", 90.0, above=0),
-        Key("start", Kind.NUMBER, "Start time of a constant rate.", "s", 0.0, at_least=0),
-        Key("angle", Kind.HISTORY, "Angle with time; or give `rate`.", "°", None),
+        Key("axis", ValueKind.VECTOR, "Axis about which the table turns, right-handed.", "-"),
+        Key("rate", ValueKind.NUMBER, "Constant rate; or give `angle`.", "°/s", None, above=0),
+        Key("limit", ValueKind.NUMBER, "Angle at which a constant rate ends.", "°", 90.0, above=0),
+        Key("start", ValueKind.NUMBER, "Start time of a constant rate.", "s", 0.0, at_least=0),
+        Key("angle", ValueKind.HISTORY, "Angle with time; or give `rate`.", "°", None),
     ),
     "force": (
         _STONES,
-        Key("force", Kind.VECTOR_HISTORY, "Force on each of them, constant or with time.", "N"),
+        Key("force", ValueKind.VECTOR_HISTORY, "Force on each of them, constant or with time.", "N"),
         Key(
             "point",
-            Kind.VECTOR,
+            ValueKind.VECTOR,
             "Point of application on a single stone, which carries it along; if not given, the centre of mass.",
             "m",
             None,
@@ -66,47 +66,49 @@ LOAD_TYPES: Mapping[str, tuple[Key, ...]] = {
     ),
     "settlement": (
         _SUPPORTS,
-        Key("displacement", Kind.VECTOR, "Displacement at the end.", "m"),
+        Key("displacement", ValueKind.VECTOR, "Displacement at the end.", "m"),
         _DURATION,
         _START,
     ),
     "spreading": (
         Key(
             "first",
-            Kind.STONES,
+            ValueKind.STONES,
             "Codes or expressions of the fixed stones that move back by half of `distance`.",
         ),
-        Key("second", Kind.STONES, "Codes or expressions of those that move forward by the other half."),
-        Key("direction", Kind.VECTOR, "Direction of the second ones; its length does not matter.", "-"),
-        Key("distance", Kind.NUMBER, "Distance by which the groups part.", "m"),
+        Key("second", ValueKind.STONES, "Codes or expressions of those that move forward by the other half."),
+        Key("direction", ValueKind.VECTOR, "Direction of the second ones; its length does not matter.", "-"),
+        Key("distance", ValueKind.NUMBER, "Distance by which the groups part.", "m"),
         _DURATION,
         _START,
     ),
     "motion": (
         _SUPPORTS,
-        Key("velocity", Kind.VECTOR_HISTORY, "Velocity, constant or with time.", "m/s", (0.0, 0.0, 0.0)),
-        Key("spin", Kind.HISTORY, "Angular velocity, constant or with time; needs `pivot`.", "°/s", 0.0),
+        Key("velocity", ValueKind.VECTOR_HISTORY, "Velocity, constant or with time.", "m/s", (0.0, 0.0, 0.0)),
+        Key("spin", ValueKind.HISTORY, "Angular velocity, constant or with time; needs `pivot`.", "°/s", 0.0),
         *keys_of(ImposedMotion),
-        Key("pivot", Kind.VECTOR, "A point of that axis at the start.", "m", None),
+        Key("pivot", ValueKind.VECTOR, "A point of that axis at the start.", "m", None),
     ),
     "ground_motion": (
         _SUPPORTS,
         Key(
             "x",
-            Kind.TEXT,
+            ValueKind.TEXT,
             "File of the record along x: PEER's .AT2, or a table of time and acceleration.",
             default=None,
         ),
-        Key("y", Kind.TEXT, "File of the record along y.", default=None),
-        Key("z", Kind.TEXT, "File of the record along z.", default=None),
-        Key("unit", Kind.TEXT, "Unit of the acceleration in tables.", default=None, choices=tuple(UNITS)),
-        Key("azimuth", Kind.NUMBER, "Angle by which x and y are first turned about z.", "°", 0.0),
+        Key("y", ValueKind.TEXT, "File of the record along y.", default=None),
+        Key("z", ValueKind.TEXT, "File of the record along z.", default=None),
+        Key(
+            "unit", ValueKind.TEXT, "Unit of the acceleration in tables.", default=None, choices=tuple(UNITS)
+        ),
+        Key("azimuth", ValueKind.NUMBER, "Angle by which x and y are first turned about z.", "°", 0.0),
         *keys_of(GroundMotion),
-        Key("low", Kind.NUMBER, "Lower corner of a Butterworth filter, if any.", "Hz", None, above=0),
-        Key("high", Kind.NUMBER, "Upper corner of a Butterworth filter, if any.", "Hz", None, above=0),
+        Key("low", ValueKind.NUMBER, "Lower corner of a Butterworth filter, if any.", "Hz", None, above=0),
+        Key("high", ValueKind.NUMBER, "Upper corner of a Butterworth filter, if any.", "Hz", None, above=0),
         Key(
             "order",
-            Kind.INTEGER,
+            ValueKind.INTEGER,
             "Order of the filter, applied both ways.",
             default=4,
             at_least=1,
@@ -114,7 +116,7 @@ LOAD_TYPES: Mapping[str, tuple[Key, ...]] = {
         ),
         Key(
             "baseline",
-            Kind.INTEGER,
+            ValueKind.INTEGER,
             "Degree of the polynomial that is subtracted from the displacement, at least 2; 0: none.",
             default=0,
             at_least=0,
@@ -126,38 +128,40 @@ LOAD_TYPES: Mapping[str, tuple[Key, ...]] = {
 LOAD_KEYS = (ACTS_IN,)
 """Keys of every load."""
 
-_FIXED = Key("stones", Kind.STONES, "Codes or expressions of the fixed stones on which it acts.")
+_FIXED = Key("stones", ValueKind.STONES, "Codes or expressions of the fixed stones on which it acts.")
 
 _RUNS = (
     Key(
         "confirm",
-        Kind.BOOLEAN,
+        ValueKind.BOOLEAN,
         "Confirm the candidate by runs, as `--confirm` does for all loads.",
         default=False,
     ),
     Key(
         "pushover",
-        Kind.BOOLEAN,
+        ValueKind.BOOLEAN,
         "Lead the mechanism to collapse by a run: the capacity curve.",
         default=False,
     ),
 )
 _CODE = Key(
     "code",
-    Kind.TEXT,
+    ValueKind.TEXT,
     "Check the mechanism by this code, for the place of `[site]`, as `--code` does for all pushes on all stones.",
     default=None,
 )
 
 ASSESS_TYPES: Mapping[str, tuple[Key, ...]] = {
     "horizontal": (
-        Key("direction", Kind.VECTOR, "Direction of the push, λ times the weight of each stone.", "-"),
+        Key("direction", ValueKind.VECTOR, "Direction of the push, λ times the weight of each stone.", "-"),
         replace(_STONES, doc=f"{_STONES.doc[:-1]}; if not given, on all.", default=()),
         *_RUNS,
         _CODE,
     ),
     "tilt": (
-        Key("axis", Kind.VECTOR, "Axis about which the table turns, right-handed; its tangent is λ.", "-"),
+        Key(
+            "axis", ValueKind.VECTOR, "Axis about which the table turns, right-handed; its tangent is λ.", "-"
+        ),
         *_RUNS,
         _CODE,
     ),
@@ -169,29 +173,29 @@ ASSESS_TYPES: Mapping[str, tuple[Key, ...]] = {
         replace(
             _STONES, doc="Codes or expressions of the stones on which it acts, spread as their weight is."
         ),
-        Key("force", Kind.VECTOR, "Force on all of them at λ = 1.", "N"),
+        Key("force", ValueKind.VECTOR, "Force on all of them at λ = 1.", "N"),
         Key(
             "point",
-            Kind.VECTOR,
+            ValueKind.VECTOR,
             "Where it acts on a single stone; if not given, at the centre of mass.",
             "m",
             None,
         ),
         *_RUNS,
     ),
-    "thrust": (_FIXED, Key("direction", Kind.VECTOR, "Direction in which the thrust counts.", "-")),
-    "settlement": (_FIXED, Key("direction", Kind.VECTOR, "Direction in which they yield.", "-")),
+    "thrust": (_FIXED, Key("direction", ValueKind.VECTOR, "Direction in which the thrust counts.", "-")),
+    "settlement": (_FIXED, Key("direction", ValueKind.VECTOR, "Direction in which they yield.", "-")),
     "thickness": (),
 }
 
 THROW_KEYS = (
-    Key("stones", Kind.STONES, "Codes or expressions of the stones that begin in motion."),
-    Key("velocity", Kind.VECTOR, "Velocity of the centre of mass.", "m/s", (0.0, 0.0, 0.0)),
-    Key("spin", Kind.VECTOR, "Angular velocity about the axes x, y, z.", "°/s", (0.0, 0.0, 0.0)),
+    Key("stones", ValueKind.STONES, "Codes or expressions of the stones that begin in motion."),
+    Key("velocity", ValueKind.VECTOR, "Velocity of the centre of mass.", "m/s", (0.0, 0.0, 0.0)),
+    Key("spin", ValueKind.VECTOR, "Angular velocity about the axes x, y, z.", "°/s", (0.0, 0.0, 0.0)),
 )
 
 
-def read_loads(document: Document, given: Mapping[str, Any]) -> tuple[Entry, ...]:
+def read_loads(document: TomlDocument, given: Mapping[str, Any]) -> tuple[ArrayTable, ...]:
     """Check all loads and read their records; their stones are still expressions."""
     entries = read_entries(document, given, "loads", LOAD_TYPES, LOAD_KEYS)
     for entry in entries:
@@ -204,12 +208,14 @@ def read_loads(document: Document, given: Mapping[str, Any]) -> tuple[Entry, ...
     )
 
 
-def read_throws(document: Document, given: Mapping[str, Any]) -> tuple[Entry, ...]:
+def read_throws(document: TomlDocument, given: Mapping[str, Any]) -> tuple[ArrayTable, ...]:
     """Check all initial motions; their stones are still expressions."""
     return read_entries(document, given, "throw", {"throw": THROW_KEYS})
 
 
-def build_loads(document: Document, entries: Iterable[Entry], groups: Groups, blocks: Blocks) -> Loads:
+def build_loads(
+    document: TomlDocument, entries: Iterable[ArrayTable], groups: Groups, blocks: Blocks
+) -> Loads:
     """Return the loads on the blocks, given by code; `groups` are the codes that each entry names.
 
     Raises
@@ -235,7 +241,7 @@ def build_loads(document: Document, entries: Iterable[Entry], groups: Groups, bl
 
 
 def thrown(
-    document: Document, entries: Iterable[Entry], groups: Groups, blocks: Blocks
+    document: TomlDocument, entries: Iterable[ArrayTable], groups: Groups, blocks: Blocks
 ) -> dict[str, tuple[float, ...]]:
     """Return the initial velocity (6,) [m/s, rad/s] of every stone that begins in motion, by code."""
     found: dict[str, tuple[float, ...]] = {}
@@ -251,7 +257,7 @@ def thrown(
     return found
 
 
-def _with_records(document: Document, entry: Entry) -> Entry:
+def _with_records(document: TomlDocument, entry: ArrayTable) -> ArrayTable:
     """Return the entry with records in place of their file names."""
     values = dict(entry.values)
     if not any(values[axis] for axis in "xyz"):
@@ -259,10 +265,10 @@ def _with_records(document: Document, entry: Entry) -> Entry:
     for axis in "xyz":
         if values[axis] is not None:
             values[axis] = _record(document, entry, axis)
-    return Entry(entry.path, entry.type, values, entry.groups)
+    return ArrayTable(entry.path, entry.type, values, entry.groups)
 
 
-def _record(document: Document, entry: Entry, axis: str) -> Accelerogram:
+def _record(document: TomlDocument, entry: ArrayTable, axis: str) -> Accelerogram:
     values = entry.values
     path = file_beside(document, values[axis])
     if path.suffix.lower() != ".at2" and values["unit"] is None:
@@ -291,7 +297,7 @@ _GRAVITY: Mapping[str, Callable[[Mapping[str, Any]], GravityChange]] = {
 }
 
 
-def _force(document: Document, entry: Entry, codes: Codes, blocks: Blocks) -> StoneForce:
+def _force(document: TomlDocument, entry: ArrayTable, codes: Codes, blocks: Blocks) -> StoneForce:
     values, point = entry.values, entry.values["point"]
     if point is None:
         return StoneForce(codes, values["force"], follows=values["follows"])
@@ -304,11 +310,11 @@ def _force(document: Document, entry: Entry, codes: Codes, blocks: Blocks) -> St
     return StoneForce(codes, values["force"], (x, y, z), values["follows"])
 
 
-FORCES: Mapping[str, Callable[[Document, Entry, Codes, Blocks], Force]] = {"force": _force}
+FORCES: Mapping[str, Callable[[TomlDocument, ArrayTable, Codes, Blocks], Force]] = {"force": _force}
 """Loads that push stones, which stay rigid, by their type."""
 
 
-def _check_rigid(document: Document, entry: Entry, codes: Codes, blocks: Blocks) -> None:
+def _check_rigid(document: TomlDocument, entry: ArrayTable, codes: Codes, blocks: Blocks) -> None:
     """Refuse a force on stones that are not rigid."""
     for code in sorted(codes):
         if blocks[code].fidelity is not Fidelity.RIGID:
@@ -317,7 +323,7 @@ def _check_rigid(document: Document, entry: Entry, codes: Codes, blocks: Blocks)
 
 
 def _check_supports(
-    document: Document, entry: Entry, groups: Sequence[Codes], blocks: Blocks, taken: dict[str, str]
+    document: TomlDocument, entry: ArrayTable, groups: Sequence[Codes], blocks: Blocks, taken: dict[str, str]
 ) -> None:
     """Refuse to move stones that are not fixed, or are moved by another load; `taken` maps codes to loads."""
     for (key, _), codes in zip(entry.groups, groups, strict=True):

@@ -5,31 +5,31 @@ from dataclasses import dataclass
 from typing import Any
 
 from moma.errors import UsageError
-from pipelines.scene.array_tables import Entry, read_entries
+from pipelines.scene.array_tables import ArrayTable, read_entries
 from pipelines.toml.lines import Path
-from pipelines.toml.schema import Document, Key, Kind, nearest
+from pipelines.toml.schema import Key, TomlDocument, ValueKind, nearest
 
 __all__ = ["ACTS_IN", "STAGE_KEYS", "StandingStones", "read_stages", "refuse_stages", "standing_stones"]
 
 Codes = frozenset[str]
 
 STAGE_KEYS = (
-    Key("name", Kind.TEXT, "Name, by which loads refer to it."),
+    Key("name", ValueKind.TEXT, "Name, by which loads refer to it."),
     Key(
         "lay",
-        Kind.STONES,
+        ValueKind.STONES,
         "Codes or expressions of the stones that are laid in it. Fixed stones that no stage lays stand from the first.",
         default=(),
     ),
     Key(
         "remove",
-        Kind.STONES,
+        ValueKind.STONES,
         "Codes or expressions of the stones that are taken away before it: a centring that was laid.",
         default=(),
     ),
     Key(
         "hold",
-        Kind.STONES,
+        ValueKind.STONES,
         "Codes or expressions of the stones that a rigid centring holds in it, if they stand: they do not move.",
         default=(),
     ),
@@ -37,7 +37,7 @@ STAGE_KEYS = (
 
 ACTS_IN = Key(
     "stages",
-    Kind.TEXTS,
+    ValueKind.TEXTS,
     "Names of the stages in which it acts, from the beginning of each; needed in a scene with `[[stages]]`, "
     "and only there.",
     default=(),
@@ -49,7 +49,7 @@ ACTS_IN = Key(
 class StandingStones:
     """Stones that stand in a stage, and those of them that its centring holds, by code."""
 
-    entry: Entry
+    entry: ArrayTable
     standing: Codes
     held: Codes
 
@@ -60,8 +60,11 @@ class StandingStones:
 
 
 def read_stages(
-    document: Document, given: Mapping[str, Any], loads: Iterable[Entry], throws: Sequence[Entry]
-) -> tuple[Entry, ...]:
+    document: TomlDocument,
+    given: Mapping[str, Any],
+    loads: Iterable[ArrayTable],
+    throws: Sequence[ArrayTable],
+) -> tuple[ArrayTable, ...]:
     """Check all stages, and the names by which loads refer to them; their stones are still expressions."""
     stages = read_entries(document, given, "stages", {"stage": STAGE_KEYS})
     names: list[str] = []
@@ -79,7 +82,7 @@ def read_stages(
     return stages
 
 
-def _check_load(document: Document, load: Entry, names: Sequence[str]) -> None:
+def _check_load(document: TomlDocument, load: ArrayTable, names: Sequence[str]) -> None:
     asked = load.values[ACTS_IN.name]
     if names and not asked:
         document.fail(
@@ -95,12 +98,12 @@ def _check_load(document: Document, load: Entry, names: Sequence[str]) -> None:
 
 
 def standing_stones(
-    document: Document,
-    stages: Sequence[Entry],
+    document: TomlDocument,
+    stages: Sequence[ArrayTable],
     groups: Mapping[Path, Sequence[Codes]],
     codes: Iterable[str],
     fixed: Codes,
-    loads: Iterable[Entry],
+    loads: Iterable[ArrayTable],
 ) -> tuple[StandingStones, ...]:
     """Return the stones that stand in each stage; `fixed` ones that no stage lays stand in the first.
 
@@ -153,7 +156,7 @@ def standing_stones(
     return tuple(found)
 
 
-def refuse_stages(stages: Sequence[Entry], document: Document, command: str) -> None:
+def refuse_stages(stages: Sequence[ArrayTable], document: TomlDocument, command: str) -> None:
     """Refuse a scene with stages in a command that knows none.
 
     Raises

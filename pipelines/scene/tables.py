@@ -9,7 +9,7 @@ from mechanics.stones.materials import Material, Orthotropy
 from pipelines.scene.keys import keys_of
 from pipelines.scene.settings import Fidelities, MaterialRule, MeshSettings, Output, Selection
 from pipelines.scene.site import Site
-from pipelines.toml.schema import Key, Kind
+from pipelines.toml.schema import Key, ValueKind
 from survey.joints.settings import JointSettings
 
 __all__ = ["ARRAYS", "AUTO", "MATERIAL_KEYS", "MESH_KEYS", "ORTHOTROPY_KEYS", "SITE_KEYS", "TABLES"]
@@ -25,17 +25,22 @@ _models = (AUTO, Fidelity.RIGID.value, Fidelity.DEFORMABLE.value)
 
 TABLES: Mapping[str, tuple[Key, ...]] = {
     "scene": (
-        Key("name", Kind.TEXT, "Title of reports and pictures; if not given, the file's name.", default=None),
+        Key(
+            "name",
+            ValueKind.TEXT,
+            "Title of reports and pictures; if not given, the file's name.",
+            default=None,
+        ),
     ),
     "select": keys_of(Selection),
     "bodies": (replace(_default, default=AUTO, choices=_models), *_lists),
     "joints": keys_of(JointSettings),
     "contact": (*keys_of(DryJoint), *keys_of(ContactSettings)),
     "gravity": (
-        Key("magnitude", Kind.NUMBER, "Acceleration of gravity.", "m/s²", 9.81, at_least=0),
+        Key("magnitude", ValueKind.NUMBER, "Acceleration of gravity.", "m/s²", 9.81, at_least=0),
         Key(
             "direction",
-            Kind.VECTOR,
+            ValueKind.VECTOR,
             "Direction in which things fall; its length does not matter.",
             "-",
             (0.0, 0.0, -1.0),
@@ -54,7 +59,7 @@ MATERIAL_KEYS = (*keys_of(Material), *keys_of(MaterialRule))
 ORTHOTROPY_KEYS = keys_of(Orthotropy)
 
 MESH_KEYS = (
-    Key("stones", Kind.STONES, "Codes or expressions of the stones that are meshed otherwise."),
+    Key("stones", ValueKind.STONES, "Codes or expressions of the stones that are meshed otherwise."),
     *(
         replace(key, doc=f"As in `[mesh]`, whose `{key.name}` holds if none is given.", default=None)
         for key in keys_of(MeshSettings)

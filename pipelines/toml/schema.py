@@ -12,7 +12,7 @@ from typing import NoReturn
 from moma.errors import SceneError
 from pipelines.toml.lines import Path, line_of
 
-__all__ = ["REQUIRED", "Document", "Key", "Kind", "check_table", "nearest"]
+__all__ = ["REQUIRED", "Key", "TomlDocument", "ValueKind", "check_table", "nearest"]
 
 
 class _Required(Enum):
@@ -25,7 +25,7 @@ REQUIRED = _Required.REQUIRED
 _HUGE = 10**300
 
 
-class Kind(Enum):
+class ValueKind(Enum):
     """Type of the value of a key, in the words of an error message."""
 
     NUMBER = "a number"
@@ -60,7 +60,7 @@ class Key:
     """
 
     name: str
-    kind: Kind
+    kind: ValueKind
     doc: str
     unit: str = ""
     default: object = REQUIRED
@@ -72,7 +72,7 @@ class Key:
 
 
 @dataclass(frozen=True)
-class Document:
+class TomlDocument:
     """Path and line numbers of a TOML text, so that errors can name them.
 
     Attributes
@@ -104,7 +104,7 @@ class Document:
 
 
 def check_table(
-    document: Document, table: Path, given: Mapping[str, object], keys: Iterable[Key], title: str = ""
+    document: TomlDocument, table: Path, given: Mapping[str, object], keys: Iterable[Key], title: str = ""
 ) -> dict[str, object]:
     """Return the values of all keys of one table, with defaults filled in.
 
@@ -119,9 +119,9 @@ def check_table(
     SceneError : at the first key that is unknown, missing or wrong
 
     >>> friction = Key("friction", Kind.NUMBER, "Coulomb's coefficient μ.", "-", 0.6, at_least=0)
-    >>> check_table(Document("scene.toml"), ("contact",), {"friction": 1}, [friction])
+    >>> check_table(TomlDocument("scene.toml"), ("contact",), {"friction": 1}, [friction])
     {'friction': 1.0}
-    >>> check_table(Document("scene.toml"), ("contact",), {"frictoin": 1}, [friction])
+    >>> check_table(TomlDocument("scene.toml"), ("contact",), {"frictoin": 1}, [friction])
     Traceback (most recent call last):
     moma.errors.SceneError: scene.toml:1: unknown key 'frictoin' in [contact]; did you mean 'friction'?
     """
@@ -150,7 +150,7 @@ def nearest(name: str, known: Iterable[str]) -> str:
     return "known here: " + ", ".join(names[:20]) + (", …" if len(names) > 20 else "")
 
 
-def _checked(document: Document, path: Path, value: object, key: Key) -> object:
+def _checked(document: TomlDocument, path: Path, value: object, key: Key) -> object:
     typed = _typed(value, key.kind)
     if typed is None:
         document.fail(
@@ -170,37 +170,39 @@ def _checked(document: Document, path: Path, value: object, key: Key) -> object:
     return typed
 
 
-def _typed(value: object, kind: Kind) -> object | None:
+def _typed(value: object, kind: ValueKind) -> object | None:
     """Return the value as the type of its kind, or None if it is of another."""
     match kind:
-        case Kind.NUMBER:
+        case ValueKind.NUMBER:
             return float(value) if _is_number(value) else None  # type: ignore[arg-type]
-        case Kind.INTEGER:
+        case ValueKind.INTEGER:
             return value if isinstance(value, int) and not isinstance(value, bool) else None
-        case Kind.BOOLEAN:
+        case ValueKind.BOOLEAN:
             return value if isinstance(value, bool) else None
-        case Kind.TEXT:
+        case ValueKind.TEXT:
             return value if isinstance(value, str) and value.strip() else None
-        case Kind.TEXTS:
+        case ValueKind.TEXTS:
             return _list_of(value, lambda one: one if isinstance(one, str) and one.strip() else None)
-        case Kind.STONES:
-            return _typed(value, Kind.TEXTS) or None
-        case Kind.GROUPS:
-            groups = _list_of(value, lambda one: _typed([one] if isinstance(one, str) else one, Kind.STONES))
+        case ValueKind.STONES:
+            return _typed(value, ValueKind.TEXTS) or None
+        case ValueKind.GROUPS:
+            groups = _list_of(
+                value, lambda one: _typed([one] if isinstance(one, str) else one, ValueKind.STONES)
+            )
             return groups if groups is not None and len(groups) == 2 else None
-        case Kind.NUMBERS:
-            return _list_of(value, lambda one: _typed(one, Kind.NUMBER))
-        case Kind.VECTOR:
-            vector = _typed(value, Kind.NUMBERS)
+        case ValueKind.NUMBERS:
+            return _list_of(value, lambda one: _typed(one, ValueKind.NUMBER))
+        case ValueKind.VECTOR:
+            vector = _typed(value, ValueKind.NUMBERS)
             return vector if isinstance(vector, tuple) and len(vector) == 3 else None
-        case Kind.ROWS:
-            return _list_of(value, lambda one: _typed(one, Kind.VECTOR))
-        case Kind.HISTORY | Kind.VECTOR_HISTORY:
-            constant = Kind.NUMBER if kind is Kind.HISTORY else Kind.VECTOR
+        case ValueKind.ROWS:
+            return _list_of(value, lambda one: _typed(one, ValueKind.VECTOR))
+        case ValueKind.HISTORY | ValueKind.VECTOR_HISTORY:
+            constant = ValueKind.NUMBER if kind is ValueKind.HISTORY else ValueKind.VECTOR
             return value if isinstance(value, dict) else _typed(value, constant)
-        case Kind.DATE:
+        case ValueKind.DATE:
             return value if type(value) is date else None
-        case Kind.TABLE:
+        case ValueKind.TABLE:
             return value if isinstance(value, dict) else None
 
 

@@ -1,5 +1,5 @@
 """Studies of speed against accuracy on a scene (`moma trade`).
 
-Public: `run_trade`, `Asked`, `TradeReport` (study); `grid`, `Setting` (grid); `front`, `judge` (pareto); `Store`
+Public: `run_trade`, `Asked`, `TradeReport` (study); `grid`, `Variant` (grid); `front`, `judge` (pareto); `Store`
 (store).
 """

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.tradeoff.grid import Setting
+from pipelines.tradeoff.grid import Variant
 from pipelines.tradeoff.store import Measured, Status
 from pipelines.tradeoff.worker import SHORT
 
@@ -32,10 +32,10 @@ class Forecast:
     ended : runs, by the name of their setting
     """
 
-    settings: Mapping[str, Setting]
+    settings: Mapping[str, Variant]
     ended: Mapping[str, Measured]
 
-    def seconds(self, setting: Setting) -> float | None:
+    def seconds(self, setting: Variant) -> float | None:
         """Return the expected time of the process from start to end [s]; None if there is no run to infer it from."""
         start = self._start()
         if setting.varied is not None:
@@ -50,7 +50,7 @@ class Forecast:
         grown: float = (setting.unknowns / known.unknowns) ** self._power()
         return start + _twice(grown * setting.effort / known.effort * max(near.wall, 1e-3))
 
-    def memory(self, setting: Setting) -> float | None:
+    def memory(self, setting: Variant) -> float | None:
         """Return the expected memory of the process [bytes]; None if there is no run to infer it from."""
         near = self.ended.get(setting.varied) if setting.varied is not None else self._nearest(setting)
         if near is None or near.memory == 0:
@@ -65,7 +65,7 @@ class Forecast:
         spent = [one.elapsed - _twice(one.wall) for one in self.ended.values() if one.status is Status.DONE]
         return max(float(np.median(spent)), 0.5) if spent else _START
 
-    def _nearest(self, setting: Setting) -> Measured | None:
+    def _nearest(self, setting: Variant) -> Measured | None:
         """Return the run with the nearest number of unknowns, of the same element type if there is one.
 
         A stopped run only bounds the time of the same element type with more unknowns.
@@ -84,7 +84,7 @@ class Forecast:
                 others.append(one)
         return min(alike or others, key=lambda one: self._apart(setting, one), default=None)
 
-    def _apart(self, setting: Setting, run: Measured) -> float:
+    def _apart(self, setting: Variant, run: Measured) -> float:
         return abs(math.log(setting.unknowns / self.settings[run.name].unknowns))
 
     def _power(self) -> float:
@@ -112,7 +112,7 @@ class Choice:
     limit : time after which it is stopped [s]
     """
 
-    setting: Setting
+    setting: Variant
     limit: float
 
 
@@ -148,7 +148,7 @@ def next_run(
     return None
 
 
-def left_out(forecast: Forecast, setting: Setting, left: float, memory: float) -> str:
+def left_out(forecast: Forecast, setting: Variant, left: float, memory: float) -> str:
     """Return the reason for which a setting was not run."""
     base = forecast.ended.get(setting.varied or "")
     if setting.varied is not None and (base is None or base.status is not Status.DONE):
@@ -159,7 +159,7 @@ def left_out(forecast: Forecast, setting: Setting, left: float, memory: float) -
     )
 
 
-def _refusal(forecast: Forecast, setting: Setting, left: float, memory: float) -> str:
+def _refusal(forecast: Forecast, setting: Variant, left: float, memory: float) -> str:
     expected, needed = forecast.seconds(setting), forecast.memory(setting)
     if needed is not None and needed > memory:
         return f"would take about {needed / 2**30:.1f} GiB of memory, there are {memory / 2**30:.1f}"
@@ -170,7 +170,7 @@ def _refusal(forecast: Forecast, setting: Setting, left: float, memory: float) -
     return ""
 
 
-def _order(forecast: Forecast, setting: Setting) -> tuple[float, float]:
+def _order(forecast: Forecast, setting: Variant) -> tuple[float, float]:
     expected = forecast.seconds(setting)
     return (0.0 if expected is None else expected, setting.effort * setting.unknowns)
 

@@ -14,7 +14,7 @@ from pipelines.scene.file import SceneFile
 from pipelines.tuning.overlay import Overlay
 from pipelines.tuning.profiles import PROFILES
 
-__all__ = ["Setting", "grid", "setting_name"]
+__all__ = ["Variant", "grid", "setting_name"]
 
 _CELLS = {
     Element.TET4: (1, 2, 3, 4, 6),
@@ -49,7 +49,7 @@ _PROFILE = "profile"  # first word of the names of profiles
 
 
 @dataclass(frozen=True)
-class Setting:
+class Variant:
     """One setting of the study.
 
     Attributes
@@ -81,7 +81,7 @@ class Setting:
 
 def grid(
     scene: SceneFile, blocks: Sequence[Block], width: float, stress: bool = False
-) -> tuple[Setting, ...]:
+) -> tuple[Variant, ...]:
     """Return the settings to try: models of the stones, cheapest first, then variants in one further setting.
 
     Parameters
@@ -118,7 +118,7 @@ def setting_name(overlay: Overlay) -> str:
     return re.sub(r"(?<![.\d])1 cells", "1 cell", words) or "as written"
 
 
-def _models(scene: SceneFile, moving: Sequence[Block], width: float, stress: bool) -> list[Setting]:
+def _models(scene: SceneFile, moving: Sequence[Block], width: float, stress: bool) -> list[Variant]:
     """Return the models of the stones, by increasing cost."""
     soft = [block for block in moving if block.fidelity is Fidelity.DEFORMABLE]
     found = [_model(scene, Overlay(), moving, soft, width)]
@@ -141,7 +141,7 @@ def _models(scene: SceneFile, moving: Sequence[Block], width: float, stress: boo
 
 def _profiles(
     scene: SceneFile, moving: Sequence[Block], soft: Sequence[Block], width: float
-) -> Iterator[Setting]:
+) -> Iterator[Variant]:
     """Yield the named profiles; where no stone deforms, without those in which all do."""
     for profile in PROFILES.values():
         overlay = profile.overlay(scene.time)
@@ -151,7 +151,7 @@ def _profiles(
         yield replace(_model(scene, overlay, moving, deformed, width), name=f"{_PROFILE} {profile.name}")
 
 
-def _of_solver(scene: SceneFile, model: Setting) -> Iterator[Setting]:
+def _of_solver(scene: SceneFile, model: Variant) -> Iterator[Variant]:
     """Yield other tolerances, and other methods for the scene as written and for rigid stones."""
     plain, solver = model.overlay in _PLAIN, scene.solver
     for factor, effort in ((_LOOSER, 1.0), (_TIGHTER, 2.0)) if plain else ((_LOOSER, 1.0),):
@@ -166,7 +166,7 @@ def _of_solver(scene: SceneFile, model: Setting) -> Iterator[Setting]:
             yield _variant(model, replace(model.overlay, method=method), 2.0)
 
 
-def _of_time(scene: SceneFile, model: Setting) -> Iterator[Setting]:
+def _of_time(scene: SceneFile, model: Variant) -> Iterator[Variant]:
     """Yield other time steps, errors of the motion and damping of the scheme, where motion is followed."""
     time = scene.time
     if model.overlay not in _PLAIN or time.relaxation:
@@ -181,7 +181,7 @@ def _of_time(scene: SceneFile, model: Setting) -> Iterator[Setting]:
             yield _variant(model, replace(model.overlay, theta=theta), 1.0)
 
 
-def _of_points(scene: SceneFile, model: Setting) -> Iterator[Setting]:
+def _of_points(scene: SceneFile, model: Variant) -> Iterator[Variant]:
     """Yield other contact points of flat faces, for rigid stones."""
     for points in (3, 4, 8):
         if points != scene.contact.points:
@@ -197,11 +197,11 @@ def _other(tolerance: float, factor: float) -> float:
 
 def _model(
     scene: SceneFile, overlay: Overlay, moving: Sequence[Block], soft: Sequence[Block], width: float
-) -> Setting:
+) -> Variant:
     """Return a setting in which the stones `soft`, of those that move, have finite elements."""
     element = overlay.element or scene.mesh.element
     edge = scene.mesh.size if overlay.cells is None else width / overlay.cells
-    return Setting(
+    return Variant(
         name=setting_name(overlay),
         overlay=overlay,
         unknowns=6.0 * (len(moving) - len(soft)) + sum(_unknowns(one, element, edge) for one in soft),
@@ -215,7 +215,7 @@ def _model(
     )
 
 
-def _variant(model: Setting, overlay: Overlay, effort: float) -> Setting:
+def _variant(model: Variant, overlay: Overlay, effort: float) -> Variant:
     return replace(
         model,
         name=setting_name(overlay),

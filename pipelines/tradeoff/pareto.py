@@ -5,14 +5,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from pipelines.results.quantities import QUANTITIES, differences
-from pipelines.tradeoff.grid import Setting
+from pipelines.tradeoff.grid import Variant
 from pipelines.tradeoff.store import Measured, Status
 from pipelines.tuning.overlay import Overlay
 
 __all__ = [
+    "ErrorReference",
     "Judged",
     "Recommendation",
-    "Reference",
     "cheapest",
     "counted",
     "front",
@@ -25,7 +25,7 @@ _COARSER = 1.2  # least ratio of sizes at which one mesh gives an error estimate
 
 
 @dataclass(frozen=True)
-class Reference:
+class ErrorReference:
     """Reference of the errors: the finest run within the budget, not the truth.
 
     Attributes
@@ -75,8 +75,8 @@ class Recommendation:
 
 
 def judge(
-    settings: Mapping[str, Setting], runs: Mapping[str, Measured]
-) -> tuple[Reference | None, tuple[Judged, ...]]:
+    settings: Mapping[str, Variant], runs: Mapping[str, Measured]
+) -> tuple[ErrorReference | None, tuple[Judged, ...]]:
     """Return the reference, None without finished runs, and all finished runs with their errors.
 
     The reference is the run with the finest elements, by the distance of their nodes and their order: error estimates
@@ -117,7 +117,7 @@ def front(points: Iterable[tuple[float, float]]) -> tuple[int, ...]:
 
 
 def cheapest(
-    judged: Sequence[Judged], reference: Reference, quantity: str, error: float
+    judged: Sequence[Judged], reference: ErrorReference, quantity: str, error: float
 ) -> Recommendation | None:
     """Return the cheapest run that is surely below an error of a quantity; None if its error is unknown in all runs.
 
@@ -135,7 +135,7 @@ def cheapest(
 
 
 def models_of_interest(
-    settings: Mapping[str, Setting], runs: Mapping[str, Measured], quantity: str
+    settings: Mapping[str, Variant], runs: Mapping[str, Measured], quantity: str
 ) -> frozenset[str]:
     """Return the scene as written, if its error is known, and the models on the front of a quantity."""
     _, judged = judge(settings, runs)
@@ -154,7 +154,7 @@ def counted(one: Judged, quantity: str) -> float | None:
     return None if one.errors["outcome"] else one.errors[quantity]
 
 
-def _bound(one: Judged, reference: Reference, quantity: str) -> float | None:
+def _bound(one: Judged, reference: ErrorReference, quantity: str) -> float | None:
     """Return the error of a run plus that of the reference; None if it is unknown, or the outcome differs."""
     error, own = counted(one, quantity), reference.errors[quantity]
     if error is None or own is None:
@@ -162,7 +162,7 @@ def _bound(one: Judged, reference: Reference, quantity: str) -> float | None:
     return error if one.run.name == reference.name or quantity in _OWN else error + own
 
 
-def _fineness(setting: Setting, run: Measured) -> tuple[float, ...]:
+def _fineness(setting: Variant, run: Measured) -> tuple[float, ...]:
     """Return a sort key that is smaller for finer runs."""
     stressed = run.quantities is not None and run.quantities.stress_error is not None
     return (
@@ -175,23 +175,25 @@ def _fineness(setting: Setting, run: Measured) -> tuple[float, ...]:
     )
 
 
-def _reference(settings: Mapping[str, Setting], finest: Measured, others: Sequence[Measured]) -> Reference:
+def _reference(
+    settings: Mapping[str, Variant], finest: Measured, others: Sequence[Measured]
+) -> ErrorReference:
     """Return the finest run, its error estimated from the finest of the others that is coarser in mesh or step."""
     found = _partner(settings, finest, others)
     assert finest.quantities is not None
     if found is None:
         own = dict.fromkeys(QUANTITIES) | {name: finest.quantities.errors[name] for name in _OWN}
-        return Reference(finest.name, own, "", 1.0, finest.quantities.stress_error)
+        return ErrorReference(finest.name, own, "", 1.0, finest.quantities.stress_error)
     partner, ratio = found
     assert partner.quantities is not None
     apart = differences(partner.quantities, finest.quantities)
     errors = {name: None if value is None else value / (ratio - 1.0) for name, value in apart.items()}
     errors |= {"outcome": 0.0} | {name: finest.quantities.errors[name] for name in _OWN}
-    return Reference(finest.name, errors, partner.name, ratio, finest.quantities.stress_error)
+    return ErrorReference(finest.name, errors, partner.name, ratio, finest.quantities.stress_error)
 
 
 def _partner(
-    settings: Mapping[str, Setting], finest: Measured, others: Sequence[Measured]
+    settings: Mapping[str, Variant], finest: Measured, others: Sequence[Measured]
 ) -> tuple[Measured, float] | None:
     """Return a run for the error estimate of the finest, and how much coarser it is; None if none is coarser."""
     fine = settings[finest.name]
@@ -207,7 +209,7 @@ def _partner(
 
 
 def _coarser(
-    settings: Mapping[str, Setting], fine: Setting, runs: Sequence[Measured], size: str
+    settings: Mapping[str, Variant], fine: Variant, runs: Sequence[Measured], size: str
 ) -> tuple[Measured, float] | None:
     """Return the first of the runs that is coarser in cell or step size, and by how much."""
     for one in runs:

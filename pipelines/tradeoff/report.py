@@ -13,7 +13,7 @@ from mechanics.scene.scene import Fidelity
 from pipelines.results.quantities import QUANTITIES
 from pipelines.results.summary import as_json
 from pipelines.tradeoff.forecast import Forecast, left_out
-from pipelines.tradeoff.pareto import Judged, Reference, cheapest, counted, front, judge
+from pipelines.tradeoff.pareto import ErrorReference, Judged, cheapest, counted, front, judge
 from pipelines.tradeoff.plot import Panel, Point, trade_png
 from pipelines.tradeoff.scheduler import Limits
 from pipelines.tradeoff.store import INDEX, Measured, Status, Store
@@ -110,7 +110,7 @@ def _row(one: Judged) -> dict[str, Any]:
 
 def _recommended(
     goal: Goal,
-    reference: Reference | None,
+    reference: ErrorReference | None,
     judged: Sequence[Judged],
     runs: Mapping[str, Measured],
 ) -> dict[str, Any] | None:

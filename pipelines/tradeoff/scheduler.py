@@ -16,7 +16,7 @@ from typing import IO, Any, Self
 from mechanics.dynamics.progress import Listener, Progress
 from pipelines.results.quantities import quantities_from
 from pipelines.tradeoff.forecast import Choice, Forecast, next_run
-from pipelines.tradeoff.grid import Setting
+from pipelines.tradeoff.grid import Variant
 from pipelines.tradeoff.pareto import models_of_interest
 from pipelines.tradeoff.store import Measured, Status, Store
 from pipelines.tradeoff.worker import FAILED, Job
@@ -49,7 +49,7 @@ class Limits:
 
 
 def carry_out(
-    job: Job, settings: Sequence[Setting], store: Store, limits: Limits, progress: Listener
+    job: Job, settings: Sequence[Variant], store: Store, limits: Limits, progress: Listener
 ) -> tuple[Forecast, float]:
     """Run what fits into the budget and has not been run; return the forecast and the remaining time [s].
 
@@ -80,7 +80,7 @@ def carry_out(
 
 
 def _next(
-    settings: Mapping[str, Setting],
+    settings: Mapping[str, Variant],
     ended: Mapping[str, Measured],
     runs: "_Runs",
     left: float,

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from mechanics.arrays import Array
 from mechanics.scene.scene import Block, Fidelity, Method, Placement, Scene
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.polyhedra import smallest_width
-from pipelines.arrays import Array
 from pipelines.scene.file import SceneFile
 from pipelines.scene.selection import StoneModel
 

@@ -1,6 +1,6 @@
 """Closed solids with planar faces: cutting, convex parts, adjacency, folds.
 
-Public: `Solid`, `volume_of` (solids); `Polyhedra`, `Touching`, `find_touching` (adjacency); `cut_stones`, `CutStone`
+Public: `Solid`, `volume_of` (solids); `SolidArrays`, `Touching`, `find_touching` (adjacency); `cut_stones`, `CutStone`
 (cutting); `convex_parts` (convex_parts); `stone_parts` (stone_parts); `is_convex`, `reflex_edges` (convexity);
 `intersection` (half_spaces); `fold`, `warp` (folds); `settle` (plane_network); `check_watertight`, `triangulate`
 (watertight).

@@ -22,8 +22,8 @@ from survey.geometry._kernels.between import hidden, thinnest_of
 from survey.geometry._kernels.boxes import count_near, list_near, morton_codes
 
 __all__ = [
-    "Polyhedra",
     "PolyhedraBuilder",
+    "SolidArrays",
     "Touching",
     "boxes_of",
     "find_touching",
@@ -33,7 +33,7 @@ __all__ = [
 
 
 @dataclass(frozen=True)
-class Polyhedra:
+class SolidArrays:
     """Many closed solids with planar faces, one after the other.
 
     Attributes
@@ -53,7 +53,7 @@ class Polyhedra:
         return len(self.solid_starts) - 1
 
     @classmethod
-    def gather(cls, solids: Iterable[tuple[Array, Sequence[Sequence[int]]]]) -> "Polyhedra":
+    def gather(cls, solids: Iterable[tuple[Array, Sequence[Sequence[int]]]]) -> "SolidArrays":
         """Concatenate solids, each given by its vertices (nv, 3) and its faces."""
         builder = PolyhedraBuilder()
         for vertices, faces in solids:
@@ -63,7 +63,7 @@ class Polyhedra:
 
 @dataclass
 class PolyhedraBuilder:
-    """Incremental builder of `Polyhedra`, which keeps only the numbers of each solid."""
+    """Incremental builder of `SolidArrays`, which keeps only the numbers of each solid."""
 
     _vertices: bytearray = field(default_factory=bytearray)
     _corners: bytearray = field(default_factory=bytearray)
@@ -83,10 +83,10 @@ class PolyhedraBuilder:
         self._face_counts += known[1]
         self._solid_counts.append(len(faces))
 
-    def build(self) -> Polyhedra:
+    def build(self) -> SolidArrays:
         """Return all solids added so far."""
         counts = np.frombuffer(bytes(self._face_counts), dtype=np.int64)
-        return Polyhedra(
+        return SolidArrays(
             np.frombuffer(bytes(self._vertices)).reshape(-1, 3),
             np.frombuffer(bytes(self._corners), dtype=np.int64),
             np.concatenate([[0], np.cumsum(counts)]),
@@ -118,7 +118,7 @@ class Touching:
 
 
 def find_touching(
-    solids: Polyhedra,
+    solids: SolidArrays,
     width: float = 0.04,
     angle: float = 12.0,
     *,

@@ -9,7 +9,7 @@ from numba import njit
 from survey.arrays import Array, Bools, Ints
 from survey.geometry._kernels.vectors import dot, height_over
 
-__all__ = ["KNOWN", "JointCorners", "continuing_faces", "fit_middle_planes"]
+__all__ = ["KNOWN", "FaceCorners", "continuing_faces", "fit_middle_planes"]
 
 _ROUNDS = 30
 _HUBER = 1.5
@@ -43,7 +43,7 @@ _WEDGE = 0.035
 """Least opening of a joint, as a slope, for which the two sides may have planes of their own (2°)."""
 
 
-class JointCorners(NamedTuple):
+class FaceCorners(NamedTuple):
     """Corners of the faces of several joints, joint after joint.
 
     Attributes
@@ -290,7 +290,7 @@ def continuing_faces(pairs, solid, normals, offsets, joined, cosine, near):
     Inputs
     ------
     pairs : (n, 2) int64, neighbouring stones
-    solid : vertices, corners, face_starts, solid_starts of `Polyhedra`
+    solid : vertices, corners, face_starts, solid_starts of `SolidArrays`
     normals, offsets : (nf, 3) float64 unit [-], (nf,) float64 [m], of all faces
     joined : (nf,) bool, whether a face belongs to a joint
     cosine : float, of the largest angle between the two [-]

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from survey.arrays import Array, Bools, Ints
-from survey.geometry.adjacency import Polyhedra
+from survey.geometry.adjacency import SolidArrays
 from survey.joints.facing import FacePlanes, FacingFaces
 from survey.joints.settings import JointSettings
 
@@ -72,7 +72,7 @@ class _Chain:
 
 
 def fit_bent_bed(
-    solids: Polyhedra,
+    solids: SolidArrays,
     planes: FacePlanes,
     sound: Bools,
     facing: FacingFaces,
@@ -135,7 +135,7 @@ def _bed(planes: FacePlanes, facing: FacingFaces, links: Ints) -> _Bed:
     return _Bed(axes, origin, local[:, 0], local[:, 2], lower, upper)
 
 
-def _extents(solids: Polyhedra, bed: _Bed) -> dict[int, tuple[float, float]]:
+def _extents(solids: SolidArrays, bed: _Bed) -> dict[int, tuple[float, float]]:
     """Return the interval that each face covers along the bed [m]."""
     out = {}
     for face in np.unique(np.concatenate([bed.lower, bed.upper])).tolist():
@@ -217,7 +217,7 @@ def _changes(
     return of_link, knots
 
 
-def _fitted(solids: Polyhedra, sound: Bools, bed: _Bed, posts: Array, number: Ints) -> _Chain:
+def _fitted(solids: SolidArrays, sound: Bools, bed: _Bed, posts: Array, number: Ints) -> _Chain:
     """Fit the chain through posts to the corners on both sides."""
     rows, hands = [], []
     for side, sign in ((bed.lower, -1.0), (bed.upper, 1.0)):

@@ -8,7 +8,7 @@ import numpy as np
 from moma.errors import GeometryError
 from survey.arrays import Array, Bools, Ints
 from survey.geometry._kernels.convexity import highest_corners
-from survey.geometry.adjacency import Polyhedra
+from survey.geometry.adjacency import SolidArrays
 from survey.geometry.cutting import cut_stones, joins_three, moves
 from survey.geometry.solids import Solid
 from survey.joints.contact_planes import ContactPlanes, StoneFaces, contact_planes, some_links
@@ -17,7 +17,7 @@ from survey.joints.settings import JointSettings
 from survey.joints.worn_sides import mended_planes
 from survey.simplify.simplify import BlockyStone
 
-__all__ = ["Building", "Cut", "as_building", "close_within_bounds"]
+__all__ = ["Cut", "LocalStones", "as_building", "close_within_bounds"]
 
 
 _ROUNDS = 10  # rounds in which single joints are left open; then all joints of a stone that moves too far
@@ -29,7 +29,7 @@ _KEPT = "one of the stones keeps its shape, and the other is led by its other jo
 
 
 @dataclass(frozen=True)
-class Building:
+class LocalStones:
     """All stones, in coordinates about a place among them.
 
     Attributes
@@ -79,7 +79,7 @@ class Cut:
     of_face: dict[int, tuple[int, ...]]
 
 
-def as_building(stones: Sequence[BlockyStone]) -> Building:
+def as_building(stones: Sequence[BlockyStone]) -> LocalStones:
     """Express the stones in coordinates about a place among them.
 
     Raises
@@ -95,7 +95,7 @@ def as_building(stones: Sequence[BlockyStone]) -> Building:
         known.add(stone.code)
     origin = stones[0].solid.vertices.mean(axis=0)
     solids = tuple(replace(one.solid, vertices=one.solid.vertices - origin) for one in stones)
-    gathered = Polyhedra.gather((solid.vertices, solid.faces) for solid in solids)
+    gathered = SolidArrays.gather((solid.vertices, solid.faces) for solid in solids)
     planes = planes_of(gathered)
     height, extent = highest_corners(*_arrays(gathered), planes.normals, planes.offsets)
     convex: Bools = height <= _CONVEX * extent
@@ -106,11 +106,11 @@ def as_building(stones: Sequence[BlockyStone]) -> Building:
     kept = ~(convex | notched)[planes.owner]
     faces = StoneFaces(gathered, planes, sound, kept, core[planes.owner], slack)
     rows = np.column_stack([planes.normals, planes.offsets])
-    return Building(tuple(stones), solids, origin, faces, rows, convex, notched)
+    return LocalStones(tuple(stones), solids, origin, faces, rows, convex, notched)
 
 
 def close_within_bounds(
-    building: Building, facing: FacingFaces, settings: JointSettings, known: Sequence[Solid]
+    building: LocalStones, facing: FacingFaces, settings: JointSettings, known: Sequence[Solid]
 ) -> Cut:
     """Close the joints of a building, except those that would move a corner farther than the bound.
 
@@ -165,7 +165,7 @@ def _slack(stone: BlockyStone) -> Array:
     return np.where(hidden, sigma, 0.0)
 
 
-def _arrays(solids: Polyhedra) -> tuple[Array, Ints, Ints, Ints]:
+def _arrays(solids: SolidArrays) -> tuple[Array, Ints, Ints, Ints]:
     return solids.vertices, solids.corners, solids.face_starts, solids.solid_starts
 
 
@@ -177,7 +177,7 @@ def _of_all(some: ContactPlanes, links: Ints, count: int) -> ContactPlanes:
 
 
 def _stone_planes(
-    building: Building,
+    building: LocalStones,
     facing: FacingFaces,
     contact: ContactPlanes,
     known: Sequence[Solid],
@@ -212,7 +212,7 @@ def _stone_planes(
     return planes, free
 
 
-def _moved(building: Building, stone: int, solid: Solid, planes: Array) -> float:
+def _moved(building: LocalStones, stone: int, solid: Solid, planes: Array) -> float:
     """Return how far a corner moves; of the core, how far it comes to lie from the surface [m].
 
     Two sides of a core block that come to lie in one plane have no corner between them any more; nobody measured it.
@@ -223,14 +223,14 @@ def _moved(building: Building, stone: int, solid: Solid, planes: Array) -> float
     return float(np.abs((old.vertices @ planes[:, :3].T - planes[:, 3]).max(axis=1)).max())
 
 
-def _changed(building: Building, stone: int, planes: Array) -> bool:
+def _changed(building: LocalStones, stone: int, planes: Array) -> bool:
     """Return whether a stone has other planes than those of its faces."""
     own = building.planes[building.rows(stone)]
     return len(planes) != len(own) or not np.array_equal(planes, own)
 
 
 def _leave_open(
-    building: Building,
+    building: LocalStones,
     facing: FacingFaces,
     contact: ContactPlanes,
     stone: int,

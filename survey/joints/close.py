@@ -15,10 +15,10 @@ import numpy as np
 
 from survey.arrays import Array, Ints
 from survey.extrusion.extrusion import SurveyedBlock
-from survey.geometry.adjacency import Polyhedra
+from survey.geometry.adjacency import SolidArrays
 from survey.geometry.solids import Solid, planes_of_solid
 from survey.geometry.stone_parts import stone_parts
-from survey.joints.bounded_closing import Building, Cut, as_building, close_within_bounds
+from survey.joints.bounded_closing import Cut, LocalStones, as_building, close_within_bounds
 from survey.joints.contact_planes import ContactPlanes
 from survey.joints.facing import FacingFaces, find_facing, planes_of
 from survey.joints.overlaps import find_overlaps, part_stones
@@ -110,7 +110,7 @@ def close_joints(
     return ClosedStones(changed, blocky, report)
 
 
-def _closed(building: Building, facing: FacingFaces, settings: JointSettings) -> tuple[Cut, FacingFaces]:
+def _closed(building: LocalStones, facing: FacingFaces, settings: JointSettings) -> tuple[Cut, FacingFaces]:
     """Close all joints that can be closed, including those revealed by closing others."""
     cut = close_within_bounds(building, facing, settings, building.solids)
     for _ in range(_ROUNDS):
@@ -121,7 +121,7 @@ def _closed(building: Building, facing: FacingFaces, settings: JointSettings) ->
     return cut, facing
 
 
-def _parts(building: Building, cut: Cut) -> tuple[list[Solid], dict[int, Array]]:
+def _parts(building: LocalStones, cut: Cut) -> tuple[list[Solid], dict[int, Array]]:
     """Return the convex parts of non-convex stones, and their planes (n, 4), numbered after all stones."""
     parts: list[Solid] = []
     for i in np.flatnonzero(~building.convex).tolist():
@@ -129,7 +129,7 @@ def _parts(building: Building, cut: Cut) -> tuple[list[Solid], dict[int, Array]]
     return parts, {len(building.solids) + k: planes_of_solid(part) for k, part in enumerate(parts)}
 
 
-def _as_surveyed(building: Building, facing: FacingFaces) -> Cut:
+def _as_surveyed(building: LocalStones, facing: FacingFaces) -> Cut:
     """Return all stones as they are, with all joints open except those whose faces already share a plane."""
     convex = np.flatnonzero(building.convex).tolist()
     planes = {i: building.planes[building.rows(i)] for i in convex}
@@ -144,7 +144,9 @@ def _as_surveyed(building: Building, facing: FacingFaces) -> Cut:
     return Cut(contact, reasons, list(building.solids), planes, free, {})
 
 
-def newly_facing(building: Building, facing: FacingFaces, cut: Cut, settings: JointSettings) -> FacingFaces:
+def newly_facing(
+    building: LocalStones, facing: FacingFaces, cut: Cut, settings: JointSettings
+) -> FacingFaces:
     """Return the known pairs of faces, and those of further stones that face each other now.
 
     Parameters
@@ -154,7 +156,7 @@ def newly_facing(building: Building, facing: FacingFaces, cut: Cut, settings: Jo
     cut : stones with the joints of these closed
     settings : criteria of a joint; a newly found joint is at most half as wide
     """
-    solids = Polyhedra.gather((solid.vertices, solid.faces) for solid in cut.solids)
+    solids = SolidArrays.gather((solid.vertices, solid.faces) for solid in cut.solids)
     found = find_facing(solids, planes_of(solids), replace(settings, max_width=0.5 * settings.max_width))
     pairs, owner = _surveyed_faces(building, cut)[found.faces], building.faces.planes.owner
     known = set(map(tuple, owner[facing.faces].tolist()))
@@ -175,7 +177,7 @@ def newly_facing(building: Building, facing: FacingFaces, cut: Cut, settings: Jo
     )
 
 
-def _surveyed_faces(building: Building, cut: Cut) -> Ints:
+def _surveyed_faces(building: LocalStones, cut: Cut) -> Ints:
     """Return the surveyed face of each face of the cut stones; -1 for one that came from a bend of its bed."""
     out = []
     for i, solid in enumerate(cut.solids):
@@ -185,7 +187,7 @@ def _surveyed_faces(building: Building, cut: Cut) -> Ints:
     return np.concatenate(out)
 
 
-def _height(building: Building, faces: Ints, found: FacingFaces, links: list[int]) -> Array:
+def _height(building: LocalStones, faces: Ints, found: FacingFaces, links: list[int]) -> Array:
     """Return the heights of the planes of surveyed faces along the normal of a joint, above its middle [m]."""
     normals, offsets = building.faces.planes.normals[faces], building.faces.planes.offsets[faces]
     centroid, normal = found.centroid[links], found.normal[links]

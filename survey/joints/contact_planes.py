@@ -16,8 +16,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from survey.arrays import Array, Bools, Ints
-from survey.geometry.adjacency import Polyhedra
-from survey.joints._kernels import KNOWN, JointCorners, continuing_faces, fit_middle_planes
+from survey.geometry.adjacency import SolidArrays
+from survey.joints._kernels import KNOWN, FaceCorners, continuing_faces, fit_middle_planes
 from survey.joints.bent_beds import fit_bent_bed
 from survey.joints.facing import FacePlanes, FacingFaces
 from survey.joints.hidden_sides import HiddenSides, common_planes
@@ -46,7 +46,7 @@ class StoneFaces:
     slack : (nf,) distance by which the plane of a hidden side may be wrong, as its depth was not measured; else 0 [m]
     """
 
-    solids: Polyhedra
+    solids: SolidArrays
     planes: FacePlanes
     sound: Bools
     kept: Bools
@@ -412,7 +412,7 @@ def _fitted(faces: StoneFaces, groups: _Groups, usual: float, settings: JointSet
     scale = np.ones(count)
     np.maximum.at(scale, joint, np.abs(local[:, :2]).max(axis=1))
     planes, values = np.zeros((count, 3)), np.zeros((count, 5))
-    corners = JointCorners(
+    corners = FaceCorners(
         np.ascontiguousarray(local), np.repeat(groups.hands, sizes), faces.sound[corner], starts, scale
     )
     fit_middle_planes(corners, usual, settings.straightness, planes, values)

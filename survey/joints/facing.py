@@ -6,7 +6,7 @@ import numpy as np
 
 from survey.arrays import Array, Bools, Ints
 from survey.geometry._kernels.adjacency import face_planes, facing_faces
-from survey.geometry.adjacency import Polyhedra, boxes_of, near_pairs, open_to_each_other
+from survey.geometry.adjacency import SolidArrays, boxes_of, near_pairs, open_to_each_other
 from survey.joints.settings import JointSettings
 
 __all__ = ["FacePlanes", "FacingFaces", "find_facing", "planes_of"]
@@ -57,7 +57,7 @@ class FacingFaces:
         return len(self.faces)
 
 
-def planes_of(solids: Polyhedra) -> FacePlanes:
+def planes_of(solids: SolidArrays) -> FacePlanes:
     """Return the planes of all faces, each through the mean of its corners."""
     normals, areas, boxes, convex = face_planes(solids.vertices, solids.corners, solids.face_starts)
     counts = np.diff(solids.face_starts)
@@ -68,7 +68,7 @@ def planes_of(solids: Polyhedra) -> FacePlanes:
     return FacePlanes(normals, (normals * centres).sum(axis=1), areas, boxes, convex, owner)
 
 
-def find_facing(solids: Polyhedra, planes: FacePlanes, settings: JointSettings) -> FacingFaces:
+def find_facing(solids: SolidArrays, planes: FacePlanes, settings: JointSettings) -> FacingFaces:
     """Find the faces that face each other across a joint, or overlap by no more than a joint is wide.
 
     Parameters

@@ -7,18 +7,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from survey.arrays import Array
-from survey.geometry.adjacency import Polyhedra
+from survey.geometry.adjacency import SolidArrays
 from survey.geometry.cutting import moves
-from survey.joints.bounded_closing import Building, Cut
+from survey.joints.bounded_closing import Cut, LocalStones
 from survey.joints.facing import FacePlanes, FacingFaces, find_facing, planes_of
 from survey.joints.overlaps import Overlapping
 from survey.joints.settings import JointMode, JointSettings
 
-__all__ = ["ClosingReport", "Gap", "Joint", "Overlap", "closing_report"]
+__all__ = ["ClosingReport", "Gap", "Overlap", "StoneJoint", "closing_report"]
 
 
 @dataclass(frozen=True)
-class Joint:
+class StoneJoint:
     """A joint between two stones.
 
     Attributes
@@ -96,7 +96,7 @@ class ClosingReport:
     """
 
     mode: JointMode
-    joints: tuple[Joint, ...]
+    joints: tuple[StoneJoint, ...]
     displacement: Mapping[str, Array]
     volume_change: Mapping[str, float]
     alone: tuple[str, ...]
@@ -119,7 +119,7 @@ _BENT = "the bed is bent or stepped here, and stones stay convex"
 
 
 def closing_report(
-    building: Building,
+    building: LocalStones,
     facing: FacingFaces,
     cut: Cut,
     overlaps: list[Overlapping],
@@ -135,7 +135,7 @@ def closing_report(
     overlaps : stones that still overlap
     settings : settings of the closing
     """
-    now = Polyhedra.gather((solid.vertices, solid.faces) for solid in cut.solids)
+    now = SolidArrays.gather((solid.vertices, solid.faces) for solid in cut.solids)
     planes = planes_of(now)
     joints = _joints(building, facing, cut, _contacts(now, planes, settings))
     codes = [stone.code for stone in building.stones]
@@ -161,7 +161,7 @@ def closing_report(
     )
 
 
-def _overlaps(building: Building, found: list[Overlapping]) -> tuple[Overlap, ...]:
+def _overlaps(building: LocalStones, found: list[Overlapping]) -> tuple[Overlap, ...]:
     """Return one entry for each pair of stones, summed over their parts."""
     together: dict[tuple[str, str], list[Overlapping]] = defaultdict(list)
     for one in found:
@@ -174,7 +174,7 @@ def _overlaps(building: Building, found: list[Overlapping]) -> tuple[Overlap, ..
     return tuple(out)
 
 
-def _volume_changes(building: Building, cut: Cut, after: Array) -> list[float]:
+def _volume_changes(building: LocalStones, cut: Cut, after: Array) -> list[float]:
     """Return the new volume (n,) over the old, minus 1, of each stone; zero for an unchanged one."""
     before = _volumes(building.faces.solids, building.faces.planes)
     out: list[float] = (after / before - 1.0).tolist()
@@ -182,14 +182,14 @@ def _volume_changes(building: Building, cut: Cut, after: Array) -> list[float]:
     return [0.0 if old is new else change for old, new, change in pairs]
 
 
-def _volumes(solids: Polyhedra, planes: FacePlanes) -> Array:
+def _volumes(solids: SolidArrays, planes: FacePlanes) -> Array:
     """Return volumes (n,), by the divergence theorem [m³]."""
     cones = planes.areas * planes.offsets / 3.0
     out: Array = np.add.reduceat(cones, solids.solid_starts[:-1])
     return out
 
 
-def _joints(building: Building, facing: FacingFaces, cut: Cut, touching: _Contacts) -> list[Joint]:
+def _joints(building: LocalStones, facing: FacingFaces, cut: Cut, touching: _Contacts) -> list[StoneJoint]:
     """Return all joints in the order of `facing`."""
     planes, codes = building.faces.planes, [stone.code for stone in building.stones]
     pairs = planes.owner[facing.faces]
@@ -205,7 +205,7 @@ def _joints(building: Building, facing: FacingFaces, cut: Cut, touching: _Contac
             area, middle = _shared(touching.get((int(pairs[k, 0]), int(pairs[k, 1])), []), normal)
             centroid = centroid if middle is None else middle
         joints.append(
-            Joint(
+            StoneJoint(
                 stones=(codes[pairs[k, 0]], codes[pairs[k, 1]]),
                 plane=plane if not reason else -1,
                 width=float(facing.gap[k]) if reason else _width(building, facing, cut, k),
@@ -219,7 +219,7 @@ def _joints(building: Building, facing: FacingFaces, cut: Cut, touching: _Contac
     return joints
 
 
-def _width(building: Building, facing: FacingFaces, cut: Cut, link: int) -> float:
+def _width(building: LocalStones, facing: FacingFaces, cut: Cut, link: int) -> float:
     """Return the distance of the sound corners of the two faces along the normal of their plane [m].
 
     Measured corners count; hidden ones follow from them, and would open a joint like a wedge where faces are turned.
@@ -242,7 +242,7 @@ def _width(building: Building, facing: FacingFaces, cut: Cut, link: int) -> floa
     return total
 
 
-def _contacts(solids: Polyhedra, planes: FacePlanes, settings: JointSettings) -> _Contacts:
+def _contacts(solids: SolidArrays, planes: FacePlanes, settings: JointSettings) -> _Contacts:
     """Return all current contacts of faces."""
     close = replace(settings, max_width=_MEETS, max_angle=0.01, min_overlap=0.0)
     found = find_facing(solids, planes, close)

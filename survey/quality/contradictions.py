@@ -26,7 +26,7 @@ import numpy as np
 from survey.arrays import Array
 from survey.quality.facades import Facade
 from survey.quality.precision import StoneQuality
-from survey.quality.wedges import Wedge, sloped_side, wedges
+from survey.quality.wedges import SideConvergence, sloped_side, wedges
 
 __all__ = ["SIGNIFICANT", "Contradiction", "contradictions"]
 
@@ -80,7 +80,7 @@ class _Around:
     """
 
     stretchers: Mapping[int, tuple[float, float, str]]
-    wedges: Mapping[int, Wedge]
+    wedges: Mapping[int, SideConvergence]
     convergence: float
 
 
@@ -219,7 +219,7 @@ def _middle(stones: Sequence[StoneQuality], words: str) -> tuple[float, float, s
     return float(np.median([stone.length for stone in stones])), sigma, words
 
 
-def _least_convergence(measured: Mapping[int, Wedge]) -> float:
+def _least_convergence(measured: Mapping[int, SideConvergence]) -> float:
     """Return half the median convergence of the survey's arch stones; 1° if there are too few."""
     if len(measured) < _FEWEST:
         return _PARALLEL

@@ -11,7 +11,7 @@ from survey.arrays import Array
 from survey.quality.facades import Facade, upright_frame
 from survey.quality.precision import StoneQuality
 
-__all__ = ["Wedge", "sloped_side", "wedges"]
+__all__ = ["SideConvergence", "sloped_side", "wedges"]
 
 
 _ARCH = ("voussoir", "keystone")
@@ -22,7 +22,7 @@ _SHORT = 0.5  # of the longest side: length below which a side is an arris or a 
 
 
 @dataclass(frozen=True)
-class Wedge:
+class SideConvergence:
     """Convergence of the two sides of an arch stone.
 
     Attributes
@@ -35,7 +35,7 @@ class Wedge:
     sigma: float
 
 
-def wedges(stones: Sequence[StoneQuality], facades: Sequence[Facade]) -> dict[int, Wedge]:
+def wedges(stones: Sequence[StoneQuality], facades: Sequence[Facade]) -> dict[int, SideConvergence]:
     """Return the convergence of every voussoir and keystone of the standing facades, by index.
 
     A stone's sides are those that face along the arch, from one of its neighbours to the other; the extrados
@@ -104,7 +104,7 @@ def _radial(k: int, centres: Array, tree: "cKDTree[None]", reach: float) -> Arra
     return None
 
 
-def _wedge(flat: Array, radial: Array, stone: StoneQuality) -> Wedge | None:
+def _wedge(flat: Array, radial: Array, stone: StoneQuality) -> SideConvergence | None:
     tangent = np.array([radial[1], -radial[0]])
     run = np.roll(flat, -1, axis=0) - flat
     length = np.linalg.norm(run, axis=1)
@@ -118,4 +118,4 @@ def _wedge(flat: Array, radial: Array, stone: StoneQuality) -> Wedge | None:
         up = run[k] if run[k] @ radial > 0.0 else -run[k]
         angles.append(sign * math.atan2(float(up @ tangent), float(up @ radial)))
         variance += 2.0 * _corner(stone) ** 2 / float(length[k]) ** 2
-    return Wedge(sum(angles), math.sqrt(variance))
+    return SideConvergence(sum(angles), math.sqrt(variance))

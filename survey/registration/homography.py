@@ -16,8 +16,14 @@ from numpy.typing import ArrayLike
 
 from moma.errors import GeometryError
 from survey.arrays import Array, Bools
-from survey.registration.outliers import Verdict, find_outliers, point_tests
-from survey.registration.projective import Frame, direct_homography, frame_of, linearised, mapped_points
+from survey.registration.outliers import Agreement, find_outliers, point_tests
+from survey.registration.projective import (
+    ReducedFrame,
+    direct_homography,
+    frame_of,
+    linearised,
+    mapped_points,
+)
 
 __all__ = ["Homography", "fit_homography"]
 
@@ -48,8 +54,8 @@ class Homography:
     """
 
     reduced: Array
-    image_frame: Frame
-    plane_frame: Frame
+    image_frame: ReducedFrame
+    plane_frame: ReducedFrame
     covariance: Array
     residuals: Array
     image_residuals: Array
@@ -163,9 +169,9 @@ class _Marks:
 def _without_outliers(marks: _Marks, names: list[str]) -> Homography:
     everything = np.ones(len(names), dtype=bool)
     _check_spread(marks, names)
-    fits: dict[bytes, tuple[Homography, Verdict]] = {}
+    fits: dict[bytes, tuple[Homography, Agreement]] = {}
 
-    def judge(accepted: Bools) -> Verdict | None:
+    def judge(accepted: Bools) -> Agreement | None:
         if _aligned(marks, accepted) is not None:
             return None
         try:
@@ -238,7 +244,7 @@ def _beyond(marks: _Marks) -> tuple[int, ...]:
     return tuple(np.flatnonzero(few if 0 < 2 * few.sum() < len(few) else np.ones(len(u))).tolist())
 
 
-def _adjust(marks: _Marks, accepted: Bools) -> tuple[Homography, Verdict] | None:
+def _adjust(marks: _Marks, accepted: Bools) -> tuple[Homography, Agreement] | None:
     """Fit by least squares; return None if some point is not in front of the camera."""
     frames = frame_of(marks.image[accepted]), frame_of(marks.plane[accepted])
     u, y = frames[0].reduce(marks.image), frames[1].reduce(marks.plane)
@@ -268,9 +274,9 @@ def _adjust(marks: _Marks, accepted: Bools) -> tuple[Homography, Verdict] | None
 def _result(
     marks: _Marks,
     accepted: Bools,
-    fitted: tuple[Array, Frame, Frame],
+    fitted: tuple[Array, ReducedFrame, ReducedFrame],
     terms: tuple[Array, Array, Array, Array],
-) -> tuple[Homography, Verdict]:
+) -> tuple[Homography, Agreement]:
     matrix, image_frame, plane_frame = fitted
     misclosures, covariances, _, by_parameter = terms
     weights = np.linalg.inv(covariances)
@@ -295,4 +301,4 @@ def _result(
         redundancy=redundancy,
         rejected=tuple(int(i) for i in np.flatnonzero(~accepted)),
     )
-    return fit, Verdict(squares, redundancy, tests, limits, accepted)
+    return fit, Agreement(squares, redundancy, tests, limits, accepted)

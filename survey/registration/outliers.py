@@ -20,7 +20,7 @@ from scipy.special import chdtri
 
 from survey.arrays import Array, Bools
 
-__all__ = ["LEVEL", "Outliers", "Verdict", "find_outliers", "point_tests"]
+__all__ = ["LEVEL", "Agreement", "Outliers", "find_outliers", "point_tests"]
 
 
 LEVEL = 1e-3
@@ -33,7 +33,7 @@ _NARROW = 1.5  # factor of a test beyond its limit below which chance is a plaus
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Agreement:
     """Agreement of a set of points with its own best fit.
 
     Attributes
@@ -109,7 +109,7 @@ def point_tests(
     return tests, np.sqrt(chdtri(np.maximum(freedom, 1), LEVEL))
 
 
-def find_outliers(count: int, smallest: int, judge: Callable[[Bools], Verdict | None]) -> Outliers:
+def find_outliers(count: int, smallest: int, judge: Callable[[Bools], Agreement | None]) -> Outliers:
     """Find the fewest points that have to be left out so that the others agree.
 
     Parameters
@@ -143,7 +143,7 @@ def _subsets(count: int, size: int, best: tuple[int, ...]) -> Iterable[tuple[int
 
 
 def _judged(
-    subsets: Iterable[tuple[int, ...]], everything: Bools, judge: Callable[[Bools], Verdict | None]
+    subsets: Iterable[tuple[int, ...]], everything: Bools, judge: Callable[[Bools], Agreement | None]
 ) -> list[tuple[float, tuple[int, ...], bool]]:
     """Return for each subset the sum of squares, itself, and whether all others agree without it."""
     out = []
@@ -156,7 +156,7 @@ def _judged(
     return out
 
 
-def _decide(explanations: list[tuple[float, tuple[int, ...]]], whole: Verdict | None) -> Outliers:
+def _decide(explanations: list[tuple[float, tuple[int, ...]]], whole: Agreement | None) -> Outliers:
     least, best = min(explanations)
     rivals = [subset for squares, subset in explanations if squares - least < _RIVAL]
     narrow = whole is not None and not (np.nan_to_num(whole.tests) > _NARROW * whole.limits).any()
@@ -165,7 +165,9 @@ def _decide(explanations: list[tuple[float, tuple[int, ...]]], whole: Verdict | 
     return Outliers(suspects=tuple(sorted({i for subset in rivals for i in subset})))
 
 
-def _suspects(count: int, whole: Verdict | None, judge: Callable[[Bools], Verdict | None]) -> tuple[int, ...]:
+def _suspects(
+    count: int, whole: Agreement | None, judge: Callable[[Bools], Agreement | None]
+) -> tuple[int, ...]:
     """Return the points that could be the only wrong one; without any, those that fail; otherwise all."""
     everything = np.ones(count, dtype=bool)
     single = _judged(combinations(range(count), 1), everything, judge)

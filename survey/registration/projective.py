@@ -11,11 +11,11 @@ import numpy as np
 
 from survey.arrays import Array
 
-__all__ = ["Frame", "direct_homography", "frame_of", "linearised", "mapped_points"]
+__all__ = ["ReducedFrame", "direct_homography", "frame_of", "linearised", "mapped_points"]
 
 
 @dataclass(frozen=True)
-class Frame:
+class ReducedFrame:
     """Frame of reduced coordinates (p - centre) · scale, at a mean distance of √2 from the origin."""
 
     centre: Array
@@ -33,10 +33,10 @@ class Frame:
         return np.array([[s, 0.0, -s * x], [0.0, s, -s * y], [0.0, 0.0, 1.0]])
 
 
-def frame_of(points: Array) -> Frame:
+def frame_of(points: Array) -> ReducedFrame:
     """Make the frame in which points (n, 2) lie about the origin, at a mean distance of √2."""
     centre = points[0] + (points - points[0]).mean(axis=0)
-    return Frame(centre, float(np.sqrt(2.0) / np.linalg.norm(points - centre, axis=1).mean()))
+    return ReducedFrame(centre, float(np.sqrt(2.0) / np.linalg.norm(points - centre, axis=1).mean()))
 
 
 def direct_homography(u: Array, y: Array) -> Array | None:

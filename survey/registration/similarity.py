@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from survey.arrays import Array, Bools
-from survey.registration.outliers import Verdict, point_tests
+from survey.registration.outliers import Agreement, point_tests
 
 __all__ = ["Similarity", "adjust_similarity", "best_similarity"]
 
@@ -44,7 +44,7 @@ class Similarity:
     target_centre: Array
     covariance: Array
     residuals: Array
-    verdict: Verdict
+    verdict: Agreement
 
 
 def best_similarity(
@@ -196,5 +196,5 @@ def _result(
     covariance: Array = inverse * np.outer(units, units)
     tests, limits = point_tests(residuals, np.eye(3) / weights[:, None, None], design, covariance, accepted)
     squares = float((weights[:, None] * residuals**2)[accepted].sum())
-    verdict = Verdict(squares, 3 * int(accepted.sum()) - 7, tests, limits, accepted)
+    verdict = Agreement(squares, 3 * int(accepted.sum()) - 7, tests, limits, accepted)
     return Similarity(rotation, scale, *centres, covariance, residuals, verdict)

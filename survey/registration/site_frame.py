@@ -22,7 +22,7 @@ from scipy.special import ndtri
 from moma.errors import SurveyError
 from survey.arrays import Array, Bools
 from survey.records.survey import BlockRecord, ControlPoint, Extrusion, SolidRecord, SurveyHead
-from survey.registration.outliers import LEVEL, Verdict, find_outliers
+from survey.registration.outliers import LEVEL, Agreement, find_outliers
 from survey.registration.similarity import Similarity, adjust_similarity
 
 __all__ = ["SiteTransform", "fit_similarity", "record_to_site", "to_site"]
@@ -269,7 +269,7 @@ def _without_outliers(
             remedy="look for two axes that are exchanged, or one that runs the other way",
         )
 
-    def judge(accepted: Bools) -> Verdict | None:
+    def judge(accepted: Bools) -> Agreement | None:
         if accepted.sum() < 3 or any(
             _spread(points[accepted])[1] <= width
             for points, width in zip((measured, site), least, strict=True)

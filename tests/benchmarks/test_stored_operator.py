@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from mechanics.solvers.first_order.admm import ADMM
 from scipy.sparse import bsr_array
 
 from benchmarks.stored import StoredDelassus
 from mechanics.problem.problem import ContactProblem, ContactStart
 from mechanics.problem.residual import natural_map
-from mechanics.solvers.first_order.admm import ADMM
 from mechanics.solvers.first_order.nsgs import NSGS
 from moma.errors import SolverError
 from tests.mechanics.dense_operator import slow_sweep

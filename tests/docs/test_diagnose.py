@@ -84,7 +84,7 @@ def test_the_tables_list_all_keys_and_the_example_can_be_read(tmp_path):
     for key in (*DIAGNOSIS_KEYS, *HYPOTHESIS_KEYS, *UNKNOWN_KEYS):
         assert (key.name, key.unit, key.doc) in listed
     example, _ = blocks(PAGE, "toml")
-    (tmp_path / "settled-small.toml").write_text("[[loads]]\n", encoding="utf-8")
+    (tmp_path / "wall.toml").write_text("[[loads]]\n", encoding="utf-8")
     (tmp_path / "diagnosis.toml").write_text(example, encoding="utf-8")
     file = read_diagnosis(tmp_path / "diagnosis.toml")
     (hypothesis,) = file.hypotheses

@@ -8,9 +8,9 @@ import pytest
 from typer.testing import CliRunner
 
 from moma.cli import app
+from pipelines.samples.buildings.facings import two_facings
+from pipelines.samples.buildings.window import make_window
 from survey.formats.native.writer import write_moma
-from survey.synthetic.buildings.facings import two_facings
-from survey.synthetic.window_bay.sample import make_sample
 from survey.unseen.core.settings import InfillSettings
 from survey.unseen.missing.settings import MissingSettings
 from tests.paths import ROOT
@@ -29,7 +29,7 @@ def printed(tmp_path_factory):
     sample = place / "data/samples/window"
     sample.mkdir(parents=True)
     (sample / "window.moma").symlink_to(ROOT / "data/samples/window/window.moma")
-    survey = make_sample().survey
+    survey = make_window().survey
     gone = {"W05-02", "V6", "W10-05"}
     holes = replace(survey, blocks=tuple(one for one in survey.blocks if one.code not in gone))
     write_moma(holes, place / "holes.moma")

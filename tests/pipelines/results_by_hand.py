@@ -6,7 +6,7 @@ import numpy as np
 
 from mechanics.results.contact_result import ContactResult, JointResult
 from mechanics.results.postprocess import surface_polygons
-from mechanics.results.result import BodyResult, Energies, Errors, Frame, History, Outcome, Result
+from mechanics.results.result import BodyResult, Energies, Errors, Frame, Outcome, Result, RunHistory
 from mechanics.results.stress_values import stress_values
 from mechanics.scene.scene import Block, Fidelity, Scene
 from mechanics.scene.shapes import BOX_FACES, box_corners
@@ -185,7 +185,7 @@ def result_of(
             frame_of(0.0, bodies, [b.reference for b in bodies], 0.0, contacts_of((), ())),
             frame_of(0.1, bodies, [b.position for b in bodies], 1.0, contacts),
         ),
-        history=History(
+        history=RunHistory(
             time=steps * 0.01,
             kinetic=10.0**-steps,
             speed=10.0**-steps,

@@ -10,12 +10,12 @@ from mechanics.contact._kernels.facets import corner_count
 from mechanics.contact._kernels.overlap import FlatMesh, flattened, overlap_integrals, room
 from mechanics.contact._kernels.vectors import dot, minus, row
 
-__all__ = ["Bodies", "Interfaces", "mortar_rows"]
+__all__ = ["Bodies", "FacePairs", "mortar_rows"]
 
 _SLIVER = 1e-2  # a node whose share of the overlap is below this fraction of a neighbour's is merged into it
 
 
-class Interfaces(NamedTuple):
+class FacePairs(NamedTuple):
     """Pairs of flat faces; 0 is the candidate, 1 the antagonist.
 
     Attributes

@@ -8,7 +8,7 @@ from numba import njit
 from mechanics.arrays import Array, Bools
 from mechanics.planar._kernels.grid import bucket
 
-__all__ = ["FACE", "Disks", "Watch", "find_disks", "longer", "sort_contacts"]
+__all__ = ["FACE", "Disks", "GapWatch", "find_disks", "longer", "sort_contacts"]
 
 # feature 0 of a contact: on the face of both bodies; 1 and 2 are the ends of a wall
 FACE = 0
@@ -37,7 +37,7 @@ class Disks(NamedTuple):
     asked: Bools
 
 
-class Watch(NamedTuple):
+class GapWatch(NamedTuple):
     """Gaps that are watched: alert × smaller radius [-], the reach of the laws [m], and what a step [s] can close."""
 
     alert: float

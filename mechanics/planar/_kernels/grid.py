@@ -12,7 +12,7 @@ from numba import njit
 
 from mechanics.arrays import Array, Ints
 
-__all__ = ["Grid", "bucket", "build_grid", "cells_along"]
+__all__ = ["DiskGrid", "bucket", "build_grid", "cells_along"]
 
 # half width over the mean up to which disks are in the class of the mean
 _SIMILAR = 1.25
@@ -21,7 +21,7 @@ _SIMILAR = 1.25
 _WIDER = 2.0 * (1.0 + 1e-9)
 
 
-class Grid(NamedTuple):
+class DiskGrid(NamedTuple):
     """Disks sorted into cells.
 
     A class with few empty cells has one bucket for each cell; one with many shares buckets by a hash, and the cell of
@@ -128,7 +128,7 @@ def build_grid(centre, extent):  # pragma: no cover - compiled
 
     Outputs
     -------
-    Grid
+    DiskGrid
     """
     level, width = _size_classes(extent)
     origin, cell, low, count = _cells_in_use(centre, level, width)
@@ -155,7 +155,7 @@ def build_grid(centre, extent):  # pragma: no cover - compiled
     for i in range(nd):
         order[filled[where[i]]] = i
         filled[where[i]] += 1
-    return Grid(origin, width, low, count, base, buckets, start, order, level, cell)
+    return DiskGrid(origin, width, low, count, base, buckets, start, order, level, cell)
 
 
 @njit(cache=True)

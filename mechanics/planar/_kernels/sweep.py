@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from mechanics.planar._kernels.lanes import LANES, solve_disks
 
 __all__ = [
-    "Layout",
+    "SweepOrder",
     "apply",
     "diagonals",
     "layout_of",
@@ -40,7 +40,7 @@ _AHEAD = 64
 _RECENT = 2
 
 
-class Layout(NamedTuple):
+class SweepOrder(NamedTuple):
     """Order of the contacts and bodies in a sweep.
 
     Attributes
@@ -124,7 +124,7 @@ def layout_of(order, start, rank, body, inertia):  # pragma: no cover - compiled
 
     Outputs
     -------
-    Layout
+    SweepOrder
     """
     moving = rank.max() + 1 if len(rank) else 0
     parts = len(start) - 1
@@ -146,7 +146,7 @@ def layout_of(order, start, rank, body, inertia):  # pragma: no cover - compiled
                 c = place[g, lane]
                 for s in range(2):
                     rows[g, s, lane] = row[c, s] if c >= 0 else moving + part
-    return Layout(place, begin, rows, own)
+    return SweepOrder(place, begin, rows, own)
 
 
 @njit(cache=True)

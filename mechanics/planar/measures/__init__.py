@@ -1,7 +1,7 @@
 """Measures of a sample of disks: cells that follow the material, stress, fabric, strain and surface.
 
 Public: `Tessellation` (tessellation); `Cell`, `layer_members`, `members`, `shape_of` (cells); `moments`,
-`Stress`, `mean_stress` (stress); `Fabric`, `fabric_of` (fabric); `Deformation`, `deformation` (strain); `profile`,
+`Stress`, `mean_stress` (stress); `Fabric`, `fabric_of` (fabric); `DiskDeformation`, `deformation` (strain); `profile`,
 `slope` (surface); `sides_of` (outline); `Trishear`, `trishear_fit` (trishear); `critical_slope` (taper);
 `Thrusts`, `thrusts_of` (thrusts).
 """

@@ -7,11 +7,11 @@ import numpy as np
 from mechanics.arrays import Array
 from mechanics.planar.measures.tessellation import Tessellation
 
-__all__ = ["Deformation", "deformation"]
+__all__ = ["DiskDeformation", "deformation"]
 
 
 @dataclass(frozen=True)
-class Deformation:
+class DiskDeformation:
     """Deformation at each disk, the mean over its triangles by area; nan where it has none.
 
     Attributes
@@ -26,7 +26,7 @@ class Deformation:
     shear: Array
 
 
-def deformation(start: Array, now: Array, cells: Tessellation) -> Deformation:
+def deformation(start: Array, now: Array, cells: Tessellation) -> DiskDeformation:
     """Return the deformation from the places (nd, 2) at the start, tessellated by `cells`, to those now [m].
 
     The displacement is linear in a triangle, so one of a triangle's three disks changes it by its distance over the
@@ -48,4 +48,4 @@ def deformation(start: Array, now: Array, cells: Tessellation) -> Deformation:
     differing = np.hypot(gradient[:, 0, 0] - gradient[:, 1, 1], gradient[:, 1, 0] + gradient[:, 0, 1])
     with np.errstate(invalid="ignore", divide="ignore"):
         shear = np.log((summed + differing) / np.abs(summed - differing))
-    return Deformation(gradient, volume, shear)
+    return DiskDeformation(gradient, volume, shear)

@@ -17,7 +17,7 @@ from scipy.optimize import least_squares
 
 from mechanics.arrays import Array
 
-__all__ = ["Fit", "Trishear", "trishear_fit"]
+__all__ = ["Trishear", "TrishearFit", "trishear_fit"]
 
 _INCREMENTS = 100  # of the slip, in which places are carried along
 _HALF_ANGLES = np.radians([10.0, 20.0, 30.0, 45.0, 60.0])  # from which fits start [rad]
@@ -73,7 +73,7 @@ class Trishear:
 
 
 @dataclass(frozen=True)
-class Fit:
+class TrishearFit:
     """The trishear that comes nearest to a motion.
 
     Attributes
@@ -90,7 +90,9 @@ class Fit:
     explained: float
 
 
-def trishear_fit(place: Array, moved: Array, tip: tuple[float, float], dip: float, slip: float) -> Fit:
+def trishear_fit(
+    place: Array, moved: Array, tip: tuple[float, float], dip: float, slip: float
+) -> TrishearFit:
     """Fit half angle and ratio to places (n, 2) at the start, and where they went (n, 2) after a slip [m].
 
     Robust least squares from a grid of starts, as different ratios may give nearly the same fold.
@@ -119,4 +121,4 @@ def trishear_fit(place: Array, moved: Array, tip: tuple[float, float], dip: floa
     left, whole = float(np.sum(misfit(best.x) ** 2)), float(np.sum((moved - place) ** 2))
     residual = float(np.sqrt(left / len(place)))
     explained = 1.0 - left / whole if whole > 0 else float("nan")
-    return Fit(Trishear(tip, dip, *map(float, best.x)), residual, residual / abs(slip), explained)
+    return TrishearFit(Trishear(tip, dip, *map(float, best.x)), residual, residual / abs(slip), explained)

@@ -11,7 +11,7 @@ import numpy as np
 
 from mechanics.arrays import Array, Ints
 
-__all__ = ["Motion", "classes", "motion", "translation"]
+__all__ = ["Congruence", "classes", "motion", "translation"]
 
 Faces = tuple[tuple[int, ...], ...]
 
@@ -22,7 +22,7 @@ _ROUNDING = (
 
 
 @dataclass(frozen=True)
-class Motion:
+class Congruence:
     """x → turn (x - origin) + target.
 
     Attributes
@@ -81,7 +81,7 @@ def motion(
     second_faces: Faces,
     marked: Collection[int] = (),
     second_marked: Collection[int] = (),
-) -> Motion | None:
+) -> Congruence | None:
     """Find the rigid motion that takes a stone to another, faces onto faces and marked faces onto marked ones.
 
     Of several motions a pure translation is preferred; None if there is no motion.
@@ -105,7 +105,7 @@ def motion(
             continue
         face = _faces_onto(faces, second_faces, corner)
         if face is not None and set(face[list(marked)].tolist()) == set(second_marked):
-            return Motion(fine, origin, target, face)
+            return Congruence(fine, origin, target, face)
     return None
 
 

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pipelines.assess.assess import Assessment
-    from pipelines.assess.compare import Comparison
+    from pipelines.assess.compare import SurveyComparison
 
 __all__ = ["assessment_lines", "comparison_lines"]
 
@@ -58,7 +58,7 @@ def _mechanism(found: dict[str, Any], verbose: bool) -> list[str]:
     ]
 
 
-def comparison_lines(done: "Comparison", verbose: bool) -> list[str]:
+def comparison_lines(done: "SurveyComparison", verbose: bool) -> list[str]:
     """Return the lines of a comparison: the whole, each wall, and the courses with the largest misfits."""
     summary = done.summary
     courses = sorted(summary["courses"], key=lambda one: -_ratio(one))

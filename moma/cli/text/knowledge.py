@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from archmodel.store.revisions import Outcome
+    from archmodel.store.revisions import RowCounts
     from pipelines.record.record import RecordReport
 
 __all__ = ["record_lines"]
@@ -30,7 +30,7 @@ def record_lines(report: "RecordReport", verbose: bool) -> list[str]:
     return lines
 
 
-def _counts(outcome: "Outcome") -> str:
+def _counts(outcome: "RowCounts") -> str:
     """Format the counts that are not zero."""
     counts = {
         "new": outcome.new,

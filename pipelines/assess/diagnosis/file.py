@@ -10,7 +10,7 @@ from typing import Any
 from moma.errors import SceneError
 from pipelines.scene.file import BESIDE
 from pipelines.toml.lines import key_lines, parse_toml, read_text
-from pipelines.toml.schema import Document, Key, Kind, check_table, nearest
+from pipelines.toml.schema import Key, TomlDocument, ValueKind, check_table, nearest
 from pipelines.toml.writer import is_table_array
 
 __all__ = [
@@ -25,18 +25,21 @@ __all__ = [
 
 DIAGNOSIS_KEYS = (
     Key(
-        "scene", Kind.TEXT, "Scene file, beside this one; if not given, the scene is this file.", default=None
+        "scene",
+        ValueKind.TEXT,
+        "Scene file, beside this one; if not given, the scene is this file.",
+        default=None,
     ),
-    Key("without", Kind.TEXTS, "Tables of that scene that are left out, such as loads.", default=()),
+    Key("without", ValueKind.TEXTS, "Tables of that scene that are left out, such as loads.", default=()),
     Key(
         "battered",
-        Kind.BOOLEAN,
+        ValueKind.BOOLEAN,
         "Walls may have been built leaning, each by an angle of its own.",
         default=False,
     ),
     Key(
         "level_tolerance",
-        Kind.NUMBER,
+        ValueKind.NUMBER,
         "Standard deviation of the slope with which courses were laid.",
         "-",
         0.0,
@@ -45,45 +48,45 @@ DIAGNOSIS_KEYS = (
     ),
     Key(
         "from_rest",
-        Kind.BOOLEAN,
+        ValueKind.BOOLEAN,
         "Movements count from where the scene rests without any cause, not from the survey: for joints that yield "
         "under the weight alone.",
         default=False,
     ),
     Key(
         "phases",
-        Kind.TEXTS,
+        ValueKind.TEXTS,
         "Names of building phases, the oldest first; with two or more the movement is dated against them.",
         default=(),
     ),
 )
 
 HYPOTHESIS_KEYS = (
-    Key("name", Kind.TEXT, "The hypothesis in words."),
+    Key("name", ValueKind.TEXT, "The hypothesis in words."),
     Key(
         "scene",
-        Kind.TABLE,
+        ValueKind.TABLE,
         "Keys of the scene that it changes; arrays such as `loads` are added to those of the scene. A text that begins "
         "with `=` is a formula of the unknowns: numbers, + - * / and brackets.",
     ),
 )
 
 UNKNOWN_KEYS = (
-    Key("name", Kind.TEXT, "As it stands in formulas."),
-    Key("unit", Kind.TEXT, "Of its values, for reports."),
-    Key("start", Kind.NUMBER, "Value with which the search begins."),
-    Key("low", Kind.NUMBER, "Least value."),
-    Key("high", Kind.NUMBER, "Largest value."),
+    Key("name", ValueKind.TEXT, "As it stands in formulas."),
+    Key("unit", ValueKind.TEXT, "Of its values, for reports."),
+    Key("start", ValueKind.NUMBER, "Value with which the search begins."),
+    Key("low", ValueKind.NUMBER, "Least value."),
+    Key("high", ValueKind.NUMBER, "Largest value."),
     Key(
         "step",
-        Kind.NUMBER,
+        ValueKind.NUMBER,
         "Change by which derivatives are taken; if not given, a twentieth of the range.",
         default=None,
         above=0,
     ),
     Key(
         "scan",
-        Kind.INTEGER,
+        ValueKind.INTEGER,
         "Number of values across its range that are tried first; the search begins with the best. Where nothing moves "
         "at the start, or its run fails, some are tried in any case.",
         default=0,
@@ -160,7 +163,7 @@ class DiagnosisFile:
     hypotheses : one or more
     """
 
-    document: Document
+    document: TomlDocument
     scene_path: str
     base: Mapping[str, Any]
     battered: bool
@@ -179,7 +182,7 @@ def read_diagnosis(path: str | Path) -> DiagnosisFile:
     """
     text = read_text(path, SceneError, missing="no such file")
     given = parse_toml(text, str(path), SceneError, "see docs/howto/diagnose.md for one to start from")
-    document = Document(str(path), key_lines(text))
+    document = TomlDocument(str(path), key_lines(text))
     head: dict[str, Any] = check_table(document, ("diagnosis",), given.get("diagnosis", {}), DIAGNOSIS_KEYS)
     if head["scene"] is None:
         scene_path, base = str(path), {name: one for name, one in given.items() if name not in BESIDE}
@@ -209,14 +212,14 @@ def read_diagnosis(path: str | Path) -> DiagnosisFile:
     )
 
 
-def _distinct(document: Document, phases: tuple[str, ...]) -> tuple[str, ...]:
+def _distinct(document: TomlDocument, phases: tuple[str, ...]) -> tuple[str, ...]:
     if len(phases) == 1 or len(set(phases)) < len(phases):
         what = f"phases = {list(phases)} are not several different ones"
         document.fail(what, "diagnosis", "phases", remedy="name two or more, the oldest first, or none")
     return phases
 
 
-def _hypotheses(document: Document, given: Mapping[str, Any]) -> Iterator[Hypothesis]:
+def _hypotheses(document: TomlDocument, given: Mapping[str, Any]) -> Iterator[Hypothesis]:
     tables = given.get("hypotheses", [])
     if not isinstance(tables, list) or not tables or not all(isinstance(one, dict) for one in tables):
         document.fail("no hypothesis", "hypotheses", remedy="write [[hypotheses]] above each")
@@ -233,7 +236,7 @@ def _hypotheses(document: Document, given: Mapping[str, Any]) -> Iterator[Hypoth
         yield Hypothesis(values["name"], path, unknowns, values["scene"])
 
 
-def _unknowns(document: Document, path: tuple[str, ...], tables: Any) -> Iterator[Unknown]:
+def _unknowns(document: TomlDocument, path: tuple[str, ...], tables: Any) -> Iterator[Unknown]:
     if not isinstance(tables, list) or not all(isinstance(one, dict) for one in tables):
         what = "'unknowns' is not a list of tables"
         document.fail(what, *path, "unknowns", remedy="write [[hypotheses.unknowns]] above each")
@@ -254,7 +257,7 @@ def _unknowns(document: Document, path: tuple[str, ...], tables: Any) -> Iterato
         yield Unknown(**values)
 
 
-def _check_formulas(document: Document, path: tuple[str, ...], change: Any, names: list[str]) -> None:
+def _check_formulas(document: TomlDocument, path: tuple[str, ...], change: Any, names: list[str]) -> None:
     """Refuse formulas that cannot be read, and unknowns that stand in none."""
     used: set[str] = set()
     for place, text in _formulas(change, (*path, "scene")):

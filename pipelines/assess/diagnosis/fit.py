@@ -15,7 +15,7 @@ from itertools import product
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from pipelines.arrays import Array
+from mechanics.arrays import Array
 from pipelines.assess.diagnosis.file import Unknown
 
 __all__ = ["Ask", "Fit", "fit"]

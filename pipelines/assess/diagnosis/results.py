@@ -2,10 +2,11 @@
 
 import csv
 import math
+import shutil
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pipelines.assess.diagnosis.best import write_best
 from pipelines.assess.diagnosis.dating import Dating
 from pipelines.assess.diagnosis.file import DiagnosisFile
 from pipelines.assess.diagnosis.measurements import Measurements
@@ -15,10 +16,14 @@ from pipelines.assess.motions import Motions
 from pipelines.draw.elevations.movement import draw_bed_movement
 from pipelines.results.summary import as_json
 from pipelines.run.record import versions
+from pipelines.toml.writer import toml_text
 from survey.quality.courses import measure_courses
 from survey.quality.movement import CourseMovement, compare_courses
 
-__all__ = ["INDEX", "write_diagnosis"]
+__all__ = ["INDEX", "write_best", "write_diagnosis"]
+
+_BEST = "best.toml"  # name of the scene
+_RECORDS = ("x", "y", "z")  # keys of a ground motion that name files
 
 _HYPOTHESIS = "rank hypothesis stood chi2 dof probability aicc amplitude unit value low high"  # columns
 
@@ -175,3 +180,57 @@ def _draw(folder: Path, courses: tuple[CourseMovement, ...]) -> None:
         walls.setdefault(one.line.facade, []).append(one)
     for number, lines in enumerate(walls.values(), start=1):
         draw_bed_movement(folder / f"beds-{number}.png", lines)
+
+
+def write_best(folder: Path, file: DiagnosisFile, case: Case, best: Ranked) -> None:
+    """Write the scene with the best hypothesis, and copies of the records and tables that it names.
+
+    Parameters
+    ----------
+    folder : that is empty of files of these names
+    file : for the place of the scene, beside which they lie
+    case, best : the hypothesis, and its amplitudes
+    """
+    copies = _Copies(Path(file.scene_path).parent, folder)
+    scene = copies.named(case.scene(file, best.fit.amplitudes))
+    heading = f"# {best.title}: the amplitudes that explain best\n"
+    if file.from_rest:
+        heading += "# Movements were counted from where the scene rests without this cause.\n"
+    (folder / _BEST).write_text(heading + toml_text(scene), encoding="utf-8")
+
+
+class _Copies:
+    """Copies of the files that a scene names, each under a name of its own.
+
+    Parameters
+    ----------
+    source : folder of the scene
+    target : of the copies
+    """
+
+    def __init__(self, source: Path, target: Path) -> None:
+        self._source, self._target = source, target
+        self._names: dict[Path, str] = {}
+
+    def named(self, part: Any) -> Any:
+        """Return part of a scene with the names of the copies."""
+        if isinstance(part, list):
+            return [self.named(one) for one in part]
+        if not isinstance(part, Mapping):
+            return part
+        names = _RECORDS if part.get("type") == "ground_motion" else ("file",)
+        return {
+            key: self._copied(one) if key in names and isinstance(one, str) else self.named(one)
+            for key, one in part.items()
+        }
+
+    def _copied(self, name: str) -> str:
+        path = (self._source / name).resolve()
+        if path not in self._names:
+            own, number = path.name, 1
+            while own in self._names.values() or (self._target / own).exists():
+                number += 1
+                own = f"{path.stem}-{number}{path.suffix}"
+            shutil.copyfile(path, self._target / own)
+            self._names[path] = own
+        return self._names[path]

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import stdtrit
 
-from pipelines.arrays import Array
+from mechanics.arrays import Array
 from pipelines.assess.diagnosis.file import Unknown
 from pipelines.assess.diagnosis.ranking import QUANTILE, Ranked
 

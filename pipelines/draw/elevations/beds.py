@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipelines.arrays import Array
+from mechanics.arrays import Array
 from pipelines.draw.elevations.sheet import FLAG, INK, PALE, PLAIN, new_sheet, save_sheet
 from survey.quality.courses import SIGNIFICANT, CourseLine
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.arrays import Array
+from mechanics.arrays import Array
 from pipelines.draw.elevations.closing_shapes import ClosingShapes, DrawnStone
 from pipelines.draw.elevations.sheet import (
     CODES,

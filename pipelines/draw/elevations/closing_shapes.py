@@ -6,12 +6,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipelines.arrays import Array
-from pipelines.draw.elevations.joint_polygons import joint_polygon
+from mechanics.arrays import Array
 from survey.geometry.solids import Solid, area_vector
-from survey.joints.report import ClosingReport, Joint
+from survey.joints.report import ClosingReport, StoneJoint
 
-__all__ = ["ClosingShapes", "DrawnJoint", "DrawnStone", "Place", "Stages", "closing_shapes", "places"]
+__all__ = [
+    "ClosingShapes",
+    "DrawnJoint",
+    "DrawnStone",
+    "Place",
+    "Stages",
+    "closing_shapes",
+    "joint_polygon",
+    "places",
+]
+
+_FACING = np.cos(np.radians(45.0))  # faces turned farther from the joint are not sides of it
+_NOTHING = 1e-10  # smaller areas are rounding [m²]
 
 
 @dataclass(frozen=True)
@@ -57,7 +68,7 @@ class DrawnJoint:
     polygon : (k, 3) [m]; None where it is not known
     """
 
-    joint: Joint
+    joint: StoneJoint
     polygon: Array | None
 
 
@@ -181,3 +192,70 @@ def _of_corners(values: Array | None, solid: Solid) -> Array:
     if values is None or not len(values):
         return np.full(count, np.nan)
     return values if len(values) == count else np.full(count, float(values.max()))
+
+
+def joint_polygon(first: Solid, second: Solid, normal: Array, centroid: Array) -> Array | None:
+    """Intersect a face of one stone with a face of the other, projected onto their joint.
+
+    Of several pairs of faces, the one with the largest intersection counts. Faces are taken for convex.
+
+    Parameters
+    ----------
+    first, second : the two stones
+    normal : (3,) unit normal of the joint, from the second to the first [-]
+    centroid : (3,) a place of the joint [m]
+
+    Returns
+    -------
+    (k, 3) corners on the joint's plane, counter-clockwise about its normal [m]; None where no faces face each other
+    """
+    along = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+    along /= np.linalg.norm(along)
+    axes = np.array([along, np.cross(normal, along)])
+    best: Array | None = None
+    most = _NOTHING
+    for above in _sides(first, -normal, axes, centroid):
+        for below in _sides(second, normal, axes, centroid):
+            common = _clipped(above, below)
+            if (area := _area(common)) > most:
+                best, most = common, area
+    return None if best is None else centroid + best @ axes
+
+
+def _sides(solid: Solid, towards: Array, axes: Array, centroid: Array) -> list[Array]:
+    """Project the faces of a stone that look in a direction onto the joint: (k, 2) each, counter-clockwise."""
+    found = []
+    for face in solid.faces:
+        polygon = solid.vertices[list(face)]
+        area = area_vector(polygon)
+        if area @ towards > _FACING * float(np.linalg.norm(area)):
+            flat = (polygon - centroid) @ axes.T
+            found.append(flat if _area(flat) > 0.0 else flat[::-1])
+    return found
+
+
+def _clipped(subject: Array, window: Array) -> Array:
+    """Clip a polygon by a convex one, both counter-clockwise, (k, 2) (Sutherland and Hodgman 1974)."""
+    corners: Sequence[Array] = list(subject)
+    for start, end in zip(window, np.roll(window, -1, axis=0), strict=True):
+        edge = end - start
+        inside = [float(edge[0] * (one[1] - start[1]) - edge[1] * (one[0] - start[0])) for one in corners]
+        kept: list[Array] = []
+        for i, corner in enumerate(corners):
+            before = inside[i - 1]
+            if before * inside[i] < 0.0:
+                kept.append(corners[i - 1] + before / (before - inside[i]) * (corner - corners[i - 1]))
+            if inside[i] >= 0.0:
+                kept.append(corner)
+        corners = kept
+        if not corners:
+            break
+    return np.array(corners).reshape(-1, 2)
+
+
+def _area(polygon: Array) -> float:
+    """Return the area of a polygon (k, 2), positive if it is counter-clockwise [m²]."""
+    if len(polygon) < 3:
+        return 0.0
+    x, y = (polygon - polygon[0]).T
+    return float(0.5 * (x * np.roll(y, -1) - np.roll(x, -1) * y).sum())

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pipelines.arrays import Array
+from mechanics.arrays import Array
 from pipelines.draw.elevations.closing import back_to_front, guess_key, hatch, name_stones, visible_faces
 from pipelines.draw.elevations.closing_shapes import ClosingShapes, DrawnJoint, Place
 from pipelines.draw.elevations.sheet import (

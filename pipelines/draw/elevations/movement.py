@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipelines.arrays import Array
+from mechanics.arrays import Array
 from pipelines.draw.elevations.sheet import (
     FLAG,
     INK,

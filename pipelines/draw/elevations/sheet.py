@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipelines.arrays import Array
+from mechanics.arrays import Array
 from survey.quality.facades import Facade
 
 __all__ = [

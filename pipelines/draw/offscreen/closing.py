@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.arrays import Array, Ints
+from mechanics.arrays import Array, Ints
 from pipelines.draw.offscreen.jobs import run_job
 from pipelines.draw.offscreen.parts import (
     LIGHT,

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.arrays import Array, Bools, Ints
+from mechanics.arrays import Array, Bools, Ints
 from pipelines.draw.catalogue import PICTURES
 from pipelines.draw.offscreen.jobs import run_job
 from pipelines.draw.offscreen.parts import (
     Colouring,
-    Resultants,
+    DrawnResultants,
     add_coloured,
     add_edges,
     add_glass,
@@ -39,7 +39,7 @@ class MechanismSurface:
     moved : (k, n, 3) the same in each mechanism [m]
     triangles : (nt, 3)
     edges : (ne, 2)
-    places, forces : (k, nj, 3) resultants of all joints at each limit, see `Resultants`; NaN places without compression
+    places, forces : (k, nj, 3) resultants of all joints at each limit, see `DrawnResultants`; NaN without pressure
     in_kern : (k, nj)
     """
 
@@ -70,7 +70,7 @@ def _draw_forces(
     pressed = np.isfinite(surface.places[number]).all(axis=1)
     add_glass(pyvista, plotter, surface.points, surface.triangles)
     rows = (one[number][pressed] for one in (surface.places, surface.forces, surface.in_kern))
-    add_resultants(pyvista, plotter, surface.points, Resultants(*rows))
+    add_resultants(pyvista, plotter, surface.points, DrawnResultants(*rows))
     place_camera(pyvista, plotter, surface.points, np.array(job["towards"]), np.array(job["up"]))
     add_edges(pyvista, plotter, surface.points, surface.edges)
     save_picture(plotter, path, f"{job['title']}\nAt the limit", PICTURES["resultants"].note)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.arrays import Array, Bools, Ints
+from mechanics.arrays import Array, Bools, Ints
 
 __all__ = [
     "INK",
@@ -16,7 +16,7 @@ __all__ = [
     "OBLIQUELY",
     "PLAIN",
     "Colouring",
-    "Resultants",
+    "DrawnResultants",
     "add_coloured",
     "add_edges",
     "add_glass",
@@ -67,7 +67,7 @@ class Colouring:
 
 
 @dataclass(frozen=True)
-class Resultants:
+class DrawnResultants:
     """Resultants of joints.
 
     Attributes
@@ -142,7 +142,7 @@ def add_edges(pyvista: Any, plotter: Any, points: Array, edges: Ints) -> None:
     plotter.add_mesh(lines, color=_EDGE, line_width=2.5, lighting=False)
 
 
-def add_resultants(pyvista: Any, plotter: Any, points: Array, shown: Resultants) -> None:
+def add_resultants(pyvista: Any, plotter: Any, points: Array, shown: DrawnResultants) -> None:
     """Add a stroke through each joint of a scene with these points, along its resultant and proportional to it."""
     force = np.linalg.norm(shown.forces, axis=1)
     reach = _LONGEST * float(np.linalg.norm(np.ptp(points, axis=0)))

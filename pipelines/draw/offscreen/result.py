@@ -12,7 +12,7 @@ from pipelines.draw.offscreen.parts import (
     LIGHT,
     PLAIN,
     Colouring,
-    Resultants,
+    DrawnResultants,
     add_coloured,
     add_edges,
     add_glass,
@@ -62,7 +62,7 @@ def draw(surface: WallSurface, path: Path, job: dict[str, Any]) -> None:
             pyvista,
             plotter,
             surface.points,
-            Resultants(surface.resultant_points, surface.resultants, surface.in_kern),
+            DrawnResultants(surface.resultant_points, surface.resultants, surface.in_kern),
         )
     elif job["quantity"] == "pressure":
         add_glass(pyvista, plotter, surface.points, surface.triangles)

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mechanics.arrays import Array, Bools, Ints
 from mechanics.results.result import BodyResult, Result
 from mechanics.results.stress_values import utilisation
 from mechanics.scene.scene import Fidelity
 from mechanics.stones.materials import Material
-from pipelines.arrays import Array, Bools, Ints
 from pipelines.draw.catalogue import PICTURES
 from pipelines.draw.offscreen.parts import fan_polygons
 

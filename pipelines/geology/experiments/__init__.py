@@ -1,5 +1,5 @@
 """Experiments: deposits, folds, faults, compression, wedges and heaps.
 
 Public: `Experiment`, `Setup` (experiment); `Deposition` (deposition); `Fold` (fold); `Fault` (fault); `Biaxial`,
-`Sides` (biaxial); `Membrane` (membrane); `Wedge` (wedge); `Repose` (repose).
+`SampleSides` (biaxial); `Membrane` (membrane); `Wedge` (wedge); `Repose` (repose).
 """

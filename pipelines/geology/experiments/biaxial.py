@@ -17,14 +17,14 @@ from mechanics.stones.settings import Setting
 from pipelines.geology.experiments.experiment import Setup
 from pipelines.geology.observe import Fields
 
-__all__ = ["Biaxial", "Sides"]
+__all__ = ["Biaxial", "SampleSides"]
 
 _LATE = 0.5  # of the run, whose mean is that of large strain [-]
 _PEAK = 0.01  # vertical strain over which the largest ratio is a mean [-]
 _MASS = 0.1  # of a side platen, over that of the sample if it were water [-]
 
 
-class Sides(StrEnum):
+class SampleSides(StrEnum):
     """Sides of the sample: platens or a membrane."""
 
     RIGID = "rigid"
@@ -44,8 +44,8 @@ class Biaxial:
     pressure: Annotated[float, Setting("Of the sides.", "Pa", above=0)]
     strain: Annotated[float, Setting("Vertical strain at the end.", "-", above=0, below=0.9)] = 0.2
     walls: Annotated[
-        Sides, Setting("Sides: platens that stay straight, or a membrane that follows the disks.")
-    ] = Sides.RIGID
+        SampleSides, Setting("Sides: platens that stay straight, or a membrane that follows the disks.")
+    ] = SampleSides.RIGID
 
     @property
     def length(self) -> float:
@@ -69,7 +69,7 @@ class Biaxial:
         )
         floor = Wall("floor", (-out, 0.0), (self.width + out, 0.0))
         top = Wall("top", (-out, self.height), (self.width + out, self.height))
-        if self.walls is Sides.FLEXIBLE:
+        if self.walls is SampleSides.FLEXIBLE:
             smooth = frozenset({"floor", "top"})
             return Setup(
                 (floor, top), Loads(motions=(sink,)), smooth=smooth, weightless=True, membrane=self.pressure

@@ -29,7 +29,7 @@ def face_planes(vertices, corners, face_starts):
     Inputs
     ------
     vertices : (nv, 3) float64 [m]
-    corners, face_starts : (nc,), (nf + 1,) int64, as in `Polyhedra`
+    corners, face_starts : (nc,), (nf + 1,) int64, as in `SolidArrays`
 
     Outputs
     -------
@@ -204,7 +204,7 @@ def thickness(one, solid, n):
     Inputs
     ------
     one : int, solid
-    solid : vertices, corners, face_starts, solid_starts of `Polyhedra`
+    solid : vertices, corners, face_starts, solid_starts of `SolidArrays`
     n : (3,) float64, unit vector [-]
 
     Outputs
@@ -245,7 +245,7 @@ def touching_faces(pairs, solid, planes, limits, out_pairs, out):
     Inputs
     ------
     pairs : (n, 2) int64, solids
-    solid : vertices, corners, face_starts, solid_starts of `Polyhedra`
+    solid : vertices, corners, face_starts, solid_starts of `SolidArrays`
     planes : as from `face_planes`
     limits : widest joint, deepest overlap [m], cosine of the largest angle, least share of the smaller face [-],
         whether the width applies at the narrow end of a joint instead of its middle

@@ -55,7 +55,7 @@ def thinnest_of(solid, normals):
 
     Inputs
     ------
-    solid : vertices, corners, face_starts, solid_starts of `Polyhedra`
+    solid : vertices, corners, face_starts, solid_starts of `SolidArrays`
     normals : (nf, 3) float64, outward unit normals of its faces [-]
 
     Outputs

@@ -52,7 +52,7 @@ def highest_corners(vertices, corners, face_starts, solid_starts, normals, offse
 
     Inputs
     ------
-    vertices, corners, face_starts, solid_starts : as in `Polyhedra`
+    vertices, corners, face_starts, solid_starts : as in `SolidArrays`
     normals, offsets : (nf, 3) float64 unit [-], (nf,) float64 [m]
 
     Outputs

@@ -88,7 +88,7 @@ def matching_faces(pairs, solid, planes, tolerance, out, measures):
     Inputs
     ------
     pairs : (n, 2) int64, solids
-    solid : vertices, corners, face_starts, solid_starts of `Polyhedra`
+    solid : vertices, corners, face_starts, solid_starts of `SolidArrays`
     planes : as from `face_planes`
     tolerance : float, distance of the corners of both faces from their common plane [m]
 

@@ -6,6 +6,7 @@ two jambs, a jamb and a sill or the like, gaps several courses high, and gaps th
 a wall and its top give no evidence of missing stones.
 """
 
+import re
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -15,7 +16,6 @@ from survey.arrays import Array
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.solids import area_vector
 from survey.unseen.missing.arches import ArchGap, arch_gaps, voussoir_outlines
-from survey.unseen.missing.codes import FreeCodes
 from survey.unseen.missing.faces import MissingFace, is_plausible, stone_of
 from survey.unseen.missing.gaps import CourseGap, Gaps, Hole, find_gaps, find_holes, opening_signs
 from survey.unseen.missing.kinds import Filling, UsualKind, depth_of_kind, likeliest, split, usual_kinds
@@ -56,6 +56,37 @@ class MissingStone:
         return self.block.face.provenance.text
 
 
+class _FreeCodes:
+    """Supply of free codes.
+
+    Parameters
+    ----------
+    taken : codes of stones; codes handed out are added
+    """
+
+    def __init__(self, taken: set[str]) -> None:
+        self._taken = taken
+
+    def after(self, left: str, right: str) -> str:
+        """Return H- and the code of a stone between two others: the next free number after the left one."""
+        left, right = left.removeprefix("H-"), right.removeprefix("H-")
+        for code, step in ((left, 1), (right, -1)):
+            number = re.search(r"\d+$", code)
+            if number is None:
+                continue
+            name = f"{code[: number.start()]}{int(number[0]) + step:0{len(number[0])}d}"
+            if int(number[0]) + step >= 0 and not {name, f"H-{name}"} & self._taken:
+                return self._take(f"H-{name}")
+        count = 1
+        while f"H-{left}+{count}" in self._taken:
+            count += 1
+        return self._take(f"H-{left}+{count}")
+
+    def _take(self, code: str) -> str:
+        self._taken.add(code)
+        return code
+
+
 def propose_missing(
     blocks: Sequence[SurveyedBlock],
     settings: MissingSettings | None = None,
@@ -75,7 +106,7 @@ def propose_missing(
     Proposals, facade by facade: the voussoirs first, then course by course from below
     """
     settings = settings or MissingSettings()
-    codes = FreeCodes({*taken, *(block.code for block in blocks)})
+    codes = _FreeCodes({*taken, *(block.code for block in blocks)})
     found: list[MissingStone] = []
     for elevation in elevations(blocks):
         mine = {id(stone.block) for stone in elevation.stones}
@@ -113,7 +144,7 @@ def _flat(block: SurveyedBlock, elevation: Elevation) -> FlatStone:
     return FlatStone(block, elevation.frame.flatten(block.face.outline), frozenset())
 
 
-def _voussoirs(elevation: Elevation, settings: MissingSettings, codes: FreeCodes) -> Iterator[MissingStone]:
+def _voussoirs(elevation: Elevation, settings: MissingSettings, codes: _FreeCodes) -> Iterator[MissingStone]:
     gaps = arch_gaps(elevation, settings)
     joint = _usual_joint(find_gaps(elevation, settings)) if gaps else _USUAL_JOINT
     for gap in gaps:
@@ -169,7 +200,7 @@ def _sigma(left: FlatStone, right: FlatStone) -> float:
     return float(np.hypot(measured, _SCATTER))
 
 
-def _of_courses(elevation: Elevation, settings: MissingSettings, codes: FreeCodes) -> Iterator[MissingStone]:
+def _of_courses(elevation: Elevation, settings: MissingSettings, codes: _FreeCodes) -> Iterator[MissingStone]:
     gaps = find_gaps(elevation, settings)
     joint, kinds = _usual_joint(gaps), usual_kinds(elevation)
     for hole in find_holes(gaps.gaps):
@@ -191,7 +222,7 @@ def _of_courses(elevation: Elevation, settings: MissingSettings, codes: FreeCode
 
 
 def _frame_stone(
-    frame: FrameGap, joint: float, elevation: Elevation, codes: FreeCodes
+    frame: FrameGap, joint: float, elevation: Elevation, codes: _FreeCodes
 ) -> Iterator[MissingStone]:
     """Propose a jamb that ends where the others do, or a sill."""
     gap = frame.gap
@@ -260,7 +291,7 @@ class _Fill:
     elevation: Elevation
     signs: tuple[str, ...]
 
-    def stones(self, codes: FreeCodes) -> Iterator[MissingStone]:
+    def stones(self, codes: _FreeCodes) -> Iterator[MissingStone]:
         """Yield the stones of the gap, from left to right."""
         gap, count = self.gap, len(self.filling.kinds)
         kinds, cuts = split(gap, self.filling, self.known, self.elevation)

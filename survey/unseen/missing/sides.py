@@ -35,10 +35,6 @@ class Line:
         sign = 1.0 if normal @ (towards - self.point) > 0.0 else -1.0
         return Line(self.point + sign * by * normal, self.direction)
 
-    def at_height(self, height: float) -> float:
-        """Return its place along the wall at a height [m]."""
-        return float(self.point[0] + (height - self.point[1]) * self.direction[0] / self.direction[1])
-
     def at_place(self, place: float) -> float:
         """Return its height at a place along the wall [m]."""
         return float(self.point[1] + (place - self.point[0]) * self.direction[1] / self.direction[0])

@@ -7,7 +7,7 @@ from sqlalchemy.orm import Session
 from archmodel.assertions.correct import correct
 from archmodel.database.session import Database
 from archmodel.query.api import find
-from archmodel.store.revisions import Outcome
+from archmodel.store.revisions import RowCounts
 from archmodel.tables.entities import Entity, Header, Quoin, Voussoir
 from archmodel.tables.entries import Entry, new_entry
 from archmodel.tables.knowledge import Correction
@@ -27,7 +27,7 @@ def test_a_stone_of_another_kind_is_found_among_those(filled: Database) -> None:
     with filled.session() as session:
         (loaded,) = find(session, "header", ["code = W01-01"])
         assert isinstance(loaded, Header)
-        assert correct(session, entry_of(session), "W01-01", {"kind": "Quoin"}) == Outcome(replaced=1)
+        assert correct(session, entry_of(session), "W01-01", {"kind": "Quoin"}) == RowCounts(replaced=1)
         assert [one.code for one in find(session, "quoin")] == ["W01-01"]
         assert isinstance(find(session, "quoin")[0], Quoin)
         assert find(session, "header") == []
@@ -48,11 +48,11 @@ def test_what_the_new_kind_has_not_is_given_up(filled: Database) -> None:
 def test_several_attributes_at_once(filled: Database) -> None:
     with filled.session() as session:
         values = {"code": "W9", "course": 3, "zone": "north", "tail_length": 0.2}
-        assert correct(session, entry_of(session), "W01-01", values) == Outcome(replaced=1)
-        assert correct(session, entry_of(session), "W9", values) == Outcome(unchanged=1)
+        assert correct(session, entry_of(session), "W01-01", values) == RowCounts(replaced=1)
+        assert correct(session, entry_of(session), "W9", values) == RowCounts(unchanged=1)
         stone = session.scalars(select(Header)).one()
         assert (stone.code, stone.course, stone.zone, stone.tail_length) == ("W9", 3, "north", 0.2)
-        assert correct(session, entry_of(session), "W9", {"zone": None, "course": None}) == Outcome(
+        assert correct(session, entry_of(session), "W9", {"zone": None, "course": None}) == RowCounts(
             replaced=1
         )
         assert corrections(session)[-2:] == [("W9", "zone", "north", None), ("W9", "course", 3, None)]

@@ -18,14 +18,14 @@ from archmodel.assertions.withdraw import withdraw_members
 from archmodel.database.session import Database
 from archmodel.describe.entity import describe
 from archmodel.store.find_by_code import Subjects, held_named, subjects
-from archmodel.store.revisions import Outcome, supersede, withdraw
+from archmodel.store.revisions import RowCounts, supersede, withdraw
 from archmodel.tables.entries import Entry, held_at, new_entry
 from archmodel.tables.knowledge import Document, MaterialProperty, Phase
 from archmodel.tables.relations import Membership, Relation
 from archmodel.tables.structures import Arch, Structure
 from moma.errors import DatabaseError, UsageError
 
-NEW, SAME, OTHER = Outcome(new=1), Outcome(unchanged=1), Outcome(replaced=1)
+NEW, SAME, OTHER = RowCounts(new=1), RowCounts(unchanged=1), RowCounts(replaced=1)
 
 
 def entry_of(session: Session) -> Entry:
@@ -52,14 +52,14 @@ def test_properties_are_replaced_one_by_one(empty: Database) -> None:
     with empty.session() as session:
         entry = entry_of(session)
         given = {"density": PropertyValue(2300), "young": PropertyValue(9e9, sigma=1e9, source="cores")}
-        assert declare_material(session, entry, "tuff", "soft", given) == Outcome(new=3)
-        assert declare_material(session, entry, "tuff", None, given) == Outcome(unchanged=3)
+        assert declare_material(session, entry, "tuff", "soft", given) == RowCounts(new=3)
+        assert declare_material(session, entry, "tuff", None, given) == RowCounts(unchanged=3)
         # from another source, nothing else is said
         elsewhere = new_entry(session, "declaration", "another test")
-        assert declare_material(session, elsewhere, "tuff", None, given) == Outcome(unchanged=3)
+        assert declare_material(session, elsewhere, "tuff", None, given) == RowCounts(unchanged=3)
         later = entry_of(session)
         better = {"density": PropertyValue(2310, sigma=20), "grain": PropertyValue(0.004, unit="m")}
-        assert declare_material(session, later, "tuff", None, better) == Outcome(1, 1, 1)
+        assert declare_material(session, later, "tuff", None, better) == RowCounts(1, 1, 1)
         rows = session.scalars(select(MaterialProperty).order_by(MaterialProperty.id)).all()
         told = [(one.name, one.value, one.sigma, one.unit, one.source, one.superseded_id) for one in rows]
     assert told == [
@@ -102,9 +102,9 @@ def test_members_are_ranked_and_stay(filled: Database) -> None:
             declare_structure(session, entry, "arch", "V1")
         assert declare_structure(session, entry, "arch", "ARCH", title="Arch", parent="B") == NEW
         stones = subjects(session, ["V3", "V1"]).entities
-        assert declare_members(session, entry, "ARCH", stones) == Outcome(new=2)
-        assert declare_members(session, entry, "ARCH", stones, ordered=True) == Outcome(replaced=2)
-        assert declare_members(session, entry, "ARCH", stones) == Outcome(unchanged=2)
+        assert declare_members(session, entry, "ARCH", stones) == RowCounts(new=2)
+        assert declare_members(session, entry, "ARCH", stones, ordered=True) == RowCounts(replaced=2)
+        assert declare_members(session, entry, "ARCH", stones) == RowCounts(unchanged=2)
         rows = session.scalars(select(Membership).where(held_at(Membership)).order_by(Membership.rank))
         assert [(one.entity.code, one.rank) for one in rows] == [("V3", 1), ("V1", 2)]
         arch = held_named(session, Structure, "ARCH")
@@ -171,7 +171,7 @@ def test_a_declaration_after_a_withdrawal_is_a_new_one(empty: Database) -> None:
         entry = entry_of(session)
         declare_document(session, entry, "P1", "photograph", "The arch", dated="1898")
         document = held_named(session, Document, "P1")
-        assert withdraw(session, entry, document) == Outcome(withdrawn=1)
+        assert withdraw(session, entry, document) == RowCounts(withdrawn=1)
         with pytest.raises(DatabaseError, match="is held no longer"):
             withdraw(session, entry, document)
         with pytest.raises(UsageError, match="there is no document 'P1'; declare it first"):
@@ -210,7 +210,7 @@ def test_what_was_computed_can_be_declared_too(filled: Database) -> None:
         ]
         with pytest.raises(UsageError, match="no such declared membership to withdraw"):
             withdraw_members(session, entry, Subjects((one,), (course,)))
-        assert withdraw_members(session, entry, Subjects((other,), (course,))) == Outcome(withdrawn=1)
+        assert withdraw_members(session, entry, Subjects((other,), (course,))) == RowCounts(withdrawn=1)
 
 
 def test_a_relation_that_is_computed_and_declared_is_told_once(filled: Database) -> None:

@@ -15,7 +15,7 @@ from archmodel.describe.entity import describe
 from archmodel.describe.history import history
 from archmodel.query.api import find
 from archmodel.relations.graph import courses_in_order
-from archmodel.store.revisions import Outcome
+from archmodel.store.revisions import RowCounts
 from archmodel.store.stones import store_survey
 from archmodel.tables.entities import (
     Ashlar,
@@ -44,7 +44,7 @@ def entry_of(session: Session) -> Entry:
     return new_entry(session, "declaration", "a test")
 
 
-def merlon(session: Session, definition: str = "A stone of a merlon.") -> Outcome:
+def merlon(session: Session, definition: str = "A stone of a merlon.") -> RowCounts:
     return register_kind(
         session, entry_of(session), "merlon", "coping", definition, canon="depth < length", attributes=OWN
     )
@@ -52,8 +52,8 @@ def merlon(session: Session, definition: str = "A stone of a merlon.") -> Outcom
 
 def test_a_registered_kind_is_like_any_other(filled: Database) -> None:
     with filled.session() as session:
-        assert merlon(session) == Outcome(new=1)
-        assert merlon(session) == Outcome(unchanged=1)
+        assert merlon(session) == RowCounts(new=1)
+        assert merlon(session) == RowCounts(unchanged=1)
         register_kind(session, entry_of(session), "corner_merlon", "merlon", "A merlon's stone at a corner.")
         cls = kind_named("Corner merlon")
         assert definition_of(kind_named("merlon")) == "A stone of a merlon."
@@ -117,7 +117,7 @@ def test_what_was_rolled_back_is_not_known(empty: Database) -> None:
         attempt = session.begin_nested()
         merlon(session)
         attempt.rollback()
-        assert merlon(session, "Another stone.") == Outcome(new=1)
+        assert merlon(session, "Another stone.") == RowCounts(new=1)
         assert definition_of(kind_named("merlon")) == "Another stone."
 
 
@@ -203,7 +203,7 @@ def test_attributes_are_not_named_like_members_of_the_classes(empty: Database, n
         register_kind(session, entry_of(session), "slab_of_own", "ashlar", "A slab.", attributes=given)
 
 
-def wall_rib(session: Session, definition: str = "A rib along a wall.", parent: str = "rib") -> Outcome:
+def wall_rib(session: Session, definition: str = "A rib along a wall.", parent: str = "rib") -> RowCounts:
     return register_kind(session, entry_of(session), "wall_rib", parent, definition)
 
 
@@ -214,8 +214,8 @@ def test_no_name_is_in_both_hierarchies() -> None:
 
 def test_a_registered_kind_of_structure_is_like_any_other(filled: Database) -> None:
     with filled.session() as session:
-        assert wall_rib(session) == Outcome(new=1)
-        assert wall_rib(session) == Outcome(unchanged=1)
+        assert wall_rib(session) == RowCounts(new=1)
+        assert wall_rib(session) == RowCounts(unchanged=1)
         register_kind(session, entry_of(session), "corner_rib", "wall_rib", "A wall rib at a corner.")
         cls = structure_kind_named("Corner rib")
         assert kind_chain(cls) == (Structure, Rib, structure_kind_named("wall_rib"), cls)
@@ -248,7 +248,7 @@ def test_what_a_structure_was_before_its_kind_was_told_better_is_kept(filled: Da
         first = entry_of(session)
         declare_structure(session, first, "rib", "R", title="the southern one")
         wall_rib(session)
-        assert declare_structure(session, entry_of(session), "wall_rib", "R") == Outcome(replaced=1)
+        assert declare_structure(session, entry_of(session), "wall_rib", "R") == RowCounts(replaced=1)
         session.expire_all()
         assert describe(session, "R")["kind"] == "wall_rib"
         then = describe(session, "R", first.id)
@@ -281,7 +281,7 @@ def test_a_kind_of_structure_that_was_rolled_back_is_not_known(empty: Database) 
         attempt = session.begin_nested()
         wall_rib(session)
         attempt.rollback()
-        assert wall_rib(session, "A stone.", "ashlar") == Outcome(new=1)
+        assert wall_rib(session, "A stone.", "ashlar") == RowCounts(new=1)
         assert "wall_rib" not in structure_kinds()
 
 

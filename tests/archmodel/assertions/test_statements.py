@@ -22,7 +22,7 @@ from archmodel.assertions.statements import (
 from archmodel.assertions.withdraw import withdraw_members, withdraw_relations, withdraw_statements
 from archmodel.database.session import Database
 from archmodel.store.find_by_code import Subjects, subjects
-from archmodel.store.revisions import Outcome, supersede, withdraw
+from archmodel.store.revisions import RowCounts, supersede, withdraw
 from archmodel.tables.entries import Entry, new_entry
 from archmodel.tables.knowledge import DepthEvidence, MadeOf, MasonMark, Note, Observation, Statement
 from moma.errors import UsageError
@@ -49,12 +49,12 @@ def test_a_stone_is_of_one_material(known: Database) -> None:
     with known.session() as session:
         about = subjects(session, ["V1", "V2"], ["ARCH"])
         first, second = entry_of(session), entry_of(session)
-        assert say_made_of(session, first, about, "tuff") == Outcome(new=3)
-        assert say_made_of(session, first, about, "tuff") == Outcome(unchanged=3)
+        assert say_made_of(session, first, about, "tuff") == RowCounts(new=3)
+        assert say_made_of(session, first, about, "tuff") == RowCounts(unchanged=3)
         one = subjects(session, ["V1"])
-        assert say_made_of(session, second, one, "limestone", Remark("by colour")) == Outcome(replaced=1)
+        assert say_made_of(session, second, one, "limestone", Remark("by colour")) == RowCounts(replaced=1)
         # the same material, but for another reason, is another statement
-        assert say_made_of(session, second, one, "limestone") == Outcome(replaced=1)
+        assert say_made_of(session, second, one, "limestone") == RowCounts(replaced=1)
         rows = session.scalars(
             select(MadeOf).where(MadeOf.entity_id.in_(one.entities)).order_by(MadeOf.id)
         ).all()
@@ -66,14 +66,14 @@ def test_a_stone_is_of_one_material(known: Database) -> None:
 def test_marks_add_up_until_one_is_withdrawn(known: Database) -> None:
     with known.session() as session:
         entry, about = entry_of(session), subjects(session, ["V1", "V2"])
-        assert say_mason_mark(session, entry, about, "star", "left") == Outcome(new=2)
-        assert say_mason_mark(session, entry, about, "star") == Outcome(new=2)
-        assert say_mason_mark(session, entry, about, "arrow") == Outcome(new=2)
+        assert say_mason_mark(session, entry, about, "star", "left") == RowCounts(new=2)
+        assert say_mason_mark(session, entry, about, "star") == RowCounts(new=2)
+        assert say_mason_mark(session, entry, about, "arrow") == RowCounts(new=2)
         later = entry_of(session)
         match = {"sign": "star", "place": "left"}
-        assert withdraw_statements(session, later, MasonMark, about, match) == Outcome(withdrawn=2)
+        assert withdraw_statements(session, later, MasonMark, about, match) == RowCounts(withdrawn=2)
         # done already
-        assert withdraw_statements(session, later, MasonMark, about, match) == Outcome(unchanged=2)
+        assert withdraw_statements(session, later, MasonMark, about, match) == RowCounts(unchanged=2)
         with pytest.raises(UsageError, match="there is no such mason_mark to withdraw"):
             withdraw_statements(session, later, MasonMark, about, {"sign": "cross"})
         held = select(MasonMark.sign).where(MasonMark.superseded_id.is_(None)).order_by(MasonMark.id)
@@ -105,8 +105,8 @@ def test_an_observation_keeps_everything_that_was_said(known: Database) -> None:
 def test_a_note_and_a_reference_say_something(known: Database) -> None:
     with known.session() as session:
         entry, about = entry_of(session), subjects(session, structures=["ARCH"])
-        assert say_note(session, entry, about, "tooling", Remark("two\nlines")) == Outcome(new=1)
-        assert say_reference(session, entry, about, Remark(document="P1")) == Outcome(new=1)
+        assert say_note(session, entry, about, "tooling", Remark("two\nlines")) == RowCounts(new=1)
+        assert say_reference(session, entry, about, Remark(document="P1")) == RowCounts(new=1)
         (note,) = session.scalars(select(Note)).all()
         assert note.structure is not None
         assert (note.key, note.text, note.structure.code) == ("tooling", "two\nlines", "ARCH")
@@ -120,8 +120,8 @@ def test_a_note_and_a_reference_say_something(known: Database) -> None:
 def test_a_depth_is_only_replaced(known: Database) -> None:
     with known.session() as session:
         entry, about = entry_of(session), subjects(session, ["V3"])
-        assert say_depth(session, entry, about, 0.4) == Outcome(new=1)
-        assert say_depth(session, entry, about, 0.4, 0.01) == Outcome(replaced=1)
+        assert say_depth(session, entry, about, 0.4) == RowCounts(new=1)
+        assert say_depth(session, entry, about, 0.4, 0.01) == RowCounts(replaced=1)
         (held,) = session.scalars(select(DepthEvidence).where(DepthEvidence.superseded_id.is_(None)))
         for attempt in (
             lambda: withdraw(session, entry, held),

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from archmodel.database.session import Database
-from archmodel.query.api import Face, find_faces
+from archmodel.query.api import FoundFace, find_faces
 from archmodel.query.geojson import feature_collection, flattened
 from moma.errors import UsageError
 from tests.archmodel.conftest import WALL
@@ -18,14 +18,14 @@ from tests.archmodel.conftest import WALL
 SQUARE = np.array([[0.0, 0, 0], [2, 0, 0], [2, 0, 1], [0, 0, 1]])
 
 
-def turned(angle: float, tilt: float = 0.0) -> Face:
+def turned(angle: float, tilt: float = 0.0) -> FoundFace:
     """A face of 2 m × 1 m, looking to negative y, turned about the vertical and then leaning backwards [rad]."""
     lean = np.array([[1, 0, 0], [0, math.cos(tilt), math.sin(tilt)], [0, -math.sin(tilt), math.cos(tilt)]])
     turn = np.array(
         [[math.cos(angle), -math.sin(angle), 0], [math.sin(angle), math.cos(angle), 0], [0, 0, 1]]
     )
     rotation = turn @ lean
-    return Face(
+    return FoundFace(
         SQUARE @ rotation.T, rotation @ np.array([0.0, -1.0, 0.0]), {"code": f"{math.degrees(angle):.0f}"}
     )
 
@@ -51,9 +51,9 @@ def test_faces_are_those_that_were_measured(filled: Database) -> None:
 
 
 def test_what_was_not_measured_has_no_geometry() -> None:
-    (feature,) = feature_collection([Face(None, None, {"code": "X"})])["features"]  # type: ignore[misc]
+    (feature,) = feature_collection([FoundFace(None, None, {"code": "X"})])["features"]  # type: ignore[misc]
     assert feature == {"type": "Feature", "id": "X", "geometry": None, "properties": {"code": "X"}}
-    assert flattened([Face(None, None, {})])[0].outline is None
+    assert flattened([FoundFace(None, None, {})])[0].outline is None
     assert flattened([]) == []
 
 
@@ -76,7 +76,7 @@ def test_on_an_upright_wall_v_is_the_height_and_u_goes_to_the_right() -> None:
 
 def test_a_paving_keeps_its_plan() -> None:
     plan = np.array([[1.0, 2, 0.1], [3, 2, 0.1], [3, 5, 0.1], [1, 5, 0.1]])
-    (face,) = flattened([Face(plan, np.array([0.0, 0.0, 1.0]), {"code": "P"})])
+    (face,) = flattened([FoundFace(plan, np.array([0.0, 0.0, 1.0]), {"code": "P"})])
     np.testing.assert_allclose(face.outline, plan[:, :2])  # type: ignore[arg-type]
 
 

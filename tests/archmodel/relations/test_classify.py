@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from archmodel.relations.classify import Contacts, RelationSettings, StonesOf, relations_between
+from archmodel.relations.classify import RelationSettings, StoneContacts, StonesOf, relations_between
 from archmodel.tables.relations import RELATIONS
 
 FRONT, BACK = (0.0, -1.0, 0.0), (0.0, 1.0, 0.0)
@@ -15,7 +15,7 @@ def contacts(*rows):
     """Contacts from (first, second, normal) or (…, area, gap)."""
     full = [(*row, 1.0, 0.01)[:5] for row in rows]
     normals = np.array([row[2] for row in full], dtype=float)
-    return Contacts(
+    return StoneContacts(
         np.array([row[:2] for row in full]),
         np.array([row[3] for row in full], dtype=float),
         np.array([row[4] for row in full], dtype=float),

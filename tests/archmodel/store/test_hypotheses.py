@@ -9,23 +9,23 @@ from sqlalchemy import func, select
 from archmodel.database.session import open_database
 from archmodel.query.api import find, find_faces, find_rows
 from archmodel.store.hypotheses import store_hypotheses, withdraw_hypotheses
-from archmodel.store.revisions import Outcome
+from archmodel.store.revisions import RowCounts
 from archmodel.store.stones import load_stones
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Entry, new_entry
 from archmodel.tables.surveys import Measurement
 from moma.errors import DatabaseError, UsageError
 from pipelines.ingest.records import stone_record, surveyed_block
+from pipelines.samples.buildings.window import make_window
 from survey.extrusion.depth import depth_for
 from survey.extrusion.extrusion import extrude
 from survey.faces.faces import outline_face
-from survey.synthetic.window_bay.sample import make_sample
 from survey.unseen.missing.propose import propose_missing
 
 
 @pytest.fixture(scope="module")
 def records():
-    survey = make_sample().survey
+    survey = make_window().survey
     blocks = [
         extrude(outline_face(one, survey.head.viewpoint(None)), depth_for(one, survey.head.depth_rules))
         for one in survey.blocks
@@ -78,8 +78,8 @@ def test_all_or_nothing(session, records):
 def test_one_that_is_withdrawn_is_found_no_more_and_forgotten_not(session, records):
     _, numbers = store_hypotheses(session, "test", records, "thought")
     entry = new_entry(session, "declaration", "seen", author="A. Mason")
-    assert withdraw_hypotheses(session, entry, numbers[:1]) == Outcome(withdrawn=1)
-    assert withdraw_hypotheses(session, entry, numbers) == Outcome(withdrawn=1, unchanged=1)
+    assert withdraw_hypotheses(session, entry, numbers[:1]) == RowCounts(withdrawn=1)
+    assert withdraw_hypotheses(session, entry, numbers) == RowCounts(withdrawn=1, unchanged=1)
     assert find(session, "entity") == []
     assert find_rows(session, "entity", ["hypothesis = true"]) == find_faces(session, "entity") == []
     assert count(session, Entity) == 2

@@ -4,16 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mechanics.solvers.first_order.admm import ADMM
+from mechanics.solvers.second_order.proximal_newton import ProximalNewton
+from mechanics.solvers.strategies.compliant import Compliant
 
 from mechanics.delassus.compliant import CompliantDelassus
 from mechanics.problem.problem import ContactStart
 from mechanics.problem.residual import residual
-from mechanics.solvers.first_order.admm import ADMM
 from mechanics.solvers.first_order.nsgs import NSGS
 from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.second_order.newton import Newton
-from mechanics.solvers.second_order.proximal_newton import ProximalNewton
-from mechanics.solvers.strategies.compliant import Compliant
 from tests.mechanics.dense_operator import DenseDelassus
 from tests.mechanics.shapes import brick, ground, posed, scene
 

@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from mechanics.model.deformable import Compliance, deformable
-from mechanics.model.dissection import dissection
+from mechanics.model.deformable import Compliance, deformable, dissection
 from mechanics.stones.elasticity.tensors import from_voigt, von_mises
 from mechanics.stones.meshing.meshers.gmsh import mesh_with_gmsh
 from tests.mechanics.shapes import LIMESTONE, TURN

@@ -5,6 +5,13 @@ from types import FunctionType
 
 import numpy as np
 import pytest
+from mechanics.solvers.first_order.admm import ADMM
+from mechanics.solvers.first_order.apgd import APGD
+from mechanics.solvers.second_order.cone_program import ConeProgram
+from mechanics.solvers.strategies.auto import Auto
+from mechanics.solvers.strategies.planar import Planar
+from mechanics.solvers.strategies.rigid import Alternating
+from mechanics.solvers.strategies.rigid_first import RigidFirst
 
 from mechanics.delassus.rigid import RigidDelassus
 from mechanics.problem.problem import ContactStart
@@ -12,17 +19,10 @@ from mechanics.problem.residual import natural_map, residual
 from mechanics.scene.laws.mortar import MortarJoint
 from mechanics.scene.scene import ContactSettings, Fidelity, Method, Placement, SolverSettings, TimeSettings
 from mechanics.solvers.choice import choose_planar_solver, choose_solver, choose_solvers
-from mechanics.solvers.first_order.admm import ADMM
 from mechanics.solvers.first_order.anderson import Anderson
-from mechanics.solvers.first_order.apgd import APGD
 from mechanics.solvers.first_order.nsgs import NSGS
-from mechanics.solvers.second_order.cone_program import ConeProgram
 from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.second_order.newton import Newton
-from mechanics.solvers.strategies.auto import Auto
-from mechanics.solvers.strategies.planar import Planar
-from mechanics.solvers.strategies.rigid import Alternating
-from mechanics.solvers.strategies.rigid_first import RigidFirst
 from moma.errors import SolverError
 from tests.mechanics.dense_operator import products_alone
 from tests.mechanics.shapes import brick, ground, posed, scene

@@ -4,18 +4,18 @@ from dataclasses import replace
 
 import pytest
 
+from pipelines.samples.buildings.facings import two_facings
+from pipelines.samples.buildings.ribs import RibVaultShape, rib_vault
+from pipelines.samples.buildings.window import make_window
 from survey.formats.native.writer import write_head, write_moma
 from survey.formats.solids.obj_writer import write_obj
-from survey.synthetic.buildings.facings import two_facings
-from survey.synthetic.buildings.ribs import RibVaultShape, rib_vault
-from survey.synthetic.window_bay.sample import make_sample
 from tests.moma.commands import answer, fails, invoke, prints
 
 
 @pytest.fixture
 def holes(tmp_path):
     """A database with the sample without two stones."""
-    survey = make_sample().survey
+    survey = make_window().survey
     kept = tuple(one for one in survey.blocks if one.code not in {"W05-02", "W10-05"})
     write_moma(replace(survey, blocks=kept), tmp_path / "holes.moma")
     url = f"sqlite:///{tmp_path / 'holes.db'}"

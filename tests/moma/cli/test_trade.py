@@ -16,7 +16,7 @@ from mechanics.stones.meshing.elements import Element
 from pipelines.ingest.ingest import ingest
 from pipelines.results.quantities import QUANTITIES
 from pipelines.tradeoff import study as trade_module
-from pipelines.tradeoff.grid import Setting, grid
+from pipelines.tradeoff.grid import Variant, grid
 from pipelines.tuning.overlay import Overlay
 from tests.moma.commands import invoke
 from tests.paths import ROOT
@@ -53,7 +53,7 @@ def few_settings(scene, blocks, width, stress=False):
     """Two of the usual settings, and one that no memory holds."""
     chosen = [one for one in grid(scene, blocks, width, stress) if one.name in TRIED]
     finest = Overlay(element=Element.HEX8, cells=1e5)
-    return (*chosen, Setting(TOO_FINE, finest, 100.0, Element.HEX8, 1e-5, 1e-5, 3e-3, 1e-6, 4))
+    return (*chosen, Variant(TOO_FINE, finest, 100.0, Element.HEX8, 1e-5, 1e-5, 3e-3, 1e-6, 4))
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from mechanics.limit.kinematic import Kinematics
-from pipelines.assess.codes.check import check_code
-from pipelines.assess.codes.floor import floor_acceleration, floor_displacement, floor_spectrum
+from pipelines.assess.codes.check import check_code, floor_acceleration, floor_displacement, floor_spectrum
 from pipelines.scene.site import Site
 
 G = 9.81

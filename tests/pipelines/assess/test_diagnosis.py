@@ -16,12 +16,12 @@ from pipelines.assess.diagnosis.search import cases_of, fit_cases, runs_of
 from pipelines.assess.diagnosis.smoothness import probes, with_unevenness
 from pipelines.assess.diagnosis.trials import Trial, Tried, runner
 from pipelines.assess.motions import Motions
+from pipelines.samples.buildings.walls import wall
+from pipelines.samples.frame import RigidMotion
 from pipelines.scene.file import parse_scene
 from pipelines.toml.lines import parse_toml
 from pipelines.toml.writer import toml_text
 from survey.quality.precision import appraise
-from survey.synthetic.buildings.walls import wall
-from survey.synthetic.frame import RigidMotion
 
 SCENE = """
 [scene]

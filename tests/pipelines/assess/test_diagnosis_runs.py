@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.assess.diagnosis.best import write_best
 from pipelines.assess.diagnosis.file import read_diagnosis
 from pipelines.assess.diagnosis.fit import Fit
 from pipelines.assess.diagnosis.ranking import rank
+from pipelines.assess.diagnosis.results import write_best
 from pipelines.assess.diagnosis.search import cases_of, check_case, runs_of
 from pipelines.assess.diagnosis.trials import Trial, Tried, run_trial, since_rest
 from pipelines.assess.motions import Motions

@@ -17,11 +17,11 @@ from pipelines.draw.elevations.closing_shapes import Stages, closing_shapes, pla
 from pipelines.draw.elevations.sheet import FLAG
 from pipelines.draw.offscreen.closing import ClosingSurface
 from pipelines.draw.offscreen.jobs import load_surface, save_surface
+from pipelines.samples.buildings.quoins import corner
+from pipelines.samples.buildings.vaults import barrel_vault
 from survey.geometry.solids import Solid, area_vector
-from survey.joints.report import ClosingReport, Gap, Joint, Overlap
+from survey.joints.report import ClosingReport, Gap, Overlap, StoneJoint
 from survey.joints.settings import JointMode
-from survey.synthetic.buildings.quoins import corner
-from survey.synthetic.buildings.vaults import barrel_vault
 from tests.pipelines.results_by_hand import BOX_FACES, box
 
 AWAY = np.array([0.0, -1.0, 0.0])
@@ -48,7 +48,7 @@ def face_of(solid):
 
 def bed(lower, upper, width=0.012, left_open=""):
     place = upper.vertices.mean(axis=0) * [1, 1, 0] + [0, 0, upper.vertices[:, 2].min()]
-    return Joint(
+    return StoneJoint(
         (upper.code, lower.code),
         -1 if left_open else 0,
         width,

@@ -12,7 +12,7 @@ from archmodel.tables.runs import CellResult
 from mechanics.planar.model import build_planar_model
 from mechanics.planar.scene import Disk, PlanarScene, PlanarTime
 from mechanics.planar.simulate import simulate_planar
-from moma.cli.geology import Experiment
+from moma.cli.geology import ExperimentName
 from moma.errors import MomaError, SceneError
 from pipelines.geology.file import EXPERIMENTS, parse_geology, read_geology
 from pipelines.geology.observe import CELL_COLUMNS, Fields, read_rows
@@ -398,7 +398,7 @@ def test_a_cell_outside_the_sample_is_refused_at_its_line(tmp_path):
 
 
 def test_the_command_knows_all_experiments():
-    assert {one.value for one in Experiment} == set(EXPERIMENTS)
+    assert {one.value for one in ExperimentName} == set(EXPERIMENTS)
 
 
 def test_the_commands_of_the_how_to_run(tmp_path, monkeypatch):

@@ -10,7 +10,7 @@ from sqlalchemy import select
 from archmodel.assertions.statements import Remark
 from archmodel.database.session import open_database
 from archmodel.describe.entity import describe
-from archmodel.store.revisions import Outcome
+from archmodel.store.revisions import RowCounts
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import held_at, new_entry
 from archmodel.tables.knowledge import Correction, DepthEvidence
@@ -45,8 +45,8 @@ def test_the_solid_follows_the_depth(url: str) -> None:
             entry = new_entry(session, "correction", "drill hole", author="A")
             remark = Remark("measured in a drill hole")
             outcome = record_depth(session, entry, [CODE], 0.6, 0.01, remark)
-            assert outcome == Outcome(new=1, replaced=1)
-            assert record_depth(session, entry, [CODE], 0.6, 0.01, remark) == Outcome(unchanged=1)
+            assert outcome == RowCounts(new=1, replaced=1)
+            assert record_depth(session, entry, [CODE], 0.6, 0.01, remark) == RowCounts(unchanged=1)
             number = entry.id
         with database.session(read_only=True) as session:
             stone = session.scalars(select(Entity).where(Entity.code == CODE)).one()

@@ -9,7 +9,7 @@ from sqlalchemy import func, select
 from archmodel.database.session import open_database
 from archmodel.describe.entity import describe
 from archmodel.query.api import find
-from archmodel.store.revisions import Outcome
+from archmodel.store.revisions import RowCounts
 from archmodel.store.stones import store_survey
 from archmodel.tables.entries import Entry
 from archmodel.tables.knowledge import Correction, MasonMark, Material, Observation, Phase, Statement
@@ -88,8 +88,8 @@ def counts(url: str) -> dict[str, int]:
 
 def test_a_file_is_recorded_with_who_says_so(url: str, write: Write) -> None:
     (file,) = record([write(WALL)], url).files
-    assert file.outcome == Outcome(new=3 + 4 + 1 + 3 + 1)
-    assert file.tables["mark"] == Outcome(new=3)
+    assert file.outcome == RowCounts(new=3 + 4 + 1 + 3 + 1)
+    assert file.tables["mark"] == RowCounts(new=3)
     with open_database(url) as database, database.session(read_only=True) as session:
         (entry,) = session.scalars(select(Entry).where(Entry.action == "declaration"))
         assert (entry.author, entry.source, (entry.id,)) == ("A", "by eye", file.entries)
@@ -113,11 +113,11 @@ def test_the_same_file_changes_nothing_and_a_longer_one_only_adds(url: str, writ
     assert (again.recorded_before, again.entries, again.tables) == (first.entries[0], (), {})
     # the same in other words: nothing is new, and no entry is made
     (same,) = record([write(WALL + "# checked\n")], url).files
-    assert (same.entries, same.outcome) == ((), Outcome(unchanged=first.outcome.new))
+    assert (same.entries, same.outcome) == ((), RowCounts(unchanged=first.outcome.new))
     assert counts(url) == before
     more = '\n[[phase]]\nname = "2"\n\n[[of_phase]]\nphase = "2"\nstones = ["V1"]\n'
     (longer,) = record([write(WALL + more)], url).files
-    assert longer.outcome == Outcome(new=2, unchanged=first.outcome.new)
+    assert longer.outcome == RowCounts(new=2, unchanged=first.outcome.new)
 
 
 def test_all_files_or_none(url: str, write: Write) -> None:
@@ -209,9 +209,9 @@ name = "WALL"
 """
     (done,) = record([write(undo + rest)], url).files
     # with the material goes its other property, with the structure its other members
-    assert done.outcome == Outcome(withdrawn=8 + 1 + 2)
+    assert done.outcome == RowCounts(withdrawn=8 + 1 + 2)
     (again,) = record([write(undo)], url).files
-    assert again.outcome == Outcome(unchanged=2)
+    assert again.outcome == RowCounts(unchanged=2)
     with open_database(url) as database, database.session(read_only=True) as session:
         for cls in (Material, Phase, Structure, Relation):
             assert session.scalars(select(cls).where(cls.superseded_id.is_(None))).all() == [], cls
@@ -327,7 +327,7 @@ def test_a_file_with_a_byte_order_mark_is_read(write: Write) -> None:
 def test_kinds_can_be_registered_before_there_is_a_survey(new_url: Callable[[], str], write: Write) -> None:
     url = new_url()
     kind = "[[kind]]\nname = 'merlon'\nparent = 'coping'\ndefinition = 'A stone of a merlon.'\n"
-    assert record([write(kind)], url).files[0].outcome == Outcome(new=1)
+    assert record([write(kind)], url).files[0].outcome == RowCounts(new=1)
     with open_database(url) as database, database.session() as session:
         store_survey(session, "w", "w.moma", SHA, [box_stone("M1", "merlon")])
         assert [one.code for one in find(session, "coping")] == ["M1"]

@@ -14,7 +14,7 @@ from archmodel.store.stones import store_survey
 from moma.errors import MomaError
 from pipelines.record.keys import ARRAYS
 from pipelines.record.record import record
-from pipelines.toml.schema import REQUIRED, Kind
+from pipelines.toml.schema import REQUIRED, ValueKind
 from tests.archmodel.stones import SHA, box_stone
 
 NAMES = (
@@ -57,19 +57,19 @@ INNER = st.dictionaries(
     max_size=2,
 )
 # what mostly passes the check of types, so that the database is reached
-TYPED: dict[Kind, st.SearchStrategy[Any]] = {
-    Kind.TEXT: st.sampled_from(NAMES) | TEXTS.filter(str.strip),
-    Kind.TEXTS: st.lists(TEXTS.filter(str.strip), max_size=1),
-    Kind.STONES: st.lists(st.sampled_from(("V1", "V2", "course = 1")), min_size=1, max_size=2),
-    Kind.NUMBER: st.floats(1e-3, 1e3) | st.floats(0.0),
-    Kind.INTEGER: st.integers(-1, 3000),
-    Kind.BOOLEAN: st.booleans(),
-    Kind.VECTOR: st.lists(st.floats(allow_nan=False), min_size=3, max_size=3),
-    Kind.DATE: st.dates(dt.date(1, 1, 1), dt.date(9999, 12, 31)),
-    Kind.TABLE: INNER | st.dictionaries(st.just("slit"), st.just({"unit": "m", "definition": "x"})),
+TYPED: dict[ValueKind, st.SearchStrategy[Any]] = {
+    ValueKind.TEXT: st.sampled_from(NAMES) | TEXTS.filter(str.strip),
+    ValueKind.TEXTS: st.lists(TEXTS.filter(str.strip), max_size=1),
+    ValueKind.STONES: st.lists(st.sampled_from(("V1", "V2", "course = 1")), min_size=1, max_size=2),
+    ValueKind.NUMBER: st.floats(1e-3, 1e3) | st.floats(0.0),
+    ValueKind.INTEGER: st.integers(-1, 3000),
+    ValueKind.BOOLEAN: st.booleans(),
+    ValueKind.VECTOR: st.lists(st.floats(allow_nan=False), min_size=3, max_size=3),
+    ValueKind.DATE: st.dates(dt.date(1, 1, 1), dt.date(9999, 12, 31)),
+    ValueKind.TABLE: INNER | st.dictionaries(st.just("slit"), st.just({"unit": "m", "definition": "x"})),
 }
 ABOUT: dict[str, st.SearchStrategy[Any]] = {
-    "stones": TYPED[Kind.STONES],
+    "stones": TYPED[ValueKind.STONES],
     "structures": st.just([]),
     "to": st.just(["V2"]),
     "of": st.just(["V1"]),

@@ -18,8 +18,7 @@ from pipelines.reports.run import write_report
 from pipelines.results.joints_csv import write_joints
 from pipelines.results.series_csv import write_series
 from pipelines.results.stone_values import stone_results
-from pipelines.results.summary import summarise
-from pipelines.results.trust import indeterminacy, length_tolerance
+from pipelines.results.summary import indeterminacy, length_tolerance, summarise
 from pipelines.run.record import joint_arrays
 from pipelines.run.run import RunReport
 from tests.pipelines.reports.page import Page

@@ -12,10 +12,10 @@ from pipelines.ingest.ingest import ingest
 from pipelines.run.check import check_scene
 from pipelines.run.check_report import CheckReport
 from pipelines.run.closing_check import joints_report, simplification_report
-from survey.joints.report import ClosingReport, Gap, Joint, Overlap
+from pipelines.samples.buildings.walls import wall
+from survey.joints.report import ClosingReport, Gap, Overlap, StoneJoint
 from survey.joints.settings import JointMode
 from survey.simplify.simplify import simplify
-from survey.synthetic.buildings.walls import wall
 from tests.pipelines.scenes import TWO_COURSES, survey_text
 
 PLACE, UP = np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.0, 1.0])
@@ -29,7 +29,7 @@ def scene(tmp_path):
 
 
 def joint(stones, plane, width, area, left_open=""):
-    return Joint(stones, plane, width, 0.5, area, PLACE, UP, left_open)
+    return StoneJoint(stones, plane, width, 0.5, area, PLACE, UP, left_open)
 
 
 REPORT = ClosingReport(

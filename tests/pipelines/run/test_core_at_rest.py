@@ -11,10 +11,10 @@ from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene, Start
 from mechanics.simulate import simulate
 from mechanics.stones.materials import Material
 from pipelines.ingest.records import surveyed_block
-from pipelines.propose.records import core_record
+from pipelines.propose.propose import core_record
+from pipelines.samples.buildings.facings import two_facings
 from survey.joints.close import close_joints
 from survey.joints.settings import JointSettings
-from survey.synthetic.buildings.facings import two_facings
 from survey.unseen.core.facings import facing_stone
 from survey.unseen.core.propose import propose_infill
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from mechanics.scene.scene import Fidelity
 from pipelines.run.fidelity import Wishes, modelled, neighbours
-from survey.joints.report import Joint
+from survey.joints.report import StoneJoint
 
 FIXED, RIGID, DEFORMABLE = Fidelity.FIXED, Fidelity.RIGID, Fidelity.DEFORMABLE
 CODES = tuple("ABCDEFGHIJ")
@@ -75,7 +75,9 @@ def test_stress_is_of_those_who_are_asked_or_of_all_that_deform():
 
 def test_a_joint_makes_two_stones_neighbours_closed_or_not():
     def joint(first, second, left_open=""):
-        return Joint((first, second), -1, 0.01, 0.0, 0.1, np.zeros(3), np.array([0.0, 0.0, 1.0]), left_open)
+        return StoneJoint(
+            (first, second), -1, 0.01, 0.0, 0.1, np.zeros(3), np.array([0.0, 0.0, 1.0]), left_open
+        )
 
     found = neighbours([joint("A", "B"), joint("C", "B", "too wide"), joint("B", "A")])
     assert found == {"A": {"B"}, "B": {"A", "C"}, "C": {"B"}}

@@ -14,7 +14,7 @@ from archmodel.database.session import open_database
 from archmodel.query.api import find
 from archmodel.store.stones import load_stones
 from pipelines.ingest.ingest import ingest
-from pipelines.run.local_frame import local_origin, stone_about
+from pipelines.run.assemble import local_origin, stone_about
 from pipelines.run.run import run_scene
 from tests.pipelines.scenes import assembled, survey_text
 

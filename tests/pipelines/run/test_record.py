@@ -17,7 +17,7 @@ from pipelines.run.record import surveyed_widths
 from pipelines.run.run import run_scene
 from pipelines.scene.file import read_scene
 from survey.joints.report import ClosingReport
-from survey.joints.report import Joint as SurveyedJoint
+from survey.joints.report import StoneJoint as SurveyedJoint
 from survey.joints.settings import JointMode
 from tests.pipelines.results_by_hand import joints_of
 from tests.pipelines.scenes import survey_text

@@ -10,9 +10,8 @@ from mechanics.simulate import simulate
 from pipelines.propose.propose import Recording, propose_core
 from pipelines.record.record import record
 from pipelines.run.assemble import assemble
+from pipelines.samples.write import write_sample
 from pipelines.scene.file import read_scene
-from pipelines.scene.sample import write_recipe
-from survey.synthetic.samples import storey_recipe
 from tests.moma.commands import answer, prints
 
 SPRINGERS = ("T1", "T2", "T3", "T4")
@@ -22,15 +21,15 @@ SPRINGERS = ("T1", "T2", "T3", "T4")
 def storey(tmp_path_factory):
     """The database of a storey of 17 courses, its scene and its result."""
     folder = tmp_path_factory.mktemp("storey")
-    write_recipe("storey", storey_recipe(17, "Storey"), folder)
+    write_sample("tower", folder, courses=17)
     url = f"sqlite:///{folder / 'storey.db'}"
-    prints("ingest", folder / "storey.moma", "--db", url)
+    prints("ingest", folder / "tower.moma", "--db", url)
     solids = ["--format", "solids", "--header", folder / "head.moma"]
     prints("ingest", folder / "solids.obj", *solids, "--db", url)
     record([folder / "knowledge.toml"], url)
     propose_core(url, recording=Recording())
     with open_database(url, create=False) as database, database.session(read_only=True) as session:
-        built = assemble(read_scene(folder / "storey.toml"), session)
+        built = assemble(read_scene(folder / "tower.toml"), session)
     return url, built.scene, simulate(built.scene)
 
 

@@ -9,7 +9,7 @@ import pytest
 from mechanics.stones.settings import Setting, check_settings
 from moma.errors import SceneError
 from pipelines.scene.keys import build, keys_of
-from pipelines.toml.schema import REQUIRED, Document, Kind, check_table
+from pipelines.toml.schema import REQUIRED, TomlDocument, ValueKind, check_table
 
 
 class Colour(StrEnum):
@@ -31,17 +31,17 @@ def test_fields_with_a_declaration_become_keys():
     keys = {key.name: key for key in keys_of(Paint, "names")}
     assert list(keys) == ["weight", "coats", "colour", "second", "names"]
     weight = keys["weight"]
-    assert (weight.kind, weight.doc, weight.unit) == (Kind.NUMBER, "Weight.", "kg")
+    assert (weight.kind, weight.doc, weight.unit) == (ValueKind.NUMBER, "Weight.", "kg")
     assert (weight.default, weight.above, weight.at_most) == (REQUIRED, 0, 5)
     assert (keys["coats"].default, keys["coats"].choices) == (3, (1, 3))
     assert (keys["colour"].default, keys["colour"].choices) == ("red", ("red", "green"))
-    assert (keys["second"].kind, keys["second"].default) == (Kind.TEXT, None)
+    assert (keys["second"].kind, keys["second"].default) == (ValueKind.TEXT, None)
     assert keys["names"].default is REQUIRED
 
 
 def test_a_checked_table_makes_the_dataclass():
     given = {"weight": 2, "colour": "green", "names": ["a"]}
-    values = check_table(Document("paint.toml"), ("paint",), given, keys_of(Paint))
+    values = check_table(TomlDocument("paint.toml"), ("paint",), given, keys_of(Paint))
     assert build(Paint, values | {"other": 1}) == Paint(2.0, 3, Colour.GREEN, None, ("a",))
 
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from pipelines.scene.reference import with_tables
 from tests.paths import ROOT
+from tests.pipelines.scene.reference import with_tables
 
 PAGE = (ROOT / "docs/scene.md").read_text(encoding="utf-8")
 

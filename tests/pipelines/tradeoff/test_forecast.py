@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from mechanics.stones.meshing.elements import Element
 from pipelines.tradeoff.forecast import Forecast, left_out, next_run
-from pipelines.tradeoff.grid import Setting
+from pipelines.tradeoff.grid import Variant
 from pipelines.tradeoff.store import Measured, Status
 from pipelines.tuning.overlay import Overlay
 
@@ -16,11 +16,11 @@ GIB = 2**30
 
 
 def model(name, element, unknowns):
-    return Setting(name, Overlay(element=element), unknowns, element, 1.0, 1.0, 1e-3, 1e-6, 4)
+    return Variant(name, Overlay(element=element), unknowns, element, 1.0, 1.0, 1e-3, 1e-6, 4)
 
 
 def variant(of, name, effort=1.0):
-    return Setting(
+    return Variant(
         name, Overlay(tolerance=1e-4), of.unknowns, of.element, 1.0, 1.0, 1e-3, 1e-4, 4, of.name, effort
     )
 

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from mechanics.stones.meshing.elements import Element
 from pipelines.results.quantities import QUANTITIES, Quantities, StoneQuantities
-from pipelines.tradeoff.grid import Setting
-from pipelines.tradeoff.pareto import Judged, Reference, cheapest, front, judge, models_of_interest
+from pipelines.tradeoff.grid import Variant
+from pipelines.tradeoff.pareto import ErrorReference, Judged, cheapest, front, judge, models_of_interest
 from pipelines.tradeoff.store import Measured, Status
 from pipelines.tuning.overlay import Overlay
 
@@ -63,7 +63,7 @@ def judged(listed):
 
 
 def reference(name, error):
-    return Reference(name, dict.fromkeys(QUANTITIES) | {"von_mises_p99": error}, "other", 2.0, 0.1)
+    return ErrorReference(name, dict.fromkeys(QUANTITIES) | {"von_mises_p99": error}, "other", 2.0, 0.1)
 
 
 @given(
@@ -132,7 +132,7 @@ def quantities_of(stress, eta=1e-7, outcome="equilibrium"):
 def setting(name, element=None, edge=1.0, step=1e-3, tolerance=1e-6, points=4, varied=None):
     coarse = math.inf if element is None else (edge / element.order) ** element.order
     overlay = Overlay(element=element, cells=1.0 / edge)
-    return Setting(name, overlay, 1e3, element, edge, coarse, step, tolerance, points, varied)
+    return Variant(name, overlay, 1e3, element, edge, coarse, step, tolerance, points, varied)
 
 
 def study(*listed):

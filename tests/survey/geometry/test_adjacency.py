@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from mechanics.scene import shapes
 from mechanics.scene.scene import Fidelity
-from survey.geometry.adjacency import Polyhedra, find_touching
+from survey.geometry.adjacency import SolidArrays, find_touching
 from tests.survey.geometry.touching_twin import touching
 from tests.validation import masonry
 
@@ -23,7 +23,7 @@ def solids_of(blocks):
 
 
 def gathered(solids):
-    return Polyhedra.gather(solids)
+    return SolidArrays.gather(solids)
 
 
 def inset(block, by):

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from moma.errors import GeometryError
+from pipelines.samples.buildings.window import make_window
 from survey.extrusion.depth import Depth
 from survey.extrusion.extrusion import SurveyedBlock, extrude
 from survey.faces.faces import outline_face
@@ -20,7 +21,6 @@ from survey.joints.close import ClosedStones, close_joints
 from survey.joints.settings import JointMode, JointSettings
 from survey.records.survey import BlockRecord
 from survey.simplify.simplify import BlockShape, simplify
-from survey.synthetic.window_bay.sample import make_sample
 from tests.survey.plain_blocks import DEPTH, as_stone, box, cuboid, drawn, moved, stone
 from tests.survey.unseen.statics import contact_area, contacts, near_pairs, overlap_depth, side_planes
 
@@ -321,7 +321,7 @@ def test_any_noisy_t_junction_closes_without_overlap(seed: int, width: float, at
 def test_other_samples_close_as_well() -> None:
     # the committed sample is one draw; the method must not depend on it
     for seed in (1, 2, 3):
-        sample = make_sample(seed)
+        sample = make_window(seed)
         blocks = [
             extrude(
                 outline_face(one.record, sample.survey.head.viewpoint(None)),

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from survey.geometry.solids import Solid
-from survey.joints._kernels import JointCorners, continuing_faces, fit_middle_planes
+from survey.joints._kernels import FaceCorners, continuing_faces, fit_middle_planes
 from survey.joints.bounded_closing import as_building, close_within_bounds
 from survey.joints.contact_planes import contact_planes
 from survey.joints.facing import find_facing
@@ -43,7 +43,7 @@ def fit(points, hands, sound=None, usual=-1.0, straightness=0.02):
     sound = np.ones(len(points), np.bool_) if sound is None else np.asarray(sound)
     planes, values = np.zeros((1, 3)), np.zeros((1, 5))
     starts, scales = np.array([0, len(points)]), np.array([scale_of(points)])
-    corners = JointCorners(points, hands, sound, starts, scales)
+    corners = FaceCorners(points, hands, sound, starts, scales)
     fit_middle_planes(corners, usual, straightness, planes, values)
     return planes[0], values[0]
 

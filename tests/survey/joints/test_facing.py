@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from survey.geometry.adjacency import Polyhedra
+from survey.geometry.adjacency import SolidArrays
 from survey.geometry.solids import area_vector
 from survey.joints.facing import find_facing, planes_of
 from survey.joints.settings import JointSettings
@@ -18,7 +18,7 @@ USUAL = JointSettings()
 
 
 def gathered(solids):
-    return Polyhedra.gather((solid.vertices, solid.faces) for solid in solids)
+    return SolidArrays.gather((solid.vertices, solid.faces) for solid in solids)
 
 
 def facing(solids, limits=USUAL):

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from survey.geometry.adjacency import Polyhedra
+from survey.geometry.adjacency import SolidArrays
 from survey.geometry.solids import Solid
 from survey.joints.contact_planes import StoneFaces
 from survey.joints.facing import planes_of
@@ -22,7 +22,7 @@ LOST = (2, 6)  # the corner, in front and behind
 
 def faces_of(solids, lost=LOST, kept=()):
     """Return all faces; of the first solid some corners are not sound."""
-    gathered = Polyhedra.gather((solid.vertices, solid.faces) for solid in solids)
+    gathered = SolidArrays.gather((solid.vertices, solid.faces) for solid in solids)
     planes = planes_of(gathered)
     sound = np.ones(len(gathered.vertices), np.bool_)
     sound[list(lost)] = False

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from pipelines.samples.buildings.walls import wall
+from pipelines.samples.frame import RigidMotion
 from survey.quality.courses import measure_courses
 from survey.quality.facades import find_facades
 from survey.quality.movement import compare_courses, compare_plumb
 from survey.quality.precision import appraise
-from survey.synthetic.buildings.walls import wall
-from survey.synthetic.frame import RigidMotion
 
 
 def surveyed(building):

@@ -10,6 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from pipelines.samples.buildings.openings import ArchShape
+from pipelines.samples.buildings.quoins import corner
+from pipelines.samples.buildings.vaults import barrel_vault, semicircular_arch
+from pipelines.samples.buildings.walls import wall
+from pipelines.samples.buildings.window import make_window
+from pipelines.samples.true_joints import TrueJoint, true_joints
 from survey.extrusion.depth import depth_for
 from survey.extrusion.extrusion import SurveyedBlock, extrude
 from survey.faces.faces import outline_face
@@ -17,12 +23,6 @@ from survey.formats.native.reader import read_moma
 from survey.joints.close import ClosedStones, close_joints
 from survey.joints.settings import JointMode, JointSettings
 from survey.simplify.simplify import simplify
-from survey.synthetic.buildings.openings import Arch
-from survey.synthetic.buildings.quoins import corner
-from survey.synthetic.buildings.vaults import barrel_vault, semicircular_arch
-from survey.synthetic.buildings.walls import wall
-from survey.synthetic.shared_faces import TrueJoint, true_joints
-from survey.synthetic.window_bay.sample import make_sample
 from tests.paths import ROOT
 from tests.validation.closing.closing_truth import Verdict, judge
 
@@ -31,8 +31,8 @@ SETTINGS = JointSettings()
 
 SMALL = {
     "wall": lambda: wall(40),
-    "segmental arch": lambda: wall(80, arch=Arch.SEGMENTAL),
-    "semicircular arch": lambda: wall(98, arch=Arch.SEMICIRCULAR),
+    "segmental arch": lambda: wall(80, arch=ArchShape.SEGMENTAL),
+    "semicircular arch": lambda: wall(98, arch=ArchShape.SEMICIRCULAR),
     "sagging 5 cm": lambda: wall(90, seed=3, sag=0.05),
     "snecked": lambda: wall(90, snecked=0.1),
     "corner": lambda: corner(6),
@@ -42,8 +42,8 @@ SMALL = {
     "free arch": lambda: semicircular_arch(17),
 }
 LARGE = {
-    "1,000 stones": lambda: wall(1000, arch=Arch.SEGMENTAL),
-    "1,000 stones, semicircular": lambda: wall(1000, seed=2, arch=Arch.SEMICIRCULAR, snecked=0.05),
+    "1,000 stones": lambda: wall(1000, arch=ArchShape.SEGMENTAL),
+    "1,000 stones, semicircular": lambda: wall(1000, seed=2, arch=ArchShape.SEMICIRCULAR, snecked=0.05),
     "sagging 10 cm": lambda: wall(500, seed=4, sag=0.10),
     "long corner": lambda: corner(16, 8.0, seed=2),
     "wide vault": lambda: barrel_vault(25, 12, seed=2, radius=3.0),
@@ -75,7 +75,7 @@ def closing(request: pytest.FixtureRequest) -> Case:
             extrude(outline_face(one, head.viewpoint(None)), depth_for(one, head.depth_rules))
             for one in survey.blocks
         ]
-        return case(blocks, true_joints([stone.solid for stone in make_sample().stones]))
+        return case(blocks, true_joints([stone.solid for stone in make_window().stones]))
     building = (SMALL | LARGE)[request.param]()
     return case(building.blocks(), building.joints)
 

@@ -25,11 +25,11 @@ from mechanics.scene.scene import (
 from mechanics.simulate import simulate
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
+from pipelines.samples.buildings.openings import ArchShape
+from pipelines.samples.buildings.quoins import corner
+from pipelines.samples.buildings.vaults import barrel_vault, semicircular_arch
+from pipelines.samples.buildings.walls import wall
 from survey.joints.close import close_joints
-from survey.synthetic.buildings.openings import Arch
-from survey.synthetic.buildings.quoins import corner
-from survey.synthetic.buildings.vaults import barrel_vault, semicircular_arch
-from survey.synthetic.buildings.walls import wall
 
 STONE = Material("stone", density=2400.0, young=10e9, poisson=0.2)
 RIGID = {
@@ -42,7 +42,7 @@ RIGID = {
 }
 ELASTIC = {
     "wall": lambda: wall(40),
-    "segmental arch": lambda: wall(60, seed=2, arch=Arch.SEGMENTAL),
+    "segmental arch": lambda: wall(60, seed=2, arch=ArchShape.SEGMENTAL),
     "corner": lambda: corner(4, 2.0),
     "higher corner": lambda: corner(6),
     "vault": lambda: barrel_vault(13, 2, thickness=0.3),
@@ -115,7 +115,7 @@ def test_what_rigid_stones_bear_is_not_unique_below_an_arch_in_a_wall():
 
     An interior point ends among all forces that hold the wall up, sweeps near where they began.
     """
-    building = wall(98, arch=Arch.SEMICIRCULAR)
+    building = wall(98, arch=ArchShape.SEMICIRCULAR)
     one, two = (
         supported(building, building.solids, method=method) for method in (Method.NSGS, Method.INTERIOR_POINT)
     )

@@ -9,7 +9,7 @@ from survey.joints.close import close_joints
 from survey.joints.settings import JointSettings
 from survey.records.survey import SolidRecord
 from survey.simplify.simplify import simplify
-from survey.synthetic.buildings.assemblies import RoundedAssembly, angled_pier, hexagonal_dome
+from tests.validation.closing.assemblies import RoundedAssembly, angled_pier, hexagonal_dome
 from tests.validation.closing.closing_truth import judge
 
 ASSEMBLIES = {

@@ -7,12 +7,12 @@ slightly asymmetric; its solution is that of another Gauss–Seidel code, truste
 
 import numpy as np
 import pytest
+from mechanics.solvers.first_order.admm import ADMM
+from mechanics.solvers.strategies.rigid import Alternating
 
 from mechanics.problem.problem import ContactProblem, ContactStart
 from mechanics.problem.residual import natural_map
-from mechanics.solvers.first_order.admm import ADMM
 from mechanics.solvers.first_order.nsgs import NSGS
-from mechanics.solvers.strategies.rigid import Alternating
 from tests.mechanics.dense_operator import DenseDelassus
 
 SOLVERS = {"nsgs": NSGS, "admm": ADMM, "auto": Alternating}

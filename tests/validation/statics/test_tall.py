@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mechanics.solvers.strategies.rigid import Alternating
 
 from benchmarks.scenes import column, first_problem, thick_wall
 from mechanics.problem.problem import ContactStart
 from mechanics.problem.residual import residual
 from mechanics.solvers.second_order.interior_point import InteriorPoint
-from mechanics.solvers.strategies.rigid import Alternating
 
 G, STEP = 9.81, 1e-3
 STONE = 2400.0

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mechanics.solvers.first_order.apgd import APGD
 
 from mechanics.problem.problem import ContactStart
 from mechanics.problem.residual import natural_map, project_on_cone
 from mechanics.solvers._kernels.apgd import Pair, Terms, curvature, momentum, project_step
-from mechanics.solvers.first_order.apgd import APGD
 from tests.mechanics.shapes import brick, ground, posed, scene
 
 

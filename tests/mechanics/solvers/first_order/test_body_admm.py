@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mechanics.solvers.strategies.compliant import Compliant
 
 from benchmarks.scenes import engine_scene, running_bond
 from mechanics.delassus.compliant import CompliantDelassus
@@ -19,7 +20,6 @@ from mechanics.solvers._kernels.body_parts import parts_of
 from mechanics.solvers.first_order import body_admm
 from mechanics.solvers.first_order.body_admm import BodyADMM, Stage
 from mechanics.solvers.second_order.interior_point import InteriorPoint
-from mechanics.solvers.strategies.compliant import Compliant
 from moma.errors import SolverError
 
 _ALONG, _ACROSS = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mechanics.solvers.first_order.admm import ADMM
 
 from mechanics.dynamics.progress import Clock
 from mechanics.planar.delassus import PlanarDelassus
@@ -12,7 +13,6 @@ from mechanics.planar.simulation import PlanarSimulation
 from mechanics.problem.problem import ContactProblem, ContactStart
 from mechanics.problem.residual import residual
 from mechanics.solvers._kernels import disk_admm as kernel
-from mechanics.solvers.first_order.admm import ADMM
 from mechanics.solvers.first_order.disk_admm import DiskADMM, _eliminated
 from mechanics.solvers.first_order.nsgs import NSGS
 from moma.errors import SolverError

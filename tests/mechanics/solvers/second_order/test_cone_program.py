@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mechanics.solvers.second_order.cone_program import ConeProgram
 
 from mechanics.problem.problem import ContactProblem, ContactStart
 from mechanics.problem.residual import natural_map
 from mechanics.scene.scene import Fidelity
-from mechanics.solvers.second_order.cone_program import ConeProgram
 from moma.errors import SolverError
 from tests.mechanics.dense_operator import blocks_apart, products_alone
 from tests.mechanics.shapes import brick, ground, posed, scene

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mechanics.solvers.second_order.proximal_newton import ProximalNewton, _System
 
 from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
@@ -12,7 +13,6 @@ from mechanics.scene.scene import Scene, SolverSettings
 from mechanics.solvers._kernels import body_newton as bodies
 from mechanics.solvers.choice import choose_solver
 from mechanics.solvers.first_order.nsgs import NSGS
-from mechanics.solvers.second_order.proximal_newton import ProximalNewton, _System
 from mechanics.stones.materials import Material
 from moma.errors import SolverError
 from tests.mechanics.dense_operator import blocks_apart

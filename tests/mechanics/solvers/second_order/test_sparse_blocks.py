@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from mechanics.solvers.second_order.proximal_newton import ProximalNewton
 
 from mechanics.solvers.second_order import proximal_newton
-from mechanics.solvers.second_order.proximal_newton import ProximalNewton
 from mechanics.solvers.second_order.sparse_blocks import SparseBlocks
 from tests.mechanics.solvers.second_order.test_proximal_newton import column, first_problem, nothing
 

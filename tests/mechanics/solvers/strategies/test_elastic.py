@@ -5,14 +5,14 @@ from functools import cache
 
 import numpy as np
 import pytest
+from mechanics.solvers.first_order.admm import ADMM
+from mechanics.solvers.strategies import elastic
+from mechanics.solvers.strategies.elastic import Elastic
 
 from mechanics.problem.problem import ContactSolution, ContactStart
 from mechanics.problem.residual import natural_map
 from mechanics.scene.scene import Fidelity, Method, SolverSettings
 from mechanics.solvers.choice import choose_solver
-from mechanics.solvers.first_order.admm import ADMM
-from mechanics.solvers.strategies import elastic
-from mechanics.solvers.strategies.elastic import Elastic
 from tests.mechanics.shapes import brick, ground, posed, scene
 
 SOFT = Fidelity.DEFORMABLE

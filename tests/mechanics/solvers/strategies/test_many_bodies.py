@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mechanics.solvers.strategies import rigid
+from mechanics.solvers.strategies.compliant import Compliant
 
 from benchmarks.tower import tower_scene
 from mechanics.delassus.compliant import CompliantDelassus
@@ -17,8 +19,6 @@ from mechanics.scene.scene import ContactSettings, Scene, SolverSettings, TimeSe
 from mechanics.scene.shapes import bond, wall
 from mechanics.solvers.first_order.body_admm import BodyADMM, Stage
 from mechanics.solvers.second_order.interior_point import InteriorPoint
-from mechanics.solvers.strategies import rigid
-from mechanics.solvers.strategies.compliant import Compliant
 
 _LIMITS = 1e-5, 1e-2
 _STEP = 5e-3  # [s]

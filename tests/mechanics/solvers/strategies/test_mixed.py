@@ -4,14 +4,14 @@ from functools import cache
 
 import numpy as np
 import pytest
+from mechanics.solvers.strategies.elastic import Elastic
+from mechanics.solvers.strategies.mixed import Mixed
 
 from mechanics.problem.problem import ContactStart
 from mechanics.problem.residual import residual
 from mechanics.solvers.second_order.central_path import CentralPath
 from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.second_order.scaling import equilibrated
-from mechanics.solvers.strategies.elastic import Elastic
-from mechanics.solvers.strategies.mixed import Mixed
 from tests.mechanics.shapes import partly_deformable_wall, posed
 
 

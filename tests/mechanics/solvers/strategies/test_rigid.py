@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mechanics.solvers.strategies.rigid import Alternating, _without_self_stress
 
 from benchmarks.scenes import column, engine_scene, first_problem, running_bond
 from mechanics.contact.contacts import gaps
@@ -15,7 +16,6 @@ from mechanics.scene.loads.load import Loads
 from mechanics.scene.scene import SolverSettings
 from mechanics.solvers.first_order.body_admm import BodyADMM
 from mechanics.solvers.second_order.scaling import equilibrated
-from mechanics.solvers.strategies.rigid import Alternating, _without_self_stress
 
 FREE = 9.81 * 1e-3  # velocity that gravity gives in a step of 1 ms [m/s]
 

@@ -5,16 +5,16 @@ from functools import cache
 
 import numpy as np
 import pytest
+from mechanics.solvers.second_order.proximal_newton import ProximalNewton
+from mechanics.solvers.strategies.rigid_first import RigidFirst
 
 from mechanics.delassus.compliant import CompliantDelassus
 from mechanics.problem.problem import ContactProblem, ContactStart
 from mechanics.problem.residual import residual
 from mechanics.solvers.second_order import proximal_newton
 from mechanics.solvers.second_order.interior_point import InteriorPoint
-from mechanics.solvers.second_order.proximal_newton import ProximalNewton
 from mechanics.solvers.second_order.scaling import equilibrated
 from mechanics.solvers.second_order.sparse_blocks import SparseBlocks
-from mechanics.solvers.strategies.rigid_first import RigidFirst
 from moma.errors import SolverError
 from tests.mechanics.dense_operator import blocks_apart
 from tests.mechanics.shapes import partly_deformable_wall, posed

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mechanics.model.contact_faces import touching_faces
 from mechanics.model.model import build_model
+from mechanics.model.stone_meshes import touching_faces
 from mechanics.scene.scene import Fidelity
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.mesh import tet_mesh

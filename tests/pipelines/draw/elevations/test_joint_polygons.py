@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 from scipy.spatial.transform import Rotation
 
-from pipelines.draw.elevations.joint_polygons import joint_polygon
+from pipelines.draw.elevations.closing_shapes import joint_polygon
 from survey.geometry.solids import Solid, area_vector
 from tests.pipelines.results_by_hand import BOX_FACES, box
 

@@ -4,8 +4,10 @@ import numpy as np
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
+from pipelines.samples.buildings.facings import TwoFacings
+from pipelines.samples.frame import wall_frame
 from survey.extrusion.extrusion import prism
-from survey.geometry.solids import Solid
+from survey.geometry.solids import Solid, area_vector
 from survey.geometry.watertight import triangulate
 from survey.unseen.core.facings import FacingStone
 from tests.survey.largest_ball import largest_ball
@@ -67,3 +69,33 @@ def contains(solid, points):
     upper = (a * np.cross(b, c)).sum(axis=2)
     lower = la * lb * lc + (a * b).sum(axis=2) * lc + (b * c).sum(axis=2) * la + (c * a).sum(axis=2) * lb
     return np.abs(2.0 * np.arctan2(upper, lower).sum(axis=1)) > 2.0 * np.pi
+
+
+def core_volume(wall: TwoFacings) -> float:
+    """Compute the true volume between the hidden sides of the two facings of a wall [m³].
+
+    Behind each stone, from its hidden side to the middle of the wall, lies a prism square to the wall: its
+    section times the length at the section's centroid, since both ends are planes.
+    """
+    frame, volume = wall_frame(), 0.0
+    for solid in wall.building.solids:
+        if solid.code in wall.through:
+            continue
+        hidden = solid.vertices[list(solid.faces[1])]
+        heights_over_middle = (hidden - frame.origin) @ frame.axes[2] + 0.5 * wall.thickness
+        if solid.code in wall.second:
+            heights_over_middle = -heights_over_middle
+        section = abs(float(area_vector(hidden) @ frame.axes[2]))
+        volume += section * _mean_over(hidden, heights_over_middle)
+    return volume
+
+
+def _mean_over(polygon, values):
+    """Average over a plane polygon a linear function that is known at its corners."""
+    areas, means = [], []
+    normal = area_vector(polygon)
+    for k in range(1, len(polygon) - 1):
+        triangle = polygon[[0, k, k + 1]]
+        areas.append(float(area_vector(triangle) @ normal))
+        means.append(float(values[[0, k, k + 1]].mean()))
+    return float(np.average(means, weights=areas))

@@ -9,14 +9,14 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from pipelines.samples.buildings.facings import two_facings
+from pipelines.samples.buildings.openings import ArchShape
+from pipelines.samples.buildings.walls import wall
+from pipelines.samples.buildings.window import make_window
 from survey.extrusion.depth import depth_for
 from survey.extrusion.extrusion import extrude
 from survey.faces.faces import outline_face
 from survey.geometry.watertight import check_watertight
-from survey.synthetic.buildings.facings import two_facings
-from survey.synthetic.buildings.openings import Arch
-from survey.synthetic.buildings.walls import wall
-from survey.synthetic.window_bay.sample import make_sample
 from survey.unseen.missing.propose import propose_missing
 from survey.unseen.missing.settings import MissingSettings
 
@@ -32,7 +32,7 @@ def blocks_of(survey):
 @cache
 def sample():
     """Return surveyed stones of the sample, and their true solids by code."""
-    made = make_sample()
+    made = make_window()
     return blocks_of(made.survey), {one.plan.code: one for one in made.stones}
 
 
@@ -66,12 +66,12 @@ def inner_codes():
 @pytest.mark.parametrize(
     "made",
     [
-        lambda: make_sample().survey,
+        lambda: make_window().survey,
         lambda: wall(150, 2).survey,
         lambda: wall(150, 3, sag=0.03).survey,
         lambda: wall(150, 4, snecked=0.1).survey,
-        lambda: wall(150, 5, arch=Arch.SEGMENTAL).survey,
-        lambda: wall(150, 6, arch=Arch.SEMICIRCULAR).survey,
+        lambda: wall(150, 5, arch=ArchShape.SEGMENTAL).survey,
+        lambda: wall(150, 6, arch=ArchShape.SEMICIRCULAR).survey,
         lambda: two_facings(4.0, 6, 1).building.survey,
     ],
 )
@@ -106,7 +106,7 @@ def test_the_ends_of_a_wall_and_its_top_tell_nothing():
 @given(seed=st.integers(0, 10**6))
 def test_the_window_stays_open_whatever_is_missing(seed):
     blocks, _ = sample()
-    frame = make_sample().frame
+    frame = make_window().frame
     rng = Random(seed)
     gone = {code for code in inner_codes() if rng.random() < 0.1}
     for one in proposed(blocks, gone):
@@ -207,7 +207,7 @@ def test_a_hole_of_many_stones_or_courses_is_an_opening():
 @settings(max_examples=6, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(turn=st.floats(0.0, 6.28), shift=st.tuples(st.floats(-500.0, 500.0), st.floats(-500.0, 500.0)))
 def test_proposals_turn_with_the_wall(turn, shift):
-    survey = make_sample().survey
+    survey = make_window().survey
     rotation = np.array(
         [[np.cos(turn), -np.sin(turn), 0.0], [np.sin(turn), np.cos(turn), 0.0], [0.0, 0.0, 1.0]]
     )
@@ -233,7 +233,7 @@ def test_proposals_turn_with_the_wall(turn, shift):
 @cache
 def arched():
     """Return a wall with an arch."""
-    return blocks_of(wall(90, 5, arch=Arch.SEGMENTAL).survey)
+    return blocks_of(wall(90, 5, arch=ArchShape.SEGMENTAL).survey)
 
 
 @settings(max_examples=12, deadline=None)

@@ -1,0 +1,351 @@
+"""A synthetic survey with a scene that runs, written into a folder for people to start from."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from mechanics.dynamics.progress import Listener, silent
+from moma.errors import UsageError
+from pipelines.samples.causes import PULSE, Cause
+from pipelines.samples.samples import Recipe, recipe_of
+from survey.arrays import Array
+from survey.formats.native.writer import write_head, write_moma
+from survey.formats.solids.obj_writer import write_obj
+
+__all__ = ["WrittenSample", "write_sample"]
+
+_SCENE = """\
+# {title}: synthetic, no such building exists. Every key is explained in docs/scene.md.
+{commands}
+[scene]
+name = "{title} (synthetic)"
+
+# A sound limestone; synthetic values, like the survey.
+[materials.limestone]
+density = 2350.0   # kg/m³
+young = 12e9       # Pa
+poisson = 0.2
+{core}
+[bodies]
+default = "rigid"
+fixed = ["{fixed}"]
+
+[joints]
+max_width = 0.04   # m
+
+[contact]
+friction = {friction}
+{joints}
+[time]
+start = "equilibrium"  # found at once; the steps then show that it lasts
+step = {step}{pad}# s
+theta = 1.0
+duration = {duration}     # s
+{relaxation}
+{loads}
+[output]
+pictures = ["displacement", "pressure"]
+"""
+
+_SETTLEMENT = """
+[[loads]]
+type = "settlement"
+stones = ["{code}"]
+displacement = [0.0, 0.0, {height}]
+duration = {duration}
+"""
+_FORCE = """
+[[loads]]
+type = "force"
+stones = ["{code}"]
+force = {force}
+"""
+
+_JERK = """
+[[loads]]
+type = "motion"
+stones = ["{fixed}"]
+velocity = {{ time = [0.0, {peak}, {end}], value = [[0.0, 0.0, 0.0], {velocity}, [0.0, 0.0, 0.0]] }}
+"""
+_RELAXED = "relaxation = true  # only where it comes to rest is asked for"
+_FOLLOWED = "relaxation = false # the motion itself is followed"
+
+_SPRINGS = """\
+placement = "centroid"  # joints bend on their springs like the whole bed
+
+# Soft lime mortar, which has crept; synthetic values. The amount of a thrust is known no better than they are.
+[[laws]]
+type = "elastic_joint"
+friction = 0.6
+normal_stiffness = {across:g}  # Pa/m
+shear_stiffness = {along:g}
+"""
+_HEAD = "head.moma"  # header file of closed solids
+_LONGEST = 3.0  # duration of the scene of a building that has moved [s]
+
+_DIAGNOSIS = """\
+# What has moved it? {count} answers, each of unknown amount. Explained in docs/howto/diagnose.md.
+{commands}
+[diagnosis]
+scene = "{kind}.toml"
+without = ["loads"]  # the scene knows the cause; a diagnosis is to find it
+{built}{hypotheses}"""
+
+_BATTERED = "battered = true\n"
+
+_HYPOTHESIS = """
+[[hypotheses]]
+name = "{name}"
+
+[[hypotheses.unknowns]]
+name = "{unknown}"
+unit = "{unit}"
+start = {start}
+low = {low}
+high = {high}
+{scan}{loads}"""
+
+_TILT = """
+[[loads]]
+type = "motion"
+stones = ["{fixed}"]
+spin = {{ time = [0.0, {duration}, {after}], value = ["= tilt / {duration}", "= tilt / {duration}", 0.0] }}
+axis = [{axis[0]:.6f}, {axis[1]:.6f}, 0.0]
+pivot = [{pivot[0]:.3f}, {pivot[1]:.3f}, {pivot[2]:.3f}]
+"""
+_INSTANT = 1e-6  # in which the tilt of the base ends [s]
+_SCAN = "scan = 5  # stones slide from a threshold on\n"
+
+_CORE = """
+# Mortar and small stones between the facings.
+[materials.core]
+stones = ["kind = infill"]
+density = 1900.0
+young = 1e9
+poisson = 0.2
+"""
+
+
+@dataclass(frozen=True)
+class WrittenSample:
+    """Files of a sample.
+
+    Attributes
+    ----------
+    kind, title : the sample
+    stones : their number in the survey
+    files : paths of the survey, its truth, the scene, what is known besides, and stones that are closed solids
+    commands : that take the survey to the results of the scene, in order
+    """
+
+    kind: str
+    title: str
+    stones: int
+    files: tuple[str, ...]
+    commands: tuple[str, ...]
+
+
+def write_sample(
+    kind: str,
+    folder: Path,
+    progress: Listener = silent,
+    *,
+    moved: str | None = None,
+    small: bool = False,
+    phases: bool = False,
+    courses: int | None = None,
+) -> WrittenSample:
+    """Write KIND.moma, truth.json and KIND.toml into a folder, created if necessary.
+
+    Some come with knowledge.toml, with solids.obj and its head.moma, or with diagnosis.toml.
+
+    Parameters
+    ----------
+    kind, moved, small, phases, courses : as of `recipe_of`
+    folder : in which none of these files exists; created if necessary
+    progress : called at every step of the simulation that moves the stones of some
+
+    Raises
+    ------
+    UsageError
+        if there is no such sample, or a file would be overwritten
+    """
+    recipe = recipe_of(kind, moved=moved, small=small, phases=phases, courses=courses)
+    cause = recipe.cause
+    survey, scene, truth = folder / f"{kind}.moma", folder / f"{kind}.toml", folder / "truth.json"
+    diagnosis = None if cause is None else folder / "diagnosis.toml"
+    # before a simulation that takes minutes
+    _must_be_new(survey, truth, scene, *([] if diagnosis is None else [diagnosis]))
+    sample = recipe.make(progress)
+    knowledge = folder / "knowledge.toml" if sample.knowledge else None
+    solids = folder / "solids.obj" if sample.modelled else None
+    commands = tuple(_commands(recipe, survey, solids, knowledge, scene, diagnosis))
+    texts = {truth: sample.truth, scene: _scene(recipe, commands)}
+    if diagnosis is not None and cause is not None:
+        texts[diagnosis] = _diagnosis(kind, recipe.fixed, cause, commands)
+    if knowledge is not None:
+        texts[knowledge] = sample.knowledge
+    extra = () if solids is None else (solids, solids.with_name(_HEAD))
+    _must_be_new(*texts, *extra)
+    folder.mkdir(parents=True, exist_ok=True)
+    write_moma(sample.survey, survey)
+    for path, text in texts.items():
+        path.write_text(text, encoding="utf-8", newline="\n")
+    if solids is not None:
+        write_obj(sample.modelled, solids)
+        head = sample.survey.head
+        write_head(replace(head, name=f"{head.name}, closed solids"), solids.with_name(_HEAD))
+    files = tuple(str(path) for path in (survey, *texts, *extra))
+    stones = len(sample.survey.blocks) + len(sample.modelled)
+    return WrittenSample(kind, recipe.title, stones, files, commands)
+
+
+def _must_be_new(*paths: Path) -> None:
+    for path in paths:
+        if path.exists():
+            raise UsageError(f"{path} exists", remedy="name another folder: --out DIR")
+
+
+def _scene(recipe: Recipe, commands: Sequence[str]) -> str:
+    cause = recipe.cause
+    step = 0.005 if cause is None else cause.step
+    stiffness = None if cause is None else cause.stiffness
+    return _SCENE.format(
+        title=recipe.title,
+        friction=0.6 if cause is None else cause.friction,
+        relaxation=_FOLLOWED if cause is not None and cause.pulse else _RELAXED,
+        joints="" if stiffness is None else _SPRINGS.format(across=stiffness[0], along=stiffness[1]),
+        commands=_listed(commands),
+        core=_CORE if recipe.core else "",
+        fixed=recipe.fixed,
+        step=step,
+        pad=" " * (12 - len(str(step))),
+        duration=1.0 if cause is None else _LONGEST,
+        loads="" if cause is None else "".join(_loads(cause, recipe.fixed)),
+    )
+
+
+def _listed(commands: Sequence[str]) -> str:
+    return "".join(f"#   {command}\n" for command in commands)
+
+
+def _diagnosis(kind: str, fixed: str, cause: Cause, commands: Sequence[str]) -> str:
+    """Return hypotheses on the movement of a building, the true one first."""
+    site = cause.build({}, None)
+    first, second = ("core decayed and sank", "left corner settled") if site.core else _CORNERS
+    hypotheses = [_settled(first, cause, site.settled)]
+    if site.rival:
+        hypotheses.append(_settled(second, cause, site.rival))
+    tilt = _TILT.format(
+        fixed=fixed,
+        duration=cause.duration,
+        after=cause.duration + _INSTANT,
+        axis=site.axis,
+        pivot=site.building.solids[0].vertices[0],
+    )
+    hypotheses.append(_hypothesis("the base tilted", "tilt", "degrees", (0.1, -1.0, 1.0), tilt))
+    if site.pushed:
+        thrusts = [
+            _FORCE.format(code=stones, force=_formulas("thrust", out)) for stones, out in site.pushed.items()
+        ]
+        name, values = "the thrust of a vault pushed the walls out", (0.25 * cause.most, 0.0, cause.most)
+        hypotheses.append(_hypothesis(name, "thrust", "N", values, "".join(thrusts)))
+    else:
+        top = max(
+            site.building.survey.blocks, key=lambda one: one.course or 0
+        ).code  # the first of its course
+        load = _FORCE.format(code=top, force='[0.0, 0.0, "= -load"]')
+        name = "a load stood on the upper left corner"
+        hypotheses.append(_hypothesis(name, "load", "N", (5000.0, 0.0, 50000.0), load))
+    if site.jerked is not None:
+        jerks = [
+            _hypothesis(
+                f"an earthquake pulse jerked the ground {way}",
+                "peak",
+                "m/s",
+                (0.1, 0.0, 1.0),
+                _jerk(fixed, _formulas("peak", sign * site.jerked)),
+                _SCAN,
+            )
+            for way, sign in (("inwards", 1.0), ("outwards", -1.0))
+        ]
+        hypotheses = [jerks[0], *hypotheses, jerks[1]]
+    dated = cause.stood is not None
+    return _DIAGNOSIS.format(
+        count=_COUNTS[len(hypotheses)],
+        commands=_listed(commands),
+        kind=kind,
+        built=(_BATTERED if cause.battered else "")
+        + ('phases = ["1", "2"]  # the oldest first\n' if dated else ""),
+        hypotheses="".join(hypotheses),
+    )
+
+
+_CORNERS = ("left corner settled", "right corner settled")
+_COUNTS = {3: "Three", 4: "Four", 5: "Five"}
+
+
+def _hypothesis(
+    name: str, unknown: str, unit: str, values: tuple[float, float, float], loads: str, scan: str = ""
+) -> str:
+    """Return a hypothesis with an unknown, of which start, least and largest value are given."""
+    start, low, high = values
+    loads = loads.replace("[[loads]]", "[[hypotheses.scene.loads]]")
+    return _HYPOTHESIS.format(
+        name=name, unknown=unknown, unit=unit, start=start, low=low, high=high, scan=scan, loads=loads
+    )
+
+
+def _settled(what: str, cause: Cause, shares: Mapping[str, float]) -> str:
+    loads = [
+        _SETTLEMENT.format(code=code, height=f'"= -settlement * {share:.4g}"', duration=cause.duration)
+        for code, share in shares.items()
+    ]
+    return _hypothesis(f"the {what}", "settlement", "m", (0.010, 0.0, 0.060), "".join(loads))
+
+
+def _formulas(unknown: str, direction: Array) -> str:
+    """Return the horizontal components of a vector of unknown length."""
+    x, y = (f"= {unknown} * {part:.6f}" for part in direction[:2])
+    return f'["{x}", "{y}", 0.0]'
+
+
+def _jerk(fixed: str, velocity: str) -> str:
+    peak, end = PULSE
+    return _JERK.format(fixed=fixed, peak=peak, end=end, velocity=velocity)
+
+
+def _loads(cause: Cause, fixed: str) -> Iterator[str]:
+    yield "\n# What moved it: the same as in the truth.\n"
+    site = cause.build({}, None)
+    for code, height in cause.heights(site).items():
+        yield _SETTLEMENT.format(code=code, height=height, duration=cause.duration)
+    for code, force in cause.forces(site).items():
+        yield _FORCE.format(code=code, force=list(force))
+    jerk = cause.jerk(site)
+    if jerk is not None:
+        yield _jerk(fixed, str(list(jerk)))
+
+
+def _commands(
+    recipe: Recipe,
+    survey: Path,
+    solids: Path | None,
+    knowledge: Path | None,
+    scene: Path,
+    diagnosis: Path | None,
+) -> Iterator[str]:
+    database = f"--db sqlite:///{survey.with_suffix('.db')}"
+    yield f"moma ingest {survey} {database}"
+    if solids is not None:
+        yield f"moma ingest {solids} --format solids --header {solids.with_name(_HEAD)} {database}"
+    if knowledge is not None:
+        yield f"moma record {knowledge} {database}"
+    if recipe.core:
+        yield f"moma propose infill --record {database}"
+    yield f"moma run {scene} {database} --out {scene.parent / 'results'}"
+    if recipe.cause is not None and recipe.cause.stood is None:
+        battered = "--battered " if recipe.cause.battered else ""
+        yield f"moma compare {scene} {battered}{database} --out {scene.parent / 'comparison'}"
+    if diagnosis is not None:
+        yield f"moma diagnose {diagnosis} {database} --out {scene.parent / 'diagnosis'}"
