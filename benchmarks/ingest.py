@@ -29,6 +29,8 @@ from mechanics.arrays import Array
 from moma.errors import SurveyError
 from pipelines.ingest.exchange import export_database, import_database
 from pipelines.ingest.ingest import ingest
+from pipelines.samples.buildings.openings import ArchShape
+from pipelines.samples.buildings.walls import wall
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.formats.reading import open_survey
 from survey.joints.close import close_joints
@@ -36,8 +38,6 @@ from survey.joints.settings import JointSettings
 from survey.records.survey import BlockRecord
 from survey.simplify.simplify import simplify
 from survey.stones import survey_stones
-from survey.synthetic.buildings.openings import Arch
-from survey.synthetic.buildings.walls import wall
 
 __all__ = ["closed", "main", "measured", "write"]
 
@@ -264,7 +264,7 @@ def closed(stones: int) -> Row:
     """Return the rows of a wall with an arch, its joints 8 to 15 mm open, its corners worn."""
     rows: list[Row] = []
     for count in (100, stones):  # the first one compiles the kernels and fills caches
-        blocks = wall(count, arch=Arch.SEGMENTAL).blocks()
+        blocks = wall(count, arch=ArchShape.SEGMENTAL).blocks()
         marks = [(time.process_time(), peak_bytes())]
         simple = [simplify(block) for block in blocks]
         marks.append((time.process_time(), peak_bytes()))

@@ -30,7 +30,7 @@ from benchmarks.report import (
     table_lines,
     write_between,
 )
-from mechanics.limit.assembly import Assembly, assembly
+from mechanics.limit.assembly import RigidAssembly, assembly
 from mechanics.limit.confirm import confirm, likeness
 from mechanics.limit.limit_load import Flow, limit_load
 from mechanics.limit.live_loads import Acceleration
@@ -91,7 +91,7 @@ class LimitCase:
         """Load whose multiple is sought."""
         return Acceleration(self.direction)
 
-    def assembly(self) -> Assembly:
+    def assembly(self) -> RigidAssembly:
         """Return the stones and their joints."""
         contact = ContactSettings(DryJoint(self.friction))
         return assembly(Scene("limit", tuple(self.blocks()), contact=contact))

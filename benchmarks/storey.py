@@ -17,9 +17,8 @@ from pipelines.ingest.reading_options import reading_options
 from pipelines.propose.propose import Recording, propose_core
 from pipelines.record.record import record
 from pipelines.run.assemble import assemble
+from pipelines.samples.write import write_sample
 from pipelines.scene.file import read_scene
-from pipelines.scene.sample import write_recipe
-from survey.synthetic.samples import storey_recipe
 
 __all__ = ["main", "measured"]
 
@@ -67,10 +66,10 @@ def measured(courses: int) -> Row:
 
 def _from_survey(courses: int, folder: Path) -> Row:
     """Return the numbers of one storey, processor times of each part [s]."""
-    written = write_recipe("storey", storey_recipe(courses, "Storey"), folder)
-    url = f"sqlite:///{folder / 'storey.db'}"
+    written = write_sample("tower", folder, courses=courses)
+    url = f"sqlite:///{folder / 'tower.db'}"
     clock = [time.process_time()]
-    ingest([folder / "storey.moma"], url)
+    ingest([folder / "tower.moma"], url)
     if (solids := folder / "solids.obj").exists():
         ingest([solids], url, "solids", options=reading_options(folder / "head.moma", None, None, None))
     record([folder / "knowledge.toml"], url)
@@ -78,7 +77,7 @@ def _from_survey(courses: int, folder: Path) -> Row:
     propose_core(url, recording=Recording())
     clock.append(time.process_time())
     with open_database(url, create=False) as database, database.session(read_only=True) as session:
-        built = assemble(read_scene(folder / "storey.toml"), session)
+        built = assemble(read_scene(folder / "tower.toml"), session)
     clock.append(time.process_time())
     result = simulate(built.scene)
     clock.append(time.process_time())
