@@ -1,4 +1,4 @@
-"""Solvers of contact problems: first order, second order, and strategies that combine them.
+"""Solvers of contact problems: one driver, chains as data, and the methods that they consist of.
 
-Public: `Solver`, `choose_solver`, `choose_planar_solver` (choice).
+Public: `choose_solver`, `choose_planar_solver` (choice); `Auto` (auto); `Solver`, `Link`, `follow` (chain).
 """

@@ -1,4 +1,4 @@
-"""First-order solvers: sweeps, splitting and projected gradients.
+"""First-order methods: sweeps and alternating directions.
 
-Public: `NSGS` (nsgs); `ADMM` (admm); `APGD` (apgd); `Anderson` (anderson).
+Public: `NSGS` (nsgs); `BodyADMM`, `Stage` (body_admm); `DiskADMM` (disk_admm); `StonesAsRigid` (stones_as_rigid).
 """

@@ -1,9 +1,10 @@
 """ADMM between rigid bodies in motion: compiled, with its own factors, and extrapolated where it is slow.
 
-The iteration of `ADMM`, from a start that is predicted from the last two steps, and with a penalty of each contact's
-own compliance. As the contacts of moving stones change from step to step and their forces from iteration to iteration,
-what counts is the cost of an iteration: of a pass over the contacts and one solution with the factors of M + H Σ⁻¹ Hᵀ,
-less than that of a Gauss–Seidel sweep (mechanics/solvers/_kernels/body_admm.py).
+Alternating directions (Boyd et al. 2011; Tasora et al. 2021) with a penalty of each contact's own compliance, and the
+de Saxcé shift renewed in each iteration (Acary, Brémond & Huber 2018). As the contacts of moving stones change from
+step to step and their forces from iteration to iteration, what counts is the cost of an iteration: of a pass over the
+contacts and one solution with the factors of M + H Σ⁻¹ Hᵀ, less than that of a Gauss–Seidel sweep
+(mechanics/solvers/_kernels/body_admm.py).
 """
 
 from collections.abc import Callable
@@ -90,7 +91,7 @@ class BodyADMM:
 
     Attributes
     ----------
-    tolerance, velocity_tolerance, max_iterations : as in `ADMM`
+    tolerance, velocity_tolerance, max_iterations : as in `NSGS`, iterations for sweeps
     stages : in turn, as long as it is not solved
     further : tolerances of the first stage over those asked for: the next steps begin where the last ones lead, and
         gain from what these go further [-]
@@ -112,7 +113,7 @@ class BodyADMM:
         contacts = problem.delassus.rigid
         if contacts is None:
             raise SolverError(
-                "bodies are not all rigid", where="ADMM of bodies", remedy='use the method "admm"'
+                "bodies are not all rigid", where="ADMM of bodies", remedy='use the method "auto"'
             )
         run = _Run(problem, contacts, start, self)
         most = min(self.max_iterations, sum(stage.iterations for stage in self.stages))

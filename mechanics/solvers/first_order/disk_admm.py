@@ -1,6 +1,6 @@
 """ADMM between rigid bodies of the plane: compiled, with its own factors in blocks of 3 × 3.
 
-The iteration of `ADMM`, with a penalty of each contact's own compliance. An iteration is one pass over the contacts and
+The iteration of `BodyADMM`, with a penalty of each contact's own compliance. An iteration is one pass over the contacts and
 one solution with the factors of M + H Σ⁻¹ Hᵀ (mechanics/solvers/_kernels/disk_admm.py).
 """
 
@@ -34,7 +34,7 @@ class DiskADMM:
 
     Attributes
     ----------
-    tolerance, velocity_tolerance, max_iterations : as in `ADMM`
+    tolerance, velocity_tolerance, max_iterations : as in `NSGS`, iterations for sweeps
     penalty : σ of a contact over the mean diagonal of its W_αα; larger values bear with contacts that open and slide,
         smaller ones find the forces of disks that stay in touch sooner [-]
     check_every : iterations between two looks at η
@@ -56,7 +56,7 @@ class DiskADMM:
         contacts = problem.delassus.plane
         if contacts is None:
             raise SolverError(
-                "bodies are not those of the plane", where="ADMM of disks", remedy='use the method "admm"'
+                "bodies are not those of the plane", where="ADMM of disks", remedy='use the method "auto"'
             )
         limits = self.tolerance, self.velocity_tolerance
         impulse = project_on_cone(start.impulse, problem.friction, problem.cohesion)

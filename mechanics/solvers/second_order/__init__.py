@@ -1,5 +1,4 @@
-"""Second-order solvers: Newton's methods, the interior point and cone programmes.
+"""Second-order methods: Newton's method and the interior point.
 
-Public: `Newton` (newton); `ProximalNewton` (proximal_newton); `InteriorPoint` (interior_point); `ConeProgram`
-(cone_program); `equilibrated` (scaling).
+Public: `Newton` (newton); `InteriorPoint` (interior_point); `SofterJoints` (softer_joints).
 """

@@ -1,8 +1,4 @@
-"""Sparse factors of matrices of 3 × 3 blocks between many rigid bodies, in an order that is given.
-
-The fronts of `block_fronts` are dense, one for each body, and take what the ones before leave entry by entry: of walls
-three stones thick they hold forty times the numbers of the factors, and moving these about takes most of the time.
-"""
+"""Sparse factors of matrices of 3 × 3 blocks between rigid bodies, in an order that is given."""
 
 import numpy as np
 from scipy.sparse import coo_array, csc_array
