@@ -12,3 +12,5 @@ quality       report on precision, courses and contradictions
 unseen        proposals for the core of walls and for missing stones
 synthetic     buildings with known truth, for tests and examples
 """
+
+import moma.kernels  # noqa: F401 - before numba
