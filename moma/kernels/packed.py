@@ -9,7 +9,6 @@ import json
 import os
 import sys
 import sysconfig
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +28,8 @@ def use_packed_kernels() -> None:
 
 def _fits(fitting: dict[str, Any]) -> bool:
     """Return whether this machine reads and runs such kernels."""
+    from importlib.metadata import version
+
     if (sysconfig.get_python_version(), version("numba")) != (fitting["python"], fitting["numba"]):
         return False
     needed = {one.lstrip("+") for one in fitting["environment"]["NUMBA_CPU_FEATURES"].split(",")}
