@@ -11,3 +11,5 @@ joints        blocks a joint apart → stones that share contact planes
 quality       report on precision, courses and contradictions
 unseen        proposals for the core of walls and for missing stones
 """
+
+import moma.kernels  # noqa: F401 - before numba

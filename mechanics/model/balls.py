@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-import trimesh
 
 from mechanics.scene.scene import Block, Fidelity
 from mechanics.stones.materials import Material
@@ -29,7 +28,9 @@ def ball(
     """
     if not radius > 0:
         raise SceneError(f"radius = {radius!r}", where=f"stone {code}", remedy="give metres greater than 0")
-    facets = trimesh.creation.icosphere(subdivisions=2, radius=radius)
+    from trimesh.creation import icosphere  # a quarter of a second, which few scenes need
+
+    facets = icosphere(subdivisions=2, radius=radius)
     return Block(
         code,
         np.asarray(facets.vertices) + np.asarray(centre, dtype=float),

@@ -1,4 +1,10 @@
-"""Compilation of kernels on the first use, by a second process beside the command that needs them.
+"""Compiled kernels: those that a wheel carries, and those that a second process compiles on the first use.
 
-Public: `compiling_beside` (beside); `KernelUse`, `kernels_of` (uses).
+Whoever loads kernels imports this package before numba, which learns here to read the kernels of a wheel.
+
+Public: `compiling_beside` (beside); `use_packed_kernels` (packed); `KernelUse`, `kernels_of` (uses).
 """
+
+from moma.kernels.packed import use_packed_kernels
+
+use_packed_kernels()

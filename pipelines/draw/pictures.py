@@ -5,7 +5,8 @@ import re
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from textwrap import shorten
 from typing import Any
@@ -24,10 +25,18 @@ from pipelines.draw.offscreen.jobs import save_job
 from pipelines.draw.offscreen.surfaces import FIELDS, stone_fields, wall_surface
 from pipelines.results.peaks import peak_records
 
-__all__ = ["draw_apart", "draw_pictures", "missing", "package_of"]
+__all__ = ["OF_RESULTS", "draw_apart", "draw_pictures", "drawing_process", "missing", "package_of"]
+
+OF_RESULTS = "pipelines.draw.offscreen.result"
+"""Module that draws the pictures of a result."""
+
 
 _PASSED = 1.05  # peak over the value at the end, from which a picture of the end states it [-]
 _LONGEST = 100  # characters of a caution in a heading, which has one line
+_WINDOWS = (
+    "vtkEGLRenderWindow",
+    None,
+)  # kinds of VTK's windows, tried in turn; None leaves the choice to VTK
 _TIMEOUT = 300.0  # [s]; software rendering of 10⁵ triangles takes a few
 _PACKAGES = {
     "libGL": "libgl1",
@@ -58,10 +67,16 @@ def package_of(message: str) -> str | None:
     return _PACKAGES.get(found.group(1)) if found else None
 
 
-def draw_pictures(result: Result, folder: Path, names: Sequence[str], towards: Array) -> tuple[str, ...]:
+def draw_pictures(
+    result: Result,
+    folder: Path,
+    names: Sequence[str],
+    towards: Array,
+    ready: "subprocess.Popen[str] | None" = None,
+) -> tuple[str, ...]:
     """Draw the named pictures into a folder, seen from the side `towards`; return the file names.
 
-    Pictures for which `missing` has a reason are left out.
+    Pictures for which `missing` has a reason are left out. `ready` is as in `draw_apart`, of `OF_RESULTS`.
 
     Raises
     ------
@@ -83,7 +98,7 @@ def draw_pictures(result: Result, folder: Path, names: Sequence[str], towards: A
         }
         for name in wanted
     ]
-    draw_apart("pipelines.draw.offscreen.result", wall_surface(result), jobs)
+    draw_apart(OF_RESULTS, wall_surface(result), jobs, ready)
     return tuple(f"{name}.png" for name in wanted)
 
 
@@ -174,7 +189,12 @@ def _fields_of(body: BodyResult, material: Material, name: str) -> Array:
     return stone_fields(body, material)[:, FIELDS.index(name)]
 
 
-def draw_apart(module: str, surface: object, pictures: Sequence[Mapping[str, Any]]) -> None:
+def draw_apart(
+    module: str,
+    surface: object,
+    pictures: Sequence[Mapping[str, Any]],
+    ready: "subprocess.Popen[str] | None" = None,
+) -> None:
     """Draw pictures in a child process; its output about displays is suppressed unless it fails.
 
     EGL comes first: it needs no X server, and no X libraries either.
@@ -184,48 +204,56 @@ def draw_apart(module: str, surface: object, pictures: Sequence[Mapping[str, Any
     module : with the function `draw`, of `pipelines.draw.offscreen`
     surface : dataclass of arrays
     pictures : absolute path of each, and what the module reads of it
+    ready : `drawing_process` of the module that has been started ahead
 
     Raises
     ------
     MissingLibraryError : VTK cannot be loaded or cannot draw on this machine
     """
     reason = ""
-    with tempfile.TemporaryDirectory() as scratch:
+    with tempfile.TemporaryDirectory() as scratch, ExitStack() as started:
         job = save_job(Path(scratch), surface, pictures)
-        for window in ("vtkEGLRenderWindow", None):
-            done = _attempt(module, job, window)
-            if done.returncode == 0:
+        for window in _WINDOWS:
+            process, ready = ready or started.enter_context(drawing_process(module, window)), None
+            try:
+                said, told = process.communicate(f"{job}\n", _TIMEOUT)
+            except subprocess.TimeoutExpired:
+                raise MissingLibraryError(f"no picture after {_TIMEOUT:.0f} s") from None
+            if process.returncode == 0:
                 return
-            if done.returncode == 3:
-                reason = done.stdout.strip()
+            if process.returncode == 3:
+                reason = said.strip()
                 package = package_of(reason) or "libgl1 libxrender1 libegl1"
                 remedy = f"install what it needs: apt-get install {package}"
                 raise MissingLibraryError(f"VTK cannot be loaded: {reason}", remedy=remedy)
-            reason = reason or _last_words(done.stderr) or f"it ended with code {done.returncode}"
+            reason = reason or _last_words(told) or f"it ended with code {process.returncode}"
     raise MissingLibraryError(
         f"VTK cannot draw off screen: {reason}",
         remedy="install software rendering: apt-get install libegl1 libgl1-mesa-dri",
     )
 
 
-def _attempt(module: str, job_file: Path, window: str | None) -> "subprocess.CompletedProcess[str]":
-    """Run one drawing process with the given kind of VTK window; None leaves the choice to VTK."""
+@contextmanager
+def drawing_process(module: str, window: str | None = _WINDOWS[0]) -> "Iterator[subprocess.Popen[str]]":
+    """Start a process that loads VTK and then waits for a job, for a with-block; an interrupt does not reach it."""
     root = str(Path(__file__).resolve().parents[2])
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([root, os.environ.get("PYTHONPATH", "")])}
     if window is not None:
         environment.setdefault("VTK_DEFAULT_OPENGL_WINDOW", window)
-    try:
-        return subprocess.run(
-            [sys.executable, "-m", module, str(job_file)],
-            capture_output=True,
-            text=True,
-            errors="replace",
-            timeout=_TIMEOUT,
-            env=environment,
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        raise MissingLibraryError(f"no picture after {_TIMEOUT:.0f} s") from None
+    with subprocess.Popen(
+        [sys.executable, "-m", module],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        errors="replace",
+        env=environment,
+        start_new_session=True,
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
 
 
 def _last_words(stderr: str) -> str:

@@ -112,6 +112,7 @@ def write_report(
     summary: Mapping[str, Any],
     stones: Sequence[StoneResult],
     warnings: Sequence[str],
+    history: str | None = None,
 ) -> None:
     """Write the page and embed the pictures of its folder.
 
@@ -121,6 +122,7 @@ def write_report(
     summary : as in summary.json
     stones : one per stone
     warnings : shown at the top
+    history : the result's `history_svg`, where it has been drawn already
     """
     pictures = [path.parent / name for name in _CAPTIONS]
     write_page(
@@ -146,7 +148,7 @@ def write_report(
             _uncertain(stones),
             *_joints(result, summary),
         ],
-        history=history_svg(result.history),
+        history=history or history_svg(result.history),
         stages=[(stage, f"{seconds:.2f} s") for stage, seconds in summary["time"]["by_stage"].items()],
         version=summary["version"],
     )

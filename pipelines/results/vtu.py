@@ -5,8 +5,8 @@ import struct
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from html import escape
 from pathlib import Path
-from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,7 +124,7 @@ def write_pvd(path: Path, datasets: Sequence[tuple[float, str]]) -> None:
         '<VTKFile type="Collection" version="1.0" byte_order="LittleEndian">',
         "<Collection>",
         *(
-            f'<DataSet timestep="{time:.17g}" group="" part="0" file={quoteattr(name)}/>'
+            f'<DataSet timestep="{time:.17g}" group="" part="0" file="{escape(name)}"/>'
             for time, name in datasets
         ),
         "</Collection>",
@@ -161,5 +161,5 @@ def _array(name: str, values: NDArray[np.generic], unit: str | None = None) -> s
     if unit is not None:
         label = f'<InformationKey name="UNITS_LABEL" location="vtkDataArray">{escape(unit)}</InformationKey>'
     return (
-        f'<DataArray type="{kind}" Name={quoteattr(name)}{shape} format="binary">{encoded}{label}</DataArray>'
+        f'<DataArray type="{kind}" Name="{escape(name)}"{shape} format="binary">{encoded}{label}</DataArray>'
     )

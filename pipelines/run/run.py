@@ -1,8 +1,10 @@
 """A scene from file to results: assemble, simulate, write, and keep the results in the database."""
 
+import subprocess
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager, nullcontext
 from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -21,7 +23,8 @@ from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.files import check_mesh_file, write_meshes
 from mechanics.stones.meshing.mesh import VolumeMesh
 from moma.errors import MissingLibraryError
-from pipelines.draw.pictures import draw_pictures, missing
+from pipelines.draw.history_plot import history_svg
+from pipelines.draw.pictures import OF_RESULTS, draw_pictures, drawing_process, missing
 from pipelines.reports.run import write_report
 from pipelines.results.folder import check_replaceable, replacing
 from pipelines.results.joints_csv import write_joints
@@ -146,19 +149,20 @@ def run_scene(
             steps,
             bool(resume),
         )
-        if assembly.stages:
-            result = simulate_stages(assembly.stages, progress, stop, built, unfinished)
-        else:
-            result = simulate(assembly.scene, progress, stop, built, unfinished)
-        if problems:
-            result = replace(result, cautions=(caution_of(problems), *result.cautions))
-        seconds |= result.wall_time
-        stones, reached = stone_results(result), profile_report(profile, scene, result)
-        with replacing(folder) as fresh:
-            summary, warnings = write_results(
-                result, stones, scene, assembly, fresh, seconds, progress, reached, unfinished
-            )
-            unfinished.hand_over(fresh)
+        with drawing_process(OF_RESULTS) if _asked(scene) else nullcontext() as ready:
+            if assembly.stages:
+                result = simulate_stages(assembly.stages, progress, stop, built, unfinished)
+            else:
+                result = simulate(assembly.scene, progress, stop, built, unfinished)
+            if problems:
+                result = replace(result, cautions=(caution_of(problems), *result.cautions))
+            seconds |= result.wall_time
+            stones, reached = stone_results(result), profile_report(profile, scene, result)
+            with replacing(folder) as fresh:
+                summary, warnings = write_results(
+                    result, stones, scene, assembly, fresh, seconds, progress, reached, unfinished, ready
+                )
+                unfinished.hand_over(fresh)
         if meshes is not None:
             write_meshes(meshes, _meshes(result, assembly))
         record = run_record(result, stones, scene, assembly, summary, as_of)
@@ -178,10 +182,12 @@ def write_results(
     progress: Listener = silent,
     profile: ProfileReport | None = None,
     unfinished: UnfinishedRun | None = None,
+    ready: "subprocess.Popen[str] | None" = None,
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Write all files of a run into an empty folder; return the summary and the warnings.
 
-    Pictures that cannot be drawn on this machine cause a warning; everything else is written.
+    Pictures that cannot be drawn on this machine cause a warning; everything else is written. They are drawn by
+    another process, `ready` if it is given, beside the other files.
     """
     warnings = [*assembly.remarks, *(() if unfinished is None else unfinished.warnings)]
     # of a relaxation only the final equilibrium counts, whose steps are all solved
@@ -196,29 +202,32 @@ def write_results(
             f"no static equilibrium was found in {result.static.steps} steps, with balance "
             f"{result.static.balance:.1e}; the run began at rest, all loads at once"
         )
-    with _timed(seconds, "files"):
-        progress(Progress("write", 0, 3, "results for ParaView"))
-        if scene.output.paraview is not ParaView.PVD:
-            write_vtkhdf(folder / RESULTS, result.bodies, result.scene.blocks, result.frames)
-        if scene.output.paraview is not ParaView.VTKHDF:
-            write_frames(result, folder)
-        write_joint_grid(result, folder)
-        write_joints(folder / "joints.csv", result, assembly.origin)
-        write_series(folder, result, assembly.origin)
-    with _timed(seconds, "pictures"):
-        progress(Progress("write", 1, 3, "pictures"))
-        pictures, omitted = _pictures(scene, result)
-        warnings += omitted
-        try:
-            draw_pictures(result, folder, pictures, assembly.towards)
-        except MissingLibraryError as error:
-            warnings.append(f"no pictures: {error}")
+    pictures, omitted = _pictures(scene, result)
+    warnings += omitted
+    with ThreadPoolExecutor(1) as beside:
+        drawing = beside.submit(draw_pictures, result, folder, pictures, assembly.towards, ready)
+        with _timed(seconds, "files"):
+            progress(Progress("write", 0, 3, "results for ParaView"))
+            if scene.output.paraview is not ParaView.PVD:
+                write_vtkhdf(folder / RESULTS, result.bodies, result.scene.blocks, result.frames)
+            if scene.output.paraview is not ParaView.VTKHDF:
+                write_frames(result, folder)
+            write_joint_grid(result, folder)
+            write_joints(folder / "joints.csv", result, assembly.origin)
+            write_series(folder, result, assembly.origin)
+            history = history_svg(result.history)
+        with _timed(seconds, "pictures"):
+            progress(Progress("write", 1, 3, "pictures"))
+            try:
+                drawing.result()
+            except MissingLibraryError as error:
+                warnings.append(f"no pictures: {error}")
     progress(Progress("write", 2, 3, "report.html"))
     reached = None if profile is None else asdict(profile)
     summary = summarise(result, version=version("moma-masonry"), seconds=seconds, profile=reached)
     summary["inputs"] = {title: list(lines) for title, lines in assembly.inputs.items()}
     summary["versions"] = dict(versions())
-    write_report(folder / "report.html", result, summary, stones, warnings)
+    write_report(folder / "report.html", result, summary, stones, warnings, history)
     (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
     summary["resumed"] = [] if unfinished is None else unfinished.resumed
     summary["origin"] = assembly.origin.tolist()
@@ -244,10 +253,14 @@ def _meshes(result: Result, assembly: Assembly) -> dict[str, VolumeMesh]:
     }
 
 
+def _asked(scene: SceneFile) -> tuple[str, ...]:
+    """Return the pictures that a scene asks for."""
+    return USUAL if scene.output.pictures is None else scene.output.pictures
+
+
 def _pictures(scene: SceneFile, result: Result) -> tuple[tuple[str, ...], list[str]]:
     """Return the pictures to draw, and a warning for each requested one that would show nothing."""
-    asked = USUAL if scene.output.pictures is None else scene.output.pictures
-    reasons = {name: missing(result, name) for name in asked}
+    reasons = {name: missing(result, name) for name in _asked(scene)}
     omitted = [f"no picture {name}: {reason}" for name, reason in reasons.items() if reason is not None]
     drawn = tuple(name for name, reason in reasons.items() if reason is None)
     return drawn, [] if scene.output.pictures is None else omitted

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from moma.errors import GeometryError
@@ -41,7 +40,9 @@ def check_watertight(solid: Solid, *, convex: bool = False) -> None:
     if not np.isfinite(solid.vertices).all():
         raise GeometryError("a corner is not finite", where=where, remedy=remedy)
     if not _closes(solid.faces):
-        mesh = trimesh.Trimesh(solid.vertices, triangulate(solid), process=False)
+        from trimesh import Trimesh  # a quarter of a second, which sound solids do not need
+
+        mesh = Trimesh(solid.vertices, triangulate(solid), process=False)
         if not mesh.is_watertight:
             raise GeometryError("the solid is not closed", where=where, remedy=remedy)
         if not mesh.is_winding_consistent:

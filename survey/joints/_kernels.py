@@ -194,8 +194,11 @@ def _normal(design, heights, weights, unknowns):
             right[c] += weights[i] * design[i, c] * heights[i]
             for d in range(unknowns):
                 matrix[c, d] += weights[i] * design[i, c] * design[i, d]
+    total = 0.0
+    for i in range(design.shape[0]):
+        total += weights[i]
     for c in range(unknowns):
-        matrix[c, c] += 1e-12 * weights.sum()
+        matrix[c, c] += 1e-12 * total
     return matrix, right
 
 
@@ -241,14 +244,15 @@ def _huber(design, heights, sound, unknowns, prior, usual):
 def _weigh(design, heights, sound, solution, weights):
     """Replace `weights` by Huber's weights of the residuals; return the mean square residual by the old weights."""
     # of no literal type, or numba compiles `_median` twice
-    residuals, count, total = np.empty(design.shape[0]), np.int64(0), 0.0
+    residuals, count, total, whole = np.empty(design.shape[0]), np.int64(0), 0.0, 0.0
     for i in range(design.shape[0]):
         residual = abs(heights[i] - _value(design[i], solution))
         total += weights[i] * residual**2
+        whole += weights[i]
         if sound[i]:
             residuals[count] = residual
             count += 1
-    left = total / weights.sum()
+    left = total / whole
     spread = 1e-4 if count == 0 else max(1.4826 * _median(residuals, count), 1e-4)
     for i in range(design.shape[0]):
         residual = abs(heights[i] - _value(design[i], solution))

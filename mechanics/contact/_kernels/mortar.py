@@ -183,7 +183,10 @@ def mortar_rows(kept_ptr, kept, interfaces, bodies, meshes, shapes, shares):  # 
         outlines, size = _outlines(p, (meshes.cut[m], a < 0 or meshes.cut[a]), interfaces, shapes)
         share, moment = np.zeros(own.x.shape[0]), np.zeros((own.x.shape[0], 3))
         used, mass, met_ptr, met, cross = overlap_integrals(own, other, outlines, size, share, moment)
-        if not share.sum() >= interfaces.least[p]:
+        covered = 0.0
+        for n in range(share.shape[0]):
+            covered += share[n]
+        if not covered >= interfaces.least[p]:
             continue
         for n in range(share.shape[0]):
             shares[kept_ptr[p] + n] = share[n]
@@ -248,7 +251,7 @@ def _outlines(p, bounded, interfaces, shapes):
         if bounded[s]:
             f = interfaces.face[p, s]
             size[s] = shapes.cptr[f + 1] - shapes.cptr[f]
-    out = np.empty((size.sum(), 2))
+    out = np.empty((size[0] + size[1], 2))
     o, t1, t2 = row(interfaces.origin, p), row(interfaces.frame[p], 1), row(interfaces.frame[p], 2)
     k = 0
     for s in range(2):

@@ -168,7 +168,7 @@ def _grid(low, high):
     width, height = max(top[0] - origin[0], 1e-300), max(top[1] - origin[1], 1e-300)
     nx = min(max(int(np.sqrt(n * width / height)), 1), n)
     ny = max(n // nx, 1)
-    size = np.array([width / nx, height / ny])
+    size = (width / nx, height / ny)
     start = np.zeros(nx * ny + 1, dtype=np.int64)
     for t in range(n):
         x0, x1, y0, y1 = _cells(low[t], high[t], origin, size, nx, ny)
@@ -351,13 +351,14 @@ def _turn_dual(own, kind, share, moment, mass, cross):
         turn[i, i] = share[i]
     # its rows are the columns of T
     _solve_small(products, turn, corners)
-    turn = dual * turn.T.copy()
     for i in range(corners):
-        turn[i, i] += 1.0 - dual
-    _turn_rows(turn, corners, mass)
-    _turn_rows(turn, corners, moment)
+        for j in range(corners):
+            products[i, j] = dual * turn[j, i]
+        products[i, i] += 1.0 - dual
+    _turn_rows(products, corners, mass)
+    _turn_rows(products, corners, moment)
     for e in range(cross.shape[0]):
-        _turn_rows(turn, corners, cross[e])
+        _turn_rows(products, corners, cross[e])
     if kind == corners and dual == 1.0:
         # exact zeros, so that they are not stored
         for i in range(corners):
@@ -390,13 +391,15 @@ def overlap_integrals(own, other, outlines, outline_size, share, moment):  # pra
     if other.kind > 0:
         near_ptr, near = _close_facets(low, high, *_facet_boxes(other))
     else:
-        near_ptr, near = np.arange(most + 1), np.zeros(most, dtype=np.int64)
+        near_ptr, near = np.empty(most + 1, dtype=np.int64), np.zeros(most, dtype=np.int64)
+        for t in range(most + 1):
+            near_ptr[t] = t
     used, pointer = np.empty(most, dtype=np.int64), np.zeros(most + 1, dtype=np.int64)
     stride, stride_a = corners * own.kind, corners * other.kind
     mass = np.zeros(most * stride)
     far, cross = np.empty(near_ptr[-1], dtype=np.int64), np.zeros(near_ptr[-1] * stride_a)
     # a facet cut by another facet and by the outlines of two faces has at most as many corners as all of them together
-    room_for = corners + corners_a + outline_size.sum()
+    room_for = corners + corners_a + outline_size[0] + outline_size[1]
     polygon, kept = np.empty((room_for, 2)), np.empty((room_for, 2))
     mine, theirs = np.empty((4, 2)), np.empty((4, 2))
     values, part, middle = np.empty((3, 9)), np.empty(4), np.empty((4, 3))

@@ -6,9 +6,7 @@ Both follow the documented processing of the PEER database (Ancheta et al. 2013;
 from dataclasses import replace
 
 import numpy as np
-from scipy import signal
 
-from mechanics.arrays import Array
 from mechanics.scene.loads.accelerogram import Accelerogram
 from moma.errors import SceneError
 
@@ -55,22 +53,15 @@ def band_pass(
         )
     if order < 1:
         raise SceneError(f"order = {order}", where=record.source, remedy="give 1 or more")
-    sections = _butterworth(order, low, high, 1 / record.dt)
+    from scipy.signal import butter, sosfiltfilt  # half a second, which few scenes need
+
+    kind = "bandpass" if len(corners) == 2 else "highpass" if high is None else "lowpass"
+    sections = butter(order, np.squeeze(corners), kind, fs=1 / record.dt, output="sos")
     zeros = np.zeros(int(np.ceil(0.75 * order / min(corners) / record.dt)))
     padded = np.concatenate([zeros, record.acceleration, zeros])
     band = f"{low or 0:g} to {high or nyquist:g} Hz"
     return replace(
         record,
-        acceleration=signal.sosfiltfilt(sections, padded, padtype=None),
+        acceleration=sosfiltfilt(sections, padded, padtype=None),
         source=f"{record.source}, Butterworth {band} (order {order}, both ways)",
     )
-
-
-def _butterworth(order: int, low: float | None, high: float | None, rate: float) -> Array:
-    """Return the second-order sections of the filter for a sampling rate [Hz]."""
-    if low is not None and high is not None:
-        return signal.butter(order, [low, high], "bandpass", fs=rate, output="sos")
-    if low is not None:
-        return signal.butter(order, low, "highpass", fs=rate, output="sos")
-    assert high is not None
-    return signal.butter(order, high, "lowpass", fs=rate, output="sos")

@@ -1,4 +1,4 @@
-"""Pictures of closed joints in space, drawn off screen by PyVista (``python -m`` this module ``JOB.json``)."""
+"""Pictures of closed joints in space, drawn off screen by PyVista."""
 
 import sys
 from dataclasses import dataclass
@@ -124,4 +124,4 @@ def _colouring(values: Array, label: str, palette: tuple[str, float]) -> Colouri
 
 
 if __name__ == "__main__":
-    sys.exit(run_job(sys.argv, ClosingSurface, draw))
+    sys.exit(run_job(ClosingSurface, draw))

@@ -1,16 +1,20 @@
 """Jobs of a drawing process: one surface as .npz, and its pictures as JSON.
 
-The modules that draw run in a process of their own (``python -m pipelines.draw.offscreen.result JOB.json``): a graphics
-library that is missing or broken may end the process that uses it, and must not take the results along.
+The modules that draw run in a process of their own (``python -m pipelines.draw.offscreen.result``, which then reads the
+name of a job's file): a graphics library that is missing or broken may end the process that uses it, and must not take
+the results along. Such a process may be started long before there is something to draw.
 """
 
 import json
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
+
+from pipelines.draw.offscreen.parts import new_plotter
 
 __all__ = ["load_surface", "run_job", "save_job", "save_surface"]
 
@@ -33,16 +37,22 @@ def save_job(folder: Path, surface: Any, pictures: Sequence[Mapping[str, Any]]) 
     return job
 
 
-def run_job(
-    arguments: Sequence[str], kind: type[Surface], draw: Callable[[Surface, Path, dict[str, Any]], None]
-) -> int:
-    """Draw the pictures of a job file; return 3 if a library cannot be loaded, with its message on stdout."""
-    job = json.loads(Path(arguments[1]).read_text(encoding="utf-8"))
+def run_job(kind: type[Surface], draw: Callable[[Surface, Path, dict[str, Any]], None]) -> int:
+    """Load what draws, and draw the pictures of the job whose file is named on stdin; without a name, nothing.
+
+    Return 3 if a library cannot be loaded, with its message on stdout.
+    """
     try:
-        import pyvista  # noqa: F401
+        import pyvista
     except ImportError as error:
         print(error)
         return 3
+    import matplotlib.colors  # noqa: F401
+
+    new_plotter(pyvista).close()  # the first one loads the libraries of the system
+    if not (name := sys.stdin.readline().strip()):
+        return 0
+    job = json.loads(Path(name).read_text(encoding="utf-8"))
     surface = load_surface(Path(job["surface"]), kind)
     for picture in job["pictures"]:
         draw(surface, Path(picture["path"]), picture)

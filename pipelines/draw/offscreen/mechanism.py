@@ -1,4 +1,4 @@
-"""Pictures of mechanisms, drawn off screen by PyVista (``python -m`` this module ``JOB.json``)."""
+"""Pictures of mechanisms, drawn off screen by PyVista."""
 
 import sys
 from dataclasses import dataclass
@@ -93,4 +93,4 @@ def _draw_motion(
 
 
 if __name__ == "__main__":
-    sys.exit(run_job(sys.argv, MechanismSurface, draw))
+    sys.exit(run_job(MechanismSurface, draw))

@@ -1,4 +1,4 @@
-"""Pictures of a result, drawn off screen by PyVista (``python -m`` this module ``JOB.json``)."""
+"""Pictures of a result, drawn off screen by PyVista."""
 
 import sys
 from pathlib import Path
@@ -93,4 +93,4 @@ def _add_joints(pyvista: Any, plotter: Any, surface: WallSurface, colours: Colou
 
 
 if __name__ == "__main__":
-    sys.exit(run_job(sys.argv, WallSurface, draw))
+    sys.exit(run_job(WallSurface, draw))

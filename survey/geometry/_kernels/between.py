@@ -66,6 +66,6 @@ def thinnest_of(solid, normals):
     out = np.full(solid_starts.shape[0] - 1, math.inf)
     for one in range(out.shape[0]):
         for f in range(solid_starts[one], solid_starts[one + 1]):
-            if normals[f].any():
+            if normals[f, 0] != 0.0 or normals[f, 1] != 0.0 or normals[f, 2] != 0.0:
                 out[one] = min(out[one], thickness(one, solid, normals[f]))
     return out

@@ -13,7 +13,7 @@ from pipelines.draw.offscreen.jobs import load_surface, save_surface
 from pipelines.draw.offscreen.parts import nice_ceiling
 from pipelines.draw.offscreen.result import colouring
 from pipelines.draw.offscreen.surfaces import WallSurface, wall_surface
-from pipelines.draw.pictures import draw_pictures, missing, package_of
+from pipelines.draw.pictures import OF_RESULTS, draw_pictures, drawing_process, missing, package_of
 from tests.paths import ROOT
 from tests.pipelines.results_by_hand import result_of, rigid_body
 
@@ -116,6 +116,20 @@ def test_the_resultants_are_blue_within_the_kern_and_red_outside(strong, tmp_pat
     }
     assert len(rows["blue"]) > len(rows["red"]) > 0  # the larger force has the longer stroke
     assert rows["red"].max() < rows["blue"].min()  # the upper joint is out of its kern
+
+
+def test_a_process_that_was_started_ahead_draws_the_same(strong, tmp_path):
+    (tmp_path / "ahead").mkdir()
+    with drawing_process(OF_RESULTS) as ready:
+        draw_pictures(strong, tmp_path / "ahead", ("resultants",), TOWARDS, ready)
+    draw_pictures(strong, tmp_path, ("resultants",), TOWARDS)
+    assert (tmp_path / "ahead/resultants.png").read_bytes() == (tmp_path / "resultants.png").read_bytes()
+
+
+def test_a_process_that_gets_no_job_ends_with_its_block():
+    with drawing_process(OF_RESULTS) as idle:
+        assert idle.poll() is None
+    assert idle.returncode is not None
 
 
 def test_every_picture_is_documented():

@@ -96,7 +96,7 @@ def test_an_unsound_scene_that_is_accepted_is_marked_in_every_output(boxes, tmp_
     monkeypatch.setattr(
         pictures_module,
         "draw_apart",
-        lambda module, surface, jobs: titles.extend(one["title"] for one in jobs),
+        lambda module, surface, jobs, ready: titles.extend(one["title"] for one in jobs),
     )
     scene, url = boxes(BASE, lifted("STONE", -0.05))
     options = ("--db", url, "--out", tmp_path / "out", "--accept-unsound")

@@ -148,9 +148,14 @@ def _steps(sizes):
     """Return steps (n,) of the lattices, from the largest size down, each at least half of the one before."""
     size, fine = sizes.size, sizes.fine
     if len(sizes.offsets) == 0 or fine >= size:
-        return np.array([size])
+        one = np.empty(1)
+        one[0] = size
+        return one
     levels = ceil(log2(size / fine) - 1e-9)
-    return size * (fine / size) ** (np.arange(levels + 1) / levels)
+    steps = np.empty(levels + 1)
+    for k in range(levels + 1):
+        steps[k] = size * (fine / size) ** (k / levels)
+    return steps
 
 
 @njit(cache=True)
@@ -255,7 +260,8 @@ def _inside(points, owner, count, stone, sizes):
     for j in range(len(corners)):
         for k in range(3):
             extent[k] = max(extent[k], abs(axes[k] @ (corners[j] - origin)))
-    for step in _STEP * _steps(sizes):
+    for widest in _steps(sizes):
+        step = _STEP * widest
         across = int(extent[0] / step) + 1
         rows = int(extent[1] / step) + 1
         layers = int(extent[2] / step) + 1
