@@ -23,8 +23,8 @@ from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.files import check_mesh_file, write_meshes
 from mechanics.stones.meshing.mesh import VolumeMesh
 from moma.errors import MissingLibraryError
-from pipelines.draw.history_plot import history_svg
 from pipelines.draw.pictures import OF_RESULTS, draw_pictures, drawing_process, missing
+from pipelines.draw.plots import history_svg
 from pipelines.reports.run import write_report
 from pipelines.results.folder import check_replaceable, replacing
 from pipelines.results.joints_csv import write_joints

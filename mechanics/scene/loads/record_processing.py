@@ -4,6 +4,7 @@ Both follow the documented processing of the PEER database (Ancheta et al. 2013;
 """
 
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
@@ -55,6 +56,7 @@ def band_pass(
         raise SceneError(f"order = {order}", where=record.source, remedy="give 1 or more")
     from scipy.signal import butter, sosfiltfilt  # half a second, which few scenes need
 
+    kind: Literal["bandpass", "highpass", "lowpass"]
     kind = "bandpass" if len(corners) == 2 else "highpass" if high is None else "lowpass"
     sections = butter(order, np.squeeze(corners), kind, fs=1 / record.dt, output="sos")
     zeros = np.zeros(int(np.ceil(0.75 * order / min(corners) / record.dt)))

@@ -1,6 +1,6 @@
 """ADMM between rigid bodies of the plane: compiled, with its own factors in blocks of 3 × 3.
 
-The iteration of `BodyADMM`, with a penalty of each contact's own compliance. An iteration is one pass over the contacts and
+The iteration of `BodyADMM`, with a penalty of each contact's own compliance: one pass over the contacts and
 one solution with the factors of M + H Σ⁻¹ Hᵀ (mechanics/solvers/_kernels/disk_admm.py).
 """
 
