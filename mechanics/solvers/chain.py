@@ -15,7 +15,7 @@ from mechanics.problem.problem import ContactProblem, ContactSolution, ContactSt
 from mechanics.problem.residual import residual
 from moma.errors import SolverError
 
-__all__ = ["KEPT", "Begin", "Link", "Solver", "follow"]
+__all__ = ["KEPT", "Begin", "Chain", "Link", "Solver", "follow"]
 
 KEPT = "forces of the last step"
 """Reason of a solution that no method had to find."""
@@ -101,6 +101,28 @@ def follow(
         if best.converged:
             break
     return replace(best, iterations=count)
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Solver that follows one chain.
+
+    Attributes
+    ----------
+    tolerance, velocity_tolerance : as in `NSGS`
+    max_iterations : of all links together
+    links : in order
+    """
+
+    tolerance: float
+    velocity_tolerance: float
+    max_iterations: int
+    links: Sequence[Link]
+
+    def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
+        """Solve from `start`."""
+        limits = self.tolerance, self.velocity_tolerance
+        return follow(self.links, problem, start, limits, self.max_iterations)
 
 
 def _begun(begin: Begin, start: ContactStart, best: ContactSolution) -> ContactStart:

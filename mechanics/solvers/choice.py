@@ -1,16 +1,17 @@
 """Solver registry."""
 
 from collections.abc import Callable, Mapping
+from functools import partial
 
 import numpy as np
 
 from mechanics.scene.scene import Method, SolverSettings
 from mechanics.solvers.auto import Auto
-from mechanics.solvers.chain import Solver
+from mechanics.solvers.chain import Chain, Solver
 from mechanics.solvers.first_order.body_admm import BodyADMM
 from mechanics.solvers.first_order.disk_admm import DiskADMM
 from mechanics.solvers.first_order.nsgs import NSGS
-from mechanics.solvers.second_order.interior_point import InteriorPoint
+from mechanics.solvers.kinds import ENDED_PATH
 from mechanics.solvers.second_order.newton import Newton
 from moma.errors import SolverError
 
@@ -27,7 +28,7 @@ _METHODS: Mapping[Method, Callable[[float, float, int], Solver]] = {
     Method.AUTO: Auto,
     Method.NSGS: NSGS,
     Method.ADMM: BodyADMM,
-    Method.INTERIOR_POINT: InteriorPoint,
+    Method.INTERIOR_POINT: partial(Chain, links=ENDED_PATH),
     Method.NEWTON: Newton,
 }
 

@@ -19,7 +19,7 @@ from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.second_order.newton import Newton
 from mechanics.solvers.second_order.softer_joints import SofterJoints
 
-__all__ = ["POLISH", "chain_of"]
+__all__ = ["ENDED_PATH", "POLISH", "chain_of"]
 
 # budgets: iterations of ADMM and sweeps over disks, steps of Newton's method, factorisations of a path
 _ADMM, _NEWTON, _PATH = 500, 20, 60
@@ -62,6 +62,9 @@ _endless = replace(_admm, iterations=10**6)
 
 POLISH = replace(_newton, further=_EXACT)
 """Link that makes forces exact which a rest keeps."""
+
+ENDED_PATH = (_path, _newton)
+"""Chain of the interior point alone, which Newton's method ends: it stalls where contacts are between two states."""
 
 # Newton's method goes first from nothing: it begins with forces that yielding joints would have, without self-stress
 _REST = (replace(POLISH, begin=Begin.GIVEN), replace(_admm, begin=Begin.GIVEN), _newton, _path, _newton)

@@ -162,7 +162,8 @@ def _of_solver(scene: SceneFile, model: Variant) -> Iterator[Variant]:
         )
         yield _variant(model, overlay, effort)
     for method in Method if plain else ():
-        if method is not solver.method:
+        suits = model.element is None or method is not Method.ADMM
+        if suits and method is not solver.method:
             yield _variant(model, replace(model.overlay, method=method), 2.0)
 
 
