@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 from moma.cli import app
 from pipelines.run.run import run_scene
 
-NAME = "tower-small"
+NAME = "tower"
 ARCH, BAY = "kind = voussoir and code like 'AO%'", "code like 'A%' and course > 3"
 
 
@@ -25,7 +25,7 @@ def summary_of(folder, stones, laws=""):
     """Survey, ingest and run the storey with these stones deformable."""
     db = f"sqlite:///{folder / 'storey.db'}"
     for command in (
-        ["sample", NAME, "--out", str(folder)],
+        ["sample", NAME, "--small", "--out", str(folder)],
         ["ingest", str(folder / f"{NAME}.moma"), "--db", db],
         ["propose", "infill", "--record", "--db", db],
     ):
