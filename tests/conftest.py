@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
-from hypothesis import is_hypothesis_test, settings
+from hypothesis import settings
 
 from tests.kernel_locks import compile_once
 from tests.postgresql import Server, Unavailable, running_server
@@ -24,10 +24,17 @@ if "PYTEST_XDIST_WORKER" in os.environ:
         os.environ.setdefault(f"{library}_NUM_THREADS", str(threads))
     compile_once()
 
+if "MOMA_ROUNDING" in os.environ:
+    from tests.rounding import perturb
+
+    perturb(int(os.environ["MOMA_ROUNDING"]))
+
 # deadlines would fail on a processor that is busy or slow
 settings.register_profile("fixed", derandomize=True, deadline=None)
 settings.register_profile("free", deadline=None)
 FREE = pytest.StashKey[bool]()
+# files of these folders take longest; begun last, one of them would run alone while other cores wait
+FIRST = ("tests/validation/wild/", "tests/validation/", "tests/docs/", "tests/mechanics/")
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -38,11 +45,20 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Count properties among the slow tests where these are asked for."""
+    """Begin with the files that take longest; count properties among the slow tests where these are asked for."""
+    items.sort(key=lambda item: [not item.nodeid.startswith(folder) for folder in FIRST])
     if config.stash[FREE]:
         for item in items:
-            if is_hypothesis_test(getattr(item, "obj", None)):
+            if getattr(getattr(item, "obj", None), "is_hypothesis_test", False):
                 item.add_marker("slow")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Leave pictures blank, but where a test is marked `draws`."""
+    from tests.drawing import allow
+
+    allow(item)
 
 
 @pytest.fixture(scope="session")

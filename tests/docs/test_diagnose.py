@@ -3,6 +3,7 @@
 import json
 import re
 
+import numpy as np
 import pytest
 
 from pipelines.assess.diagnosis.file import DIAGNOSIS_KEYS, HYPOTHESIS_KEYS, UNKNOWN_KEYS, read_diagnosis
@@ -72,6 +73,30 @@ def test_the_best_scene_goes_into_the_database(place):
     assert compared["chi2"] < compared["dof"]
     stones = answer("query", "entity", "--where", "sag_sigma > 0", "--db", f"sqlite:///{folder / 'small.db'}")
     assert len(stones) == 28
+
+
+def test_what_the_best_scene_explains_stillness_does_not(place):
+    folder, _ = place
+    compared = json.loads((folder / "out/small-best/comparison.json").read_text(encoding="utf-8"))
+    assert compared["chi2_still"] > 10.0 * compared["dof"]
+    for course in compared["courses"]:
+        assert abs(course["measured"] - course["simulated"]) < 3.0 * course["sigma"], course["course"]
+    pictures = {path.name for path in (folder / "out/small-best").glob("*.png")}
+    assert pictures == {"beds-1.png", "misfit-1.png"} <= set(compared["files"])
+
+
+def test_stones_are_measured_to_have_moved_as_they_truly_have(place):
+    folder, _ = place
+    truth = json.loads((folder / "out/small/truth.json").read_text(encoding="utf-8"))
+    moved = {stone["code"]: stone["shift"][2] for stone in truth["stones"]}
+    stones = answer("query", "entity", "--where", "sag_sigma > 0", "--db", f"sqlite:///{folder / 'small.db'}")
+    apart = np.array([stone["sag_measured"] - moved[stone["code"]] for stone in stones])
+    sigma = np.array([stone["sag_sigma"] for stone in stones])
+    # the height at which a course was laid is free
+    course = np.array([stone["course"] for stone in stones])
+    for one in np.unique(course):
+        level = np.average(apart[course == one], weights=1.0 / sigma[course == one] ** 2)
+        assert np.abs(apart - level)[course == one].max() < (4.0 * sigma[course == one]).max(), one
 
 
 def test_the_tables_list_all_keys_and_the_example_can_be_read(tmp_path):

@@ -24,6 +24,7 @@ from survey.synthetic.buildings.quoins import corner
 from survey.synthetic.buildings.vaults import barrel_vault
 from tests.pipelines.results_by_hand import BOX_FACES, box
 
+pytestmark = pytest.mark.draws
 AWAY = np.array([0.0, -1.0, 0.0])
 
 
