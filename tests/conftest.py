@@ -1,17 +1,64 @@
-"""Fixtures that tests of several packages share: databases of each kind; and kernels that are compiled once."""
+"""How tests run: byte code, threads, kernels, seeds; and the databases that tests of several packages share."""
 
 import os
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from tests.kernel_locks import compile_once
 from tests.postgresql import Server, Unavailable, running_server
 
+# Without byte code a worker needs 30 s to import the tests and what they test, with it 9 s. It is kept beside the
+# sources, where numba keeps its compiled kernels in any case.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
 if "PYTEST_XDIST_WORKER" in os.environ:
+    # workers share the cores: threads of one would only take them from another
+    threads = max(1, (os.cpu_count() or 1) // int(os.environ["PYTEST_XDIST_WORKER_COUNT"]))
+    for library in ("NUMBA", "OMP", "OPENBLAS", "MKL"):
+        os.environ.setdefault(f"{library}_NUM_THREADS", str(threads))
     compile_once()
+
+if "MOMA_ROUNDING" in os.environ:
+    from tests.rounding import perturb
+
+    perturb(int(os.environ["MOMA_ROUNDING"]))
+
+# deadlines would fail on a processor that is busy or slow
+settings.register_profile("fixed", derandomize=True, deadline=None)
+settings.register_profile("free", deadline=None)
+FREE = pytest.StashKey[bool]()
+# files of these folders take longest; begun last, one of them would run alone while other cores wait
+FIRST = ("tests/validation/wild/", "tests/validation/", "tests/docs/", "tests/mechanics/")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Try the same examples of properties in every run; where slow tests are asked for, others each time."""
+    config.stash[FREE] = "slow" in config.getoption("markexpr").replace("not slow", "")
+    settings.load_profile("free" if config.stash[FREE] else "fixed")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Begin with the files that take longest; count properties among the slow tests where these are asked for."""
+    items.sort(key=lambda item: [not item.nodeid.startswith(folder) for folder in FIRST])
+    if config.stash[FREE]:
+        for item in items:
+            if getattr(getattr(item, "obj", None), "is_hypothesis_test", False):
+                item.add_marker("slow")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Leave pictures blank, but where a test is marked `draws`."""
+    from tests.drawing import allow
+
+    allow(item)
 
 
 @pytest.fixture(scope="session")

@@ -69,18 +69,22 @@ def order(name):
     return group, natural
 
 
-@pytest.mark.parametrize("name", MODULES)
-def test_all_is_complete_and_sorted(name):
+def test_all_is_complete_and_sorted():
+    wrong = {name: said for name in MODULES if (said := faults_of_all(name))}
+    assert not wrong
+
+
+def faults_of_all(name):
+    """Return what is wrong with the `__all__` of a module; an empty list where nothing is."""
     module = importlib.import_module(name)
     offered = list(getattr(module, "__all__", []))  # a package that only explains itself offers nothing
-    assert offered == sorted(offered, key=order)
-    assert len(set(offered)) == len(offered)
-    missing = [one for one in offered if not hasattr(module, one)]
-    assert not missing
+    wrong = [] if offered == sorted(offered, key=order) else ["not sorted"]
+    wrong += [f"{one} twice" for one in sorted(set(offered)) if offered.count(one) > 1]
+    wrong += [f"no {one}" for one in offered if not hasattr(module, one)]
     tree = ast.parse(Path(module.__file__).read_text(encoding="utf-8"))
-    defined = [
+    defined = {
         node.name
         for node in tree.body
         if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_")
-    ]
-    assert set(defined) <= set(offered)
+    }
+    return wrong + [f"{one} is not offered" for one in sorted(defined - set(offered))]

@@ -8,6 +8,7 @@ import pytest
 from tests.docs.pages import blocks, ran
 from tests.moma.commands import answer
 
+pytestmark = pytest.mark.slow  # tests/docs/test_diagnose.py compares the small wall
 PAGE = "docs/howto/compare.md"
 
 

@@ -74,6 +74,28 @@ def test_the_best_scene_goes_into_the_database(place):
     assert len(stones) == 28
 
 
+def test_what_the_best_scene_explains_stillness_does_not(place):
+    folder, _ = place
+    compared = json.loads((folder / "out/small-best/comparison.json").read_text(encoding="utf-8"))
+    assert compared["chi2_still"] > 10.0 * compared["dof"]
+    for course in compared["courses"]:
+        assert abs(course["measured"] - course["simulated"]) < 3.0 * course["sigma"], course["course"]
+    pictures = {path.name for path in (folder / "out/small-best").glob("*.png")}
+    assert pictures == {"beds-1.png", "misfit-1.png"} <= set(compared["files"])
+
+
+def test_what_the_surveyor_finds_of_each_stone_is_what_is_true(place):
+    folder, _ = place
+    truth = json.loads((folder / "out/small/truth.json").read_text(encoding="utf-8"))
+    assert truth["settlement"] == {"W01-01": -0.03, "W01-02": -0.015}
+    database = f"sqlite:///{folder / 'small.db'}"
+    stones = answer("query", "entity", "--where", "course = 1", "--db", database)
+    sag = {stone["code"]: stone["sag_measured"] for stone in stones}
+    for stone in stones:
+        settled = truth["settlement"].get(stone["code"], 0.0)
+        assert sag[stone["code"]] - sag["W01-04"] == pytest.approx(settled, abs=4.0 * stone["sag_sigma"])
+
+
 def test_the_tables_list_all_keys_and_the_example_can_be_read(tmp_path):
     rows = [
         re.split(r" ?\| ?", line)[1:5]

@@ -9,10 +9,15 @@ import sys
 import pytest
 
 from tests.docs.pages import blocks
+from tests.moma.commands import invoke
 from tests.paths import ROOT
 from tests.pipelines.scenes import small_geology
 
-PAGES = ("README.md", "docs/howto/first-run.md", "docs/howto/survey.md")
+PAGES = (
+    "README.md",
+    pytest.param("docs/howto/first-run.md", marks=pytest.mark.draws),
+    "docs/howto/survey.md",
+)
 SCENE = "data/samples/window/window.toml"
 
 
@@ -51,11 +56,26 @@ def execute(arguments, folder):
     return subprocess.run(arguments, cwd=folder, env=environment, capture_output=True, text=True, check=False)
 
 
+@pytest.fixture
+def here(place, monkeypatch):
+    """The folder, in which commands run within this process."""
+    monkeypatch.chdir(place)
+    monkeypatch.delenv("MOMA_DB", raising=False)
+    return place
+
+
 @pytest.mark.parametrize("page", PAGES)
-def test_the_commands_run_in_their_order(page, place):
+def test_the_commands_run_in_their_order(page, here):
     found = commands(page)
     assert found
     for command in found:
+        done = invoke(*command[1:])
+        assert done.exit_code == 0, (command, done.output)
+        assert "error" not in done.stderr, (command, done.stderr)
+
+
+def test_the_first_commands_run_as_processes(place):
+    for command in commands("docs/howto/first-run.md")[:2]:
         done = execute([sys.executable, "-m", *command], place)
         assert done.returncode == 0, (command, done.stderr)
         assert "error" not in done.stderr, (command, done.stderr)
@@ -87,7 +107,7 @@ def test_the_python_of_the_how_to_on_studies_prints_what_it_says(place):
     assert (place / "lintel.csv").read_text(encoding="utf-8").startswith("# time [s],x [m]")
 
 
-def test_what_the_how_to_on_surveys_shows_is_what_the_files_and_commands_say(place):
+def test_what_the_how_to_on_surveys_shows_is_what_the_files_and_commands_say(here):
     page = "docs/howto/survey.md"
     said = [
         path.read_text(encoding="utf-8") for path in (ROOT / "docs/howto/survey").iterdir() if path.is_file()
@@ -95,15 +115,15 @@ def test_what_the_how_to_on_surveys_shows_is_what_the_files_and_commands_say(pla
     shown_whole = [
         one for one in commands(page) if "data/samples/window/window.moma" in one or "--keep-going" in one
     ]
-    said += [execute([sys.executable, "-m", *command], place).stdout for command in shown_whole]
-    said.append((place / "rejects.txt").read_text(encoding="utf-8"))
+    said += [invoke(*command[1:]).stdout for command in shown_whole]
+    said.append((here / "rejects.txt").read_text(encoding="utf-8"))
     known = set("\n".join(said).splitlines())
     shown = [line for block in blocks(page, "text") for line in block.splitlines()]
     assert len(shown) > 20
     assert [line for line in shown if line not in known] == []
 
 
-def test_the_questions_of_the_how_to_on_queries_have_the_answers_it_shows(place):
+def test_the_questions_of_the_how_to_on_queries_have_the_answers_it_shows(here):
     page = "docs/howto/query.md"
     text = (ROOT / page).read_text(encoding="utf-8")
     pieces = re.findall(r"^```(bash|text|python)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
@@ -111,8 +131,8 @@ def test_the_questions_of_the_how_to_on_queries_have_the_answers_it_shows(place)
     for (language, block), (following, answer) in zip(pieces, [*pieces[1:], ("", "")], strict=True):
         for number, line in enumerate(block.splitlines() if language == "bash" else []):
             command = shlex.split(line)
-            done = execute([sys.executable, "-m", *command], place)
-            assert done.returncode == 0, (command, done.stderr)
+            done = invoke(*command[1:])
+            assert done.exit_code == 0, (command, done.output)
             shown = answer if following == "text" and number == 0 else ""
             if command[1] == "query" and "--format" not in command:
                 assert done.stdout == shown, command  # the whole answer
@@ -121,7 +141,7 @@ def test_the_questions_of_the_how_to_on_queries_have_the_answers_it_shows(place)
             questions += command[1] not in ("ingest", "record", "run")
     assert questions >= 15
     (script,) = blocks(page, "python")
-    done = execute([sys.executable, "-W", "error", "-c", script], place)
+    done = execute([sys.executable, "-W", "error", "-c", script], here)
     assert done.stdout.split() == ["W10-03", "10", "W10-06", "10"], done.stderr
 
 

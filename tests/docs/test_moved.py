@@ -29,6 +29,7 @@ def ran(folder, commands):
     return said
 
 
+@pytest.mark.slow  # docs/howto/diagnose.md finds a settlement in each run of the tests
 def test_the_thrust_of_a_vault_is_recovered_and_its_rival_named(tmp_path):
     said = ran(tmp_path, blocks("bash")[0])
     number = re.compile(

@@ -71,6 +71,7 @@ def test_the_commands_print_what_the_page_shows(place):
 
 
 @pytest.mark.slow
+@pytest.mark.draws
 def test_all_commands_run_and_draw_the_pictures_of_the_page(place):
     from PIL import Image
 

@@ -108,6 +108,7 @@ def test_results_of_a_run_are_not_replaced(url, scene, tmp_path):
     assert "results of a run" in fails(2, "assess", scene, "--db", url, "--out", folder)
 
 
+@pytest.mark.draws
 def test_every_kind_of_question_has_an_answer(url, scene, tmp_path):
     scene.write_text(
         TWO_COURSES

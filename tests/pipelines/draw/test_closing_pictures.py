@@ -24,6 +24,7 @@ from survey.joints.report import ClosingReport, Gap, Overlap, StoneJoint
 from survey.joints.settings import JointMode
 from tests.pipelines.results_by_hand import BOX_FACES, box
 
+pytestmark = pytest.mark.draws
 AWAY = np.array([0.0, -1.0, 0.0])
 
 

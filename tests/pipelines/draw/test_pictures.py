@@ -17,6 +17,7 @@ from pipelines.draw.pictures import OF_RESULTS, draw_pictures, drawing_process, 
 from tests.paths import ROOT
 from tests.pipelines.results_by_hand import result_of, rigid_body
 
+pytestmark = pytest.mark.draws
 TOWARDS = np.array([0.0, -1.0, 0.0])
 
 

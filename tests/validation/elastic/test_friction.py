@@ -43,7 +43,7 @@ def pulled(times, parts, duration, size=SIDE):
         "pull",
         blocks,
         contact=ContactSettings(DryJoint(FRICTION), rules=rules),
-        time=TimeSettings(5e-3, 1.0, duration, stop_at_equilibrium=False),
+        time=TimeSettings(1e-2, 1.0, duration, stop_at_equilibrium=False),
         solver=SolverSettings(tolerance=1e-8),
         loads=Loads(gravity=(GravityRamp(0.3),), forces=(force,)),
     )

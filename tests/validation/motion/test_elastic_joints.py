@@ -65,8 +65,8 @@ def test_a_block_set_on_springs_vibrates_about_its_rest():
 def test_a_push_along_the_joint_shears_its_springs():
     """x = v/ω sin ωt below the limit of friction: the joint neither slides nor forgets."""
     law = ElasticJoint(0.6, 10 * STIFF, STIFF, tension=1e6, shear=1e6)
-    found = track(started(law, slab((1e-4, 0, 0, 0, 0, 0)), gravity=(0, 0, 0), step=2e-5), 2000)[:, 0]
-    time, omega = 2e-5 * np.arange(1, 2001), np.sqrt(STIFF / MASS)
+    found = track(started(law, slab((1e-4, 0, 0, 0, 0, 0)), gravity=(0, 0, 0), step=4e-5), 500)[:, 0]
+    time, omega = 4e-5 * np.arange(1, 501), np.sqrt(STIFF / MASS)
     np.testing.assert_allclose(found, 1e-4 / omega * np.sin(omega * time), atol=0.03e-4 / omega)
 
 
@@ -74,7 +74,7 @@ def test_dashpots_damp_by_pi_f_tau():
     damping = 0.05
     omega = np.sqrt(STIFF / MASS)
     law = ElasticJoint(0.6, STIFF, STIFF, 2 * damping / omega, tension=1e6, shear=1e6)
-    found = track(started(law, slab((0, 0, 1e-4, 0, 0, 0)), gravity=(0, 0, 0), step=1e-5), 2500)[:, 2]
+    found = track(started(law, slab((0, 0, 1e-4, 0, 0, 0)), gravity=(0, 0, 0), step=2e-5), 800)[:, 2]
     up = np.array([one.max() for one in np.split(found, np.flatnonzero(np.diff(np.sign(found)) > 0) + 1)])
     decrement = np.log(up[:-1] / up[1:])
     np.testing.assert_allclose(decrement[:3], 2 * np.pi * damping, rtol=0.03)
@@ -248,21 +248,27 @@ def swing(law, placement=Placement.CORNERS):
     return 1e3 * abs(path[peak]), 1e-3 * (peak + 1)
 
 
+PULSED = ElasticJoint(float(np.tan(np.radians(35.0))), 1e10, 1e10, damping_time=5e-4)
+
+
+def test_the_pulsed_arch_of_lemos_moves_as_in_3dec_where_joints_stay_closed():
+    """Case K10: 3DEC's crown moves by 0.27 to 0.34 mm."""
+    glued = replace(PULSED, tension=1e9, shear=1e9)
+    assert swing(glued)[0] < 0.27 < 0.34 < swing(glued, Placement.CENTROID)[0]
+
+
+@pytest.mark.slow
 def test_the_pulsed_arch_of_lemos_moves_as_in_3dec():
-    """Case K10: 3DEC's crown moves by 15.7 to 16.9 mm at 0.51 to 0.54 s, by 0.27 to 0.34 mm where joints stay closed.
+    """Case K10: 3DEC's crown moves by 15.7 to 16.9 mm at 0.51 to 0.54 s.
 
     It does not say how many points carry a joint: springs at the corners are stiffer in bending, those of the whole
     area softer. Rigid joints let the crown move too little.
     """
-    friction = float(np.tan(np.radians(35.0)))
-    law = ElasticJoint(friction, 1e10, 1e10, damping_time=5e-4)
-    glued = replace(law, tension=1e9, shear=1e9)
-    corners, corners_at = swing(law)
-    whole, whole_at = swing(law, Placement.CENTROID)
+    corners, corners_at = swing(PULSED)
+    whole, whole_at = swing(PULSED, Placement.CENTROID)
     assert 0.8 * 15.73 < corners < 15.73 < 16.87 < whole
     assert 0.45 < corners_at < 0.514 < 0.543 < whole_at
-    assert swing(glued)[0] < 0.27 < 0.34 < swing(glued, Placement.CENTROID)[0]
-    assert swing(DryJoint(friction))[0] < 0.8 * 15.73
+    assert swing(DryJoint(PULSED.friction))[0] < 0.8 * 15.73
 
 
 @pytest.mark.parametrize("method", [Method.NSGS, Method.APGD, Method.CONE])

@@ -41,7 +41,7 @@ SCENES = {
     "arch that stands": (arch, leaning(4.0), 0.7, 0.1),
     "arch that falls": (arch, leaning(25.0), 0.7, 0.16),
     "wall that stands": (wall, leaning(4.0), 0.6, 0.1),
-    "wall that slides": (wall, leaning(20.0), 0.3, 0.2),
+    "wall that slides": (wall, leaning(20.0), 0.3, 0.12),
 }
 
 
