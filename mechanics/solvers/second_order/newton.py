@@ -7,7 +7,7 @@ lost. A line search keeps them from going astray; where it has to shorten steps,
 the forces of joints that yield a little and hold everywhere: self-stress that no load causes is left out.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -74,7 +74,10 @@ class Newton:
         """
         if len(start.impulse) == 0:
             return ContactSolution(start.impulse, start.velocity, 0, 0.0, True)
-        return solved_evenly(self._solved, problem, start)
+        found = solved_evenly(self._solved, problem, start)
+        left = residual(problem, found.impulse)
+        within = left.within(self.tolerance, self.velocity_tolerance)
+        return replace(found, velocity=left.dual, natural_map=left.natural_map, converged=within)
 
     def _solved(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         limits = self.tolerance, self.velocity_tolerance
