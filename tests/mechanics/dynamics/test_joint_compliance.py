@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mechanics.solvers.strategies.rigid import Alternating
 
 from mechanics.dynamics.contact_problem import JointCompliance
 from mechanics.dynamics.outcome import Outcome
@@ -14,7 +15,6 @@ from mechanics.scene.scene import Fidelity, Method
 from mechanics.scene.shapes import bond, box, wall
 from mechanics.simulate import simulate
 from mechanics.solvers.choice import choose_solvers
-from mechanics.solvers.strategies.rigid import Alternating
 from tests.mechanics.shapes import brick, ground, scene
 
 G, STEP, DENSITY = 9.81, 5e-3, 2000.0
