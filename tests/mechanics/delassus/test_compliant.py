@@ -4,18 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from mechanics.solvers.first_order.admm import ADMM
-from mechanics.solvers.second_order.proximal_newton import ProximalNewton
-from mechanics.solvers.strategies.compliant import Compliant
 
 from mechanics.delassus.compliant import CompliantDelassus
 from mechanics.problem.problem import ContactStart
 from mechanics.problem.residual import residual
+from mechanics.solvers.auto import Auto
+from mechanics.solvers.first_order.body_admm import BodyADMM, Stage
 from mechanics.solvers.first_order.nsgs import NSGS
 from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.second_order.newton import Newton
 from tests.mechanics.dense_operator import DenseDelassus
 from tests.mechanics.shapes import brick, ground, posed, scene
+from tests.mechanics.solvers.cone_program import ConeProgram
 
 
 @pytest.fixture(scope="module")
@@ -53,8 +53,6 @@ def test_its_form_solves_for_the_sum(problem, soft):
     theta = np.tile(0.1 * scale * np.eye(3), (len(problem.bias), 1, 1))
     shifted = np.linalg.solve(matrix + 0.1 * scale * np.eye(len(matrix)), b)
     np.testing.assert_allclose(soft.delassus.form.shifted(theta)(b), shifted, rtol=1e-9, atol=1e-9)
-    relaxed = np.linalg.solve(matrix / (0.3 * scale) + np.eye(len(matrix)), b)
-    np.testing.assert_allclose(soft.delassus.form.relaxed(0.3 * scale)(b), relaxed, rtol=1e-9, atol=1e-9)
 
 
 def test_units_of_the_contacts_scale_both_parts(soft):
@@ -68,11 +66,10 @@ def test_units_of_the_contacts_scale_both_parts(soft):
     "solver",
     [
         NSGS(1e-11, 1e-9, 5000),
-        ADMM(1e-11, 1e-9, 5000),
+        BodyADMM(1e-11, 1e-9, 5000, (Stage(0.2, 5000, extrapolated=True),)),
         Newton(1e-11, 1e-9),
-        ProximalNewton(1e-11, 1e-9),
         InteriorPoint(1e-11, 1e-9),
-        Compliant(1e-11, 1e-9),
+        Auto(1e-11, 1e-9),
     ],
     ids=lambda one: type(one).__name__,
 )
@@ -81,8 +78,8 @@ def test_every_method_finds_the_one_solution(soft, solver):
     plain = DenseDelassus(dense(soft.delassus))
     zero = np.zeros_like(soft.u_free)
     start = ContactStart(zero, zero)
-    known = Newton(1e-12, 1e-10)(replace(soft, delassus=plain), start)
+    known = ConeProgram(1e-10, 1e-8)(replace(soft, delassus=plain), start)
     assert known.converged
     found = solver(soft, start)
     assert residual(soft, found.impulse).natural_map < 1e-10
-    np.testing.assert_allclose(found.impulse, known.impulse, atol=1e-7 * np.abs(known.impulse).max())
+    np.testing.assert_allclose(found.impulse, known.impulse, atol=1e-6 * np.abs(known.impulse).max())

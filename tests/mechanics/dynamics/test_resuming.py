@@ -28,6 +28,7 @@ from mechanics.scene.scene import (
     TimeSettings,
 )
 from mechanics.simulate import simulate
+from mechanics.solvers.choice import choose_solver
 from tests.mechanics.shapes import brick, ground, opening, scene
 from tests.validation.statics.test_imperfect_vaults import barrel, warped
 
@@ -254,4 +255,4 @@ def test_every_attribute_that_changes_is_carried(name, monkeypatch):
     for keeper in (simulation._detect, *simulation._compliance):
         assert set(vars(keeper)) == KEEPERS[type(keeper)]
     # solvers remember nothing of their own
-    assert immutable(simulation._solvers)
+    assert immutable(choose_solver(simulation.model.scene.solver))

@@ -1,4 +1,4 @@
-"""Contact with friction as a sequence of cone programmes, solved by Clarabel (Goulart & Chen 2024).
+"""Independent reference: contact with friction as a sequence of cone programmes (Clarabel, Goulart & Chen 2024).
 
 With the de Saxcé shift s = μ‖u_T‖ held, the laws are the optimality conditions of a convex programme in r
 (Acary, Brémond & Huber 2018, §5),
@@ -11,23 +11,17 @@ nothing dense is made.
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
 
+import clarabel
 import numpy as np
 from scipy.sparse import block_array, block_diag, csc_array, diags_array, eye_array, triu, vstack
 
-from mechanics.arrays import Array, Bools, Ints
 from mechanics.problem.forms import SparseForm
-from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
-from mechanics.problem.residual import Residual, residual
+from mechanics.problem.problem import ContactSolution, ContactStart
+from mechanics.problem.residual import residual
 from mechanics.solvers.first_order.anderson import Anderson
 from mechanics.solvers.second_order.newton import Newton
-from moma.errors import SolverError
 
-__all__ = ["ConeProgram"]
-
-
-_NAME = "cone programme"
 # gap and infeasibility asked of Clarabel, which it can just reach; η is about the root of it [-]
 _GAP = 1e-12
 # κ/τ asked of Clarabel [-]
@@ -67,107 +61,100 @@ class ConeProgram:
     max_iterations: int = 2000
     polish: bool = True
 
-    def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
-        """Solve; of the start its shift alone is used. Returns the best of all iterates.
-
-        Raises
-        ------
-        SolverError : if W is known by its products only, or Clarabel is not installed
-        """
+    def __call__(self, problem, start):
+        """Solve; of the start its shift alone is used. Returns the best of all iterates."""
         limits = self.tolerance, self.velocity_tolerance
         left = residual(problem, start.impulse)
         best = ContactSolution(start.impulse, left.dual, 0, left.natural_map, left.within(*limits))
         if best.converged:
             return best
-        programme, shifts = _Programme(problem), Anderson(_DEPTH)
-        shift, asked, vain, last, bold = _shift(problem, start.impulse), _NEAR, 0, np.inf, True
+        programme, shifts = Programme(problem), Anderson(_DEPTH)
+        shift, asked, vain, last, bold = shift_of(problem, start.impulse), _NEAR, 0, np.inf, True
         while not best.converged and vain < _IN_VAIN and programme.iterations < self.max_iterations:
             r = programme(shift, self.max_iterations - programme.iterations)
-            found, vain = self._judged(problem, r), vain + 1
+            found, vain = self.judged(problem, r), vain + 1
             if found.natural_map < best.natural_map:
                 best, vain = found, 0
             if self.polish and not best.converged and found.natural_map < asked:
                 asked = _NEARER * found.natural_map
-                ended = self._newton(problem, found, self.max_iterations - programme.iterations)
+                ended = self.newton(problem, found, self.max_iterations - programme.iterations)
                 programme.iterations += ended.iterations
                 best = ended if ended.natural_map < best.natural_map else best
-            image = _shift(problem, r)
+            image = shift_of(problem, r)
             # where friction is much, extrapolations lead astray
             bold = bold and found.natural_map <= last
             bolder = shifts(shift, image) if bold else None
             shift, last = image if bolder is None else np.maximum(bolder, 0.0), found.natural_map
         return replace(best, iterations=programme.iterations)
 
-    def _judged(self, problem: ContactProblem, impulse: Array) -> ContactSolution:
-        left: Residual = residual(problem, impulse)
+    def judged(self, problem, impulse):
+        left = residual(problem, impulse)
         within = left.within(self.tolerance, self.velocity_tolerance)
         return ContactSolution(impulse, left.dual, 0, left.natural_map, within)
 
-    def _newton(self, problem: ContactProblem, found: ContactSolution, most: int) -> ContactSolution:
+    def newton(self, problem, found, most):
         newton = Newton(self.tolerance, self.velocity_tolerance, max(0, min(_NEWTON_STEPS, most)))
         return newton(problem, ContactStart(found.impulse, found.velocity))
 
 
-def _shift(problem: ContactProblem, impulse: Array) -> Array:
+def shift_of(problem, impulse):
     """Return μ‖u_T‖ (nc,) of some impulses."""
     u = problem.delassus.apply(impulse) + problem.u_free
-    size: Array = problem.friction * np.sqrt((u[:, 1:] ** 2).sum(axis=1))
-    return size
+    return problem.friction * np.sqrt((u[:, 1:] ** 2).sum(axis=1))
 
 
-class _Programme:
+class Programme:
     """Programme of one problem, for one shift after the other; the pattern is analysed once.
 
     Unknowns are y and r in units in which the largest closing velocity and the mean diagonal of W are 1. A contact
     without friction has r_N only.
     """
 
-    def __init__(self, problem: ContactProblem) -> None:
-        clarabel = load_clarabel(_NAME, "pip install clarabel, or use another method")
-        self._problem, self.iterations = problem, 0
+    def __init__(self, problem):
+        self.problem, self.iterations = problem, 0
         pushed = -(problem.u_free[:, 0] + problem.bias)
         # contacts that open may slide far faster than those that have to be stopped
-        self._pace = float(max(pushed.max(), _LEAST * np.abs(problem.u_free).max(), 1e-300))
-        self._scale = problem.delassus.scale
+        self.pace = float(max(pushed.max(), _LEAST * np.abs(problem.u_free).max(), 1e-300))
+        self.scale = problem.delassus.scale
         rough = (problem.friction > 0) | (problem.cohesion > 0)
         d = problem.u_free.shape[1]
-        self._kept = np.flatnonzero(np.column_stack([np.ones(len(rough), bool), *[rough] * (d - 1)]).ravel())
-        energy, balance = _energy(problem, self._kept, self._scale)
-        self._extra = energy.shape[0] - len(self._kept)
-        rows, right, cones = _cones(problem, rough, self._kept, self._scale / self._pace, clarabel)
-        wide = csc_array((rows.shape[0], self._extra))
-        rows = block_array([[wide, rows]]) if self._extra else rows
+        self.kept = np.flatnonzero(np.column_stack([np.ones(len(rough), bool), *[rough] * (d - 1)]).ravel())
+        energy, balance = energy_of(problem, self.kept, self.scale)
+        self.extra = energy.shape[0] - len(self.kept)
+        rows, right, cones = cones_of(problem, rough, self.kept, self.scale / self.pace)
+        wide = csc_array((rows.shape[0], self.extra))
+        rows = block_array([[wide, rows]]) if self.extra else rows
         if balance is not None:
-            rows, right = vstack([balance, rows]), np.concatenate([np.zeros(self._extra), right])
-            cones = [clarabel.ZeroConeT(self._extra), *cones]
-        self._settings = _settings(clarabel)
-        self._solver = clarabel.DefaultSolver(
+            rows, right = vstack([balance, rows]), np.concatenate([np.zeros(self.extra), right])
+            cones = [clarabel.ZeroConeT(self.extra), *cones]
+        self.settings = exact_settings()
+        self.solver = clarabel.DefaultSolver(
             csc_array(triu(energy)),
             np.zeros(energy.shape[0]),
             csc_array(rows),
             right,
             cones,
-            self._settings,
+            self.settings,
         )
-        self._most = int(self._settings.max_iter)
+        self.most = int(self.settings.max_iter)
 
-    def __call__(self, shift: Array, most: int) -> Array:
+    def __call__(self, shift, most):
         """Return the impulses r (nc, d) of the programme with one shift (nc,), within `most` iterations."""
-        problem = self._problem
+        problem = self.problem
         free = problem.u_free.copy()
         # contacts far from closing count as a little nearer: large numbers would hide the small ones
-        free[:, 0] = np.minimum(free[:, 0] + problem.bias, _FAR * self._pace) + shift
-        linear = np.concatenate([np.zeros(self._extra), free.ravel()[self._kept] / self._pace])
-        self._settings.max_iter = min(most, self._most)
-        self._solver.update(q=linear, settings=self._settings)
-        found = self._solver.solve()
+        free[:, 0] = np.minimum(free[:, 0] + problem.bias, _FAR * self.pace) + shift
+        linear = np.concatenate([np.zeros(self.extra), free.ravel()[self.kept] / self.pace])
+        self.settings.max_iter = min(most, self.most)
+        self.solver.update(q=linear, settings=self.settings)
+        found = self.solver.solve()
         self.iterations += int(found.iterations)
         impulse = np.zeros(problem.u_free.size)
-        impulse[self._kept] = np.asarray(found.x)[self._extra :] * (self._pace / self._scale)
+        impulse[self.kept] = np.asarray(found.x)[self.extra :] * (self.pace / self.scale)
         return impulse.reshape(problem.u_free.shape)
 
 
-def _settings(clarabel: Any) -> Any:
+def exact_settings():
     settings = clarabel.DefaultSettings()
     settings.verbose, settings.max_threads, settings.presolve_enable = False, 1, False
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = _GAP
@@ -175,7 +162,7 @@ def _settings(clarabel: Any) -> Any:
     return settings
 
 
-def _energy(problem: ContactProblem, kept: Ints, scale: float) -> tuple[Any, "csc_array[np.float64] | None"]:
+def energy_of(problem, kept, scale):
     """Return the quadratic part over (y, r) or r alone, in units of `scale`, and Â y - H r = 0 where y is there."""
     form = problem.delassus.form
     if isinstance(form, SparseForm):
@@ -184,15 +171,10 @@ def _energy(problem: ContactProblem, kept: Ints, scale: float) -> tuple[Any, "cs
         inertia, lift = unit @ form.inertia @ unit, (unit @ form.lift)[:, kept] / np.sqrt(scale)
         none = csc_array((len(kept), len(kept)))
         return block_diag([inertia, none]), csc_array(block_array([[inertia, -lift]]))
-    matrix = None if form is None else form.matrix
-    if matrix is None:
-        raise SolverError("W is not known as a matrix", where=_NAME, remedy='use the method "nsgs"')
-    return matrix[kept][:, kept] / scale, None
+    return form.matrix[kept][:, kept] / scale, None
 
 
-def _cones(
-    problem: ContactProblem, rough: Bools, kept: Ints, unit: float, clarabel: Any
-) -> tuple[Any, Array, list[Any]]:
+def cones_of(problem, rough, kept, unit):
     """Return rows, right side and kinds of: (μ r_N + k, r_T) in a second-order cone, r_N ≥ 0."""
     d, k = problem.u_free.shape[1], problem.cohesion
     # without cohesion r_N ≥ 0 follows from the cone
@@ -208,17 +190,3 @@ def _cones(
     if len(side):
         kinds.append(clarabel.NonnegativeConeT(len(side)))
     return -rows, np.concatenate([right.ravel(), np.zeros(len(side))]), kinds
-
-
-def load_clarabel(where: str, remedy: str) -> Any:
-    """Return the module of Clarabel.
-
-    Raises
-    ------
-    SolverError : it is not installed; with the place and the remedy given
-    """
-    try:
-        import clarabel
-    except ImportError as error:
-        raise SolverError("Clarabel is not installed", where=where, remedy=remedy) from error
-    return clarabel

@@ -5,7 +5,7 @@ import pytest
 
 from mechanics.dynamics.outcome import Outcome
 from mechanics.scene.laws.dry_joint import DryJoint
-from mechanics.scene.scene import ContactSettings, Fidelity, Method, Scene, SolverSettings, TimeSettings
+from mechanics.scene.scene import ContactSettings, Fidelity, Scene, SolverSettings, TimeSettings
 from mechanics.simulate import simulate
 from mechanics.stones.materials import Material
 from tests.validation.scenes import G, box, ground
@@ -23,7 +23,7 @@ def column():
             (ground(half=1.0), block),
             contact=ContactSettings(DryJoint(0.5)),
             time=TimeSettings(step=1e-2, theta=1.0, duration=1.0, relaxation=True),
-            solver=SolverSettings(Method.ADMM, tolerance=1e-7),
+            solver=SolverSettings(tolerance=1e-7),
         )
     )
 

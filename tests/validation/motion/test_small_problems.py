@@ -7,15 +7,15 @@ slightly asymmetric; its solution is that of another Gauss–Seidel code, truste
 
 import numpy as np
 import pytest
-from mechanics.solvers.first_order.admm import ADMM
-from mechanics.solvers.strategies.rigid import Alternating
 
 from mechanics.problem.problem import ContactProblem, ContactStart
 from mechanics.problem.residual import natural_map
+from mechanics.solvers.auto import Auto
 from mechanics.solvers.first_order.nsgs import NSGS
+from mechanics.solvers.second_order.newton import Newton
 from tests.mechanics.dense_operator import DenseDelassus
 
-SOLVERS = {"nsgs": NSGS, "admm": ADMM, "auto": Alternating}
+SOLVERS = {"nsgs": NSGS, "newton": Newton, "auto": Auto}
 
 ROVER4396_W = np.array(
     [
@@ -37,11 +37,11 @@ def problem(w, q, mu):
 
 
 def solve(name, posed):
-    solver = SOLVERS[name](tolerance=1e-12, velocity_tolerance=np.inf, max_iterations=20_000)
+    solver = SOLVERS[name](tolerance=1e-11, velocity_tolerance=np.inf, max_iterations=20_000)
     none = np.zeros_like(posed.u_free)
     solution = solver(posed, ContactStart(none, none))
     assert solution.converged
-    assert natural_map(posed, solution.impulse) <= 1e-12
+    assert natural_map(posed, solution.impulse) <= 1e-11
     return solution.impulse
 
 
@@ -50,11 +50,11 @@ def test_example1_is_solved_as_in_closed_form(name):
     """W = 1 and q = (-1, 1, 3) at each of three contacts, μ = 0.1: they slide.
 
     r_N = 1, and r_T = -μ r_N u_T/‖u_T‖ with u_T = q_T + r_T along q_T, so r_T = -0.1 (1, 3)/√10 = (-0.0316227766,
-    -0.0948683298). Tolerance 1e-10, for η = 1e-12.
+    -0.0948683298). Tolerance 1e-9, for η = 1e-11.
     """
     impulse = solve(name, problem(np.eye(9), np.tile([-1.0, 1.0, 3.0], (3, 1)), 0.1))
     expected = np.tile([1.0, -0.1 / np.sqrt(10), -0.3 / np.sqrt(10)], (3, 1))
-    np.testing.assert_allclose(impulse, expected, rtol=1e-10)
+    np.testing.assert_allclose(impulse, expected, rtol=1e-9)
 
 
 @pytest.mark.parametrize("name", SOLVERS)
