@@ -15,7 +15,6 @@ from mechanics.solvers.auto import Auto
 from mechanics.solvers.chain import Begin
 from mechanics.solvers.first_order.nsgs import NSGS
 from mechanics.solvers.kinds import chain_of
-from mechanics.solvers.second_order.interior_point import InteriorPoint
 from tests.mechanics.dense_operator import products_alone
 from tests.mechanics.planar.shapes import random_problem
 from tests.mechanics.shapes import posed
@@ -24,6 +23,7 @@ from tests.mechanics.solvers.problems import (
     FORWARD,
     RIGID,
     SOFT,
+    by_path,
     cold,
     few_deformable,
     leaning,
@@ -59,7 +59,7 @@ class Kind:
     problem: object
     first: str
     solved: str
-    other: object = InteriorPoint(*EXACT, 200)
+    other: object = by_path
 
 
 # a start of its own is needed by Newton's method between stones that deform, which others find first

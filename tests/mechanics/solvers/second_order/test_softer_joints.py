@@ -7,12 +7,11 @@ import pytest
 
 from mechanics.problem.problem import ContactStart
 from mechanics.problem.residual import residual
-from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.second_order.newton import Newton
 from mechanics.solvers.second_order.softer_joints import SofterJoints
 from moma.errors import SolverError
 from tests.mechanics.shapes import posed
-from tests.mechanics.solvers.problems import cold, leaning, yielding
+from tests.mechanics.solvers.problems import by_path, cold, leaning, yielding
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +24,7 @@ def test_it_solves_the_joints_that_are_asked_for(problem):
     found = SofterJoints(1e-9, 1e-8)(problem, cold(problem))
     assert found.converged
     assert residual(problem, found.impulse).within(1e-9, 1e-8)
-    other = InteriorPoint(1e-10, 1e-9)(problem, cold(problem))
+    other = by_path(problem, cold(problem))
     assert other.converged
     # W + E is regular: forces are determined, to what η leaves
     np.testing.assert_allclose(found.impulse, other.impulse, atol=1e-3 * np.abs(other.impulse).max())
