@@ -48,9 +48,9 @@ def test_its_steps_are_limited_and_counted(problem, most):
 
 def test_an_unfinished_way_never_counts_as_solved(problem):
     """A solution of softer joints is none of those asked for."""
-    found = SofterJoints(1e-8, 1e-7, 12)(problem, cold(problem))
-    if not found.converged:
-        assert not residual(problem, found.impulse).within(1e-8, 1e-7)
+    found = SofterJoints(1e-4, 1e-3, 2)(problem, cold(problem))
+    assert not found.converged
+    assert found.natural_map == np.inf
 
 
 def test_joints_that_do_not_yield_are_refused(problem):
