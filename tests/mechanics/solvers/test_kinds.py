@@ -76,7 +76,7 @@ KINDS = {
     ),
     "disks": Kind(lambda: disks(30), "sweeps", ("sweeps",), NSGS(*EXACT, 100_000)),
     "known by products alone": Kind(
-        lambda: products_alone(blocks(RIGID, RIGID)), "sweeps", ("sweeps",), NSGS(*EXACT, 100_000, depth=0)
+        lambda: products_alone(blocks(RIGID, RIGID)), "sweeps", ("sweeps",), NSGS(*EXACT, 5000, depth=0)
     ),
 }  # fmt: skip
 EVERY = pytest.mark.parametrize("name", KINDS)
