@@ -29,7 +29,7 @@ def exact(problem):
 
 
 def test_from_the_solution_it_stays_near(problem, exact):
-    """What W r is beyond the simple operator is taken from the start, and exact there; one compliance is along a joint."""
+    """What the simple operator lacks is taken from the start, and exact there, but compliances along joints."""
     solver = StonesAsRigid(1e-7, 1e-6, 2000, STAGES)
     found = solver(problem, ContactStart(exact.impulse, exact.velocity))
     np.testing.assert_allclose(found.impulse, exact.impulse, atol=0.2 * np.abs(exact.impulse).max())
