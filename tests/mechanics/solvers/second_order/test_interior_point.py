@@ -293,21 +293,21 @@ def test_a_problem_that_cannot_be_factorised_is_refused():
 
 @cache
 def mixed():
-    return InteriorPoint()(few_deformable(), cold(few_deformable()))
+    return InteriorPoint(1e-5, 1e-4)(few_deformable(), cold(few_deformable()))
 
 
 def test_a_wall_of_which_three_stones_deform_is_solved_from_nothing():
     problem = few_deformable()
     assert problem.delassus.mostly_rigid
     assert mixed().converged
-    assert residual(problem, mixed().impulse).within(1e-6, 1e-5)
+    assert residual(problem, mixed().impulse).within(1e-5, 1e-4)
 
 
 def test_a_path_that_begins_near_the_impulses_of_the_last_step_is_shorter():
     problem, rng = few_deformable(), np.random.default_rng(1)
-    near = mixed().impulse * (1.0 + 1e-4 * rng.normal(size=mixed().impulse.shape))
-    assert not residual(problem, near).within(1e-6, 1e-5)
-    answer = InteriorPoint()(problem, ContactStart(near, np.zeros_like(near)))
+    near = mixed().impulse * (1.0 + 1e-3 * rng.normal(size=mixed().impulse.shape))
+    assert not residual(problem, near).within(1e-5, 1e-4)
+    answer = InteriorPoint(1e-5, 1e-4)(problem, ContactStart(near, np.zeros_like(near)))
     assert answer.converged
     assert answer.iterations <= 2 * mixed().iterations / 3
 
