@@ -21,7 +21,7 @@ from mechanics.scene.loads.motions import ImposedMotion
 from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import ContactSettings, Fidelity, SolverSettings, Start, TimeSettings
 from mechanics.simulate import simulate
-from mechanics.solvers.second_order.interior_point import InteriorPoint
+from mechanics.solvers.auto import Auto
 from mechanics.stones.meshing.elements import Element
 from tests.mechanics.shapes import TURN, brick, ground, scene, transformed
 
@@ -154,7 +154,7 @@ def test_a_second_step_goes_on_from_the_impulses_of_the_first():
     """W is so large that whole stones move by what these lack, next to nothing: η is 1, and a factorisation ends it."""
     wall = wall_scene(4, 4, Element.TET10, Start.EQUILIBRIUM, 0.1, step=1e-3, theta=1.0, base=False)
     model, start = build_model(replace(wall, time=TimeSettings(step=1.0, theta=1.0, relaxation=True)))
-    search = Simulation(model, start, solver=InteriorPoint(1e-7, 1e-7), elastic_scale=True)
+    search = Simulation(model, start, solver=Auto(1e-7, 1e-7), elastic_scale=True)
     search.step()
     search.halt(0.0)
     second = search.step()

@@ -9,6 +9,8 @@ from mechanics.delassus.compliant import CompliantDelassus
 from mechanics.problem.problem import ContactProblem, ContactStart
 from mechanics.scene.scene import Fidelity
 from mechanics.scene.shapes import bond, wall
+from mechanics.solvers.second_order.interior_point import InteriorPoint
+from mechanics.solvers.second_order.newton import Newton
 from mechanics.stones.materials import Material
 from tests.mechanics.dense_operator import blocks_apart
 from tests.mechanics.shapes import brick, ground, partly_deformable_wall, posed, scene
@@ -27,6 +29,13 @@ def cold(problem):
 def velocity_of(problem, solution):
     """u after a solution."""
     return problem.delassus.apply(solution.impulse) + problem.u_free
+
+
+def by_path(problem, start, eta=1e-8):
+    """The interior point's path, and Newton's method from its end."""
+    near = InteriorPoint(eta, 100 * eta)(problem, start)
+    found = Newton(eta, 100 * eta)(problem, ContactStart(near.impulse, near.velocity))
+    return replace(found, iterations=near.iterations + found.iterations)
 
 
 def alone(count=3, **given):

@@ -33,7 +33,7 @@ WEIGHT = MASS * G * STEP
 METHODS = list(Method)
 DEFORMABLE = [one for one in METHODS if one is not Method.ADMM]
 # η that a method is asked for, and iterations
-GOAL, ITERATIONS = 1e-9, 100_000
+GOAL, ITERATIONS = 1e-9, 2000
 HARD, HELD, TORN = 4e5, 2e3, 1e3
 
 

@@ -15,7 +15,6 @@ from mechanics.solvers.auto import Auto
 from mechanics.solvers.chain import Begin
 from mechanics.solvers.first_order.nsgs import NSGS
 from mechanics.solvers.kinds import chain_of
-from mechanics.solvers.second_order.interior_point import InteriorPoint
 from tests.mechanics.dense_operator import products_alone
 from tests.mechanics.planar.shapes import random_problem
 from tests.mechanics.shapes import posed
@@ -24,6 +23,7 @@ from tests.mechanics.solvers.problems import (
     FORWARD,
     RIGID,
     SOFT,
+    by_path,
     cold,
     few_deformable,
     leaning,
@@ -54,28 +54,29 @@ def blocks(*fidelities, **more):
 
 @dataclass(frozen=True)
 class Kind:
-    """A problem, the first link of its chain, the link that solves it from nothing, and an independent method."""
+    """A problem, the first link of its chain, links that may solve it from nothing, and an independent method."""
 
     problem: object
     first: str
-    solved: str
-    other: object = InteriorPoint(*EXACT, 200)
+    solved: tuple[str, ...]
+    other: object = by_path
 
 
-# a start of its own is needed by Newton's method between stones that deform, which others find first
+# Newton's method goes first between stones that deform, but from near alone; a path may need it at its end
+ENDED = "interior point", "Newton"
 KINDS = {
-    "few rigid": Kind(lambda: wall(4, 4), "Newton", "Newton"),
-    "some hundred rigid": Kind(lambda: wall(18, 18), "body ADMM", "body ADMM"),
-    "few on springs": Kind(lambda: yielding(wall(4, 4), 1e-2), "Newton", "Newton"),
-    "some hundred on springs": Kind(lambda: yielding(wall(18, 18), 1e-2), "body ADMM", "body ADMM"),
-    "deformable": Kind(lambda: blocks(SOFT, SOFT), "Newton", "interior point", NSGS(*EXACT, 100_000)),
-    "few deformable among rigid": Kind(few_deformable, "interior point", "interior point"),
+    "few rigid": Kind(lambda: wall(4, 4), "Newton", ("Newton",)),
+    "some hundred rigid": Kind(lambda: wall(18, 18), "body ADMM", ("body ADMM",)),
+    "few on springs": Kind(lambda: yielding(wall(4, 4), 1e-2), "Newton", ("Newton",)),
+    "some hundred on springs": Kind(lambda: yielding(wall(18, 18), 1e-2), "body ADMM", ("body ADMM",)),
+    "deformable": Kind(lambda: blocks(SOFT, SOFT), "Newton", ENDED, NSGS(*EXACT, 100_000)),
+    "few deformable among rigid": Kind(few_deformable, "interior point", ENDED),
     "few deformable, joints yield": Kind(
         lambda: yielding(few_deformable(), 1e-3), "Newton", "Newton"
     ),
-    "disks": Kind(lambda: disks(30), "sweeps", "sweeps", NSGS(*EXACT, 100_000)),
+    "disks": Kind(lambda: disks(30), "sweeps", ("sweeps",), NSGS(*EXACT, 100_000)),
     "known by products alone": Kind(
-        lambda: products_alone(blocks(RIGID, RIGID)), "sweeps", "sweeps", NSGS(*EXACT, 100_000, depth=0)
+        lambda: products_alone(blocks(RIGID, RIGID)), "sweeps", ("sweeps",), NSGS(*EXACT, 5000, depth=0)
     ),
 }  # fmt: skip
 EVERY = pytest.mark.parametrize("name", KINDS)
@@ -99,7 +100,7 @@ def test_every_kind_is_solved_from_nothing_by_the_method_that_suits_it(name):
     assert left.within(1e-6, 1e-5)
     assert found.converged
     assert found.natural_map == pytest.approx(left.natural_map, rel=1e-9)
-    assert found.why.startswith(KINDS[name].solved + ":")
+    assert found.why.split(":")[0] in KINDS[name].solved
     assert chain_of(problem, False, False, 1e-5)[0].name == KINDS[name].first
 
 
@@ -128,7 +129,7 @@ def test_a_solution_costs_nothing(name):
 @EVERY
 def test_iterations_of_all_methods_together_are_at_most_those_allowed(name, most):
     problem = problem_of(name)
-    found = Auto(1e-14, 1e-14, most)(problem, cold(problem))
+    found = Auto(1e-300, 1e-300, most)(problem, cold(problem))
     assert not found.converged
     assert found.iterations <= most
     assert found.natural_map == pytest.approx(residual(problem, found.impulse).natural_map, rel=1e-9)

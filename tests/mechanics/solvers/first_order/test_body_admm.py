@@ -16,12 +16,11 @@ from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import SolverSettings
 from mechanics.scene.shapes import bond, wall
 from mechanics.solvers.first_order.body_admm import BodyADMM, Stage
-from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.second_order.newton import Newton
 from moma.errors import SolverError
 from tests.mechanics.dense_operator import products_alone
 from tests.mechanics.shapes import posed, scene
-from tests.mechanics.solvers.problems import cold, leaning
+from tests.mechanics.solvers.problems import by_path, cold, leaning
 
 _ALONG, _ACROSS = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 _STEPS = 40
@@ -68,9 +67,9 @@ def problem():
         (Stage(0.1, 20, False), Stage(0.05, 4000, False)),
     ],
 )
-def test_velocities_are_those_of_the_interior_point(problem, stages):
+def test_velocities_are_those_of_the_central_path(problem, stages):
     found = BodyADMM(1e-7, 1e-6, 5000, stages)(problem, cold(problem))
-    exact = InteriorPoint(1e-8, 1e-6, 100)(problem, cold(problem))
+    exact = by_path(problem, cold(problem))
     assert found.converged
     # forces of joints of four points are not unique, the velocities that they give are
     wanted = problem.delassus.apply(exact.impulse)

