@@ -7,7 +7,7 @@ import numpy as np
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.problem.residual import residual
 from mechanics.solvers.chain import KEPT, follow
-from mechanics.solvers.kinds import POLISH, chain_of
+from mechanics.solvers.kinds import EXACT, POLISH, chain_of
 
 __all__ = ["Auto"]
 
@@ -17,6 +17,8 @@ _MOTION = 40
 _LOOSEST, _LOOSEST_MAP = 0.025, 1e-2
 # velocity of a contact that moves, over the velocity tolerance, and over the fastest u_free, at most [-]
 _MOVES, _MOST = 10.0, 1e-2
+# velocity tolerance up to which the bias of a gap counts as closed in a rest: by less than an ångström, as a rule [-]
+_CLOSED = 0.9
 
 
 @dataclass(frozen=True)
@@ -57,9 +59,24 @@ class Auto:
             return replace(found, motion=_MOTION)
         if not moving:
             # what forces lack that are kept for hundreds of steps would add up
-            exact = follow((POLISH,), problem, ContactStart(found.impulse, found.velocity), limits, most)
-            found = replace(exact, iterations=found.iterations + exact.iterations, why=found.why)
+            found = self._exact(problem, found)
         return replace(found, motion=steps - 1 if steps else _MOTION * warm)
+
+    def _exact(self, problem: ContactProblem, found: ContactSolution) -> ContactSolution:
+        """Return the forces of a rest solved further, with gaps closed that are below the tolerance; or as they are."""
+        small = _CLOSED * self.velocity_tolerance * float(np.abs(problem.u_free).max())
+        closed = replace(problem, bias=np.where(np.abs(problem.bias) <= small, 0.0, problem.bias))
+        limits = EXACT * self.tolerance, EXACT * self.velocity_tolerance
+        start = ContactStart(found.impulse, np.zeros_like(found.velocity))
+        exact = follow((POLISH,), closed, start, limits, self.max_iterations)
+        count = found.iterations + exact.iterations
+        left = residual(problem, exact.impulse)
+        if not left.within(self.tolerance, self.velocity_tolerance):
+            return replace(found, iterations=count)
+        velocity, natural_map = left.dual, left.natural_map
+        return replace(
+            found, impulse=exact.impulse, velocity=velocity, iterations=count, natural_map=natural_map
+        )
 
     def _in_motion(self, problem: ContactProblem) -> tuple[float, float]:
         """Return the tolerances of a step of a motion, of η and of velocities."""

@@ -122,7 +122,8 @@ class Chain:
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from `start`."""
         limits = self.tolerance, self.velocity_tolerance
-        return follow(self.links, problem, start, limits, self.max_iterations)
+        kept = follow((), problem, start, limits, 0)
+        return kept if kept.converged else follow(self.links, problem, start, limits, self.max_iterations)
 
 
 def _begun(begin: Begin, start: ContactStart, best: ContactSolution) -> ContactStart:

@@ -19,16 +19,21 @@ from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.second_order.newton import Newton
 from mechanics.solvers.second_order.softer_joints import SofterJoints
 
-__all__ = ["ENDED_PATH", "POLISH", "chain_of"]
+__all__ = ["ENDED_PATH", "EXACT", "POLISH", "chain_of"]
 
 # budgets: iterations of ADMM and sweeps over disks, steps of Newton's method, factorisations of a path
 _ADMM, _NEWTON, _PATH = 500, 20, 60
 # moving rigid bodies from which a factorisation in each step of Newton's method takes longer than iterations with kept
 # factors: at first, and at all
 _SOME, _MANY = 300, 1000
-# tolerances over those asked for [-]: of forces that a rest keeps for hundreds of steps, as what they lack would be a
-# creep; and of others that the next step begins with
-_EXACT, _FURTHER = 1e-3, 0.03
+# contacts of disks up to which Newton's method takes less than the iterations that it spares
+_FEW = 1000
+EXACT = 1e-3
+"""Tolerances over those asked for, of forces that a rest keeps for hundreds of steps: what they lack would be a creep.
+"""
+
+# the same of forces that the next step begins with [-]
+_FURTHER = 0.03
 # velocity tolerance of a motion from which it is solved loosely [-]
 _LOOSE = 1e-3
 # η up to which forces of the last step lead a path, and Newton's method between deformable stones [-]
@@ -47,7 +52,7 @@ _TURNS = (replace(_SORT, iterations=10), replace(_GROW, penalty=(1.0, 0.05, 0.01
 
 _Method = Callable[[float, float, int], Solver]
 _turns: _Method = partial(BodyADMM, stages=_TURNS)
-_rest: _Method = partial(BodyADMM, stages=(_HOLD, *_TURNS), further=_EXACT)
+_rest: _Method = partial(BodyADMM, stages=(_HOLD, *_TURNS), further=EXACT)
 _motion: _Method = partial(BodyADMM, stages=(*_FOLLOW, *_TURNS), further=0.1)
 _loosely: _Method = partial(BodyADMM, stages=(_SHAKE, *_TURNS))
 _as_rigid: _Method = partial(StonesAsRigid, stages=_TURNS)
@@ -60,14 +65,16 @@ _from_best = replace(_path, begin=Begin.BEST)
 _admm = Link("body ADMM", _turns, _ADMM)
 _endless = replace(_admm, iterations=10**6)
 
-POLISH = replace(_newton, further=_EXACT)
+_exact = replace(_newton, further=EXACT)
+
+POLISH = Link("body ADMM", partial(BodyADMM, stages=(_HOLD,)), 50)
 """Link that makes forces exact which a rest keeps."""
 
 ENDED_PATH = (_path, _newton)
 """Chain of the interior point alone, which Newton's method ends: it stalls where contacts are between two states."""
 
 # Newton's method goes first from nothing: it begins with forces that yielding joints would have, without self-stress
-_REST = (replace(POLISH, begin=Begin.GIVEN), replace(_admm, begin=Begin.GIVEN), _newton, _path, _newton)
+_REST = (replace(_exact, begin=Begin.GIVEN), replace(_admm, begin=Begin.GIVEN), _newton, _path, _newton)
 _REST_OF_SOME = (replace(_admm, method=_rest, begin=Begin.GIVEN), _newton, _path, _newton)
 _REST_OF_MANY = (replace(_endless, method=_rest, begin=Begin.GIVEN),)
 _MOTION = (
@@ -78,9 +85,9 @@ _MOTION = (
 # errors that are allowed would be extrapolated with the rest
 _LOOSE_MOTION = (replace(_endless, method=_loosely, begin=Begin.GIVEN),)
 _MOTION_OF_MANY = (replace(_endless, begin=Begin.AHEAD),)
-_SOFTER = Link("Newton from softer joints", SofterJoints, 150, Begin.GIVEN, _EXACT)
-_SPRINGS = (replace(POLISH, begin=Begin.GIVEN), _SOFTER, _path)
-_SPRINGS_OF_SOME = (replace(_admm, begin=Begin.GIVEN), POLISH, _SOFTER, _path)
+_SOFTER = Link("Newton from softer joints", SofterJoints, 150, Begin.GIVEN, EXACT)
+_SPRINGS = (replace(_exact, begin=Begin.GIVEN), _SOFTER, _path)
+_SPRINGS_OF_SOME = (replace(_admm, begin=Begin.GIVEN), _exact, _SOFTER, _path)
 _DEFORMABLE = (
     replace(_newton, method=partial(Newton, hopeless=0.3), begin=Begin.GIVEN, further=1.0),
     *(_path, _newton),
@@ -89,12 +96,13 @@ _DEFORMABLE = (
 # between rigid stones Newton's method wanders, so the path is followed until the laws hold, again from where it stalled
 _AMONG_RIGID = (replace(_from_best, near=_NEAR), _path, _from_best, _from_best)
 _STONES_AS_RIGID = Link("stones as rigid ones", _as_rigid, _ADMM, Begin.BEST, 100.0)
-_SPRINGS_AMONG_RIGID = (replace(POLISH, near=_NEARER), *(2 * (_STONES_AS_RIGID, POLISH)))
+_SPRINGS_AMONG_RIGID = (replace(_exact, near=_NEARER), *(2 * (_STONES_AS_RIGID, _exact)))
 _DISKS = (
     Link("sweeps", _sweeps, _ADMM, Begin.GIVEN),
     Link("ADMM of disks", partial(DiskADMM, penalty=0.05), _ADMM, Begin.GIVEN),
     Link("ADMM of disks", DiskADMM, 10**6),
 )
+_FEW_DISKS = (*_DISKS[:2], replace(_newton, iterations=100, begin=Begin.GIVEN), _DISKS[2])
 _SWEEPS = (Link("sweeps", NSGS, 10**6, Begin.GIVEN),)
 
 
@@ -111,7 +119,7 @@ def chain_of(
     operator, bodies = problem.delassus, _moving_bodies(problem)
     yields = operator.joint_compliance is not None
     if operator.plane is not None:
-        return _DISKS
+        return _FEW_DISKS if len(problem.friction) <= _FEW else _DISKS
     if operator.rigid is None:
         if operator.form is None:
             return _SWEEPS

@@ -115,6 +115,8 @@ class BodyADMM:
             raise SolverError(
                 "bodies are not all rigid", where="ADMM of bodies", remedy='use the method "auto"'
             )
+        if len(start.impulse) == 0:
+            return ContactSolution(start.impulse, start.velocity, 0, 0.0, True)
         run = _Run(problem, contacts, start, self)
         most = min(self.max_iterations, sum(stage.iterations for stage in self.stages))
         try:

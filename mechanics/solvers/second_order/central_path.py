@@ -152,7 +152,9 @@ class CentralPath:
         diagonal = np.column_stack([mu[cone], np.ones((len(cone), 2))])
         point = diagonal * near[cone]
         point[:, 0] += k[cone]
-        slack, other = central(point - dual[cone] / (diagonal * scale), level * size * size)
+        slack, other = central(
+            point - dual[cone] / (np.maximum(diagonal, _SMOOTH) * scale), level * size * size
+        )
         self._cone = _Cone(cone, mu[cone], k[cone], slack, scale * other)
         point = near[side, 0] - normal / scale
         root = np.sqrt(point**2 + 4.0 * level * size * size)

@@ -7,17 +7,17 @@ lost. A line search keeps them from going astray; where it has to shorten steps,
 the forces of joints that yield a little and hold everywhere: self-stress that no load causes is left out.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from mechanics.arrays import Array
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
-from mechanics.problem.residual import Residual, residual
+from mechanics.problem.residual import residual
 from mechanics.solvers._kernels.body_newton import alart_curnier
 from mechanics.solvers.second_order.newton_equations import Equations, equations_of
-from mechanics.solvers.second_order.scaling import solved_evenly
+from mechanics.solvers.second_order.scaling import equilibrated
 
 __all__ = ["Newton"]
 
@@ -74,12 +74,6 @@ class Newton:
         """
         if len(start.impulse) == 0:
             return ContactSolution(start.impulse, start.velocity, 0, 0.0, True)
-        found = solved_evenly(self._solved, problem, start)
-        left = residual(problem, found.impulse)
-        within = left.within(self.tolerance, self.velocity_tolerance)
-        return replace(found, velocity=left.dual, natural_map=left.natural_map, converged=within)
-
-    def _solved(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         limits = self.tolerance, self.velocity_tolerance
         run = _Run(problem, start.impulse)
         best, idle = (run.left, run.r), 0
@@ -94,22 +88,28 @@ class Newton:
             if solved or idle > _IDLE or run.iterations >= self.max_iterations or not run.step():
                 break
         left, impulse = (run.left, run.r) if run.left.within(*limits) else best
-        return ContactSolution(impulse, left.dual, run.iterations, left.natural_map, left.within(*limits))
+        return ContactSolution(
+            run.unit * impulse, left.dual, run.iterations, left.natural_map, left.within(*limits)
+        )
 
 
 class _Run:
-    """Iterates of one solution.
+    """Iterates of one solution, in units in which all contacts yield alike.
 
     Attributes
     ----------
-    r : (nc, 3) impulses [N s]
-    left : their residual
+    unit : (nc, 1) of the impulses [√kg]
+    r : (nc, 3) impulses in these units
+    left : residual of the problem itself
     iterations : steps so far
     exact : the last one had the least α
     """
 
-    def __init__(self, problem: ContactProblem, impulse: Array) -> None:
-        self.exact = False
+    def __init__(self, given: ContactProblem, impulse: Array) -> None:
+        self.exact, self._given = False, given
+        problem, each = equilibrated(given)
+        self.unit = each[:, None]
+        impulse = impulse / self.unit
         self._problem, self._delassus = problem, problem.delassus
         self._free = problem.biased
         self._scale = problem.delassus.scale
@@ -124,10 +124,10 @@ class _Run:
         self._first, self._second = np.zeros((2, len(impulse), size, size))
         self._merits: list[float] = []
         self.iterations, self._share = 0, _SHARE
-        self._take(impulse, residual(problem, impulse))
+        self._take(impulse)
 
-    def _take(self, impulse: Array, left: Residual) -> None:
-        self.r, self.left = impulse, left
+    def _take(self, impulse: Array) -> None:
+        self.r, self.left = impulse, residual(self._given, self.unit * impulse)
         self._error = np.empty_like(impulse)
         self._u = self._delassus.apply(impulse) + self._free
         self._merits.append(self._look(impulse, self._u, self._error))
@@ -152,8 +152,7 @@ class _Run:
         self.iterations += 1
         # not projected on the cones, which would break the balance: it tells the states apart
         self._merits.clear()
-        impulse = self.r + step
-        self._take(impulse, residual(self._problem, impulse))
+        self._take(self.r + step)
 
     def step(self) -> bool:
         """Make one step of Newton's method; return whether there was one."""
@@ -176,8 +175,7 @@ class _Run:
             self._share = min(self._share * _ADAPT, _MOST)
         elif length == 1.0:
             self._share = max(self._share / _ADAPT, _SHARE)
-        impulse = self.r + length * step
-        self._take(impulse, residual(self._problem, impulse))
+        self._take(self.r + length * step)
         return True
 
     def _look(self, r: Array, u: Array, error: Array) -> float:

@@ -8,15 +8,14 @@ is the same problem: Coulomb's cones keep their shape. D makes the mean diagonal
 a regularisation or a start inside the cones that is right for one contact is right for all.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from mechanics.arrays import Array
-from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
+from mechanics.problem.problem import ContactProblem
 
-__all__ = ["equilibrated", "solved_evenly"]
+__all__ = ["equilibrated"]
 
 
 # difference of an operator's scale from its mean diagonal, over that, that is more than rounding [-]
@@ -41,15 +40,3 @@ def equilibrated(problem: ContactProblem) -> tuple[ContactProblem, Array]:
         cohesion=problem.cohesion / unit,
         adhesion=None if problem.adhesion is None else problem.adhesion / unit,
     ), unit
-
-
-def solved_evenly(
-    solver: Callable[[ContactProblem, ContactStart], ContactSolution],
-    problem: ContactProblem,
-    start: ContactStart,
-) -> ContactSolution:
-    """Return the solution that a solver finds in these units, in those of the problem."""
-    even, each = equilibrated(problem)
-    unit = each[:, None]
-    found = solver(even, ContactStart(start.impulse / unit, start.velocity * unit))
-    return replace(found, impulse=found.impulse * unit, velocity=found.velocity / unit)

@@ -10,11 +10,11 @@ from mechanics.problem.residual import natural_map
 from mechanics.scene.laws.mortar import MortarJoint
 from mechanics.scene.scene import ContactSettings, Method, Placement, SolverSettings
 from mechanics.solvers.auto import Auto
+from mechanics.solvers.chain import Chain
 from mechanics.solvers.choice import choose_planar_solver, choose_solver
 from mechanics.solvers.first_order.body_admm import BodyADMM
 from mechanics.solvers.first_order.disk_admm import DiskADMM
 from mechanics.solvers.first_order.nsgs import NSGS
-from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.second_order.newton import Newton
 from moma.errors import SolverError
 from tests.mechanics.shapes import brick, ground, posed, scene
@@ -55,7 +55,7 @@ def resultants(one, impulse):
         (Method.AUTO, True, Auto),
         (Method.NSGS, True, NSGS),
         (Method.ADMM, False, BodyADMM),
-        (Method.INTERIOR_POINT, True, InteriorPoint),
+        (Method.INTERIOR_POINT, True, Chain),
         (Method.NEWTON, True, Newton),
     ],
 )

@@ -74,7 +74,7 @@ KINDS = {
     "few deformable, joints yield": Kind(
         lambda: yielding(few_deformable(), 1e-3), "Newton", "Newton"
     ),
-    "disks": Kind(lambda: disks(30), "sweeps", ("sweeps",), NSGS(*EXACT, 100_000)),
+    "disks": Kind(lambda: disks(30), "sweeps", ("sweeps", "ADMM of disks", "Newton"), NSGS(*EXACT, 100_000)),
     "known by products alone": Kind(
         lambda: products_alone(blocks(RIGID, RIGID)), "sweeps", ("sweeps",), NSGS(*EXACT, 5000, depth=0)
     ),

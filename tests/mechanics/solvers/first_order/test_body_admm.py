@@ -128,7 +128,7 @@ def test_three_equal_penalties_are_one(problem):
 
 def test_a_contact_that_sticks_has_the_last_of_three_penalties():
     """Nearly all contacts of a wall at rest stick, and find their forces by their small penalty alone."""
-    one = posed(leaning(0.0, 8, 8), step=5e-3).problem
+    one = posed(leaning(0.0, 12, 12), step=5e-3).problem
     sticking, opening = (
         BodyADMM(1e-6, 1e-5, 400, (Stage(1e-2, 20, False), Stage(penalty, 380, False)))(one, cold(one))
         for penalty in ((1.0, 1.0, 1e-3), (1e-3, 1.0, 1.0))
