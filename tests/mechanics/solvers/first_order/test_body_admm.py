@@ -127,13 +127,13 @@ def test_three_equal_penalties_are_one(problem):
 
 
 def test_a_contact_that_sticks_has_the_last_of_three_penalties():
-    """Nearly all contacts of a wall at rest stick, and find their forces by their small penalty alone."""
-    one = posed(leaning(0.0, 12, 12), step=5e-3).problem
+    """Nearly all contacts of a wall that leans stick, and find their forces by their small penalty alone."""
+    one = posed(leaning(0.3), step=5e-3).problem
     sticking, opening = (
         BodyADMM(1e-6, 1e-5, 400, (Stage(1e-2, 20, False), Stage(penalty, 380, False)))(one, cold(one))
         for penalty in ((1.0, 1.0, 1e-3), (1e-3, 1.0, 1.0))
     )
-    assert sticking.iterations < opening.iterations
+    assert 2 * sticking.iterations < opening.iterations
 
 
 def test_contacts_of_joints_that_yield_share_their_load_as_newton_finds_it(problem):

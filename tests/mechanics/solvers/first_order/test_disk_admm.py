@@ -11,7 +11,7 @@ from mechanics.planar.model import build_planar_model
 from mechanics.planar.simulation import PlanarSimulation
 from mechanics.problem.problem import ContactProblem, ContactStart
 from mechanics.problem.residual import residual
-from mechanics.solvers.auto import Auto
+from mechanics.solvers.choice import choose_planar_solver
 from mechanics.solvers.first_order.disk_admm import DiskADMM
 from mechanics.solvers.first_order.nsgs import NSGS
 from moma.errors import SolverError
@@ -52,7 +52,7 @@ def test_its_solutions_obey_the_laws_and_are_those_of_the_other_methods(seed):
 def flowing():
     """The problem of a step of a slow flow that sweeps do not solve."""
     model, state = build_planar_model(pushed_bed(24, 10, 300, 100))
-    kept, solver = [], Auto()
+    kept, solver = [], choose_planar_solver(model.scene.solver, model.scene.min_sweeps)
 
     def spy(problem, start):
         kept[:] = [(problem, start)]
