@@ -51,7 +51,7 @@ _AMONG_RIGID = _Way(5e-3, 50, 0.5, unsolved=2)
 # rigid stones, which fall by a millimetre in a step; joints that are open by a millimetre need some ten
 _SETTLING = _Way(1e-2, 50)
 # tolerances of statics over those asked for, of η and of velocities [-]: Newton's last steps spare the run its first
-_NATURAL_MAP, _VELOCITY = 0.1, 0.01
+_NATURAL_MAP, _VELOCITY = 0.5, 0.01
 _ROUNDING = 1e-7  # least η in steps as long as 1 s, because of rounding [-]
 _CLOSING = 5  # steps of the run's own length in which rigid stones close their last gaps
 _FALLS = 0.2  # displacement over the smallest width beyond which a stone falls rather than settles [-]

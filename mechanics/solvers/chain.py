@@ -13,6 +13,7 @@ import numpy as np
 
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.problem.residual import residual
+from mechanics.solvers.self_stress import without_self_stress
 from moma.errors import SolverError
 
 __all__ = ["KEPT", "Begin", "Chain", "Link", "Solver", "follow"]
@@ -35,6 +36,7 @@ class Begin(Enum):
     AHEAD = auto()  # forces of the last two steps, extrapolated
     NOTHING = auto()  # no force
     BEST = auto()  # best iterate of the links before
+    RELEASED = auto()  # the same without self-stress
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,7 @@ def follow(
         tight = link.further * limits[0], link.further * limits[1]
         solver = link.method(*tight, min(link.iterations, most - count))
         try:
-            found = solver(problem, _begun(link.begin, start, best))
+            found = solver(problem, _begun(link.begin, problem, start, best))
         except SolverError as error:
             before = f"{link.name} failed: {error.what}"
             continue
@@ -126,7 +128,9 @@ class Chain:
         return kept if kept.converged else follow(self.links, problem, start, limits, self.max_iterations)
 
 
-def _begun(begin: Begin, start: ContactStart, best: ContactSolution) -> ContactStart:
+def _begun(begin: Begin, problem: ContactProblem, start: ContactStart, best: ContactSolution) -> ContactStart:
+    if begin is Begin.RELEASED:
+        return ContactStart(without_self_stress(problem, best.impulse), best.velocity)
     if begin is Begin.BEST:
         return ContactStart(best.impulse, best.velocity)
     if begin is Begin.NOTHING:

@@ -74,7 +74,15 @@ ENDED_PATH = (_path, _newton)
 """Chain of the interior point alone, which Newton's method ends: it stalls where contacts are between two states."""
 
 # Newton's method goes first from nothing: it begins with forces that yielding joints would have, without self-stress
-_REST = (replace(_exact, begin=Begin.GIVEN), replace(_admm, begin=Begin.GIVEN), _newton, _path, _newton)
+_released = replace(_newton, iterations=60, begin=Begin.RELEASED)
+_REST = (
+    replace(_exact, begin=Begin.GIVEN),
+    replace(_admm, begin=Begin.GIVEN),
+    _newton,
+    _path,
+    _released,
+    _released,
+)
 _REST_OF_SOME = (replace(_admm, method=_rest, begin=Begin.GIVEN), _newton, _path, _newton)
 _REST_OF_MANY = (replace(_endless, method=_rest, begin=Begin.GIVEN),)
 _MOTION = (

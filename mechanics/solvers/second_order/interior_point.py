@@ -17,10 +17,8 @@ __all__ = ["InteriorPoint"]
 # complementarity, relative to typical impulses, at which a path begins near the impulses of a start: those of the step
 # before cost 10 iterations at 1e-4, 13 at 1e-2 and 15 at 1e-6 [-]
 _NEAR = 1e-4
-# part of a step below which it is short [-]
-_SHORT = 0.2
-# short steps in a row with which a path has stalled
-_STUCK = 4
+# fall of η that is progress, and iterations without any after which the path has stalled [-]
+_PROGRESS, _STALLED = 0.9, 8
 # errors over the tolerances to which a solved path goes on [-], and iterations that it may take for that: what forces
 # that are kept from step to step lack would add up
 _FURTHER, _OVER = 0.1, 3
@@ -62,12 +60,13 @@ class InteriorPoint:
         even, unit = equilibrated(problem)
         units = unit[:, None]
         path = CentralPath(even, start.impulse / units, _NEAR) if start.impulse.any() else CentralPath(even)
-        count = short = over = 0
-        while count < self.max_iterations and short < _STUCK and over < _OVER and best.excess > _FURTHER:
+        count = idle = over = 0
+        least = best.left.natural_map
+        while count < self.max_iterations and idle < _STALLED and over < _OVER and best.excess > _FURTHER:
             try:
                 # where the laws contradict each other impulses grow until they overflow
                 with np.errstate(all="ignore"):
-                    length = path.advance()
+                    path.advance()
             except SolverError:
                 # rounding has won
                 break
@@ -75,8 +74,9 @@ class InteriorPoint:
             impulse = path.impulse
             if not (np.isfinite(path.complementarity) and np.abs(impulse).max() < _WORTHLESS):
                 break
-            short = short + 1 if length < _SHORT else 0
             found = self._looked(problem, impulse * units)
+            idle = 0 if found.left.natural_map < _PROGRESS * least else idle + 1
+            least = min(least, found.left.natural_map)
             best = found if found.excess < best.excess else best
             over += best.excess <= 1.0
         return _solution(best, count)

@@ -44,6 +44,8 @@ _MEMORY = 5
 _GAIN = 1e-4
 # shortest part of a step [-]
 _SHORTEST = 1e-3
+# steps after which η tells whether others would wander
+_TRIED = 3
 # steps with the least α that may gain nothing
 _IDLE = 1
 _SPACE = 3  # components of an impulse in space
@@ -57,7 +59,7 @@ class Newton:
     ----------
     tolerance, velocity_tolerance : as in `NSGS`
     max_iterations : limit of the steps, with a factorisation each as a rule
-    hopeless : η from which it gives up, as its steps would wander [-]
+    hopeless : η from which it gives up after three steps, as the others would wander [-]
     """
 
     tolerance: float = 1e-6
@@ -79,7 +81,7 @@ class Newton:
         best, idle = (run.left, run.r), 0
         if run.left.natural_map > _FAR:
             run.hold()
-        while run.left.natural_map <= self.hopeless:
+        while run.iterations <= _TRIED or run.left.natural_map <= self.hopeless:
             gains = run.left.natural_map < best[0].natural_map
             best = (run.left, run.r) if gains else best
             # where α is least each step gains until rounding wins

@@ -9,7 +9,7 @@ from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.loads.forces import StoneForce
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.time_series import History
-from mechanics.scene.scene import LawRule, SolverSettings
+from mechanics.scene.scene import LawRule, Method, SolverSettings
 
 RADIUS, COLUMNS, ROWS = 1.0, 7, 9
 SIDE = 1e3  # confining pressure [Pa]
@@ -57,7 +57,7 @@ def first_sliding(friction, expected, step=1e-2, steps=40):
         time=PlanarTime(step, 1.0, steps * step, stop_at_equilibrium=False),
         loads=Loads(forces=tuple(StoneForce(frozenset({c}), f) for c, f in (("top", press), *sides.items()))),
         # at the edge of sliding, errors of iterations move the disks
-        solver=SolverSettings(tolerance=1e-8, velocity_tolerance=1e-8),
+        solver=SolverSettings(Method.NEWTON, tolerance=1e-8, velocity_tolerance=1e-8),
     )
     run = PlanarRun(scene)
     while not run.done:

@@ -8,7 +8,8 @@ import pytest
 
 from mechanics.problem.residual import residual
 from mechanics.solvers.auto import Auto
-from mechanics.solvers.second_order.interior_point import InteriorPoint
+from mechanics.solvers.chain import Chain
+from mechanics.solvers.kinds import ENDED_PATH
 from mechanics.stones.materials import Material
 from tests.mechanics.shapes import brick, ground, posed, scene
 from tests.mechanics.solvers.problems import STEP, G, carried, cold, column
@@ -16,6 +17,11 @@ from tests.mechanics.solvers.problems import STEP, G, carried, cold, column
 STONE = 2400.0
 # of one block of 0.5 × 0.5 × 0.25 m at 2,400 kg/m³
 MASS = STONE * 0.5 * 0.5 * 0.25
+
+
+def by_path(tolerance, velocity_tolerance, most=200):
+    """The interior point, ended by Newton's method."""
+    return Chain(tolerance, velocity_tolerance, most, ENDED_PATH)
 
 
 def solved(problem, tolerance=1e-6, velocity_tolerance=1e-5, solver=Auto):
@@ -62,8 +68,9 @@ def test_friction_does_not_matter_to_a_column_that_stands(friction):
 def test_a_tilted_column_of_a_hundred_begins_to_topple():
     """2°, and 50 times as high as wide: joints open, and two solvers find the same motion."""
     problem = column([STONE] * 100, tilt=2.0)
-    solution, other = solved(problem, 1e-8, 1e-6), solved(problem, 1e-10, 1e-8, InteriorPoint)
-    assert solved(problem).iterations < 100
+    solution, other = solved(problem, 1e-8, 1e-6), solved(problem, 1e-10, 1e-8, by_path)
+    # 500 of them by ADMM, a hundredth of a factorisation each
+    assert solved(problem).iterations < 600
     one, two = (problem.delassus.apply(found.impulse) + problem.u_free for found in (solution, other))
     np.testing.assert_allclose(one, two, atol=1e-5 * np.abs(problem.u_free).max())
     assert two[:, 0].max() > 1e-4 * G * STEP
@@ -80,7 +87,7 @@ HEAVY = {
 }
 
 
-@pytest.mark.parametrize("solver", [Auto, InteriorPoint])
+@pytest.mark.parametrize("solver", [Auto, by_path])
 @pytest.mark.parametrize("ratio", HEAVY.values(), ids=HEAVY)
 def test_masses_may_differ_by_a_million(ratio, solver):
     """η and velocities below 1e-8; each joint carries what lies above it, the light stones too. Statics."""
@@ -113,11 +120,12 @@ def test_a_heavy_block_that_slides_pulls_its_light_neighbours(seed):
     assert slip[~lowest].max() < 1e-5 * expected
 
 
-def test_a_thick_wall_is_solved_in_under_a_hundred_iterations():
+def test_a_thick_wall_is_solved_in_under_two_hundred_iterations():
     """20 courses in three leaves that share no stone: far more contacts than balance needs. Statics."""
     problem = thick_wall(4, 20)
     solution = solved(problem)
-    assert solution.iterations < 100
+    # a hundred of them by ADMM, each a hundredth of a factorisation
+    assert solution.iterations < 200
     weight = STONE * 4 * 0.3 * 3 * 0.15 * 20 * 0.1 * G
     grounded = (problem.delassus.body == 0).any(axis=1)
     assert solution.impulse[grounded, 0].sum() / STEP == pytest.approx(weight, rel=1e-5)
