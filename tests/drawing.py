@@ -1,6 +1,7 @@
 """Pictures that no test looks at: blank ones, instead of a process of 3 s that loads VTK and draws."""
 
 import base64
+import subprocess
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -26,11 +27,18 @@ def allow(item: pytest.Item) -> None:
     drawing = item.get_closest_marker("draws") is not None
 
 
-def draw_apart(module: str, surface: object, jobs: Sequence[Mapping[str, Any]]) -> None:
+def draw_apart(
+    module: str,
+    surface: object,
+    jobs: Sequence[Mapping[str, Any]],
+    ready: "subprocess.Popen[str] | None" = None,
+) -> None:
     """Draw pictures, or write a job that could draw them and leave blank ones."""
     if drawing:
-        truly(module, surface, jobs)
+        truly(module, surface, jobs, ready)
         return
+    if ready is not None:
+        ready.kill()
     with tempfile.TemporaryDirectory() as scratch:
         save_job(Path(scratch), surface, jobs)
     for job in jobs:

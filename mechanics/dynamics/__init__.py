@@ -3,5 +3,5 @@
 Public: `Simulation` (simulation); `Step`, `ContactForces` (step); `static_start` (static_start);
 `Watch` (stopping); `Outcome`, `StaticStart` (outcome); `EnergyBalance` (energy_balance); `Progress`, `Listener`,
 `Clock` (progress); `Memory` (warm_start); `Handover`, `Beginning` (handover);
-`contact_problem` (contact_problem); `JointCompliance` (joint_compliance); `Detection`, `detector` (contact_search).
+`contact_problem`, `JointCompliance` (contact_problem); `Detection`, `detector` (contact_search).
 """

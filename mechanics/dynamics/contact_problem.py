@@ -13,7 +13,7 @@ so that W + ε stands for W, and stones overlap by ε h r_N = ε h² F. The gap 
 nothing moves, neither across the joint nor along it (docs/design/joints-that-yield.md).
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,16 +23,19 @@ from mechanics.delassus.assembly import local_velocity
 from mechanics.delassus.compliant import CompliantDelassus
 from mechanics.dynamics.contact_search import Detection
 from mechanics.dynamics.handover import Beginning
-from mechanics.dynamics.joint_compliance import JointCompliance
 from mechanics.dynamics.stepping import Kick
 from mechanics.model.model import Model
-from mechanics.problem.problem import ContactProblem, ContactStart
+from mechanics.problem.problem import ContactProblem, ContactStart, Delassus, mean_diagonal
 from mechanics.scene.laws.law import REST, SPRING, Approach, Springs, Terms
+from mechanics.scene.scene import Method
 from mechanics.scene.state import State
 from mechanics.stones.validation import SMALLEST
 
 __all__ = [
+    "SOFTNESS",
+    "JointCompliance",
     "contact_problem",
+    "may_yield",
     "shifted",
     "spring_axes",
     "terms_of",
@@ -46,6 +49,75 @@ _TOUCH = 1e-9  # overlap over a body's size that comes from rounding, and is no 
 _NEVER = 1e3
 # overlap over that of the largest force, from which it comes from no force of a compliant joint [-]
 _UNEXPLAINED = 4.0
+
+
+SOFTNESS = (1.0, 3.0, 10.0)
+"""Factors on the compliance of joints, tried in turn where a step cannot be solved with it either."""
+
+# compliant steps after which rigid joints are tried again, at first; twice as many after each failure
+_FIRST_WAIT = 8
+
+
+def may_yield(model: Model) -> bool:
+    """Return whether joints of a run may yield: on the way to a rest alone, as in a motion they would decide it.
+
+    Joints with springs of their own yield in every step; where most stones deform, these do.
+    """
+    settings, elastic = model.scene.solver, int(model.elastic.sum())
+    automatic = settings.method is Method.AUTO and settings.joint_compliance > 0
+    rest = model.scene.time.relaxation and not model.laws.sprung
+    return automatic and rest and not 0 < elastic >= int(model.inertia.moving.sum())
+
+
+@dataclass(frozen=True)
+class JointCompliance:
+    """Compliance of the joints of a run: none until a step with rigid joints could not be solved.
+
+    Attributes
+    ----------
+    value : ε of all joints once it has been needed, kept from then on; 0 until then [1/kg]
+    left : steps with compliant joints still to come, before rigid joints are tried again; negative: steps that are left
+        to rigid joints alone, as compliant ones have failed, too
+    wait : number of steps after the next failure of either
+    softness : factor on ε with which the last step with compliant joints was solved [-]
+    lasting : once needed, joints stay compliant: where stones deform, too, by as much
+    """
+
+    value: float = 0.0
+    left: int = 0
+    wait: int = _FIRST_WAIT
+    softness: float = 1.0
+    lasting: bool = False
+
+    @property
+    def rigid(self) -> bool:
+        """True where the next step is tried with rigid joints."""
+        return self.left <= 0
+
+    def needed(self, operator: Delassus, share: float) -> "JointCompliance":
+        """Return the state after a failure with rigid joints: ε is a share of the mean diagonal of W [-]."""
+        value = self.value or share * mean_diagonal(operator.diagonal)
+        return replace(self, value=value, left=self.wait, wait=2 * self.wait, softness=1.0)
+
+    def softer(self, factor: float) -> "JointCompliance":
+        """Return the state with joints that many times as compliant."""
+        return replace(self, value=factor * self.value)
+
+    def used(self, softness: float) -> "JointCompliance":
+        """Return the state after a step with compliant joints."""
+        return replace(self, left=self.left - (not self.lasting), softness=softness)
+
+    def released(self) -> "JointCompliance":
+        """Return the state in which forces are forgotten, which rigid joints bear as they lie, if they may be tried."""
+        return self if self.lasting else replace(self, left=min(self.left, 0))
+
+    def failed(self) -> "JointCompliance":
+        """Return the state after a step that could not be solved at all."""
+        return replace(self, left=-self.wait, wait=2 * self.wait)
+
+    def passed(self) -> "JointCompliance":
+        """Return the state after a step with rigid joints."""
+        return replace(self, left=min(self.left + 1, 0))
 
 
 _RIGID = JointCompliance()

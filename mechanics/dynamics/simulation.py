@@ -8,10 +8,16 @@ import numpy as np
 
 from mechanics.arrays import Array, Bools
 from mechanics.carried import Carried, Carrier
-from mechanics.dynamics.contact_problem import contact_problem, shifted, unshifted
+from mechanics.dynamics.contact_problem import (
+    SOFTNESS,
+    JointCompliance,
+    contact_problem,
+    may_yield,
+    shifted,
+    unshifted,
+)
 from mechanics.dynamics.contact_search import ContactSearch, Detection
 from mechanics.dynamics.handover import Beginning, Handover, of_run
-from mechanics.dynamics.joint_compliance import SOFTNESS, JointCompliance, may_yield
 from mechanics.dynamics.observers.energy import kinetic_energy
 from mechanics.dynamics.progress import Clock
 from mechanics.dynamics.rest.relaxation import Relaxation, halted

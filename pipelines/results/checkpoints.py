@@ -23,7 +23,7 @@ from scipy.sparse import csr_array
 
 from mechanics.carried import Carried, Rows
 from mechanics.contact.contacts import Contacts
-from mechanics.dynamics.joint_compliance import JointCompliance
+from mechanics.dynamics.contact_problem import JointCompliance
 from mechanics.dynamics.outcome import StaticStart
 from mechanics.dynamics.step import ContactForces
 from mechanics.planar.model import PlanarState

@@ -118,7 +118,7 @@ def check_table(
     ------
     SceneError : at the first key that is unknown, missing or wrong
 
-    >>> friction = Key("friction", Kind.NUMBER, "Coulomb's coefficient μ.", "-", 0.6, at_least=0)
+    >>> friction = Key("friction", ValueKind.NUMBER, "Coulomb's coefficient μ.", "-", 0.6, at_least=0)
     >>> check_table(TomlDocument("scene.toml"), ("contact",), {"friction": 1}, [friction])
     {'friction': 1.0}
     >>> check_table(TomlDocument("scene.toml"), ("contact",), {"frictoin": 1}, [friction])

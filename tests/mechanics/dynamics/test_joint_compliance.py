@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mechanics.dynamics.joint_compliance import JointCompliance, may_yield
+from mechanics.dynamics.contact_problem import JointCompliance, may_yield
 from mechanics.dynamics.outcome import Outcome
 from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
