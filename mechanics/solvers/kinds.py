@@ -24,8 +24,8 @@ __all__ = ["ENDED_PATH", "EXACT", "POLISH", "chain_of"]
 # budgets: iterations of ADMM and sweeps over disks, steps of Newton's method, factorisations of a path
 _ADMM, _NEWTON, _PATH = 500, 20, 60
 # moving rigid bodies from which a factorisation in each step of Newton's method takes longer than iterations with kept
-# factors: at first, and at all
-_SOME, _MANY = 300, 1000
+# factors: in each step of a motion, at rest, and at all
+_HANDFUL, _SOME, _MANY = 60, 300, 1000
 # contacts of disks up to which Newton's method takes less than the iterations that it spares
 _FEW = 1000
 EXACT = 1e-3
@@ -90,6 +90,9 @@ _MOTION = (
     *(3 * (replace(_newton, iterations=100), _admm)),
     _path,
 )
+# of few stones Newton's method goes first, from known forces: ADMM presses stones against what they only touch, and
+# friction would hold what falls
+_MOTION_OF_FEW = (replace(_newton, begin=Begin.GIVEN), *_MOTION)
 # errors that are allowed would be extrapolated with the rest
 _LOOSE_MOTION = (replace(_endless, method=_loosely, begin=Begin.GIVEN),)
 _MOTION_OF_MANY = (replace(_endless, begin=Begin.AHEAD),)
@@ -141,8 +144,10 @@ def chain_of(
         return _SPRINGS if bodies < _SOME else _SPRINGS_OF_SOME
     if follows and bodies >= _MANY:
         return _MOTION_OF_MANY if moving else _REST_OF_MANY
+    if moving and velocity_tolerance < _LOOSE:
+        return _MOTION if bodies >= _HANDFUL else _MOTION_OF_FEW
     if moving:
-        return _MOTION if velocity_tolerance < _LOOSE else _LOOSE_MOTION
+        return _LOOSE_MOTION
     return _REST if bodies < _SOME else _REST_OF_SOME
 
 
