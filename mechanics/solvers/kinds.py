@@ -103,6 +103,8 @@ _DEFORMABLE = (
     replace(_newton, method=partial(Newton, hopeless=0.3), begin=Begin.GIVEN, further=1.0),
     *(_path, _newton),
     *(_from_best, _newton),
+    replace(_SOFTER, further=1.0),
+    Link("sweeps", NSGS, 1000),
 )
 # between rigid stones Newton's method wanders, so the path is followed until the laws hold, again from where it stalled
 _AMONG_RIGID = (replace(_from_best, near=_NEAR), _path, _from_best, _from_best)

@@ -1,16 +1,20 @@
 """Newton's method by way of softer joints: each solution leads to that of joints a little harder."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from mechanics.delassus.compliant import CompliantDelassus
-from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
+from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, Delassus
 from mechanics.solvers.second_order.newton import Newton
-from moma.errors import SolverError
 
 __all__ = ["SofterJoints"]
 
 # factors on the compliance of joints
-_FACTORS = (100.0, 30.0, 10.0, 3.0, 1.0)
+_FACTORS = (100.0, 30.0, 10.0, 3.0)
+# that of rigid joints for this purpose, over the scale of W [-]
+_RIGID = 1e-4
 # steps of Newton's method with each
 _STEPS = 30
 
@@ -30,27 +34,28 @@ class SofterJoints:
     max_iterations: int = 150
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
-        """Solve from `start`; return the last iterate of the joints asked for, or of the hardest that were solved.
-
-        Raises
-        ------
-        SolverError : if the joints do not yield
-        """
-        operator = problem.delassus
-        if not isinstance(operator, CompliantDelassus):
-            raise SolverError("the joints are rigid", where="softer joints", remedy='use the method "auto"')
+        """Solve from `start`; return the last iterate of the joints asked for, or of the hardest that were solved."""
         count = 0
-        for factor in _FACTORS:
-            soft = CompliantDelassus(operator.inner, factor * operator.joint_compliance)
+        for operator in _softened(problem.delassus):
             most = min(_STEPS, self.max_iterations - count)
             newton = Newton(self.tolerance, self.velocity_tolerance, most)
-            found = newton(replace(problem, delassus=soft), start)
+            found = newton(replace(problem, delassus=operator), start)
             count += found.iterations
             # the softest lead on even where they are not quite solved
-            if found.converged or factor == _FACTORS[0]:
+            if found.converged or count == found.iterations:
                 start = ContactStart(found.impulse, found.velocity)
             if count >= self.max_iterations:
                 break
-        if found.converged and factor == _FACTORS[-1]:
+        if found.converged and operator is problem.delassus:
             return replace(found, iterations=count)
         return ContactSolution(start.impulse, start.velocity, count, float("inf"), False)
+
+
+def _softened(operator: Delassus) -> Iterator[Delassus]:
+    """Yield the operator with softer joints, ever harder, and as it is; rigid joints yield next to nothing at first."""
+    inner, compliance = operator, np.full(operator.diagonal.shape[:2], _RIGID * operator.scale)
+    if isinstance(operator, CompliantDelassus):
+        inner, compliance = operator.inner, operator.joint_compliance
+    for factor in _FACTORS:
+        yield CompliantDelassus(inner, factor * compliance)
+    yield operator

@@ -29,7 +29,7 @@ from mechanics.scene.scene import (
 )
 from mechanics.simulate import simulate
 from mechanics.solvers.choice import choose_solver
-from tests.mechanics.shapes import brick, ground, opening, scene
+from tests.mechanics.shapes import brick, ground, scene
 from tests.validation.statics.test_imperfect_vaults import barrel, warped
 
 G = 9.81
@@ -137,9 +137,9 @@ def soft():
     return scene(ground(), *row, slab, friction=0.3, step=1e-2, theta=0.5, duration=0.3)
 
 
-def jammed():
-    """Stones that a relaxation jams over an opening: their rest is refuted, and they fall without it."""
-    return opening(step=5e-4, relaxation=True)
+def refuted():
+    """A vault with gaping joints: its first rest does not last without its forces, and it goes on without halts."""
+    return warped(barrel(11, 3), 1e-3)
 
 
 def relaxed():
@@ -161,7 +161,7 @@ def yielding():
 
 SCENES = {
     one.__name__: one
-    for one in (shaken, on_springs, sleepers, soft, relaxed, jammed, yielding, from_equilibrium)
+    for one in (shaken, on_springs, sleepers, soft, relaxed, refuted, yielding, from_equilibrium)
 }
 
 
@@ -198,7 +198,7 @@ def test_the_scenes_do_what_they_are_for():
     asleep = [int(one["_sleepers"]["asleep"].sum()) for one in kept["sleepers"]]
     assert any(before > after for before, after in pairwise(asleep))
     assert any(condensed[:, 1].max() > 0 for condensed in kept["soft"][-1]["condensed"])
-    assert kept["jammed"][-1]["_freed"]
+    assert kept["refuted"][-1]["_freed"]
     assert any(one["_joints"].value > 0 for one in kept["yielding"])
 
 

@@ -9,7 +9,8 @@ from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.loads.forces import StoneForce
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.time_series import History
-from mechanics.scene.scene import LawRule, Method, SolverSettings
+from mechanics.scene.scene import LawRule
+from tests.mechanics.solvers.cone_program import ConeProgram
 
 RADIUS, COLUMNS, ROWS = 1.0, 7, 9
 SIDE = 1e3  # confining pressure [Pa]
@@ -56,10 +57,9 @@ def first_sliding(friction, expected, step=1e-2, steps=40):
         rules=(LawRule(frozenset(wall.code for wall in walls), codes, DryJoint(friction=0.0)),),
         time=PlanarTime(step, 1.0, steps * step, stop_at_equilibrium=False),
         loads=Loads(forces=tuple(StoneForce(frozenset({c}), f) for c, f in (("top", press), *sides.items()))),
-        # at the edge of sliding, errors of iterations move the disks
-        solver=SolverSettings(Method.NEWTON, tolerance=1e-8, velocity_tolerance=1e-8),
     )
-    run = PlanarRun(scene)
+    # at the edge of sliding, errors of iterations move the disks
+    run = PlanarRun(scene, ConeProgram(1e-8, 1e-8))
     while not run.done:
         last = run.step()
         speed = -last.after.velocity[len(disks) + 1, 1]
