@@ -25,7 +25,7 @@ __all__ = ["ENDED_PATH", "EXACT", "POLISH", "chain_of"]
 _ADMM, _NEWTON, _PATH = 500, 20, 60
 # moving rigid bodies from which a factorisation in each step of Newton's method takes longer than iterations with kept
 # factors: in each step of a motion, at rest, and at all
-_HANDFUL, _SOME, _MANY = 60, 300, 1000
+_HANDFUL, _SOME, _MANY = 32, 300, 1000
 # contacts of disks up to which Newton's method takes less than the iterations that it spares
 _FEW = 1000
 EXACT = 1e-3
@@ -87,12 +87,12 @@ _REST_OF_SOME = (replace(_admm, method=_rest, begin=Begin.GIVEN), _newton, _path
 _REST_OF_MANY = (replace(_endless, method=_rest, begin=Begin.GIVEN),)
 _MOTION = (
     replace(_admm, method=_motion, begin=Begin.AHEAD),
-    *(3 * (replace(_newton, iterations=100), _admm)),
+    *(2 * (replace(_newton, iterations=100), _admm)),
     _path,
 )
-# of few stones Newton's method goes first, from known forces: ADMM presses stones against what they only touch, and
+# of few stones Newton's method goes first: ADMM presses stones against what they only touch, and
 # friction would hold what falls
-_MOTION_OF_FEW = (replace(_newton, begin=Begin.GIVEN), *_MOTION)
+_MOTION_OF_FEW = (replace(_newton, begin=Begin.AHEAD), *_MOTION)
 # errors that are allowed would be extrapolated with the rest
 _LOOSE_MOTION = (replace(_endless, method=_loosely, begin=Begin.GIVEN),)
 _MOTION_OF_MANY = (replace(_endless, begin=Begin.AHEAD),)

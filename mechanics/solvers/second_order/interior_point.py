@@ -61,7 +61,7 @@ class InteriorPoint:
         units = unit[:, None]
         path = CentralPath(even, start.impulse / units, _NEAR) if start.impulse.any() else CentralPath(even)
         count = idle = over = 0
-        least = best.left.natural_map
+        least = np.inf
         while count < self.max_iterations and idle < _STALLED and over < _OVER and best.excess > _FURTHER:
             try:
                 # where the laws contradict each other impulses grow until they overflow

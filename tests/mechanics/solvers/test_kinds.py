@@ -135,7 +135,7 @@ def test_iterations_of_all_methods_together_are_at_most_those_allowed(name, most
     assert found.natural_map == pytest.approx(residual(problem, found.impulse).natural_map, rel=1e-9)
 
 
-@pytest.mark.parametrize("name", ["few deformable among rigid", "few deformable, joints yield", "deformable"])
+@pytest.mark.parametrize("name", ["few deformable, joints yield", "deformable"])
 def test_what_is_nearly_a_solution_takes_fewer_factorisations(name):
     problem, found = problem_of(name), solved(name)
     rng = np.random.default_rng(1)
@@ -146,8 +146,11 @@ def test_what_is_nearly_a_solution_takes_fewer_factorisations(name):
 
 
 def test_a_motion_of_rigid_bodies_is_followed_from_extrapolated_forces():
-    chain = chain_of(problem_of("few rigid"), True, True, 1e-5)
+    chain = chain_of(problem_of("some hundred rigid"), True, True, 1e-5)
     assert (chain[0].name, chain[0].begin) == ("body ADMM", Begin.AHEAD)
+    # of few stones from known forces: ADMM would press stones against what they only touch
+    chain = chain_of(problem_of("few rigid"), True, True, 1e-5)
+    assert (chain[0].name, chain[0].begin) == ("Newton", Begin.AHEAD)
 
 
 def test_mortar_is_no_kind_of_its_own():
