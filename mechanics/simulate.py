@@ -16,7 +16,7 @@ from mechanics.dynamics.progress import Clock, Listener, Progress, silent
 from mechanics.dynamics.simulation import Simulation
 from mechanics.dynamics.static_start import static_start
 from mechanics.dynamics.step import Step
-from mechanics.dynamics.stopping import LASTING, Watch, lasts
+from mechanics.dynamics.stopping import Watch, disproof
 from mechanics.dynamics.warm_start import Memory
 from mechanics.model.model import Model, build_model
 from mechanics.results.log import Log, result_of, stage_result
@@ -157,15 +157,13 @@ def _simulate(
         with clock("observe"):
             balance = log(step)
             outcome = watch(step, balance)
-        if outcome is Outcome.EQUILIBRIUM and (settings.stop_at_equilibrium or count == total):
-            # a relaxation that has rested in every step has halted no velocity above that of rest
-            at_once = count == LASTING and run.simulation.cold and not watch.yielded
+        if outcome.rests and (settings.stop_at_equilibrium or count == total):
             with clock("confirm"):
-                confirmed = at_once or lasts(run.simulation.released())
-            if not confirmed:
+                other = disproof(run.simulation)
+            if other is not None:
                 if settings.relaxation:
                     log.energy.halted(run.simulation.state)
-                outcome, run.simulation = watch.disproved(), run.simulation.released()
+                outcome, run.simulation = watch.disproved(), other
         text = f"balance {balance.max():.1e}, η {step.solution.natural_map:.1e}"
         report(Progress("step", count, total, text))
         done = settings.stop_at_equilibrium and outcome is not Outcome.MOVING
@@ -183,7 +181,7 @@ def _simulate(
             outcome = Outcome.INTERRUPTED
         if last:
             break
-    verdict = watch.verdict(outcome, step.after, run.static)
+    verdict = watch.verdict(outcome, run.static)
     return result_of(log, step, verdict, watch.rest_time, clock, run.static), run
 
 
@@ -262,7 +260,7 @@ class _Building:
         for number in range(len(self.ends), len(self.stages)):
             result = self._stage(number, report, stop, earlier)
             earlier = None
-            if result.outcome is not Outcome.EQUILIBRIUM:
+            if not result.outcome.rests:
                 break
         return replace(result, stages=self.ends, cautions=self._cautions(), wall_time=self.seconds)
 
@@ -303,7 +301,11 @@ class _Building:
         left = count - len(self.ends)
         why = "was interrupted" if last.outcome == Outcome.INTERRUPTED else "did not come to rest"
         unbuilt = (f"{left} of {count} stages were not built, as stage {last.name!r} {why}",)
-        earlier = (f"in stage {one.name!r}, {caution}" for one in self.ends[:-1] for caution in one.cautions)
+        earlier = (
+            f"in stage {one.name!r}, {said}"
+            for one in self.ends[:-1]
+            for said in filter(None, (one.reason, *one.cautions))
+        )
         return (*(unbuilt if left else ()), *last.cautions, *earlier)
 
     def carried(self) -> dict[str, Any]:

@@ -149,7 +149,7 @@ _COMPUTED = (
     Attribute(
         "outcome",
         None,
-        "equilibrium, moving, collapsed, undecided or interrupted",
+        "equilibrium, settled, moving, collapsed, undecided or interrupted",
         lambda scope, run: scope.run(run).c.outcome,
         of_run=True,
     ),

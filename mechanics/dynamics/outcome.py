@@ -9,14 +9,22 @@ __all__ = ["Outcome", "StaticStart"]
 class Outcome(StrEnum):
     """End of a run.
 
-    *Undecided*: the steps that would decide were not solved. *Interrupted*: ended by its user before its time.
+    *Equilibrium*: the stones stand as they are drawn, by forces that arise from nothing. *Settled*: they have come to
+    rest elsewhere. *Moving*: they have done neither, nor fallen. *Undecided*: the steps that would decide were not
+    solved. *Interrupted*: ended by its user before its time.
     """
 
     EQUILIBRIUM = "equilibrium"
+    SETTLED = "settled"
     MOVING = "moving"
     COLLAPSED = "collapsed"
     UNDECIDED = "undecided"
     INTERRUPTED = "interrupted"
+
+    @property
+    def rests(self) -> bool:
+        """True where all stones have come to rest without a fall."""
+        return self in (Outcome.EQUILIBRIUM, Outcome.SETTLED)
 
 
 @dataclass(frozen=True)

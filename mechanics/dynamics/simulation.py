@@ -28,13 +28,17 @@ from mechanics.dynamics.warm_start import Memory
 from mechanics.model.model import Model
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.scene.laws.law import Approach
+from mechanics.scene.scene import Method, SolverSettings
 from mechanics.scene.state import State
 from mechanics.solvers.chain import Solver
 from mechanics.solvers.choice import choose_solver
+from mechanics.solvers.from_nothing import rests_from_nothing
 from moma.errors import SolverError
 
 __all__ = ["Simulation"]
 
+# bias of a gap over the largest u_free up to which it is one of an inexact step, and counts as closed [-]
+_CLOSED = 1e-3
 # predicted state, contacts, free motion, internal variables, and how the run begins
 _Given = tuple[State, Detection, Kick, Array, Beginning | None]
 _Solved = tuple[ContactProblem, Approach, ContactSolution]
@@ -59,7 +63,8 @@ class Simulation(Carrier):
 
     CARRIED = ("_first", "_freed", "_joints", "_memory", "_relax", "_sleepers", "cold", "state")
     REBUILT = (
-        "_begin", "_compliance", "_detect", "_may_yield", "_solve", "_step", "_theta", "clock", "model", "start",
+        "_begin", "_compliance", "_detect", "_given", "_may_yield", "_solve", "_step", "_theta", "clock", "model",
+        "start",
     )  # fmt: skip
 
     def __init__(
@@ -78,8 +83,8 @@ class Simulation(Carrier):
             self._compliance = compliances(model, self._step, self._theta)
         bed = begin.bed(model)
         self._detect = ContactSearch(model, self._compliance, self.clock, fresh_contacts, elastic_scale, bed)
-        deforms, sprung = bool(model.elastic.any()), model.laws.sprung
-        self._solve = solver or choose_solver(model.scene.solver, deforms, sprung, model.scene.time.duration)
+        self._given = solver
+        self._solve = solver or _solver_of(model, model.scene.solver)
         self._may_yield = solver is None and may_yield(model)
         self._joints = JointCompliance(lasting=model.mostly_rigid)
         self._relax = Relaxation(model)
@@ -124,8 +129,8 @@ class Simulation(Carrier):
         self._sleepers.wake_all(self.state)
         return Handover(self.model, self._begin.drawn, halted(self.state), self._memory)
 
-    def released(self) -> "Simulation":
-        """Return a simulation that goes on from here, neither halted any more nor knowing a force between rigid stones.
+    def released(self, forgets: bool = True) -> "Simulation":
+        """Return a simulation that goes on from here, not halted any more, and which `forgets` forces between stones.
 
         A relaxation goes on with θ = 1, as its user does not ask for the motion, and begins with a last halt: forces
         that also stop what is left of a motion would set stones in motion in the next step, in which they are kept.
@@ -138,6 +143,9 @@ class Simulation(Carrier):
         other = copy(self)
         other.model, other._theta, other._relax, other._first = model, free.theta, Relaxation(model), False
         other._freed = True
+        if other._solve is not self._given:
+            # some methods press stones against what they only touch
+            other._solve = _solver_of(model, replace(model.scene.solver, method=Method.AUTO))
         other._joints = self._joints.released()
         if time.relaxation:
             other.state = halted(self.state)
@@ -146,9 +154,33 @@ class Simulation(Carrier):
                 other._compliance = compliances(model, self._step, free.theta)
         other._detect = self._detect.continued(model, other._compliance)
         # forces of elastic stones come from their strain, which stays
-        other._memory = self._memory.at_rest(0.0 if model.inertia.moving.any() else 1.0)
+        other._memory = self._memory.at_rest(0.0 if forgets and model.inertia.moving.any() else 1.0)
         other._sleepers = Sleepers(model, other.state, other._memory)
         return other
+
+    def rests_from_nothing(self) -> bool:
+        """Return whether rigid stones at rest are seen to be so by forces that arise from nothing.
+
+        If they are not, the next step begins with these forces. Gaps within the error of a step are closed.
+        """
+        model, h = self.model, self._step
+        if not model.rigid_only or model.laws.sprung:
+            return False
+        still = halted(self.state)
+        predicted = predict(model, self.start, still, h * (1 - self._theta))
+        found = self._detect(model, predicted)
+        if not len(found.contacts.key):
+            return False
+        _, internal = self._memory.recall(found.contacts.key, found.place)
+        free = free_kick(model, self.start, predicted, self._compliance, h, self._theta)
+        problem, approach = contact_problem(model, predicted, found, free, internal, None)
+        near = problem.bias <= _CLOSED * float(np.abs(problem.u_free).max())
+        problem = replace(problem, bias=np.where(near, 0.0, problem.bias))
+        rests, impulse = rests_from_nothing(problem)
+        if not rests:
+            begin = ContactSolution(unshifted(problem, impulse), np.zeros_like(impulse), 0, np.inf, False)
+            self._memory.store(found.contacts.key, begin, approach.state, found.place)
+        return rests
 
     def carried(self) -> dict[str, Any]:
         """Return what the next step needs to know.
@@ -258,3 +290,8 @@ class Simulation(Carrier):
         return replace(
             step, relaxed=kinetic_energy(self.model, after) - kinetic_energy(self.model, self.state)
         )
+
+
+def _solver_of(model: Model, settings: SolverSettings) -> Solver:
+    deforms, sprung = bool(model.elastic.any()), model.laws.sprung
+    return choose_solver(settings, deforms, sprung, model.scene.time.duration)

@@ -22,11 +22,11 @@ from mechanics.problem.residual import residual
 from mechanics.scene.laws.law import BOND
 from mechanics.scene.state import State
 
-__all__ = ["LASTING", "MOVED", "Verdict", "Watch", "balance_of", "lasts", "rests"]
+__all__ = ["LASTING", "MOVED", "Verdict", "Watch", "balance_of", "disproof", "rests"]
 
 
 LASTING = 5  # steps in a row that must be in balance
-MOVED = 0.01  # displacement over a stone's width that the reader of a verdict must know of [-]
+MOVED = 0.01  # displacement over a stone's width from which it does not stand as it is drawn [-]
 _REST_SPEED = 1e-4  # of √(g · width), the speed of a fall over a body's own width, below which it rests [-]
 _FALL_SPEED = 0.05  # of the same speed, above which a body falls [-]
 _TOPPLED = np.pi / 4  # tilt from which a stone at rest away from its place has toppled [rad]
@@ -34,6 +34,7 @@ _LEANS = np.radians(10.0)  # tilt from which one that has sunk by half a collaps
 _DOUBT = 0.5  # velocity that unsolved steps may have added, over that of a proven motion [-]
 _RELEASED = 50  # most steps in which a rest must show that it lasts without its forces
 _UNFILLED = 0.01  # area of joints that mortar does not fill, over that which it was to fill, that is told [-]
+_LOWER = 0.7  # way along the load over the whole way from which a stone has sunk rather than moved aside [-]
 _STAYS = 1e-3  # displacement over the width within which a released stone stays where it rested [-]
 
 
@@ -50,10 +51,11 @@ class Watch(Carrier):
     """Outcome of a run, judged after each step.
 
     *Equilibrium*: for five steps in a row, solved, and after all loads have ceased to change, every body that is not
-    fixed is in balance (unbalanced force and moment below the scene's tolerance) and slower than 10⁻⁴ √(g · its
-    width). *Collapsed*: a body has sunk, along the load that acts on it, by more than the scene's fraction of its
-    width, and is faster than 0.05 √(g · width); or it has come to rest after such a fall, or after toppling. A body
-    that rocks lifts its centre, one that slides slowly keeps its support: both move, and may still come to rest.
+    fixed is in balance (unbalanced force and moment below the scene's tolerance), slower than 10⁻⁴ √(g · its width),
+    and within 1 % of its width from where it began. *Settled*: the same, but farther away. *Collapsed*: a body has
+    sunk, along the load that acts on it, by more than the scene's fraction of its width, and is faster than
+    0.05 √(g · width); or it has come to rest after such a fall, or after toppling. A body that rocks lifts its centre,
+    one that slides slowly keeps its support: both move, and may still come to rest.
     *Undecided*: steps that were not solved may have added as much velocity as the motion has. Without gravity g
     counts as 1 m/s². Displacements and speeds are relative to the supports where these are driven. Steps with compliant
     joints count as solved, and are told.
@@ -68,8 +70,8 @@ class Watch(Carrier):
     """
 
     CARRIED = (
-        "_compliant", "_culprit", "_deepest", "_depth", "_doubt", "_fastest", "_pair", "_quiet", "_speed", "_steps",
-        "_still", "_sunk", "_unbonded", "_unsolved", "_worst_error", "rest_time",
+        "_clamped", "_compliant", "_culprit", "_deepest", "_depth", "_doubt", "_fastest", "_moved", "_pair", "_quiet",
+        "_speed", "_steps", "_still", "_sunk", "_unbonded", "_unsolved", "_worst_error", "rest_time",
     )  # fmt: skip
     REBUILT = ("_model", "_start")
 
@@ -78,7 +80,8 @@ class Watch(Carrier):
         self._quiet = self._unsolved = self._steps = 0
         self._doubt = self._worst_error = self._fastest = 0.0
         self._still = False
-        self._culprit, self._sunk, self._speed = 0, 0.0, 0.0
+        self._culprit, self._sunk, self._moved, self._speed = 0, 0.0, 0.0, 0.0
+        self._clamped = False
         self._compliant, self._deepest, self._depth, self._pair = 0, 0.0, 0.0, (0, 0)
         self._unbonded: tuple[str, ...] = ()
         self.rest_time = 0.0
@@ -119,7 +122,11 @@ class Watch(Carrier):
         if fallen.any():
             self._blame(fallen, sunk, speeds)
             return Outcome.COLLAPSED
-        return Outcome.EQUILIBRIUM
+        moved = np.where(model.fixed, 0.0, displacement(model, self._start, seen))
+        share = moved / model.surfaces.size
+        self._culprit = int(share.argmax())
+        self._sunk, self._moved = float(sunk[self._culprit]), float(moved[self._culprit])
+        return Outcome.SETTLED if share[self._culprit] > MOVED else Outcome.EQUILIBRIUM
 
     @property
     def yielded(self) -> bool:
@@ -128,18 +135,20 @@ class Watch(Carrier):
 
     def disproved(self) -> Outcome:
         """Take back a rest that did not last once its forces were forgotten."""
-        self._quiet = 0
+        self._quiet, self._clamped = 0, True
         return Outcome.MOVING
 
-    def verdict(self, outcome: Outcome, state: State, static: StaticStart | None) -> Verdict:
-        """Return the outcome in words, from that of the last step, its state, and the static start."""
+    def verdict(self, outcome: Outcome, static: StaticStart | None) -> Verdict:
+        """Return the outcome in words, from that of the last step, and the static start."""
         if outcome is Outcome.MOVING and (self._still or self._doubt > _DOUBT * self._fastest):
             outcome = Outcome.UNDECIDED
         cautions = [*self._gave_way(), *self._unbonded]
-        if outcome is Outcome.EQUILIBRIUM:
-            cautions += self._moved(state)
-            if self._doubt > _DOUBT * self._fastest:
-                cautions.append(f"on the way {self._unsolved_steps()}")
+        if self._clamped and outcome is not Outcome.EQUILIBRIUM:
+            cautions.insert(0, "a rest on the way was held only by self-stress, which no load applies")
+        if outcome is Outcome.MOVING:
+            cautions.insert(0, "whether it stands is not decided: its time was over before it rested or fell")
+        if outcome.rests and self._doubt > _DOUBT * self._fastest:
+            cautions.append(f"on the way {self._unsolved_steps()}")
         if (left_out := relaxation_caution(self._model)) is not None:
             cautions.append(left_out)
         if static is not None and not static.found:
@@ -152,6 +161,11 @@ class Watch(Carrier):
             return self._unsolved_steps()
         if outcome is Outcome.MOVING:
             return f"stone {code} moves at {_short(self._speed)}/s"
+        if outcome is Outcome.SETTLED:
+            share = _percent(self._moved / float(self._model.surfaces.size[self._culprit]))
+            lower = self._sunk > _LOWER * self._moved
+            way = f"{_short(self._sunk)} lower" if lower else f"{_short(self._moved)} away"
+            return f"it does not stand as surveyed: stone {code} came to rest {way}, {share} of its width"
         if outcome is Outcome.COLLAPSED and self._quiet >= LASTING:
             return f"stone {code} has fallen or toppled, and lies {_short(max(self._sunk, 0.0))} lower"
         if outcome is Outcome.COLLAPSED:
@@ -185,20 +199,6 @@ class Watch(Carrier):
             f"solve: stones overlap by at most {_short(self._deepest)} for it ({one} and {other}; {end})"
         ]
 
-    def _moved(self, state: State) -> list[str]:
-        """Return a caution that names the stone that moved furthest over its width, if it is worth one."""
-        model = self._model
-        seen = seen_from_supports(model, self._start, state)
-        moved = np.where(model.fixed, 0.0, displacement(model, self._start, seen))
-        share = moved / model.surfaces.size
-        far = int(share.argmax())
-        if share[far] <= MOVED:
-            return []
-        code = model.scene.blocks[far].code
-        return [
-            f"stone {code} moved by {_short(moved[far])}, {_percent(share[far])} of its width, before it came to rest"
-        ]
-
     def _sinking(self, step: Step, seen: State) -> Array:
         """Return how far each body (nb,) has moved along its present load, weight included [m]."""
         weight = self._model.mass[:, None] * self._model.gravity(seen.time)
@@ -230,13 +230,21 @@ def balance_of(model: Model, step: Step) -> Array:
     return imbalance(model, step.after, active.contacts, active.force, step.kick.load, step.resting)
 
 
-def lasts(simulation: Simulation) -> bool:
-    """Return whether a rest lasts in a released simulation, which this advances.
+def disproof(simulation: Simulation) -> Simulation | None:
+    """Return the simulation with which a run goes on where a rest does not last; None where it lasts.
 
     Rigid stones in a gap admit forces that press them against each other without cause: an overlap that was pushed
-    out, an impact or a solver's long way may leave such forces, and friction then holds what nothing carries. So the
-    stones forget all contact forces, and must find those of their rest again without leaving it.
+    out, an impact or a solver's long way may leave such forces, and friction then holds what nothing carries. So
+    the stones forget all contact forces, and must find those of their rest again without leaving it: rigid ones from
+    forces that arise from nothing.
     """
+    other = simulation.released()
+    lasting = other.rests_from_nothing() or _lasts(other.released(forgets=False))
+    return None if lasting else other
+
+
+def _lasts(simulation: Simulation) -> bool:
+    """Return whether a rest lasts in a released simulation, which this advances."""
     model, begin = simulation.model, simulation.state
     quiet = 0
     for _ in range(_RELEASED):

@@ -1,8 +1,9 @@
 """Confirmation of a limit load by the dynamics: the load comes at once on stones at rest, and they hold or fall.
 
-*Held*: the run ends in equilibrium, every stone in balance. *Lost*: it ends in a collapse. Between the largest load
-that is held and the least that is lost lies the limit of the dynamics from rest; a load that grows slowly may be held
-up to 6 % further, or less far, as friction without dilatancy has no unique limit.
+*Held*: the run ends at rest, every stone in balance by forces that arise from nothing. *Lost*: it does not, or the load
+is the bound of associative friction. Between the largest load that is held and the least that is lost lies the limit of
+the dynamics from rest; a load that grows slowly may be held up to 6 % further, or less far, as friction without
+dilatancy has no unique limit.
 
 How alike the mechanism of a candidate and the collapse of the dynamics are says the cosine between the velocities v of
 the one and the displacements d of the other, of the centres of all stones, weighted by mass:
@@ -27,8 +28,8 @@ from mechanics.simulate import simulate
 __all__ = ["Confirmation", "ConfirmationRun", "Likeness", "confirm", "likeness"]
 
 
-# load over the candidate of the first two runs, and by how much each further one goes on [-]
-_NEAR, _WIDER = 0.03, 0.06
+# load that is lost over that which is held at the end [-]
+_NEAR = 0.03
 # step in which a stone falls by this share of the least width, and steps of a run at most
 _FALL, _STEPS = 2.5e-3, 500
 # move over its width from which a stone that falls has collapsed [-]
@@ -63,8 +64,8 @@ class Confirmation:
 
     Attributes
     ----------
-    held : largest λ that is held, below every one that is lost; 0: none [-]
-    lost : least λ that is lost; infinite: none [-]
+    held : largest λ that is held; 0: none [-]
+    lost : least λ that is lost, the bound included; infinite: none [-]
     trials : the runs, in their order
     """
 
@@ -128,16 +129,18 @@ def confirm(
     on: RigidAssembly,
     live: LiveLoad,
     candidate: float,
-    runs: int = 6,
+    bound: float = np.inf,
+    runs: int = 12,
     progress: Listener = silent,
     stop: Callable[[], bool] = lambda: False,
 ) -> Confirmation:
-    """Return what the dynamics hold and lose around a candidate: first 3 % below and above it, then farther off.
+    """Return what the dynamics hold and lose, within 3 % of each other: first at a candidate, then beside it.
 
     Parameters
     ----------
-    on, live : the rigid stones, and the load
-    candidate : λ [-]
+    on, live : the rigid stones, which stand without the load, and the load
+    candidate : λ with which to begin [-]
+    bound : λ that no stones bear, and which is lost without a run [-]
     runs : at most
     progress, stop : of every run, see `simulate`
 
@@ -146,22 +149,24 @@ def confirm(
     SceneError, SolverError : see `simulate`
     """
     trials: list[ConfirmationRun] = []
-    low, high = 1.0 - _NEAR, 1.0 + _NEAR
-    held, lost = 0.0, np.inf
-    while len(trials) < runs and not stop():
-        if held == 0.0 and low > 0.0:
-            share, low = low, low - _WIDER
-        elif np.isinf(lost):
-            share, high = high, high + _WIDER
-        else:
-            break
-        trial = _trial(on, live, share * candidate, progress, stop)
+    held, lost, way = 0.0, bound, _NEAR
+    multiplier = min(candidate, bound)
+    while len(trials) < runs and not stop() and lost > (1.0 + _NEAR) * held:
+        trial = _trial(on, live, multiplier, progress, stop)
         trials.append(trial)
-        if trial.outcome is Outcome.EQUILIBRIUM:
-            held = max(held, trial.multiplier)
-        elif trial.outcome is Outcome.COLLAPSED:
-            lost = min(lost, trial.multiplier)
-    return Confirmation(held if held < lost else 0.0, float(lost), tuple(trials))
+        if trial.outcome.rests:
+            held = multiplier
+        else:
+            lost = multiplier
+        if held == 0.0:
+            multiplier, way = multiplier * max(1.0 - way, 0.5), 2.0 * way
+        elif np.isinf(lost):
+            multiplier, way = multiplier * (1.0 + way), 2.0 * way
+        else:
+            # next to the candidate first, half-way later on
+            multiplier = min(0.5 * (held + lost), held * (1.0 + way))
+            way *= 2.0
+    return Confirmation(held, float(lost), tuple(trials))
 
 
 def _trial(

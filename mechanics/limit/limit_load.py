@@ -17,8 +17,8 @@ come to forces that meet Coulomb's law and to a mechanism without opening (Gilbe
 et al. 2014). A small charge on the sum of the normal forces takes away those with which stones clamp one another, and
 one on the squares of f_N - n̄ keeps each programme near the one before, so that the iteration comes to rest. It begins
 twice: from the forces of the bound, and from the least that carry the dead load. In the plane both come to one λ; in
-space the loads may lie apart by a fifth, and Coulomb's law holds at both. The lower is the candidate: the stones may
-fall at less (docs/design/limit-loads.md).
+space the loads may lie apart by a third, and Coulomb's law holds at both. The higher is the candidate, as loads that
+grow from nothing are borne up to it as a rule; only runs tell (`confirm`, docs/design/limit-loads.md).
 """
 
 from dataclasses import dataclass, replace
@@ -91,7 +91,7 @@ class LimitLoad:
     programmes : cone programmes that were solved
     converged : they came to an end: to the tolerance, or as λ and forces of a candidate stood
     beyond : friction beyond Coulomb's law, over the strength of all contacts [-]
-    highest : largest load of a candidate's beginnings that came to an end; of a bound, itself [-]
+    lowest : least load of a candidate's beginnings that came to an end; of a bound, itself [-]
     """
 
     flow: Flow
@@ -102,7 +102,7 @@ class LimitLoad:
     programmes: int
     converged: bool
     beyond: float
-    highest: float
+    lowest: float
 
     @property
     def headline(self) -> str:
@@ -139,7 +139,7 @@ def limit_load(
             programmes=1,
             converged=True,
             beyond=_beyond(on, found.force),
-            highest=found.multiplier,
+            lowest=found.multiplier,
         )
     if flow is Flow.ASSOCIATIVE or not np.isfinite(bound.multiplier):
         return replace(bound, flow=flow)
@@ -180,7 +180,7 @@ class _Ending:
 
 
 def _candidate(on: RigidAssembly, programme: Programme, bound: LimitLoad) -> LimitLoad:
-    """Return the lower of the loads to which the iteration comes from the bound, and from the dead load.
+    """Return the higher of the loads to which the iteration comes from the bound, and from the dead load.
 
     Its mechanism is that of the last strength without the charges, which would open joints a little.
     """
@@ -191,18 +191,18 @@ def _candidate(on: RigidAssembly, programme: Programme, bound: LimitLoad) -> Lim
     known = first.multiplier if first.converged else None
     found = [first, _iterated(on, programme, resting.force, 0, known)]
     ended = [one for one in found if one.converged] or [one for one in found if np.isfinite(one.multiplier)]
-    lowest = min(ended or found[:1], key=lambda one: one.multiplier)
-    moving: Optimum = programme.solve(lowest.strength)
+    highest = max(ended or found[:1], key=lambda one: one.multiplier)
+    moving: Optimum = programme.solve(highest.strength)
     return LimitLoad(
         flow=Flow.COULOMB,
         load=bound.load,
-        multiplier=lowest.multiplier,
-        force=lowest.force,
+        multiplier=highest.multiplier,
+        force=highest.force,
         mechanism=mechanism(on, moving.velocity),
         programmes=2 + sum(one.programmes for one in found),
-        converged=lowest.converged,
-        beyond=lowest.beyond,
-        highest=max(one.multiplier for one in ended or [lowest]),
+        converged=highest.converged,
+        beyond=highest.beyond,
+        lowest=min(one.multiplier for one in ended or [highest]),
     )
 
 

@@ -10,7 +10,7 @@ from mechanics.carried import Carried, Carrier, Rows
 from mechanics.dynamics.energy_balance import EnergyBalance
 from mechanics.dynamics.observers.energy import kinetic_energy
 from mechanics.dynamics.observers.equilibrium import settlement, speed, support_reaction
-from mechanics.dynamics.outcome import Outcome, StaticStart
+from mechanics.dynamics.outcome import StaticStart
 from mechanics.dynamics.progress import Clock
 from mechanics.dynamics.step import Step
 from mechanics.dynamics.stopping import LASTING, Verdict, balance_of
@@ -121,7 +121,7 @@ def result_of(
         joints=joints,
         errors=errors,
         energies=Energies(energy.external, energy.contact, energy.scheme),
-        rest_time=rest_time if verdict.outcome is Outcome.EQUILIBRIUM else None,
+        rest_time=rest_time if verdict.outcome.rests else None,
         reaction=support.reaction,
         weight=support.weight,
         frames=tuple(log.frames),

@@ -22,7 +22,7 @@ def assess(
             metavar="LOAD",
             help='"horizontal x", "horizontal 30" (degrees from x), "tilt y", "force CODE FX FY FZ", '
             '"weight CODE,CODE", "thrust CODE x", "settlement CODE -z" or "thickness"; also several. '
-            "Default: [[assess]] of the scene, which may ask more, or horizontal along x, -x, y and -y.",
+            "Default: [[assess]] of the scene, which may ask more, or horizontal: square to each façade and along it.",
         ),
     ] = None,
     code: Annotated[
@@ -37,6 +37,23 @@ def assess(
         bool,
         typer.Option("--confirm", help="Confirm each candidate by runs: which loads are held, which lost."),
     ] = False,
+    weakest: Annotated[
+        bool, typer.Option("--weakest", help="Seek the direction of the weakest horizontal push, too.")
+    ] = False,
+    at: Annotated[
+        float | None,
+        typer.Option(
+            "--at",
+            metavar="SECONDS",
+            help="Instant at which loads that change are taken. Default: from which they are constant.",
+        ),
+    ] = None,
+    leave_out_loose: Annotated[
+        bool,
+        typer.Option(
+            "--leave-out-loose", help="Leave out, and list, stones that fall under their own weight."
+        ),
+    ] = False,
     out: Out = None,
     db: Db = DEFAULT_DB,
     json: Json = False,
@@ -49,7 +66,18 @@ def assess(
 
     folder = out or Path("out") / f"{scene.stem}-assess"
     with progress_bars() as listener:
-        done = answered(scene, db, folder, load or (), listener, confirm, code)
+        done = answered(
+            scene,
+            db,
+            folder,
+            load or (),
+            listener,
+            confirm,
+            code,
+            weakest=weakest,
+            instant=at,
+            leave_out_loose=leave_out_loose,
+        )
     for warning in done.warnings:
         say(f"warning: {warning}")
     print(as_json(done.summary) if json else "\n".join(assessment_lines(done, verbose)))

@@ -93,7 +93,7 @@ def run(
     print(as_json(done.summary) if json else "\n".join(run_lines(done, verbose)))
     if done.summary["outcome"] == "interrupted":
         say(f"the same command with --resume goes on after step {done.summary['steps']}")
-    if done.summary["outcome"] in ("undecided", "interrupted"):
+    if done.summary["outcome"] in ("moving", "undecided", "interrupted"):
         raise typer.Exit(1)
 
 

@@ -10,8 +10,9 @@ from mechanics.arrays import Array
 from mechanics.dynamics.outcome import Outcome
 from mechanics.limit.assembly import RigidAssembly
 from mechanics.limit.confirm import Confirmation, confirm, likeness
+from mechanics.limit.dead_load import Standing
 from mechanics.limit.kinematic import Kinematics, kinematics
-from mechanics.limit.limit_load import Flow, LimitLoad, Mechanism, limit_load
+from mechanics.limit.limit_load import Flow, LimitLoad, Mechanism, limit_load, mechanism
 from mechanics.limit.live_loads import Acceleration, LiveLoad
 from mechanics.limit.pushover import Pushover, pushover
 from mechanics.limit.thickness import geometric_safety
@@ -28,6 +29,7 @@ __all__ = [
     "Lead",
     "answer",
     "confirmer",
+    "fallen",
     "leader",
     "refuse_unanswerable",
 ]
@@ -40,8 +42,10 @@ _ONE = 1.03  # highest over lowest candidate up to which they are one [-]
 _ALIKE = 0.9  # cosine between mechanism and collapse from which they are one [-]
 _MOVES = 0.01  # speed over that of the fastest stone from which a stone belongs to a mechanism [-]
 
-Confirm = Callable[[LiveLoad, float], Confirmation]
-"""Confirmation of a candidate by runs."""
+_FIRST = 1.0  # λ from which runs seek the limit of a load that the bound does not limit [-]
+
+Confirm = Callable[[LiveLoad, float, float], Confirmation]
+"""Confirmation of a candidate by runs, below a bound."""
 
 Lead = Callable[[LiveLoad, LimitLoad, float | None], Pushover]
 """Pushover from a limit load, to a way [m] if one is known."""
@@ -107,12 +111,37 @@ def refuse_unanswerable(on: RigidAssembly, question: Question) -> None:
 
 def confirmer(on: RigidAssembly, runs: int, **listeners: Any) -> Confirm:
     """Return what confirms a candidate by runs of the stones, all rigid."""
-    return lambda live, candidate: confirm(on, live, candidate, runs, **listeners)
+    return lambda live, candidate, bound: confirm(on, live, candidate, bound, runs, **listeners)
 
 
 def leader(on: RigidAssembly, **listeners: Any) -> Lead:
     """Return what leads a mechanism to collapse by runs of the stones, all rigid."""
     return lambda live, found, reach: pushover(on, live, found, reach, **listeners)
+
+
+def fallen(on: RigidAssembly, question: Question, standing: Standing) -> Answer:
+    """Return the answer to any question about stones that do not stand under their dead load."""
+    velocity = np.zeros((len(on.model.mass), 6))
+    velocity[:, :3] = standing.displacement
+    falls = mechanism(on, velocity[on.free])
+    kind = "load"
+    told: dict[str, Any] = {"name": question.name, "outcome": FALLS, "headline": f"{question.name}: {FALLS}"}
+    match question:
+        case LoadQuestion():
+            told |= {"meaning": str(question.live), "candidate": None, "candidate_lowest": None}
+            told |= {"bound": None, "candidate_converged": None}
+        case ThrustQuestion():
+            kind = "settlement" if question.settles else "thrust"
+            told |= {
+                "meaning": f"push on {', '.join(question.supports)} [N]",
+                "least": None,
+                "greatest": None,
+            }
+        case Thickness():
+            kind = "thickness"
+            told |= {"meaning": "share to which all joints may shrink", "factor": None, "share": None}
+    told |= {"kind": kind, "mechanism": _moving(on, falls)}
+    return Answer(told, falls, np.zeros((len(on.contacts), 3)))
 
 
 def _load(
@@ -130,14 +159,19 @@ def _load(
         "bound_kind": "associative friction, rigorous upper bound",
         "candidate": None if candidate is None else _number(candidate.multiplier),
         "candidate_kind": "Coulomb's friction without dilatancy, candidate: the stones may fall at less",
-        "candidate_highest": None if candidate is None else _number(candidate.highest),
+        "candidate_lowest": None if candidate is None else _number(candidate.lowest),
         "candidate_converged": None if candidate is None else candidate.converged,
         "outcome": _outcome(bound.multiplier),
     }
     if question.whole and np.isfinite(lowest.multiplier):
         told["tilt"] = float(np.degrees(np.arctan(lowest.multiplier)))
-    if question.confirm and candidate is not None:
-        told["confirmation"] = _confirmed(on, confirming(live, candidate.multiplier), candidate)
+    unlimited = np.isinf(bound.multiplier)
+    if question.confirm or candidate is None or not candidate.converged:
+        # where statics gives no number, only runs can
+        first = _FIRST if unlimited else lowest.multiplier
+        told["confirmation"] = _confirmed(on, confirming(live, first, bound.multiplier), lowest)
+        if unlimited and told["confirmation"]["lost"] is not None:
+            told["outcome"] = "limited"
     if isinstance(live, Acceleration) and np.isfinite(lowest.multiplier):
         code = None if question.code is None or site is None else (question.code, site)
         told["kinematics"], checked = _kinematics(on, live, lowest, code)
@@ -197,8 +231,8 @@ def _candidate(on: RigidAssembly, live: LiveLoad, bound: LimitLoad) -> LimitLoad
 
 
 def _confirmed(on: RigidAssembly, found: Confirmation, candidate: LimitLoad) -> dict[str, Any]:
-    fallen = found.collapse
-    alike = None if fallen is None else likeness(on, candidate.mechanism, fallen.displacement)
+    lost = found.collapse
+    alike = None if lost is None else likeness(on, candidate.mechanism, lost.displacement)
     return {
         "held": found.held or None,
         "lost": _number(found.lost),
@@ -214,7 +248,7 @@ def _confirmed(on: RigidAssembly, found: Confirmation, candidate: LimitLoad) -> 
             for trial in found.trials
         ],
         "undecided": sum(
-            trial.outcome not in (Outcome.EQUILIBRIUM, Outcome.COLLAPSED) for trial in found.trials
+            not trial.outcome.rests and trial.outcome is not Outcome.COLLAPSED for trial in found.trials
         ),
     }
 
@@ -322,13 +356,17 @@ def _outcome(value: float) -> str:
 
 def _sentence(one: dict[str, Any]) -> str:
     if one["bound"] is None:
-        return f"{one['name']}: {one['outcome']}"
+        if one["outcome"] == FALLS or "confirmation" not in one:
+            return f"{one['name']}: {one['outcome']}"
+        return f"{one['name']}: no bound{_dynamics(one)}"
     text = f"{one['name']}: λ ≤ {one['bound']:.4g} (bound)"
     if one["candidate"] is None:
-        return f"{text}, NO CANDIDATE found"
+        return (
+            f"{text}, NO CANDIDATE found: below the bound nothing is known but what runs say{_dynamics(one)}"
+        )
     stood = "" if one["candidate_converged"] else ", NOT CONVERGED"
-    if one["candidate_highest"] > _ONE * one["candidate"]:
-        stood += f"; other forces of the same friction hold up to {one['candidate_highest']:.4g}"
+    if one["candidate"] > _ONE * one["candidate_lowest"]:
+        stood += f", other forces of the same friction hold no more than {one['candidate_lowest']:.4g}"
     angle = f", a tilt of {one['tilt']:.3g}°" if "tilt" in one else ""
     return f"{text}, {one['candidate']:.4g} (candidate{stood}){angle}{_dynamics(one)}{_collapse(one)}{_verdict(one)}"
 
@@ -339,7 +377,10 @@ def _dynamics(one: dict[str, Any]) -> str:
     found = one["confirmation"]
     held = "nothing held" if found["held"] is None else f"held at {found['held']:.4g}"
     lost = "nothing lost" if found["lost"] is None else f"lost at {found['lost']:.4g}"
-    text = f"; by the dynamics {'CONFIRMED' if found['agrees'] else 'NOT CONFIRMED'}: {held}, {lost}"
+    said = ""
+    if one["candidate"] is not None:
+        said = "CONFIRMED" if found["agrees"] else "NOT CONFIRMED"
+    text = f"; by the dynamics {said}: {held}, {lost}".replace("  ", " ").replace(" :", ":")
     if found["likeness"] is None:
         return text
     cosine = found["likeness"]["cosine"]

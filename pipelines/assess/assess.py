@@ -11,14 +11,17 @@ import numpy as np
 from archmodel.database.session import open_database
 from archmodel.store.run_record import MovingStone, RunRecord
 from archmodel.tables.entries import latest_entry
+from mechanics.dynamics.outcome import Outcome
 from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.limit.assembly import RigidAssembly, assembly
+from mechanics.limit.dead_load import Standing, at_instant, stands
 from mechanics.limit.joints import Resultants, resultants
 from mechanics.results.forecast.plan import loose_blocks
-from mechanics.scene.scene import Fidelity
+from mechanics.scene.scene import Fidelity, Scene
 from moma.errors import MissingLibraryError, UsageError
-from pipelines.assess.answers import FALLS, Answer, answer, confirmer, leader, refuse_unanswerable
+from pipelines.assess.answers import FALLS, Answer, answer, confirmer, fallen, leader, refuse_unanswerable
 from pipelines.assess.codes.check import CODES
+from pipelines.assess.directions import facade_pushes, weakest_push
 from pipelines.assess.questions import LoadQuestion, Question, parse_question, scene_questions
 from pipelines.draw.mechanism import draw_mechanisms
 from pipelines.draw.plots import draw_capacity
@@ -61,7 +64,9 @@ REPORT = "report.html"
 """Page for people."""
 
 _SOUND_FIRST = "limit loads need sound joints: mend the scene until `moma check` finds nothing"
-_RUNS = 6  # by which a candidate is confirmed, at most
+_LOOSE = 0.5  # share of the stones that may be left out as loose, at most [-]
+_NAMED = 6  # stones that fall which the headline names
+_RUNS = 12  # by which a candidate is confirmed, at most
 
 
 @dataclass(frozen=True)
@@ -90,6 +95,10 @@ def assess(
     progress: Listener = silent,
     confirm: bool = False,
     code: str | None = None,
+    *,
+    weakest: bool = False,
+    instant: float | None = None,
+    leave_out_loose: bool = False,
 ) -> Assessment:
     """Answer how far a scene is from falling, on the stones of a database; keep the answers there and in a folder.
 
@@ -98,11 +107,15 @@ def assess(
     path : scene file
     url : of the database
     folder : of the results; earlier ones there are replaced
-    loads : in words (`parse_question`); none: those of the scene's [[assess]], or horizontal along x, -x, y, -y
+    loads : in words (`parse_question`); none: those of the scene's [[assess]], or horizontal pushes square to each
+        façade, both ways, and along it
     progress : called at every stage
     confirm : candidates of all loads are confirmed by runs, also of those that do not ask for it
     code : by which mechanisms of pushes on all stones are checked (`pipelines.assess.codes.check.CODES`), where their
         question names no other; needs [site] in the scene
+    weakest : seek the direction of the weakest horizontal push, too
+    instant : at which loads that change with time are taken [s]; None: the one from which they are constant
+    leave_out_loose : stones that fall under their own weight are left out, and listed, if the others stand
 
     Raises
     ------
@@ -126,17 +139,27 @@ def assess(
     questions = [
         _asked(one, confirm, code) for one in asked or scene_questions(scene, groups, assembled.origin)
     ]
-    on = assembly(assembled.scene)
+    dead = at_instant(assembled.scene, instant)
+    on = assembly(dead)
     refuse_unsound(problems_of(scene, assembled, loose_blocks(on.model, on.state)), str(path), _SOUND_FIRST)
     for question in questions:
         refuse_unanswerable(on, question)
+    progress(Progress("assess", 0, len(questions), "do the stones stand by themselves?"))
+    on, standing, left_out = _standing(on, dead, leave_out_loose, progress)
+    questions = questions or [_asked(one, confirm, code) for one in facade_pushes(on.model.scene.blocks)]
+    if weakest and standing.outcome.rests:
+        progress(Progress("assess", 0, len(questions), "the weakest direction"))
+        questions.append(_asked(weakest_push(on), confirm, code))
     confirming, leading = confirmer(on, _RUNS, progress=progress), leader(on, progress=progress)
     answers: list[Answer] = []
     for number, question in enumerate(questions):
         progress(Progress("assess", number, len(questions), question.name))
-        answers.append(answer(on, question, confirming, leading, scene.site))
+        if standing.outcome.rests:
+            answers.append(answer(on, question, confirming, leading, scene.site))
+        else:
+            answers.append(fallen(on, question, standing))
     unchecked = [one.name for one in questions if code and isinstance(one, LoadQuestion) and one.code is None]
-    summary = _summary(assembled, on, answers, unchecked)
+    summary = _summary(assembled, on, answers, unchecked, standing, left_out)
     progress(Progress("write", 0, 1, "pictures"))
     warnings: list[str] = []
     with replacing(folder, INDEX) as fresh:
@@ -151,7 +174,7 @@ def assess(
         try:
             summary["files"] += draw_mechanisms(
                 fresh,
-                assembled.scene.blocks,
+                on.model.scene.blocks,
                 on,
                 list(zip(titles, moving, carried, strict=True)),
                 assembled.towards,
@@ -165,6 +188,24 @@ def assess(
         run = store_record(database, folder, _record(scene, on, answers, summary, as_of))
     progress(Progress("write", 1, 1))
     return Assessment(folder, summary, run, tuple(warnings))
+
+
+def _standing(
+    on: RigidAssembly, dead: Scene, leave_out: bool, progress: Listener
+) -> tuple[RigidAssembly, Standing, tuple[str, ...]]:
+    """Return stones under their dead load alone, without those that fall if they may be left out, and their codes."""
+    left_out: tuple[str, ...] = ()
+    standing = stands(on, progress)
+    first = on, standing
+    while leave_out and standing.outcome is Outcome.COLLAPSED and standing.moved:
+        loose = set(left_out) | set(standing.moved)
+        kept = tuple(block for block in dead.blocks if block.code not in loose)
+        if len(loose) > _LOOSE * len(on.free):
+            return *first, ()
+        left_out = tuple(sorted(loose))
+        on = assembly(replace(dead, blocks=kept))
+        standing = stands(on, progress)
+    return on, standing, left_out
 
 
 def _asked(question: Question, confirm: bool, code: str | None) -> Question:
@@ -188,14 +229,31 @@ def _refuse_code(code: str, scene: SceneFile) -> None:
 
 
 def _summary(
-    assembled: Assembly, on: RigidAssembly, answers: Sequence[Answer], unchecked: Sequence[str]
+    assembled: Assembly,
+    on: RigidAssembly,
+    answers: Sequence[Answer],
+    unchecked: Sequence[str],
+    standing: Standing,
+    left_out: Sequence[str],
 ) -> dict[str, Any]:
     """Return all answers; `unchecked` are the loads that the code of the option --code does not take."""
     soft = sum(block.fidelity is Fidelity.DEFORMABLE for block in assembled.scene.blocks)
     crushing = (
         "stones are rigid and do not crush" if on.crushing is None else "stones crush at their strength"
     )
+    until = assembled.scene.loads.until
     cautions = [
+        *(
+            [f"left out, as they fall under their own weight: {_some(left_out, len(left_out))}"]
+            if left_out
+            else []
+        ),
+        *([f"under the dead load alone {standing.reason}"] if standing.outcome is Outcome.SETTLED else []),
+        *(
+            ["loads that change are taken as they are in the end, but where an instant is named"]
+            if until
+            else []
+        ),
         f"{crushing}; joints keep their geometry until the mechanism moves",
         *([f"{soft} deformable stones count as rigid"] if soft else []),
         *([f"gaps of up to {1e3 * on.widest:.2g} mm count as closed"] if on.widest > 1e-6 else []),
@@ -214,20 +272,44 @@ def _summary(
         "contacts": len(on.contacts),
         "cautions": [*cautions, *assembled.remarks],
         "loads": told,
-        "headline": _headline(told),
+        "standing": {
+            "outcome": str(standing.outcome),
+            "reason": standing.reason,
+            "moved": list(standing.moved),
+        },
+        "left_out": list(left_out),
+        "headline": _headline(told, standing, left_out),
         "versions": dict(versions()),
     }
 
 
-def _headline(loads: Sequence[dict[str, Any]]) -> str:
-    """Return the decisive load in a sentence: the least candidate, or what cannot stand at all."""
-    if any(one["outcome"] == FALLS for one in loads):
-        return f"it {FALLS}"
-    limited = [one for one in loads if one.get("bound") is not None]
-    if limited:
-        least = min(limited, key=lambda one: one["bound"] if one["candidate"] is None else one["candidate"])
-        return str(least["headline"])
-    return str(loads[0]["headline"]) if loads[0]["kind"] != "load" else "nothing limits its loads"
+def _headline(loads: Sequence[dict[str, Any]], standing: Standing, left_out: Sequence[str]) -> str:
+    """Return the decisive load in a sentence: the least that is known, or what cannot stand at all."""
+    without = f"without {_some(left_out, _NAMED)}, which fall under their own weight, " if left_out else ""
+    if standing.outcome is Outcome.COLLAPSED:
+        loose = f": {_some(standing.moved, _NAMED)}" if standing.moved else ""
+        return f"it {FALLS}{loose}; --leave-out-loose assesses the rest, if that stands"
+    if not standing.outcome.rests:
+        return f"under its own weight it does not come to rest: {standing.reason}"
+    if standing.outcome is Outcome.SETTLED:
+        without += f"although {standing.reason}, "
+    least = min(loads, key=_limit)
+    if loads[0]["kind"] == "load" and not np.isfinite(_limit(least)):
+        return f"{without}nothing limits its loads"
+    governs = "governs: " if sum(one["kind"] == "load" for one in loads) > 1 else ""
+    return f"{without}{governs}{least['headline']}"
+
+
+def _limit(one: dict[str, Any]) -> float:
+    """Return the least load known at which an answer says that stones fall [-]; infinite without one."""
+    runs = one.get("confirmation", {})
+    known = [one.get("candidate"), one.get("bound"), runs.get("held") or runs.get("lost")]
+    return min((value for value in known if value is not None), default=float("inf"))
+
+
+def _some(codes: Sequence[str], most: int) -> str:
+    more = f" and {len(codes) - most} more" if len(codes) > most else ""
+    return ", ".join(codes[:most]) + more
 
 
 def _carried(on: RigidAssembly, found: Answer) -> Resultants | None:

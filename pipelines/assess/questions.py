@@ -81,7 +81,6 @@ _AXES: Mapping[str, Vector] = {
 }
 _OWN = ("confirm", "pushover", "code")
 _DOWN: Vector = (0.0, 0.0, -1.0)
-_USUAL = tuple(f"horizontal {axis}" for axis in ("x", "-x", "y", "-y"))
 _REMEDY = (
     'give "horizontal x", "horizontal 30" (degrees from x towards y), "tilt y", "force CODE FX FY FZ", '
     '"weight CODE,CODE", "thrust CODE,CODE x", "settlement CODE -z" or "thickness"'
@@ -121,15 +120,13 @@ def parse_question(words: str) -> Question:
 
 
 def scene_questions(scene: SceneFile, groups: Groups, origin: Array) -> tuple[Question, ...]:
-    """Return the questions of [[assess]]; the push along the four horizontal axes where there are none.
+    """Return the questions of [[assess]]; none where there are none.
 
     Parameters
     ----------
     scene, groups : the scene, and the codes of the stones that its tables name
     origin : (3,) of the scene, in the frame of the site [m]
     """
-    if not scene.assess:
-        return tuple(map(parse_question, _USUAL))
     found = []
     for entry in scene.assess:
         with scene.document.at(*entry.path):

@@ -54,6 +54,7 @@ _PACKAGES = {
 }
 _ENDINGS = {
     Outcome.EQUILIBRIUM: "at equilibrium",
+    Outcome.SETTLED: "SETTLED elsewhere",
     Outcome.MOVING: "still moving",
     Outcome.COLLAPSED: "collapsed",
     Outcome.UNDECIDED: "UNDECIDED: not solved",

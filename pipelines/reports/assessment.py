@@ -58,7 +58,8 @@ def _row(one: Mapping[str, Any]) -> tuple[str, ...]:
     tilt = f"{one['tilt']:.3g}°" if "tilt" in one else ""
     bound = one["outcome"] if one["bound"] is None else _number(one["bound"])
     held, lost = (_number(runs[end]) if runs.get(end) is not None else "" for end in ("held", "lost"))
-    return (one["name"], bound, _number(one["candidate"]), held, lost, tilt)
+    stood = "" if one["candidate_converged"] in (None, True) else " NOT CONVERGED"
+    return (one["name"], bound, _number(one["candidate"]) + stood, held, lost, tilt)
 
 
 def _part(folder: Path, number: int, one: Mapping[str, Any]) -> dict[str, Any]:

@@ -27,14 +27,15 @@ from pipelines.reports.peaks import peak_rows
 __all__ = ["write_report"]
 
 _OUTCOMES = {
-    "equilibrium": "It stands: every stone came to rest, in balance.",
+    "equilibrium": "It stands as surveyed: every stone is at rest, in balance.",
+    "settled": "It does not stand as surveyed: every stone came to rest, in balance, but not all in their places.",
     "moving": "It was still moving at the end of the simulated time: neither at rest nor collapsed.",
     "collapsed": "It falls: at least one stone moved too far to come back, and was still moving.",
     "undecided": "Nothing can be said: the steps that would decide were not solved.",
     "interrupted": "It was interrupted before its time: what it would have come to is not known.",
 }
 
-_OPEN = ("undecided", "interrupted")
+_OPEN = ("moving", "undecided", "interrupted")
 
 _ERRORS = (
     (

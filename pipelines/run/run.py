@@ -191,7 +191,7 @@ def write_results(
     """
     warnings = [*assembly.remarks, *(() if unfinished is None else unfinished.warnings)]
     # of a relaxation only the final equilibrium counts, whose steps are all solved
-    relaxed = result.outcome is Outcome.EQUILIBRIUM and result.scene.time.relaxation
+    relaxed = result.outcome.rests and result.scene.time.relaxation
     if result.errors.unconverged_steps and not relaxed:
         warnings.append(
             f"{result.errors.unconverged_steps} of {result.steps} steps were left above the solver's "

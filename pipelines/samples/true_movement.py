@@ -3,7 +3,6 @@
 import numpy as np
 
 from mechanics.dynamics.progress import Listener, silent
-from mechanics.results.result import Outcome
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.elastic_joint import ElasticJoint
 from mechanics.scene.loads.forces import StoneForce
@@ -81,7 +80,7 @@ def true_movement(cause: Cause, progress: Listener = silent) -> Movement:
         loads=Loads(motions=tuple(motions), forces=tuple(forces)),
     )
     result = simulate(scene, progress)
-    if result.outcome is not Outcome.EQUILIBRIUM:
+    if not result.outcome.rests:
         raise SolverError(
             f"the stones of the sample do not come to rest: {result.outcome}", remedy="choose another sample"
         )

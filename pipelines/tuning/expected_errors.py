@@ -105,7 +105,7 @@ def expected_errors(name: str, found: Quantities, free: float, *, rigid: bool) -
     free : fraction of its joints that statics leaves undetermined, see `loops`
     rigid : some of its stones are rigid
     """
-    if found.outcome != Outcome.EQUILIBRIUM:
+    if not Outcome(found.outcome).rests:
         return {}
     expected = {}
     for quantity in (*TYPICAL, *BOUNDS):

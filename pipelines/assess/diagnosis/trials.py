@@ -73,7 +73,7 @@ def run_trial(trial: Trial) -> Tried:
     cpu = time.process_time() - begun
     if result.outcome is Outcome.COLLAPSED:
         return Tried(None, "the run ended in collapse", cpu)
-    fault = "" if result.outcome is Outcome.EQUILIBRIUM else f"its run did not come to rest: {result.outcome}"
+    fault = "" if result.outcome.rests else f"its run did not come to rest: {result.outcome}"
     return Tried(stone_motions(result.bodies, assembly.origin), fault, cpu)
 
 

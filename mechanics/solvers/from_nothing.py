@@ -1,0 +1,52 @@
+"""Rest by forces that arise from nothing, or by self-stress alone (docs/theory.md §3)."""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from mechanics.arrays import Array
+from mechanics.delassus.compliant import CompliantDelassus
+from mechanics.problem.problem import ContactProblem, ContactStart, mean_diagonal
+from mechanics.problem.residual import residual
+from mechanics.solvers.chain import Link, follow
+from mechanics.solvers.first_order.body_admm import BodyADMM, Stage
+from mechanics.solvers.second_order.newton import Newton
+
+__all__ = ["rests_from_nothing"]
+
+# compliances of joints over the scale of W, a hundred apart, and penalties of ADMM that suit them [-]
+_JOINTS = (1e-4, 1e-3), (1e-6, 0.02)
+# velocity with the harder joints over that with the softer ones below which it vanishes with them [-]
+_VANISHES = 0.1
+# velocity over the largest u_free that is none: the tolerance of a step [-]
+_STILL = 1e-5
+# tolerances of η and of velocities, and steps or iterations in which they are to be met [-]
+_LIMITS, _STEPS, _ITERATIONS = (1e-6, 1e-5), 60, 300
+# contacts from which iterations with kept factors cost less than Newton's steps
+_MANY = 3000
+
+
+def rests_from_nothing(problem: ContactProblem) -> tuple[bool, Array]:
+    """Return whether stones are seen to rest by forces that arise from nothing, and these (nc, 3).
+
+    Joints with a small compliance E bring about one set of forces: those of the law at u = (W + E) r + u_free. Where
+    stones rest, W r + u_free is that by which joints yield, and vanishes with E; where it does not, they begin to move,
+    and may come to rest again after next to nothing.
+    """
+    operator, pace = problem.delassus, float(np.abs(problem.u_free).max(initial=0.0))
+    nothing = np.zeros_like(problem.u_free)
+    start, speeds, error = ContactStart(nothing, nothing), [], 0.0
+    for share, penalty in _JOINTS:
+        admm = partial(BodyADMM, stages=(Stage(penalty, _ITERATIONS, extrapolated=True),))
+        link = Link("body ADMM", admm, _ITERATIONS)
+        if len(nothing) < _MANY or operator.rigid is None:
+            link = Link("Newton", Newton, _STEPS)
+        yields = np.full_like(nothing, share * mean_diagonal(operator.diagonal))
+        yielding = replace(problem, delassus=CompliantDelassus(operator, yields))
+        found = follow((link,), yielding, start, _LIMITS, link.iterations)
+        start = ContactStart(found.impulse, found.velocity)
+        error = pace * residual(yielding, found.impulse).velocity
+        speeds.append(float(np.abs(operator.apply(found.impulse) + problem.u_free).max(initial=0.0)))
+    softer, harder = speeds
+    return harder + error <= max(_VANISHES * softer, _STILL * pace), start.impulse

@@ -1,0 +1,86 @@
+"""Directions in which a building is pushed: square to its façades and along them, or the weakest."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mechanics.arrays import Array
+from mechanics.limit.assembly import RigidAssembly
+from mechanics.limit.limit_load import limit_load
+from mechanics.limit.live_loads import Acceleration
+from mechanics.scene.scene import Block, Fidelity
+from pipelines.assess.questions import LoadQuestion
+
+__all__ = ["facade_pushes", "push", "weakest_push"]
+
+_UPRIGHT = 0.3  # vertical part of the normal of an upright face, at most [-]
+_ALIKE = np.radians(5.0)  # angle within which faces belong to one façade [rad]
+_PART = 0.25  # area of the upright faces that a façade has, those square to it included [-]
+_SAME = 0.5  # angle to an axis that is none [°]
+_COARSE, _FINE = 15, 1.0  # angles at which the weakest direction is sought, and to which [°]
+_AXES = {0.0: "x", 90.0: "y", 180.0: "-x", 270.0: "-y"}
+
+
+def push(angle: float) -> LoadQuestion:
+    """Return the question of a horizontal push at an angle from x towards y [°]."""
+    near = min(_AXES, key=lambda one: abs((angle - one + 180.0) % 360.0 - 180.0))
+    if abs((angle - near + 180.0) % 360.0 - 180.0) <= _SAME:
+        x, y = round(np.cos(np.radians(near))), round(np.sin(np.radians(near)))
+        return LoadQuestion(f"horizontal {_AXES[near]}", Acceleration((float(x), float(y), 0.0)))
+    turn = np.radians(angle)
+    return LoadQuestion(
+        f"horizontal {angle % 360.0:.3g}", Acceleration((float(np.cos(turn)), float(np.sin(turn)), 0.0))
+    )
+
+
+def facade_pushes(blocks: Sequence[Block]) -> tuple[LoadQuestion, ...]:
+    """Return pushes square to each façade, both ways, and along it; along the axes where stones have none.
+
+    The façades are the directions that most upright faces of the stones share, up to a right angle.
+    """
+    area, angle = _upright([block for block in blocks if block.fidelity is not Fidelity.FIXED])
+    turns, left = list[float](), np.ones(len(area), dtype=bool)
+    while left.any():
+        # angles count four times: faces at right angles are of one façade or of those beside it
+        near = np.abs(np.angle(np.exp(4j * (angle[:, None] - angle[left])))) <= 4.0 * _ALIKE
+        weight = (area * left) @ near
+        peak = int(weight.argmax())
+        if weight[peak] < _PART * area.sum():
+            break
+        own = near[:, peak] & left
+        turns.append(float(np.degrees(np.angle(area[own] @ np.exp(4j * angle[own])) / 4.0)) % 90.0)
+        left &= ~own
+    sides = (0.0, 180.0, 90.0, 270.0)
+    return tuple(push(turn + side) for turn in turns or [0.0] for side in sides)
+
+
+def weakest_push(on: RigidAssembly) -> LoadQuestion:
+    """Return the horizontal push that the bound of associative friction limits most."""
+    known: dict[float, float] = {}
+
+    def bound(angle: float) -> float:
+        if angle not in known:
+            known[angle] = limit_load(on, push(angle).live).multiplier
+        return known[angle]
+
+    best = min((float(one) for one in range(0, 360, _COARSE)), key=bound)
+    width = _COARSE / 2.0
+    while width >= _FINE:
+        best = min((best - width, best, best + width), key=bound)
+        width /= 2.0
+    found = push(best)
+    return LoadQuestion(f"{found.name} (weakest)", found.live)
+
+
+def _upright(blocks: Sequence[Block]) -> tuple[Array, Array]:
+    """Return area [m²] and horizontal angle of the normal [rad] of all upright faces."""
+    areas, angles = [], []
+    for block in blocks:
+        for face in block.faces:
+            corners = block.vertices[list(face)]
+            normal = 0.5 * np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
+            size = float(np.linalg.norm(normal))
+            if size > 0.0 and abs(normal[2]) <= _UPRIGHT * size:
+                areas.append(size)
+                angles.append(float(np.arctan2(normal[1], normal[0])))
+    return np.array(areas), np.array(angles)
