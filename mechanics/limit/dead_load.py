@@ -9,13 +9,14 @@ from mechanics.arrays import Array
 from mechanics.dynamics.outcome import Outcome
 from mechanics.dynamics.progress import Listener, silent
 from mechanics.dynamics.stopping import MOVED
-from mechanics.limit.assembly import RigidAssembly
+from mechanics.limit.assembly import RigidAssembly, assembly
+from mechanics.limit.programme import Ending, Programme
 from mechanics.scene.loads.load import Force, Loads
 from mechanics.scene.scene import Scene, Start
 from mechanics.simulate import simulate
 from moma.errors import SceneError
 
-__all__ = ["Standing", "at_instant", "stands"]
+__all__ = ["Standing", "admits_rest", "at_instant", "stands"]
 
 
 @dataclass(frozen=True)
@@ -84,6 +85,19 @@ class Standing:
     reason: str
     moved: tuple[str, ...]
     displacement: Array
+
+
+def admits_rest(scene: Scene) -> bool:
+    """Return whether some forces within the strength of rigid joints balance the dead load, whatever brings them about.
+
+    Raises
+    ------
+    SceneError, SolverError : see `assembly` and `Programme`
+    """
+    on = assembly(at_instant(scene))
+    least = np.zeros((len(on.contacts), 3))
+    least[:, 0] = 1.0 / len(least)
+    return Programme(on, None, scene.name).solve(on.strength, cost=least).ending is Ending.FOUND
 
 
 def stands(

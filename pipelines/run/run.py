@@ -14,6 +14,7 @@ from archmodel.database.session import open_database
 from archmodel.store.run_record import StoneResult
 from archmodel.tables.entries import latest_entry
 from mechanics.dynamics.progress import Listener, Progress, silent
+from mechanics.limit.dead_load import admits_rest
 from mechanics.model.model import build_model
 from mechanics.results.forecast.plan import loose_blocks
 from mechanics.results.result import Outcome, Result
@@ -22,7 +23,7 @@ from mechanics.simulate import simulate, simulate_stages
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.files import check_mesh_file, write_meshes
 from mechanics.stones.meshing.mesh import VolumeMesh
-from moma.errors import MissingLibraryError
+from moma.errors import MissingLibraryError, MomaError
 from pipelines.draw.pictures import OF_RESULTS, draw_pictures, drawing_process, missing
 from pipelines.draw.plots import history_svg
 from pipelines.reports.run import write_report
@@ -156,6 +157,8 @@ def run_scene(
                 result = simulate(assembly.scene, progress, stop, built, unfinished)
             if problems:
                 result = replace(result, cautions=(caution_of(problems), *result.cautions))
+            if not assembly.stages and _by_self_stress(result):
+                result = replace(result, cautions=(_SELF_STRESS, *result.cautions))
             seconds |= result.wall_time
             stones, reached = stone_results(result), profile_report(profile, scene, result)
             with replacing(folder) as fresh:
@@ -236,6 +239,22 @@ def write_results(
     (folder / "summary.json").write_text(as_json(summary), encoding="utf-8")
     progress(Progress("write", 3, 3))
     return summary, tuple(warnings)
+
+
+_SELF_STRESS = "rigid joints admit a rest as surveyed, held only by self-stress, which no load applies"
+
+
+def _by_self_stress(result: Result) -> bool:
+    """Return whether forces between rigid joints could hold stones that do not stand, as no load brings them about."""
+    scene = result.scene
+    still = not scene.loads.until and not any(any(block.velocity) for block in scene.blocks)
+    rigid = all(block.fidelity is not Fidelity.DEFORMABLE for block in scene.blocks)
+    if not (still and rigid and result.outcome in (Outcome.COLLAPSED, Outcome.MOVING, Outcome.SETTLED)):
+        return False
+    try:
+        return admits_rest(scene)
+    except MomaError:
+        return False
 
 
 def _elements(assembly: Assembly) -> dict[str, Element]:
