@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from moma.cli.assess import assess, compare, diagnose
+from moma.cli.console import PlainCommand, PlainGroup
 from moma.cli.database import export, import_, migrate
 from moma.cli.entities import query, schema, show
 from moma.cli.geology import geology
@@ -19,6 +20,7 @@ from moma.cli.surveys import ingest, sample, survey_report
 __all__ = ["app", "main"]
 
 app = typer.Typer(
+    cls=PlainGroup,
     name="moma",
     help="From a stone-by-stone survey of a historic building to a mechanical simulation of it.",
     no_args_is_help=True,
@@ -78,6 +80,6 @@ _COMMANDS = (
     migrate,
 )
 for _command in _COMMANDS:
-    app.command(_command.__name__.strip("_").replace("_", "-"))(_command)
+    app.command(_command.__name__.strip("_").replace("_", "-"), cls=PlainCommand)(_command)
 # another name of trade, which reads as commerce to some
-app.command("tradeoff", hidden=True)(trade)
+app.command("tradeoff", hidden=True, cls=PlainCommand)(trade)

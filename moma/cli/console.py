@@ -1,4 +1,4 @@
-"""Output on stderr, beside the results, warnings and errors; and how short commands end soon."""
+"""Output on stderr, beside the results, warnings and errors; help as plain text; and how short commands end soon."""
 
 import gc
 import sys
@@ -7,15 +7,46 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import wraps
-from typing import ParamSpec, TextIO
+from typing import Any, ParamSpec, TextIO
 
 import typer
+from typer.core import HAS_RICH, TyperCommand, TyperGroup
 
 from moma.errors import MomaError
 
-__all__ = ["reporting", "say", "short_lived"]
+__all__ = ["PlainCommand", "PlainGroup", "reporting", "say", "short_lived"]
 
 P = ParamSpec("P")
+
+
+class PlainCommand(TyperCommand):
+    """Command whose help is shown as it is written: [[loads]] in it is no markup."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the help, once in the life of a command."""
+        _escape(self)
+        super().format_help(ctx, formatter)
+
+
+class PlainGroup(TyperGroup):
+    """Group of commands whose help is shown as it is written."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the help of the group, and the first line of that of each command."""
+        for one in (self, *self.commands.values()):
+            _escape(one)
+        super().format_help(ctx, formatter)
+
+
+def _escape(command: Any) -> None:
+    """Escape what Rich, where Typer uses it, would take for markup in the help of a command and of its parameters."""
+    if not HAS_RICH:
+        return
+    from rich.markup import escape
+
+    for one in (command, *command.params):
+        if getattr(one, "help", None):
+            one.help = escape(one.help)
 
 
 def say(message: str) -> None:

@@ -146,12 +146,12 @@ def _bars() -> "Iterator[Listener]":
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns: list[Any] = [
-        TextColumn("{task.description:>12}"),
+        TextColumn("{task.description:>12}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
         TextColumn("{task.fields[left]}"),
-        TextColumn("{task.fields[text]}"),
+        TextColumn("{task.fields[text]}", markup=False),  # codes of stones may hold brackets
     ]
     stages = _Stages()
     with Progress(*columns, console=Console(stderr=True), transient=True) as bars:

@@ -3,6 +3,7 @@
 Nothing runs and no database is read here; stones are still expressions. docs/scene.md lists the keys.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -231,6 +232,13 @@ def _time(document: TomlDocument, values: dict[str, Any]) -> TimeSettings:
             "time",
             "duration",
             remedy="give at least one step",
+        )
+    if not math.isfinite(values["duration"] / values["step"]):
+        document.fail(
+            f"step = {values['step']:g} s is too short to count the steps of {values['duration']:g} s",
+            "time",
+            "step",
+            remedy="usual steps are 0.5 to 10 ms",
         )
     return build(TimeSettings, values)
 
