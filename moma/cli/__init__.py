@@ -1,6 +1,7 @@
 """Command line of MOMA. Commands import heavy packages themselves, so that help is fast."""
 
 import gc
+import signal
 from typing import Annotated
 
 import typer
@@ -30,7 +31,8 @@ app = typer.Typer(
 
 
 def main() -> None:
-    """Run the command line; exit code 0 done, 1 failed, 2 wrong use."""
+    """Run the command line; exit code 0 done, 1 failed, 2 wrong use, 130 ended by Ctrl-C or SIGTERM."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # raises KeyboardInterrupt, as Ctrl-C does
     try:
         app(prog_name="moma")
     finally:

@@ -14,22 +14,27 @@ from archmodel.tables.entries import latest_entry
 from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.limit.assembly import RigidAssembly, assembly
 from mechanics.limit.joints import Resultants, resultants
+from mechanics.limit.limit_load import Mechanism
+from mechanics.limit.pushover import Pushover
 from mechanics.results.forecast.plan import loose_blocks
 from mechanics.scene.scene import Fidelity
 from moma.errors import MissingLibraryError, UsageError
 from pipelines.assess.answers import FALLS, Answer, answer, confirmer, leader, refuse_unanswerable
 from pipelines.assess.codes.check import CODES
+from pipelines.assess.kept import Kept, kept_answers
 from pipelines.assess.questions import LoadQuestion, Question, parse_question, scene_questions
 from pipelines.draw.mechanism import draw_mechanisms
 from pipelines.draw.plots import draw_capacity
 from pipelines.reports.assessment import write_assessment
-from pipelines.results.folder import check_replaceable, replacing
+from pipelines.results.folder import UNFINISHED_ASSESSMENT, check_replaceable, replacing
 from pipelines.results.summary import as_json
 from pipelines.run.assemble import Assembly, assemble_stones
 from pipelines.run.record import store_record, versions
 from pipelines.run.soundness import problems_of, refuse_unsound
 from pipelines.scene.file import SceneFile, read_scene
+from pipelines.scene.fingerprint import digest, fingerprint
 from pipelines.scene.selection import select_groups, select_stones
+from pipelines.scene.site import Site
 from pipelines.scene.stages import refuse_stages
 
 __all__ = ["CURVE_COLUMNS", "INDEX", "JOINT_COLUMNS", "REPORT", "Assessment", "assess"]
@@ -90,8 +95,11 @@ def assess(
     progress: Listener = silent,
     confirm: bool = False,
     code: str | None = None,
+    overwrite: bool = False,
 ) -> Assessment:
     """Answer how far a scene is from falling, on the stones of a database; keep the answers there and in a folder.
+
+    Each answer is kept in the folder as soon as there is one: stopped or killed, the same call goes on from there.
 
     Parameters
     ----------
@@ -103,17 +111,19 @@ def assess(
     confirm : candidates of all loads are confirmed by runs, also of those that do not ask for it
     code : by which mechanisms of pushes on all stones are checked (`pipelines.assess.codes.check.CODES`), where their
         question names no other; needs [site] in the scene
+    overwrite : replace the results of another scene in the folder
 
     Raises
     ------
-    UsageError : the folder holds other files, a load cannot be read, or there is no such code or no site
+    UsageError : the folder holds other files, or results of another scene; a load cannot be read; there is no such code
+        or no site
     UnsoundSceneError : the scene has problems that `check_scene` reports
     SceneError, GeometryError, SolverError : see `assemble` and `mechanics.limit`
     DatabaseError : the database cannot be read or written
     """
     folder, scene, asked = Path(folder), read_scene(path), tuple(map(parse_question, loads))
     refuse_stages(scene.stages, scene.document, "moma assess")
-    check_replaceable(folder, INDEX)
+    check_replaceable(folder, INDEX, () if overwrite else (Path(path),))
     if code is not None:
         _refuse_code(code, scene)
     progress(Progress("blocks", 0, None, "reading the stones"))
@@ -130,16 +140,17 @@ def assess(
     refuse_unsound(problems_of(scene, assembled, loose_blocks(on.model, on.state)), str(path), _SOUND_FIRST)
     for question in questions:
         refuse_unanswerable(on, question)
-    confirming, leading = confirmer(on, _RUNS, progress=progress), leader(on, progress=progress)
-    answers: list[Answer] = []
-    for number, question in enumerate(questions):
-        progress(Progress("assess", number, len(questions), question.name))
-        answers.append(answer(on, question, confirming, leading, scene.site))
+    given = digest(sorted(fingerprint(assembled.scene, on.model, on.state, models).items()))
+    with kept_answers(folder, UNFINISHED_ASSESSMENT, (Answer, Mechanism, Pushover)) as kept:
+        if len(kept):
+            text = f"going on, with {len(kept)} answers that were found before"
+            progress(Progress("assess", 0, len(questions), found=text))
+        answers = _answered(on, questions, scene.site, kept, given, progress)
     unchecked = [one.name for one in questions if code and isinstance(one, LoadQuestion) and one.code is None]
     summary = _summary(assembled, on, answers, unchecked)
     progress(Progress("write", 0, 1, "pictures"))
     warnings: list[str] = []
-    with replacing(folder, INDEX) as fresh:
+    with replacing(folder, INDEX, (Path(path),)) as fresh:
         carried = [_carried(on, one) for one in answers]
         summary["files"] = [INDEX, REPORT, "scene.toml", *_write_forces(fresh, on, assembled, carried)]
         titles = [
@@ -165,6 +176,37 @@ def assess(
         run = store_record(database, folder, _record(scene, on, answers, summary, as_of))
     progress(Progress("write", 1, 1))
     return Assessment(folder, summary, run, tuple(warnings))
+
+
+def _answered(
+    on: RigidAssembly,
+    questions: Sequence[Question],
+    site: Site | None,
+    kept: Kept,
+    given: str,
+    progress: Listener,
+) -> list[Answer]:
+    """Answer the questions that are not answered yet; each answer is kept, and told, as soon as there is one."""
+    answers: list[Answer] = []
+    total = len(questions)
+
+    def within(report: Progress) -> None:
+        """Tell how far the runs of a question are, as a part of the whole."""
+        done = f" {report.done}" if report.done else ""
+        text = f"{questions[len(answers)].name}: {report.stage}{done}"
+        progress(Progress("assess", len(answers), total, ", ".join(filter(None, (text, report.text)))))
+
+    confirming, leading = confirmer(on, _RUNS, progress=within), leader(on, progress=within)
+    for number, question in enumerate(questions):
+        progress(Progress("assess", number, total, question.name))
+        decides = [given, digest([question, site])]
+        found: Answer | None = kept.get(decides)
+        if found is None:
+            found = answer(on, question, confirming, leading, site)
+            kept.put(decides, found)
+        answers.append(found)
+        progress(Progress("assess", number + 1, total, question.name, found.told["headline"]))
+    return answers
 
 
 def _asked(question: Question, confirm: bool, code: str | None) -> Question:

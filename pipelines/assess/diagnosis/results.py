@@ -11,7 +11,7 @@ from pipelines.assess.diagnosis.dating import Dating
 from pipelines.assess.diagnosis.file import DiagnosisFile
 from pipelines.assess.diagnosis.measurements import Measurements
 from pipelines.assess.diagnosis.ranking import Ranked, verdict
-from pipelines.assess.diagnosis.search import Case, Fitted
+from pipelines.assess.diagnosis.search import RECORDS, Case, Fitted
 from pipelines.assess.motions import Motions
 from pipelines.draw.elevations.movement import draw_bed_movement
 from pipelines.results.summary import as_json
@@ -23,7 +23,6 @@ from survey.quality.movement import CourseMovement, compare_courses
 __all__ = ["INDEX", "write_best", "write_diagnosis"]
 
 _BEST = "best.toml"  # name of the scene
-_RECORDS = ("x", "y", "z")  # keys of a ground motion that name files
 
 _HYPOTHESIS = "rank hypothesis stood chi2 dof probability aicc amplitude unit value low high"  # columns
 
@@ -218,7 +217,7 @@ class _Copies:
             return [self.named(one) for one in part]
         if not isinstance(part, Mapping):
             return part
-        names = _RECORDS if part.get("type") == "ground_motion" else ("file",)
+        names = RECORDS if part.get("type") == "ground_motion" else ("file",)
         return {
             key: self._copied(one) if key in names and isinstance(one, str) else self.named(one)
             for key, one in part.items()

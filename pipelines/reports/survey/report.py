@@ -45,6 +45,7 @@ def report_surveys(
     format: str = "moma",
     options: ReadingOptions | None = None,
     progress: Listener = silent,
+    overwrite: bool = False,
 ) -> SurveyReport:
     """Judge survey files and write the report, which includes the stones that could not be made.
 
@@ -55,16 +56,18 @@ def report_surveys(
     format : name of their format
     options : defaults for what the files leave out
     progress : called at every stage
+    overwrite : replace a report on other files in the folder
 
     Raises
     ------
-    UsageError : no such file or format; the folder holds other things
+    UsageError : no such file or format; the folder holds other things, or a report on other files
     SurveyError : a file that cannot be read at all, or control points that contradict each other
     """
     folder = Path(folder)
-    check_replaceable(folder, INDEX)
+    source = [Path(one) for one in paths]
+    check_replaceable(folder, INDEX, () if overwrite else source)
     study = study_surveys(paths, format, options or ReadingOptions(), progress)
-    with replacing(folder, INDEX) as fresh:
+    with replacing(folder, INDEX, source) as fresh:
         content = write_survey_report(study, fresh, progress)
     return SurveyReport(folder, study, content)
 
