@@ -134,15 +134,19 @@ class _Stages:
 
     def line(self) -> str | None:
         """Return one line on the present stage; None if no stage has begun."""
-        from moma.cli.text.checks import duration
-
         if (report := self.latest) is None:
             return None
         counted = (
             f" {report.done} of {report.total}" if report.total else f" {report.done}" if report.done else ""
         )
         parts = [f"{report.stage}{counted}", self.left(), report.text]
-        return f"[{duration(time.monotonic() - self.begun)}] {', '.join(filter(None, parts))}"
+        return f"[{self.age()}] {', '.join(filter(None, parts))}"
+
+    def age(self) -> str:
+        """Return the time since the command began, in words."""
+        from moma.cli.text.checks import duration
+
+        return duration(time.monotonic() - self.begun)
 
     def _now(self) -> float:
         """Return the time without that of compilations [s]."""
@@ -167,13 +171,14 @@ def progress_bars() -> "Iterator[Listener]":
 def _lines(stages: _Stages) -> "Iterator[Listener]":
     """Yield a listener whose latest report is printed from the first second on, however long a stage is silent.
 
-    Results are printed as they come.
+    Results are printed as they come, if the command takes longer.
     """
     over = threading.Event()
 
     def print_lines() -> None:
         pause = _FIRST
         while not over.wait(pause):
+            print_found()
             if (line := stages.line()) is not None:
                 say(line)
             pause = _EVERY
@@ -181,8 +186,14 @@ def _lines(stages: _Stages) -> "Iterator[Listener]":
     def listen(report: "Report") -> None:
         stages(report)
         if report.found:
-            say(report.found)
+            found.append(f"[{stages.age()}] {report.found}")
+            print_found()
 
+    def print_found() -> None:
+        while found and time.monotonic() - stages.begun >= _FIRST:
+            say(found.popleft())
+
+    found: deque[str] = deque()
     thread = threading.Thread(target=print_lines, daemon=True)
     thread.start()
     try:
@@ -190,6 +201,7 @@ def _lines(stages: _Stages) -> "Iterator[Listener]":
     finally:
         over.set()
         thread.join()
+        print_found()
 
 
 @contextmanager

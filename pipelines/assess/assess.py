@@ -26,7 +26,7 @@ from pipelines.assess.questions import LoadQuestion, Question, parse_question, s
 from pipelines.draw.mechanism import draw_mechanisms
 from pipelines.draw.plots import draw_capacity
 from pipelines.reports.assessment import write_assessment
-from pipelines.results.folder import UNFINISHED_ASSESSMENT, check_replaceable, replacing
+from pipelines.results.folder import UNFINISHED_ASSESSMENT, check_replaceable, replacing, source_of
 from pipelines.results.summary import as_json
 from pipelines.run.assemble import Assembly, assemble_stones
 from pipelines.run.record import store_record, versions
@@ -150,7 +150,7 @@ def assess(
     summary = _summary(assembled, on, answers, unchecked)
     progress(Progress("write", 0, 1, "pictures"))
     warnings: list[str] = []
-    with replacing(folder, INDEX, (Path(path),)) as fresh:
+    with replacing(folder, INDEX) as fresh:
         carried = [_carried(on, one) for one in answers]
         summary["files"] = [INDEX, REPORT, "scene.toml", *_write_forces(fresh, on, assembled, carried)]
         titles = [
@@ -169,6 +169,7 @@ def assess(
             )
         except MissingLibraryError as error:
             warnings.append(f"no pictures: {error}")
+        summary["source"] = source_of([path], fresh)
         write_assessment(fresh / REPORT, summary)
         (fresh / "scene.toml").write_text(scene.text, encoding="utf-8")
         (fresh / INDEX).write_text(as_json(summary), encoding="utf-8")

@@ -18,7 +18,7 @@ from mechanics.simulate import simulate
 from pipelines.assess.motions import stone_motions
 from pipelines.draw.elevations.movement import draw_bed_movement, draw_misfit
 from pipelines.ingest.records import surveyed_block
-from pipelines.results.folder import check_replaceable, replacing
+from pipelines.results.folder import check_replaceable, replacing, source_of
 from pipelines.results.stone_values import stone_results
 from pipelines.results.summary import as_json, summarise
 from pipelines.run.assemble import Assembly, assemble_stones
@@ -112,9 +112,10 @@ def compare(
         plumb = compare_plumb(stones, facades, moved, battered)
         progress(Progress("write", 0, 1, "pictures"))
         summary = _summary(result, assembly, courses, plumb, battered)
-        with replacing(folder, INDEX, (Path(path),)) as fresh:
+        with replacing(folder, INDEX) as fresh:
             _draw(fresh, facades, stones, courses)
             (fresh / "scene.toml").write_text(scene.text, encoding="utf-8")
+            summary["source"] = source_of([path], fresh)
             summary["files"] = sorted([INDEX, *(entry.name for entry in fresh.iterdir())])
             (fresh / INDEX).write_text(as_json(summary), encoding="utf-8")
         kept = summarise(result, version=versions()["moma"], seconds=result.wall_time)

@@ -203,15 +203,7 @@ def run_geology(
 
         with scene.document.at(kind):
             result, _ = run_planar(
-                planar,
-                folder,
-                resume,
-                scene.output.checkpoint,
-                progress,
-                stop,
-                observers,
-                write,
-                (Path(path),),
+                planar, folder, resume, scene.output.checkpoint, progress, stop, observers, write
             )
         if database is not None:
             number = store_record(database, folder, _geology_record(scene, result, summary, rows))

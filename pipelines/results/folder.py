@@ -1,7 +1,7 @@
 """Atomic replacement of result folders: all files appear or none, and only earlier results are replaced.
 
-The index of the results names the files that they are of, as ``source``. Results of others are replaced only where
-that is asked for.
+The index of the results names the files that they are of (`source_of`). Results of others are replaced only where that
+is asked for.
 
 New results are written into a hidden folder beside the place, ``.NAME.moma-XXXXXXXX``, which then changes places with
 the earlier ones. Where the system exchanges two names at once, there is an old or a new complete folder at every
@@ -17,12 +17,11 @@ import os
 import shutil
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from moma.errors import UsageError, storing
-from pipelines.results.summary import as_json
 
 if sys.platform != "win32":
     import fcntl
@@ -35,6 +34,7 @@ __all__ = [
     "check_replaceable",
     "locked",
     "replacing",
+    "source_of",
 ]
 
 RUN_INDEX = "summary.json"
@@ -100,7 +100,7 @@ def check_replaceable(folder: Path, index: str = RUN_INDEX, source: Sequence[Pat
     for left, (own, what) in _LEFT.items():
         if index != own and (folder / left).exists():
             raise UsageError(f"holds an unfinished {what}", where=place, remedy=remedy)
-    if source and (earlier := _source(folder)) not in (None, _relative(source, folder)):
+    if source and (earlier := _source(folder)) not in (None, source_of(source, folder)):
         there = " and ".join(os.path.normpath(folder / one) for one in earlier or ())
         raise UsageError(
             f"holds the results of {there}", where=place, remedy=f"{remedy}, or replace them with --overwrite"
@@ -122,11 +122,10 @@ def _refuse_unwritable(folder: Path) -> None:
 
 
 @contextmanager
-def replacing(folder: Path, index: str = RUN_INDEX, source: Sequence[Path] = ()) -> Iterator[Path]:
+def replacing(folder: Path, index: str = RUN_INDEX) -> Iterator[Path]:
     """Yield a fresh folder, which replaces `folder` when the block ends without an error.
 
-    If the block fails, is interrupted or killed, `folder` stays as it was. The index of the new results is given their
-    source; `folder`, `index` and `source` are those of `check_replaceable`, which has been asked before.
+    If the block fails, is interrupted or killed, `folder` stays as it was.
 
     Raises
     ------
@@ -148,7 +147,6 @@ def replacing(folder: Path, index: str = RUN_INDEX, source: Sequence[Path] = ())
     try:
         with storing(str(folder), "earlier results there are as they were" if folder.exists() else ""):
             yield fresh
-            _name_source(fresh / index, _relative(source, folder))
             fresh.chmod(0o777 & ~_umask())  # mkdtemp makes it private
             check_replaceable(folder, index)
             _put(fresh, target)
@@ -158,22 +156,19 @@ def replacing(folder: Path, index: str = RUN_INDEX, source: Sequence[Path] = ())
             os.close(handle)
 
 
-def _relative(source: Sequence[Path], folder: Path) -> list[str]:
-    """Return files relative to a folder, so that both can be moved together; absolute on another drive."""
+def source_of(files: Iterable[str | Path], folder: Path) -> list[str]:
+    """Return the files that results are of, relative to their folder, so that both can be moved together.
+
+    That is ``source`` in the index of the results. Files on another drive than the folder are absolute.
+    """
 
     def relative(path: Path) -> str:
         try:
-            return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
+            return Path(os.path.relpath(path, folder.resolve())).as_posix()
         except ValueError:
-            return path.resolve().as_posix()
+            return path.as_posix()
 
-    return [relative(one) for one in source]
-
-
-def _name_source(index: Path, source: list[str]) -> None:
-    if source and index.exists():
-        told = json.loads(index.read_text(encoding="utf-8")) | {_SOURCE: source}
-        index.write_text(as_json(told), encoding="utf-8")
+    return [relative(Path(one).resolve()) for one in files]
 
 
 def _source(folder: Path) -> list[str] | None:

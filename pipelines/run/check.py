@@ -15,7 +15,7 @@ from moma.errors import GeometryError, MeshError
 from pipelines.draw.catalogue import PICTURES
 from pipelines.draw.closing_pictures import draw_closing
 from pipelines.draw.elevations.closing_shapes import ClosingShapes, Stages, closing_shapes
-from pipelines.results.folder import check_replaceable, replacing
+from pipelines.results.folder import check_replaceable, replacing, source_of
 from pipelines.results.summary import as_json
 from pipelines.run.assemble import Assembly, assemble_stones, wishes_of
 from pipelines.run.check_report import (
@@ -107,9 +107,14 @@ def check_scene(
 
 def _with_pictures(report: CheckReport, assembly: Assembly, folder: Path, scene: Path) -> CheckReport:
     """Draw the pictures into the folder, all of them or none; return the report that lists them."""
-    with replacing(folder, _INDEX, (scene,)) as fresh:
+    with replacing(folder, _INDEX) as fresh:
         files, warnings = draw_closing(fresh, _shapes(report.scene, assembly))
-        report = replace(report, files=(*files, _INDEX), warnings=(*report.warnings, *warnings))
+        report = replace(
+            report,
+            files=(*files, _INDEX),
+            warnings=(*report.warnings, *warnings),
+            source=tuple(source_of([scene], fresh)),
+        )
         (fresh / _INDEX).write_text(as_json(asdict(report)), encoding="utf-8")
     return report
 

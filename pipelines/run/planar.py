@@ -29,7 +29,6 @@ def run_planar(
     stop: Callable[[], bool] = lambda: False,
     observers: Sequence[PlanarObserver] = (),
     write: Write | None = None,
-    source: Sequence[Path] = (),
 ) -> tuple[PlanarResult, tuple[str, ...]]:
     """Run a scene of the plane with checkpoints; return its result, and warnings of checkpoints.
 
@@ -44,7 +43,6 @@ def run_planar(
     every : number of steps between two checkpoints; those that would take more than 4 % of the time are left out
     progress, stop, observers : as in `simulate_planar`
     write : called at the end, even of an interrupted run, with a new folder that then takes the place of `folder`
-    source : files that the results are of
 
     Raises
     ------
@@ -58,7 +56,7 @@ def run_planar(
         archive.open((), planar_fingerprint(scene), versions(), steps, bool(resume))
         result = simulate_planar(scene, progress, stop, archive, observers)
         if write is not None:
-            with replacing(folder, source=source) as fresh:
+            with replacing(folder) as fresh:
                 write(fresh, result, archive)
                 archive.hand_over(fresh)
         if result.outcome is not Outcome.INTERRUPTED:

@@ -26,7 +26,7 @@ from moma.errors import MissingLibraryError, storing
 from pipelines.draw.pictures import OF_RESULTS, draw_pictures, drawing_process, missing
 from pipelines.draw.plots import history_svg
 from pipelines.reports.run import write_report
-from pipelines.results.folder import check_replaceable, replacing
+from pipelines.results.folder import check_replaceable, replacing, source_of
 from pipelines.results.joints_csv import write_joints
 from pipelines.results.series_csv import write_series
 from pipelines.results.stone_values import stone_results
@@ -160,7 +160,7 @@ def run_scene(
                 result = replace(result, cautions=(caution_of(problems), *result.cautions))
             seconds |= result.wall_time
             stones, reached = stone_results(result), profile_report(profile, scene, result)
-            with replacing(folder, source=(Path(path),)) as fresh:
+            with replacing(folder) as fresh:
                 summary, warnings = write_results(
                     result, stones, scene, assembly, fresh, seconds, progress, reached, unfinished, ready
                 )
@@ -233,6 +233,7 @@ def write_results(
     write_report(folder / "report.html", result, summary, stones, warnings, history)
     (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
     summary["resumed"] = [] if unfinished is None else unfinished.resumed
+    summary["source"] = source_of([scene.document.path], folder)
     summary["origin"] = assembly.origin.tolist()
     summary["warnings"] = warnings
     summary["files"] = sorted(["summary.json", *(entry.name for entry in folder.iterdir())])

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from archmodel.store.lookalikes import explained, plain_form
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import ContactSettings, SolverSettings, TimeSettings
 from mechanics.stones.materials import Material, Orthotropy
@@ -160,8 +161,11 @@ def _materials(document: TomlDocument, given: Mapping[str, Any]) -> tuple[Materi
     tables = given.get("materials", {})
     if not tables:
         document.fail("no material", "materials", remedy="add a table such as [materials.limestone]")
-    rules = []
+    rules, forms = [], dict[str, str]()
     for name, content in tables.items():
+        if (other := forms.setdefault(plain_form(name), name)) != name:
+            what = f"the material {explained(name, other)}"
+            document.fail(what, "materials", name, remedy="write both with the same characters")
         if not isinstance(content, dict):
             document.fail(
                 f"{name!r} stands in no material", "materials", name, remedy="write it under [materials.NAME]"

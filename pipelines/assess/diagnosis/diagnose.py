@@ -92,7 +92,7 @@ def diagnose(
             done = fit_cases(cases, found.deformation, runs, progress)
             dating = _dated(file, cases, found, done, runs) if found.phases else None
     progress(Progress("write", 0, 1, "pictures"))
-    with replacing(folder, INDEX, (Path(path),)) as fresh:
+    with replacing(folder, INDEX) as fresh:
         summary = write_diagnosis(fresh, file, cases, found, done, dating, tuple(filter(None, impossible)))
     progress(Progress("write", 1, 1))
     return Diagnosis(folder, summary, file.battered)

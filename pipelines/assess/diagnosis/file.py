@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from archmodel.store.lookalikes import explained, plain_form
 from moma.errors import SceneError
 from pipelines.scene.file import BESIDE
 from pipelines.toml.lines import key_lines, parse_toml, read_text
@@ -227,14 +228,16 @@ def _hypotheses(document: TomlDocument, given: Mapping[str, Any]) -> Iterator[Hy
     tables = given.get("hypotheses", [])
     if not isinstance(tables, list) or not tables or not all(isinstance(one, dict) for one in tables):
         document.fail("no hypothesis", "hypotheses", remedy="write [[hypotheses]] above each")
-    names: set[str] = set()
+    names: dict[str, str] = {}
     for index, table in enumerate(tables):
         path = ("hypotheses", str(index))
         plain = {key: value for key, value in table.items() if key != "unknowns"}
         values: dict[str, Any] = check_table(document, path, plain, HYPOTHESIS_KEYS, "[[hypotheses]]")
-        if values["name"] in names:
+        if values["name"] in names.values():
             document.fail(f"two hypotheses {values['name']!r}", *path, "name", remedy="name each differently")
-        names.add(values["name"])
+        if (other := names.setdefault(plain_form(values["name"]), values["name"])) != values["name"]:
+            what = f"the hypothesis {explained(values['name'], other)}"
+            document.fail(what, *path, "name", remedy="name each differently")
         unknowns = tuple(_unknowns(document, path, table.get("unknowns", [])))
         _check_formulas(document, path, values["scene"], [one.name for one in unknowns])
         yield Hypothesis(values["name"], path, unknowns, values["scene"])

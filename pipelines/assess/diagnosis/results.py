@@ -14,6 +14,7 @@ from pipelines.assess.diagnosis.ranking import Ranked, verdict
 from pipelines.assess.diagnosis.search import RECORDS, Case, Fitted
 from pipelines.assess.motions import Motions
 from pipelines.draw.elevations.movement import draw_bed_movement
+from pipelines.results.folder import source_of
 from pipelines.results.summary import as_json
 from pipelines.run.record import versions
 from pipelines.toml.writer import toml_text
@@ -59,6 +60,7 @@ def write_diagnosis(
     write_best(folder, file, case, best)
     summary = _summary(file, found, done, dating)
     summary["cautions"] += cautions
+    summary["source"] = source_of([file.document.path], folder)
     summary["files"] = sorted([INDEX, *(entry.name for entry in folder.iterdir())])
     (folder / INDEX).write_text(as_json(summary), encoding="utf-8")
     return summary

@@ -12,7 +12,7 @@ from pipelines.draw.elevations.survey import draw_elevation, draw_residuals
 from pipelines.reports.survey.document import survey_json, write_survey_json
 from pipelines.reports.survey.page import write_survey_page
 from pipelines.reports.survey.study import SurveyStudy, study_surveys
-from pipelines.results.folder import check_replaceable, replacing
+from pipelines.results.folder import check_replaceable, replacing, source_of
 from survey.formats.options import ReadingOptions
 
 __all__ = ["INDEX", "SurveyReport", "report_surveys", "write_survey_report"]
@@ -67,12 +67,14 @@ def report_surveys(
     source = [Path(one) for one in paths]
     check_replaceable(folder, INDEX, () if overwrite else source)
     study = study_surveys(paths, format, options or ReadingOptions(), progress)
-    with replacing(folder, INDEX, source) as fresh:
-        content = write_survey_report(study, fresh, progress)
+    with replacing(folder, INDEX) as fresh:
+        content = write_survey_report(study, fresh, progress, source)
     return SurveyReport(folder, study, content)
 
 
-def write_survey_report(study: SurveyStudy, folder: Path, progress: Listener = silent) -> dict[str, Any]:
+def write_survey_report(
+    study: SurveyStudy, folder: Path, progress: Listener = silent, source: Sequence[Path] = ()
+) -> dict[str, Any]:
     """Write all files of a report into an empty folder; return survey.json without its parts."""
     release = version("moma-masonry")
     progress(Progress("write", 0, 3, "pictures"))
@@ -81,6 +83,7 @@ def write_survey_report(study: SurveyStudy, folder: Path, progress: Listener = s
     write_survey_page(folder / "report.html", study, pictures, release)
     progress(Progress("write", 2, 3, INDEX))
     content = survey_json(study, release)
+    content["source"] = source_of(source, folder)
     content["files"] = sorted([INDEX, *(entry.name for entry in folder.iterdir())])
     write_survey_json(folder / INDEX, study, content)
     progress(Progress("write", 3, 3))
