@@ -141,16 +141,18 @@ class _Worker:
 
     def ask(self, trial: Trial) -> None:
         """Hand a scene to the process."""
-        if not self._process.is_alive():
+        try:
+            self.channel.send(trial)
+        except OSError:
             self.end()
             self._start()
-        self.channel.send(trial)
+            self.channel.send(trial)
 
     def answer(self) -> Tried:
         """Return its answer, which is there, or the reason why the process has ended without one."""
         try:
             answer = self.channel.recv()
-        except EOFError:
+        except (EOFError, OSError):
             self._process.join()
             code = self._process.exitcode or 0
             how = (
