@@ -6,6 +6,7 @@ other (O and 0, l and 1) are left alone: both are common in codes, and every key
 
 import unicodedata
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 from sqlalchemy import ColumnElement, select
 from sqlalchemy.orm import InstrumentedAttribute, Session
@@ -54,9 +55,9 @@ class Lookalikes:
     """
 
     def __init__(
-        self, session: Session, column: InstrumentedAttribute[str], *conditions: ColumnElement[bool]
+        self, session: Session, column: InstrumentedAttribute[Any], *conditions: ColumnElement[bool]
     ) -> None:
-        self._names = select(column).where(*conditions)
+        self._names = select(column).where(*conditions).distinct()
         self._session, self._column = session, column
         # names beyond ASCII, which are few; SQLite and PostgreSQL say so in words of their own
         sqlite = session.get_bind().dialect.name == "sqlite"

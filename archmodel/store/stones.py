@@ -82,9 +82,10 @@ def store_survey(
         session.flush()
         lines: dict[str, int] = {}
         start, measured_again = first_free_id(session, Entity), list[int]()
-        lookalikes = Lookalikes(session, Entity.code)
+        codes, zones = Lookalikes(session, Entity.code), Lookalikes(session, Entity.zone)
         for batch in batches(stones):
-            _refuse_lookalikes(lookalikes, batch, source_path)
+            _refuse_lookalikes(codes, batch, source_path, "code")
+            _refuse_lookalikes(zones, batch, source_path, "zone")
             known = _known_codes(session, batch)
             _refuse_codes(batch, {} if again else known, lines, source_path)
             insert_stones(session, [one for one in batch if one.code not in known], survey)
@@ -167,14 +168,16 @@ def _refuse_codes(
         raise DatabaseError(what, where=f"{path}:{stone.line}", remedy=remedy)
 
 
-def _refuse_lookalikes(lookalikes: Lookalikes, batch: Sequence[StoneRecord], path: str) -> None:
-    if (found := lookalikes.like([stone.code for stone in batch])) is not None:
-        line = next(stone.line for stone in batch if stone.code == found[0])
-        raise DatabaseError(
-            f"the code {explained(*found)}",
-            where=f"{path}:{line}",
-            remedy="write both with the same characters",
-        )
+def _refuse_lookalikes(known: Lookalikes, batch: Sequence[StoneRecord], path: str, name: str) -> None:
+    """Refuse codes or zones that look like others, at their place in the file."""
+    lines: dict[str, int] = {}
+    for stone in batch:
+        if (text := getattr(stone, name)) is not None:
+            lines.setdefault(text, stone.line)
+    if (found := known.like(list(lines))) is not None:
+        remedy = "write both with the same characters"
+        place = f"{path}:{lines[found[0]]}"
+        raise DatabaseError(f"the {name} {explained(*found)}", where=place, remedy=remedy)
 
 
 def _places(batch: Sequence[StoneRecord], path: str) -> list[str]:

@@ -145,7 +145,8 @@ def replacing(folder: Path, index: str = RUN_INDEX) -> Iterator[Path]:
             f"cannot be written: {error.strerror}", where=str(target.parent), remedy="name another folder"
         ) from error
     try:
-        with storing(str(folder), "earlier results there are as they were" if folder.exists() else ""):
+        earlier = any((folder / one).exists() for one in _INDEXES)
+        with storing(str(folder), "earlier results there are as they were" if earlier else ""):
             yield fresh
             fresh.chmod(0o777 & ~_umask())  # mkdtemp makes it private
             check_replaceable(folder, index)

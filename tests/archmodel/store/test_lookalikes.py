@@ -1,5 +1,7 @@
 """Names that look like others are refused, with the character that differs."""
 
+from dataclasses import replace
+
 import pytest
 
 from archmodel.assertions.correct import correct
@@ -35,6 +37,19 @@ def test_a_code_that_looks_like_another_is_refused_whichever_comes_first(new_url
             # what is measured again, or only resembles another, is itself
             stored(database, 4, first, again=True)
             stored(database, 5, "S\N{LATIN SMALL LETTER A WITH DIAERESIS}ule", "Saule", "O1", "01")
+
+
+def test_a_zone_that_looks_like_another_is_refused(tmp_path):
+    with open_database(f"sqlite:///{tmp_path / 'moma.db'}") as database, database.session() as session:
+        stones = [
+            replace(box_stone(code), zone=zone) for code, zone in (("A", "East"), ("B", None), ("C", "East"))
+        ]
+        store_survey(session, "wall", "wall.moma", SHA, stones)
+        other = replace(box_stone("D"), zone="E\N{CYRILLIC SMALL LETTER A}st")
+        with pytest.raises(
+            DatabaseError, match=r"the zone .* looks like East, but has CYRILLIC SMALL LETTER A"
+        ):
+            store_survey(session, "wall", "wall.moma", f"00{SHA[2:]}", [other])
 
 
 def test_a_code_may_be_corrected_to_what_it_looks_like(tmp_path):
