@@ -12,6 +12,7 @@
     │   └── NoDatabaseError        exit 1   ... that does not exist
     ├── ExchangeError              exit 1   an exchange document
     ├── MeshError                  exit 1   a stone that cannot be meshed
+    ├── StorageError               exit 1   a disk that is full, or a folder that cannot be written
     ├── UnsoundSceneError          exit 1   a scene with problems that make its result worthless
     ├── SolverError                exit 1   a step that was not solved
     └── MissingLibraryError        exit 1   a missing shared library
@@ -19,6 +20,10 @@
 Each message gives the place, the fact and the remedy: ``where: what; remedy``.
 """
 
+import errno
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Self
 
 __all__ = [
@@ -32,9 +37,12 @@ __all__ = [
     "QueryError",
     "SceneError",
     "SolverError",
+    "StorageError",
     "SurveyError",
     "UnsoundSceneError",
     "UsageError",
+    "storage_error",
+    "storing",
 ]
 
 
@@ -98,6 +106,10 @@ class MeshError(MomaError):
     """Stone that cannot be meshed."""
 
 
+class StorageError(MomaError):
+    """Disk that is full, or file or folder that cannot be written."""
+
+
 class UnsoundSceneError(MomaError):
     """Scene that can be run, but whose result would be worthless."""
 
@@ -108,3 +120,53 @@ class SolverError(MomaError):
 
 class MissingLibraryError(MomaError):
     """Missing shared library of the system; the remedy names the package to install."""
+
+
+_ELSEWHERE = "name a place that can be written"
+_STORAGE = {
+    errno.ENOSPC: ("the disk is full", "make room on it and try again"),
+    errno.EDQUOT: ("the quota on the disk is used up", "make room and try again"),
+    errno.EFBIG: (
+        "a file would be larger than the system allows",
+        "raise the limit (ulimit -f) and try again",
+    ),
+    errno.EROFS: ("the file system is read-only", _ELSEWHERE),
+    errno.EACCES: ("permission denied", _ELSEWHERE),
+    errno.EPERM: ("operation not permitted", _ELSEWHERE),
+    errno.ENOTDIR: ("a part of the path is not a folder", _ELSEWHERE),
+    errno.EISDIR: ("it is a folder", "name a file"),
+    errno.ENAMETOOLONG: ("the name is too long", "give a shorter one"),
+    errno.ELOOP: ("the links of the path run in a circle", _ELSEWHERE),
+    errno.EIO: ("the disk reports an error", "check the disk"),
+}  # by the number of the error: what is wrong, and what to do
+
+
+def storage_error(error: Exception, where: str | None = None, kept: str = "") -> StorageError | None:
+    """Return the error of a disk or folder that refuses to store; None if another thing has failed.
+
+    Parameters
+    ----------
+    error : as the system or a library reports it; HDF5 gives its number in the text alone
+    where : file or folder, where the error names none
+    kept : what has not been lost
+    """
+    number = getattr(error, "errno", None)
+    if number is None and (told := re.search(r"errno = (\d+)", str(error))) is not None:
+        number = int(told[1])
+    if not isinstance(error, OSError | RuntimeError) or number not in _STORAGE:
+        return None
+    what, remedy = _STORAGE[number]
+    named = getattr(error, "filename", None)
+    place = where if where is not None else None if named is None else str(named)
+    return StorageError(what, where=place, remedy="; ".join(filter(None, (remedy, kept))))
+
+
+@contextmanager
+def storing(where: str, kept: str = "") -> Iterator[None]:
+    """Raise `StorageError` where the file system refuses what a with-block stores; see `storage_error`."""
+    try:
+        yield
+    except (OSError, RuntimeError) as error:
+        if (refusal := storage_error(error, where, kept)) is None:
+            raise
+        raise refusal from error

@@ -3,7 +3,8 @@
 import base64
 import subprocess
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ BLANK = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR42mP4DwABAQEAG7buVgAAAABJRU5ErkJggg=="
 )
 truly = pictures.draw_apart
+truly_started = pictures.drawing_process
 drawing = True
 
 
@@ -37,12 +39,22 @@ def draw_apart(
     if drawing:
         truly(module, surface, jobs, ready)
         return
-    if ready is not None:
-        ready.kill()
     with tempfile.TemporaryDirectory() as scratch:
         save_job(Path(scratch), surface, jobs)
     for job in jobs:
         Path(job["path"]).write_bytes(BLANK)
 
 
-pictures.draw_apart = draw_apart  # before the modules that import its name
+@contextmanager
+def drawing_process(module: str, *window: str | None) -> Iterator["subprocess.Popen[str] | None"]:
+    """Start the process that loads VTK ahead of a picture, where a test draws in truth."""
+    if not drawing:
+        yield None
+        return
+    with truly_started(module, *window) as process:
+        yield process
+
+
+# before the modules that import their names
+pictures.draw_apart = draw_apart
+pictures.drawing_process = drawing_process

@@ -19,6 +19,7 @@ from archmodel.assertions.validation import (
     checked_whole,
 )
 from archmodel.store.find_by_code import no_such_code
+from archmodel.store.lookalikes import Lookalikes, explained
 from archmodel.store.remeasuring import MEASURED
 from archmodel.store.revisions import RowCounts, table_of
 from archmodel.store.stone_record import StoneRecord
@@ -59,7 +60,7 @@ def correct(session: Session, entry: Entry, code: str, values: Mapping[str, obje
     if not changes:
         return RowCounts(unchanged=1)
     if "code" in changes:
-        _refuse_taken(session, str(checked["code"]))
+        _refuse_taken(session, str(checked["code"]), row["id"])
     after = {name: new for name, (_, new) in changes.items()}
     columns = {name: new for name, new in after.items() if name in table_of(Entity).c}
     registered = {name: new for name, new in after.items() if name not in columns}
@@ -162,9 +163,11 @@ def _lost(row: Mapping[str, Any], own: Mapping[str, StoneAttribute]) -> set[str]
     return {name for name in before if name not in own and _value(row, name) is not None}
 
 
-def _refuse_taken(session: Session, code: str) -> None:
+def _refuse_taken(session: Session, code: str, number: int) -> None:
     if session.scalar(select(Entity.id).where(Entity.code == code)) is not None:
         raise UsageError(f"the code {code} is taken by another stone", remedy="give it a code of its own")
+    if (found := Lookalikes(session, Entity.code, Entity.id != number).like([code])) is not None:
+        raise UsageError(f"the code {explained(*found)}", remedy="write both with the same characters")
 
 
 def _change(

@@ -18,6 +18,7 @@ from archmodel.assertions.validation import (
     checked_years,
 )
 from archmodel.store.find_by_code import held_named, held_or_none
+from archmodel.store.lookalikes import Lookalikes, explained
 from archmodel.store.revisions import RowCounts, revise, supersede
 from archmodel.tables.entries import Entry
 from archmodel.tables.knowledge import Document, Material, MaterialProperty, Phase
@@ -176,11 +177,22 @@ def declare_named(
     values: Mapping[str, object],
     made: type[Structure] | None = None,
 ) -> RowCounts:
-    """Declare a row under a name: new, unchanged, or with new contents."""
+    """Declare a row under a name: new, unchanged, or with new contents.
+
+    Raises
+    ------
+    UsageError
+        if the name looks like that of another row
+    """
     (name,) = key.values()
     held = held_or_none(session, cls, name)  # type: ignore[type-var]
     if held is not None:
         return revise(session, entry, held, {key: one for key, one in values.items() if one is not None})
+    (column,) = key
+    lookalikes = Lookalikes(session, getattr(cls, column), cls.superseded_id.is_(None))
+    if (found := lookalikes.like([name])) is not None:
+        remedy = "write both with the same characters"
+        raise UsageError(f"the {column} {explained(*found)}", remedy=remedy)
     own = {column: value for column, value in values.items() if column != "kind"}
     session.add((made or cls)(**key, **own, entry_id=entry.id))
     session.flush()

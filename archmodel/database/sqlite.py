@@ -114,6 +114,9 @@ class SqliteFile:
     def refusal(self, error: Exception) -> DatabaseError:
         """Translate a complaint of SQLite for users."""
         message = _first_message(error)
+        if self.file is not None and not self.file.exists() and not os.access(self.file.parent, os.W_OK):
+            what, remedy = "its folder cannot be written", "name a database in another folder with --db"
+            return DatabaseError(what, where=self.place, remedy=remedy)
         for words, what, remedy in _COMPLAINTS:
             if any(word in message for word in words):
                 return DatabaseError(what.format(message=message), where=self.place, remedy=remedy)

@@ -32,7 +32,7 @@ from archmodel.query.names import meant, run_with_number
 from archmodel.query.scope import Context, Scope, StructureScope
 from archmodel.query.tokens import Token, complaint
 from archmodel.tables.entities import Entity, kind_named
-from archmodel.tables.hierarchy import kind_of
+from archmodel.tables.hierarchy import names_below
 from archmodel.tables.structures import structure_kind_named
 from moma.errors import UsageError
 
@@ -131,9 +131,13 @@ def condition_in(scope: Where, node: Node) -> ColumnElement[bool]:
             return column.ilike(pattern.text.replace("~", "~~"), escape="~")
         case IsIn(name, values):
             attribute, column = _column(scope, name)
+            if attribute.name == "kind":
+                return column.in_(_kinds(scope, *values))
             return column.in_([_constant(scope, attribute, value) for value in values])
         case Comparison(name, sign, value):
             attribute, column = _column(scope, name)
+            if attribute.name == "kind":
+                return _of_kind(scope, column, sign, value)
             compared: ColumnElement[bool] = _OPERATORS[sign](column, _operand(scope, attribute, value))
             return compared
         case AmountComparison(left, sign, right):
@@ -226,17 +230,32 @@ def _constant(scope: Where, attribute: Attribute, value: Token) -> Any:
         return _number(attribute, value)
     if attribute.is_truth:
         return _truth(attribute, value)
-    if attribute.name == "kind":
-        try:
-            if isinstance(scope, StructureScope):
-                return kind_of(structure_kind_named(value.text))
-            return kind_of(kind_named(value.text))
-        except UsageError as error:
-            raise complaint(value, error.what, error.remedy) from None
     if attribute.words is not None and value.text not in attribute.words:
         what = f"unknown {attribute.name} {value.text[:40]!r}"
         raise complaint(value, what, f"they are {', '.join(attribute.words)}")
     return value.text
+
+
+def _of_kind(scope: Where, column: ColumnElement[Any], sign: str, value: Token) -> ColumnElement[bool]:
+    """Return the condition that a kind is, or is not, a named one or a subkind of it."""
+    if sign not in ("=", "!="):
+        raise complaint(value, f"kinds have no order, {sign} does not compare them", "write = or !=")
+    names = _kinds(scope, value)
+    return column.in_(names) if sign == "=" else column.not_in(names)
+
+
+def _kinds(scope: Where, *values: Token) -> list[str]:
+    """Return the names of kinds and of all their subkinds."""
+    names: set[str] = set()
+    for value in values:
+        try:
+            if isinstance(scope, StructureScope):
+                names |= names_below(structure_kind_named(value.text))
+            else:
+                names |= names_below(kind_named(value.text))
+        except UsageError as error:
+            raise complaint(value, error.what, error.remedy) from None
+    return sorted(names)
 
 
 def _type_of(attribute: Attribute) -> str:

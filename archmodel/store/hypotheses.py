@@ -12,6 +12,7 @@ from sqlalchemy import insert, select, update
 from sqlalchemy.orm import Session
 
 from archmodel.store.bulk import batches
+from archmodel.store.lookalikes import Lookalikes, explained
 from archmodel.store.remeasuring import MEASURED
 from archmodel.store.revisions import NOTHING, RowCounts, end_rows
 from archmodel.store.stone_record import StoneRecord
@@ -100,12 +101,16 @@ def _check(session: Session, stones: Sequence[StoneRecord]) -> None:
     if not stones:
         raise UsageError("there are no stones", remedy="give one at least")
     known: set[str] = set()
+    lookalikes = Lookalikes(session, Entity.code)
     for batch in batches(stones):
         codes = [stone.code for stone in batch]
         there = session.scalars(select(Entity.code).where(Entity.code.in_(codes))).all()
         twice = [*there, *(code for code in codes if code in known or codes.count(code) > 1)]
         if twice:
             raise DatabaseError(f"the code {twice[0]} is taken", remedy="give each stone a code of its own")
+        if (found := lookalikes.like(codes)) is not None:
+            remedy = "write both with the same characters"
+            raise DatabaseError(f"the code {explained(*found)}", remedy=remedy)
         known |= set(codes)
         if any(not stone.hypothesis for stone in batch):
             code = next(stone.code for stone in batch if not stone.hypothesis)

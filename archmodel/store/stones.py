@@ -7,6 +7,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from archmodel.store.bulk import batches, first_free_id, insert_rows
+from archmodel.store.lookalikes import Lookalikes, explained
 from archmodel.store.remeasuring import supersede_measurements
 from archmodel.store.stone_record import StoneRecord
 from archmodel.store.stone_rows import entity_rows, measurement_row, stone_record, storable
@@ -62,7 +63,7 @@ def store_survey(
     Raises
     ------
     DatabaseError
-        if the file was taken in before, or a code is there already or twice in the file
+        if the file was taken in before, or a code is there already or twice in the file, or looks like another
     SurveyError, GeometryError
         if a stone cannot be stored, at its ``file:line``
     """
@@ -81,7 +82,10 @@ def store_survey(
         session.flush()
         lines: dict[str, int] = {}
         start, measured_again = first_free_id(session, Entity), list[int]()
+        codes, zones = Lookalikes(session, Entity.code), Lookalikes(session, Entity.zone)
         for batch in batches(stones):
+            _refuse_lookalikes(codes, batch, source_path, "code")
+            _refuse_lookalikes(zones, batch, source_path, "zone")
             known = _known_codes(session, batch)
             _refuse_codes(batch, {} if again else known, lines, source_path)
             insert_stones(session, [one for one in batch if one.code not in known], survey)
@@ -162,6 +166,18 @@ def _refuse_codes(
             continue
         what = f"the code {stone.code} is taken by the stone at {first}"
         raise DatabaseError(what, where=f"{path}:{stone.line}", remedy=remedy)
+
+
+def _refuse_lookalikes(known: Lookalikes, batch: Sequence[StoneRecord], path: str, name: str) -> None:
+    """Refuse codes or zones that look like others, at their place in the file."""
+    lines: dict[str, int] = {}
+    for stone in batch:
+        if (text := getattr(stone, name)) is not None:
+            lines.setdefault(text, stone.line)
+    if (found := known.like(list(lines))) is not None:
+        remedy = "write both with the same characters"
+        place = f"{path}:{lines[found[0]]}"
+        raise DatabaseError(f"the {name} {explained(*found)}", where=place, remedy=remedy)
 
 
 def _places(batch: Sequence[StoneRecord], path: str) -> list[str]:

@@ -10,12 +10,16 @@ __all__ = ["Clock", "Listener", "Progress", "silent"]
 
 @dataclass(frozen=True)
 class Progress:
-    """Progress of a run: `done` of `total` in a stage, with a short text; `total` is None if not known."""
+    """Progress of a run: `done` of `total` in a stage, with a short text; `total` is None if not known.
+
+    `found` is a result in a line, to be shown as soon as there is one.
+    """
 
     stage: str
     done: int
     total: int | None
     text: str = ""
+    found: str = ""
 
 
 Listener = Callable[[Progress], None]

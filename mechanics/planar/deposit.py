@@ -223,7 +223,7 @@ def _calm(run: PlanarRun, asked: Deposit, slow: float, kept: float, progress: Li
         state = run.simulation.state
         run.simulation.state = replace(state, velocity=kept * state.velocity)
         speed = float(np.hypot(*last.after.velocity[:count, :2].T).mean())
-        progress(Progress("step", run.steps, None, f"mean speed {speed:.1e} m/s"))
+        progress(Progress("deposit", run.steps, None, f"mean speed {speed:.1e} m/s"))
         if run.steps >= _FEWEST and speed < slow * np.sqrt(asked.gravity * asked.smallest):
             break
     return last.after.centre[:count]

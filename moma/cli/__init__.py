@@ -1,11 +1,13 @@
 """Command line of MOMA. Commands import heavy packages themselves, so that help is fast."""
 
 import gc
+import signal
 from typing import Annotated
 
 import typer
 
 from moma.cli.assess import assess, compare, diagnose
+from moma.cli.console import PlainCommand, PlainGroup
 from moma.cli.database import export, import_, migrate
 from moma.cli.entities import query, schema, show
 from moma.cli.geology import geology
@@ -19,6 +21,7 @@ from moma.cli.surveys import ingest, sample, survey_report
 __all__ = ["app", "main"]
 
 app = typer.Typer(
+    cls=PlainGroup,
     name="moma",
     help="From a stone-by-stone survey of a historic building to a mechanical simulation of it.",
     no_args_is_help=True,
@@ -28,7 +31,8 @@ app = typer.Typer(
 
 
 def main() -> None:
-    """Run the command line; exit code 0 done, 1 failed, 2 wrong use."""
+    """Run the command line; exit code 0 done, 1 failed, 2 wrong use, 130 ended by Ctrl-C or SIGTERM."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # raises KeyboardInterrupt, as Ctrl-C does
     try:
         app(prog_name="moma")
     finally:
@@ -78,6 +82,6 @@ _COMMANDS = (
     migrate,
 )
 for _command in _COMMANDS:
-    app.command(_command.__name__.strip("_").replace("_", "-"))(_command)
+    app.command(_command.__name__.strip("_").replace("_", "-"), cls=PlainCommand)(_command)
 # another name of trade, which reads as commerce to some
-app.command("tradeoff", hidden=True)(trade)
+app.command("tradeoff", hidden=True, cls=PlainCommand)(trade)

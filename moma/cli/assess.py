@@ -1,15 +1,28 @@
 """Commands that ask how far a scene is from falling, and what explains the movement that was measured."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from moma.cli.console import reporting, say
-from moma.cli.options import DEFAULT_DB, AcceptUnsound, Db, Json, Out, SceneArgument, Verbose
+from moma.cli.options import DEFAULT_DB, AcceptUnsound, Db, Json, Out, Overwrite, SceneArgument, Verbose
 from moma.cli.progress import progress_bars
 
 __all__ = ["assess", "compare", "diagnose"]
+
+
+@contextmanager
+def _going_on(folder: Path) -> Iterator[None]:
+    """Say how to go on where a with-block is stopped."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        if any(folder.glob("unfinished-*/*.json")):
+            say(f"stopped; what was found is kept in {folder}, and the same command goes on from there")
+        raise
 
 
 @reporting
@@ -55,6 +68,7 @@ def assess(
         ),
     ] = False,
     out: Out = None,
+    overwrite: Overwrite = False,
     db: Db = DEFAULT_DB,
     json: Json = False,
     verbose: Verbose = False,
@@ -65,7 +79,7 @@ def assess(
     from pipelines.assess.assess import assess as answered
 
     folder = out or Path("out") / f"{scene.stem}-assess"
-    with progress_bars() as listener:
+    with progress_bars() as listener, _going_on(folder):
         done = answered(
             scene,
             db,
@@ -74,6 +88,7 @@ def assess(
             listener,
             confirm,
             code,
+            overwrite,
             weakest=weakest,
             instant=at,
             leave_out_loose=leave_out_loose,
@@ -93,6 +108,7 @@ def compare(
         ),
     ] = False,
     out: Out = None,
+    overwrite: Overwrite = False,
     accept_unsound: AcceptUnsound = False,
     db: Db = DEFAULT_DB,
     json: Json = False,
@@ -105,7 +121,7 @@ def compare(
 
     folder = out or Path("out") / f"{scene.stem}-compare"
     with progress_bars() as listener:
-        done = compared(scene, db, folder, listener, accept_unsound, battered)
+        done = compared(scene, db, folder, listener, accept_unsound, battered, overwrite)
     print(as_json(done.summary) if json else "\n".join(comparison_lines(done, verbose)))
 
 
@@ -119,6 +135,7 @@ def diagnose(
     ],
     jobs: Annotated[int, typer.Option("--jobs", metavar="N", min=1, help="Runs at a time.")] = 1,
     out: Out = None,
+    overwrite: Overwrite = False,
     accept_unsound: AcceptUnsound = False,
     db: Db = DEFAULT_DB,
     json: Json = False,
@@ -130,6 +147,6 @@ def diagnose(
     from pipelines.assess.diagnosis.diagnose import diagnose as diagnosed
 
     folder = out or Path("out") / f"{file.stem}-diagnose"
-    with progress_bars() as listener:
-        done = diagnosed(file, db, folder, listener, jobs, accept_unsound)
+    with progress_bars() as listener, _going_on(folder):
+        done = diagnosed(file, db, folder, listener, jobs, accept_unsound, overwrite=overwrite)
     print(as_json(done.summary) if json else "\n".join(diagnosis_lines(done, verbose)))

@@ -1,21 +1,53 @@
-"""Output on stderr, beside the results, warnings and errors; and how short commands end soon."""
+"""Output on stderr, beside the results, warnings and errors; help as plain text; and how short commands end soon."""
 
 import gc
+import os
 import sys
 import traceback
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import wraps
-from typing import ParamSpec, TextIO
+from typing import Any, ParamSpec, TextIO
 
 import typer
+from typer.core import HAS_RICH, TyperCommand, TyperGroup
 
-from moma.errors import MomaError
+from moma.errors import MomaError, storage_error
 
-__all__ = ["reporting", "say", "short_lived"]
+__all__ = ["PlainCommand", "PlainGroup", "reporting", "say", "short_lived"]
 
 P = ParamSpec("P")
+
+
+class PlainCommand(TyperCommand):
+    """Command whose help is shown as it is written: [[loads]] in it is no markup."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the help, once in the life of a command."""
+        _escape(self)
+        super().format_help(ctx, formatter)
+
+
+class PlainGroup(TyperGroup):
+    """Group of commands whose help is shown as it is written."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the help of the group, and the first line of that of each command."""
+        for one in (self, *self.commands.values()):
+            _escape(one)
+        super().format_help(ctx, formatter)
+
+
+def _escape(command: Any) -> None:
+    """Escape what Rich, where Typer uses it, would take for markup in the help of a command and of its parameters."""
+    if not HAS_RICH:
+        return
+    from rich.markup import escape
+
+    for one in (command, *command.params):
+        if getattr(one, "help", None):
+            one.help = escape(one.help)
 
 
 def say(message: str) -> None:
@@ -30,19 +62,26 @@ def reporting(command: Callable[P, None]) -> Callable[P, None]:
     def run(*arguments: P.args, **options: P.kwargs) -> None:
         verbose = bool(options.get("verbose"))
         try:
-            with _short_warnings():
+            with _short_warnings(), _flushed():
                 command(*arguments, **options)
-        except MomaError as error:
+        except (typer.Exit, typer.Abort, BrokenPipeError):
+            raise  # typer handles its own exceptions, which end a command, and broken pipes
+        except KeyboardInterrupt:
+            say("interrupted")
+            raise
+        except Exception as error:
+            foreseen = error if isinstance(error, MomaError) else storage_error(error)
+            if foreseen is None and verbose:
+                raise
             if verbose:
                 traceback.print_exc()
-            say(f"error: {' '.join(str(error).split())}")
-            raise typer.Exit(error.exit_code) from None
-        except Exception as error:
-            # typer handles its own exceptions, which end a command, and broken pipes
-            if verbose or isinstance(error, typer.Exit | typer.Abort | BrokenPipeError):
-                raise
-            say(f"error: unexpected {type(error).__name__}: {error}; please report it with the output of -v")
-            raise typer.Exit(1) from None
+            if foreseen is None:
+                say(
+                    f"error: unexpected {type(error).__name__}: {error}; please report it with the output of -v"
+                )
+                raise typer.Exit(1) from None
+            say(f"error: {' '.join(str(foreseen).split())}")
+            raise typer.Exit(foreseen.exit_code) from None
 
     return run
 
@@ -57,6 +96,28 @@ def short_lived() -> Iterator[None]:
     finally:
         if collecting:
             gc.enable()
+
+
+@contextmanager
+def _flushed() -> Iterator[None]:
+    """Write out what was printed in a with-block, so that a full disk is reported as that of a file is."""
+    try:
+        yield
+    except OSError:
+        _flush()  # if it was the printing that failed, it fails again
+        raise
+    _flush()
+
+
+def _flush() -> None:
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        if (refusal := storage_error(error, "standard output")) is None:
+            raise
+        # the interpreter would try again at its end
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise refusal from error
 
 
 @contextmanager

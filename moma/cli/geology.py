@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from moma.cli.console import reporting, say
-from moma.cli.options import Json, Out, Resume, SceneArgument, StoreDb
+from moma.cli.options import Json, Out, Overwrite, Resume, SceneArgument, StoreDb
 from moma.cli.progress import Interruption, progress_bars
 
 __all__ = ["ExperimentName", "geology"]
@@ -38,6 +38,7 @@ def geology(
         ),
     ] = None,
     resume: Resume = None,
+    overwrite: Overwrite = False,
     db: StoreDb = None,
     json: Json = False,
 ) -> None:
@@ -48,7 +49,15 @@ def geology(
     folder, stop = out or Path("out") / scene.stem, Interruption()
     with progress_bars() as listener, stop.handled():
         done = run_geology(
-            scene, experiment.value, folder, samples, stop.listening(listener), stop, resume, db
+            scene,
+            experiment.value,
+            folder,
+            samples,
+            stop.listening(listener),
+            stop,
+            resume,
+            db,
+            overwrite,
         )
     for warning in done.warnings:
         say(f"warning: {warning}")

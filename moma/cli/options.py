@@ -19,6 +19,7 @@ __all__ = [
     "KindWhere",
     "ListFormat",
     "Out",
+    "Overwrite",
     "Planes",
     "Profile",
     "ProfileName",
@@ -159,6 +160,9 @@ Planes = Annotated[
 SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene file; see docs/scene.md.")]
 Out = Annotated[
     Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results; default: out/SCENE.")
+]
+Overwrite = Annotated[
+    bool, typer.Option("--overwrite", help="Replace the results of another scene in the folder.")
 ]
 Resume = Annotated[
     bool | None,

@@ -7,7 +7,18 @@ from typing import Annotated
 import typer
 
 from moma.cli.console import reporting, say
-from moma.cli.options import DEFAULT_DB, AcceptUnsound, Db, Json, Out, Profile, Resume, SceneArgument, Verbose
+from moma.cli.options import (
+    DEFAULT_DB,
+    AcceptUnsound,
+    Db,
+    Json,
+    Out,
+    Overwrite,
+    Profile,
+    Resume,
+    SceneArgument,
+    Verbose,
+)
 from moma.cli.progress import Interruption, progress_bars
 
 __all__ = ["check", "run", "trade"]
@@ -28,6 +39,7 @@ def check(
         bool, typer.Option("--explain", help="List the model of each stone, with the reason.")
     ] = False,
     profile: Profile = None,
+    overwrite: Overwrite = False,
     db: Db = DEFAULT_DB,
     json: Json = False,
     verbose: Verbose = False,
@@ -39,7 +51,7 @@ def check(
     from pipelines.run.check import check_scene
 
     with progress_bars() as listener:
-        report = check_scene(scene, db, pictures, profile, listener)
+        report = check_scene(scene, db, pictures, profile, listener, overwrite)
     for warning in report.warnings:
         say(f"warning: {warning}")
     lines = check_lines(report, verbose, explain)
@@ -65,6 +77,7 @@ def run(
         ),
     ] = None,
     resume: Resume = None,
+    overwrite: Overwrite = False,
     accept_unsound: AcceptUnsound = False,
     profile: Profile = None,
     db: Db = DEFAULT_DB,
@@ -86,7 +99,16 @@ def run(
         return
     with compiling_beside("run"), progress_bars() as listener, stop.handled():
         done = run_scene(
-            scene, db, folder, stop.listening(listener), profile, meshes, accept_unsound, stop, resume
+            scene,
+            db,
+            folder,
+            stop.listening(listener),
+            profile,
+            meshes,
+            accept_unsound,
+            stop,
+            resume,
+            overwrite,
         )
     for warning in done.warnings:
         say(f"warning: {warning}")

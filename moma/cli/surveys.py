@@ -17,6 +17,7 @@ from moma.cli.options import (
     Json,
     Kind,
     KindWhere,
+    Overwrite,
     Planes,
     Sigma,
     Snap,
@@ -159,6 +160,7 @@ def survey_report(
         Path | None,
         typer.Option("--out", metavar="DIR", help="Folder for the report; default: out/survey-FILE."),
     ] = None,
+    overwrite: Overwrite = False,
     json: Json = False,
     verbose: Verbose = False,
 ) -> None:
@@ -170,7 +172,7 @@ def survey_report(
     options = reading_options(header, codes, kind, sigma)
     folder = out or Path("out") / f"survey-{files[0].resolve().stem}"
     with progress_bars() as listener:
-        report = report_surveys(files, folder, format.value, options, listener)
+        report = report_surveys(files, folder, format.value, options, listener, overwrite)
     for warning in report.study.warnings:
         say(f"warning: {warning}")
     lines = survey_report_lines(report, verbose)

@@ -367,7 +367,9 @@ def _sentence(one: dict[str, Any]) -> str:
     stood = "" if one["candidate_converged"] else ", NOT CONVERGED"
     if one["candidate"] > _ONE * one["candidate_lowest"]:
         unsure = "" if "confirmation" in one else ": confirm it by runs"
-        stood += f"; other forces of the same friction hold no more than {one['candidate_lowest']:.4g}{unsure}"
+        stood += (
+            f"; other forces of the same friction hold no more than {one['candidate_lowest']:.4g}{unsure}"
+        )
     angle = f", a tilt of {one['tilt']:.3g}°" if "tilt" in one else ""
     return f"{text}, {one['candidate']:.4g} (candidate{stood}){angle}{_dynamics(one)}{_collapse(one)}{_verdict(one)}"
 

@@ -16,23 +16,28 @@ from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.limit.assembly import RigidAssembly, assembly
 from mechanics.limit.dead_load import Standing, at_instant, stands
 from mechanics.limit.joints import Resultants, resultants
+from mechanics.limit.limit_load import Mechanism
+from mechanics.limit.pushover import Pushover
 from mechanics.results.forecast.plan import loose_blocks
 from mechanics.scene.scene import Fidelity, Scene
 from moma.errors import MissingLibraryError, UsageError
 from pipelines.assess.answers import FALLS, Answer, answer, confirmer, fallen, leader, refuse_unanswerable
 from pipelines.assess.codes.check import CODES
 from pipelines.assess.directions import facade_pushes, weakest_push
+from pipelines.assess.kept import Kept, kept_answers
 from pipelines.assess.questions import LoadQuestion, Question, parse_question, scene_questions
 from pipelines.draw.mechanism import draw_mechanisms
 from pipelines.draw.plots import draw_capacity
 from pipelines.reports.assessment import write_assessment
-from pipelines.results.folder import check_replaceable, replacing
+from pipelines.results.folder import UNFINISHED_ASSESSMENT, check_replaceable, replacing, source_of
 from pipelines.results.summary import as_json
 from pipelines.run.assemble import Assembly, assemble_stones
 from pipelines.run.record import store_record, versions
 from pipelines.run.soundness import problems_of, refuse_unsound
 from pipelines.scene.file import SceneFile, read_scene
+from pipelines.scene.fingerprint import digest, fingerprint
 from pipelines.scene.selection import select_groups, select_stones
+from pipelines.scene.site import Site
 from pipelines.scene.stages import refuse_stages
 
 __all__ = ["CURVE_COLUMNS", "INDEX", "JOINT_COLUMNS", "REPORT", "Assessment", "assess"]
@@ -95,12 +100,15 @@ def assess(
     progress: Listener = silent,
     confirm: bool = False,
     code: str | None = None,
+    overwrite: bool = False,
     *,
     weakest: bool = False,
     instant: float | None = None,
     leave_out_loose: bool = False,
 ) -> Assessment:
     """Answer how far a scene is from falling, on the stones of a database; keep the answers there and in a folder.
+
+    Each answer is kept in the folder as soon as there is one: stopped or killed, the same call goes on from there.
 
     Parameters
     ----------
@@ -113,20 +121,22 @@ def assess(
     confirm : candidates of all loads are confirmed by runs, also of those that do not ask for it
     code : by which mechanisms of pushes on all stones are checked (`pipelines.assess.codes.check.CODES`), where their
         question names no other; needs [site] in the scene
+    overwrite : replace the results of another scene in the folder
     weakest : seek the direction of the weakest horizontal push, too
     instant : at which loads that change with time are taken [s]; None: the one from which they are constant
     leave_out_loose : stones that fall under their own weight are left out, and listed, if the others stand
 
     Raises
     ------
-    UsageError : the folder holds other files, a load cannot be read, or there is no such code or no site
+    UsageError : the folder holds other files, or results of another scene; a load cannot be read; there is no such code
+        or no site
     UnsoundSceneError : the scene has problems that `check_scene` reports
     SceneError, GeometryError, SolverError : see `assemble` and `mechanics.limit`
     DatabaseError : the database cannot be read or written
     """
     folder, scene, asked = Path(folder), read_scene(path), tuple(map(parse_question, loads))
     refuse_stages(scene.stages, scene.document, "moma assess")
-    check_replaceable(folder, INDEX)
+    check_replaceable(folder, INDEX, () if overwrite else (Path(path),))
     if code is not None:
         _refuse_code(code, scene)
     progress(Progress("blocks", 0, None, "reading the stones"))
@@ -150,14 +160,15 @@ def assess(
     if weakest and standing.outcome.rests:
         progress(Progress("assess", 0, len(questions), "the weakest direction"))
         questions.append(_asked(weakest_push(on), confirm, code))
-    confirming, leading = confirmer(on, _RUNS, progress=progress), leader(on, progress=progress)
-    answers: list[Answer] = []
-    for number, question in enumerate(questions):
-        progress(Progress("assess", number, len(questions), question.name))
+    given = digest(sorted(fingerprint(on.model.scene, on.model, on.state, models).items()))
+    with kept_answers(folder, UNFINISHED_ASSESSMENT, (Answer, Mechanism, Pushover)) as kept:
+        if len(kept):
+            text = f"going on, with {len(kept)} answers that were found before"
+            progress(Progress("assess", 0, len(questions), found=text))
         if standing.outcome.rests:
-            answers.append(answer(on, question, confirming, leading, scene.site))
+            answers = _answered(on, questions, scene.site, kept, given, progress)
         else:
-            answers.append(fallen(on, question, standing))
+            answers = [fallen(on, question, standing) for question in questions]
     unchecked = [one.name for one in questions if code and isinstance(one, LoadQuestion) and one.code is None]
     summary = _summary(assembled, on, answers, unchecked, standing, left_out)
     progress(Progress("write", 0, 1, "pictures"))
@@ -181,6 +192,7 @@ def assess(
             )
         except MissingLibraryError as error:
             warnings.append(f"no pictures: {error}")
+        summary["source"] = source_of([path], fresh)
         write_assessment(fresh / REPORT, summary)
         (fresh / "scene.toml").write_text(scene.text, encoding="utf-8")
         (fresh / INDEX).write_text(as_json(summary), encoding="utf-8")
@@ -206,6 +218,37 @@ def _standing(
         on = assembly(replace(dead, blocks=kept))
         standing = stands(on, progress)
     return on, standing, left_out
+
+
+def _answered(
+    on: RigidAssembly,
+    questions: Sequence[Question],
+    site: Site | None,
+    kept: Kept,
+    given: str,
+    progress: Listener,
+) -> list[Answer]:
+    """Answer the questions that are not answered yet; each answer is kept, and told, as soon as there is one."""
+    answers: list[Answer] = []
+    total = len(questions)
+
+    def within(report: Progress) -> None:
+        """Tell how far the runs of a question are, as a part of the whole."""
+        done = f" {report.done}" if report.done else ""
+        text = f"{questions[len(answers)].name}: {report.stage}{done}"
+        progress(Progress("assess", len(answers), total, ", ".join(filter(None, (text, report.text)))))
+
+    confirming, leading = confirmer(on, _RUNS, progress=within), leader(on, progress=within)
+    for number, question in enumerate(questions):
+        progress(Progress("assess", number, total, question.name))
+        decides = [given, digest([question, site])]
+        found: Answer | None = kept.get(decides)
+        if found is None:
+            found = answer(on, question, confirming, leading, site)
+            kept.put(decides, found)
+        answers.append(found)
+        progress(Progress("assess", number + 1, total, question.name, found.told["headline"]))
+    return answers
 
 
 def _asked(question: Question, confirm: bool, code: str | None) -> Question:

@@ -18,7 +18,7 @@ from mechanics.simulate import simulate
 from pipelines.assess.motions import stone_motions
 from pipelines.draw.elevations.movement import draw_bed_movement, draw_misfit
 from pipelines.ingest.records import surveyed_block
-from pipelines.results.folder import check_replaceable, replacing
+from pipelines.results.folder import check_replaceable, replacing, source_of
 from pipelines.results.stone_values import stone_results
 from pipelines.results.summary import as_json, summarise
 from pipelines.run.assemble import Assembly, assemble_stones
@@ -71,6 +71,7 @@ def compare(
     progress: Listener = silent,
     accept_unsound: bool = False,
     battered: bool = False,
+    overwrite: bool = False,
 ) -> SurveyComparison:
     """Run a scene and compare the movement of its stones with their measured departure from level and plumb.
 
@@ -82,17 +83,18 @@ def compare(
     progress : called at every stage
     accept_unsound : run a scene that `check_scene` finds unsound all the same
     battered : walls may have been built leaning: a uniform lean is no movement
+    overwrite : replace the results of another scene in the folder
 
     Raises
     ------
-    UsageError : the folder holds other files
+    UsageError : the folder holds other files, or results of another scene
     UnsoundSceneError : the scene has problems that `check_scene` reports
     SceneError, GeometryError, MeshError, SolverError : see `assemble` and `mechanics.simulate`
     DatabaseError : the database cannot be read or written
     """
     folder, scene = Path(folder), read_scene(path)
     refuse_stages(scene.stages, scene.document, "moma compare")
-    check_replaceable(folder, INDEX)
+    check_replaceable(folder, INDEX, () if overwrite else (Path(path),))
     progress(Progress("blocks", 0, None, "reading the stones"))
     with open_database(url, create=False) as database:
         with database.session(read_only=True) as session:
@@ -113,6 +115,7 @@ def compare(
         with replacing(folder, INDEX) as fresh:
             _draw(fresh, facades, stones, courses)
             (fresh / "scene.toml").write_text(scene.text, encoding="utf-8")
+            summary["source"] = source_of([path], fresh)
             summary["files"] = sorted([INDEX, *(entry.name for entry in fresh.iterdir())])
             (fresh / INDEX).write_text(as_json(summary), encoding="utf-8")
         kept = summarise(result, version=versions()["moma"], seconds=result.wall_time)

@@ -54,7 +54,7 @@ def draw_capacity(path: Path, title: str, curve: "Pushover", bound: float) -> No
     axes.set_ylim(0.0, 1.2 * bound)
     axes.set_xlabel(f"way of {curve.control} along the load [mm]")
     axes.set_ylabel("λ [-]")
-    axes.set_title(title, fontsize=9)
+    axes.set_title(title, fontsize=9, parse_math=False)
     axes.grid(alpha=0.3)
     axes.legend(frameon=False, loc="upper right")
     figure.savefig(path)

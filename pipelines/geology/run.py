@@ -156,6 +156,7 @@ def run_geology(
     stop: Callable[[], bool] = lambda: False,
     resume: bool | None = None,
     url: str | None = None,
+    overwrite: bool = False,
 ) -> GeologyReport:
     """Run the scene file of an experiment, and write the results into a folder.
 
@@ -169,17 +170,18 @@ def run_geology(
     stop : asked after every step; where it says True, the run ends there as interrupted, with results of what there is
     resume : go on with the unfinished run in the folder, if there is one; False: give it up; None: refuse to run then
     url : of the database that keeps the run too, made if it is not there; None: none does
+    overwrite : replace the results of another scene in the folder
 
     Raises
     ------
-    UsageError : the folder holds other files or an unfinished run, or the scene is not that of the run to be resumed;
-        the folder of samples cannot be written
+    UsageError : the folder holds other files, results of another scene or an unfinished run; the scene is not that of
+        the run to be resumed; the folder of samples cannot be written
     SceneError : with file and line, at the first mistake
     SolverError : if the motion is no longer finite
     DatabaseError : the database cannot be opened, or not written at the end; the folder is complete then
     """
     folder, scene = Path(folder), read_geology(path, kind)
-    check_replaceable(folder)
+    check_replaceable(folder, source=() if overwrite else (Path(path),))
     summary: dict[str, Any] = {}
     rows: dict[str, dict[str, Array]] = {}
     number: int | None = None

@@ -11,9 +11,23 @@ import operator
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from archmodel.query.grammar import All, AnyOf, Call, Comparison, IsIn, IsNull, Like, Node, Not, parse
+from archmodel.query.grammar import (
+    All,
+    AmountComparison,
+    AnyOf,
+    Call,
+    Comparison,
+    IsIn,
+    IsNull,
+    Like,
+    Node,
+    Not,
+    attributes_in,
+    parse,
+)
 from archmodel.query.tokens import Token, complaint
 from archmodel.tables.entities import kind_named
+from archmodel.tables.hierarchy import names_below
 from moma.errors import UsageError
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.solids import area_vector
@@ -103,6 +117,25 @@ def check_kinds(rules: Sequence[KindRule]) -> None:
             kind_named(rule.kind)
         except UsageError as error:
             raise error.at(rule.option) from error
+        for token in _kinds_named(rule.node):
+            try:
+                kind_named(token.text)
+            except UsageError as error:
+                raise complaint(token, error.what, error.remedy) from None
+
+
+def _kinds_named(node: Node) -> Iterator[Token]:
+    """Yield the names of kinds with which an expression compares that of a stone."""
+    match node:
+        case All(operands) | AnyOf(operands):
+            for operand in operands:
+                yield from _kinds_named(operand)
+        case Not(operand):
+            yield from _kinds_named(operand)
+        case Comparison(Token(text="kind"), _, value):
+            yield value
+        case IsIn(Token(text="kind"), values):
+            yield from values
 
 
 def apply_rules(block: SurveyedBlock, rules: Sequence[KindRule]) -> SurveyedBlock:
@@ -151,15 +184,20 @@ def _check(node: Node) -> None:
             _check(operand)
         case Call(function) | IsNull(Call(function)):
             raise complaint(function, f"{function.text} is a function", "a rule may ask for attributes only")
+        case AmountComparison():
+            for token in attributes_in(node):
+                raise complaint(token, "a rule computes nothing", "compare one attribute with a number")
         case IsNull(Token() as attribute):
             _check_attribute(attribute)
         case Like(attribute, _):
             _check_attribute(attribute)
             if attribute.text not in _TEXTS:
                 raise complaint(attribute, f"{attribute.text} is a number, like is for texts", "use < and >")
-        case Comparison(attribute, _, value):
+        case Comparison(attribute, sign, value):
             _check_attribute(attribute)
             _check_value(attribute, value)
+            if attribute.text == "kind" and sign not in ("=", "!="):
+                raise complaint(value, f"kinds have no order, {sign} does not compare them", "write = or !=")
         case IsIn(attribute, values):
             _check_attribute(attribute)
             for value in values:
@@ -197,6 +235,10 @@ def _holds(node: Node, values: Mapping[str, Value]) -> bool | None:
             return values[attribute.text] is None
         case Like(attribute, pattern):
             return bool(_matches(str(values[attribute.text]), pattern.text))
+        case Comparison(Token(text="kind"), sign, value):
+            return _is_a(values["kind"], value) is (sign == "=")
+        case IsIn(Token(text="kind"), members):
+            return any(_is_a(values["kind"], one) for one in members)
         case Comparison(attribute, sign, value):
             return _compared(sign, values[attribute.text], _value(attribute, value, values))
         case IsIn(attribute, members):
@@ -207,6 +249,11 @@ def _holds(node: Node, values: Mapping[str, Value]) -> bool | None:
     return None
 
 
+def _is_a(kind: Value, named: Token) -> bool:
+    """Return whether a kind is a named one or a subkind of it."""
+    return kind in names_below(kind_named(named.text))
+
+
 def _compared(sign: str, one: Value, other: Value) -> bool | None:
     if one is None or other is None:
         return None
@@ -215,7 +262,7 @@ def _compared(sign: str, one: Value, other: Value) -> bool | None:
 
 def _value(attribute: Token, token: Token, values: Mapping[str, Value]) -> Value:
     if attribute.text in _TEXTS:
-        return token.text.lower() if attribute.text == "kind" else token.text
+        return token.text
     return float(token.text) if token.role == "number" else values[token.text]
 
 

@@ -79,7 +79,7 @@ def read_record(path: str | FilePath) -> RecordFile:
     ------
     UsageError : naming file and line of the first mistake
     """
-    return parse_record(read_text(path, UsageError, encoding="utf-8-sig"), str(path))
+    return parse_record(read_text(path, UsageError), str(path))
 
 
 def parse_record(text: str, path: str) -> RecordFile:

@@ -1,5 +1,8 @@
 """Atomic replacement of result folders: all files appear or none, and only earlier results are replaced.
 
+The index of the results names the files that they are of (`source_of`). Results of others are replaced only where that
+is asked for.
+
 New results are written into a hidden folder beside the place, ``.NAME.moma-XXXXXXXX``, which then changes places with
 the earlier ones. Where the system exchanges two names at once, there is an old or a new complete folder at every
 instant. Elsewhere the earlier results wait as ``.NAME.moma-earlier`` between two renames; where a kill left them
@@ -14,22 +17,34 @@ import os
 import shutil
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from moma.errors import UsageError
+from moma.errors import UsageError, storing
 
 if sys.platform != "win32":
     import fcntl
 
-__all__ = ["RUN_INDEX", "UNFINISHED", "check_replaceable", "locked", "replacing"]
+__all__ = [
+    "RUN_INDEX",
+    "UNFINISHED",
+    "UNFINISHED_ASSESSMENT",
+    "UNFINISHED_DIAGNOSIS",
+    "check_replaceable",
+    "locked",
+    "replacing",
+    "source_of",
+]
 
 RUN_INDEX = "summary.json"
 """Index of the results of a run."""
 
 UNFINISHED = "unfinished"
 """Folder within that of the results, of a run that goes on or has been stopped."""
+
+UNFINISHED_ASSESSMENT, UNFINISHED_DIAGNOSIS = "unfinished-assessment", "unfinished-diagnosis"
+"""The same of an assessment, and of a diagnosis."""
 
 _INDEXES = (
     RUN_INDEX,
@@ -39,6 +54,12 @@ _INDEXES = (
     "comparison.json",
     "diagnosis.json",
 )  # their "files" list the files that MOMA wrote
+_LEFT = {
+    UNFINISHED: (RUN_INDEX, "run"),
+    UNFINISHED_ASSESSMENT: ("assessment.json", "assessment"),
+    UNFINISHED_DIAGNOSIS: ("diagnosis.json", "diagnosis"),
+}  # folders of unfinished work: the index of its results, and the name of the work
+_SOURCE = "source"  # key of an index: the files that the results are of, relative to the folder
 _MARK = ".moma-"  # in the names of hidden folders
 _EARLIER = f"{_MARK}earlier"
 _RANDOM = "?" * 8  # characters that tempfile adds to a name
@@ -47,15 +68,16 @@ _HERE = -100  # AT_FDCWD of Linux: paths are relative to the working directory
 _CANNOT = {errno.ENOSYS, errno.EINVAL, errno.ENOTSUP, errno.EOPNOTSUPP}  # file systems without exchange
 
 
-def check_replaceable(folder: Path, index: str = RUN_INDEX) -> None:
+def check_replaceable(folder: Path, index: str = RUN_INDEX, source: Sequence[Path] = ()) -> None:
     """Refuse to replace a file, or a folder that holds anything other than what MOMA wrote.
 
-    The results of a run are replaced by those of a run alone.
+    The results of a run are replaced by those of a run alone, and those of other files not at all.
 
     Parameters
     ----------
-    folder : the place
+    folder : the place, which may be missing
     index : name of the JSON file of the new results whose "files" lists all of them
+    source : files that the new results are of, as a scene; none: results of whatever files are replaced
 
     Raises
     ------
@@ -64,6 +86,7 @@ def check_replaceable(folder: Path, index: str = RUN_INDEX) -> None:
     place, remedy = str(folder), "name another folder"
     if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
         raise UsageError("is not a folder", where=place, remedy=remedy)
+    _refuse_unwritable(folder)
     _recover(folder)
     if not folder.exists():
         return
@@ -74,8 +97,28 @@ def check_replaceable(folder: Path, index: str = RUN_INDEX) -> None:
         raise UsageError(f"holds files that no run of MOMA wrote ({shown})", where=place, remedy=remedy)
     if known[RUN_INDEX] and index != RUN_INDEX:
         raise UsageError("holds the results of a run", where=place, remedy=remedy)
-    if index != RUN_INDEX and (folder / UNFINISHED).exists():
-        raise UsageError("holds an unfinished run", where=place, remedy=remedy)
+    for left, (own, what) in _LEFT.items():
+        if index != own and (folder / left).exists():
+            raise UsageError(f"holds an unfinished {what}", where=place, remedy=remedy)
+    if source and (earlier := _source(folder)) not in (None, source_of(source, folder)):
+        there = " and ".join(os.path.normpath(folder / one) for one in earlier or ())
+        raise UsageError(
+            f"holds the results of {there}", where=place, remedy=f"{remedy}, or replace them with --overwrite"
+        )
+
+
+def _refuse_unwritable(folder: Path) -> None:
+    """Refuse a place that cannot be written before anything is computed for it."""
+    parent = folder.absolute().parent
+    while not parent.exists():
+        parent = parent.parent
+    for place in (parent, folder):
+        if place.is_dir() and not os.access(place, os.W_OK | os.X_OK):
+            raise UsageError(
+                "the folder cannot be written",
+                where=str(place),
+                remedy="name another place, or change its permissions",
+            )
 
 
 @contextmanager
@@ -83,6 +126,11 @@ def replacing(folder: Path, index: str = RUN_INDEX) -> Iterator[Path]:
     """Yield a fresh folder, which replaces `folder` when the block ends without an error.
 
     If the block fails, is interrupted or killed, `folder` stays as it was.
+
+    Raises
+    ------
+    UsageError : see `check_replaceable`
+    StorageError : the disk is full, for example
     """
     check_replaceable(folder, index)
     target = folder.absolute()
@@ -97,14 +145,39 @@ def replacing(folder: Path, index: str = RUN_INDEX) -> Iterator[Path]:
             f"cannot be written: {error.strerror}", where=str(target.parent), remedy="name another folder"
         ) from error
     try:
-        yield fresh
-        fresh.chmod(0o777 & ~_umask())  # mkdtemp makes it private
-        check_replaceable(folder, index)
-        _put(fresh, target)
+        earlier = any((folder / one).exists() for one in _INDEXES)
+        with storing(str(folder), "earlier results there are as they were" if earlier else ""):
+            yield fresh
+            fresh.chmod(0o777 & ~_umask())  # mkdtemp makes it private
+            check_replaceable(folder, index)
+            _put(fresh, target)
     finally:
         shutil.rmtree(fresh, ignore_errors=True)
         if handle is not None:
             os.close(handle)
+
+
+def source_of(files: Iterable[str | Path], folder: Path) -> list[str]:
+    """Return the files that results are of, relative to their folder, so that both can be moved together.
+
+    That is ``source`` in the index of the results. Files on another drive than the folder are absolute.
+    """
+
+    def relative(path: Path) -> str:
+        try:
+            return Path(os.path.relpath(path, folder.resolve())).as_posix()
+        except ValueError:
+            return path.as_posix()
+
+    return [relative(Path(one).resolve()) for one in files]
+
+
+def _source(folder: Path) -> list[str] | None:
+    """Return the files that the results in a folder are of; None if that is not known."""
+    for index in _INDEXES:
+        with suppress(OSError, ValueError, LookupError, TypeError):
+            return list(map(str, json.loads((folder / index).read_text(encoding="utf-8"))[_SOURCE]))
+    return None
 
 
 def _put(fresh: Path, target: Path) -> None:
@@ -205,11 +278,11 @@ def locked(folder: Path, *, wait: bool = False) -> Iterator[None]:
 
 
 def _entries(folder: Path) -> set[str]:
-    """List the names in a folder, without the unfinished run and the link to its results."""
+    """List the names in a folder, without unfinished work and the link to the results of a run."""
     return {
         entry.name
         for entry in folder.iterdir()
-        if entry.name != UNFINISHED and not (entry.is_symlink() and os.readlink(entry).startswith(UNFINISHED))
+        if entry.name not in _LEFT and not (entry.is_symlink() and os.readlink(entry).startswith(UNFINISHED))
     }
 
 

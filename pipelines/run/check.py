@@ -15,7 +15,7 @@ from moma.errors import GeometryError, MeshError
 from pipelines.draw.catalogue import PICTURES
 from pipelines.draw.closing_pictures import draw_closing
 from pipelines.draw.elevations.closing_shapes import ClosingShapes, Stages, closing_shapes
-from pipelines.results.folder import check_replaceable, replacing
+from pipelines.results.folder import check_replaceable, replacing, source_of
 from pipelines.results.summary import as_json
 from pipelines.run.assemble import Assembly, assemble_stones, wishes_of
 from pipelines.run.check_report import (
@@ -58,6 +58,7 @@ def check_scene(
     pictures: Path | None = None,
     profile: str | None = None,
     progress: Listener = silent,
+    overwrite: bool = False,
 ) -> CheckReport:
     """Check a scene file against a database, without running anything.
 
@@ -70,15 +71,16 @@ def check_scene(
     pictures : folder for pictures of the stones and their joints, and for the report as ``check.json``; None: none
     profile : name of the profile whose settings take precedence over the scene's; None: the scene as written
     progress : called at every stage
+    overwrite : replace the pictures of another scene in the folder
 
     Raises
     ------
     SceneError : the file is wrong, or an expression names no stone
     DatabaseError : the database cannot be read
-    UsageError : the folder holds other files, or there is no such profile
+    UsageError : the folder holds other files, or those of another scene, or there is no such profile
     """
     if pictures is not None:
-        check_replaceable(pictures, _INDEX)
+        check_replaceable(pictures, _INDEX, () if overwrite else (Path(path),))
     scene = read_scene(path)
     progress(Progress("blocks", 0, None, "reading the stones"))
     with open_database(url, create=False) as database, database.session(read_only=True) as session:
@@ -100,14 +102,19 @@ def check_scene(
     if pictures is None or assembly is None:
         return report
     progress(Progress("write", 0, None, "pictures"))
-    return _with_pictures(report, assembly, pictures)
+    return _with_pictures(report, assembly, pictures, Path(path))
 
 
-def _with_pictures(report: CheckReport, assembly: Assembly, folder: Path) -> CheckReport:
+def _with_pictures(report: CheckReport, assembly: Assembly, folder: Path, scene: Path) -> CheckReport:
     """Draw the pictures into the folder, all of them or none; return the report that lists them."""
     with replacing(folder, _INDEX) as fresh:
         files, warnings = draw_closing(fresh, _shapes(report.scene, assembly))
-        report = replace(report, files=(*files, _INDEX), warnings=(*report.warnings, *warnings))
+        report = replace(
+            report,
+            files=(*files, _INDEX),
+            warnings=(*report.warnings, *warnings),
+            source=tuple(source_of([scene], fresh)),
+        )
         (fresh / _INDEX).write_text(as_json(asdict(report)), encoding="utf-8")
     return report
 

@@ -110,6 +110,7 @@ class CheckReport:
     stones : model of each stone, and its reason; where joints could not be closed, as if there were none
     simplification, joints : changes of the stones and of their joints; None if they could not be made
     files : pictures that were drawn
+    source : the scene file, relative to the folder of the pictures; empty if none were drawn
     warnings : keys without effect, limits of the stresses, and pictures that could not be drawn
     """
 
@@ -129,4 +130,5 @@ class CheckReport:
     stages: tuple[str, ...]
     problems: tuple[str, ...]
     files: tuple[str, ...] = ()
+    source: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()

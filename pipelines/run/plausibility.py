@@ -1,4 +1,4 @@
-"""Values and corners that no stone can have, and those that deserve a second look, before a scene is built of them."""
+"""Values and corners that no stone or scene can have, and those that deserve a second look, before it is built."""
 
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
@@ -14,6 +14,9 @@ from survey.quality.plausible import DENSITY, FRICTION, LENGTH, POISSON, YOUNG, 
 __all__ = ["corner_warnings", "impossible_values", "unusual_values"]
 
 _SHOWN = 6  # most findings of one sort that are named
+_MANY_STEPS = 1e7  # an hour for the smallest scenes, at 0.3 ms for a step
+_ENDLESS_STEPS = 1e9  # days even for a single stone
+_LONG_STEP = 0.05  # in which a falling stone moves by its joint's width and more: g h² = 25 mm [s]
 
 
 def impossible_values(scene: SceneFile, models: Sequence[StoneModel]) -> list[str]:
@@ -42,6 +45,7 @@ def corner_warnings(models: Sequence[StoneModel]) -> list[str]:
 
 def _doubts(scene: SceneFile, models: Sequence[StoneModel]) -> Iterator[tuple[str, Doubt]]:
     yield from _of_sizes(models)
+    yield from _of_steps(scene)
     for material in dict.fromkeys(one.material for one in models):
         for value, of in ((material.density, DENSITY), (material.young, YOUNG), (material.poisson, POISSON)):
             if (doubt := doubt_of(value, of)) is not None:
@@ -53,6 +57,24 @@ def _doubts(scene: SceneFile, models: Sequence[StoneModel]) -> Iterator[tuple[st
         friction = getattr(law, "friction", None)
         if friction is not None and (doubt := doubt_of(friction, FRICTION)) is not None:
             yield f"{document.where(*path)}: {doubt.text}", doubt
+
+
+def _of_steps(scene: SceneFile) -> Iterator[tuple[str, Doubt]]:
+    step, duration = scene.time.step, scene.time.duration
+    where = scene.document.where("time", "step")
+    if (count := duration / step) >= _MANY_STEPS:
+        text = (
+            f"{where}: {duration:g} s in steps of {step:g} s are {count:.0e} steps, which takes "
+            + ("longer than anyone waits" if count >= _ENDLESS_STEPS else "hours at the least")
+            + "; usual steps are 0.5 to 10 ms"
+        )
+        yield text, Doubt(text, count >= _ENDLESS_STEPS)
+    if step > _LONG_STEP:
+        text = (
+            f"{where}: in a step of {step:g} s a stone falls by {9.81e3 * step**2:.0f} mm; "
+            "usual steps are 0.5 to 10 ms"
+        )
+        yield text, Doubt(text, False)
 
 
 def _of_sizes(models: Sequence[StoneModel]) -> Iterator[tuple[str, Doubt]]:

@@ -23,11 +23,11 @@ from mechanics.simulate import simulate, simulate_stages
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.files import check_mesh_file, write_meshes
 from mechanics.stones.meshing.mesh import VolumeMesh
-from moma.errors import MissingLibraryError, MomaError
+from moma.errors import MissingLibraryError, MomaError, storing
 from pipelines.draw.pictures import OF_RESULTS, draw_pictures, drawing_process, missing
 from pipelines.draw.plots import history_svg
 from pipelines.reports.run import write_report
-from pipelines.results.folder import check_replaceable, replacing
+from pipelines.results.folder import check_replaceable, replacing, source_of
 from pipelines.results.joints_csv import write_joints
 from pipelines.results.series_csv import write_series
 from pipelines.results.stone_values import stone_results
@@ -81,6 +81,7 @@ def run_scene(
     accept_unsound: bool = False,
     stop: Callable[[], bool] = lambda: False,
     resume: bool | None = None,
+    overwrite: bool = False,
 ) -> RunReport:
     """Run a scene file on the stones of a database, and write the results into a folder.
 
@@ -95,18 +96,19 @@ def run_scene(
     accept_unsound : run a scene that `check_scene` finds unsound all the same; every result says so then
     stop : asked after every step; where it says True, the run ends there as interrupted, with results of what there is
     resume : go on with the unfinished run in the folder, if there is one; False: give it up; None: refuse to run then
+    overwrite : replace the results of another scene in the folder
 
     Raises
     ------
-    UsageError : the folder holds other files or an unfinished run, the scene is not that of the run to be resumed,
-        there is no such profile, or the meshes cannot be written
+    UsageError : the folder holds other files, results of another scene or an unfinished run, the scene is not that of
+        the run to be resumed, there is no such profile, or the meshes cannot be written
     UnsoundSceneError : the scene has problems that `check_scene` reports, and they are not accepted
     SceneError, GeometryError, MeshError, SolverError : see `assemble` and `mechanics.simulate`
     DatabaseError : the database cannot be read, or not written at the end; the folder is complete then
     """
     seconds: dict[str, float] = {}
     folder, scene = Path(folder), read_scene(path)
-    check_replaceable(folder)
+    check_replaceable(folder, source=() if overwrite else (Path(path),))
     if meshes is not None:
         check_mesh_file(meshes)
     progress(Progress("blocks", 0, None, "reading the stones"))
@@ -167,7 +169,8 @@ def run_scene(
                 )
                 unfinished.hand_over(fresh)
         if meshes is not None:
-            write_meshes(meshes, _meshes(result, assembly))
+            with storing(str(meshes)):
+                write_meshes(meshes, _meshes(result, assembly))
         record = run_record(result, stones, scene, assembly, summary, as_of)
         run = store_record(database, folder, record)
         if result.outcome is not Outcome.INTERRUPTED:
@@ -233,6 +236,7 @@ def write_results(
     write_report(folder / "report.html", result, summary, stones, warnings, history)
     (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
     summary["resumed"] = [] if unfinished is None else unfinished.resumed
+    summary["source"] = source_of([scene.document.path], folder)
     summary["origin"] = assembly.origin.tolist()
     summary["warnings"] = warnings
     summary["files"] = sorted(["summary.json", *(entry.name for entry in folder.iterdir())])

@@ -13,7 +13,7 @@ from mechanics.carried import Carried
 from mechanics.dynamics.progress import Listener, Progress
 from mechanics.results.result import BodyResult, Frame
 from mechanics.scene.scene import Block
-from moma.errors import UsageError
+from moma.errors import StorageError, UsageError, storing
 from pipelines.results.checkpoints import Checkpoint, Checkpoints, write_whole
 from pipelines.results.folder import RUN_INDEX, UNFINISHED, locked
 from pipelines.results.vtkhdf import RESULTS, GrowingResults
@@ -235,6 +235,7 @@ def unfinished_run(
     Raises
     ------
     UsageError : there is an unfinished run, or another program runs there
+    StorageError : the disk is full, for example
     """
     place, made = folder / UNFINISHED, not folder.exists()
     try:
@@ -253,8 +254,15 @@ def unfinished_run(
             )
         if steps and resume:
             progress(Progress("blocks", 0, None, f"the run will go on after step {steps[0]}"))
+        archive = UnfinishedRun(folder, output)
         try:
-            yield UnfinishedRun(folder, output)
+            with storing(str(folder)):
+                yield archive
+        except StorageError as error:
+            if not (kept := _checkpoints(folder).steps()):
+                raise
+            how = f"--resume goes on after step {kept[0]}"
+            raise StorageError(error.what, where=error.where, remedy=f"{error.remedy}; {how}") from error
         finally:
             if not _checkpoints(folder).steps():
                 shutil.rmtree(place, ignore_errors=True)

@@ -1,11 +1,12 @@
 """A synthetic survey with a scene that runs, written into a folder for people to start from."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mechanics.dynamics.progress import Listener, silent
-from moma.errors import UsageError
+from moma.errors import UsageError, storing
 from pipelines.samples.causes import PULSE, Cause
 from pipelines.samples.samples import Recipe, recipe_of
 from survey.arrays import Array
@@ -169,6 +170,8 @@ def write_sample(
     ------
     UsageError
         if there is no such sample, or a file would be overwritten
+    StorageError
+        if the disk is full, for example; none of the files is left then
     """
     recipe = recipe_of(kind, moved=moved, small=small, phases=phases, courses=courses)
     cause = recipe.cause
@@ -187,17 +190,31 @@ def write_sample(
         texts[knowledge] = sample.knowledge
     extra = () if solids is None else (solids, solids.with_name(_HEAD))
     _must_be_new(*texts, *extra)
-    folder.mkdir(parents=True, exist_ok=True)
-    write_moma(sample.survey, survey)
-    for path, text in texts.items():
-        path.write_text(text, encoding="utf-8", newline="\n")
-    if solids is not None:
-        write_obj(sample.modelled, solids)
-        head = sample.survey.head
-        write_head(replace(head, name=f"{head.name}, closed solids"), solids.with_name(_HEAD))
-    files = tuple(str(path) for path in (survey, *texts, *extra))
+    paths = (survey, *texts, *extra)
+    with storing(str(folder)):
+        folder.mkdir(parents=True, exist_ok=True)
+        with _all_or_none(paths):
+            write_moma(sample.survey, survey)
+            for path, text in texts.items():
+                path.write_text(text, encoding="utf-8", newline="\n")
+            if solids is not None:
+                write_obj(sample.modelled, solids)
+                head = sample.survey.head
+                write_head(replace(head, name=f"{head.name}, closed solids"), solids.with_name(_HEAD))
+    files = tuple(map(str, paths))
     stones = len(sample.survey.blocks) + len(sample.modelled)
     return WrittenSample(kind, recipe.title, stones, files, commands)
+
+
+@contextmanager
+def _all_or_none(paths: Sequence[Path]) -> Iterator[None]:
+    """Remove new files where a with-block that writes them fails."""
+    try:
+        yield
+    except BaseException:
+        for path in paths:
+            path.unlink(missing_ok=True)
+        raise
 
 
 def _must_be_new(*paths: Path) -> None:

@@ -3,6 +3,7 @@
 Nothing runs and no database is read here; stones are still expressions. docs/scene.md lists the keys.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from archmodel.store.lookalikes import explained, plain_form
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import ContactSettings, SolverSettings, TimeSettings
 from mechanics.stones.materials import Material, Orthotropy
@@ -159,8 +161,11 @@ def _materials(document: TomlDocument, given: Mapping[str, Any]) -> tuple[Materi
     tables = given.get("materials", {})
     if not tables:
         document.fail("no material", "materials", remedy="add a table such as [materials.limestone]")
-    rules = []
+    rules, forms = [], dict[str, str]()
     for name, content in tables.items():
+        if (other := forms.setdefault(plain_form(name), name)) != name:
+            what = f"the material {explained(name, other)}"
+            document.fail(what, "materials", name, remedy="write both with the same characters")
         if not isinstance(content, dict):
             document.fail(
                 f"{name!r} stands in no material", "materials", name, remedy="write it under [materials.NAME]"
@@ -231,6 +236,13 @@ def _time(document: TomlDocument, values: dict[str, Any]) -> TimeSettings:
             "time",
             "duration",
             remedy="give at least one step",
+        )
+    if not math.isfinite(values["duration"] / values["step"]):
+        document.fail(
+            f"step = {values['step']:g} s is too short to count the steps of {values['duration']:g} s",
+            "time",
+            "step",
+            remedy="usual steps are 0.5 to 10 ms",
         )
     return build(TimeSettings, values)
 

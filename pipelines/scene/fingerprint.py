@@ -14,7 +14,7 @@ from mechanics.scene.stages import Stage
 from mechanics.scene.state import State
 from pipelines.scene.selection import StoneModel
 
-__all__ = ["changes", "fingerprint", "planar_fingerprint"]
+__all__ = ["changes", "digest", "fingerprint", "planar_fingerprint"]
 
 _STONE = "stone "
 _SHOWN = 9  # numbers up to which an array stands in full
@@ -41,14 +41,14 @@ def fingerprint(
     recorded = (
         (stone.record.code, [stone.record.solid_vertices, stone.record.solid_faces]) for stone in stones
     )
-    found = {f"{_STONE}{code}: solid in the database": _digest(solid) for code, solid in recorded}
+    found = {f"{_STONE}{code}: solid in the database": digest(solid) for code, solid in recorded}
     found |= dict(_parts(own, ""))
     for block in scene.blocks:
         values = ((one.name, getattr(block, one.name)) for one in fields(block) if one.name != "code")
-        found |= {f"{_STONE}{block.code}: {name}": _digest(value) for name, value in values}
+        found |= {f"{_STONE}{block.code}: {name}": digest(value) for name, value in values}
     for number, stage in enumerate(stages, 1):
         standing = [(block.code, str(block.fidelity)) for block in stage.scene.blocks]
-        what = {"name": stage.name, "stones": _digest(standing), "loads": stage.scene.loads}
+        what = {"name": stage.name, "stones": digest(standing), "loads": stage.scene.loads}
         what["duration"] = stage.scene.time.duration
         found |= dict(_parts(what, f"stage {number}"))
     built = (
@@ -59,17 +59,17 @@ def fingerprint(
         [stone and stone.mesh for stone in model.stones],
     )
     return found | {
-        "order of the stones": _digest([one.code for one in scene.blocks]),
-        "meshes": _digest(built),
+        "order of the stones": digest([one.code for one in scene.blocks]),
+        "meshes": digest(built),
     }
 
 
 def planar_fingerprint(scene: PlanarScene) -> dict[str, str]:
     """Return a text for each setting, load and body of a scene of the plane."""
     own = {one.name: getattr(scene, one.name) for one in fields(scene) if one.name not in ("disks", "walls")}
-    bodies = [(f"disk {disk.code}", _digest(disk)) for disk in scene.disks]
-    bodies += [(f"wall {wall.code}", _digest(wall)) for wall in scene.walls]
-    return dict(_parts(own, "")) | dict(bodies) | {"order of the bodies": _digest(scene.codes)}
+    bodies = [(f"disk {disk.code}", digest(disk)) for disk in scene.disks]
+    bodies += [(f"wall {wall.code}", digest(wall)) for wall in scene.walls]
+    return dict(_parts(own, "")) | dict(bodies) | {"order of the bodies": digest(scene.codes)}
 
 
 def changes(then: Mapping[str, str], now: Mapping[str, str]) -> tuple[list[str], list[str]]:
@@ -118,17 +118,18 @@ def _parts(value: Any, path: str) -> Iterator[tuple[str, str]]:
 def _text(value: Any) -> str:
     """Return a short value in full, the digest of a longer one."""
     if isinstance(value, np.ndarray):
-        return repr(value.tolist()) if value.size <= _SHOWN else _digest(value)
+        return repr(value.tolist()) if value.size <= _SHOWN else digest(value)
     if isinstance(value, list | tuple) and len(value) > _SHOWN:
-        return _digest(value)
+        return digest(value)
     return repr(value) if isinstance(value, float) else str(value)
 
 
-def _digest(value: Any) -> str:
-    digest = hashlib.sha256()
+def digest(value: Any) -> str:
+    """Return a digest of a value made of dataclasses, lists, tuples, sets, arrays and plain values."""
+    found = hashlib.sha256()
     for part in _bytes(value):
-        digest.update(part)
-    return f"#{digest.hexdigest()[:_DIGITS]}"
+        found.update(part)
+    return f"#{found.hexdigest()[:_DIGITS]}"
 
 
 def _bytes(value: Any) -> Iterator[bytes]:

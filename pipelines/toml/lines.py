@@ -106,10 +106,8 @@ def _dotted(key: str) -> Path:
     return tuple(path)
 
 
-def read_text(
-    path: str | FilePath, error: type[UsageError], *, missing: str = "no such file", encoding: str = "utf-8"
-) -> str:
-    """Read the text of a file that a user wrote.
+def read_text(path: str | FilePath, error: type[UsageError], *, missing: str = "no such file") -> str:
+    """Read the text of a file that a user wrote; a byte-order mark, with which some editors begin, is left out.
 
     Parameters
     ----------
@@ -120,7 +118,7 @@ def read_text(
     UsageError : as `error`
     """
     try:
-        return FilePath(path).read_text(encoding=encoding)
+        return FilePath(path).read_text(encoding="utf-8-sig")
     except FileNotFoundError:
         raise error(missing, where=str(path), remedy="check the path") from None
     except UnicodeDecodeError as fault:

@@ -70,7 +70,7 @@ def trade_png(title: str, panels: Sequence[Panel], asked: float) -> bytes:
         _draw(axes, panel, asked)
     for axes in places[len(panels) :]:
         axes.set_axis_off()
-    figure.suptitle(title, fontsize=11)
+    figure.suptitle(title, fontsize=11, parse_math=False)
     _legend(figure, panels)
     out = io.BytesIO()
     figure.savefig(out, format="png")

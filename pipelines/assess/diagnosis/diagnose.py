@@ -11,10 +11,20 @@ from pipelines.assess.diagnosis.dating import Dating, date_movement
 from pipelines.assess.diagnosis.file import DiagnosisFile, read_diagnosis
 from pipelines.assess.diagnosis.measurements import Measurements, measurements
 from pipelines.assess.diagnosis.results import INDEX, write_diagnosis
-from pipelines.assess.diagnosis.search import Case, Fitted, Runs, cases_of, check_case, fit_cases, runs_of
-from pipelines.assess.diagnosis.trials import Runner, runner
+from pipelines.assess.diagnosis.search import (
+    Case,
+    Fitted,
+    Runs,
+    cases_of,
+    check_case,
+    fit_cases,
+    kept_runner,
+    runs_of,
+)
+from pipelines.assess.diagnosis.trials import Runner, Tried, runner
+from pipelines.assess.kept import kept_answers
 from pipelines.assess.motions import Motions
-from pipelines.results.folder import check_replaceable, replacing
+from pipelines.results.folder import UNFINISHED_DIAGNOSIS, check_replaceable, replacing
 
 __all__ = ["Diagnosis", "diagnose"]
 
@@ -43,37 +53,44 @@ def diagnose(
     jobs: int = 1,
     accept_unsound: bool = False,
     run: Runner | None = None,
+    overwrite: bool = False,
 ) -> Diagnosis:
     """Fit each hypothesis of a file to the measured deformation, rank them, and write the diagnosis.
+
+    Answers of runs are kept in the folder until all is done: stopped or killed, the same call goes on from there.
 
     Parameters
     ----------
     path : file of the diagnosis, or scene with [[hypotheses]]
     url : of the database
     folder : of the results; earlier ones there are replaced
-    progress : called at every batch of runs
+    progress : called after every run, and with the fit of each hypothesis as soon as there is one
     jobs : runs at a time on this machine
     accept_unsound : run scenes that `check_scene` finds unsound all the same
     run : runs scenes elsewhere; `jobs` is not used then
+    overwrite : replace the results of another file in the folder
 
     Raises
     ------
-    UsageError : the folder holds other files
+    UsageError : the folder holds other files, or results of another file
     SceneError : at the first mistake of the file, or of a scene with a hypothesis
     UnsoundSceneError : a scene has problems that `check_scene` reports
     DatabaseError : the database cannot be read
     """
     folder, file = Path(folder), read_diagnosis(path)
-    check_replaceable(folder, INDEX)
+    check_replaceable(folder, INDEX, () if overwrite else (Path(path),))
     progress(Progress("blocks", 0, None, "reading the stones"))
     found = measurements(file, url)
     every = cases_of(file, found.phases)
     impossible = [check_case(file, case, url, accept_unsound) for case in every]
     cases = tuple(case for case, reason in zip(every, impossible, strict=True) if not reason)
-    with runner(jobs) if run is None else nullcontext(run) as own:
-        runs = runs_of(file, url, own)
-        done = fit_cases(cases, found.deformation, runs, progress)
-        dating = _dated(file, cases, found, done, runs) if found.phases else None
+    with kept_answers(folder, UNFINISHED_DIAGNOSIS, (Tried, Motions)) as kept:
+        if len(kept):
+            progress(Progress("run", 0, None, found=f"going on, with {len(kept)} runs that were made before"))
+        with runner(jobs) if run is None else nullcontext(run) as own:
+            runs = runs_of(file, url, kept_runner(file, found.solids, kept, own))
+            done = fit_cases(cases, found.deformation, runs, progress)
+            dating = _dated(file, cases, found, done, runs) if found.phases else None
     progress(Progress("write", 0, 1, "pictures"))
     with replacing(folder, INDEX) as fresh:
         summary = write_diagnosis(fresh, file, cases, found, done, dating, tuple(filter(None, impossible)))

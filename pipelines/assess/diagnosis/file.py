@@ -1,12 +1,14 @@
 """Files of a diagnosis: hypotheses on what has moved a building, each a change of a scene with unknown amplitudes."""
 
 import ast
+import math
 import operator
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from archmodel.store.lookalikes import explained, plain_form
 from moma.errors import SceneError
 from pipelines.scene.file import BESIDE
 from pipelines.toml.lines import key_lines, parse_toml, read_text
@@ -94,6 +96,9 @@ UNKNOWN_KEYS = (
         at_most=100,
     ),
 )
+
+_LONGEST = 500  # characters of a formula
+_SHOWN = 60  # characters of a formula in a message
 
 _OPERATORS: Mapping[type[ast.operator], Callable[[float, float], float]] = {
     ast.Add: operator.add,
@@ -223,14 +228,16 @@ def _hypotheses(document: TomlDocument, given: Mapping[str, Any]) -> Iterator[Hy
     tables = given.get("hypotheses", [])
     if not isinstance(tables, list) or not tables or not all(isinstance(one, dict) for one in tables):
         document.fail("no hypothesis", "hypotheses", remedy="write [[hypotheses]] above each")
-    names: set[str] = set()
+    names: dict[str, str] = {}
     for index, table in enumerate(tables):
         path = ("hypotheses", str(index))
         plain = {key: value for key, value in table.items() if key != "unknowns"}
         values: dict[str, Any] = check_table(document, path, plain, HYPOTHESIS_KEYS, "[[hypotheses]]")
-        if values["name"] in names:
+        if values["name"] in names.values():
             document.fail(f"two hypotheses {values['name']!r}", *path, "name", remedy="name each differently")
-        names.add(values["name"])
+        if (other := names.setdefault(plain_form(values["name"]), values["name"])) != values["name"]:
+            what = f"the hypothesis {explained(values['name'], other)}"
+            document.fail(what, *path, "name", remedy="name each differently")
         unknowns = tuple(_unknowns(document, path, table.get("unknowns", [])))
         _check_formulas(document, path, values["scene"], [one.name for one in unknowns])
         yield Hypothesis(values["name"], path, unknowns, values["scene"])
@@ -261,15 +268,15 @@ def _check_formulas(document: TomlDocument, path: tuple[str, ...], change: Any, 
     """Refuse formulas that cannot be read, and unknowns that stand in none."""
     used: set[str] = set()
     for place, text in _formulas(change, (*path, "scene")):
+        remedy = f"use numbers, + - * / ( ) and {', '.join(names) or 'no names'}"
+        if len(text) > _LONGEST:
+            document.fail(f"a formula of {len(text)} characters", *place, remedy=f"write {_LONGEST} at most")
         try:
-            tree = ast.parse(text[1:].strip(), mode="eval")
             # with values that no formula divides by
-            _value(tree.body, dict.fromkeys(names, 0.7310585))
-        except (SyntaxError, ValueError, ZeroDivisionError) as fault:
-            why = fault if isinstance(fault, ValueError) else "not a formula"
-            remedy = f"use numbers, + - * / ( ) and {', '.join(names) or 'no names'}"
-            document.fail(f"{text!r}: {why}", *place, remedy=remedy)
-        used |= {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+            _computed(text, dict.fromkeys(names, 0.7310585))
+        except ValueError as fault:
+            document.fail(f"{_shortened(text)}: {fault}", *place, remedy=remedy)
+        used |= {node.id for node in ast.walk(_parsed(text)) if isinstance(node, ast.Name)}
     for index, name in enumerate(names):
         if name not in used or names.count(name) > 1:
             what = f"unknown {name!r} stands in no formula" if name not in used else f"two unknowns {name!r}"
@@ -294,10 +301,43 @@ def _formulas(change: Any, path: tuple[str, ...]) -> Iterator[tuple[tuple[str, .
 def _filled(change: Any, values: Mapping[str, float]) -> Any:
     """Return a change with numbers in place of formulas."""
     if isinstance(change, str) and change.startswith("="):
-        return _value(ast.parse(change[1:].strip(), mode="eval").body, values)
+        try:
+            return _computed(change, values)
+        except ValueError as fault:
+            raise SceneError(f"{_shortened(change)}: {fault}") from None
     if isinstance(change, Mapping):
         return {key: _filled(one, values) for key, one in change.items()}
     return [_filled(one, values) for one in change] if isinstance(change, list) else change
+
+
+def _shortened(formula: str) -> str:
+    """Return a formula for a message of one line."""
+    return repr(formula if len(formula) <= _SHOWN else formula[: _SHOWN - 3] + "...")
+
+
+def _parsed(formula: str) -> ast.expr:
+    return ast.parse(formula[1:].strip(), mode="eval").body
+
+
+def _computed(formula: str, values: Mapping[str, float]) -> float:
+    """Return the value of a formula.
+
+    Raises
+    ------
+    ValueError : it cannot be read, or has no finite value
+    """
+    try:
+        number = _value(_parsed(formula), values)
+    except SyntaxError:
+        raise ValueError("not a formula") from None
+    except (RecursionError, MemoryError):
+        raise ValueError("it is nested too deeply") from None
+    except ArithmeticError:
+        number = math.nan
+    if not math.isfinite(number):
+        at = ", ".join(f"{name} = {value:g}" for name, value in values.items())
+        raise ValueError("it has no finite value" + (f" at {at}" if at else ""))
+    return number
 
 
 def _value(node: ast.expr, values: Mapping[str, float]) -> float:

@@ -5,9 +5,11 @@ from dataclasses import dataclass, replace
 
 from archmodel.database.session import open_database
 from archmodel.query.api import find_rows
+from archmodel.tables.entries import latest_entry
 from pipelines.assess.compare import measured_stones
 from pipelines.assess.diagnosis.file import DiagnosisFile
 from pipelines.scene.file import read_scene
+from pipelines.scene.fingerprint import digest
 from pipelines.scene.selection import select_stones
 from survey.quality.deformation import Built, Deformation, measure_deformation
 from survey.quality.facades import Facade
@@ -27,6 +29,7 @@ class Measurements:
     deformation : their departure from level and plumb
     phases : of each stone by code; empty if the movement is not to be dated
     resting : codes of stones that rest on those of an earlier phase
+    solids : digest of the stones in the database
     """
 
     stones: tuple[StoneQuality, ...]
@@ -34,6 +37,7 @@ class Measurements:
     deformation: Deformation
     phases: Mapping[str, str]
     resting: frozenset[str]
+    solids: str = ""
 
 
 def measurements(file: DiagnosisFile, url: str) -> Measurements:
@@ -46,7 +50,10 @@ def measurements(file: DiagnosisFile, url: str) -> Measurements:
     """
     scene = read_scene(file.scene_path)
     with open_database(url, create=False) as database, database.session(read_only=True) as session:
-        stones, facades = measured_stones(select_stones(scene, session))
+        models = select_stones(scene, session)
+        stones, facades = measured_stones(models)
+        records = [[one.record.code, one.record.solid_vertices, one.record.solid_faces] for one in models]
+        solids = digest([latest_entry(session), records])
         rows = find_rows(session, "entity", (), columns=("code", "phase")) if file.phases else ()
     known = {str(row["code"]): row["phase"] for row in rows}
     phases = {stone.code: known.get(stone.code) for stone in stones} if file.phases else {}
@@ -56,7 +63,8 @@ def measurements(file: DiagnosisFile, url: str) -> Measurements:
                 f"stone {code} is of {'no phase' if phase is None else f'phase {phase}, which is not listed'}"
             )
             file.document.fail(what, "diagnosis", "phases", remedy="record its phase, or leave 'phases' out")
-    return measure(file, stones, facades, {code: str(phase) for code, phase in phases.items()})
+    found = measure(file, stones, facades, {code: str(phase) for code, phase in phases.items()})
+    return replace(found, solids=solids)
 
 
 def measure(

@@ -11,9 +11,10 @@ from pipelines.assess.diagnosis.dating import Dating
 from pipelines.assess.diagnosis.file import DiagnosisFile
 from pipelines.assess.diagnosis.measurements import Measurements
 from pipelines.assess.diagnosis.ranking import Ranked, verdict
-from pipelines.assess.diagnosis.search import Case, Fitted
+from pipelines.assess.diagnosis.search import RECORDS, Case, Fitted
 from pipelines.assess.motions import Motions
 from pipelines.draw.elevations.movement import draw_bed_movement
+from pipelines.results.folder import source_of
 from pipelines.results.summary import as_json
 from pipelines.run.record import versions
 from pipelines.toml.writer import toml_text
@@ -23,7 +24,6 @@ from survey.quality.movement import CourseMovement, compare_courses
 __all__ = ["INDEX", "write_best", "write_diagnosis"]
 
 _BEST = "best.toml"  # name of the scene
-_RECORDS = ("x", "y", "z")  # keys of a ground motion that name files
 
 _HYPOTHESIS = "rank hypothesis stood chi2 dof probability aicc amplitude unit value low high"  # columns
 
@@ -60,6 +60,7 @@ def write_diagnosis(
     write_best(folder, file, case, best)
     summary = _summary(file, found, done, dating)
     summary["cautions"] += cautions
+    summary["source"] = source_of([file.document.path], folder)
     summary["files"] = sorted([INDEX, *(entry.name for entry in folder.iterdir())])
     (folder / INDEX).write_text(as_json(summary), encoding="utf-8")
     return summary
@@ -218,7 +219,7 @@ class _Copies:
             return [self.named(one) for one in part]
         if not isinstance(part, Mapping):
             return part
-        names = _RECORDS if part.get("type") == "ground_motion" else ("file",)
+        names = RECORDS if part.get("type") == "ground_motion" else ("file",)
         return {
             key: self._copied(one) if key in names and isinstance(one, str) else self.named(one)
             for key, one in part.items()

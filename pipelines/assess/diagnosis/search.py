@@ -1,7 +1,10 @@
 """Search for the amplitudes of all hypotheses at once, so that their runs can be made side by side."""
 
-from collections.abc import Callable, Mapping, Sequence
+import tomllib
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,15 +20,33 @@ from pipelines.assess.diagnosis.fit import Ask, Fit, fit
 from pipelines.assess.diagnosis.ranking import APART, STILL, Ranked, Ranking, rank, with_others
 from pipelines.assess.diagnosis.smoothness import probes, with_unevenness
 from pipelines.assess.diagnosis.trials import Runner, Trial, Tried, since_rest
+from pipelines.assess.kept import Kept
 from pipelines.assess.motions import Motions
 from pipelines.run.assemble import assemble
 from pipelines.run.soundness import problems_of, refuse_unsound
 from pipelines.scene.file import parse_scene
+from pipelines.scene.fingerprint import digest
 from pipelines.toml.writer import toml_text
 from survey.quality.deformation import Deformation
 
-__all__ = ["Case", "Fitted", "Place", "Runs", "cases_of", "check_case", "fit_cases", "runs_of"]
+__all__ = [
+    "RECORDS",
+    "Case",
+    "Fitted",
+    "Place",
+    "Runs",
+    "cases_of",
+    "check_case",
+    "fit_cases",
+    "kept_runner",
+    "named_files",
+    "runs_of",
+]
 
+RECORDS = ("x", "y", "z")
+"""Keys of a ground motion that name files."""
+
+_USUAL_TURNS = 3  # of a search
 _NOWHERE = Motions({}, {})
 
 
@@ -61,8 +82,8 @@ class Case:
 Place = tuple[Case, tuple[float, ...]]
 """A case with its amplitudes."""
 
-Runs = Callable[[Sequence[Place]], Sequence[Tried]]
-"""Function that makes the runs of cases with given amplitudes."""
+Runs = Callable[[Sequence[Place]], Iterable[Tried]]
+"""Function that makes the runs of cases with given amplitudes, and gives the answers as they come."""
 
 
 @dataclass(frozen=True)
@@ -128,24 +149,72 @@ def check_case(file: DiagnosisFile, case: Case, url: str, accept_unsound: bool) 
 def runs_of(file: DiagnosisFile, url: str, run: Runner) -> Runs:
     """Return a function that makes the runs of cases by running their scenes.
 
-    If movements count from rest, the scene without any cause is run too, once for each set of stones that stood.
+    If movements count from rest, the scene without any cause is run too, once for each set of stones that stood. A case
+    whose formulas have no value at the amplitudes has failed.
     """
     rest: dict[tuple[str, ...], Tried] = {}
 
-    def made(places: Sequence[Place]) -> list[Tried]:
-        trials = [Trial(case.text(file, x), file.scene_path, url) for case, x in places]
-        if not file.from_rest:
-            return list(run(trials))
+    def made(places: Sequence[Place]) -> Iterator[Tried]:
+        scenes = [_scene_or_fault(file, case, x) for case, x in places]
+        trials = [Trial(one, file.scene_path, url) for one in scenes if isinstance(one, str)]
         fresh = [later for later in dict.fromkeys(case.later for case, _ in places) if later not in rest]
+        fresh = fresh if file.from_rest else []
         first = [Trial(toml_text(_without(file.base, later)), file.scene_path, url) for later in fresh]
-        answers = run([*first, *trials])
-        rest.update(zip(fresh, answers, strict=False))
-        return [
-            since_rest(one, rest[case.later])
-            for (case, _), one in zip(places, answers[len(fresh) :], strict=True)
-        ]
+        answers = iter(run([*first, *trials]))
+        rest.update({later: next(answers) for later in fresh})
+        for (case, _), one in zip(places, scenes, strict=True):
+            tried = next(answers) if isinstance(one, str) else one
+            yield since_rest(tried, rest[case.later]) if file.from_rest else tried
 
     return made
+
+
+def _scene_or_fault(file: DiagnosisFile, case: Case, amplitudes: tuple[float, ...]) -> str | Tried:
+    try:
+        return case.text(file, amplitudes)
+    except SceneError as error:
+        return Tried(None, str(error), 0.0)
+
+
+def kept_runner(file: DiagnosisFile, solids: str, kept: Kept, run: Runner) -> Runner:
+    """Return a runner that keeps each answer as soon as there is one, and does not run again what is kept.
+
+    Parameters
+    ----------
+    file : names the scene, beside which the files lie that scenes name
+    solids : digest of the stones in the database
+    kept : the answers
+    run : runs the other scenes
+    """
+
+    def decides(trial: Trial) -> list[str]:
+        scene = tomllib.loads(trial.text)
+        return [solids, trial.text, digest([one.read_bytes() for one in named_files(scene, file.scene_path)])]
+
+    def made(trials: Sequence[Trial]) -> Iterator[Tried]:
+        known = [(one, keys, kept.get(keys)) for one in trials for keys in [decides(one)]]
+        others = iter(run([one for one, _, tried in known if tried is None]))
+        for _, keys, tried in known:
+            if tried is None:
+                tried = next(others)
+                kept.put(keys, tried)
+            yield tried
+
+    return made
+
+
+def named_files(part: Any, scene: str | Path) -> Iterator[Path]:
+    """Yield the files that the contents of a scene file name, which lie beside it."""
+    if isinstance(part, list):
+        for one in part:
+            yield from named_files(one, scene)
+    elif isinstance(part, Mapping):
+        names = RECORDS if part.get("type") == "ground_motion" else ("file",)
+        for key, one in part.items():
+            if key in names and isinstance(one, str):
+                yield Path(scene).parent / one
+            else:
+                yield from named_files(one, scene)
 
 
 def _without(scene: Mapping[str, Any], later: tuple[str, ...]) -> dict[str, Any]:
@@ -170,12 +239,17 @@ def fit_cases(
     asked = {k: next(search) for k, search in searches.items()}
     known: dict[tuple[int, tuple[float, ...]], Tried] = {}
 
-    def make(places: Mapping[int, Sequence[tuple[float, ...]]]) -> None:
+    turns: Counter[int] = Counter()
+
+    def make(places: Mapping[int, Sequence[tuple[float, ...]]], text: str = "") -> None:
         fresh = [place for k, xs in places.items() for x in xs if (place := (k, x)) not in known]
         fresh = list(dict.fromkeys(fresh))
-        progress(Progress("run", len(known), None, f"{len(fresh)} runs for {len(places)} hypotheses"))
-        answers = runs([(cases[k], x) for k, x in fresh])
-        known.update(zip(fresh, answers, strict=True))
+        turns.update(list(places))
+        total = len(known) + len(fresh) + (0 if text else _to_come(cases, asked, turns))
+        progress(Progress("run", len(known), total, text or _of_hypotheses(places)))
+        for place, tried in zip(fresh, runs([(cases[k], x) for k, x in fresh]), strict=True):
+            known[place] = tried
+            progress(Progress("run", len(known), total, text or _of_hypotheses(places)))
 
     fits: dict[int, Fit] = {}
     while asked:
@@ -186,6 +260,8 @@ def fit_cases(
             except StopIteration as end:
                 fits[k] = end.value
                 del asked[k]
+                found = _found(cases[k], fits[k], deformation.dof)
+                progress(Progress("run", len(known), len(known) + _to_come(cases, asked, turns), found=found))
     ranked, motions = list[Ranked](), {}
     for k, case in enumerate(cases):
         unknowns = case.hypothesis.unknowns
@@ -203,7 +279,7 @@ def fit_cases(
         if ranked[k].aicc < least + APART and len(fits[k].covariance)
     }
     if near:
-        make(near)
+        make(near, "intervals")
     for k, xs in near.items():
         answers = {x: _answer(known[k, x], deformation) for x in xs}
         uneven = with_unevenness(ranked[k], cases[k].hypothesis.unknowns, answers)
@@ -220,6 +296,33 @@ def fit_cases(
         rank(STILL, (), (), still, deformation.dof, deformation.steps),
     )
     return Fitted(ranking, motions, len(known), sum(one.cpu for one in known.values()))
+
+
+def _to_come(cases: Sequence[Case], asked: Iterable[int], turns: Mapping[int, int]) -> int:
+    """Return how many runs are expected after those that have been asked for, as searches usually go."""
+    left = 0
+    for k in asked:
+        left += max(1, _USUAL_TURNS - turns[k]) * (1 + len(cases[k].hypothesis.unknowns))
+    # one or two hypotheses are worth the runs for their intervals
+    return left + 4 * max((len(case.hypothesis.unknowns) for case in cases), default=0)
+
+
+def _of_hypotheses(places: Iterable[int]) -> str:
+    count = len(list(places))
+    return f"{count} {'hypothesis is' if count == 1 else 'hypotheses are'} still being fitted"
+
+
+def _found(case: Case, done: Fit, dof: int) -> str:
+    """Return a hypothesis that has been fitted, in a line."""
+    when = f", when phase {' and '.join(case.stood)} stood" if case.stood else ""
+    name = f"'{case.hypothesis.name}{when}'"
+    if not len(done.residuals):
+        return f"{name}: {done.trouble}"
+    amounts = ", ".join(
+        f"{one.name} = {value:.4g} {one.unit}"
+        for one, value in zip(case.hypothesis.unknowns, done.amplitudes, strict=True)
+    )
+    return f"{name}: χ² {done.chi2:.4g} of {dof - len(done.amplitudes)}, {amounts or 'no unknowns'}"
 
 
 def _answer(tried: Tried, deformation: Deformation) -> Array | str:

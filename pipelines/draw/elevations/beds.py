@@ -50,7 +50,7 @@ def draw_courses(path: Path, lines: Sequence[CourseLine]) -> None:
     axes.set_title(
         f"Bed lines of {lines[0].facade}: deviations from level drawn {factor:g} times as large\n"
         "bars: ± one standard deviation of a corner; grey: level; orange: slope or sag beyond chance",
-        fontsize=10, color=INK,
+        fontsize=10, color=INK, parse_math=False,
     )  # fmt: skip
     axes.spines[["top", "right"]].set_visible(False)
     save_sheet(figure, path)

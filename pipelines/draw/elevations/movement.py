@@ -60,7 +60,7 @@ def draw_bed_movement(path: Path, courses: Sequence[CourseMovement]) -> None:
     axes.set_title(
         f"Bed lines of {line.facade}{f', {line.zone}' if line.zone else ''}: departure from level drawn {factor:g} "
         "times as large\norange: measured, bars ± one standard deviation of a corner; blue: simulated",
-        fontsize=10, color=INK,
+        fontsize=10, color=INK, parse_math=False,
     )  # fmt: skip
     axes.spines[["top", "right"]].set_visible(False)
     save_sheet(figure, path)

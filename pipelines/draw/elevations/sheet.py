@@ -97,7 +97,7 @@ def frame_elevation(axes: "Axes", facade: Facade, low: Array, high: Array, title
     axes.set_aspect("equal")
     axes.set_xlabel("along the facade, to the right of the viewer [m]")
     axes.set_ylabel("height [m]" if facade.azimuth is not None else "across [m]")
-    axes.set_title(title, fontsize=11, color=INK)
+    axes.set_title(title, fontsize=11, color=INK, parse_math=False)
     axes.spines[["top", "right"]].set_visible(False)
 
 

@@ -87,7 +87,7 @@ def draw_residuals(path: Path, residuals: Histogram, verdict: str) -> None:
     axes.plot(fine, normal, color=FLAG, linewidth=2.0, label="expected, if the stated sigma is right")
     axes.set_xlabel("residual over its own standard deviation [-]; the end bars hold all beyond")
     axes.set_ylabel("points and corners")
-    axes.set_title("\n".join(_wrapped(verdict, 90)), fontsize=10, color=INK)
+    axes.set_title("\n".join(_wrapped(verdict, 90)), fontsize=10, color=INK, parse_math=False)
     axes.legend(frameon=False, loc="upper left")
     axes.spines[["top", "right"]].set_visible(False)
     save_sheet(figure, path)

@@ -12,7 +12,7 @@ from pipelines.draw.elevations.survey import draw_elevation, draw_residuals
 from pipelines.reports.survey.document import survey_json, write_survey_json
 from pipelines.reports.survey.page import write_survey_page
 from pipelines.reports.survey.study import SurveyStudy, study_surveys
-from pipelines.results.folder import check_replaceable, replacing
+from pipelines.results.folder import check_replaceable, replacing, source_of
 from survey.formats.options import ReadingOptions
 
 __all__ = ["INDEX", "SurveyReport", "report_surveys", "write_survey_report"]
@@ -45,6 +45,7 @@ def report_surveys(
     format: str = "moma",
     options: ReadingOptions | None = None,
     progress: Listener = silent,
+    overwrite: bool = False,
 ) -> SurveyReport:
     """Judge survey files and write the report, which includes the stones that could not be made.
 
@@ -55,21 +56,25 @@ def report_surveys(
     format : name of their format
     options : defaults for what the files leave out
     progress : called at every stage
+    overwrite : replace a report on other files in the folder
 
     Raises
     ------
-    UsageError : no such file or format; the folder holds other things
+    UsageError : no such file or format; the folder holds other things, or a report on other files
     SurveyError : a file that cannot be read at all, or control points that contradict each other
     """
     folder = Path(folder)
-    check_replaceable(folder, INDEX)
+    source = [Path(one) for one in paths]
+    check_replaceable(folder, INDEX, () if overwrite else source)
     study = study_surveys(paths, format, options or ReadingOptions(), progress)
     with replacing(folder, INDEX) as fresh:
-        content = write_survey_report(study, fresh, progress)
+        content = write_survey_report(study, fresh, progress, source)
     return SurveyReport(folder, study, content)
 
 
-def write_survey_report(study: SurveyStudy, folder: Path, progress: Listener = silent) -> dict[str, Any]:
+def write_survey_report(
+    study: SurveyStudy, folder: Path, progress: Listener = silent, source: Sequence[Path] = ()
+) -> dict[str, Any]:
     """Write all files of a report into an empty folder; return survey.json without its parts."""
     release = version("moma-masonry")
     progress(Progress("write", 0, 3, "pictures"))
@@ -78,6 +83,7 @@ def write_survey_report(study: SurveyStudy, folder: Path, progress: Listener = s
     write_survey_page(folder / "report.html", study, pictures, release)
     progress(Progress("write", 2, 3, INDEX))
     content = survey_json(study, release)
+    content["source"] = source_of(source, folder)
     content["files"] = sorted([INDEX, *(entry.name for entry in folder.iterdir())])
     write_survey_json(folder / INDEX, study, content)
     progress(Progress("write", 3, 3))

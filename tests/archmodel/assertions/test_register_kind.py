@@ -227,7 +227,9 @@ def test_a_registered_kind_of_structure_is_like_any_other(filled: Database) -> N
         session.expire_all()
         assert describe(session, "C")["definition"] == "A wall rib at a corner."
         for question, found in (
-            ("kind = rib", ["V1"]),
+            ("kind like rib", ["V1"]),
+            ("kind = rib", ["V1", "V2", "V3"]),
+            ("kind != wall_rib", ["V1"]),
             ("is_a(rib)", ["V1", "V2", "V3"]),
             ("is_a(wall_rib)", ["V2", "V3"]),
             ("is_a(structure) and not is_a(wall_rib)", ["V1"]),

@@ -26,6 +26,17 @@ def test_a_kind_includes_its_subkinds_and_nothing_else(filled: Database) -> None
     assert codes(filled, "lintel") == []
 
 
+def test_a_kind_means_the_same_in_an_expression_as_by_itself(filled: Database) -> None:
+    for kind in ("voussoir", "keystone", "ashlar", "entity", "lintel"):
+        assert codes(filled, "entity", f"kind = {kind}") == codes(filled, kind)
+        assert codes(filled, "entity", f"kind in ({kind})") == codes(filled, kind)
+        others = set(codes(filled, "entity")) - set(codes(filled, kind))
+        assert set(codes(filled, "entity", f"kind != {kind}")) == others
+        assert set(codes(filled, "entity", f"not kind = {kind}")) == others
+    assert codes(filled, "entity", "kind in (keystone, header)") == ["W01-01", "V3"]
+    assert codes(filled, "entity", "kind like voussoir") == ["V2"]
+
+
 def test_entities_are_of_their_own_class(filled: Database) -> None:
     with filled.session(read_only=True) as session:
         assert [type(entity) for entity in find(session, "voussoir")][1:] == [Voussoir, Keystone]

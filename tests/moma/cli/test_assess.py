@@ -5,7 +5,8 @@ import json
 import pytest
 
 from moma import ingest
-from tests.moma.commands import answer, fails, prints
+from pipelines.assess import assess as assess_module
+from tests.moma.commands import answer, fails, invoke, prints
 from tests.paths import ROOT
 from tests.pipelines.scenes import TWO_COURSES, TWO_COURSES_MIXED
 
@@ -15,6 +16,12 @@ def url(tmp_path_factory):
     url = f"sqlite:///{tmp_path_factory.mktemp('assess') / 'moma.db'}"
     ingest([ROOT / "data/samples/window/window.moma"], url)
     return url
+
+
+@pytest.fixture
+def plain(monkeypatch):
+    """Without pictures, which take longest."""
+    monkeypatch.setattr(assess_module, "draw_mechanisms", lambda *_: [])
 
 
 @pytest.fixture
@@ -99,6 +106,42 @@ def test_forces_on_fixed_stones_and_unsound_scenes_are_refused(url, scene, tmp_p
     said = fails(1, "assess", scene, "--db", url, "--out", tmp_path / "out")
     assert "moma check" in said
     assert "--accept-unsound" not in said
+
+
+def test_a_stopped_assessment_goes_on_from_its_answers(url, scene, plain, tmp_path, monkeypatch):
+    words = ["assess", scene, "--db", url, "--out", tmp_path / "out", "--load", "tilt x", "--load", "tilt y"]
+    asked = []
+
+    def stopped(on, question, *others):
+        asked.append(question.name)
+        if len(asked) == 2:
+            raise KeyboardInterrupt
+        return real(on, question, *others)
+
+    real = assess_module.answer
+    monkeypatch.setattr(assess_module, "answer", stopped)
+    done = invoke(*words)
+    assert done.exit_code == 130
+    assert "the same command goes on from there" in done.stderr
+    assert asked == ["tilt x", "tilt y"]
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["unfinished-assessment"]
+    told = answer(*words)
+    assert asked == ["tilt x", "tilt y", "tilt y"]
+    assert not (tmp_path / "out/unfinished-assessment").exists()
+    # a finished assessment keeps no answers: its questions are asked again, with the same result
+    assert answer(*words)["loads"] == told["loads"]
+    assert asked[3:] == ["tilt x", "tilt y"]
+
+
+def test_another_scene_does_not_replace_results_without_being_told(url, scene, plain, tmp_path):
+    other = tmp_path / "other.toml"
+    other.write_text(TWO_COURSES, encoding="utf-8")
+    words = ["--db", url, "--out", tmp_path / "out", "--load", "tilt x"]
+    prints("assess", scene, *words)
+    assert "holds the results of" in fails(2, "assess", other, *words)
+    scene.write_text(TWO_COURSES + "# edited\n", encoding="utf-8")
+    assert answer("assess", scene, *words)["source"] == ["../two.toml"]
+    assert answer("assess", other, *words, "--overwrite")["source"] == ["../other.toml"]
 
 
 def test_results_of_a_run_are_not_replaced(url, scene, tmp_path):

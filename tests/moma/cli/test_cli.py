@@ -6,10 +6,12 @@ import json
 import os
 import subprocess
 import sys
+from typing import get_args, get_type_hints
 
 import pytest
 
 import moma
+from moma.cli import app
 from moma.cli.options import SurveyFormat
 from survey.formats.reading import FORMATS
 from tests.moma.commands import answer, fails, invoke, prints
@@ -280,6 +282,31 @@ def test_run_tells_how_it_ended_and_query_knows_it(scene, tmp_path):
     assert all(row["course"] == 2 for row in rows)
     summary = answer("run", scene, "--db", url, "--out", tmp_path / "out")
     assert summary["bodies"]["rigid"] == len(rows)
+    other = tmp_path / "other.toml"
+    other.write_text(TWO_COURSES, encoding="utf-8")
+    said = fails(2, "run", other, "--db", url, "--out", tmp_path / "out")
+    assert f"holds the results of {scene}" in said
+    assert "--overwrite" in said
+
+
+def test_a_full_disk_is_one_line_wherever_it_is_found(database, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device", "/tmp/some.file")
+
+    monkeypatch.setattr("archmodel.describe.entity.describe", full)
+    assert fails(1, "show", "V4", "--db", database) == (
+        "moma: error: /tmp/some.file: the disk is full; make room on it and try again"
+    )
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="a device of Linux")
+def test_a_full_disk_under_the_standard_output_is_one_line():
+    words = [sys.executable, "-m", "moma", "schema", "--json"]
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True, check=False, cwd=ROOT)
+    assert done.returncode == 1
+    (line,) = done.stderr.splitlines()
+    assert "the disk is full" in line
 
 
 def test_an_unexpected_error_is_one_line_and_whole_with_v(database, monkeypatch):
@@ -297,3 +324,22 @@ def test_a_foreseen_error_shows_its_traceback_with_v(database):
     assert done.exit_code == 2
     assert "Traceback" in done.stderr
     assert done.stderr.splitlines()[-1].startswith("moma: error: ")
+
+
+def test_help_is_shown_as_it_is_written(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "400")
+    monkeypatch.setenv("TERMINAL_WIDTH", "400")
+    whole = invoke("--help").output
+    for command in app.registered_commands:
+        name, function = command.name, command.callback
+        shown = " ".join(invoke(name, "--help").output.replace("│", " ").split())
+        said = [function.__doc__.split("\n\n")[0]]
+        said += [
+            one.help
+            for hint in get_type_hints(function, include_extras=True).values()
+            for one in get_args(hint)[1:]
+        ]
+        for text in filter(None, said):
+            assert " ".join(text.split()) in shown, name
+        assert command.hidden or name in whole
+    assert "[[assess]]" in invoke("assess", "--help").output

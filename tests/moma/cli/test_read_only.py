@@ -96,3 +96,23 @@ def test_without_the_right_to_write_its_folder_a_database_can_be_read(tmp_path, 
 
         with pytest.raises(DatabaseError, match="cannot be written"):
             write()
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("sample", "window", "--out"), ("survey-report", ROOT / "data/samples/window/window.moma", "--out")],
+)
+def test_a_full_disk_ends_a_command_in_one_line_and_leaves_nothing(shelf, words):
+    script = 'mount -t tmpfs -o size=24k tmpfs "$0" && "$@"; code=$?; ls -A "$0"/*; exit $code'
+    command = [sys.executable, "-m", "moma", *map(str, words), str(shelf / "out")]
+    done = subprocess.run(
+        ["unshare", "-rm", "sh", "-c", script, str(shelf), *command],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    line, *_ = [one for one in done.stderr.splitlines() if one.startswith("moma: error")]
+    assert line == f"moma: error: {shelf / 'out'}: the disk is full; make room on it and try again"
+    assert done.stdout.split() == []

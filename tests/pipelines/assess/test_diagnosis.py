@@ -1,6 +1,11 @@
 """Diagnosis: its file, the search, the rank, and the date, on walls whose movement is a formula."""
 
+import multiprocessing
+import signal
+import threading
+import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,9 +17,10 @@ from pipelines.assess.diagnosis.file import Unknown, read_diagnosis
 from pipelines.assess.diagnosis.fit import Fit, fit
 from pipelines.assess.diagnosis.measurements import measure
 from pipelines.assess.diagnosis.ranking import STILL, Ranking, rank, verdict, with_others
-from pipelines.assess.diagnosis.search import cases_of, fit_cases, runs_of
+from pipelines.assess.diagnosis.search import cases_of, fit_cases, kept_runner, runs_of
 from pipelines.assess.diagnosis.smoothness import probes, with_unevenness
 from pipelines.assess.diagnosis.trials import Trial, Tried, runner
+from pipelines.assess.kept import kept_answers
 from pipelines.assess.motions import Motions
 from pipelines.samples.buildings.walls import wall
 from pipelines.samples.frame import RigidMotion
@@ -461,3 +467,132 @@ def test_runs_in_processes_of_their_own_answer_in_order():
     with runner(2) as beside:
         faults = [one.fault for one in beside(trials)]
     assert [fault.split(":")[0] for fault in faults] == [f"scene {k}" for k in range(5)]
+
+
+@pytest.mark.parametrize(
+    ("formula", "words"),
+    [
+        ("-" * 20000 + "angle", "a formula of 20007 characters"),
+        ("-" * 400 + "angle", ""),
+        ("(" * 240 + "angle" + ")" * 240, "not a formula"),
+        ("+".join(["angle"] * 80), ""),
+        ("angle * 1e400", "it has no finite value at angle = 0.731059"),
+        ("angle + " + "9" * 400, "it has no finite value"),
+        ("angle / (1 - 1)", "it has no finite value"),
+    ],
+)
+def test_a_formula_is_short_shallow_and_finite(tmp_path, formula, words):
+    text = (SCENE + HYPOTHESES).replace("= -(angle + 1) / 2e3", f"= {formula}")
+    if not words:
+        assert len(read_diagnosis(written(tmp_path, text)).hypotheses) == 2
+        return
+    with pytest.raises(SceneError) as caught:
+        read_diagnosis(written(tmp_path, text))
+    assert words in str(caught.value)
+    assert len(str(caught.value)) < 300
+    assert caught.value.where
+
+
+def test_a_formula_without_a_value_at_an_amount_is_a_run_that_fails(tmp_path):
+    text = (SCENE + HYPOTHESES).replace("= -(angle + 1) / 2e3", "= 1 / (angle - 5)")
+    file = read_diagnosis(written(tmp_path, text))
+    case = cases_of(file, {})[0]
+
+    def all_fall(trials):
+        return [Tried(None, "the run ended in collapse", 0.0) for _ in trials]
+
+    runs = runs_of(file, "sqlite:///none.db", all_fall)
+    first, second, third = runs([(case, (x,)) for x in (4.0, 5.0, 6.0)])
+    assert first.fault == third.fault == "the run ended in collapse"
+    assert second.fault == "'= 1 / (angle - 5)': it has no finite value at angle = 5"
+
+
+def test_hypotheses_that_look_alike_are_refused(tmp_path):
+    text = (SCENE + HYPOTHESES).replace('name = "sheared"', 'name = "turn\N{CYRILLIC SMALL LETTER IE}d"')
+    with pytest.raises(SceneError, match="looks like turned, but has CYRILLIC SMALL LETTER IE"):
+        read_diagnosis(written(tmp_path, text))
+
+
+def test_a_diagnosis_tells_its_total_and_each_fit_and_makes_no_run_twice(truth, tmp_path):
+    file = read_diagnosis(written(tmp_path, SCENE + HYPOTHESES))
+    cases = cases_of(file, {})
+    _, _, course, motion = truth
+    found = surveyed(file, turned_wall(dict.fromkeys(course, motion), 3))
+    heard, asked = [], []
+
+    def runs(places):
+        for case, x in places:
+            asked.append((case.hypothesis.name, x))
+            yield from answers(truth)([(case, x)])
+
+    done = fit_cases(cases, found.deformation, runs, heard.append)
+    assert len(set(asked)) == len(asked) == done.runs
+    counted = [one for one in heard if not one.found]
+    assert all(one.stage == "run" and one.done <= one.total for one in heard)
+    assert [one.done for one in counted] == sorted(one.done for one in counted)
+    # every run is told as it is made, with a total that is never far off
+    assert {one.done for one in counted} == set(range(done.runs + 1))
+    assert all(one.total <= 2.5 * done.runs for one in counted)
+    assert counted[-1].done == counted[-1].total == done.runs
+    fits = [one.found for one in heard if one.found]
+    assert sorted(fit.split(":")[0] for fit in fits) == ["'sheared'", "'turned'"]
+    assert any(fit.startswith("'turned': χ²") and "angle = " in fit for fit in fits)
+
+
+def test_a_stopped_diagnosis_goes_on_from_its_runs(tmp_path):
+    file = read_diagnosis(written(tmp_path, SCENE + HYPOTHESES))
+    table = Path(file.scene_path).parent / "table.csv"
+    table.write_text("0, 1\n", encoding="utf-8")
+    tables = '\n[[loads]]\ntype = "force"\nfile = "table.csv"\n'
+    trials = [Trial(f"[scene]\nname = {k}{tables}", "", "") for k in range(4)]
+    made = []
+
+    def run(trials, most):
+        for one in trials:
+            if len(made) == most:
+                raise KeyboardInterrupt
+            made.append(one)
+            yield Tried(None, one.text.split("\n")[1], 0.0)
+
+    def all_answers(solids="", most=99):
+        with kept_answers(tmp_path / "out", "unfinished", (Tried, Motions)) as kept:
+            runner = kept_runner(file, solids, kept, lambda trials: run(trials, most))
+            return [one.fault for one in runner(trials)]
+
+    with pytest.raises(KeyboardInterrupt):
+        all_answers(most=2)
+    assert all_answers() == [f"name = {k}" for k in range(4)]
+    assert made == trials
+    assert all_answers() == [f"name = {k}" for k in range(4)]
+    assert len(made) == 4
+    # other stones, or another table beside the scene, are other runs
+    all_answers("other stones")
+    assert len(made) == 8
+    table.write_text("0, 2\n", encoding="utf-8")
+    all_answers()
+    assert len(made) == 12
+
+
+def test_a_run_whose_process_is_killed_has_failed_and_no_process_is_left():
+    trial = Trial("[scene]\nname = 1\n", "scene 1", "sqlite:///none.db")
+    with runner(2) as beside:
+        answers = iter(beside([trial]))
+        killing = threading.Timer(0.2, lambda: [one.kill() for one in multiprocessing.active_children()])
+        killing.start()
+        killed = next(answers)
+        killing.join()
+        assert killed.motions is None
+        assert "was killed by signal 9" in killed.fault
+        # the next scene has a process of its own, which an interruption ends within its run
+        with pytest.raises(KeyboardInterrupt):
+            interrupted(beside([trial]))
+        (running,) = multiprocessing.active_children()
+    assert not running.is_alive()
+    assert multiprocessing.active_children() == []
+
+
+def interrupted(answers):
+    """Wait for answers, and be interrupted at once."""
+    threading.Timer(0.2, lambda: signal.raise_signal(signal.SIGINT)).start()
+    next(iter(answers))
+    time.sleep(9.0)

@@ -64,6 +64,9 @@ def test_the_last_rule_that_holds_counts_and_supports_count_most(tmp_path: Path)
         ("course is null", {"W0", "W1", "W2", "W3"}),
         ("course > 1", set()),
         ("kind = ashlar and not code like 'w0%'", {"W1", "W2", "W3"}),
+        ("kind = stone", {"W0", "W1", "W2", "W3"}),
+        ("kind != stone", set()),
+        ("kind in (header, rubble)", set()),
     ],
 )
 def test_rules_are_written_as_queries_are(tmp_path: Path, rule: str, stones: set[str]) -> None:
@@ -81,6 +84,8 @@ def test_rules_are_written_as_queries_are(tmp_path: Path, rule: str, stones: set
         ("voussoir: z < kind", "z is a number, 'kind' is not"),
         ("voussoir: z like '1%'", "z is a number, like is for texts"),
         ("voussoir: above(A)", "above is a function"),
+        ("voussoir: z - 0.1 > 0", "a rule computes nothing"),
+        ("voussoir: kind < header", "kinds have no order"),
         ("voussoir: z <", "is not a value"),
         ("voussoir:", "attribute"),
     ],
@@ -104,6 +109,8 @@ def test_kinds_that_there_are_not_and_other_formats_are_refused_before_anything_
     url = f"sqlite:///{tmp_path / 'stones.db'}"
     with pytest.raises(UsageError, match="--kind-where: unknown kind 'vousoir'; did you mean voussoir"):
         ingest([path], url, "solids", rules=kind_rules(["vousoir: z > 0"]))
+    with pytest.raises(UsageError, match="at character 9: unknown kind 'vousoir'; did you mean voussoir"):
+        ingest([path], url, "solids", rules=kind_rules(["header: kind = vousoir"]))
     with pytest.raises(UsageError, match="--support: a rule for solids with format csv"):
         ingest([path], url, "csv", rules=kind_rules(supports=["z < 0"]))
     assert not (tmp_path / "stones.db").exists()

@@ -1,13 +1,15 @@
 """Results appear whole or not at all, and replace nothing but earlier results."""
 
+import errno
 import json
+import os
 import subprocess
 import sys
 
 import pytest
 
-from moma.errors import UsageError
-from pipelines.results.folder import check_replaceable, replacing
+from moma.errors import StorageError, UsageError
+from pipelines.results.folder import UNFINISHED_ASSESSMENT, check_replaceable, replacing, source_of
 from tests.paths import ROOT
 
 
@@ -172,3 +174,68 @@ def test_a_hidden_folder_of_the_user_is_left_alone(tmp_path):
     with replacing(tmp_path / "out") as fresh:
         write(fresh, "new.png")
     assert (tmp_path / ".out-settings").exists()
+
+
+@pytest.mark.parametrize(
+    "failure",
+    [
+        OSError(errno.ENOSPC, "No space left on device"),
+        OSError(
+            "Can't write data (file write failed: errno = 28, error message = 'No space left on device')"
+        ),
+        RuntimeError("Can't decrement id ref count (unable to close file, errno = 28)"),
+    ],
+)
+def test_a_full_disk_is_named_with_what_is_kept(tmp_path, failure):
+    folder = results(tmp_path / "out", "old.png")
+
+    def run():
+        with replacing(folder) as fresh:
+            write(fresh, "new.png")
+            raise failure
+
+    with pytest.raises(StorageError, match=r"out: the disk is full; make room .*; earlier results there"):
+        run()
+    assert sorted(one.name for one in folder.iterdir()) == ["old.png", "summary.json"]
+    assert [one.name for one in tmp_path.iterdir()] == ["out"]
+
+
+def test_other_failures_are_not_taken_for_a_full_disk(tmp_path):
+    with pytest.raises(FileNotFoundError), replacing(tmp_path / "out"):
+        (tmp_path / "none").read_text(encoding="utf-8")
+    with pytest.raises(RuntimeError, match="a mistake"), replacing(tmp_path / "out"):
+        raise RuntimeError("a mistake")
+
+
+def test_a_folder_that_cannot_be_written_is_refused_before_anything_is_computed(tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "access", lambda place, mode: place != tmp_path)
+    with pytest.raises(UsageError, match=f"{tmp_path}: the folder cannot be written"):
+        check_replaceable(tmp_path / "a/b/out")
+
+
+def test_results_of_another_scene_are_replaced_only_where_that_is_asked_for(tmp_path):
+    scene, other = tmp_path / "wall.toml", tmp_path / "tower.toml"
+    folder = results(tmp_path / "out", "old.png")
+    told = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    check_replaceable(folder, source=[scene])  # an older version did not say of which scene they are
+    write(folder, "summary.json", json.dumps(told | {"source": source_of([scene], folder)}))
+    check_replaceable(folder, source=[scene])
+    check_replaceable(folder)
+    with pytest.raises(UsageError, match=r"holds the results of .*wall\.toml; .* --overwrite"):
+        check_replaceable(folder, source=[other])
+    # moved together with their scene, they are still of that scene
+    moved = tmp_path.parent / f"{tmp_path.name}-moved"
+    tmp_path.rename(moved)
+    check_replaceable(moved / "out", source=[moved / "wall.toml"])
+    with pytest.raises(UsageError):
+        check_replaceable(moved / "out", source=[moved / "tower.toml"])
+    moved.rename(tmp_path)
+
+
+def test_unfinished_work_of_another_command_is_left_alone(tmp_path):
+    folder = tmp_path / "out"
+    (folder / UNFINISHED_ASSESSMENT).mkdir(parents=True)
+    check_replaceable(folder, "assessment.json")
+    for index in ("summary.json", "diagnosis.json"):
+        with pytest.raises(UsageError, match="holds an unfinished assessment"):
+            check_replaceable(folder, index)

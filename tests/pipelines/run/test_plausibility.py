@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from moma.errors import SceneError
 from pipelines.ingest.ingest import ingest
 from pipelines.reports.survey.report import report_surveys
 from pipelines.run.check import check_scene
@@ -65,6 +66,30 @@ def test_a_property_that_hardly_any_stone_has_is_a_warning(tmp_path, url):
     report = checked(tmp_path, url, "2350.0", "900.0")
     assert report.problems == ()
     assert "density 900 kg/m³ is unusual" in report.warnings[0]
+
+
+@pytest.mark.parametrize(
+    ("step", "duration", "problem", "warning"),
+    [
+        ("1e-9", "1e6", "1e+15 steps, which takes longer than anyone waits", ""),
+        ("1e-6", "2e3", "2e+09 steps", ""),
+        ("1e-6", "20.0", "", "2e+07 steps, which takes hours"),
+        ("0.5", "20.0", "", "falls by 2452 mm"),
+        ("1e-3", "600.0", "", ""),
+        ("0.01", "10.0", "", ""),
+    ],
+)
+def test_steps_that_never_end_are_a_problem(tmp_path, url, step, duration, problem, warning):
+    report = checked(tmp_path, url, "[contact]", f"[time]\nstep = {step}\nduration = {duration}\n[contact]")
+    for found, words in ((report.problems, problem), (report.warnings, warning)):
+        told = [one for one in found if "steps" in one]
+        assert len(told) == bool(words)
+        assert all(one.startswith(f"{tmp_path / 'low.toml'}:11: ") and words in one for one in told)
+
+
+def test_steps_that_cannot_be_counted_are_refused(tmp_path, url):
+    with pytest.raises(SceneError, match="too short to count the steps"):
+        checked(tmp_path, url, "[contact]", "[time]\nstep = 1e-320\n[contact]")
 
 
 def test_a_survey_in_millimetres_is_recognised(tmp_path):

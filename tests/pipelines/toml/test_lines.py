@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from moma.errors import UsageError
 from pipelines.record.file import parse_record
 from pipelines.scene.file import parse_scene
-from pipelines.toml.lines import key_lines
+from pipelines.toml.lines import key_lines, read_text
 
 
 def test_tables_of_an_array_have_their_own_lines():
@@ -78,3 +78,12 @@ def test_toml_that_breaks_its_reader_is_an_error_with_a_line(text, message):
     for parse in (parse_scene, parse_record):
         with pytest.raises(UsageError, match=message):
             parse(text, "wild.toml")
+
+
+def test_a_file_may_begin_with_a_byte_order_mark(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text("[scene]\nname = 1\n", encoding="utf-8-sig")
+    assert read_text(path, UsageError) == "[scene]\nname = 1\n"
+    path.write_bytes(b"name = '\xff'")
+    with pytest.raises(UsageError, match="byte 8 is not UTF-8"):
+        read_text(path, UsageError)
