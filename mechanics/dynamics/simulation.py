@@ -158,19 +158,19 @@ class Simulation(Carrier):
         other._sleepers = Sleepers(model, other.state, other._memory)
         return other
 
-    def rests_from_nothing(self) -> bool:
-        """Return whether rigid stones at rest are seen to be so by forces that arise from nothing.
+    def rests_from_nothing(self) -> bool | None:
+        """Return whether rigid stones at rest are so by forces that arise from nothing; None: release them to see.
 
-        If they are not, the next step begins with these forces. Gaps within the error of a step are closed.
+        If they are not seen to be, the next step begins with these forces. Gaps within the error of a step are closed.
         """
         model, h = self.model, self._step
         if not model.rigid_only or model.laws.sprung:
-            return False
+            return None
         still = halted(self.state)
         predicted = predict(model, self.start, still, h * (1 - self._theta))
         found = self._detect(model, predicted)
         if not len(found.contacts.key):
-            return False
+            return None
         _, internal = self._memory.recall(found.contacts.key, found.place)
         free = free_kick(model, self.start, predicted, self._compliance, h, self._theta)
         problem, approach = contact_problem(model, predicted, found, free, internal, None)

@@ -239,7 +239,9 @@ def disproof(simulation: Simulation) -> Simulation | None:
     forces that arise from nothing.
     """
     other = simulation.released()
-    lasting = other.rests_from_nothing() or _lasts(other.released(forgets=False))
+    lasting = other.rests_from_nothing()
+    if lasting is None:
+        lasting = _lasts(other.released(forgets=False))
     return None if lasting else other
 
 

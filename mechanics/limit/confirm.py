@@ -75,8 +75,9 @@ class Confirmation:
 
     @property
     def collapse(self) -> ConfirmationRun | None:
-        """Run of the least load that is lost; None where none is."""
-        return next((one for one in self.trials if one.multiplier == self.lost), None)
+        """Run of the least load that collapses; None where none does."""
+        fallen = [one for one in self.trials if one.outcome is Outcome.COLLAPSED]
+        return min(fallen, key=lambda one: one.multiplier, default=None)
 
     def agrees(self, candidate: float) -> bool:
         """Return True if the limit of the dynamics lies within 3 % of a candidate."""
@@ -166,6 +167,9 @@ def confirm(
             # next to the candidate first, half-way later on
             multiplier = min(0.5 * (held + lost), held * (1.0 + way))
             way *= 2.0
+    if np.isfinite(lost) and all(one.outcome.rests for one in trials) and not stop():
+        # how stones fall beyond the bound
+        trials.append(_trial(on, live, (1.0 + _NEAR) * lost, progress, stop))
     return Confirmation(held, float(lost), tuple(trials))
 
 

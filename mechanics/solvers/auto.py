@@ -51,7 +51,7 @@ class Auto:
         # a motion that has long been still may have come to rest: one step brakes it, one finds its forces
         moving = warm and follows and steps not in (1, 2)
         asked = self._in_motion(problem) if moving else limits
-        links = chain_of(problem, follows, moving, asked[1])
+        links = chain_of(problem, follows, moving, asked[1], warm)
         found = follow(links, problem, start, asked, most)
         if not follows or steps is None:
             return found

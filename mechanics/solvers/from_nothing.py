@@ -15,8 +15,11 @@ from mechanics.solvers.second_order.newton import Newton
 
 __all__ = ["rests_from_nothing"]
 
-# compliances of joints over the scale of W, a hundred apart, and penalties of ADMM that suit them [-]
-_JOINTS = (1e-4, 1e-3), (1e-6, 0.02)
+# compliances of joints over the scale of W, and penalties of ADMM that suit them: from joints so soft that there is one
+# state only, to two stiff ones a hundred apart [-]
+_JOINTS = (10.0, 10.0), (0.1, 1.0), (1e-3, 0.01), (1e-4, 1e-3), (1e-6, 0.02)
+# velocity over the largest u_free from which stones fall, and need not be released to see it [-]
+_FALLS = 0.1
 # velocity with the harder joints over that with the softer ones below which it vanishes with them [-]
 _VANISHES = 0.1
 # velocity over the largest u_free that is none: the tolerance of a step [-]
@@ -27,8 +30,8 @@ _LIMITS, _STEPS, _ITERATIONS = (1e-6, 1e-5), 60, 300
 _MANY = 3000
 
 
-def rests_from_nothing(problem: ContactProblem) -> tuple[bool, Array]:
-    """Return whether stones are seen to rest by forces that arise from nothing, and these (nc, 3).
+def rests_from_nothing(problem: ContactProblem) -> tuple[bool | None, Array]:
+    """Return whether stones rest by forces that arise from nothing, and these (nc, 3); None: they may rest again.
 
     Joints with a small compliance E bring about one set of forces: those of the law at u = (W + E) r + u_free. Where
     stones rest, W r + u_free is that by which joints yield, and vanishes with E; where it does not, they begin to move,
@@ -48,5 +51,7 @@ def rests_from_nothing(problem: ContactProblem) -> tuple[bool, Array]:
         start = ContactStart(found.impulse, found.velocity)
         error = pace * residual(yielding, found.impulse).velocity
         speeds.append(float(np.abs(operator.apply(found.impulse) + problem.u_free).max(initial=0.0)))
-    softer, harder = speeds
-    return harder + error <= max(_VANISHES * softer, _STILL * pace), start.impulse
+    *_, softer, harder = speeds
+    if harder + error <= max(_VANISHES * softer, _STILL * pace):
+        return True, start.impulse
+    return (False if harder - error > _FALLS * pace else None), start.impulse

@@ -73,7 +73,6 @@ POLISH = Link("body ADMM", partial(BodyADMM, stages=(_HOLD,)), 50)
 ENDED_PATH = (_path, _newton)
 """Chain of the interior point alone, which Newton's method ends: it stalls where contacts are between two states."""
 
-# Newton's method goes first from nothing: it begins with forces that yielding joints would have, without self-stress
 _released = replace(_newton, iterations=60, begin=Begin.RELEASED)
 _REST = (
     replace(_exact, begin=Begin.GIVEN),
@@ -83,6 +82,12 @@ _REST = (
     _released,
     _released,
 )
+# from nothing: between joints so soft that contacts hardly know of each other there is one state only, and the way from
+# it leaves out self-stress, as a fall does that is under way when joints would jam
+_FROM_NOTHING = Link(
+    "Newton from soft joints", partial(SofterJoints, factors=(1e5, 1e3, 10.0)), 150, Begin.GIVEN, _FURTHER
+)
+_REST_FROM_NOTHING = (_FROM_NOTHING, *_REST)
 _REST_OF_SOME = (replace(_admm, method=_rest, begin=Begin.GIVEN), _newton, _path, _newton)
 _REST_OF_MANY = (replace(_endless, method=_rest, begin=Begin.GIVEN),)
 _MOTION = (
@@ -120,7 +125,7 @@ _SWEEPS = (Link("sweeps", NSGS, 10**6, Begin.GIVEN),)
 
 
 def chain_of(
-    problem: ContactProblem, follows: bool, moving: bool, velocity_tolerance: float
+    problem: ContactProblem, follows: bool, moving: bool, velocity_tolerance: float, warm: bool = True
 ) -> Sequence[Link]:
     """Return the chain for a problem.
 
@@ -128,6 +133,7 @@ def chain_of(
     ----------
     follows, moving : the steps follow a motion; this one is part of it
     velocity_tolerance : asked of this step [-]
+    warm : forces are known to begin with
     """
     operator, bodies = problem.delassus, _moving_bodies(problem)
     yields = operator.joint_compliance is not None
@@ -150,7 +156,9 @@ def chain_of(
         return _MOTION if bodies >= _HANDFUL else _MOTION_OF_FEW
     if moving:
         return _LOOSE_MOTION
-    return _REST if bodies < _SOME else _REST_OF_SOME
+    if bodies < _SOME:
+        return _REST if warm else _REST_FROM_NOTHING
+    return _REST_OF_SOME
 
 
 def _moving_bodies(problem: ContactProblem) -> int:

@@ -11,8 +11,6 @@ from mechanics.solvers.second_order.newton import Newton
 
 __all__ = ["SofterJoints"]
 
-# factors on the compliance of joints
-_FACTORS = (100.0, 30.0, 10.0, 3.0)
 # that of rigid joints for this purpose, over the scale of W [-]
 _RIGID = 1e-4
 # steps of Newton's method with each
@@ -27,16 +25,18 @@ class SofterJoints:
     ----------
     tolerance, velocity_tolerance : as in `NSGS`
     max_iterations : steps of Newton's method in all
+    factors : on the compliance of joints, in turn [-]
     """
 
     tolerance: float = 1e-6
     velocity_tolerance: float = 1e-5
     max_iterations: int = 150
+    factors: tuple[float, ...] = (100.0, 30.0, 10.0, 3.0)
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from `start`; return the last iterate of the joints asked for, or of the hardest that were solved."""
         count = 0
-        for operator in _softened(problem.delassus):
+        for operator in _softened(problem.delassus, self.factors):
             most = min(_STEPS, self.max_iterations - count)
             newton = Newton(self.tolerance, self.velocity_tolerance, most)
             found = newton(replace(problem, delassus=operator), start)
@@ -51,11 +51,11 @@ class SofterJoints:
         return ContactSolution(start.impulse, start.velocity, count, float("inf"), False)
 
 
-def _softened(operator: Delassus) -> Iterator[Delassus]:
+def _softened(operator: Delassus, factors: tuple[float, ...]) -> Iterator[Delassus]:
     """Yield the operator with softer joints, ever harder, and as it is; rigid joints yield next to nothing at first."""
     inner, compliance = operator, np.full(operator.diagonal.shape[:2], _RIGID * operator.scale)
     if isinstance(operator, CompliantDelassus):
         inner, compliance = operator.inner, operator.joint_compliance
-    for factor in _FACTORS:
+    for factor in factors:
         yield CompliantDelassus(inner, factor * compliance)
     yield operator

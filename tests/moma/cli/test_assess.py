@@ -41,7 +41,7 @@ def test_four_directions_have_bound_candidate_and_mechanism(url, scene, tmp_path
         assert one["bound"] <= 0.6 * 1.01
         assert one["mechanism"]["stones"]
     least = min(told["loads"], key=lambda one: one["candidate"])
-    assert told["headline"] == least["headline"]
+    assert told["headline"] == f"governs: {least['headline']}"
     assert (out / "scene.toml").read_text(encoding="utf-8") == TWO_COURSES
     assert json.loads((out / "assessment.json").read_text(encoding="utf-8")) == told
     assert sorted(told["files"]) == sorted(path.name for path in out.iterdir())
@@ -288,7 +288,7 @@ def test_runs_confirm_a_candidate(url, scene, tmp_path):
         "assess", scene, "--db", url, "--out", tmp_path / "out", "--load", "horizontal y", "--confirm"
     )["loads"]
     assert told["confirmation"]["agrees"]
-    assert told["confirmation"]["held"] < told["candidate"] < told["confirmation"]["lost"]
+    assert 0.97 * told["confirmation"]["lost"] <= told["confirmation"]["held"] < told["bound"]
     assert "CONFIRMED" in told["headline"]
     alike = told["confirmation"]["likeness"]
     assert f"the mechanism (cosine {alike['cosine']:.2f})" in told["headline"]

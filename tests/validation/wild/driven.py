@@ -8,7 +8,7 @@ from mechanics.scene.loads.ground_motion import Component, GroundMotion
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.motions import settlement
 from mechanics.scene.shapes import box
-from tests.validation.wild.scene_list import G, falls, scene, stands
+from tests.validation.wild.scene_list import G, falls, rests, scene
 from tests.validation.wild.stones import fixed, ground, stack
 
 WIDTH, HEIGHT = 0.4, 1.0
@@ -22,7 +22,7 @@ def _shaken(acceleration):
     return scene([ground(), block], 1.0, motion=True, loads=Loads(motions=(motion,)), duration=4.0)
 
 
-@stands
+@rests
 def shaken_below_wests_limit():
     """Two periods of 0.5 s with 0.8 of the acceleration g b/h that lifts an edge (West 1882); friction holds."""
     return _shaken(0.8 * np.sin(2 * np.pi * np.linspace(0.0, 2.0, 201)))
@@ -47,13 +47,13 @@ def _beam(motion):
     return scene([*piers, box("beam", (-0.5, -0.15, 0.5), (0.5, 0.15, 0.7))], loads=loads, duration=3.0)
 
 
-@stands
+@rests
 def pier_that_settles():
     """The right pier goes down by 20 mm: the beam turns by 1/50, a thirty-fifth of μ, and slides less than a mm."""
     return _beam((0.0, 0.0, -0.02))
 
 
-@stands
+@rests
 def pier_that_moves_a_little():
     """The right pier moves away by 30 mm: whichever end slides, its bearing of 40 mm keeps 10 mm."""
     return _beam((0.03, 0.0, 0.0))
@@ -70,7 +70,7 @@ def _tilted(degrees):
     return scene([ground(), *stack(3, 0.4, 0.4)], 0.7, loads=Loads(gravity=(table,)), duration=3.0)
 
 
-@stands
+@rests
 def table_tilted_inside():
     """A column of 0.4 m x 1.2 m on a table that tilts to 17°, tan 0.306; it tips at 1/3 and slides at 0.7."""
     return _tilted(17.0)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from mechanics.scene.shapes import bond, box, semicircular_arch, wall
-from tests.validation.wild.scene_list import falls, scene, stands, tilted
+from tests.validation.wild.scene_list import falls, rests, scene, stands, tilted
 from tests.validation.wild.stones import (
     fixed,
     folded_box,
@@ -113,13 +113,13 @@ def overlapping_wall():
     return scene([base, *grown])
 
 
-@stands
+@rests
 def gapped_stack():
     """Five stones, each 1 mm above the one below: they fall by up to 5 mm, and land flat."""
     return scene([ground(), *stack(5, 0.4, 0.25, gap=1e-3)])
 
 
-@stands
+@rests
 def gapped_wall():
     """A wall in running bond with joints open by 0.5 mm on all sides: the stones settle by up to 2.5 mm.
 
@@ -134,7 +134,7 @@ def gapped_wall():
     return scene([base, *shrunk])
 
 
-@stands
+@rests
 def gapped_arch():
     """Nine voussoirs, t/r = 0.25, shrunk by 0.05 mm on each joint: more than twice the least thickness, 0.1015.
 

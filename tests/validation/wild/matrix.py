@@ -84,6 +84,7 @@ def judged(truth: Truth, outcome: str) -> Mark:
         return Mark.UNDECIDED
     right = {
         Truth.STANDS: ("equilibrium",),
+        Truth.RESTS: ("equilibrium", "settled"),
         Truth.FALLS: ("collapsed",),
         Truth.SLIDES: ("moving", "collapsed"),
     }[truth]
@@ -110,9 +111,9 @@ def run(name: str, setting: Setting) -> Run:
     unfound = result.static is not None and not result.static.found
     if (
         mark is Mark.RIGHT
-        and entry.truth is Truth.STANDS
+        and entry.truth in (Truth.STANDS, Truth.RESTS)
         and (moved > MUCH or unfound)
-        and not result.cautions
+        and not (result.cautions or result.reason)
     ):
         mark = Mark.SILENT
     note = f"t = {result.time:.3g} s, {result.errors.unconverged_steps}/{result.steps} unsolved, moved {moved:.2g}"

@@ -7,7 +7,7 @@ import numpy as np
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.shapes import bond, box, column, wall
 from tests.validation.scenes import moved, rotation
-from tests.validation.wild.scene_list import G, falls, scene, stands
+from tests.validation.wild.scene_list import G, falls, rests, scene
 from tests.validation.wild.stones import fixed, ground, shifted, stack, turning
 
 
@@ -32,7 +32,7 @@ def _kicked(width, height, part, duration=4.0):
     )
 
 
-@stands
+@rests
 def rocking_below_housners_limit():
     """A block of 0.25 m x 1 m turned about its edge at 0.9 of the rate that overturns it: 0.81 of the energy."""
     return _kicked(0.25, 1.0, 0.9)
@@ -44,7 +44,7 @@ def rocking_above_housners_limit():
     return _kicked(0.25, 1.0, 1.1)
 
 
-@stands
+@rests
 def rocking_of_a_squat_block():
     """A block of 0.5 m x 0.8 m at 0.85 of its rate: its corner moves by more than half its width on the way."""
     return _kicked(0.5, 0.8, 0.85)
@@ -56,7 +56,7 @@ def _leaning(part):
     return scene([ground(), replace(block, velocity=(0.0,) * 6)], 1.0, duration=4.0, motion=True)
 
 
-@stands
+@rests
 def let_go_inside_its_edge():
     """Let go at 0.9 of the angle of its balance: it falls back, and each impact takes energy."""
     return _leaning(0.9)
@@ -100,20 +100,20 @@ def _rocking_column(count, width, height, part):
     )
 
 
-@stands
+@rests
 def rocking_column_of_three_drums():
     """Drums of 0.5 m, 0.5 m high, with half the energy of the least barrier of all ways to hinge."""
     return _rocking_column(3, 0.5, 0.5, 0.5)
 
 
-@stands
+@rests
 def rocking_column_of_ten_flat_drums():
     """Drums 0.5 m wide and 0.15 m high with 0.6 of the energy of the least barrier: the top moves by more than half
     the height of a drum, fast, and comes back."""
     return _rocking_column(10, 0.5, 0.15, 0.6)
 
 
-@stands
+@rests
 def kicked_stacks():
     """Three stacks side by side, not bonded, whose top stones get 0.2 m/s: they slide at most v²/(2 μ g) = 3 mm."""
     stacks = []
@@ -134,7 +134,7 @@ def kicked_stone_off_its_stack():
     )
 
 
-@stands
+@rests
 def slide_that_stops():
     """A block at 2 m/s on level ground: it stops after v²/(2 μ g) = 0.68 m, more than its width; it does not tip."""
     block = box("block", (-0.3, -0.2, 0), (0.3, 0.2, 0.2), velocity=(2.0, 0, 0, 0, 0, 0))
@@ -148,27 +148,27 @@ def slide_off_the_edge():
     return scene([fixed("table", (-3.0, -1.0, -0.5), (0.0, 1.0, 0.0)), block], 0.3, motion=True)
 
 
-@stands
+@rests
 def thrown_upward():
     """A block thrown up with 2 m/s: it rises v²/(2 g) = 0.20 m, and lands flat after 0.41 s, without restitution."""
     block = box("block", (-0.3, -0.2, 0), (0.3, 0.2, 0.3), velocity=(0, 0, 2.0, 0, 0, 0))
     return scene([ground(), *[block]], motion=True)
 
 
-@stands
+@rests
 def dropped_by_little():
     """A block dropped flat from 30 mm, a tenth of its height: it lands on its face without restitution."""
     return scene([ground(), box("block", (-0.3, -0.2, 0.03), (0.3, 0.2, 0.33))], motion=True)
 
 
-@stands
+@rests
 def bouncing():
     """A block dropped flat from 30 mm with e = 0.4: bounces shorten as e, so it rests after (1 + 2 e/(1 - e)) 78 ms."""
     block = box("block", (-0.3, -0.3, 0.03), (0.3, 0.3, 0.23))
     return scene([ground(), block], law=DryJoint(0.6, restitution=0.4), motion=True)
 
 
-@stands
+@rests
 def slide_along_a_wall():
     """A stone on a wall in running bond that starts at 0.5 m/s: it stops after v²/(2 μ g) = 18 mm.
 

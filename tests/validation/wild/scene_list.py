@@ -19,9 +19,8 @@ SCENES: dict[str, "Wild"] = {}
 class Truth(StrEnum):
     """Fate of the stones."""
 
-    STANDS = (
-        "stands"  # at rest in the end, near its place: rocking that comes back and stones that land included
-    )
+    STANDS = "stands"  # at rest in its place
+    RESTS = "rests"  # the same, elsewhere: it moves on its way
     FALLS = "falls"  # a stone loses its support, wherever it comes to lie afterwards
     SLIDES = "slides"  # without end, still supported
 
@@ -56,6 +55,7 @@ def wild(truth: Truth, pace: float = 1.0) -> Callable[[Callable[[], Scene]], Cal
 
 
 stands, falls, slides = wild(Truth.STANDS), wild(Truth.FALLS), wild(Truth.SLIDES)
+rests = wild(Truth.RESTS)
 
 
 def scene(

@@ -101,6 +101,8 @@ def test_the_barrier_of_a_column_is_no_higher_than_that_of_its_top_drum_or_of_th
     ("truth", "outcome", "mark"),
     [
         (Truth.STANDS, "equilibrium", Mark.RIGHT),
+        (Truth.STANDS, "settled", Mark.WRONG),
+        (Truth.RESTS, "settled", Mark.RIGHT),
         (Truth.STANDS, "moving", Mark.OPEN),
         (Truth.STANDS, "collapsed", Mark.WRONG),
         (Truth.FALLS, "collapsed", Mark.RIGHT),

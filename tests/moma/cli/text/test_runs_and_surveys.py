@@ -56,7 +56,14 @@ def test_reason_and_cautions_come_first(result, tmp_path):
 
 @pytest.mark.parametrize(
     ("outcome", "code"),
-    [("equilibrium", 0), ("moving", 0), ("collapsed", 0), ("undecided", 1), ("interrupted", 1)],
+    [
+        ("equilibrium", 0),
+        ("settled", 0),
+        ("moving", 1),
+        ("collapsed", 0),
+        ("undecided", 1),
+        ("interrupted", 1),
+    ],
 )
 @pytest.mark.parametrize("format", [(), ("--json",)])
 def test_a_run_without_an_answer_ends_in_1(result, tmp_path, monkeypatch, outcome, code, format):
