@@ -1,5 +1,10 @@
-"""Pages of the documentation: their blocks, and what their commands print."""
+"""Pages of the documentation: their blocks, and what their commands and scripts print.
 
+All run within the process of the test: another one needs 3 s to load what they use.
+"""
+
+import contextlib
+import io
 import re
 import shlex
 from pathlib import Path
@@ -9,7 +14,7 @@ import pytest
 from tests.moma.commands import prints
 from tests.paths import ROOT
 
-__all__ = ["blocks", "ran"]
+__all__ = ["blocks", "printed", "ran"]
 
 
 def blocks(page: str, language: str) -> list[str]:
@@ -27,3 +32,13 @@ def ran(folder: Path, commands: str) -> dict[str, str]:
         for line in commands.splitlines():
             said[line] = prints(*shlex.split(line)[1:])
     return said
+
+
+def printed(folder: Path, script: str) -> str:
+    """What a script of a page prints, in `folder`; warnings are errors, as in all tests."""
+    said = io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(said):
+        patch.chdir(folder)
+        patch.delenv("MOMA_DB", raising=False)
+        exec(compile(script, "the page", "exec"), {"__name__": "__main__"})
+    return said.getvalue()

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from tests.docs.pages import blocks
+from tests.docs.pages import blocks, printed
 from tests.moma.commands import invoke
 from tests.paths import ROOT
 from tests.pipelines.scenes import small_geology
@@ -83,27 +83,23 @@ def test_the_first_commands_run_as_processes(place):
 
 def test_the_python_of_the_readme_runs(place):
     (script,) = blocks("README.md", "python")
-    done = execute([sys.executable, "-W", "error", "-c", script], place)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith("W03-")
+    assert printed(place, script).startswith("W03-")
 
 
+@pytest.mark.slow
 def test_the_python_of_the_how_to_on_rigid_blocks_prints_what_it_says(place):
     page = "docs/howto/rigid-blocks.md"
-    done = execute([sys.executable, "-W", "error", "-c", "\n".join(blocks(page, "python"))], place)
-    assert done.returncode == 0, done.stderr
     said = "".join(blocks(page, "text")).splitlines()
     energy = said.pop(1)
-    printed = done.stdout.splitlines()
-    assert float(printed.pop(1).split()[-1]) < 1e-12, energy
-    assert printed == said
+    found = printed(place, "\n".join(blocks(page, "python"))).splitlines()
+    assert float(found.pop(1).split()[-1]) < 1e-12, energy
+    assert found == said
 
 
+@pytest.mark.slow
 def test_the_python_of_the_how_to_on_studies_prints_what_it_says(place):
     page = "docs/howto/python.md"
-    done = execute([sys.executable, "-W", "error", "-c", "\n".join(blocks(page, "python"))], place)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout == "".join(blocks(page, "text"))
+    assert printed(place, "\n".join(blocks(page, "python"))) == "".join(blocks(page, "text"))
     assert (place / "lintel.csv").read_text(encoding="utf-8").startswith("# time [s],x [m]")
 
 
@@ -141,8 +137,7 @@ def test_the_questions_of_the_how_to_on_queries_have_the_answers_it_shows(here):
             questions += command[1] not in ("ingest", "record", "run")
     assert questions >= 15
     (script,) = blocks(page, "python")
-    done = execute([sys.executable, "-W", "error", "-c", script], here)
-    assert done.stdout.split() == ["W10-03", "10", "W10-06", "10"], done.stderr
+    assert printed(here, script).split() == ["W10-03", "10", "W10-06", "10"]
 
 
 def untimed(text):

@@ -3,8 +3,6 @@
 import gzip
 import re
 import shlex
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -13,6 +11,7 @@ from typer.testing import CliRunner
 from archmodel.exchange.sections import sections
 from archmodel.tables.layout import SCHEMA_VERSION
 from moma.cli import app
+from tests.docs.pages import printed
 from tests.paths import ROOT
 
 PAGE = (ROOT / "docs/exchange.md").read_text(encoding="utf-8")
@@ -51,14 +50,11 @@ def test_the_example_is_the_document_cut_short(folder: Path):
 
 
 def test_the_python_reads_it(folder: Path):
-    done = subprocess.run(
-        [sys.executable, "-c", block("python")],
-        cwd=folder, capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    first = done.stdout.splitlines()[0].split()
+    said = printed(folder, block("python")).splitlines()
+    first = said[0].split()
     assert re.fullmatch(r"W\d\d-\d\d", first[0])
     assert float(first[1]) >= 0.5
-    assert done.stdout.splitlines()[3].startswith("[[")
+    assert said[3].startswith("[[")
 
 
 def test_the_sections_are_all_there_are():

@@ -2,12 +2,12 @@
 
 import re
 import shlex
-import sys
 
 import numpy as np
 import pytest
 
-from tests.docs.test_docs import ROOT, execute
+from tests.moma.commands import invoke
+from tests.paths import ROOT
 
 PAGE = "docs/howto/stones.md"
 IMAGES = {
@@ -32,15 +32,17 @@ def steps():
 
 
 @pytest.fixture
-def place(tmp_path):
-    """A folder in which the paths of the page exist."""
+def place(tmp_path, monkeypatch):
+    """A folder in which the paths of the page exist, and in which its commands run."""
     (tmp_path / "docs/howto").mkdir(parents=True)
     for folder in ("survey", "stones"):
         (tmp_path / "docs/howto" / folder).symlink_to(ROOT / "docs/howto" / folder)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("MOMA_DB", raising=False)
     return tmp_path
 
 
-def followed(place, *, whole):
+def followed(*, whole):
     """Run the commands in their order; if not the whole of them, without pictures and without simulating."""
     for line, shown in steps():
         command = shlex.split(line)
@@ -52,9 +54,9 @@ def followed(place, *, whole):
                 at = command.index("--pictures")
                 del command[at : at + 2]
                 lines = [one for one in shown if not one.startswith("  out/")]
-        done = execute([sys.executable, "-m", *command], place)
+        done = invoke(*command[1:])
         unsound = any(one.startswith("problem:") for one in done.stdout.splitlines())
-        assert done.returncode == int(unsound), (line, done.stderr)
+        assert done.exit_code == int(unsound), (line, done.stderr)
         assert unsound == any(one.startswith("problem:") for one in shown), line
         said = done.stdout.splitlines()
         assert [one for one in lines if one not in said] == [], line
@@ -67,7 +69,7 @@ def test_there_are_commands_and_answers():
 
 
 def test_the_commands_print_what_the_page_shows(place):
-    followed(place, whole=False)
+    followed(whole=False)
 
 
 @pytest.mark.slow
@@ -75,7 +77,7 @@ def test_the_commands_print_what_the_page_shows(place):
 def test_all_commands_run_and_draw_the_pictures_of_the_page(place):
     from PIL import Image
 
-    followed(place, whole=True)
+    followed(whole=True)
     for name, source in IMAGES.items():
         shown = Image.open(ROOT / "docs/images" / f"{name}.png").convert("RGB")
         drawn = Image.open(place / "out" / f"{source}.png").convert("RGB").resize(shown.size)
