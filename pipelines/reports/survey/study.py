@@ -1,12 +1,14 @@
 """Findings of a survey report, computed from survey files."""
 
-from collections.abc import Iterator, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from archmodel.tables.entities import kind_named
+from mechanics.arrays import Array
 from mechanics.dynamics.progress import Listener, Progress, silent
 from moma.errors import UsageError
 from pipelines.ingest.reading_options import Source, survey_sources
@@ -17,10 +19,15 @@ from survey.quality.canon import Deviation, KindStandard, deviations, standards
 from survey.quality.contradictions import Contradiction, contradictions
 from survey.quality.corners import SeenFace, misplaced_corners
 from survey.quality.courses import CourseHeight, CourseLine, course_heights, measure_courses
+from survey.quality.departures.beds import WallBeds, find_bed_movements
+from survey.quality.departures.depths import DoubtfulDepth, doubtful_depths
+from survey.quality.departures.faces import WallFace, find_face_departures
 from survey.quality.facades import Facade, find_facades
+from survey.quality.masonry.index import Grade
+from survey.quality.masonry.walls import MasonryQuality, WallStone, judge_masonry
 from survey.quality.plausible import LENGTH, doubt_of
 from survey.quality.precision import StoneQuality, SurveyQuality, appraise, judge_survey
-from survey.quality.remeasure import Remeasure, list_remeasures
+from survey.quality.remeasure import Remeasure, ShortList, list_remeasures, short_list
 from survey.records.survey import Canon, DepthRule, Reject, SurveyHead
 from survey.registration.site_frame import SiteTransform
 from survey.stones import survey_stones
@@ -28,6 +35,7 @@ from survey.stones import survey_stones
 __all__ = ["SurveyFile", "SurveyStudy", "study_surveys"]
 
 _SOME_DEPTH = DepthRule(None, 0.3, None, "\0")  # no file can give this source
+_BEDS, _FACES, _DEPTHS = 0.003, 0.003, 0.001  # chance that a sound survey is given a finding of each sort
 _INTERVAL = 200  # stones between two reports of progress
 
 
@@ -65,7 +73,12 @@ class SurveyStudy:
     contradictions : stones whose proportions contradict their kind
     courses : bed lines
     course_heights : from bed to bed
-    remeasures : what to measure again, most urgent first
+    beds : movement of each wall as its beds show it
+    faces : departure of each wall from plane and plumb, and the stones out of it
+    depths : depths that contradict other evidence, the worst first
+    masonry : quality of the masonry of each wall
+    remeasures : all reasons to measure a stone again, most urgent first
+    again : the short list of them
     warnings : reasons why the database would refuse the survey, and sizes that hardly any stone has
     """
 
@@ -80,12 +93,21 @@ class SurveyStudy:
     contradictions: tuple[Contradiction, ...]
     courses: tuple[CourseLine, ...]
     course_heights: tuple[CourseHeight, ...]
+    beds: tuple[WallBeds, ...]
+    faces: tuple[WallFace, ...]
+    depths: tuple[DoubtfulDepth, ...]
+    masonry: tuple[MasonryQuality, ...]
     remeasures: tuple[Remeasure, ...]
+    again: ShortList
     warnings: tuple[str, ...]
 
 
 def study_surveys(
-    paths: Sequence[str | Path], format: str, options: ReadingOptions, progress: Listener = silent
+    paths: Sequence[str | Path],
+    format: str,
+    options: ReadingOptions,
+    progress: Listener = silent,
+    given: Mapping[str, Grade] | None = None,
 ) -> SurveyStudy:
     """Read, fit and judge the stones of survey files.
 
@@ -95,6 +117,7 @@ def study_surveys(
     format : its name
     options : defaults for what the files leave out
     progress : called now and then
+    given : grades of the masonry that no survey tells: "SM", the state of the stones, and "MM", the mortar
 
     Raises
     ------
@@ -109,7 +132,7 @@ def study_surveys(
         before = len(stones), len(rejects)
         file = _read(source, format, options, stones, rejects, progress)
         files.append(replace(file, stones=len(stones) - before[0], rejects=len(rejects) - before[1]))
-    return _judge(tuple(files), tuple(stones), tuple(rejects))
+    return _judge(tuple(files), tuple(stones), tuple(rejects), given or {})
 
 
 def _read(
@@ -148,7 +171,10 @@ def _appraised(block: SurveyedBlock) -> StoneQuality:
 
 
 def _judge(
-    files: tuple[SurveyFile, ...], stones: tuple[StoneQuality, ...], rejects: tuple[Reject, ...]
+    files: tuple[SurveyFile, ...],
+    stones: tuple[StoneQuality, ...],
+    rejects: tuple[Reject, ...],
+    given: Mapping[str, Grade],
 ) -> SurveyStudy:
     quality = judge_survey(stones)
     facades = find_facades(
@@ -160,6 +186,12 @@ def _judge(
     odd = contradictions(stones, facades)
     tilts = [one.transform.covariance[3:6, 3:6] for one in files if one.transform is not None]
     lines = measure_courses(stones, facades, tilts)
+    beds, faces = _movements(stones, facades, lines, tilts)
+    rules = [rule for file in files for rule in file.head.depth_rules]
+    depths = doubtful_depths(stones, facades, rules, _DEPTHS)
+    seen = [_seen(one) for one in stones if one.measured]
+    remeasures = list_remeasures(stones, rejects, odd, quality, misplaced_corners(seen), depths)
+    verdicts = _verdicts(stones, facades, tilts, _findings(beds, faces))
     return SurveyStudy(
         name=files[0].head.name,
         files=files,
@@ -172,10 +204,96 @@ def _judge(
         contradictions=odd,
         courses=lines,
         course_heights=course_heights(lines),
-        remeasures=list_remeasures(
-            stones, rejects, odd, quality, misplaced_corners([_seen(one) for one in stones if one.measured])
-        ),
+        beds=beds,
+        faces=faces,
+        depths=depths,
+        masonry=judge_masonry([_wall_stone(one) for one in stones], facades, given),
+        remeasures=remeasures,
+        again=short_list(remeasures, len(stones) + len(rejects), verdicts),
         warnings=(*_unknown_kinds(quality.kinds), *_doubtful_sizes(stones)),
+    )
+
+
+def _movements(
+    stones: Sequence[StoneQuality],
+    facades: Sequence[Facade],
+    lines: Sequence[CourseLine],
+    tilts: Sequence[Array],
+) -> tuple[tuple[WallBeds, ...], tuple[WallFace, ...]]:
+    lengths = {one.code: one.length for one in stones}
+    rows = {one.code: one.line for one in stones}
+    leans = {}
+    for facade in facades:
+        # the rotation ω moves what is z up by ω × z, of which this is the part outwards
+        x, y, _ = facade.frame.axes[2]
+        lever = np.array([-y, x, 0.0])
+        leans[facade.name] = max((math.sqrt(float(lever @ one @ lever)) for one in tilts), default=0.0)
+    return find_bed_movements(lines, lengths, _BEDS, rows), find_face_departures(
+        stones, facades, _FACES, leans
+    )
+
+
+def _findings(beds: Sequence[WallBeds], faces: Sequence[WallFace]) -> dict[tuple[object, ...], str]:
+    """Return the verdicts on the walls, each with its name."""
+    found: dict[tuple[object, ...], str] = {}
+    for wall in beds:
+        for one in wall.movements:
+            name = "settlement" if one.kind in ("step", "part") else one.kind
+            found[wall.facade, wall.zone, name] = f"the {name} of {wall.facade}"
+            if one.older_than is not None:
+                dated = f"that it is older than course {one.older_than}"
+                found[wall.facade, wall.zone, name, one.older_than] = f"{dated} ({name} of {wall.facade})"
+    for face in faces:
+        for moved in face.movements:
+            found[face.facade, face.zone, moved.kind] = f"the {moved.kind} of {face.facade}"
+    return found
+
+
+def _verdicts(
+    stones: Sequence[StoneQuality],
+    facades: Sequence[Facade],
+    tilts: Sequence[Array],
+    found: Mapping[tuple[object, ...], str],
+) -> Callable[[str], str | None]:
+    """Return what names the verdicts that depend on a stone: those that are no longer the same without it."""
+    places = {one.code: i for i, one in enumerate(stones)}
+
+    def ask(code: str) -> str | None:
+        if code not in places:
+            return None
+        k = places[code]
+        fewer = [one for one in stones if one.code != code]
+        shifted = [
+            replace(
+                one, members=np.array([i - (i > k) for i in one.members.tolist() if i != k], dtype=np.intp)
+            )
+            for one in facades
+            if k not in one.members or len(one.members) > 1
+        ]
+        lines = measure_courses(fewer, shifted, tilts)
+        without = _findings(*_movements(fewer, shifted, lines, tilts))
+        lost = [text for key, text in found.items() if key not in without]
+        gained = [text for key, text in without.items() if key not in found]
+        if lost:
+            return f"{lost[0]}, which is not found without it"
+        return f"{gained[0]}, which is found without it" if gained else None
+
+    return ask
+
+
+def _wall_stone(stone: StoneQuality) -> WallStone:
+    known = stone.corner_sigma[np.isfinite(stone.corner_sigma)]
+    return WallStone(
+        code=stone.code,
+        kind=stone.kind,
+        course=stone.course,
+        zone=stone.zone,
+        outline=stone.outline,
+        normal=stone.normal,
+        sigma=float(np.median(known)) if len(known) else 0.0,
+        depth=stone.depth,
+        depth_sigma=stone.depth_sigma,
+        area=stone.area,
     )
 
 
