@@ -362,6 +362,8 @@ def _wall(
     runs = _runs(len(sound.numbers))
 
     def follow(one: Sample, found: Found) -> Found:
+        if found.shape.name.endswith("end"):
+            return _hinged(one, found, length)
         return _extended(one, _follow(one, found, found.run, length), length)
 
     first, _ = fit_shapes(sample, shapes, fields, runs, 2.0 * alpha / 3.0, follow)
@@ -498,6 +500,28 @@ def _places(sample: Sample, length: float) -> list[float]:
     return found
 
 
+def _hinged(sample: Sample, found: Found, length: float) -> Found:
+    """Move the place from which an end falls away to where it fits best."""
+    left, right = float(sample.along.min()), float(sample.along.max())
+    inside = (sample.group >= found.run[0]) & (sample.group <= found.run[1])
+    trials = []
+    for place in found.shape.places[0] + length * np.linspace(-0.6, 0.6, 13):
+        rising = found.shape.name == "right end"
+        reach = right - place if rising else place - left
+        if reach < length:
+            continue
+        field = (
+            np.where(inside, np.maximum(sample.along - place if rising else place - sample.along, 0.0), 0.0)
+            / reach
+        )
+        amount, sigma = _amount(sample, field, inside)
+        trials.append(((amount / sigma) ** 2, field, amount, (float(place),)))
+    if not trials:
+        return found
+    _, field, amount, places = max(trials, key=lambda one: one[0])
+    return replace(found, field=field, amount=amount, shape=found.shape._replace(places=places))
+
+
 def _extended(sample: Sample, found: Found, length: float) -> Found:
     """Add the courses next to a run which have the same step or part, their crack being a little farther off."""
     if found.shape.name not in ("step", "part"):
@@ -517,13 +541,14 @@ def _extended(sample: Sample, found: Found, length: float) -> Found:
 
 
 def _amount(sample: Sample, values: Array, own: NDArray[np.bool_]) -> tuple[float, float]:
-    """Return the amount of a shape in one course and its σ; 0 and inf if the course does not tell."""
-    weights = 1.0 / sample.variance[own]
-    centred = values[own] - np.average(values[own], weights=weights)
+    """Return the amount of a shape in some courses and its σ; 0 and inf if they do not tell."""
+    weights = np.where(own, 1.0 / sample.variance, 0.0)
+    total = np.maximum(np.bincount(sample.group, weights), 1e-300)
+    centred = values - (np.bincount(sample.group, weights * values) / total)[sample.group]
     square = float(weights @ centred**2)
     if square <= 1e-9 * float(weights.sum()):
         return 0.0, math.inf
-    return float((weights * centred) @ sample.values[own]) / square, 1.0 / math.sqrt(square)
+    return float((weights * centred) @ sample.values) / square, 1.0 / math.sqrt(square)
 
 
 def _shape_field(shape: Shape, along: Array) -> Array:

@@ -93,7 +93,8 @@ def _against_rules(
         rule = next((one for one in rules if _holds(one, stone)), None)
         if rule is not None:
             sigma = (
-                _relative(stone) ** 2 + max((rule.sigma or _WITHOUT * rule.depth) / rule.depth, _LEAST) ** 2
+                _relative(stone, rule.depth) ** 2
+                + max((rule.sigma or _WITHOUT * rule.depth) / rule.depth, _LEAST) ** 2
             )
             yield from _doubt(
                 stone, rule.depth, math.sqrt(sigma), limit, "rule", f"the rule for it, {rule.source},"
@@ -131,7 +132,12 @@ def _among(
     spread = max(_CONSISTENT * float(np.median(np.abs(logs - middle))), _LEAST)
     for i in own:
         yield from _doubt(
-            stones[i], math.exp(middle), math.hypot(spread, _relative(stones[i])), limit, against, words
+            stones[i],
+            math.exp(middle),
+            math.hypot(spread, _relative(stones[i], math.exp(middle))),
+            limit,
+            against,
+            words,
         )
 
 
@@ -231,7 +237,7 @@ def _doubt(
         yield DoubtfulDepth(stone.code, stone.line, against, stone.depth, expected, score, text)
 
 
-def _relative(stone: StoneQuality) -> float:
-    """Return the standard deviation of a depth over the depth."""
+def _relative(stone: StoneQuality, expected: float) -> float:
+    """Return the standard deviation of a depth over the depth that it would have."""
     assert stone.depth is not None
-    return (stone.depth_sigma or 0.0) / stone.depth
+    return (stone.depth_sigma or 0.0) / max(stone.depth, expected)

@@ -45,6 +45,7 @@ _RANKS = {
 }  # fmt: skip
 _GRID = 8  # places along and up the wall at which ends, offsets and bulges are looked for
 _FEWEST = 3  # stones that a shape must move
+_TRIALS = 12  # by which the place of a shape is sharpened
 
 
 class FaceKind(StrEnum):
@@ -340,7 +341,9 @@ def _beside(face: _Face) -> tuple[Array, Array, float]:
     rows = np.stack([np.ones(index.shape), *(places[index] - places[:, None]).transpose(2, 0, 1)], axis=2)
     values = face.out[index]
     scatter = 0.0
-    weights = np.where(far, 0.0, 1.0)
+    # the first weights know no plane, only the median of the neighbours: one odd stone would turn a plane
+    first = values - np.median(values, axis=1)[:, None]
+    weights = _bisquare(np.abs(first) / max(_spread(first[~far]), 1e-9), far)
     for _ in range(4):
         variance = face.sigma**2 + scatter**2
         normal = np.einsum("nki,nk,nkj->nij", rows, weights / variance[index], rows)
@@ -354,12 +357,18 @@ def _beside(face: _Face) -> tuple[Array, Array, float]:
         share = 1.0 + predicted / variance  # variance of the departure over that of a face
         found = _spread(away / np.sqrt(share))
         scatter = math.sqrt(max(found**2 - float(np.median(face.sigma**2)), 0.0))
-        size = np.abs(rest) / np.sqrt(face.sigma[index] ** 2 + scatter**2) / _BISQUARE
-        weights = np.where(far | (size >= 1.0), 0.0, (1.0 - np.minimum(size, 1.0) ** 2) ** 2)
-        lost = weights.sum(axis=1) < 3.0
-        weights[lost] = np.where(far[lost], 0.0, 1.0)
+        weights = _bisquare(np.abs(rest) / np.sqrt(face.sigma[index] ** 2 + scatter**2), far)
     sigma = np.sqrt(face.sigma**2 + scatter**2 + predicted)
     return away, sigma, scatter
+
+
+def _bisquare(size: Array, far: NDArray[np.bool_]) -> Array:
+    """Return Tukey's weights (n, k) of residuals over their σ; those of neighbours that are all far off stay equal."""
+    share = np.minimum(size / _BISQUARE, 1.0)
+    weights = np.where(far, 0.0, (1.0 - share**2) ** 2)
+    lost = weights.sum(axis=1) < 3.0
+    weights[lost] = np.where(far[lost], 0.0, 1.0)
+    return np.asarray(weights, dtype=np.float64)
 
 
 def _nearest(places: Array, count: int) -> tuple[Array, NDArray[np.intp]]:
@@ -436,7 +445,8 @@ def _shapes(face: _Face) -> Iterator[Shape]:
         inner = np.linspace(left, right, _GRID + 2)[1:-1]
         named += [("offset", (float(s),)) for s in inner]
         for s in inner.tolist():
-            named += [("left end", (left, s)), ("right end", (s, right))]
+            # where a wall stands along its facade is not known, so that only its bend is: the shorter side has moved
+            named.append(("left end", (left, s)) if s - left < right - s else ("right end", (s, right)))
             if tall > face.size:
                 named += [("left corner", (left, s, low, high)), ("right corner", (s, right, low, high))]
     if tall > 2.0 * face.size and long > 2.0 * face.size:
@@ -503,16 +513,14 @@ def _sharpener(face: _Face) -> Callable[[Sample, Found], Found]:
         free |= {"right end": (0,), "right corner": (0,)}
         if found.shape.name not in free:
             return found
-        best, gain = found.shape, _gain(sample, found.field)
-        step = 0.5 * face.size
-        while step > 0.1 * face.size:
+        best, gain, step = found.shape, _gain(sample, found.field), 0.5 * face.size
+        for _ in range(_TRIALS):
             tried = [
                 best._replace(places=tuple(p + sign * step * (i == k) for i, p in enumerate(best.places)))
                 for k in free[best.name]
                 for sign in (-1.0, 1.0)
             ]
-            sound = [one for one in tried if _is_sound(one, face)]
-            scores = [(_gain(sample, _field(one, face)), one) for one in sound]
+            scores = [(_gain(sample, _field(one, face)), one) for one in tried if _is_sound(one, face)]
             top = max(scores, key=lambda pair: pair[0], default=(-1.0, best))
             if top[0] > gain:
                 gain, best = top
@@ -525,9 +533,12 @@ def _sharpener(face: _Face) -> Callable[[Sample, Found], Found]:
 
 def _is_sound(shape: Shape, face: _Face) -> bool:
     at = shape.places
-    if shape.name == "local bulge" and at[2] < 1.5 * face.size:
+    widest = max(float(np.ptp(face.along)), float(np.ptp(face.up)))
+    if shape.name == "local bulge" and not 1.5 * face.size <= at[2] <= widest:
         return False
     if shape.name.split()[0] in ("left", "right") and at[1] - at[0] < face.size:
+        return False
+    if shape.name.endswith("end") and at[1] - at[0] > 0.5 * float(np.ptp(face.along)):
         return False
     moved = np.abs(_field(shape, face)) > 0.1
     return _FEWEST <= int(moved.sum()) <= len(moved) - _FEWEST

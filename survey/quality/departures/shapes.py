@@ -28,7 +28,8 @@ LIKELY = 1.645
 
 _MOST = 5  # shapes taken by one wall; more are noise that the shapes before have left
 _LEAST = 0.25  # of the largest amount taken: smaller ones are what the shapes do not fit exactly
-_AS_GOOD = 6.0  # difference of t² below which the simpler of two shapes is taken: odds of 20 to 1
+_AS_GOOD = 6.0  # difference of Σ r²/v below which the simpler of two shapes is taken: odds of 20 to 1
+_NEARLY = 0.01  # the same, of the whole reduction: no wall moves exactly like a shape
 _NOTHING = 1e-9  # part of a shape's sum of squares that is left if the nuisance explains it [-]
 
 Run = tuple[int, int]
@@ -159,41 +160,109 @@ def fit_shapes(
     -------
     movements, the most significant first, and the critical value of |t|
     """
-    first, last = (np.array(one, dtype=np.intp) for one in zip(*runs, strict=True))
+    ends = tuple(np.array(one, dtype=np.intp) for one in zip(*runs, strict=True))
     found: list[Found] = []
-    rest = sample.values
-    limit = math.inf
-    ranks = np.array([shape.rank for shape in shapes])
+    rest, limit, tests = sample.values, math.inf, 0
     for _ in range(_MOST):
-        taken = [one.field for one in found]
-        moments = _moments(sample, fields, rest)
-        squares, values, tilt, chi2, count = moments.over((first, last))
-        tells = squares > 0.0
+        trials = _Trials.of(_moments(sample, fields, rest), (ends[0], ends[1]))
         if not found:
-            limit = critical(alpha, int(tells.sum()), sample.freedom)
-        scale = np.maximum(1.0, chi2 / np.maximum(count - 1.0, 1.0)).astype(np.float64)
-        amount = np.divide(values, squares, out=np.zeros_like(values), where=tells)
-        lever = np.divide(tilt, squares, out=np.zeros_like(values), where=tells)
-        variance = np.divide(scale, squares, out=np.full_like(values, np.inf), where=tells) + lever**2
-        score = amount**2 / variance
-        if found:
-            score[np.abs(amount) < _LEAST * max(abs(one.amount) for one in found)] = 0.0
-        best = float(score.max(initial=0.0))
-        if best <= limit**2:
+            tests = int(trials.tells.sum())
+            limit = critical(alpha, tests, sample.freedom)
+        enough = _LEAST * max((abs(one.amount) for one in found), default=0.0)
+        score = np.where(np.abs(trials.amount) < enough, 0.0, trials.score)
+        if float(score.max(initial=0.0)) <= limit**2:
             break
-        rows, columns = np.nonzero(score >= max(best - _AS_GOOD, limit**2))
-        long = (last - first)[rows]
-        k = np.lexsort((-score[rows, columns], -long, ranks[columns]))[0]
-        run = (int(first[rows[k]]), int(last[rows[k]]))
-        field = np.where((sample.group >= run[0]) & (sample.group <= run[1]), fields[:, columns[k]], 0.0)
-        start = float(amount[rows[k], columns[k]])
-        one = Found(shapes[int(columns[k])], run, field, start, 0.0, np.zeros((0, 2)), 0.0, 0, 0.0)
-        found.append(follow(replace(sample, values=rest), one))
-        fitted = _amounts(sample, [*taken, found[-1].field])
-        found = [replace(one, amount=float(a)) for one, a in zip(found, fitted, strict=True)]
-        rest = sample.values - np.column_stack([one.field for one in found]) @ fitted
-    tests = int((_moments(sample, fields, sample.values).over((first, last))[0] > 0.0).sum())
-    return [_judged(sample, found, k, fields, tests) for k in range(len(found))], limit
+        now = replace(sample, values=rest)
+        best = [
+            follow(now, one) for one in _best_of_families(sample, shapes, fields, ends, trials, score, limit)
+        ]
+        gains = [_gain(now, one) for one in best]
+        good = max(gains) - max(_AS_GOOD, _NEARLY * max(gains))
+        chosen = min(
+            (one for one, gain in zip(best, gains, strict=True) if gain >= good),
+            key=lambda one: one.shape.rank,
+        )
+        found = _fitted(sample, [*found, chosen])
+        rest = _rest(sample, found)
+    while found:
+        judged = [_judged(sample, found, k, fields, tests) for k in range(len(found))]
+        most = max(abs(one.amount) for one in judged)
+        weak = [one for one in judged if abs(one.amount) <= max(limit * one.sigma, _LEAST * most)]
+        if not weak:
+            return judged, limit
+        least = min(weak, key=lambda one: abs(one.amount) / one.sigma)
+        found = _fitted(sample, [one for one in found if one.field is not least.field])
+    return [], limit
+
+
+def _fitted(sample: Sample, found: Sequence[Found]) -> list[Found]:
+    """Return movements with the amounts that fit best together."""
+    if not found:
+        return []
+    amounts = _amounts(sample, [one.field for one in found])
+    return [replace(one, amount=float(amount)) for one, amount in zip(found, amounts, strict=True)]
+
+
+def _rest(sample: Sample, found: Sequence[Found]) -> Array:
+    """Return what movements leave of the departures."""
+    rest: Array = sample.values - sum((one.amount * one.field for one in found), np.zeros(len(sample.values)))
+    return rest
+
+
+@dataclass(frozen=True)
+class _Trials:
+    """Every shape in every run, (runs, m): whether it tells, its amount, the reduction of Σ r²/v, and t²."""
+
+    tells: NDArray[np.bool_]
+    amount: Array
+    gain: Array
+    score: Array
+
+    @classmethod
+    def of(cls, moments: "_Moments", ends: tuple[NDArray[np.intp], NDArray[np.intp]]) -> "_Trials":
+        """Try all shapes in all runs."""
+        squares, values, tilt, chi2, count = moments.over(ends)
+        tells = squares > 0.0
+        safe = np.where(tells, squares, 1.0)
+        scale = np.maximum(1.0, chi2 / np.maximum(count - 1.0, 1.0))
+        amount = np.where(tells, values / safe, 0.0)
+        variance = scale / safe + (tilt / safe) ** 2
+        gain = np.where(tells, values**2 / safe / (1.0 + tilt**2 / safe), 0.0)
+        return cls(tells, amount, gain, np.where(tells, amount**2 / variance, 0.0))
+
+
+def _best_of_families(
+    sample: Sample,
+    shapes: Sequence[Shape],
+    fields: Array,
+    ends: tuple[NDArray[np.intp], ...],
+    trials: _Trials,
+    score: Array,
+    limit: float,
+) -> list[Found]:
+    """Return of each family the shape and run that explain most: significant ones or, without any, all of them."""
+    names = np.array([shape.name for shape in shapes])
+    found = []
+    for name in dict.fromkeys(names.tolist()):
+        own = names == name
+        allowed = own & (score > limit**2) if (score[:, own] > limit**2).any() else own & (score > 0.0)
+        gain = np.where(allowed, trials.gain, 0.0)
+        row, column = np.unravel_index(int(gain.argmax()), gain.shape)
+        if gain[row, column] <= limit**2:
+            continue
+        run = (int(ends[0][row]), int(ends[1][row]))
+        inside = (sample.group >= run[0]) & (sample.group <= run[1])
+        field = np.where(inside, fields[:, column], 0.0)
+        amount = float(trials.amount[row, column])
+        found.append(Found(shapes[int(column)], run, field, amount, 0.0, np.zeros((0, 2)), 0.0, 0, 0.0))
+    return found
+
+
+def _gain(sample: Sample, found: Found) -> float:
+    """Return the reduction of Σ r²/v by a shape in its run."""
+    moments = _moments(sample, found.field[:, None], sample.values)
+    ends = np.array([found.run[0]]), np.array([found.run[1]])
+    return float(_Trials.of(moments, ends).gain[0, 0])
 
 
 def powers(sample: Sample, fields: Array, run: Run) -> Array:
@@ -247,13 +316,23 @@ def _amounts(sample: Sample, fields: Sequence[Array]) -> Array:
     return np.asarray(solved[: len(fields)], dtype=np.float64)
 
 
+def _variance(sample: Sample, found: Sequence[Found], k: int) -> float:
+    """Return the variance of the amount of one of the shapes that are fitted together."""
+    root = 1.0 / np.sqrt(sample.variance)
+    fields = np.column_stack([one.field for one in found]) * root[:, None]
+    basis = _basis(_design(sample) * root[:, None])
+    fields = fields - basis @ (basis.T @ fields)
+    return float(np.linalg.pinv(fields.T @ fields)[k, k])
+
+
 def _judged(sample: Sample, found: Sequence[Found], k: int, fields: Array, tests: int) -> Found:
     """Return a movement with its standard deviation and the amounts of single groups, the others taken out."""
     one = found[k]
-    rest = sample.values - sum(
-        (f.amount * f.field for f in found if f is not one), np.zeros(len(sample.values))
-    )
     inside = (sample.group >= one.run[0]) & (sample.group <= one.run[1])
+    others = [f for f in found if f is not one]
+    # what other groups alone have is not taken out of them: what it has in common with this one tells its age
+    shared = [f for f in others if f.run[0] <= one.run[0] and one.run[1] <= f.run[1]]
+    rest = np.where(inside, _rest(sample, others), _rest(sample, shared))
     # outside of its run the shape is where its family puts it
     everywhere = np.where(inside, one.field, _outside(sample, one, fields))
     moments = _moments(sample, everywhere[:, None], rest)
@@ -265,7 +344,8 @@ def _judged(sample: Sample, found: Sequence[Found], k: int, fields: Array, tests
     ends = np.array([one.run[0]]), np.array([one.run[1]])
     total, _, tilt, chi2, count = (float(part[0, 0]) for part in moments.over(ends))
     dof = max(int(count) - 1, 0)
-    sigma = math.sqrt(max(1.0, chi2 / max(dof, 1)) / total + (tilt / total) ** 2)
+    variance = max(_variance(sample, found, k), 1.0 / total) * max(1.0, chi2 / max(dof, 1))
+    sigma = math.sqrt(variance + (tilt / total) ** 2)
     chance = min(1.0, tests * 2.0 * float(stdtr(sample.freedom, -abs(one.amount) / sigma)))
     return replace(one, sigma=sigma, each=each, chi2=chi2, dof=dof, probability=chance)
 

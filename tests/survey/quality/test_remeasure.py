@@ -74,11 +74,11 @@ def test_the_most_urgent_come_first_and_the_worst_of_a_sort_before_the_others() 
     weak = [rectangle(f"T{k}", "header", 0, 0, 0.4, 0.3, tilt_sigma=t) for k, t in enumerate((0.6, 0.9))]
     bare = rectangle("B", "header", 0, 0, 0.4, 0.3, redundancy=0, sigma0=None, tilt_sigma=2.0)
     found = listed(*weak, bare, rejects=(reject,), odd=(odd,))
-    assert [one.code for one in found] == ["R", "B", "B", "T1", "T0", "ok3"]
+    assert [one.code for one in found] == ["R", "B", "ok3", "B", "T1", "T0"]
     assert (found[0].line, found[0].reason, found[0].action) == (
         7, "could not be made: it has 2 corners (file:7)", "measure 3",
     )  # fmt: skip
-    assert "8.0 σ" in found[-1].reason
+    assert "8.0 σ" in found[2].reason
 
 
 def test_a_wrong_sigma_is_no_fault_of_the_stones() -> None:

@@ -52,7 +52,8 @@ def contents(report):
 
 def test_the_folder_holds_what_its_index_names(window):
     names = {entry.name for entry in window.folder.iterdir()}
-    assert names == {"survey.json", "report.html", "elevation.png", "courses.png", "residuals.png"}
+    pictures = {"elevation.png", "courses.png", "plumb.png", "residuals.png"}
+    assert names == {"survey.json", "report.html", *pictures}
     assert set(contents(window)["files"]) == names
     for name in names:
         if name.endswith(".png"):
@@ -84,7 +85,11 @@ def test_the_true_beds_of_the_sample_are_level_and_found_so(window):
     """12 level courses: slopes over their standard deviations are Student's t, of which none exceeds 4."""
     lines = window.study.courses
     assert [line.course for line in lines] == list(range(1, 13))
-    assert all(line.finding == "level and straight" for line in lines)
+    (beds,) = window.study.beds
+    assert beds.movements == ()
+    assert beds.odd == ()
+    for line in lines:
+        assert beds.finding(line.course).startswith("no movement found; more than ")
     scores = np.array([line.slope / line.slope_sigma for line in lines])
     assert abs(scores).max() < 4.0
     assert 0.3 < (scores**2).mean() < 2.5  # of 12 values with variance 1.4 or so
@@ -99,7 +104,7 @@ def test_the_report_is_one_page_that_needs_nothing_else(window, wall):
     for report in (window, wall):
         page = Page(report.folder / "report.html")
         assert all(source.startswith("data:image/png;base64,") for source in page.sources)
-        assert len(page.sources) == 3
+        assert len(page.sources) == 4
         text = " ".join(page.text)
         for heading in ("What to measure again", "Courses", "Kinds", "Stones", report.study.name):
             assert heading in text
@@ -122,16 +127,26 @@ def test_what_is_wrong_with_the_synthetic_wall_is_found(wall):
     (moved,) = [one for one in control["points"] if one["name"] == "C4"]
     assert abs(moved["residual"][0]) == pytest.approx(0.04, abs=0.012)
     text = "\n".join(survey_report_lines(wall, False))
-    for words in ("G05-03", "C4", "G02-04", "4 not level or not straight"):
+    for words in ("G05-03", "C4", "G02-04", "it sags by 14."):
         assert words in text
 
 
 def test_the_sag_of_the_lower_courses_is_measured_with_its_precision(wall):
     """The wall sagged by 14 mm when four courses stood; the four above are straight."""
+    (beds,) = wall.study.beds
     for line in wall.study.courses:
         truth = -0.014 if line.course <= 4 else 0.0
         assert abs(line.sag - truth) < 3.5 * line.sag_sigma
-        assert ("sags" in line.finding) == (line.course <= 4)
+        assert beds.finding(line.course).startswith("sags -" if line.course <= 4 else "laid level above older")
+
+
+def test_the_settlement_of_the_garden_wall_is_dated(wall):
+    (movement,) = wall.study.beds[0].movements
+    assert (movement.kind, movement.first, movement.last, movement.older_than) == ("sag", 1, 4, 5)
+    assert abs(movement.amount + 0.014) < 3.0 * movement.sigma < 0.004
+    (written,) = contents(wall)["beds"][0]["movements"]
+    assert written["dating"].startswith("older than course 5")
+    assert [one["course"] for one in written["courses"]] == list(range(1, 9))
 
 
 def test_a_survey_says_the_same_in_the_frame_of_the_site(wall, tmp_path):
@@ -151,7 +166,10 @@ def test_a_survey_says_the_same_in_the_frame_of_the_site(wall, tmp_path):
         # control points 5 m apart with 3 mm tilt the frame by a milliradian at most
         assert one.slope == pytest.approx(other.slope, abs=1.5e-3)
         assert one.sag == pytest.approx(other.sag, abs=2e-4)
-        assert one.finding == other.finding
+    for one, other in zip(bare.beds, site.beds, strict=True):
+        assert [(m.kind, m.first, m.last) for m in one.movements] == [
+            (m.kind, m.first, m.last) for m in other.movements
+        ]
 
 
 def test_a_bad_stone_is_in_the_report_and_does_not_stop_it(tmp_path):
