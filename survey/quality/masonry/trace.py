@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import dijkstra
-from scipy.spatial import cKDTree
 
 from survey.arrays import Array
 
@@ -24,7 +23,9 @@ _JOINT = 0.08  # widest joint between two stones [m]; beyond is an opening, or t
 _HEIGHTS = (0.7, 1.5)  # straight distances at which it is measured, about a metre [m]; their mean is taken
 _LEAST = 0.5  # least straight distance: of a low wall [m]
 _BESIDE = 0.01  # distance of the upright from the corner at whose head joint it begins [m]
-_SAMPLES = 60  # most lines of a wall, spread evenly
+_SAMPLES = 40  # most lines of a wall, spread evenly
+_SMALL = 200  # stones of a wall up to which all its joints are a network
+_WINDOW = 1.2  # half width of the part of a larger wall around each upright, whose joints are one [m]
 _LONGEST = 3.0  # ratio beyond which it is not looked for: far more than any limit
 _SAME = 1e-6  # places closer than this are one [m]
 
@@ -34,22 +35,19 @@ class _Network:
     """Joints as a graph: places, and ways between them."""
 
     places: list[Array]
-    ways: list[tuple[int, int, float]]
+    ways: list[tuple[int, int]]
 
     def add(self, place: Array) -> int:
         self.places.append(place)
         return len(self.places) - 1
 
-    def join(self, one: int, other: int) -> None:
-        length = float(np.hypot(*(self.places[one] - self.places[other])))
-        self.ways.append((one, other, max(length, 1e-9)))
-
     def matrix(self) -> csr_array:
-        if not self.ways:
-            return csr_array((len(self.places), len(self.places)))
-        first, second, length = (np.array(column) for column in zip(*self.ways, strict=True))
         size = len(self.places)
-        return coo_array((length, (first, second)), shape=(size, size)).tocsr()
+        if not self.ways:
+            return csr_array((size, size))
+        ends, places = np.array(self.ways), np.array(self.places)
+        length = np.maximum(np.hypot(*(places[ends[:, 0]] - places[ends[:, 1]]).T), 1e-9)
+        return coo_array((length, (ends[:, 0], ends[:, 1])), shape=(size, size)).tocsr()
 
 
 def minimum_traces(faces: Sequence[Array]) -> Array:
@@ -65,70 +63,88 @@ def minimum_traces(faces: Sequence[Array]) -> Array:
     """
     if len(faces) < 3:
         return np.zeros(0)
-    network, uprights = _joints(faces)
+    centres = np.array([face.mean(axis=0) for face in faces])
+    order = np.lexsort((centres[:, 0], centres[:, 1].round(1)))
+    chosen = order[np.unique(np.linspace(0, len(faces) - 1, _SAMPLES).round().astype(int))]
+    near = _around(centres, centres[chosen])
+    own = np.flatnonzero(near)
+    number = {k: i for i, k in enumerate(own.tolist())}
+    network, uprights = _joints([faces[k] for k in own.tolist()], [number[k] for k in chosen.tolist()])
     matrix = network.matrix()
     found = []
     for start, stops in uprights:
         rise = np.array([network.places[stop][1] - network.places[start][1] for stop in stops])
-        near = (rise >= _HEIGHTS[0]) & (rise <= _HEIGHTS[1])
-        if not near.any() and (rise >= _LEAST).any():
-            near = (rise >= _LEAST) & (rise == rise[rise <= _HEIGHTS[1]].max(initial=0.0))
-        if not near.any():
+        here = (rise >= _HEIGHTS[0]) & (rise <= _HEIGHTS[1])
+        if not here.any() and (rise >= _LEAST).any():
+            here = (rise >= _LEAST) & (rise == rise[rise <= _HEIGHTS[1]].max(initial=0.0))
+        if not here.any():
             continue
-        reach = dijkstra(matrix, directed=False, indices=start, limit=_LONGEST * float(rise[near].max()))
-        ratios = reach[np.array(stops)[near]] / rise[near]
+        reach = dijkstra(matrix, directed=False, indices=start, limit=_LONGEST * float(rise[here].max()))
+        ratios = reach[np.array(stops)[here]] / rise[here]
         found.append(float(np.minimum(ratios, _LONGEST).mean()))
     return np.array(found)
 
 
-def _joints(faces: Sequence[Array]) -> tuple[_Network, list[tuple[int, list[int]]]]:
-    """Return the network of joints, and for each upright its foot and where it crosses the beds above."""
+def _around(centres: Array, chosen: Array) -> NDArray[np.bool_]:
+    """Return the stones near the uprights above some of them; in a small wall all of them."""
+    if len(centres) <= _SMALL:
+        return np.ones(len(centres), dtype=bool)
+    away = centres[:, None] - chosen
+    inside = (
+        (np.abs(away[..., 0]) <= _WINDOW) & (away[..., 1] >= -0.5 * _WINDOW) & (away[..., 1] <= 1.5 * _WINDOW)
+    )
+    return np.asarray(inside.any(axis=1))
+
+
+def _joints(faces: Sequence[Array], chosen: Sequence[int]) -> tuple[_Network, list[tuple[int, list[int]]]]:
+    """Return the network of joints, and for the upright at each chosen stone its foot and the beds that it crosses."""
     network = _Network([], [])
     corners = np.concatenate(faces)
     owner = np.repeat(np.arange(len(faces)), [len(face) for face in faces])
+    ends = np.concatenate([np.roll(face, -1, axis=0) for face in faces])
     node = [network.add(corner) for corner in corners]
-    tree = cKDTree(corners)
     first = np.concatenate([[0], np.cumsum([len(face) for face in faces])])
-    centres = np.array([face.mean(axis=0) for face in faces])
-    radius = np.array(
-        [np.hypot(*(face - centre).T).max() for face, centre in zip(faces, centres, strict=True)]
-    )
-    around = cKDTree(centres)
-    chosen = np.unique(np.linspace(0, len(faces) - 1, _SAMPLES).round().astype(int))
-    chosen = np.lexsort((centres[:, 0], centres[:, 1].round(1)))[chosen]
-    feet = np.array([faces[k][_lower_left(faces[k])] for k in chosen.tolist()])
-    uprights = feet[:, 0] + _BESIDE
+    low = np.array([face.min(axis=0) for face in faces]) - _JOINT
+    high = np.array([face.max(axis=0) for face in faces]) + _JOINT
+    uprights = np.array([faces[k][_lower_left(faces[k])][0] for k in chosen]) + _BESIDE
     starts: dict[int, int] = {}
     crossings: dict[int, list[int]] = {}
     for k, face in enumerate(faces):
-        near = [i for i in tree.query_ball_point(centres[k], radius[k] + _JOINT) if owner[i] != k]
-        reach = radius[k] + float(radius.max()) + _JOINT
-        beside = [faces[j] for j in around.query_ball_point(centres[k], reach) if j != k]
-        for side, (start, stop) in enumerate(zip(face, np.roll(face, -1, axis=0), strict=True)):
-            ends = node[first[k] + side], node[first[k] + (side + 1) % len(face)]
-            on_side = [(0.0, ends[0]), (1.0, ends[1])]
-            for i, share, distance in _feet(corners[near], start, stop):
-                place = network.add(start + share * (stop - start)) if _SAME < share < 1.0 - _SAME else None
-                foot = ends[int(share > 0.5)] if place is None else place
-                if place is not None:
-                    on_side.append((share, place))
-                if distance <= _JOINT:
-                    network.join(foot, node[near[i]])
+        beside = np.flatnonzero((low <= high[k]).all(axis=1) & (high >= low[k]).all(axis=1))
+        others = np.flatnonzero(np.isin(owner, beside[beside != k]))
+        if len(others) == 0:
+            continue
+        segments = corners[others], ends[others]
+        ways: list[tuple[int, int]] = []
+        beds: list[tuple[int, int]] = []
+        for side in range(len(face)):
+            start, stop = face[side], face[(side + 1) % len(face)]
+            at = node[first[k] + side], node[first[k] + (side + 1) % len(face)]
+            on_side = [(0.0, at[0]), (1.0, at[1])]
+            for i, share in _feet(corners[others], start, stop):
+                if _SAME < share < 1.0 - _SAME:
+                    foot = network.add(start + share * (stop - start))
+                    on_side.append((share, foot))
+                else:
+                    foot = at[int(share > 0.5)]
+                network.ways.append((foot, node[others[i]]))
             run = stop - start
             if run[0] > abs(run[1]):  # counter-clockwise, the lower sides run to the right
                 for u in np.flatnonzero((uprights > start[0]) & (uprights < stop[0])).tolist():
                     share = float((uprights[u] - start[0]) / run[0])
-                    place = network.add(start + share * run)
-                    on_side.append((share, place))
-                    if not _faces_another(network.places[place], beside):
-                        continue
-                    if chosen[u] == k:
-                        starts[u] = place
-                    crossings.setdefault(u, []).append(place)
+                    beds.append((u, network.add(start + share * run)))
+                    on_side.append((share, beds[-1][1]))
             on_side.sort()
-            for (_, one), (_, other) in pairwise(on_side):
-                if _faces_another((network.places[one] + network.places[other]) / 2.0, beside):
-                    network.join(one, other)
+            ways += [(one, other) for (_, one), (_, other) in pairwise(on_side)]
+        middles = [(network.places[one] + network.places[other]) / 2.0 for one, other in ways]
+        asked = np.array([*middles, *(network.places[place] for _, place in beds)])
+        joint = _distance(asked, *segments) <= _JOINT
+        network.ways += [way for way, there in zip(ways, joint, strict=False) if there]
+        for (u, place), there in zip(beds, joint[len(ways) :], strict=True):
+            if there:
+                crossings.setdefault(u, []).append(place)
+                if chosen[u] == k:
+                    starts[u] = place
     return network, [(place, crossings[u]) for u, place in starts.items()]
 
 
@@ -141,10 +157,8 @@ def _lower_left(face: Array) -> int:
     return int(level[face[level, 0].argmin()])
 
 
-def _feet(points: Array, start: Array, stop: Array) -> Iterator[tuple[int, float, float]]:
-    """Yield the points that lie beside a side: index, share of the side, and distance."""
-    if len(points) == 0:
-        return
+def _feet(points: Array, start: Array, stop: Array) -> Iterator[tuple[int, float]]:
+    """Yield the points that lie beside a side, within a joint's width: index, and share of the side."""
     run = stop - start
     square = float(run @ run)
     if square < _SAME**2:
@@ -152,20 +166,17 @@ def _feet(points: Array, start: Array, stop: Array) -> Iterator[tuple[int, float
     share = np.clip((points - start) @ run / square, 0.0, 1.0)
     distance = np.hypot(*(points - start - share[:, None] * run).T)
     for i in np.flatnonzero(distance <= _JOINT).tolist():
-        yield i, float(share[i]), float(distance[i])
+        yield i, float(share[i])
 
 
-def _faces_another(place: Array, beside: Sequence[Array]) -> bool:
-    """Return whether another stone is within a joint's width of a place."""
-    for face in beside:
-        if (place < face.min(axis=0) - _JOINT).any() or (place > face.max(axis=0) + _JOINT).any():
-            continue
-        run = np.roll(face, -1, axis=0) - face
-        square = np.maximum((run**2).sum(axis=1), _SAME**2)
-        share = np.clip(((place - face) * run).sum(axis=1) / square, 0.0, 1.0)
-        if float(np.hypot(*(place - face - share[:, None] * run).T).min()) <= _JOINT:
-            return True
-    return False
+def _distance(places: Array, starts: Array, stops: Array) -> Array:
+    """Return the distance of places (n, 2) from the nearest of some sides (m, 2)."""
+    run = stops - starts
+    square = np.maximum((run**2).sum(axis=1), _SAME**2)
+    away = places[:, None] - starts
+    share = np.clip((away * run).sum(axis=2) / square, 0.0, 1.0)
+    nearest: Array = np.hypot(*np.moveaxis(away - share[..., None] * run, 2, 0)).min(axis=1)
+    return nearest
 
 
 def section_trace(levels: Array, front: Array, back: Array) -> float:
