@@ -32,10 +32,12 @@ from survey.records.survey import Canon, DepthRule, Reject, SurveyHead
 from survey.registration.site_frame import SiteTransform
 from survey.stones import survey_stones
 
-__all__ = ["SurveyFile", "SurveyStudy", "study_surveys"]
+__all__ = ["CHANCES", "SurveyFile", "SurveyStudy", "study_surveys"]
+
+CHANCES = {"beds": 0.003, "faces": 0.003, "depths": 0.001}
+"""Probability that a survey without fault or movement is given a finding of each sort."""
 
 _SOME_DEPTH = DepthRule(None, 0.3, None, "\0")  # no file can give this source
-_BEDS, _FACES, _DEPTHS = 0.003, 0.003, 0.001  # chance that a sound survey is given a finding of each sort
 _INTERVAL = 200  # stones between two reports of progress
 
 
@@ -188,7 +190,7 @@ def _judge(
     lines = measure_courses(stones, facades, tilts)
     beds, faces = _movements(stones, facades, lines, tilts)
     rules = [rule for file in files for rule in file.head.depth_rules]
-    depths = doubtful_depths(stones, facades, rules, _DEPTHS)
+    depths = doubtful_depths(stones, facades, rules, CHANCES["depths"])
     seen = [_seen(one) for one in stones if one.measured]
     remeasures = list_remeasures(stones, rejects, odd, quality, misplaced_corners(seen), depths)
     verdicts = _verdicts(stones, facades, tilts, _findings(beds, faces))
@@ -228,8 +230,8 @@ def _movements(
         x, y, _ = facade.frame.axes[2]
         lever = np.array([-y, x, 0.0])
         leans[facade.name] = max((math.sqrt(float(lever @ one @ lever)) for one in tilts), default=0.0)
-    return find_bed_movements(lines, lengths, _BEDS, rows), find_face_departures(
-        stones, facades, _FACES, leans
+    return find_bed_movements(lines, lengths, CHANCES["beds"], rows), find_face_departures(
+        stones, facades, CHANCES["faces"], leans
     )
 
 

@@ -1,11 +1,12 @@
 """Surveys of walls whose movement is known: the truth beside what a total station would have measured.
 
-A wall of courses in running bond, with or without an opening, is laid with the scatter of masons, moved, and measured point
-by point with noise; the chain plane, outline, depth makes stones of the points.
+A wall of courses in running bond, with or without an opening, is laid with the scatter of masons, moved, and measured
+point by point with noise; the chain plane, outline, depth makes stones of the points.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,8 +101,20 @@ def _spans(rng: np.random.Generator, wall: Wall, course: int) -> list[tuple[floa
         else:
             sizes[-1] *= 0.5
         edges = left + (right - left) * np.concatenate([[0.0], np.cumsum(sizes)]) / sizes.sum()
-        found += [(float(a) + 0.005, float(b) - 0.005) for a, b in zip(edges, edges[1:], strict=False)]
+        found += [(float(a) + 0.005, float(b) - 0.005) for a, b in pairwise(edges)]
     return found
+
+
+def some_wall(seed: int) -> Wall:
+    """Return a wall like many: 3 to 6 m long, 5 to 10 courses, laid to 4 mm or better, 5 to 12 points on a face."""
+    rng = np.random.default_rng(seed)
+    return Wall(
+        length=float(rng.uniform(3.0, 6.0)),
+        courses=int(rng.integers(5, 11)),
+        opening=None if rng.random() < 0.5 else (1.2, 2.0, 2, 4),
+        laid=float(rng.choice([0.0, 0.001, 0.002, 0.004])),
+        inside=int(rng.integers(1, 9)),
+    )
 
 
 def settled_pier(amount: float, start: float, stop: float, last: int = 99) -> Movement:
