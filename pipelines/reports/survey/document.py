@@ -53,6 +53,7 @@ def write_survey_json(path: Path, study: SurveyStudy, content: Mapping[str, Any]
         "depths": map(_record, study.depths),
         "masonry": (_masonry(one, study.stones) for one in study.masonry),
         "measure_again": map(_remeasure, study.again.rows),
+        "measure_again_left": ({"text": one} for one in study.again.left),
         "remeasure": map(_remeasure, study.remeasures),
         "rejects": (
             {"code": one.code, "line": _line(one.spans), "reason": str(one.error)} for one in study.rejects
