@@ -237,7 +237,8 @@ def short_list(
     common = {urgency for urgency, count in counts.items() if count >= _MANY and count > _COMMON * stones}
     own = [one for one in found if one.urgency not in common]
     asked: dict[str, str | None] = {}
-    for code in dict.fromkeys(one.code for one in own if one.code is not None):
+    doubted = (one for one in own if one.urgency is not Urgency.EDGE)
+    for code in dict.fromkeys(one.code for one in doubted if one.code is not None):
         asked[code] = verdicts(code) if len(asked) < _ASKED else None
     rows: dict[object, Remeasure] = {}
     for one in own:

@@ -6,7 +6,7 @@ compared, from medians, but no less than a tenth: masons did not cut hidden ends
 
 import math
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,7 +27,8 @@ _CONSISTENT = 1.4826  # standard deviation over median absolute deviation, of a 
 _BESIDE = 8  # neighbours with which a stone is compared
 _PARALLEL = 20.0  # largest angle of two opposite faces [degrees]
 _THICKEST = 6.0  # largest thickness of a wall whose two faces are set against each other [m]
-_JOINT = 0.02  # overlap of stones from both faces that a rough survey has [m]
+_JOINT = 0.02  # by which a through stone may miss the opposite face [m]
+_OPPOSITE = 0.3  # distance of a face on the other side, along and up, from the place opposite a stone [m]
 _SLENDER = 0.2  # depth over the shorter side of the face below which a stone is a slab [-]
 _LONG = 6.0  # depth over the longer side of the face above which it is a beam across the wall [-]
 
@@ -68,11 +69,14 @@ def doubtful_depths(
     """
     known = [i for i, one in enumerate(stones) if one.depth is not None and one.source != "solid"]
     limit = critical(alpha, 3 * len(known), max(float(len(known)), 2.0))
+    thickness = dict(_thickness(stones, known, facades))
+    through = {i for i, thick in thickness.items() if _reaches(stones[i], thick)}
+    known = [i for i in known if i not in through]
     found = [
         *_against_rules(stones, known, rules, limit),
         *_against_kind(stones, known, limit),
         *_against_neighbours(stones, known, facades, limit),
-        *_against_opposite(stones, known, facades, limit),
+        *_against_opposite(stones, known, thickness, limit),
     ]
     doubted = {one.code for one in found}
     found += [one for one in _against_face(stones, known) if one.code not in doubted]
@@ -162,18 +166,56 @@ def _against_neighbours(
             yield from _among(stones, [i], beside, limit, "neighbours", "the stones beside it")
 
 
-def _against_opposite(
-    stones: Sequence[StoneQuality], known: Sequence[int], facades: Sequence[Facade], limit: float
-) -> Iterator[DoubtfulDepth]:
-    """Compare a depth with the distance to the face on the other side of the wall."""
+def _thickness(
+    stones: Sequence[StoneQuality], known: Sequence[int], facades: Sequence[Facade]
+) -> Iterator[tuple[int, float]]:
+    """Yield the distance of stones to the face on the other side of the wall [m]."""
     upright = [one for one in facades if one.azimuth is not None]
     for facade in upright:
-        for other in upright:
-            if facade.frame.axes[2] @ other.frame.axes[2] > -math.cos(math.radians(_PARALLEL)):
-                continue
-            behind = _boxes(stones, facade, other.members.tolist())
-            for i in sorted(set(facade.members.tolist()).intersection(known)):
-                yield from _through(stones, i, _boxes(stones, facade, [i])[0], behind, other, limit)
+        behind = [
+            i
+            for other in upright
+            if facade.frame.axes[2] @ other.frame.axes[2] <= -math.cos(math.radians(_PARALLEL))
+            for i in other.members.tolist()
+        ]
+        if not behind:
+            continue
+        boxes = _boxes(stones, facade, behind)
+        for i in sorted(set(facade.members.tolist()).intersection(known)):
+            (box,) = _boxes(stones, facade, [i])
+            apart = np.maximum(boxes[:, :2] - box[2:4], box[:2] - boxes[:, 2:4]).max(axis=1)
+            thick = box[4] - boxes[:, 4]
+            facing = (apart < _OPPOSITE) & (thick > 0.0) & (thick < _THICKEST)
+            if facing.any():
+                yield i, float(np.median(thick[facing]))
+
+
+def _reaches(stone: StoneQuality, thick: float) -> bool:
+    """Return whether a stone reaches through a wall, as a through stone does: nothing is odd about its depth."""
+    assert stone.depth is not None
+    return abs(stone.depth - thick) <= _JOINT + 3.0 * _sigma(stone)
+
+
+def _sigma(stone: StoneQuality) -> float:
+    """Return the standard deviation of the end of a stone [m]."""
+    face = stone.offset_sigma if math.isfinite(stone.offset_sigma) else 0.0
+    return math.hypot(stone.depth_sigma or 0.0, face)
+
+
+def _against_opposite(
+    stones: Sequence[StoneQuality], known: Sequence[int], thickness: Mapping[int, float], limit: float
+) -> Iterator[DoubtfulDepth]:
+    """Compare a depth with the distance to the face on the other side of the wall."""
+    for i in known:
+        stone, thick = stones[i], thickness.get(i)
+        assert stone.depth is not None
+        if thick is None or stone.depth - thick - _JOINT <= limit * _sigma(stone):
+            continue
+        text = (
+            f"it is {stone.depth:.2f} m deep and comes out of the opposite face, {thick:.2f} m behind its own"
+        )
+        score = (stone.depth - thick - _JOINT) / max(_sigma(stone), 0.05 * thick)
+        yield DoubtfulDepth(stone.code, stone.line, "opposite face", stone.depth, thick, score, text)
 
 
 def _boxes(stones: Sequence[StoneQuality], facade: Facade, members: Sequence[int]) -> Array:
@@ -184,32 +226,6 @@ def _boxes(stones: Sequence[StoneQuality], facade: Facade, members: Sequence[int
         out = float(((stones[i].outline - facade.frame.origin) @ facade.frame.axes[2]).mean())
         rows.append([*flat.min(axis=0), *flat.max(axis=0), out])
     return np.array(rows)
-
-
-def _through(
-    stones: Sequence[StoneQuality], i: int, box: Array, behind: Array, other: Facade, limit: float
-) -> Iterator[DoubtfulDepth]:
-    common = np.minimum(behind[:, 2:4], box[2:4]) - np.maximum(behind[:, :2], box[:2])
-    facing = np.flatnonzero((common > _JOINT).all(axis=1))
-    thickness = box[4] - behind[facing, 4]
-    facing, thickness = (
-        facing[(thickness > 0.0) & (thickness < _THICKEST)],
-        thickness[(thickness > 0.0) & (thickness < _THICKEST)],
-    )
-    if len(facing) == 0:
-        return
-    stone, thin = stones[i], float(thickness.min())
-    assert stone.depth is not None
-    sigma = math.hypot(
-        stone.depth_sigma or 0.0, stone.offset_sigma if math.isfinite(stone.offset_sigma) else 0.0
-    )
-    beyond = stone.depth - thin - _JOINT
-    if beyond > limit * sigma:
-        text = (
-            f"it is {stone.depth:.2f} m deep and comes out of the opposite face, {thin:.2f} m behind its own"
-        )
-        score = beyond / max(sigma, 0.05 * thin)
-        yield DoubtfulDepth(stone.code, stone.line, "opposite face", stone.depth, thin, score, text)
 
 
 def _against_face(stones: Sequence[StoneQuality], known: Sequence[int]) -> Iterator[DoubtfulDepth]:

@@ -21,7 +21,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from survey.arrays import Array
-from survey.quality.departures.shapes import LIKELY, Found, Sample, Shape, critical, fit_shapes, powers
+from survey.quality.departures.shapes import LIKELY, MOST, Found, Sample, Shape, critical, fit_shapes, powers
 from survey.quality.facades import Facade
 from survey.quality.precision import StoneQuality
 
@@ -311,6 +311,8 @@ def _wall(name: str, zone: str | None, face: _Face, alpha: float, tilt: float) -
     sound = np.flatnonzero(~np.isin(face.codes, [one.code for one in odd if one.sort != "turned"]))
     kept = face.of(sound)
     movements, lower = _movements(kept, scatter, alpha / 2.0, freedom, tilt)
+    if len(movements) >= MOST:  # as many shapes as are looked for leave some still: these faces make no plane
+        movements, lower = [], None
     told = tuple(_told(name, zone, kept, one) for one in movements)
     plane, plumb, lean, sigma = _departures(face, sound, scatter)
     return WallFace(

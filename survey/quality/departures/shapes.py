@@ -21,12 +21,14 @@ from scipy.special import stdtr, stdtrit
 
 from survey.arrays import Array
 
-__all__ = ["LIKELY", "Found", "Run", "Sample", "Shape", "critical", "fit_shapes", "powers"]
+__all__ = ["LIKELY", "MOST", "Found", "Run", "Sample", "Shape", "critical", "fit_shapes", "powers"]
 
 LIKELY = 1.645
 """Standard deviations by which a movement that is found in 95 of 100 surveys exceeds the critical value."""
 
-_MOST = 5  # shapes taken by one wall; more are noise that the shapes before have left
+MOST = 5
+"""Shapes that are taken by one wall; more are noise that the shapes before have left."""
+
 _LEAST = 0.25  # of the largest amount taken: smaller ones are what the shapes do not fit exactly
 _AS_GOOD = 6.0  # difference of Σ r²/v below which the simpler of two shapes is taken: odds of 20 to 1
 _NEARLY = 0.01  # the same, of the whole reduction: no wall moves exactly like a shape
@@ -163,7 +165,7 @@ def fit_shapes(
     ends = tuple(np.array(one, dtype=np.intp) for one in zip(*runs, strict=True))
     found: list[Found] = []
     rest, limit, tests = sample.values, math.inf, 0
-    for _ in range(_MOST):
+    for _ in range(MOST):
         trials = _Trials.of(_moments(sample, fields, rest), (ends[0], ends[1]))
         if not found:
             tests = int(trials.tells.sum())

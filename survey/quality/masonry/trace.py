@@ -59,7 +59,7 @@ def minimum_traces(faces: Sequence[Array]) -> Array:
 
     Returns
     -------
-    (n,) ratios [-], at most 3; empty for a wall that is too low
+    (n,) ratios [-]; empty for a wall that is too low, or has no joints to go up
     """
     if len(faces) < 3:
         return np.zeros(0)
@@ -81,7 +81,8 @@ def minimum_traces(faces: Sequence[Array]) -> Array:
             continue
         reach = dijkstra(matrix, directed=False, indices=start, limit=_LONGEST * float(rise[here].max()))
         ratios = reach[np.array(stops)[here]] / rise[here]
-        found.append(float(np.minimum(ratios, _LONGEST).mean()))
+        if np.isfinite(ratios).all():  # a pile of single stones has no way up
+            found.append(float(ratios.mean()))
     return np.array(found)
 
 

@@ -196,6 +196,10 @@ def test_few_stones_are_asked_what_depends_on_them() -> None:
     asked.clear()
     short_list([reason("A", Urgency.TILT), reason("A", Urgency.EDGE)], 1000, verdict)
     assert asked == ["A"]
+    # an edge that is left out as it should be decides nothing
+    asked.clear()
+    assert short_list([reason("A", Urgency.EDGE)], 1000, verdict).rows == ()
+    assert asked == []
 
 
 def test_a_doubtful_depth_is_listed_after_what_is_missing_and_before_what_overlaps() -> None:
