@@ -134,7 +134,7 @@ def study_surveys(
         before = len(stones), len(rejects)
         file = _read(source, format, options, stones, rejects, progress)
         files.append(replace(file, stones=len(stones) - before[0], rejects=len(rejects) - before[1]))
-    return _judge(tuple(files), tuple(stones), tuple(rejects), given or {})
+    return _judge(tuple(files), tuple(stones), tuple(rejects), given or {}, progress)
 
 
 def _read(
@@ -177,7 +177,9 @@ def _judge(
     stones: tuple[StoneQuality, ...],
     rejects: tuple[Reject, ...],
     given: Mapping[str, Grade],
+    progress: Listener,
 ) -> SurveyStudy:
+    progress(Progress("judge", 0, 3, "courses and faces"))
     quality = judge_survey(stones)
     facades = find_facades(
         np.array([one.normal for one in stones]).reshape(-1, 3),
@@ -193,7 +195,11 @@ def _judge(
     depths = doubtful_depths(stones, facades, rules, CHANCES["depths"])
     seen = [_seen(one) for one in stones if one.measured]
     remeasures = list_remeasures(stones, rejects, odd, quality, misplaced_corners(seen), depths)
-    verdicts = _verdicts(stones, facades, tilts, _findings(beds, faces))
+    progress(Progress("judge", 1, 3, "masonry"))
+    masonry = judge_masonry([_wall_stone(one) for one in stones], facades, given)
+    progress(Progress("judge", 2, 3, "what depends on doubtful stones"))
+    again = short_list(remeasures, len(stones) + len(rejects), _verdicts(stones, facades, tilts, beds, faces))
+    progress(Progress("judge", 3, 3))
     return SurveyStudy(
         name=files[0].head.name,
         files=files,
@@ -209,9 +215,9 @@ def _judge(
         beds=beds,
         faces=faces,
         depths=depths,
-        masonry=judge_masonry([_wall_stone(one) for one in stones], facades, given),
+        masonry=masonry,
         remeasures=remeasures,
-        again=short_list(remeasures, len(stones) + len(rejects), verdicts),
+        again=again,
         warnings=(*_unknown_kinds(quality.kinds), *_doubtful_sizes(stones)),
     )
 
@@ -221,7 +227,9 @@ def _movements(
     facades: Sequence[Facade],
     lines: Sequence[CourseLine],
     tilts: Sequence[Array],
+    walls: tuple[int, int] = (1, 1),
 ) -> tuple[tuple[WallBeds, ...], tuple[WallFace, ...]]:
+    """Find what has moved; `walls` share the chances, of which these are one."""
     lengths = {one.code: one.length for one in stones}
     rows = {one.code: one.line for one in stones}
     leans = {}
@@ -230,9 +238,8 @@ def _movements(
         x, y, _ = facade.frame.axes[2]
         lever = np.array([-y, x, 0.0])
         leans[facade.name] = max((math.sqrt(float(lever @ one @ lever)) for one in tilts), default=0.0)
-    return find_bed_movements(lines, lengths, CHANCES["beds"], rows), find_face_departures(
-        stones, facades, CHANCES["faces"], leans
-    )
+    beds = find_bed_movements(lines, lengths, CHANCES["beds"] / max(walls[0], 1), rows)
+    return beds, find_face_departures(stones, facades, CHANCES["faces"] / max(walls[1], 1), leans)
 
 
 def _findings(beds: Sequence[WallBeds], faces: Sequence[WallFace]) -> dict[tuple[object, ...], str]:
@@ -255,26 +262,23 @@ def _verdicts(
     stones: Sequence[StoneQuality],
     facades: Sequence[Facade],
     tilts: Sequence[Array],
-    found: Mapping[tuple[object, ...], str],
+    beds: Sequence[WallBeds],
+    faces: Sequence[WallFace],
 ) -> Callable[[str], str | None]:
-    """Return what names the verdicts that depend on a stone: those that are no longer the same without it."""
-    places = {one.code: i for i, one in enumerate(stones)}
+    """Return what names the verdicts on its wall that are no longer the same without a stone."""
+    places = {stones[i].code: (facade, i) for facade in facades for i in facade.members.tolist()}
+    found, walls = _findings(beds, faces), (len(beds), len(faces))
 
     def ask(code: str) -> str | None:
         if code not in places:
             return None
-        k = places[code]
-        fewer = [one for one in stones if one.code != code]
-        shifted = [
-            replace(
-                one, members=np.array([i - (i > k) for i in one.members.tolist() if i != k], dtype=np.intp)
-            )
-            for one in facades
-            if k not in one.members or len(one.members) > 1
-        ]
-        lines = measure_courses(fewer, shifted, tilts)
-        without = _findings(*_movements(fewer, shifted, lines, tilts))
-        lost = [text for key, text in found.items() if key not in without]
+        facade, k = places[code]
+        zone = stones[k].zone
+        wall = [stones[i] for i in facade.members.tolist() if i != k and stones[i].zone == zone]
+        alone = replace(facade, members=np.arange(len(wall)))
+        lines = measure_courses(wall, [alone], tilts)
+        without = _findings(*_movements(wall, [alone], lines, tilts, walls))
+        lost = [text for key, text in found.items() if key[:2] == (facade.name, zone) and key not in without]
         gained = [text for key, text in without.items() if key not in found]
         if lost:
             return f"{lost[0]}, which is not found without it"

@@ -150,6 +150,7 @@ def test_a_stone_has_one_row_with_all_its_reasons() -> None:
     assert row.reason == "OVERLAP of A; BLUNDERS of A; KIND of A"
     assert row.action == "mend OVERLAP; mend BLUNDERS; mend KIND"
     assert row.urgency is Urgency.OVERLAP
+    assert row.changes == "whether the wall stands, whose joints are cut to fit"
     twice = [reason("A", Urgency.KIND), reason("A", Urgency.KIND)]
     assert short_list(twice, 100).rows[0].action == "mend KIND"
     # stones that could not be made and have no code stay apart

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from survey.quality.courses import measure_courses
-from survey.quality.departures.beds import BedMovement, WallBeds, find_bed_movements
+from survey.quality.departures.beds import BedMovement, WallBeds, _age, _beds, _scatter, find_bed_movements
+from survey.quality.departures.shapes import Found, Shape
 from survey.quality.precision import StoneQuality
 from tests.survey.quality.departures.walls_by_hand import wall
 from tests.survey.quality.plain_stones import facades_of, polygon_stone
@@ -200,3 +201,38 @@ def test_the_lift_of_a_movement_is_what_was_put_in() -> None:
         [0.0, sag.amount, 0.0]
     )
     assert math.isfinite(sag.probability)
+
+
+def seen(*amounts: float, run: tuple[int, int] = (0, 1), sigma: float = 0.001) -> Found:
+    """Return a settlement of 20 mm in a run of courses, of which each has this amount by itself."""
+    each = np.array([[amount, sigma] for amount in amounts])
+    return Found(Shape("step", (0.0,), 2), run, np.zeros(1), -0.02, sigma, each, 0.0, 1, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("found", "older"),
+    [
+        (seen(-0.02, -0.02, 0.0, 0.001), 2),  # level above
+        (seen(-0.02, -0.02, -0.01, -0.01), None),  # half of it above: neither level nor the same
+        (seen(-0.02, -0.02, -0.019, -0.02), None),  # the same above
+        (seen(-0.02, -0.02, -0.01, -0.01, sigma=0.01), None),  # above nothing is known
+        (seen(0.0, -0.02, 0.0, 0.0, run=(1, 1)), None),  # the course below has not moved
+        (seen(-0.02, -0.02), None),  # nothing above
+    ],
+)
+def test_courses_date_a_movement_only_if_they_are_level_and_differ_from_it(
+    found: Found, older: int | None
+) -> None:
+    assert _age(found, range(len(found.each)))[0] == older
+
+
+def test_the_scatter_of_neighbours_is_without_the_slope_of_their_course() -> None:
+    level, sloping = (
+        _scatter([_beds(measure_courses(stones, facades_of(stones)))])[0]
+        for stones in (wall(19), wall(19, lambda s, c: 0.03 * s))
+    )
+    assert sloping == pytest.approx(level, rel=0.1)
+
+
+def test_no_stone_of_a_steep_bed_is_odd() -> None:
+    assert beds_of(wall(20, lambda s, c: 0.06 * s)).odd == ()

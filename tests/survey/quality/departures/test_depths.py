@@ -56,6 +56,7 @@ def test_a_depth_measured_on_the_stone_is_held_against_its_rule() -> None:
     assert "the rule for it, trench 2, says 0.60 m" in one.text
     # other courses, other zones and other kinds have other rules
     assert found(stones, replace(rule, courses=(3, 4))) != [one]
+    assert "rule" not in {one.against for one in found(stones, replace(rule, courses=(1, 1)))}
     assert "rule" not in {one.against for one in found(stones, replace(rule, zone="tower"))}
     assert "rule" not in {one.against for one in found(stones, replace(rule, kind="quoin"))}
     assert [one.against for one in found(stones, replace(rule, kind=None, courses=None))] == ["rule"]
