@@ -116,6 +116,7 @@ def both_faces(front: list[float], back: list[float], thickness: float = 0.6) ->
         ([0.2], [0.2], "NF"),  # two faces with a core between them
         ([0.3], [0.3], "NF"),  # a straight joint
         ([0.5, 0.1], [0.1, 0.5], "F"),  # 0.4 m to the side in each course of 0.3 m
+        ([0.42, 0.18], [0.18, 0.42], "F"),  # 0.24 m in each
         ([0.38, 0.22], [0.22, 0.38], "PF"),  # 0.16 m in each
     ],
 )
