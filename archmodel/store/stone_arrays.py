@@ -18,7 +18,17 @@ from archmodel.store.revisions import table_of
 from archmodel.tables.entities import Entity
 from archmodel.tables.surveys import Measurement
 
-__all__ = ["ENTITY", "StoneColumns", "id_conditions", "joined", "near_box", "stone_columns", "stone_shapes"]
+__all__ = [
+    "ENTITY",
+    "StoneColumns",
+    "StoneFace",
+    "id_conditions",
+    "joined",
+    "near_box",
+    "stone_columns",
+    "stone_faces",
+    "stone_shapes",
+]
 
 Faces = tuple[tuple[int, ...], ...]
 
@@ -128,6 +138,71 @@ def stone_shapes(session: Session, *conditions: ColumnElement[bool]) -> Iterator
     )
     for number, vertices, faces in chain.from_iterable(_parts(session, statement)):
         yield number, np.frombuffer(vertices, dtype="<f8").reshape(-1, 3), _faces(faces)
+
+
+@dataclass(frozen=True)
+class StoneFace:
+    """The measured face of a stone, and its depth.
+
+    Attributes
+    ----------
+    id : primary key of the entity
+    code, kind, course, zone : as in Entity
+    outline : (nv, 3) counter-clockwise seen from outside [m]
+    normal : (3,) outward unit normal [-]
+    sigma : (nv, 3) standard deviations of the outline; NaN where not known [m]
+    depth, depth_sigma : [m]; None if not known
+    area : [m²]
+    """
+
+    id: int
+    code: str
+    kind: str
+    course: int | None
+    zone: str | None
+    outline: Array
+    normal: Array
+    sigma: Array
+    depth: float | None
+    depth_sigma: float | None
+    area: float
+
+
+def stone_faces(session: Session, *conditions: ColumnElement[bool]) -> Iterator[StoneFace]:
+    """Yield the faces of the stones that were measured and meet the conditions on ENTITY, by their numbers."""
+    statement = (
+        select(
+            *(
+                ENTITY[name]
+                for name in ("id", "code", "kind", "course", "zone", "depth", "depth_sigma", "area")
+            ),
+            *(type_coerce(_MEASUREMENT[name], LargeBinary) for name in ("outline", "normal", "vertex_sigma")),
+        )
+        .join(
+            table_of(Measurement),
+            (_MEASUREMENT.entity_id == ENTITY.id) & _MEASUREMENT.superseded_id.is_(None),
+        )
+        .where(_MEASUREMENT.provenance != "hypothesis", *conditions)
+        .order_by(ENTITY.id)
+    )
+    for number, code, kind, course, zone, depth, depth_sigma, area, *packed in chain.from_iterable(
+        _parts(session, statement)
+    ):
+        outline, normal, sigma = (np.frombuffer(one, dtype="<f8") for one in packed)
+        corners = outline.reshape(-1, 3)
+        yield StoneFace(
+            id=number,
+            code=code,
+            kind=kind,
+            course=course,
+            zone=zone,
+            outline=corners,
+            normal=normal,
+            sigma=sigma.reshape(-1, 3)[: len(corners)],
+            depth=depth,
+            depth_sigma=depth_sigma,
+            area=area,
+        )
 
 
 @lru_cache(maxsize=1024)

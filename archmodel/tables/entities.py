@@ -171,6 +171,31 @@ class Entity(Kind, Base):
 class Stone(Entity):
     """A single block of stone in its place."""
 
+    minimum_trace: Mapped[float | None] = attribute(
+        "-", "of its wall: shortest way up through the joints of the face, over the straight distance"
+    )
+    section_trace: Mapped[float | None] = attribute(
+        "-", "of its wall: shortest way down through the joints between both faces, over the height"
+    )
+    mqi_vertical_low: Mapped[float | None] = attribute(
+        "-", "of its wall: masonry quality index for vertical loads, at least"
+    )
+    mqi_vertical_high: Mapped[float | None] = attribute(
+        "-", "of its wall: masonry quality index for vertical loads, at most"
+    )
+    mqi_in_plane_low: Mapped[float | None] = attribute(
+        "-", "of its wall: masonry quality index for loads in the plane, at least"
+    )
+    mqi_in_plane_high: Mapped[float | None] = attribute(
+        "-", "of its wall: masonry quality index for loads in the plane, at most"
+    )
+    mqi_out_of_plane_low: Mapped[float | None] = attribute(
+        "-", "of its wall: masonry quality index for loads out of the plane, at least"
+    )
+    mqi_out_of_plane_high: Mapped[float | None] = attribute(
+        "-", "of its wall: masonry quality index for loads out of the plane, at most"
+    )
+
 
 class Ashlar(Stone):
     """A stone cut to planar faces and laid in the masonry."""

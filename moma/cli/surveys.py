@@ -33,6 +33,14 @@ from moma.errors import UsageError
 __all__ = ["Moved", "ingest", "sample", "survey_report"]
 
 
+class Level(StrEnum):
+    """Grades of what a survey does not tell about masonry."""
+
+    GOOD = "good"
+    MEDIUM = "medium"
+    POOR = "poor"
+
+
 class Moved(StrEnum):
     """Causes of movement of samples."""
 
@@ -160,19 +168,28 @@ def survey_report(
         Path | None,
         typer.Option("--out", metavar="DIR", help="Folder for the report; default: out/survey-FILE."),
     ] = None,
+    mortar: Annotated[
+        Level | None, typer.Option(help="Quality of the mortar, for the masonry quality index.")
+    ] = None,
+    state: Annotated[
+        Level | None, typer.Option(help="State and strength of the stones, for the masonry quality index.")
+    ] = None,
     overwrite: Overwrite = False,
     json: Json = False,
     verbose: Verbose = False,
 ) -> None:
-    """Judge survey files without a database: precision, courses, kinds, stones to measure again."""
+    """Judge survey files without a database: precision, what has moved, masonry, kinds, stones to measure again."""
     from moma.cli.text.runs_and_surveys import survey_report_lines
     from pipelines.ingest.reading_options import reading_options
     from pipelines.reports.survey.report import INDEX, report_surveys
+    from survey.quality.masonry.index import given_grade
 
     options = reading_options(header, codes, kind, sigma)
     folder = out or Path("out") / f"survey-{files[0].resolve().stem}"
+    levels = {"MM": mortar, "SM": state}
+    given = {name: given_grade(level.value) for name, level in levels.items() if level is not None}
     with progress_bars() as listener:
-        report = report_surveys(files, folder, format.value, options, listener, overwrite)
+        report = report_surveys(files, folder, format.value, options, listener, given, overwrite)
     for warning in report.study.warnings:
         say(f"warning: {warning}")
     lines = survey_report_lines(report, verbose)

@@ -30,6 +30,7 @@ from archmodel.tables.entities import Entity
 from archmodel.tables.hierarchy import kinds_below
 from archmodel.tables.structures import structure_kind_named, structure_kinds
 from mechanics.arrays import Array, Ints
+from pipelines.ingest.masonry import masonry_values
 from survey.geometry.adjacency import PolyhedraBuilder, SolidArrays, find_touching
 
 __all__ = ["KnownSolids", "RelationReport", "relate"]
@@ -96,7 +97,7 @@ def relate(
     only: Collection[int] | None = None,
     solids: KnownSolids | None = None,
 ) -> RelationReport:
-    """Compute the relations of stones and what follows from them: courses, arches, tails of headers.
+    """Compute the relations of stones and what follows from them: courses, arches, tails of headers, masonry quality.
 
     Rows found again stay, rows no longer found are superseded, and declared ones are left alone.
     A repeated call changes nothing.
@@ -123,6 +124,7 @@ def relate(
     near = None if chosen is None else chosen.union(ids[found.subject].tolist(), ids[found.object].tolist())
     tails = {number: {"tail_length": tail} for number, tail in tail_lengths(session, near).items()}
     values = give_values(session, tails, act)
+    values += give_values(session, masonry_values(session, chosen), act)
     arches = find_arches(session)
     changes.append(store_parts(session, arch_parts(session, arches), act, kinds=arch_kinds))
     values += give_values(session, arch_values(arches), act)

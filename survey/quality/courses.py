@@ -3,8 +3,9 @@
 The bed line of a course is fitted to the lower corners of its stones: z against the distance s along the
 facade. The corners of one stone are not independent, since its bed lies a little high or low as a whole; least squares
 that ignored this would be overconfident by up to √2. So the beds' own scatter is estimated with the line
-(`survey.quality.bed_fit`). Slope and sag are tested with Student's t and the number of stones, not of corners. Courses
-of fewer than five stones borrow the scatter of the others.
+(`survey.quality.bed_fit`). Slope and sag have a probability by Student's t and the number of stones, not of corners.
+Courses of fewer than five stones borrow the scatter of the others. Whether a wall has moved is told by its courses
+together (`survey.quality.departures.beds`).
 """
 
 import math
@@ -21,7 +22,6 @@ from survey.quality.precision import StoneQuality
 
 __all__ = [
     "ENOUGH",
-    "SIGNIFICANT",
     "CourseHeight",
     "CourseLine",
     "course_heights",
@@ -32,9 +32,6 @@ __all__ = [
 
 ENOUGH = 5
 """Least number of stones for the scatter of a course's beds: with fewer, τ is uncertain by half."""
-
-SIGNIFICANT = 0.01
-"""Probability by chance below which a slope or sag is significant."""
 
 _BEVEL = 0.10  # longest lower side that is a bevel if it rises [m]
 _RISES = 4.0  # standard deviations by which its upper end lies higher
@@ -113,20 +110,6 @@ class CourseLine:
         """Stone with the corner farthest from the line, and its distance [m]."""
         i = int(np.abs(self.deviations).argmax())
         return self.codes[i], float(self.deviations[i])
-
-    @property
-    def finding(self) -> str:
-        """Verdict on slope and sag."""
-        if self.slope is None:
-            return "not determined: one corner is left"
-        if self.slope_probability is None:
-            return "not tested: too few stones to know the scatter of beds"
-        found = []
-        if self.slope_probability < SIGNIFICANT:
-            found.append(f"{'rises' if self.slope > 0.0 else 'falls'} to the right")
-        if self.sag is not None and self.sag_probability is not None and self.sag_probability < SIGNIFICANT:
-            found.append("hogs" if self.sag > 0.0 else "sags")
-        return " and ".join(found) or ("level and straight" if self.sag is not None else "level")
 
 
 @dataclass(frozen=True)

@@ -1,17 +1,35 @@
-"""Stones to be measured again, with reason and action, most urgent first."""
+"""Stones to be measured again, with reason and action: a short list, and what need not be done.
 
-import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+A stone is on the short list if measuring it again changes a verdict on the wall (first), or if what was measured cannot
+be right. Weaknesses that no verdict depends on, and those that so many stones share that they are the survey's, are
+counted.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from enum import IntEnum
+
+from scipy.special import chdtri
 
 from survey.faces.shapes import ShapeKind
 from survey.quality.contradictions import Contradiction
 from survey.quality.corners import Misplaced, Sign
+from survey.quality.departures.depths import DoubtfulDepth
 from survey.quality.precision import StoneQuality, SurveyQuality
 from survey.records.survey import Reject
 
-__all__ = ["BLUNDERS", "SCATTER", "SMOOTH", "TILT", "Remeasure", "Urgency", "list_remeasures"]
+__all__ = [
+    "BLUNDERS",
+    "SCATTER",
+    "SMOOTH",
+    "TILT",
+    "Remeasure",
+    "ShortList",
+    "Urgency",
+    "list_remeasures",
+    "short_list",
+]
 
 TILT = 0.5
 """Uncertainty of a plane's tilt above which it is too weak: 0.4 m behind the face it makes a hidden corner
@@ -27,7 +45,11 @@ SCATTER = 1.5
 SMOOTH = 1.0 / 3.0
 """Scatter of a face's points over the stated sigma below which they were interpolated, not measured."""
 
-_UNLIKELY = 3.29  # two-sided normal quantile of 0.1 %: one sound stone in a thousand is listed by mistake
+_UNLIKELY = 0.001  # probability that a survey of sound stones has one listed for its scatter by mistake
+_COMMON = 0.2  # part of the stones above which they share a weakness: it is the survey's
+_MANY = 5  # stones from which that is so
+_ROWS = 12  # longest list that is worked off in a day
+_ASKED = 40  # stones of which it is asked what depends on them, the most urgent
 _FREEDOM = 8  # least redundancy for which a small scatter is not accidental
 
 _SHAPE_ACTIONS = {
@@ -47,17 +69,60 @@ class Urgency(IntEnum):
     """Reasons to measure a stone again, most urgent first."""
 
     MISSING = 1
-    UNCHECKED = 2
-    BLUNDERS = 3
-    OVERLAP = 4
-    ANGLE = 5
-    SIZE = 6
-    TILT = 7
-    SHAPE = 8
-    SCATTER = 9
-    SMOOTH = 10
-    KIND = 11
-    EDGE = 12
+    DEPTH = 2
+    OVERLAP = 3
+    UNCHECKED = 4
+    BLUNDERS = 5
+    ANGLE = 6
+    SIZE = 7
+    KIND = 8
+    TILT = 9
+    SHAPE = 10
+    SCATTER = 11
+    SMOOTH = 12
+    EDGE = 13
+
+
+_WRONG = frozenset(
+    {
+        Urgency.MISSING,
+        Urgency.DEPTH,
+        Urgency.OVERLAP,
+        Urgency.UNCHECKED,
+        Urgency.BLUNDERS,
+        Urgency.ANGLE,
+        Urgency.SIZE,
+        Urgency.KIND,
+    }
+)
+
+_ALWAYS: Mapping[Urgency, str] = {
+    Urgency.MISSING: "whether the wall stands, which has a hole there",
+    Urgency.DEPTH: "whether the wall stands, by its weight and what it rests on",
+    Urgency.OVERLAP: "whether the wall stands, whose joints are cut to fit",
+}
+
+_WEAK: Mapping[Urgency, tuple[str, str]] = {
+    Urgency.MISSING: ("could not be made", "see the format of the file"),
+    Urgency.DEPTH: ("a depth that contradicts other evidence", "correct the rules"),
+    Urgency.OVERLAP: ("faces that overlap", "see how corners are measured"),
+    Urgency.UNCHECKED: (
+        "faces of three points, which nothing checks",
+        "measure five points or more on a face",
+    ),
+    Urgency.BLUNDERS: ("a quarter of the points lies off the plane", "see which surface is measured"),
+    Urgency.ANGLE: ("angles that are not usual for the kind", "see how corners are measured"),
+    Urgency.SIZE: ("sizes that no other stone of the kind has", "see how corners are measured"),
+    Urgency.TILT: (
+        f"a tilt of the face uncertain by more than {TILT}°",
+        "measure more points on a face, farther apart",
+    ),
+    Urgency.SHAPE: ("curved faces", "measure more points on a face"),
+    Urgency.SCATTER: ("points that scatter more than the others", "measure on the dressed margin"),
+    Urgency.SMOOTH: ("points that scatter too little to have been measured", "see how they were made"),
+    Urgency.KIND: ("proportions that are not those of the kind", "see on site what kinds they are"),
+    Urgency.EDGE: ("broken or cut edges", "these are left out as they should be"),
+}
 
 
 @dataclass(frozen=True)
@@ -72,6 +137,7 @@ class Remeasure:
     severity : severity among reasons of its class
     reason : defect, with numbers
     action : remedy
+    changes : verdict that depends on it; None if none does
     """
 
     code: str | None
@@ -80,6 +146,23 @@ class Remeasure:
     severity: float
     reason: str
     action: str
+    changes: str | None = None
+
+
+@dataclass(frozen=True)
+class ShortList:
+    """Stones to measure again, one row each, and what is not on the list.
+
+    Attributes
+    ----------
+    rows : those whose measurement changes a verdict, then the others; most urgent first within each
+    more : number of stones that would follow
+    left : weaknesses of other stones, counted, in sentences
+    """
+
+    rows: tuple[Remeasure, ...]
+    more: int
+    left: tuple[str, ...]
 
 
 def list_remeasures(
@@ -88,8 +171,9 @@ def list_remeasures(
     contradictions: Sequence[Contradiction],
     quality: SurveyQuality,
     misplaced: Iterable[Misplaced] = (),
+    depths: Iterable[DoubtfulDepth] = (),
 ) -> tuple[Remeasure, ...]:
-    """List the stones to measure again, most urgent first; a stone may have several reasons.
+    """List all reasons to measure a stone again, most urgent first; a stone may have several.
 
     Parameters
     ----------
@@ -98,11 +182,23 @@ def list_remeasures(
     contradictions : stones whose proportions are not those of their kind
     quality : of the survey; where its stated sigma is wrong, stones are compared with the estimated one
     misplaced : signs of corners out of place; the size of a stone of the wrong kind is none
+    depths : depths that contradict other evidence
     """
     found = [_missing(one) for one in rejects]
     scale = quality.sigma0 or 1.0
     for stone in stones:
-        found += _reasons(stone, scale)
+        found += _reasons(stone, scale, _UNLIKELY / len(stones))
+    found += [
+        Remeasure(
+            one.code,
+            one.line,
+            Urgency.DEPTH,
+            one.score,
+            f"{one.text} ({one.score:.1f} σ)",
+            "measure its depth again, or correct the rule that gives it",
+        )
+        for one in depths
+    ]
     of_wrong_kind = {one.code for one in contradictions}
     found += [
         Remeasure(
@@ -125,6 +221,54 @@ def list_remeasures(
     return tuple(sorted(found, key=lambda one: (one.urgency, -one.severity)))
 
 
+def short_list(
+    found: Sequence[Remeasure], stones: int, verdicts: Callable[[str], str | None] = lambda code: None
+) -> ShortList:
+    """Choose what is worth a way back to the wall.
+
+    Parameters
+    ----------
+    found : all reasons, most urgent first
+    stones : number of stones of the survey, with those that could not be made
+    verdicts : what changes in the verdicts on the wall without the stone of a code; None if nothing does. Called for
+        few stones, since each may take a while
+    """
+    counts = Counter(one.urgency for one in found)
+    common = {urgency for urgency, count in counts.items() if count >= _MANY and count > _COMMON * stones}
+    own = [one for one in found if one.urgency not in common]
+    asked: dict[str, str | None] = {}
+    doubted = (one for one in own if one.urgency is not Urgency.EDGE)
+    for code in dict.fromkeys(one.code for one in doubted if one.code is not None):
+        asked[code] = verdicts(code) if len(asked) < _ASKED else None
+    rows: dict[object, Remeasure] = {}
+    for one in own:
+        changes = _ALWAYS.get(one.urgency) or asked.get(one.code or "")
+        if changes is None and one.urgency not in _WRONG:
+            continue
+        key = one.code if one.code is not None else one
+        if key in rows:
+            first = rows[key]
+            reason, action = f"{first.reason}; {one.reason}", first.action
+            if one.action not in action:
+                action = f"{action}; {one.action}"
+            rows[key] = replace(first, reason=reason, action=action, changes=first.changes or changes)
+        else:
+            rows[key] = replace(one, changes=changes)
+    ordered = sorted(rows.values(), key=lambda one: (one.changes is None, one.urgency, -one.severity))
+    listed = {one.code for one in ordered}
+    left = Counter(one.urgency for one in found if one.urgency in common or one.code not in listed)
+    texts = tuple(_left(urgency, left[urgency], stones, urgency in common) for urgency in sorted(left))
+    return ShortList(tuple(ordered[:_ROWS]), max(len(ordered) - _ROWS, 0), texts)
+
+
+def _left(urgency: Urgency, count: int, stones: int, common: bool) -> str:
+    subject = f"{count} of {stones} stones" if common else f"{count} stone{'s' if count > 1 else ''}"
+    weak, remedy = _WEAK[urgency]
+    if common:
+        return f"{subject}: {weak}; so many that it is the survey, not the stones: {remedy}"
+    return f"{subject}: {weak}; no verdict depends on {'them' if count > 1 else 'it'}"
+
+
 def _missing(reject: Reject) -> Remeasure:
     line = reject.spans[0].start if reject.spans else 0
     action = reject.error.remedy or "measure the stone again"
@@ -133,7 +277,7 @@ def _missing(reject: Reject) -> Remeasure:
     return Remeasure(reject.code, line, Urgency.MISSING, 0.0, reason, action)
 
 
-def _reasons(stone: StoneQuality, scale: float) -> Iterator[Remeasure]:
+def _reasons(stone: StoneQuality, scale: float, chance: float) -> Iterator[Remeasure]:
     def reason(urgency: Urgency, severity: float, words: str, action: str) -> Remeasure:
         return Remeasure(stone.code, stone.line, urgency, severity, words, action)
 
@@ -159,17 +303,17 @@ def _reasons(stone: StoneQuality, scale: float) -> Iterator[Remeasure]:
             f"the tilt of its plane is uncertain by {stone.tilt_sigma:.2g}°",
             "measure points at the upper and lower edge, as far apart as the face allows",
         )
-    yield from _scatter_reasons(stone, scale, reason)
+    yield from _scatter_reasons(stone, scale, chance, reason)
 
 
 def _scatter_reasons(
-    stone: StoneQuality, scale: float, reason: Callable[[Urgency, float, str, str], Remeasure]
+    stone: StoneQuality, scale: float, chance: float, reason: Callable[[Urgency, float, str, str], Remeasure]
 ) -> Iterator[Remeasure]:
     relative = None if stone.sigma0 is None or not stone.measured else stone.sigma0 / scale
     sort = {ShapeKind.CURVED.value: Urgency.SHAPE, ShapeKind.BEVELLED.value: Urgency.EDGE}.get(stone.shape)
     if sort is not None:
         yield reason(sort, relative or 0.0, stone.shape_text, _SHAPE_ACTIONS[stone.shape])
-    elif relative is not None and _is_rough(relative, stone.redundancy):
+    elif relative is not None and _is_rough(relative, stone.redundancy, chance):
         text = (
             f"its points scatter {relative:.1f} times as far as those of the survey, {stone.rms * 1e3:.1f} mm"
         )
@@ -184,5 +328,6 @@ def _scatter_reasons(
         )
 
 
-def _is_rough(relative: float, redundancy: int) -> bool:
-    return relative > SCATTER and (relative - 1.0) * math.sqrt(2.0 * redundancy) > _UNLIKELY
+def _is_rough(relative: float, redundancy: int, chance: float) -> bool:
+    """Return whether the points of a face scatter more than chance allows: Σ w r² follows χ²."""
+    return relative > SCATTER and redundancy * relative**2 > float(chdtri(redundancy, chance))

@@ -245,38 +245,72 @@ def survey_report_lines(report: "SurveyReport", verbose: bool) -> list[str]:
         + ("" if one.azimuth is None else f", looks to {one.azimuth:.0f}°")
         for one in study.facades
     ]
-    lines += _course_lines(report, verbose)
+    lines += _movement_lines(report, verbose)
+    masonry = _masonry_lines(report)
+    lines += masonry if verbose else shorten(masonry, _SHOWN, "  ", ", with -v")
     lines += [f"  {one.code} is called a {one.kind}, but {one.text}" for one in study.contradictions[:_SHOWN]]
     changed = [
         f"  {one.code}: {'; '.join(one.remarks)}" for one in study.stones if one.remarks and one.measured
     ]
     lines += changed if verbose else shorten(changed, _SHOWN, "  ", ", with -v")
-    again = [f"  {one.code or '(no code)'}: {one.reason}; {one.action}" for one in study.remeasures]
-    lines.append("measure again:" if again else "nothing needs to be measured again")
-    lines += again if verbose else shorten(again, _SHOWN, "  ", ", with -v")
+    again = [
+        f"  {one.code or '(no code)'}: {one.reason}; {one.action}"
+        + (f" (decides {one.changes})" if one.changes else "")
+        for one in study.again.rows
+    ]
+    lines.append(
+        "measure again, what changes a verdict first:" if again else "nothing needs to be measured again"
+    )
+    lines += again
+    if study.again.more:
+        lines.append(f"  and {study.again.more} more, in survey.json")
+    lines += [f"  not to be measured again: {one}" for one in study.again.left]
     return [*lines, *(f"  {report.folder / name}" for name in report.content["files"])]
 
 
-def _course_lines(report: "SurveyReport", verbose: bool) -> list[str]:
-    """List the courses that are not level and straight; with -v, all of them."""
-    from survey.quality.courses import SIGNIFICANT
+def _movement_lines(report: "SurveyReport", verbose: bool) -> list[str]:
+    """Tell what has moved, what is excluded, and which stones are out of place."""
+    study = report.study
+    found, still = [], []
+    for beds in study.beds:
+        place = _wall(beds.facade, beds.zone)
+        found += [
+            f"  {place}: {one.text}{'' if one.older_than is None else f'; {one.dating}'}"
+            for one in beds.movements
+        ]
+        if not beds.movements and beds.excluded is not None:
+            still.append(
+                f"  {place}, beds: no movement found; more than {beds.excluded * 1e3:.1f} mm is excluded"
+            )
+    for face in study.faces:
+        place = _wall(face.facade, face.zone)
+        found += [f"  {place}: {one.text}" for one in face.movements]
+        if not face.movements and face.excluded is not None:
+            still.append(
+                f"  {place}, face: no movement found; more than {face.excluded * 1e3:.1f} mm is excluded"
+            )
+    odd = [f"  {one.code}: {one.text}" for face in study.faces for one in face.odd]
+    odd += [f"  {one.code}: {one.text}" for beds in study.beds for one in beds.odd]
+    if verbose:
+        return [*found, *still, *odd]
+    return [*found, *still[:_SHOWN], *shorten(odd, _SHOWN, "  ", ", with -v")]
 
-    courses = report.study.courses
+
+def _wall(facade: str, zone: str | None) -> str:
+    return facade + (f" of {zone}" if zone else "")
+
+
+def _masonry_lines(report: "SurveyReport") -> list[str]:
     lines = []
-    deformed = 0
-    for one in courses:
-        chances = [chance for chance in (one.slope_probability, one.sag_probability) if chance is not None]
-        found = any(chance < SIGNIFICANT for chance in chances)
-        deformed += found
-        if (found or verbose) and one.slope is not None and one.slope_sigma is not None:
-            place = f"{one.facade}, course {one.course}" + (f" of {one.zone}" if one.zone else "")
-            text = f"  {place}: {one.slope * 1e3:+z.2f} ± {one.slope_sigma * 1e3:.2f} mm/m"
-            if one.sag is not None and one.sag_sigma is not None:
-                text += f", mid-span {one.sag * 1e3:+z.1f} ± {one.sag_sigma * 1e3:.1f} mm"
-            lines.append(f"{text}: {one.finding}")
-    if courses:
-        lines.insert(0, f"  {len(courses)} bed lines, {deformed} not level or not straight")
-    return lines if verbose else lines[: _SHOWN + 1]
+    for wall in report.study.masonry:
+        place = _wall(wall.facade, wall.zone)
+        indices = ", ".join(
+            f"{direction.replace('_', ' ')} {low:.1f} to {high:.1f} ({wall.categories[direction]})"
+            for direction, (low, high) in wall.indices.items()
+        )
+        trace = "" if wall.trace is None else f"; minimum trace {wall.trace:.2f} ± {wall.trace_sigma:.2f}"
+        lines.append(f"  {place}: masonry quality index {indices}{trace}")
+    return lines
 
 
 def _short(value: float | int) -> str:

@@ -9,7 +9,8 @@ import numpy as np
 
 from mechanics.arrays import Array
 from pipelines.draw.elevations.sheet import FLAG, INK, PALE, PLAIN, new_sheet, save_sheet
-from survey.quality.courses import SIGNIFICANT, CourseLine
+from survey.quality.courses import CourseLine
+from survey.quality.departures.beds import BedMovement, WallBeds
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,13 +21,14 @@ __all__ = ["draw_courses"]
 _LARGEST = 0.45  # the largest deviation as drawn, over the distance between courses [-]
 
 
-def draw_courses(path: Path, lines: Sequence[CourseLine]) -> None:
+def draw_courses(path: Path, lines: Sequence[CourseLine], walls: Sequence[WallBeds] = ()) -> None:
     """Draw the bed lines of one facade at their heights, with exaggerated deviations from level.
 
     Parameters
     ----------
     path : PNG
     lines : courses of one facade
+    walls : movements of its walls
     """
     levels = np.array([line.level for line in lines])
     factor = _exaggeration(lines, levels)
@@ -36,8 +38,9 @@ def draw_courses(path: Path, lines: Sequence[CourseLine]) -> None:
     left = min(float(line.along[0]) for line in lines)
     small = len(lines) > 60
     for line, y in zip(lines, levels, strict=True):
-        colour = FLAG if _is_deformed(line) else PLAIN
-        _draw_bed(axes, line, factor, colour, small)
+        moved = _movements(line, walls)
+        colour = FLAG if moved else PLAIN
+        _draw_bed(axes, line, factor, moved, small)
         if not small:
             axes.annotate(
                 _label(line), (right, y), (8, 0), textcoords="offset points", va="center", fontsize=8, color=colour,
@@ -49,14 +52,16 @@ def draw_courses(path: Path, lines: Sequence[CourseLine]) -> None:
     axes.set_ylabel("height of the bed [m]")
     axes.set_title(
         f"Bed lines of {lines[0].facade}: deviations from level drawn {factor:g} times as large\n"
-        "bars: ± one standard deviation of a corner; grey: level; orange: slope or sag beyond chance",
+        "bars: ± one standard deviation of a corner; grey: level; orange: movement that courses share",
         fontsize=10, color=INK, parse_math=False,
     )  # fmt: skip
     axes.spines[["top", "right"]].set_visible(False)
     save_sheet(figure, path)
 
 
-def _draw_bed(axes: "Axes", line: CourseLine, factor: float, colour: str, small: bool) -> None:
+def _draw_bed(
+    axes: "Axes", line: CourseLine, factor: float, moved: Sequence[BedMovement], small: bool
+) -> None:
     from matplotlib.collections import LineCollection
 
     axes.plot(line.along[[0, -1]], [line.level] * 2, color=PALE, linewidth=0.8, zorder=1)
@@ -73,28 +78,39 @@ def _draw_bed(axes: "Axes", line: CourseLine, factor: float, colour: str, small:
     )
     axes.add_collection(strokes, autolim=False)
     if line.slope is not None:
-        fine = np.linspace(line.along[0], line.along[-1], 2 if _curvature(line) == 0.0 else 50)
+        fine = np.linspace(line.along[0], line.along[-1], 400 if moved else 2)
         axes.plot(
             fine,
-            line.level + factor * (_fitted(line, fine) - line.level),
-            color=colour,
+            line.level + factor * (_fitted(line, moved, fine) - line.level),
+            color=FLAG if moved else PLAIN,
             linewidth=1.6,
             zorder=4,
         )
 
 
-def _fitted(line: CourseLine, along: Array) -> Array:
-    """Evaluate the straight line of a course or, where it sags or hogs significantly, its parabola [m]."""
-    half = line.span / 2.0
-    bulge = float((((line.along - line.middle) / half) ** 2).mean()) - ((along - line.middle) / half) ** 2
-    fitted: Array = line.level + (line.slope or 0.0) * (along - line.middle) + _curvature(line) * bulge
-    return fitted
+def _fitted(line: CourseLine, moved: Sequence[BedMovement], along: Array) -> Array:
+    """Evaluate the movements of a course about its own height or, where there is none, its straight line [m]."""
+    if not moved:
+        straight: Array = line.level + (line.slope or 0.0) * (along - line.middle)
+        return straight
+    ends = float(line.along[0]), float(line.along[-1])
+
+    def lift(places: Array) -> Array:
+        return np.asarray(np.sum([one.lift(places, ends) for one in moved], axis=0), dtype=np.float64)
+
+    raised: Array = lift(along) + float((line.height - lift(line.along)).mean())
+    return raised
 
 
-def _curvature(line: CourseLine) -> float:
-    """Return the sag if it is significant, otherwise 0 [m]."""
-    found = line.sag_probability is not None and line.sag_probability < SIGNIFICANT
-    return line.sag if found and line.sag is not None else 0.0
+def _movements(line: CourseLine, walls: Sequence[WallBeds]) -> list[BedMovement]:
+    """Return the movements of a course."""
+    return [
+        one
+        for wall in walls
+        if wall.zone == line.zone and wall.facade == line.facade
+        for one in wall.movements
+        if one.first <= line.course <= one.last
+    ]
 
 
 def _stones(line: CourseLine) -> list[tuple[int, int]]:
@@ -103,11 +119,6 @@ def _stones(line: CourseLine) -> list[tuple[int, int]]:
     for i, code in enumerate(line.codes):
         found.setdefault(code, []).append(i)
     return [(rows[0], rows[-1]) for rows in found.values() if len(rows) > 1]
-
-
-def _is_deformed(line: CourseLine) -> bool:
-    chances = (line.slope_probability, line.sag_probability)
-    return any(chance is not None and chance < SIGNIFICANT for chance in chances)
 
 
 def _label(line: CourseLine) -> str:

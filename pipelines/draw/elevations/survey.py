@@ -1,12 +1,13 @@
 """Pictures of a survey report: elevations and residuals."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mechanics.arrays import Array
 from pipelines.draw.elevations.sheet import (
     CODES,
     FLAG,
@@ -22,16 +23,19 @@ from pipelines.draw.elevations.sheet import (
     write_codes,
 )
 from pipelines.draw.offscreen.parts import robust_ceiling
+from survey.quality.departures.faces import WallFace
 from survey.quality.facades import Facade
 from survey.quality.precision import Histogram, StoneQuality
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["draw_elevation", "draw_residuals"]
+__all__ = ["draw_departure", "draw_elevation", "draw_residuals"]
 
 
 _UNKNOWN = "#dcd9d4"
+_DIVERGING = "RdBu_r"  # blue behind, red in front: safe for colour-blind readers
+_LEAST = 1.0  # shortest scale of departures [mm]
 _FINEST = 0.01  # shortest colour scale: smaller residuals are not worth a colour [mm]
 
 
@@ -73,6 +77,75 @@ def draw_elevation(path: Path, facade: Facade, stones: Sequence[StoneQuality], f
     )  # fmt: skip
     _legend(axes, bool(marked), bool(np.isnan(rms).any()))
     save_sheet(figure, path)
+
+
+def draw_departure(
+    path: Path, facade: Facade, stones: Sequence[StoneQuality], walls: Sequence[WallFace]
+) -> None:
+    """Draw how far each stone of a facade stands before or behind its plane, and before or behind plumb.
+
+    Parameters
+    ----------
+    path : PNG
+    facade : its stones are drawn, in its frame
+    stones : all stones of the survey
+    walls : departures of the walls of this facade; others are left out
+    """
+    own = [one for one in walls if one.facade == facade.name]
+    members = facade.members.tolist()
+    polygons = {i: project(stones[i].outline, facade) for i in members}
+    low, high = extent(list(polygons.values()))
+    width, height = sheet_size(high - low)
+    stacked = high[0] - low[0] > high[1] - low[1]
+    figure = new_sheet((width, 2.0 * height) if stacked else (2.0 * width, height))
+    panels = list(np.ravel(np.array(figure.subplots(2 if stacked else 1, 1 if stacked else 2))))
+    found = {
+        name: {
+            int(i): 1e3 * float(v)
+            for wall in own
+            for i, v in zip(wall.stones, getattr(wall, name), strict=True)
+        }
+        for name in ("plane", "plumb")
+    }
+    end = max(
+        _LEAST, *(float(np.percentile(np.abs(list(one.values())), 98)) for one in found.values() if one)
+    )
+    odd = {one.code for wall in own for one in wall.odd}
+    titles = {"plane": "departure from its plane", "plumb": "departure from plumb"}
+    for axes, (name, values) in zip(panels, found.items(), strict=True):
+        _shade(axes, polygons, values, end, [polygons[i] for i in members if stones[i].code in odd])
+        if len(members) <= CODES:
+            shade = np.array([0.0 if i in values else np.nan for i in members])
+            write_codes(axes, [stones[i].code for i in members], [polygons[i] for i in members], shade)
+        frame_elevation(axes, facade, low, high, f"{facade.name}: {titles[name]}")
+    figure.colorbar(
+        panels[0].collections[0], ax=panels, label="in front (red) and behind (blue) [mm]", shrink=0.75, pad=0.02,
+        extend="both",
+    )  # fmt: skip
+    save_sheet(figure, path)
+
+
+def _shade(
+    axes: "Axes",
+    polygons: Mapping[int, Array],
+    values: Mapping[int, float],
+    end: float,
+    marked: Sequence[Array],
+) -> None:
+    """Colour polygons by their values about zero, and outline those that are marked."""
+    from matplotlib import colormaps
+    from matplotlib.collections import PolyCollection
+    from matplotlib.colors import ListedColormap
+
+    numbers = np.array([values.get(i, np.nan) for i in polygons])
+    # codes and outlines cannot be read on the darkest parts
+    paler = ListedColormap(colormaps[_DIVERGING](np.linspace(0.15, 0.85, 256))).with_extremes(bad=_UNKNOWN)
+    faces = PolyCollection(
+        list(polygons.values()), array=numbers, cmap=paler, clim=(-end, end), edgecolors=PALE, linewidths=0.6
+    )
+    axes.add_collection(faces)
+    if marked:
+        axes.add_collection(PolyCollection(marked, facecolors="none", edgecolors=INK, linewidths=2.0))
 
 
 def draw_residuals(path: Path, residuals: Histogram, verdict: str) -> None:

@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +10,14 @@ import numpy as np
 
 from pipelines.reports.survey.study import SurveyFile, SurveyStudy
 from survey.quality.courses import CourseLine
+from survey.quality.departures.beds import WallBeds
+from survey.quality.departures.faces import WallFace
 from survey.quality.facades import Facade
+from survey.quality.masonry.walls import MasonryQuality
 from survey.quality.precision import StoneQuality, SurveyQuality
+from survey.quality.remeasure import Remeasure
 
-__all__ = ["survey_json", "write_survey_json"]
+__all__ = ["finding_of", "survey_json", "write_survey_json"]
 
 
 def survey_json(study: SurveyStudy, version: str) -> dict[str, Any]:
@@ -41,10 +45,16 @@ def write_survey_json(path: Path, study: SurveyStudy, content: Mapping[str, Any]
     content : result of `survey_json`, with additions if wanted
     """
     parts: dict[str, Iterable[dict[str, Any]]] = {
-        "courses": map(_course, study.courses),
+        "courses": (_course(one, study.beds) for one in study.courses),
         "course_heights": map(_record, study.course_heights),
         "contradictions": map(_record, study.contradictions),
-        "remeasure": ({**_record(one), "urgency": one.urgency.name.lower()} for one in study.remeasures),
+        "beds": map(_beds, study.beds),
+        "faces": (_face(one, study.stones) for one in study.faces),
+        "depths": map(_record, study.depths),
+        "masonry": (_masonry(one, study.stones) for one in study.masonry),
+        "measure_again": map(_remeasure, study.again.rows),
+        "measure_again_left": ({"text": one} for one in study.again.left),
+        "remeasure": map(_remeasure, study.remeasures),
         "rejects": (
             {"code": one.code, "line": _line(one.spans), "reason": str(one.error)} for one in study.rejects
         ),
@@ -121,7 +131,7 @@ def _facade(facade: Facade) -> dict[str, Any]:
     }
 
 
-def _course(line: CourseLine) -> dict[str, Any]:
+def _course(line: CourseLine, walls: Sequence[WallBeds]) -> dict[str, Any]:
     values = _record(line)
     covariance = values.pop("covariance")
     corners = [values.pop(name) for name in ("codes", "along", "height", "sigma", "deviations")]
@@ -130,9 +140,60 @@ def _course(line: CourseLine) -> dict[str, Any]:
     values["slope_degrees"] = None if line.slope is None else math.degrees(math.atan(line.slope))
     values["span"] = line.span
     values["worst"] = {"stone": line.worst[0], "deviation": line.worst[1]}
-    values["finding"] = line.finding
+    values["finding"] = finding_of(line, walls)
     values["corners"] = dict(zip(("stone", "along", "height", "sigma", "deviation"), corners, strict=True))
     return values
+
+
+def _beds(wall: WallBeds) -> dict[str, Any]:
+    values = _record(wall)
+    values["movements"] = [
+        {
+            **_record(one),
+            "text": one.text,
+            "dating": one.dating,
+            "courses": [
+                {"course": number, "amount": amount, "sigma": sigma}
+                for number, (amount, sigma) in one.courses.items()
+            ],
+        }
+        for one in wall.movements
+    ]
+    values["odd"] = [_record(one) for one in wall.odd]
+    values["excluded_in"] = [{"course": number, "amount": one} for number, one in wall.excluded_in.items()]
+    return values
+
+
+def _face(wall: WallFace, stones: Sequence[StoneQuality]) -> dict[str, Any]:
+    values = _record(wall)
+    plane, plumb = values.pop("plane"), values.pop("plumb")
+    values["stones"] = [
+        {"code": stones[i].code, "plane": before, "plumb": upright}
+        for i, before, upright in zip(wall.stones.tolist(), plane.tolist(), plumb.tolist(), strict=True)
+    ]
+    values["movements"] = [{**_record(one), "text": one.text} for one in wall.movements]
+    values["odd"] = [{**_record(one), "text": one.text} for one in wall.odd]
+    return values
+
+
+def _masonry(wall: MasonryQuality, stones: Sequence[StoneQuality]) -> dict[str, Any]:
+    values = _record(wall)
+    values["stones"] = [stones[i].code for i in wall.stones.tolist()]
+    values["grades"] = {
+        name: {"grade": one.words, "chances": one.chances, "text": one.text}
+        for name, one in wall.grades.items()
+    }
+    return {**values, "categories": wall.categories, "strengths": wall.strengths}
+
+
+def _remeasure(one: Remeasure) -> dict[str, Any]:
+    return {**_record(one), "urgency": one.urgency.name.lower()}
+
+
+def finding_of(line: CourseLine, walls: Sequence[WallBeds]) -> str:
+    """Return the verdict on a course, which its wall gives."""
+    own = (one for one in walls if (one.facade, one.zone) == (line.facade, line.zone))
+    return next((one.finding(line.course) for one in own), "not tested")
 
 
 def _stone(stone: StoneQuality, facade: str | None, deviation: Any, reasons: list[str]) -> dict[str, Any]:

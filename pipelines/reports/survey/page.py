@@ -6,10 +6,15 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from pipelines.reports.html import picture, write_page
+from pipelines.reports.survey.document import finding_of
 from pipelines.reports.survey.study import SurveyFile, SurveyStudy
 from survey.quality.canon import Deviation
 from survey.quality.contradictions import Contradiction
 from survey.quality.courses import CourseHeight, CourseLine
+from survey.quality.departures.beds import WallBeds
+from survey.quality.departures.faces import WallFace
+from survey.quality.masonry.index import PARAMETERS
+from survey.quality.masonry.walls import MasonryQuality
 from survey.quality.precision import StoneQuality
 from survey.quality.remeasure import Remeasure
 
@@ -44,7 +49,15 @@ def write_survey_page(path: Path, study: SurveyStudy, pictures: Mapping[str, str
         beds=[one for name, one in inside.items() if name.startswith("courses")],
         residuals=[one for name, one in inside.items() if name == "residuals.png"],
         facades=len(study.facades),
-        remeasures=_first(study.remeasures, _remeasure_row),
+        plumb=[one for name, one in inside.items() if name.startswith("plumb")],
+        remeasures=[_remeasure_row(one) for one in study.again.rows],
+        more_stones=study.again.more,
+        left=study.again.left,
+        movements=list(_movements(study)),
+        faces=list(_faces(study)),
+        odd=_first(_odd(study), lambda row: row),
+        depths=_first(study.depths, lambda one: (one.code, one.against, one.text, f"{one.score:.1f} σ")),
+        masonry=list(_masonry(study)),
         quality=_overall(study),
         control=list(_control(study.files)),
         courses=list(_courses(study)),
@@ -66,16 +79,95 @@ def _first(items: Sequence[T], row: Callable[[T], Row]) -> dict[str, Any]:
 
 
 def _lead(study: SurveyStudy) -> str:
-    again = len({one.code for one in study.remeasures if one.code is not None})
+    again = len(study.again.rows) + study.again.more
     made = f"{len(study.stones)} stones"
     if study.rejects:
         made += f", and {len(study.rejects)} that could not be made"
     verdict = study.quality.verdict
-    return f"{made}; {again} to measure again. {verdict[:1].upper()}{verdict[1:]}."
+    moved = [f"{_place(wall)}: {one.text}" for wall in study.beds for one in wall.movements]
+    moved += [f"{_place(wall)}: {one.text}" for wall in study.faces for one in wall.movements]
+    found = f" Movement: {'; '.join(moved[:3])}{', and more' if len(moved) > 3 else ''}." if moved else ""
+    return f"{made}; {again} to measure again. {verdict[:1].upper()}{verdict[1:]}.{found}"
+
+
+def _place(wall: WallBeds | WallFace | MasonryQuality) -> str:
+    return wall.facade if wall.zone is None else f"{wall.facade}, {wall.zone}"
 
 
 def _remeasure_row(one: Remeasure) -> Row:
-    return (one.code or "(no code)", one.reason, one.action, str(one.line) if one.line else "–")
+    line = str(one.line) if one.line else "–"
+    return (one.code or "(no code)", one.changes or "–", one.reason, one.action, line)
+
+
+def _movements(study: SurveyStudy) -> Iterator[Row]:
+    """Yield what the beds of each wall tell: wall, finding, age, probability, what is excluded."""
+    for wall in study.beds:
+        place, bound = _place(wall), _bound(wall.excluded)
+        for one in wall.movements:
+            yield (place, one.text, one.dating, _percent(one.probability), bound)
+        if not wall.movements:
+            none = "not tested: too few stones" if wall.excluded is None else "no movement found"
+            yield (place, none, "–", "–", bound)
+
+
+def _faces(study: SurveyStudy) -> Iterator[Row]:
+    """Yield what the faces of each wall tell: lean of its plane, scatter, finding, probability, what is excluded."""
+    for wall in study.faces:
+        lean = (
+            f"{math.degrees(wall.lean):z.2f} ± {math.degrees(wall.lean_sigma):.2f}°"
+            if math.isfinite(wall.lean_sigma)
+            else "–"
+        )
+        head = (_place(wall), lean, _mm(wall.scatter))
+        tail = (_bound(wall.excluded), _bound(wall.excluded_stone))
+        for one in wall.movements:
+            yield (*head, one.text, _percent(one.probability), *tail)
+        if not wall.movements:
+            yield (*head, "no movement found" if wall.excluded is not None else "not tested", "–", *tail)
+
+
+def _odd(study: SurveyStudy) -> list[Row]:
+    rows = [(one.code, one.text, one.amount / one.sigma) for wall in study.faces for one in wall.odd]
+    rows += [(one.code, one.text, one.amount / one.sigma) for wall in study.beds for one in wall.odd]
+    return [
+        (code, text, f"{abs(score):.1f} σ")
+        for code, text, score in sorted(rows, key=lambda row: -abs(row[2]))
+    ]
+
+
+def _masonry(study: SurveyStudy) -> Iterator[dict[str, Any]]:
+    """Yield of each wall the grades of the parameters, the indices and the ranges that follow."""
+    for wall in study.masonry:
+        strengths = wall.strengths
+        yield {
+            "name": _place(wall),
+            "stones": len(wall.stones),
+            "grades": [
+                (name, PARAMETERS[name], wall.grades[name].words, wall.grades[name].text)
+                for name in PARAMETERS
+            ],
+            "indices": [
+                (direction.replace("_", " "), f"{low:.1f} to {high:.1f}", wall.categories[direction])
+                for direction, (low, high) in wall.indices.items()
+            ],
+            "strengths": [
+                ("compressive strength", _range(strengths["compressive_strength"], 1e6, "MPa", 1)),
+                ("shear strength without pressure", _range(strengths["shear_strength"], 1e6, "MPa", 3)),
+                ("Young's modulus", _range(strengths["young"], 1e9, "GPa", 2)),
+            ],
+        }
+
+
+def _range(ends: tuple[float, float], unit: float, name: str, digits: int) -> str:
+    return f"{ends[0] / unit:.{digits}f} to {ends[1] / unit:.{digits}f} {name}"
+
+
+def _bound(value: float | None) -> str:
+    return "–" if value is None else f"{value * 1e3:.1f} mm"
+
+
+def _percent(probability: float) -> str:
+    return "< 0.01 %" if probability < 1e-4 else f"{100.0 * probability:.2f} %"
 
 
 def _contradiction_row(one: Contradiction) -> Row:
@@ -136,11 +228,15 @@ def _courses(study: SurveyStudy) -> Iterator[dict[str, Any]]:
         yield {
             "name": facade,
             "tilt": f"{tilted * 1e3:.2f}" if tilted else None,
-            "lines": _first(lines, lambda line: _course_row(line, heights)),
+            "lines": _first(lines, lambda line: _course_row(line, heights, study.beds)),
         }
 
 
-def _course_row(line: CourseLine, heights: Mapping[tuple[str, str | None, int], CourseHeight]) -> Row:
+def _course_row(
+    line: CourseLine,
+    heights: Mapping[tuple[str, str | None, int], CourseHeight],
+    walls: Sequence[WallBeds],
+) -> Row:
     code, farthest = line.worst
     height = heights.get((line.facade, line.zone, line.course))
     return (
@@ -153,7 +249,7 @@ def _course_row(line: CourseLine, heights: Mapping[tuple[str, str | None, int], 
         f"{farthest * 1e3:z.1f} mm, {code}",
         _mm(line.scatter) if line.evidence != "none" else "–",
         "–" if height is None else f"{height.height:.4f} ± {height.sigma:.4f} m",
-        line.finding,
+        finding_of(line, walls),
     )
 
 

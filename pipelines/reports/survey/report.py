@@ -8,12 +8,13 @@ from typing import Any
 
 from mechanics.dynamics.progress import Listener, Progress, silent
 from pipelines.draw.elevations.beds import draw_courses
-from pipelines.draw.elevations.survey import draw_elevation, draw_residuals
+from pipelines.draw.elevations.survey import draw_departure, draw_elevation, draw_residuals
 from pipelines.reports.survey.document import survey_json, write_survey_json
 from pipelines.reports.survey.page import write_survey_page
 from pipelines.reports.survey.study import SurveyStudy, study_surveys
 from pipelines.results.folder import check_replaceable, replacing, source_of
 from survey.formats.options import ReadingOptions
+from survey.quality.masonry.index import Grade
 
 __all__ = ["INDEX", "SurveyReport", "report_surveys", "write_survey_report"]
 
@@ -45,6 +46,7 @@ def report_surveys(
     format: str = "moma",
     options: ReadingOptions | None = None,
     progress: Listener = silent,
+    given: Mapping[str, Grade] | None = None,
     overwrite: bool = False,
 ) -> SurveyReport:
     """Judge survey files and write the report, which includes the stones that could not be made.
@@ -56,6 +58,7 @@ def report_surveys(
     format : name of their format
     options : defaults for what the files leave out
     progress : called at every stage
+    given : grades of the masonry that no survey tells: "SM", the state of the stones, and "MM", the mortar
     overwrite : replace a report on other files in the folder
 
     Raises
@@ -66,7 +69,7 @@ def report_surveys(
     folder = Path(folder)
     source = [Path(one) for one in paths]
     check_replaceable(folder, INDEX, () if overwrite else source)
-    study = study_surveys(paths, format, options or ReadingOptions(), progress)
+    study = study_surveys(paths, format, options or ReadingOptions(), progress, given)
     with replacing(folder, INDEX) as fresh:
         content = write_survey_report(study, fresh, progress, source)
     return SurveyReport(folder, study, content)
@@ -93,7 +96,7 @@ def write_survey_report(
 def _draw(study: SurveyStudy, folder: Path) -> dict[str, str]:
     """Draw the pictures; return captions by file name. Those of the first facade have no number."""
     captions = {}
-    flagged = {one.code for one in study.remeasures if one.code is not None}
+    flagged = {one.code for one in study.again.rows if one.code is not None}
     for number, facade in enumerate(study.facades[:_FACADES], start=1):
         ending = ".png" if number == 1 else f"-{number}.png"
         name = f"elevation{ending}"
@@ -105,9 +108,16 @@ def _draw(study: SurveyStudy, folder: Path) -> dict[str, str]:
         lines = [line for line in study.courses if line.facade == facade.name]
         if lines:
             name = f"courses{ending}"
-            draw_courses(folder / name, lines)
+            draw_courses(folder / name, lines, study.beds)
             captions[name] = (
                 f"The beds of {facade.name}. Each black stroke is the bed of one stone, between its lower corners."
+            )
+        if any(one.facade == facade.name for one in study.faces):
+            name = f"plumb{ending}"
+            draw_departure(folder / name, facade, study.stones, study.faces)
+            captions[name] = (
+                f"How far the stones of {facade.name} stand before or behind its best plane, and before or behind the "
+                "upright plane. Stones with a black outline stand out of those around them."
             )
     if study.quality.residuals.counts.any():
         draw_residuals(folder / "residuals.png", study.quality.residuals, study.quality.verdict)

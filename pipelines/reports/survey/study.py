@@ -1,12 +1,14 @@
 """Findings of a survey report, computed from survey files."""
 
-from collections.abc import Iterator, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from archmodel.tables.entities import kind_named
+from mechanics.arrays import Array
 from mechanics.dynamics.progress import Listener, Progress, silent
 from moma.errors import UsageError
 from pipelines.ingest.reading_options import Source, survey_sources
@@ -17,15 +19,23 @@ from survey.quality.canon import Deviation, KindStandard, deviations, standards
 from survey.quality.contradictions import Contradiction, contradictions
 from survey.quality.corners import SeenFace, misplaced_corners
 from survey.quality.courses import CourseHeight, CourseLine, course_heights, measure_courses
+from survey.quality.departures.beds import WallBeds, find_bed_movements
+from survey.quality.departures.depths import DoubtfulDepth, doubtful_depths
+from survey.quality.departures.faces import WallFace, find_face_departures
 from survey.quality.facades import Facade, find_facades
+from survey.quality.masonry.index import Grade
+from survey.quality.masonry.walls import MasonryQuality, WallStone, judge_masonry
 from survey.quality.plausible import LENGTH, doubt_of
 from survey.quality.precision import StoneQuality, SurveyQuality, appraise, judge_survey
-from survey.quality.remeasure import Remeasure, list_remeasures
+from survey.quality.remeasure import Remeasure, ShortList, list_remeasures, short_list
 from survey.records.survey import Canon, DepthRule, Reject, SurveyHead
 from survey.registration.site_frame import SiteTransform
 from survey.stones import survey_stones
 
-__all__ = ["SurveyFile", "SurveyStudy", "study_surveys"]
+__all__ = ["CHANCES", "SurveyFile", "SurveyStudy", "study_surveys"]
+
+CHANCES = {"beds": 0.003, "faces": 0.003, "depths": 0.001}
+"""Probability that a survey without fault or movement is given a finding of each sort."""
 
 _SOME_DEPTH = DepthRule(None, 0.3, None, "\0")  # no file can give this source
 _INTERVAL = 200  # stones between two reports of progress
@@ -65,7 +75,12 @@ class SurveyStudy:
     contradictions : stones whose proportions contradict their kind
     courses : bed lines
     course_heights : from bed to bed
-    remeasures : what to measure again, most urgent first
+    beds : movement of each wall as its beds show it
+    faces : departure of each wall from plane and plumb, and the stones out of it
+    depths : depths that contradict other evidence, the worst first
+    masonry : quality of the masonry of each wall
+    remeasures : all reasons to measure a stone again, most urgent first
+    again : the short list of them
     warnings : reasons why the database would refuse the survey, and sizes that hardly any stone has
     """
 
@@ -80,12 +95,21 @@ class SurveyStudy:
     contradictions: tuple[Contradiction, ...]
     courses: tuple[CourseLine, ...]
     course_heights: tuple[CourseHeight, ...]
+    beds: tuple[WallBeds, ...]
+    faces: tuple[WallFace, ...]
+    depths: tuple[DoubtfulDepth, ...]
+    masonry: tuple[MasonryQuality, ...]
     remeasures: tuple[Remeasure, ...]
+    again: ShortList
     warnings: tuple[str, ...]
 
 
 def study_surveys(
-    paths: Sequence[str | Path], format: str, options: ReadingOptions, progress: Listener = silent
+    paths: Sequence[str | Path],
+    format: str,
+    options: ReadingOptions,
+    progress: Listener = silent,
+    given: Mapping[str, Grade] | None = None,
 ) -> SurveyStudy:
     """Read, fit and judge the stones of survey files.
 
@@ -95,6 +119,7 @@ def study_surveys(
     format : its name
     options : defaults for what the files leave out
     progress : called now and then
+    given : grades of the masonry that no survey tells: "SM", the state of the stones, and "MM", the mortar
 
     Raises
     ------
@@ -109,7 +134,7 @@ def study_surveys(
         before = len(stones), len(rejects)
         file = _read(source, format, options, stones, rejects, progress)
         files.append(replace(file, stones=len(stones) - before[0], rejects=len(rejects) - before[1]))
-    return _judge(tuple(files), tuple(stones), tuple(rejects))
+    return _judge(tuple(files), tuple(stones), tuple(rejects), given or {}, progress)
 
 
 def _read(
@@ -148,8 +173,13 @@ def _appraised(block: SurveyedBlock) -> StoneQuality:
 
 
 def _judge(
-    files: tuple[SurveyFile, ...], stones: tuple[StoneQuality, ...], rejects: tuple[Reject, ...]
+    files: tuple[SurveyFile, ...],
+    stones: tuple[StoneQuality, ...],
+    rejects: tuple[Reject, ...],
+    given: Mapping[str, Grade],
+    progress: Listener,
 ) -> SurveyStudy:
+    progress(Progress("judge", 0, 3, "courses and faces"))
     quality = judge_survey(stones)
     facades = find_facades(
         np.array([one.normal for one in stones]).reshape(-1, 3),
@@ -160,6 +190,16 @@ def _judge(
     odd = contradictions(stones, facades)
     tilts = [one.transform.covariance[3:6, 3:6] for one in files if one.transform is not None]
     lines = measure_courses(stones, facades, tilts)
+    beds, faces = _movements(stones, facades, lines, tilts)
+    rules = [rule for file in files for rule in file.head.depth_rules]
+    depths = doubtful_depths(stones, facades, rules, CHANCES["depths"])
+    seen = [_seen(one) for one in stones if one.measured]
+    remeasures = list_remeasures(stones, rejects, odd, quality, misplaced_corners(seen), depths)
+    progress(Progress("judge", 1, 3, "masonry"))
+    masonry = judge_masonry([_wall_stone(one) for one in stones], facades, given)
+    progress(Progress("judge", 2, 3, "what depends on doubtful stones"))
+    again = short_list(remeasures, len(stones) + len(rejects), _verdicts(stones, facades, tilts, beds, faces))
+    progress(Progress("judge", 3, 3))
     return SurveyStudy(
         name=files[0].head.name,
         files=files,
@@ -172,10 +212,94 @@ def _judge(
         contradictions=odd,
         courses=lines,
         course_heights=course_heights(lines),
-        remeasures=list_remeasures(
-            stones, rejects, odd, quality, misplaced_corners([_seen(one) for one in stones if one.measured])
-        ),
+        beds=beds,
+        faces=faces,
+        depths=depths,
+        masonry=masonry,
+        remeasures=remeasures,
+        again=again,
         warnings=(*_unknown_kinds(quality.kinds), *_doubtful_sizes(stones)),
+    )
+
+
+def _movements(
+    stones: Sequence[StoneQuality],
+    facades: Sequence[Facade],
+    lines: Sequence[CourseLine],
+    tilts: Sequence[Array],
+    walls: tuple[int, int] = (1, 1),
+) -> tuple[tuple[WallBeds, ...], tuple[WallFace, ...]]:
+    """Find what has moved; `walls` share the chances, of which these are one."""
+    lengths = {one.code: one.length for one in stones}
+    rows = {one.code: one.line for one in stones}
+    leans = {}
+    for facade in facades:
+        # the rotation ω moves what is z up by ω × z, of which this is the part outwards
+        x, y, _ = facade.frame.axes[2]
+        lever = np.array([-y, x, 0.0])
+        leans[facade.name] = max((math.sqrt(float(lever @ one @ lever)) for one in tilts), default=0.0)
+    beds = find_bed_movements(lines, lengths, CHANCES["beds"] / max(walls[0], 1), rows)
+    return beds, find_face_departures(stones, facades, CHANCES["faces"] / max(walls[1], 1), leans)
+
+
+def _findings(beds: Sequence[WallBeds], faces: Sequence[WallFace]) -> dict[tuple[object, ...], str]:
+    """Return the verdicts on the walls, each with its name."""
+    found: dict[tuple[object, ...], str] = {}
+    for wall in beds:
+        for one in wall.movements:
+            name = "settlement" if one.kind in ("step", "part") else one.kind
+            found[wall.facade, wall.zone, name] = f"the {name} of {wall.facade}"
+            if one.older_than is not None:
+                dated = f"that it is older than course {one.older_than}"
+                found[wall.facade, wall.zone, name, one.older_than] = f"{dated} ({name} of {wall.facade})"
+    for face in faces:
+        for moved in face.movements:
+            found[face.facade, face.zone, moved.kind] = f"the {moved.kind} of {face.facade}"
+    return found
+
+
+def _verdicts(
+    stones: Sequence[StoneQuality],
+    facades: Sequence[Facade],
+    tilts: Sequence[Array],
+    beds: Sequence[WallBeds],
+    faces: Sequence[WallFace],
+) -> Callable[[str], str | None]:
+    """Return what names the verdicts on its wall that are no longer the same without a stone."""
+    places = {stones[i].code: (facade, i) for facade in facades for i in facade.members.tolist()}
+    found, walls = _findings(beds, faces), (len(beds), len(faces))
+
+    def ask(code: str) -> str | None:
+        if code not in places:
+            return None
+        facade, k = places[code]
+        zone = stones[k].zone
+        wall = [stones[i] for i in facade.members.tolist() if i != k and stones[i].zone == zone]
+        alone = replace(facade, members=np.arange(len(wall)))
+        lines = measure_courses(wall, [alone], tilts)
+        without = _findings(*_movements(wall, [alone], lines, tilts, walls))
+        lost = [text for key, text in found.items() if key[:2] == (facade.name, zone) and key not in without]
+        gained = [text for key, text in without.items() if key not in found]
+        if lost:
+            return f"{lost[0]}, which is not found without it"
+        return f"{gained[0]}, which is found without it" if gained else None
+
+    return ask
+
+
+def _wall_stone(stone: StoneQuality) -> WallStone:
+    known = stone.corner_sigma[np.isfinite(stone.corner_sigma)]
+    return WallStone(
+        code=stone.code,
+        kind=stone.kind,
+        course=stone.course,
+        zone=stone.zone,
+        outline=stone.outline,
+        normal=stone.normal,
+        sigma=float(np.median(known)) if len(known) else 0.0,
+        depth=stone.depth,
+        depth_sigma=stone.depth_sigma,
+        area=stone.area,
     )
 
 

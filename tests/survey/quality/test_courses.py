@@ -37,7 +37,6 @@ def test_a_sloping_bed_has_its_slope_and_nothing_else() -> None:
     assert line.deviations == pytest.approx(0.0, abs=1e-12)
     assert (line.scatter, line.roughness, line.evidence) == (0.0, 1.0, "own")
     assert (line.sag, line.rms) == pytest.approx((0.0, 0.0), abs=1e-12)
-    assert line.finding == "rises to the right"
     assert line.level == pytest.approx(2.0 + 0.004 * places(8).mean())
 
 
@@ -64,7 +63,6 @@ def test_a_frame_that_may_be_tilted_makes_slopes_uncertain_and_nothing_else() ->
         assert level.slope_sigma is not None
         assert line.slope_sigma == pytest.approx(math.hypot(level.slope_sigma, sigma))
         assert line.sag_sigma == level.sag_sigma
-        assert line.finding == ("level and straight" if axis == 1 else "rises to the right")
 
 
 def test_a_parabola_sags_by_its_rise() -> None:
@@ -73,7 +71,6 @@ def test_a_parabola_sags_by_its_rise() -> None:
     (line,) = lines_of(course(1.0 + 0.03 * ((x - middle) / (span / 2)) ** 2))
     assert line.sag == pytest.approx(-0.03, abs=1e-12)
     assert line.slope == pytest.approx(0.0, abs=1e-12)
-    assert "sags" in line.finding
 
 
 def test_precision_without_scatter_is_that_of_the_corners() -> None:
@@ -126,7 +123,8 @@ def test_true_slopes_and_sags_are_found_without_bias() -> None:
     ):
         error = np.mean(values) - truth
         assert abs(error) < 4.0 * np.mean(sigmas) / math.sqrt(300)
-    assert np.mean(["sags" in line.finding for line in lines]) > 0.95
+    chances = np.array([line.sag_probability for line in lines])
+    assert np.mean(chances < 0.01) > 0.95
 
 
 def test_worn_corners_and_bevels_are_no_beds() -> None:
@@ -152,10 +150,8 @@ def test_a_course_of_one_stone_is_as_uncertain_as_its_two_corners() -> None:
     (line,) = lines_of([rectangle("A", "sill", 0.0, 1.0, 0.8, 0.2)])
     assert line.slope_sigma == pytest.approx(math.sqrt(2) * 0.002 / 0.8)
     assert (line.evidence, line.slope_probability, line.sag) == ("none", None, None)
-    assert "not tested" in line.finding
     (line,) = lines_of([rectangle("A", "sill", 0.0, 1.0, 0.8, 0.2, worn_corners=(0,))])
     assert (line.slope, line.slope_sigma) == (None, None)
-    assert "not determined" in line.finding
     assert lines_of([rectangle("A", "sill", 0.0, 1.0, 0.8, 0.2, worn_corners=(0, 1))]) == ()
 
 
@@ -166,8 +162,9 @@ def test_short_courses_borrow_the_scatter_of_the_long_ones() -> None:
     long, short = lines_of(stones)
     assert (long.evidence, short.evidence) == ("own", "other courses")
     assert short.scatter == long.scatter
+    # 8 mm over three stones is nothing where beds scatter by 5 mm
     assert short.slope_probability is not None
-    assert short.finding == "level"  # 8 mm over three stones is nothing where beds scatter by 5 mm
+    assert short.slope_probability > 0.01
 
 
 def test_the_stone_that_has_sunk_is_named() -> None:

@@ -112,13 +112,13 @@ def test_slope_and_sag_of_courses_are_found_within_their_precision(count):
     # what is there is said to be there, what is not is not: 1 % of straight courses may be called bent
     bent = [line for line in lines if line.course == 2]
     straight = [line for line in lines if line.course != 2]
-    assert np.mean(["rises to the right" in line.finding for line in lines]) > 0.99
+    assert np.mean([line.slope > 0.0 and line.slope_probability < 0.01 for line in lines]) > 0.99
     # the power of the two-sided test at 1 %: non-central t
     power = stats.nct.sf(stats.t.isf(0.005, STONES - 3), STONES - 3, -SAG / typical[1])
-    assert np.mean(["sags" in line.finding for line in bent]) == pytest.approx(
+    assert np.mean([line.sag < 0.0 and line.sag_probability < 0.01 for line in bent]) == pytest.approx(
         power, abs=3 * np.sqrt(0.25 / len(bent))
     )
-    wrong = sum("sags" in line.finding or "hogs" in line.finding for line in straight)
+    wrong = sum(line.sag_probability < 0.01 for line in straight)
     print(f"{wrong} of {len(straight)} straight courses called bent")
     assert wrong <= stats.binom.isf(1e-4, len(straight), 0.01)
 

@@ -1,0 +1,259 @@
+"""Depths that cannot be right, held against the rule, the kind, the neighbours and the opposite face.
+
+Depths of stones scatter by factors, so they are compared by their logarithm. The scatter is that of the stones
+compared, from medians, but no less than a tenth: masons did not cut hidden ends to measure.
+"""
+
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from survey.arrays import Array
+from survey.quality.departures.shapes import critical
+from survey.quality.facades import Facade
+from survey.quality.precision import StoneQuality
+from survey.records.survey import DepthRule
+
+__all__ = ["DoubtfulDepth", "doubtful_depths"]
+
+_ENOUGH = 5  # least number of stones for a median and its scatter
+_LEAST = 0.12  # scatter of depths that needs no reason, over the depth [-]
+_WITHOUT = 0.25  # standard deviation of a rule that states none, over its depth [-]
+_CONSISTENT = 1.4826  # standard deviation over median absolute deviation, of a normal distribution [-]
+_BESIDE = 8  # neighbours with which a stone is compared
+_PARALLEL = 20.0  # largest angle of two opposite faces [degrees]
+_THICKEST = 6.0  # largest thickness of a wall whose two faces are set against each other [m]
+_JOINT = 0.02  # by which a through stone may miss the opposite face [m]
+_OPPOSITE = 0.3  # distance of a face on the other side, along and up, from the place opposite a stone [m]
+_SLENDER = 0.2  # depth over the shorter side of the face below which a stone is a slab [-]
+_LONG = 6.0  # depth over the longer side of the face above which it is a beam across the wall [-]
+
+
+@dataclass(frozen=True)
+class DoubtfulDepth:
+    """A depth that contradicts other evidence.
+
+    Attributes
+    ----------
+    code, line : of the stone
+    against : "rule", "kind", "neighbours", "opposite face" or "own face"
+    depth, expected : [m]
+    score : departure over its standard deviation [-]
+    text : finding, with numbers
+    """
+
+    code: str
+    line: int
+    against: str
+    depth: float
+    expected: float
+    score: float
+    text: str
+
+
+def doubtful_depths(
+    stones: Sequence[StoneQuality], facades: Sequence[Facade], rules: Sequence[DepthRule], alpha: float
+) -> tuple[DoubtfulDepth, ...]:
+    """Find the stones whose depth contradicts other evidence, the worst first; one finding per stone.
+
+    Parameters
+    ----------
+    stones : all stones of the survey; those without a depth and modelled solids are left out
+    facades : of the stones
+    rules : depth rules of the survey
+    alpha : probability that a survey with sound depths is given one doubt
+    """
+    known = [i for i, one in enumerate(stones) if one.depth is not None and one.source != "solid"]
+    limit = critical(alpha, 3 * len(known), max(float(len(known)), 2.0))
+    thickness = dict(_thickness(stones, known, facades))
+    through = {i for i, thick in thickness.items() if _reaches(stones[i], thick)}
+    known = [i for i in known if i not in through]
+    found = [
+        *_against_rules(stones, known, rules, limit),
+        *_against_kind(stones, known, limit),
+        *_against_neighbours(stones, known, facades, limit),
+        *_against_opposite(stones, known, thickness, limit),
+    ]
+    doubted = {one.code for one in found}
+    found += [one for one in _against_face(stones, known) if one.code not in doubted]
+    order = ("opposite face", "rule", "kind", "neighbours", "own face")
+    best: dict[str, DoubtfulDepth] = {}
+    for one in sorted(found, key=lambda one: (order.index(one.against), -one.score)):
+        best.setdefault(one.code, one)
+    return tuple(sorted(best.values(), key=lambda one: (-one.score, one.code)))
+
+
+def _against_rules(
+    stones: Sequence[StoneQuality], known: Sequence[int], rules: Sequence[DepthRule], limit: float
+) -> Iterator[DoubtfulDepth]:
+    for i in known:
+        stone = stones[i]
+        if stone.depth_origin != "stone":
+            continue
+        rule = next((one for one in rules if _holds(one, stone)), None)
+        if rule is not None:
+            sigma = (
+                _relative(stone, rule.depth) ** 2
+                + max((rule.sigma or _WITHOUT * rule.depth) / rule.depth, _LEAST) ** 2
+            )
+            yield from _doubt(
+                stone, rule.depth, math.sqrt(sigma), limit, "rule", f"the rule for it, {rule.source},"
+            )
+
+
+def _holds(rule: DepthRule, stone: StoneQuality) -> bool:
+    within = rule.courses is None or (
+        stone.course is not None and rule.courses[0] <= stone.course <= rule.courses[1]
+    )
+    return rule.kind in (None, stone.kind) and within and rule.zone in (None, stone.zone)
+
+
+def _against_kind(
+    stones: Sequence[StoneQuality], known: Sequence[int], limit: float
+) -> Iterator[DoubtfulDepth]:
+    kinds: dict[str, list[int]] = defaultdict(list)
+    for i in known:
+        kinds[stones[i].kind].append(i)
+    for kind, own in kinds.items():
+        if len(own) >= _ENOUGH:
+            yield from _among(stones, own, own, limit, "kind", f"the other stones of its kind, {kind},")
+
+
+def _among(
+    stones: Sequence[StoneQuality],
+    own: Sequence[int],
+    beside: Sequence[int],
+    limit: float,
+    against: str,
+    words: str,
+) -> Iterator[DoubtfulDepth]:
+    logs = np.log([stones[i].depth or math.nan for i in beside])
+    middle = float(np.median(logs))
+    spread = max(_CONSISTENT * float(np.median(np.abs(logs - middle))), _LEAST)
+    for i in own:
+        yield from _doubt(
+            stones[i],
+            math.exp(middle),
+            math.hypot(spread, _relative(stones[i], math.exp(middle))),
+            limit,
+            against,
+            words,
+        )
+
+
+def _against_neighbours(
+    stones: Sequence[StoneQuality], known: Sequence[int], facades: Sequence[Facade], limit: float
+) -> Iterator[DoubtfulDepth]:
+    """Compare a stone with those beside it, where its kind has too few."""
+    counts: dict[str, int] = defaultdict(int)
+    for i in known:
+        counts[stones[i].kind] += 1
+    there = set(known)
+    for facade in facades:
+        own = [i for i in facade.members.tolist() if i in there]
+        rare = [i for i in own if counts[stones[i].kind] < _ENOUGH]
+        if len(own) <= _ENOUGH or not rare:
+            continue
+        places = np.array([facade.frame.flatten(stones[i].outline).mean(axis=0) for i in own])
+        tree = cKDTree(places)
+        for i in rare:
+            near = tree.query(places[own.index(i)], k=min(_BESIDE + 1, len(own)))[1]
+            beside = [own[k] for k in np.ravel(near).tolist() if own[k] != i]
+            yield from _among(stones, [i], beside, limit, "neighbours", "the stones beside it")
+
+
+def _thickness(
+    stones: Sequence[StoneQuality], known: Sequence[int], facades: Sequence[Facade]
+) -> Iterator[tuple[int, float]]:
+    """Yield the distance of stones to the face on the other side of the wall [m]."""
+    upright = [one for one in facades if one.azimuth is not None]
+    for facade in upright:
+        behind = [
+            i
+            for other in upright
+            if facade.frame.axes[2] @ other.frame.axes[2] <= -math.cos(math.radians(_PARALLEL))
+            for i in other.members.tolist()
+        ]
+        if not behind:
+            continue
+        boxes = _boxes(stones, facade, behind)
+        for i in sorted(set(facade.members.tolist()).intersection(known)):
+            (box,) = _boxes(stones, facade, [i])
+            apart = np.maximum(boxes[:, :2] - box[2:4], box[:2] - boxes[:, 2:4]).max(axis=1)
+            thick = box[4] - boxes[:, 4]
+            facing = (apart < _OPPOSITE) & (thick > 0.0) & (thick < _THICKEST)
+            if facing.any():
+                yield i, float(np.median(thick[facing]))
+
+
+def _reaches(stone: StoneQuality, thick: float) -> bool:
+    """Return whether a stone reaches through a wall, as a through stone does: nothing is odd about its depth."""
+    assert stone.depth is not None
+    return abs(stone.depth - thick) <= _JOINT + 3.0 * _sigma(stone)
+
+
+def _sigma(stone: StoneQuality) -> float:
+    """Return the standard deviation of the end of a stone [m]."""
+    face = stone.offset_sigma if math.isfinite(stone.offset_sigma) else 0.0
+    return math.hypot(stone.depth_sigma or 0.0, face)
+
+
+def _against_opposite(
+    stones: Sequence[StoneQuality], known: Sequence[int], thickness: Mapping[int, float], limit: float
+) -> Iterator[DoubtfulDepth]:
+    """Compare a depth with the distance to the face on the other side of the wall."""
+    for i in known:
+        stone, thick = stones[i], thickness.get(i)
+        assert stone.depth is not None
+        if thick is None or stone.depth - thick - _JOINT <= limit * _sigma(stone):
+            continue
+        text = (
+            f"it is {stone.depth:.2f} m deep and comes out of the opposite face, {thick:.2f} m behind its own"
+        )
+        score = (stone.depth - thick - _JOINT) / max(_sigma(stone), 0.05 * thick)
+        yield DoubtfulDepth(stone.code, stone.line, "opposite face", stone.depth, thick, score, text)
+
+
+def _boxes(stones: Sequence[StoneQuality], facade: Facade, members: Sequence[int]) -> Array:
+    """Return low and high ends along and up, and the place outwards of faces, (m, 5)."""
+    rows = []
+    for i in members:
+        flat = facade.frame.flatten(stones[i].outline)
+        out = float(((stones[i].outline - facade.frame.origin) @ facade.frame.axes[2]).mean())
+        rows.append([*flat.min(axis=0), *flat.max(axis=0), out])
+    return np.array(rows)
+
+
+def _against_face(stones: Sequence[StoneQuality], known: Sequence[int]) -> Iterator[DoubtfulDepth]:
+    for i in known:
+        stone = stones[i]
+        assert stone.depth is not None
+        short, long = sorted((stone.length, stone.height))
+        expected = _SLENDER * short if stone.depth < _SLENDER * short else _LONG * long
+        if short > 0.0 and (stone.depth < _SLENDER * short or stone.depth > _LONG * long):
+            text = (
+                f"it is {stone.depth:.2f} m deep behind a face of {stone.length:.2f} by {stone.height:.2f} m"
+            )
+            score = abs(math.log(stone.depth / expected)) / _LEAST
+            yield DoubtfulDepth(stone.code, stone.line, "own face", stone.depth, expected, score, text)
+
+
+def _doubt(
+    stone: StoneQuality, expected: float, sigma: float, limit: float, against: str, words: str
+) -> Iterator[DoubtfulDepth]:
+    assert stone.depth is not None
+    score = abs(math.log(stone.depth / expected)) / sigma
+    if score > limit:
+        verb = "have" if against in ("kind", "neighbours") else "says"
+        text = f"it is {stone.depth:.2f} m deep, {words} {verb} {expected:.2f} m"
+        yield DoubtfulDepth(stone.code, stone.line, against, stone.depth, expected, score, text)
+
+
+def _relative(stone: StoneQuality, expected: float) -> float:
+    """Return the standard deviation of a depth over the depth that it would have."""
+    assert stone.depth is not None
+    return (stone.depth_sigma or 0.0) / max(stone.depth, expected)

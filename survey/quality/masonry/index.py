@@ -1,0 +1,177 @@
+"""The masonry quality index of Borri, Corradi, Castori & De Maria (2015), with what is not known left open.
+
+Seven parameters are each fulfilled (F), partly (PF) or not (NF). For vertical, in-plane and out-of-plane loads
+
+    MQI = SM (SD + SS + WC + HJ + VJ + MM)
+
+with values from Table 8 of the paper, from 0 to 10; category A is good, C inadequate (Table 9). The curves of its
+Figure 10 give ranges of compressive strength and Young's modulus from the index for vertical loads, of shear strength
+from that for loads in the plane.
+
+A. Borri, M. Corradi, G. Castori, A. De Maria: A method for the analysis and classification of historic masonry.
+Bulletin of Earthquake Engineering 13 (2015) 2647-2665, doi 10.1007/s10518-015-9731-4
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+from scipy.special import ndtr
+
+__all__ = [
+    "DIRECTIONS",
+    "PARAMETERS",
+    "UNKNOWN",
+    "Direction",
+    "Grade",
+    "Parameter",
+    "category",
+    "given_grade",
+    "graded",
+    "index_range",
+    "mechanical_ranges",
+]
+
+
+class Direction(StrEnum):
+    """Directions of loads."""
+
+    VERTICAL = "vertical"
+    IN_PLANE = "in_plane"
+    OUT_OF_PLANE = "out_of_plane"
+
+
+class Parameter(StrEnum):
+    """Parameters of the index, by the names of the paper."""
+
+    SM = "SM"
+    SD = "SD"
+    SS = "SS"
+    WC = "WC"
+    HJ = "HJ"
+    VJ = "VJ"
+    MM = "MM"
+
+
+DIRECTIONS = tuple(Direction)
+
+PARAMETERS: Mapping[Parameter, str] = {
+    Parameter.SM: "state of the stones",
+    Parameter.SD: "size of the stones",
+    Parameter.SS: "shape of the stones",
+    Parameter.WC: "bonding through the wall",
+    Parameter.HJ: "level beds",
+    Parameter.VJ: "staggered head joints",
+    Parameter.MM: "mortar",
+}
+"""Parameters, and what they are about."""
+
+_VALUES: Mapping[str, tuple[tuple[float, float, float], ...]] = {
+    "SM": ((0.3, 0.7, 1.0), (0.3, 0.7, 1.0), (0.5, 0.7, 1.0)),
+    "SD": ((0.0, 0.5, 1.0), (0.0, 0.5, 1.0), (0.0, 0.5, 1.0)),
+    "SS": ((0.0, 1.5, 3.0), (0.0, 1.0, 2.0), (0.0, 1.0, 2.0)),
+    "WC": ((0.0, 1.0, 1.0), (0.0, 1.0, 2.0), (0.0, 1.5, 3.0)),
+    "HJ": ((0.0, 1.0, 2.0), (0.0, 0.5, 1.0), (0.0, 1.0, 2.0)),
+    "VJ": ((0.0, 0.5, 1.0), (0.0, 1.0, 2.0), (0.0, 0.5, 1.0)),
+    "MM": ((0.0, 0.5, 2.0), (0.0, 1.0, 2.0), (0.0, 0.5, 1.0)),
+}  # of NF, PF, F for each direction
+_BOUNDS = ((2.5, 5.0), (3.0, 5.0), (4.0, 7.0))  # of categories B and A for each direction
+_CURVES: Mapping[str, tuple[int, tuple[float, float], tuple[float, float]]] = {
+    "compressive_strength": (0, (0.9370e6, 0.2232), (1.6882e6, 0.1988)),
+    "shear_strength": (1, (1.8913e4, 0.2168), (3.0253e4, 0.1992)),
+    "young": (0, (548.31e6, 0.1738), (821.24e6, 0.1634)),
+}  # direction of the index; factor [Pa] and exponent of the lower and the upper curve
+_POSSIBLE = 0.025  # probability from which a grade is within the range
+
+
+@dataclass(frozen=True)
+class Grade:
+    """Judgement on one parameter.
+
+    Attributes
+    ----------
+    chances : probabilities of not, partly and wholly fulfilled; None if the survey does not tell
+    text : the evidence
+    """
+
+    chances: tuple[float, float, float] | None
+    text: str
+
+    @property
+    def possible(self) -> tuple[int, ...]:
+        """Grades within the range, from 0 (NF) to 2 (F)."""
+        if self.chances is None:
+            return (0, 1, 2)
+        return tuple(k for k, chance in enumerate(self.chances) if chance >= _POSSIBLE)
+
+    @property
+    def words(self) -> str:
+        """Short form: "F", "PF or F", "not known"."""
+        if self.chances is None:
+            return "not known"
+        return " or ".join(("NF", "PF", "F")[k] for k in self.possible)
+
+
+UNKNOWN = Grade(None, "the survey does not tell")
+
+
+def given_grade(level: str) -> Grade:
+    """Return the grade that somebody states.
+
+    Parameters
+    ----------
+    level : "good", "medium" or "poor"
+    """
+    chances = {"poor": (1.0, 0.0, 0.0), "medium": (0.0, 1.0, 0.0), "good": (0.0, 0.0, 1.0)}[level]
+    return Grade(chances, f"stated: {level}")
+
+
+def graded(value: float, sigma: float, bounds: tuple[float, float], text: str) -> Grade:
+    """Grade a measured quantity, the larger the better, with its uncertainty.
+
+    Parameters
+    ----------
+    value, sigma : quantity and its standard deviation
+    bounds : from where on it is partly, and wholly fulfilled
+    text : the evidence
+    """
+    low, high = (float(ndtr((value - bound) / max(sigma, 1e-12))) for bound in bounds)
+    return Grade((1.0 - low, low - high, high), text)
+
+
+def index_range(grades: Mapping[Parameter, Grade], direction: Direction) -> tuple[float, float]:
+    """Return the lowest and highest index that the grades allow.
+
+    Parameters
+    ----------
+    grades : of all parameters
+    direction : of the loads
+    """
+    k = DIRECTIONS.index(direction)
+
+    def index(end: int) -> float:
+        value = {name: _VALUES[name][k][grades[name].possible[end]] for name in PARAMETERS}
+        return value.pop(Parameter.SM) * sum(value.values())
+
+    return index(0), index(-1)
+
+
+def category(index: float, direction: Direction) -> str:
+    """Return the category of an index: A is good, B average, C inadequate."""
+    low, high = _BOUNDS[DIRECTIONS.index(direction)]
+    return "A" if index >= high else "B" if index >= low else "C"
+
+
+def mechanical_ranges(indices: Mapping[Direction, tuple[float, float]]) -> dict[str, tuple[float, float]]:
+    """Return the ranges of compressive strength, shear strength and Young's modulus [Pa].
+
+    Parameters
+    ----------
+    indices : lowest and highest index of each direction
+    """
+    found = {}
+    for name, (k, lower, upper) in _CURVES.items():
+        low, high = indices[DIRECTIONS[k]]
+        found[name] = (lower[0] * math.exp(lower[1] * low), upper[0] * math.exp(upper[1] * high))
+    return found

@@ -1,0 +1,148 @@
+"""Known movements are found at three standard deviations, and sound surveys are given none.
+
+Every survey is measured point by point with 3 mm of noise and goes through the whole chain: plane, outline, depth, bed
+lines. Movements are as large as three times the noise, or little more.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from pipelines.reports.survey.study import CHANCES
+from survey.quality.contradictions import contradictions
+from survey.quality.courses import measure_courses
+from survey.quality.departures.beds import WallBeds, find_bed_movements
+from survey.quality.departures.depths import DoubtfulDepth, doubtful_depths
+from survey.quality.departures.faces import WallFace, find_face_departures
+from survey.quality.facades import find_facades
+from survey.quality.precision import StoneQuality, judge_survey
+from survey.quality.remeasure import ShortList, list_remeasures, short_list
+from tests.validation.survey.moved_walls import (
+    NOISE,
+    Movement,
+    Wall,
+    bulging,
+    leaning,
+    leaning_corner,
+    settled_pier,
+    some_wall,
+    still,
+    survey_of,
+)
+
+
+@dataclass(frozen=True)
+class Findings:
+    """All that is found about a wall."""
+
+    beds: WallBeds
+    face: WallFace
+    depths: tuple[DoubtfulDepth, ...]
+    again: ShortList
+
+    @property
+    def count(self) -> int:
+        """Number of findings."""
+        moved = len(self.beds.movements) + len(self.beds.odd) + len(self.face.movements) + len(self.face.odd)
+        return moved + len(self.depths) + len(self.again.rows)
+
+
+def findings(stones: list[StoneQuality]) -> Findings:
+    facades = find_facades(
+        np.array([one.normal for one in stones]),
+        np.array([one.area for one in stones]),
+        np.array([one.outline.mean(axis=0) for one in stones]),
+    )
+    lengths = {one.code: one.length for one in stones}
+    (beds,) = find_bed_movements(measure_courses(stones, facades), lengths, CHANCES["beds"])
+    (face,) = find_face_departures(stones, facades, CHANCES["faces"])
+    depths = doubtful_depths(stones, facades, (), CHANCES["depths"])
+    odd = contradictions(stones, facades)
+    again = short_list(list_remeasures(stones, (), odd, judge_survey(stones), (), depths), len(stones))
+    return Findings(beds, face, depths, again)
+
+
+def test_a_settled_pier_is_found_and_dated():
+    found = findings(survey_of(21, moved=settled_pier(3.0 * NOISE, 3.6, 9.0, 7)))
+    (one,) = found.beds.movements
+    assert one.kind == "step"
+    assert (one.first, one.last, one.older_than) == (1, 7, 8)
+    assert abs(one.amount + 3.0 * NOISE) < 3.5 * one.sigma
+    assert abs(one.amount) > 3.0 * one.sigma
+    assert found.face.movements == ()
+
+
+def test_a_pier_within_the_wall_is_found():
+    found = findings(survey_of(22, Wall(opening=None), settled_pier(3.0 * NOISE, 2.0, 4.0)))
+    (one,) = found.beds.movements
+    assert one.kind == "part"
+    assert abs(one.amount + 3.0 * NOISE) < 3.5 * one.sigma
+
+
+@pytest.mark.parametrize(
+    ("moved", "amount", "kinds"),
+    [
+        (leaning(3.0 * NOISE, 2.7), 3.0 * NOISE, {"lean"}),
+        (leaning(-3.0 * NOISE, 2.7), -3.0 * NOISE, {"lean"}),
+        (bulging(5.0 * NOISE, (3.0, 1.5), 1.5), 5.0 * NOISE, {"local bulge"}),
+        (leaning_corner(4.0 * NOISE, 4.0, 6.0, 2.7), 4.0 * NOISE, {"right corner"}),
+    ],
+)
+def test_a_facade_out_of_its_plane_is_found(moved: Movement, amount: float, kinds: set[str]):
+    found = findings(survey_of(23, moved=moved))
+    (one,) = found.face.movements
+    assert one.kind in kinds
+    assert one.amount == pytest.approx(amount, rel=0.4)
+    assert abs(one.amount) > 3.0 * one.sigma
+    assert found.face.odd == ()
+    assert found.beds.movements == ()
+
+
+@pytest.mark.parametrize("amount", [4.0 * NOISE, -4.0 * NOISE, 0.03])
+def test_one_stone_out_of_the_face_is_found(amount: float):
+    found = findings(survey_of(24, Wall(laid=0.001), proud={"5-3": amount}))
+    (one,) = found.face.odd
+    assert one.code == "5-3"
+    assert abs(one.amount - amount) < 4.0 * one.sigma
+    assert found.face.movements == ()
+
+
+def test_wrong_depths_are_found_and_lead_the_list():
+    found = findings(survey_of(25, Wall(depths={"5-2": 0.05, "8-4": 5.0}, depth=0.5)))
+    assert {one.code for one in found.depths} == {"5-2", "8-4"}
+    assert [one.code for one in found.again.rows] == ["8-4", "5-2"]
+    assert all(one.changes is not None for one in found.again.rows)
+
+
+def test_a_few_sound_surveys_are_given_nothing():
+    assert [findings(survey_of(seed, some_wall(seed))).count for seed in range(300, 308)] == [0] * 8
+
+
+@pytest.mark.slow
+def test_of_a_thousand_sound_surveys_fewer_than_ten_are_given_a_finding():
+    wrong = [seed for seed in range(1000) if findings(survey_of(seed, some_wall(seed))).count]
+    print(f"{len(wrong)} of 1000 sound surveys: {wrong}")
+    assert len(wrong) < 10
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("moved", "beds"),
+    [
+        (settled_pier(3.0 * NOISE, 3.6, 9.0, 7), True),
+        (leaning(3.0 * NOISE, 2.7), False),
+        (bulging(5.0 * NOISE, (3.0, 1.5), 1.5), False),
+        (leaning_corner(4.0 * NOISE, 4.0, 6.0, 2.7), False),
+        (still, None),
+    ],
+)
+def test_movements_of_a_few_times_the_noise_are_found_in_nearly_all_surveys(
+    moved: Movement, beds: bool | None
+):
+    found = 0
+    for seed in range(60):
+        one = findings(survey_of(1000 + seed, moved=moved))
+        found += bool(one.beds.movements) if beds else bool(one.face.movements)
+    print(f"{found} of 60")
+    assert found <= 1 if beds is None else found >= 57
