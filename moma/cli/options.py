@@ -11,19 +11,23 @@ __all__ = [
     "AcceptUnsound",
     "At",
     "Codes",
+    "Columns",
     "Db",
     "Format",
     "Header",
     "Json",
     "Kind",
     "KindWhere",
+    "Kinds",
     "ListFormat",
     "Out",
     "Planes",
     "Profile",
     "ProfileName",
+    "Repair",
     "Resume",
     "SceneArgument",
+    "Sheet",
     "Sigma",
     "Snap",
     "StoreDb",
@@ -31,6 +35,8 @@ __all__ = [
     "SurveyFiles",
     "SurveyFormat",
     "Unit",
+    "Up",
+    "UpAxis",
     "Verbose",
 ]
 
@@ -44,7 +50,18 @@ class SurveyFormat(StrEnum):
     CSV = "csv"
     PNEZD = "pnezd"
     PENZD = "penzd"
+    GSI = "gsi"
+    JOBXML = "jobxml"
+    LANDXML = "landxml"
+    GEOJSON = "geojson"
     SOLIDS = "solids"
+
+
+class UpAxis(StrEnum):
+    """Axes that may point upwards."""
+
+    Y = "y"
+    Z = "z"
 
 
 class ListFormat(StrEnum):
@@ -95,7 +112,41 @@ Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Print more; show
 SurveyFiles = Annotated[
     list[Path], typer.Argument(metavar="FILE…", help="Survey files, or folders of them; see docs/formats.md.")
 ]
-Format = Annotated[SurveyFormat, typer.Option(help="Format of the survey files.")]
+Format = Annotated[
+    SurveyFormat | None,
+    typer.Option(help="Format of the survey files; default: by their endings.", show_default=False),
+]
+Columns = Annotated[
+    str | None,
+    typer.Option(
+        "--columns",
+        metavar="MAP",
+        help="Columns of a table that are not recognised, e.g. 'block=Stein,x=Rechts,ignore=Datum'.",
+    ),
+]
+Sheet = Annotated[
+    str | None, typer.Option("--sheet", metavar="NAME", help="Sheet of a workbook (XLSX, ODS) with several.")
+]
+Kinds = Annotated[
+    str | None,
+    typer.Option(
+        "--kinds",
+        metavar="TABLE",
+        help="Abbreviations of kinds, e.g. 'SPR=springer,VOU=voussoir', or a file.",
+    ),
+]
+Up = Annotated[
+    UpAxis | None,
+    typer.Option("--up", help="Axis that points upwards in files of solids; default: z.", show_default=False),
+]
+Repair = Annotated[
+    float | None,
+    typer.Option(
+        "--repair",
+        metavar="T",
+        help="Repair open edges and the like of solids within T metres; 0: nothing; default: 10⁻⁵ of their size.",
+    ),
+]
 Header = Annotated[
     Path | None,
     typer.Option(
@@ -138,7 +189,11 @@ Support = Annotated[
 ]
 Unit = Annotated[
     str | None,
-    typer.Option("--unit", metavar="UNIT", help="Unit of solids: m, dm, cm, mm, ft or in; default: m."),
+    typer.Option(
+        "--unit",
+        metavar="UNIT",
+        help="Unit of coordinates: m, dm, cm, mm, ft or in; default: m, or what the columns say.",
+    ),
 ]
 Snap = Annotated[
     float | None,

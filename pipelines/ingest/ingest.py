@@ -95,7 +95,9 @@ def ingest(
         for path, target, tally in zip(surveys, targets, tallies, strict=True):
             if tally.refused:
                 stations = _listed_stations(tally, options) if format in _LISTS else []
-                text = rejects_text(path, format, tally.refused, stations)
+                sheet = None if options is None else options.sheet
+                header = tally.stream.header
+                text = rejects_text(path, format, tally.refused, stations, header=header, sheet=sheet)
                 held.enter_context(_published(target, text))
         with open_database(url, lock_timeout=_PATIENCE) as database, database.session() as session:
             solids = KnownSolids()
@@ -131,7 +133,7 @@ def _check_codes(tallies: Sequence[Tally], spools: Sequence[Spool]) -> None:
                 raise SurveyError(what, where=place, remedy="give each stone a code of its own")
 
 
-_LISTS = ("pnezd", "penzd")
+_LISTS = ("csv", "pnezd", "penzd", "gsi")
 
 
 def _listed_stations(tally: Tally, options: ReadingOptions | None) -> list[int]:
@@ -210,7 +212,8 @@ def _of_known_kind(block: SurveyedBlock, path: str, known: set[str]) -> Surveyed
     except UsageError as error:
         record = block.face.record
         where = f"{path}:{record.line}: stone {block.code}"
-        return Reject(block.code, SurveyError(error.what, where=where, remedy=error.remedy), record.spans)
+        remedy = f'{error.remedy} Or say what it stands for: --kinds "{block.kind}=…"'
+        return Reject(block.code, SurveyError(error.what, where=where, remedy=remedy), record.spans)
     known.add(block.kind)
     return block
 

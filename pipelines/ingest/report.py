@@ -1,7 +1,7 @@
 """Report on ingested survey files, counted stone by stone."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from mechanics.arrays import Array
 from pipelines.ingest.records import frame_record
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.convexity import is_convex
-from survey.quality.plausible import LENGTH, doubt_of
+from survey.quality.plausible import LENGTH, doubt_of, lies_on_its_side
 from survey.records.snapping import Snapping
 from survey.records.survey import Reject
 from survey.stones import SurveyedStream
@@ -72,6 +72,8 @@ class FileReport:
     solids : properties of the stones, in a file of solids
     remarks : changes that made the outlines of measured faces polygons, by stone code
     doubts : sizes that hardly any stone has, in words, by stone code
+    reading : how the file was read, in words
+    questions : what the file as a whole makes doubtful, with the option that would answer it
     """
 
     path: str
@@ -88,6 +90,8 @@ class FileReport:
     solids: SolidsReport | None = None
     remarks: dict[str, tuple[str, ...]] = field(default_factory=dict)
     doubts: dict[str, str] = field(default_factory=dict)
+    reading: tuple[str, ...] = ()
+    questions: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -119,6 +123,8 @@ class Tally:
     decimals: int = 0
     changed: dict[str, tuple[str, ...]] = field(default_factory=dict)
     doubts: dict[str, str] = field(default_factory=dict)
+    units: Counter[str] = field(default_factory=Counter)
+    boxes: list[Array] = field(default_factory=list)
 
     def count(self, block: SurveyedBlock) -> None:
         """Count one more accepted stone."""
@@ -134,12 +140,15 @@ class Tally:
             self.changed[block.code] = face.remarks
         if (doubt := doubt_of(float(np.ptp(block.solid.vertices, axis=0).max()), LENGTH)) is not None:
             self.doubts[block.code] = doubt.text
+            self.units[doubt.option] += 1
         if face.provenance.source == "points" and face.fit.rms >= self.rms:
             self.rms, self.worst = face.fit.rms, block.code
 
     def _count_solid(self, block: SurveyedBlock) -> None:
         convex = is_convex(block.solid)
         self.convex[convex] += 1
+        vertices = block.solid.vertices
+        self.boxes.append(np.concatenate([vertices.min(axis=0), vertices.max(axis=0)]))
         if not convex:
             self.not_convex.append(block.code)
         if block.face.remarks:
@@ -171,7 +180,18 @@ class Tally:
             solids=self._solids(),
             remarks=self.changed,
             doubts=self.doubts,
+            reading=self.stream.remarks,
+            questions=tuple(self._questions()),
         )
+
+    def _questions(self) -> Iterator[str]:
+        """Ask for the unit if most stones are of an impossible size, and for the axis if they lie on their side."""
+        (unit, count), *_ = [*self.units.most_common(1), ("", 0)]
+        total = self.stones.total()
+        if unit and 2 * count > total:
+            yield f"{count} of {total} stones have the size of stones in {unit}, not metres: give --unit {unit}"
+        if self.boxes and lies_on_its_side(np.array(self.boxes)):
+            yield "no stone stands on another along z, but some do along y: if the file has y upwards, give --up y"
 
 
 def _has_decimals(places: Array, count: int) -> bool:
