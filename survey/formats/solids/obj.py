@@ -122,7 +122,7 @@ class _ObjReader:
                     remedy="count vertices from 1 through the whole file",
                 )
             corners.append(index)
-        if len(corners) < 3:
+        if len(corners) < 2:  # one of two bounds nothing
             raise SurveyError(f"a face of {len(corners)} corners", where=where, remedy="write: f 1 2 3 …")
         return tuple(corners)
 
