@@ -15,8 +15,8 @@ from pipelines.results.vtk import body_cells, body_grid, contact_grid, joint_gri
 from survey.formats.native import reader as moma_ascii
 from survey.formats.native.header import HeadReader
 from survey.formats.native.stone import STONE_WORDS
-from survey.formats.tables.reader import NEEDED, OPTIONAL
 from survey.formats.reading import FORMATS, ReadingOptions, open_survey, with_header
+from survey.formats.tables.reader import NEEDED, OPTIONAL
 from survey.geometry.solids import Solid
 from survey.records.survey import Reject
 from tests.paths import ROOT

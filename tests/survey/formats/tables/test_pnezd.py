@@ -8,9 +8,9 @@ import pytest
 
 from moma.errors import SurveyError, UsageError
 from survey.formats.options import ReadingOptions
+from survey.formats.reading import read_survey
 from survey.formats.tables.code_template import CodeFields, CodeTemplate
 from survey.formats.tables.reader import open_penzd, open_pnezd
-from survey.formats.reading import read_survey
 from survey.records.survey import BlockRecord, Reject, Station, SurveyHead
 from tests.survey.formats.survey_files import PNEZD
 
