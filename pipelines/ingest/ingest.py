@@ -154,10 +154,19 @@ def _measure(
 ) -> Tally:
     """Write the good stones of one file into a spool; raise at the first bad one, or keep it for the rejects."""
     path = source.path
-    tally = Tally(path, survey_stones(open_survey(path, format, source.options(options))), source.files)
+    tally = Tally(
+        path,
+        survey_stones(open_survey(path, format, source.options(options))),
+        source.files,
+        options or ReadingOptions(),
+    )
     stage, head, kinds = f"fit {path.name}", tally.stream.head, set[str]()
     for one in tally.stream.stones:
-        made = one if isinstance(one, Reject) else _of_known_kind(apply_rules(one, rules), head.path, kinds)
+        made = (
+            one
+            if isinstance(one, Reject)
+            else _of_known_kind(apply_rules(one, rules), head.path, kinds, format not in ("moma", "solids"))
+        )
         if not isinstance(made, Reject):
             tally.count(made)
             spool.append(stone_record(made))
@@ -203,7 +212,7 @@ def _kept(stones: Iterator[StoneRecord], session: Session, solids: KnownSolids) 
         yield stone
 
 
-def _of_known_kind(block: SurveyedBlock, path: str, known: set[str]) -> SurveyedBlock | Reject:
+def _of_known_kind(block: SurveyedBlock, path: str, known: set[str], tables: bool) -> SurveyedBlock | Reject:
     """Return the stone, or a reject if the hierarchy has no such kind; `known` collects kinds found there."""
     if block.kind in known:
         return block
@@ -212,7 +221,9 @@ def _of_known_kind(block: SurveyedBlock, path: str, known: set[str]) -> Surveyed
     except UsageError as error:
         record = block.face.record
         where = f"{path}:{record.line}: stone {block.code}"
-        remedy = f'{error.remedy} Or say what it stands for: --kinds "{block.kind}=…"'
+        remedy = error.remedy
+        if tables:
+            remedy = f'{remedy} Or say what it stands for, e.g. --kinds "{block.kind}=ashlar"'
         return Reject(block.code, SurveyError(error.what, where=where, remedy=remedy), record.spans)
     known.add(block.kind)
     return block

@@ -147,7 +147,7 @@ def reading_options(
     UsageError : the sigma is not positive, there is no such header file or unit, or the tolerance is negative
     SurveyError : naming the line of the header file that is wrong
     """
-    options = ReadingOptions(codes=codes, columns=columns, sheet=sheet, up=up or "z", repair=repair)
+    options = ReadingOptions(codes=codes, columns=columns, sheet=sheet, up=up, repair=repair)
     if repair is not None and not 0.0 <= repair < 1.0:
         what, remedy = (
             f"the tolerance is {repair:g} m",

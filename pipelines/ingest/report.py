@@ -11,6 +11,7 @@ import numpy as np
 from mechanics.arrays import Array
 from pipelines.ingest.records import frame_record
 from survey.extrusion.extrusion import SurveyedBlock
+from survey.formats.options import ReadingOptions
 from survey.geometry.convexity import is_convex
 from survey.quality.plausible import LENGTH, doubt_of, lies_on_its_side
 from survey.records.snapping import Snapping
@@ -109,6 +110,7 @@ class Tally:
     path: Path
     stream: SurveyedStream
     files: Sequence[Path]
+    options: ReadingOptions = field(default_factory=ReadingOptions)
     stones: Counter[str] = field(default_factory=Counter)
     rejected: dict[str, int] = field(default_factory=dict)
     shapes: dict[str, str] = field(default_factory=dict)
@@ -188,10 +190,10 @@ class Tally:
         """Ask for the unit if most stones are of an impossible size, and for the axis if they lie on their side."""
         (unit, count), *_ = [*self.units.most_common(1), ("", 0)]
         total = self.stones.total()
-        if unit and 2 * count > total:
+        if unit and 2 * count > total and self.options.unit == 1.0:
             yield f"{count} of {total} stones have the size of stones in {unit}, not metres: give --unit {unit}"
-        if self.boxes and lies_on_its_side(np.array(self.boxes)):
-            yield "no stone stands on another along z, but some do along y: if the file has y upwards, give --up y"
+        if self.boxes and self.options.up is None and lies_on_its_side(np.array(self.boxes)):
+            yield "few stones stand on others along z, but some do along y: if y points upwards in the file, give --up y"
 
 
 def _has_decimals(places: Array, count: int) -> bool:

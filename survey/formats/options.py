@@ -30,7 +30,7 @@ class ReadingOptions:
     snap : tolerance within which matching faces of neighbouring solids are brought into one plane [m]; 0: none is
     planes : distance of the facets of a scanned solid from a plane within which they are one face [m]; 0: every
         facet is kept
-    up : axis that points upwards in files of solids, "y" or "z"
+    up : axis that points upwards in files of solids, "y" or "z"; None: z, unless asked
     repair : distance within which faults of solids are repaired [m]; None: 10⁻⁵ of their size; 0: none is
     files : files of solids that are one survey together; none: only the given one
     """
@@ -46,7 +46,7 @@ class ReadingOptions:
     flat: float = 0.0
     snap: float = 0.0
     planes: float = 0.005
-    up: str = "z"
+    up: str | None = None
     repair: float | None = None
     files: tuple[Path, ...] = ()
 

@@ -261,7 +261,7 @@ def find_columns(names: Sequence[str], given: ColumnMap, where: str, codes: bool
     at: dict[str, int] = {}
     scales: dict[str, float] = {}
     free: list[int] = []
-    mine = {what: _place(names, name, what, where) for what, name in given.names.items()}
+    mine = {what: _place(names, name, what, where, given.numbered) for what, name in given.names.items()}
     taken = set(mine.values())
     for what, k in mine.items():
         _take(what, k, names, at, scales, where)
@@ -293,15 +293,15 @@ def kind_of_column(name: str) -> str | None:
     return _KNOWN.get(plain(_BRACKETS.sub("", unit_of(name)[0]))) or _KNOWN.get(plain(name))
 
 
-def _place(names: Sequence[str], name: str, what: str, where: str) -> int:
-    """Return the place of a column that the user names."""
+def _place(names: Sequence[str], name: str, what: str, where: str, numbered: bool) -> int:
+    """Return the place of a column that the user gives by name, or by number if all are."""
+    if numbered and 1 <= int(name) <= len(names):
+        return int(name) - 1
     wanted = plain(name)
     for spelling in (str, plain, lambda one: plain(unit_of(one)[0])):
         found = [k for k, one in enumerate(names) if spelling(one) == (name if spelling is str else wanted)]
         if len(found) == 1:
             return found[0]
-    if name.isascii() and name.isdigit() and 1 <= int(name) <= len(names):
-        return int(name) - 1
     shown_names = ", ".join(one or "(none)" for one in names)
     raise SurveyError(
         f"no column {shown(name)} for {what}", where=where, remedy=f"the columns are: {shown_names[:300]}"

@@ -177,7 +177,8 @@ def _find_header(
     stated = rows.delimiter
     best: tuple[int, SurveyError] | None = None
     for k, (number, row) in enumerate(ahead[:_TITLES]):
-        for delimiter in (stated,) if stated is not None else rows.delimiters(row):
+        rows.delimiter = stated
+        for delimiter in rows.delimiters(row):
             rows.delimiter = delimiter
             try:
                 names = rows.cells(row, number)

@@ -7,6 +7,7 @@ whatever the name of the file.
 """
 
 import csv
+import io
 import math
 import re
 from collections.abc import Iterator, Sequence
@@ -28,6 +29,8 @@ _BLANKS = ""
 _STATED = re.compile(r'"?sep=(.)"?', re.IGNORECASE)
 _WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 _OPEN = "unexpected end of data"  # csv's words for a quoted field that goes on
+_WHOLE_FIELD = re.compile(r'(^|[,;\t|])[ ]*"(?:[^"]|"")*"')
+_OPEN_FIELD = re.compile(r'(?:^|[,;\t|])[ ]*"')
 _LONGEST_FIELD = 40  # lines of a quoted field
 _SEPARATORS = " \t,;|"
 
@@ -67,7 +70,7 @@ class TextRows:
             text = line.strip(_SEPARATORS)
             if not text or text[0] == "#" or number == self._stated_on:
                 continue
-            if '"' in line and line.count('"') % 2 and self.delimiter:
+            if '"' in line and line.count('"') % 2 and _is_open(line):
                 line = self._joined(line, waiting, lines)
             yield number, line
 
@@ -75,14 +78,9 @@ class TextRows:
         """Return the line with those that its last quoted field goes on in, if it has an end."""
         waiting += islice(lines, max(0, _LONGEST_FIELD - len(waiting)))
         whole = line
-        for k in range(len(waiting) + 1):
-            try:
-                self._quoted(whole)
-            except csv.Error as error:
-                if str(error) != _OPEN or k == len(waiting):
-                    return line
-                whole += "\n" + waiting[k][1]
-            else:
+        for k, (_, following) in enumerate(waiting, start=1):
+            whole += "\n" + following
+            if not _is_open(whole):
                 del waiting[:k]
                 return whole
         return line
@@ -183,7 +181,7 @@ def _sheet_rows(path: Path, sheet: str | None) -> ListRows:
     from python_calamine import CalamineError, CalamineWorkbook
 
     try:
-        book = CalamineWorkbook.from_path(str(path))
+        book = CalamineWorkbook.from_filelike(io.BytesIO(path.read_bytes()))  # whatever its ending
         names = list(book.sheet_names)
         if sheet is not None and sheet not in names:
             raise UsageError(
@@ -208,6 +206,11 @@ def _sheet_rows(path: Path, sheet: str | None) -> ListRows:
         )
     name = full[0] if full else names[0]
     return ListRows(str(path), tables[name], (f"read from sheet {name!r} of a workbook",))
+
+
+def _is_open(text: str) -> bool:
+    """Return whether a quoted field begins in a row and does not end there."""
+    return _OPEN_FIELD.search(_WHOLE_FIELD.sub(r"\1", text)) is not None
 
 
 def is_workbook(path: Path) -> bool:
