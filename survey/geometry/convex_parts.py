@@ -268,7 +268,7 @@ def _farthest_behind(planes: Array) -> Array | None:
     found = linprog(
         [0.0, 0.0, 0.0, -1.0], A_ub=rows, b_ub=planes[:, 3], bounds=[(None, None)] * 3 + [(0.0, None)]
     )
-    return np.asarray(found.x[:3], dtype=np.float64) if found.status == 0 else None
+    return None if found.x is None else np.asarray(found.x[:3], dtype=np.float64)
 
 
 def _place(row: Sequence[float]) -> Place:

@@ -19,7 +19,7 @@ from survey.geometry.solids import Solid, area_vector
 from survey.geometry.watertight import triangulate
 from survey.repair.polygons import Polygon, is_flat_line, simple_polygons, without_repeats
 
-__all__ = ["Hole", "Repaired", "open_edges", "repair"]
+__all__ = ["Hole", "Repaired", "holes_of", "open_edges", "repair"]
 
 Edge = tuple[int, int]
 
@@ -103,7 +103,7 @@ def repair(vertices: Array, polygons: Sequence[Polygon], tolerance: float) -> Re
             return Repaired(vertices, covered, (*deeds, text), ())
     if left or covers:
         size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
-        slits = _holes(vertices, found)
+        slits = holes_of(vertices, found)
         widest = max(one.slit for one in slits)
         if 0.0 < widest <= _SLIT * size:
             zipped, more = _joined(vertices, found, _REACH * widest)
@@ -282,7 +282,7 @@ def _loops(polygons: Sequence[Polygon]) -> list[list[int]] | None:
     return loops
 
 
-def _holes(vertices: Array, polygons: Sequence[Polygon]) -> list[Hole]:
+def holes_of(vertices: Array, polygons: Sequence[Polygon]) -> list[Hole]:
     """Describe the holes of a surface; open edges that make no rings are one."""
     loops = _loops(polygons)
     if loops is None:
@@ -306,7 +306,7 @@ def _covers(
     """Return triangles over each small hole, the holes that are not small, and the largest that is covered."""
     if not open_edges(polygons):
         return [], [], None
-    loops, holes = _loops(polygons), _holes(vertices, polygons)
+    loops, holes = _loops(polygons), holes_of(vertices, polygons)
     if loops is None:
         return [], holes, None
     covers, left, largest = [], [], None

@@ -20,7 +20,7 @@ from survey.geometry.folds import fold, warp
 from survey.geometry.solids import Solid
 from survey.geometry.watertight import check_watertight
 from survey.repair.polygons import is_flat_line, simple_polygons, without_repeats
-from survey.repair.repair import Repaired, open_edges, repair
+from survey.repair.repair import Repaired, holes_of, open_edges, repair
 
 __all__ = ["ClosedBody", "RawBody", "check_coordinates", "closed_bodies", "compact"]
 
@@ -150,7 +150,7 @@ def _repaired(vertices: Array, polygons: list[Polygon], tolerance: float) -> Rep
             break
     else:
         remedy = "close it there"
-    hole = (found or repair(vertices, polygons, 0.0)).left[0]
+    hole = (found.left if found is not None else holes_of(vertices, polygons))[0]
     raise GeometryError(f"the solid is not closed: {edges} edges have one face; {hole.text}", remedy=remedy)
 
 

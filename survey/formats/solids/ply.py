@@ -162,13 +162,17 @@ class _BinaryRows:
 
     def _alike(self, element: _Element, names: Sequence[str]) -> list[list[tuple[float, ...]]] | None:
         """Read all rows at once if their lists are as long as those of the first; None if they are not."""
+        if not element.length:
+            return []
         start = self._at
         lengths = [0 if one.count is None else -1 for one in element.properties]
-        if element.length and -1 in lengths:
+        if -1 in lengths:
             for k, one in enumerate(element.properties):
                 lengths[k] = 0 if one.count is None else int(self._take(one.count, 1)[0])
                 self._take(one.kind, 1 if one.count is None else lengths[k])
             self._at = start
+            if min(lengths) < 0:
+                return None
         fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
         for k, one in enumerate(element.properties):
             kind = self._order + one.kind

@@ -268,19 +268,19 @@ def find_columns(names: Sequence[str], given: ColumnMap, where: str, codes: bool
     for k, name in enumerate(names):
         if k in taken or not name or re.fullmatch(r"(?i)unnamed: \d+", name):
             continue
-        what = kind_of_column(name)
-        if {plain(name), plain(unit_of(name)[0])} & given.ignored or (what is None and "*" in given.ignored):
+        found = kind_of_column(name)
+        if {plain(name), plain(unit_of(name)[0])} & given.ignored or (found is None and "*" in given.ignored):
             continue
-        if what is None or what in mine or (what in _FALLBACK and what in at):
+        if found is None or found in mine or (found in _FALLBACK and found in at):
             free.append(k)
-        elif what in at:
+        elif found in at:
             raise SurveyError(
-                f"columns {shown(names[at[what]])} and {shown(name)} are both {what}",
+                f"columns {shown(names[at[found]])} and {shown(name)} are both {found}",
                 where=where,
-                remedy=f'say which with --columns "{what}=…", and leave out others with ignore=…',
+                remedy=f'say which with --columns "{found}=…", and leave out others with ignore=…',
             )
         else:
-            _take(what, k, names, at, scales, where)
+            _take(found, k, names, at, scales, where)
     free += _fall_back(at, codes)
     _check_missing(names, at, where)
     for k in free:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from moma.errors import UsageError
 from survey.formats.fields import KIND, shown
@@ -74,6 +75,7 @@ def read_kinds(text: str) -> Mapping[str, str]:
                 remedy='write e.g. --kinds "SPR=springer,VOU=voussoir", or name a file with two columns',
             )
         table = open_rows(path)
+        row: Any
         for number, row in table:
             table.delimiter = table.delimiter if table.delimiter is not None else table.delimiters(row)[0]
             rows.append([one for one in table.cells(row, number) if one])

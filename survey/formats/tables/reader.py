@@ -179,7 +179,7 @@ def _find_header(
     for k, (number, row) in enumerate(ahead[:_TITLES]):
         rows.delimiter = stated
         for delimiter in rows.delimiters(row):
-            rows.delimiter = delimiter
+            rows.delimiter, known = delimiter, 0
             try:
                 names = rows.cells(row, number)
                 known = sum(kind_of_column(one) is not None for one in names if one)

@@ -197,6 +197,8 @@ def _sheet_rows(path: Path, sheet: str | None) -> ListRows:
             where=str(path),
             remedy="give a workbook (XLSX, ODS, XLS) that is not encrypted, or save the table as CSV",
         ) from error
+    if not names:
+        raise SurveyError("the workbook has no sheets", where=str(path), remedy="save the table as CSV")
     full = [one for one, rows in tables.items() if rows]
     if len(full) > 1:
         raise UsageError(

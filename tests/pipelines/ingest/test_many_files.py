@@ -55,7 +55,9 @@ def test_bad_files_of_a_folder_are_rejects_and_the_others_a_survey(tmp_path, sca
     url, rejects = f"sqlite:///{tmp_path}/wall.db", tmp_path / "rejects.txt"
     with pytest.raises(SurveyError, match=r"open\.ply: solid 'open': the solid is not closed"):
         ingest([scans], url, "solids")
-    told = prints("ingest", scans, "--format", "solids", "--keep-going", "--rejects", rejects, "--db", url, "-v")
+    told = prints(
+        "ingest", scans, "--format", "solids", "--keep-going", "--rejects", rejects, "--db", url, "-v"
+    )
     assert "14 stones of survey 'wall'" in told
     assert "small: 1 hole covered, the largest" in told
     assert "2 stones rejected" in told
