@@ -4,6 +4,7 @@ import hashlib
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from sqlalchemy.orm import Session
@@ -12,7 +13,7 @@ from archmodel.database.session import home_of, open_database
 from archmodel.store.bulk import first_free_id
 from archmodel.store.stone_record import StoneRecord
 from archmodel.store.stones import store_survey
-from archmodel.tables.entities import Entity, kind_named
+from archmodel.tables.entities import Entity, kind_named, kinds
 from mechanics.dynamics.progress import Listener, Progress, silent
 from moma.errors import NoDatabaseError, SurveyError, UsageError
 from pipelines.ingest.kind_rules import KindRule, apply_rules, check_kinds
@@ -85,6 +86,7 @@ def ingest(
     with ExitStack() as held:
         _open_if_there(url, held)
         check_kinds(rules)
+        options = replace(options or ReadingOptions(), known_kinds=frozenset(kinds()))
         spools = [held.enter_context(Spool()) for _ in surveys]
         tallies = [
             _measure(source, spool, format, options, rules, bool(keep_going), progress)
@@ -179,6 +181,9 @@ def _measure(
         first = f"; the first: {tally.refused[0].error}" if tally.refused else ""
         what = f"none of its {len(tally.refused)} stones can be ingested{first}"
         raise SurveyError(what, where=str(path), remedy="correct the file")
+    if format not in ("moma", "solids") and (question := tally.unit_question()) is not None:
+        what, _, remedy = question.partition(": ")
+        raise SurveyError(what, where=str(path), remedy=f"{remedy}, or --unit m if they are that large")
     return tally
 
 

@@ -186,14 +186,20 @@ class Tally:
             questions=tuple(self._questions()),
         )
 
-    def _questions(self) -> Iterator[str]:
-        """Ask for the unit if most stones are of an impossible size, and for the axis if they lie on their side."""
+    def unit_question(self) -> str | None:
+        """Ask for the unit if most stones are of an impossible size; None if they are not, or it was given."""
         (unit, count), *_ = [*self.units.most_common(1), ("", 0)]
         total = self.stones.total()
-        if unit and 2 * count > total and self.options.unit == 1.0:
-            yield f"{count} of {total} stones have the size of stones in {unit}, not metres: give --unit {unit}"
+        if not unit or 2 * count <= total or self.options.unit is not None:
+            return None
+        return f"{count} of {total} stones have the size of stones in {unit}, not metres: give --unit {unit}"
+
+    def _questions(self) -> Iterator[str]:
+        """Ask for the unit, and for the axis if the stones lie on their side."""
+        if (question := self.unit_question()) is not None:
+            yield question
         if self.boxes and self.options.up is None and lies_on_its_side(np.array(self.boxes)):
-            yield "few stones stand on others along z, but some do along y: if y points upwards in the file, give --up y"
+            yield "few stones stand on others along z, but some do along y: if y points upwards, give --up y"
 
 
 def _has_decimals(places: Array, count: int) -> bool:

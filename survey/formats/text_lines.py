@@ -64,7 +64,7 @@ class TextLines:
 
     @property
     def is_converted(self) -> bool:
-        """Whether the file has another encoding or other line ends than its lines here."""
+        """True if the file has another encoding or other line ends than its lines here."""
         return self._converted is not None
 
     def __iter__(self) -> Iterator[tuple[int, str]]:

@@ -28,7 +28,7 @@ def open_landxml(path: Path, options: ReadingOptions | None = None) -> SurveyStr
     """Read the points of a LandXML file and return its stones one by one; see `open_gsi`."""
     path, options = Path(path), options or ReadingOptions()
     collector = PointCollector(path, options, unique=False)
-    unit = [options.unit]
+    unit = [options.scale]
     count = [0]
 
     def element(where: str, given: Mapping[str, str], text: str, line: int) -> None:

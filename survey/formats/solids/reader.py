@@ -197,7 +197,7 @@ class _Solids:
 
     def _bodies(self, raw: RawBody) -> Iterator[ClosedBody | GeometryError]:
         """Make the closed bodies of one name, in metres and with z upwards."""
-        options, unit = self._options, self._options.unit
+        options, unit = self._options, self._options.scale
         vertices = raw.vertices * unit
         if options.up == "y":
             x, y, z = vertices.T

@@ -150,7 +150,7 @@ class ColumnMap:
 
     @property
     def numbered(self) -> bool:
-        """Whether all columns are given by number, so that the table may have no names."""
+        """True if all columns are given by number, so that the table may have no names."""
         return bool(self.names) and all(one.isascii() and one.isdigit() for one in self.names.values())
 
 
@@ -317,7 +317,7 @@ def _take(
         scales[what] = UNITS[unit]
     elif what in _LENGTHS and (found := re.search(r"\[\s*([^\]]+?)\s*\]", names[k])):
         raise SurveyError(
-            f"column {shown(names[k])} is in {found[1]!r}, which is not a unit of length",
+            f"column {shown(names[k])} is in {shown(found[1])}, which is not a unit of length",
             where=where,
             remedy=f"units are {', '.join(UNITS)}",
         )
@@ -358,5 +358,5 @@ def _check_spelling(name: str, at: Mapping[str, int], where: str) -> None:
         raise SurveyError(
             f"unknown column {shown(name)}, nearly {what}",
             where=where,
-            remedy=f'say what it is: --columns "{what}={name}", or --columns "ignore={name}"',
+            remedy=f'say what it is: --columns "{what}={name[:40]}", or --columns "ignore={name[:40]}"',
         )

@@ -1,6 +1,7 @@
 """Kinds of stones by the words and abbreviations that people write for them."""
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ from survey.formats.fields import KIND, shown
 from survey.formats.tables.columns import plain
 from survey.formats.tables.rows import open_rows
 
-__all__ = ["KINDS", "kind_of", "read_kinds"]
+__all__ = ["KINDS", "kind_of", "meant", "read_kinds"]
 
 KINDS: Mapping[str, Sequence[str]] = {
     # German; French; Italian; Spanish
@@ -53,6 +54,26 @@ def kind_of(text: str, given: Mapping[str, str]) -> str:
     """
     lower = text.lower()
     return given.get(lower) or _WORDS.get(plain(text)) or "_".join(lower.split())
+
+
+def meant(word: str, known: Iterable[str]) -> str:
+    """Return the kind that an abbreviation may stand for: one with its letters in order; "…" if there is none.
+
+    Examples
+    --------
+    >>> meant("spr", ["support", "springer"]), meant("hdr", ["header", "voussoir"]), meant("xy", ["header"])
+    ('springer', 'header', '…')
+    """
+    letters = ".*".join(re.escape(one) for one in word)
+    found = sorted(one for one in known if re.match(letters, one))
+    return min(found, key=lambda one: (-_alike(word, one), len(one)), default="…")
+
+
+def _alike(word: str, other: str) -> int:
+    """Return the number of letters with which both begin."""
+    return next(
+        (k for k, (a, b) in enumerate(zip(word, other, strict=False)) if a != b), min(len(word), len(other))
+    )
 
 
 def read_kinds(text: str) -> Mapping[str, str]:

@@ -24,7 +24,7 @@ from survey.formats.options import ReadingOptions, whole
 from survey.formats.tables.code_template import ROLES, STATION, CodeFields, CodeTemplate
 from survey.formats.tables.columns import ColumnMap, Columns, find_columns, kind_of_column, plain, read_map
 from survey.formats.tables.decimals import Decimals
-from survey.formats.tables.kinds import kind_of
+from survey.formats.tables.kinds import kind_of, meant
 from survey.formats.tables.point_table import PointTable, TableStone, check_station
 from survey.formats.tables.rows import ListRows, Row, TextRows, open_rows
 from survey.formats.tables.wkt import outline_of
@@ -60,6 +60,7 @@ _LIST = {"pnezd": ("name", "y", "x", "z", "description"), "penzd": ("name", "x",
 _SEPARATORS = ("\t", ";", ",", "|", "")  # empty: any blanks
 _LOOK_AHEAD = 100  # rows in which the first good one, or the names of the columns, must be found
 _TITLES = 30  # rows before the names of the columns
+_LISTED = 12  # unknown kinds in a message
 _CACHED = 4096  # identities
 _LONGEST_NAME = 64
 _NOTHING = float("nan")
@@ -254,7 +255,7 @@ def _check_axes(rows: AnyRows, header: tuple[int, Any], form: str) -> None:
     if found == list(_LIST[other][1:3]):
         raise rows.fail(
             number,
-            f"the columns are {', '.join(names)}, which is not the order of {form}",
+            f"the columns are {', '.join(names)[:200]}, which is not the order of {form}",
             f"give --format {other}",
         )
 
@@ -302,9 +303,19 @@ class PointCollector:
         return replace(self._head, stations=(*self._head.stations, *self._stations.values()))
 
     def close(self) -> None:
-        """Check that the template fits any description at all."""
+        """Check that the template fits any description, and that most kinds are known."""
         if self._misfits and not self._stations:
             self._refuse_template(self._misfits)
+        stones = [one for one in self.table.stones.values() if one.kind is not None and one.error is None]
+        unknown = [one for one in stones if one.kind not in self._options.known_kinds]
+        if self._options.known_kinds and 2 * len(unknown) > len(stones):
+            words = list(dict.fromkeys(str(one.kind) for one in unknown))
+            table = ",".join(f"{one}={meant(one, self._options.known_kinds)}" for one in words[:_LISTED])
+            raise self.fail(
+                unknown[0].line,
+                f"unknown kinds: {', '.join(words[:_LISTED])}",
+                f'say what they stand for: --kinds "{table}"',
+            )
 
     def fail(self, line: int, what: str, remedy: str) -> SurveyError:
         """Make an error that names a line of the file."""
@@ -473,7 +484,7 @@ class _RowReader:
         self._name_at, self._sigma_at = at.get("name"), at.get("sigma")
         self._of_stones = [(one, at[one]) for one in _OF_STONES if one in at]
         self._notes = [(k, _note_key(name)) for k, name in columns.notes]
-        unit = options.unit
+        unit = options.scale
         self._scale = {
             one: columns.scales.get(one, unit) for one in (*"xyz", "sigma", "depth", "depth_sigma")
         }
@@ -482,7 +493,7 @@ class _RowReader:
         self._known: dict[Any, _Identity] = {}
         self.remarks: tuple[str, ...] = ()
         if columns.notes:
-            kept = ", ".join(name for _, name in columns.notes)
+            kept = ", ".join(name[:40] for _, name in columns.notes)
             self.remarks = (f'kept as notes: {kept}; --columns "ignore=…" leaves columns out',)
 
     def take(self, row: Any, number: int) -> None:
@@ -562,7 +573,7 @@ class _RowReader:
         stone.add_line(number, count)
 
     def _add_outline(self, one: _Identity, values: Sequence[str], number: int, count: int) -> None:
-        corners = self._options.unit * outline_of(values[self._outline_at or 0], f"{self._path}:{number}")
+        corners = self._options.scale * outline_of(values[self._outline_at or 0], f"{self._path}:{number}")
         sigma = _NOTHING
         if self._sigma_at is not None and (text := values[self._sigma_at]):
             sigma = self._decimals.length(text, "sigma", number, self._scale["sigma"])
