@@ -27,6 +27,7 @@ class TableStone:
     code, course, zone, station : as in BlockRecord
     kind : as in BlockRecord; None until a line states it
     name : as people write it
+    agreed : what the last of its rows states of it, checked against the others
     notes : the different texts of each column that is kept as a note, in order
     line : the first of its lines
     error : the first error in its lines; None if there is none
@@ -51,6 +52,7 @@ class TableStone:
     vertex_names: list[str] = field(default_factory=list)
     point_names: list[str] = field(default_factory=list)
     runs: list[int] = field(default_factory=list)
+    agreed: object = None
     notes: dict[str, dict[str, None]] | None = None
 
     def add_line(self, line: int, count: int = 1) -> None:

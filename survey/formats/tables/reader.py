@@ -387,6 +387,8 @@ class PointCollector:
             if it has another name, kind or course than before
         """
         stone = self.table.stones.get(one.code)
+        if stone is not None and stone.agreed is one:  # the usual case: the row before was of the same stone
+            return stone
         if stone is None:
             return TableStone(one.code, one.kind, one.course, line, one.name, zone=one.zone)
         if stone.error is not None:
@@ -407,6 +409,7 @@ class PointCollector:
                     f"kind, course or zone of block {one.code} differs from line {stone.line}",
                     "give every line of a block the same kind and course",
                 )
+        stone.agreed = one
         return stone
 
     def check_name(self, name: str, line: int) -> None:
@@ -513,8 +516,8 @@ class _RowReader:
             stone = self._table.stones.get(one.code)
             if stone is not None and stone.error is not None and one.role != STATION:
                 stone.add_line(number, self._rows.lines_of(row))
-                return
-            self._add(one, values, number, self._rows.lines_of(row))
+            else:
+                self._add(one, values, number, self._rows.lines_of(row))
         except _WrongTemplateError:
             raise
         except SurveyError as error:
@@ -592,6 +595,8 @@ class _RowReader:
     def _stone_of(self, one: _Identity, values: Sequence[str], number: int) -> TableStone:
         """Return the stone of a row, with what the row says of all of it."""
         stone = self.collector.stone(one, number)
+        if stone.agreed is one and not self._of_stones and not self._notes:
+            return stone
         for name, k in self._of_stones:
             if values[k]:
                 self._set(stone, name, values[k], number)
