@@ -30,12 +30,16 @@ class SurveyedStream:
     stones : the stones with their hidden side, in the frame of the site, and the rejects; an iterator to be
         consumed once. Stones measured on photographs come last, because they need the faces of their neighbours.
     snapping : of solids, the changes that brought their faces into common planes; None if not asked for
+    header : number of lines at the beginning of the file that hold for all stones
+    remarks : on how the file was read, in words
     """
 
     head: SurveyHead
     transform: SiteTransform | None
     stones: Iterator[SurveyedBlock | Reject]
     snapping: Snapping | None = None
+    header: int = 0
+    remarks: tuple[str, ...] = ()
 
 
 def survey_stones(stream: SurveyStream) -> SurveyedStream:
@@ -60,7 +64,8 @@ def survey_stones(stream: SurveyStream) -> SurveyedStream:
     """
     transform = fit_similarity(stream.head.control) if stream.head.control else None
     head = stream.head if transform is None else to_site(stream.head, transform)
-    return SurveyedStream(head, transform, _stones(stream, head, transform), stream.snapping)
+    stones = _stones(stream, head, transform)
+    return SurveyedStream(head, transform, stones, stream.snapping, stream.header, stream.remarks)
 
 
 def _stones(

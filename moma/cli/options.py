@@ -11,20 +11,24 @@ __all__ = [
     "AcceptUnsound",
     "At",
     "Codes",
+    "Columns",
     "Db",
     "Format",
     "Header",
     "Json",
     "Kind",
     "KindWhere",
+    "Kinds",
     "ListFormat",
     "Out",
     "Overwrite",
     "Planes",
     "Profile",
     "ProfileName",
+    "Repair",
     "Resume",
     "SceneArgument",
+    "Sheet",
     "Sigma",
     "Snap",
     "StoreDb",
@@ -32,6 +36,8 @@ __all__ = [
     "SurveyFiles",
     "SurveyFormat",
     "Unit",
+    "Up",
+    "UpAxis",
     "Verbose",
 ]
 
@@ -45,7 +51,18 @@ class SurveyFormat(StrEnum):
     CSV = "csv"
     PNEZD = "pnezd"
     PENZD = "penzd"
+    GSI = "gsi"
+    JOBXML = "jobxml"
+    LANDXML = "landxml"
+    GEOJSON = "geojson"
     SOLIDS = "solids"
+
+
+class UpAxis(StrEnum):
+    """Axes that may point upwards."""
+
+    Y = "y"
+    Z = "z"
 
 
 class ListFormat(StrEnum):
@@ -96,7 +113,41 @@ Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Print more; show
 SurveyFiles = Annotated[
     list[Path], typer.Argument(metavar="FILE…", help="Survey files, or folders of them; see docs/formats.md.")
 ]
-Format = Annotated[SurveyFormat, typer.Option(help="Format of the survey files.")]
+Format = Annotated[
+    SurveyFormat | None,
+    typer.Option(help="Format of the survey files; default: by their endings.", show_default=False),
+]
+Columns = Annotated[
+    str | None,
+    typer.Option(
+        "--columns",
+        metavar="MAP",
+        help="Columns of a table that are not recognised, e.g. 'block=Stein,x=Rechts,ignore=Datum'.",
+    ),
+]
+Sheet = Annotated[
+    str | None, typer.Option("--sheet", metavar="NAME", help="Sheet of a workbook (XLSX, ODS) with several.")
+]
+Kinds = Annotated[
+    str | None,
+    typer.Option(
+        "--kinds",
+        metavar="TABLE",
+        help="Abbreviations of kinds, e.g. 'SPR=springer,VOU=voussoir', or a file.",
+    ),
+]
+Up = Annotated[
+    UpAxis | None,
+    typer.Option("--up", help="Axis that points upwards in files of solids; default: z.", show_default=False),
+]
+Repair = Annotated[
+    float | None,
+    typer.Option(
+        "--repair",
+        metavar="T",
+        help="Repair open edges and the like of solids within T metres; 0: nothing; default: 10⁻⁵ of their size.",
+    ),
+]
 Header = Annotated[
     Path | None,
     typer.Option(
@@ -139,7 +190,11 @@ Support = Annotated[
 ]
 Unit = Annotated[
     str | None,
-    typer.Option("--unit", metavar="UNIT", help="Unit of solids: m, dm, cm, mm, ft or in; default: m."),
+    typer.Option(
+        "--unit",
+        metavar="UNIT",
+        help="Unit of coordinates: m, dm, cm, mm, ft or in; default: m, or what the columns say.",
+    ),
 ]
 Snap = Annotated[
     float | None,

@@ -11,20 +11,24 @@ from moma.cli.console import reporting, say
 from moma.cli.options import (
     DEFAULT_DB,
     Codes,
+    Columns,
     Db,
     Format,
     Header,
     Json,
     Kind,
+    Kinds,
     KindWhere,
     Overwrite,
     Planes,
+    Repair,
+    Sheet,
     Sigma,
     Snap,
     Support,
     SurveyFiles,
-    SurveyFormat,
     Unit,
+    Up,
     Verbose,
 )
 from moma.cli.progress import progress_bars
@@ -95,12 +99,17 @@ def sample(
 @reporting
 def ingest(
     files: SurveyFiles,
-    format: Format = SurveyFormat.MOMA,
+    format: Format = None,
     header: Header = None,
+    columns: Columns = None,
+    sheet: Sheet = None,
     codes: Codes = None,
     kind: Kind = None,
+    kinds: Kinds = None,
     sigma: Sigma = None,
     unit: Unit = None,
+    up: Up = None,
+    repair: Repair = None,
     snap: Snap = None,
     planes: Planes = None,
     kind_where: KindWhere = None,
@@ -133,20 +142,30 @@ def ingest(
     from moma.kernels.beside import compiling_beside
     from pipelines.ingest.ingest import ingest as ingest_files
     from pipelines.ingest.kind_rules import kind_rules
-    from pipelines.ingest.reading_options import reading_options
+    from pipelines.ingest.reading_options import format_of_all, reading_options
 
     if rejects is not None and not keep_going:
         raise UsageError("--rejects without --keep-going", remedy="give --keep-going too")
-    for name, given in (("--unit", unit), ("--snap", snap), ("--planes", planes)):
-        if given is not None and format is not SurveyFormat.SOLIDS:
-            raise UsageError(f"{name} with format {format}", remedy="it is for --format solids")
-    options = reading_options(header, codes, kind, sigma, unit, snap, planes)
+    name = format_of_all(files) if format is None else format.value
+    solids = {"--snap": snap, "--planes": planes, "--up": up, "--repair": repair}
+    tables = {"--columns": columns, "--sheet": sheet, "--kinds": kinds}
+    for option, given in solids.items():
+        if given is not None and name != "solids":
+            raise UsageError(f"{option} with format {name}", remedy="it is for --format solids")
+    for option, text in tables.items():
+        if text is not None and name in ("moma", "solids"):
+            raise UsageError(f"{option} with format {name}", remedy="it is for tables and lists of points")
+    if unit is not None and name == "moma":
+        raise UsageError("--unit with format moma", remedy="its lengths are metres")
+    options = reading_options(
+        *(header, codes, kind, sigma, unit, snap, planes, columns, sheet, kinds, up and up.value, repair)
+    )
     rules = kind_rules(kind_where or (), support or ())
     with compiling_beside("ingest"), progress_bars() as listener:
         report = ingest_files(
             files,
             db,
-            format.value,
+            name,
             listener,
             options=options,
             keep_going=rejects or keep_going,
@@ -159,11 +178,15 @@ def ingest(
 @reporting
 def survey_report(
     files: SurveyFiles,
-    format: Format = SurveyFormat.MOMA,
+    format: Format = None,
     header: Header = None,
+    columns: Columns = None,
+    sheet: Sheet = None,
     codes: Codes = None,
     kind: Kind = None,
+    kinds: Kinds = None,
     sigma: Sigma = None,
+    unit: Unit = None,
     out: Annotated[
         Path | None,
         typer.Option("--out", metavar="DIR", help="Folder for the report; default: out/survey-FILE."),
@@ -180,16 +203,17 @@ def survey_report(
 ) -> None:
     """Judge survey files without a database: precision, what has moved, masonry, kinds, stones to measure again."""
     from moma.cli.text.runs_and_surveys import survey_report_lines
-    from pipelines.ingest.reading_options import reading_options
+    from pipelines.ingest.reading_options import format_of_all, reading_options
     from pipelines.reports.survey.report import INDEX, report_surveys
     from survey.quality.masonry.index import given_grade
 
-    options = reading_options(header, codes, kind, sigma)
+    name = format_of_all(files) if format is None else format.value
+    options = reading_options(header, codes, kind, sigma, unit, columns=columns, sheet=sheet, kinds=kinds)
     folder = out or Path("out") / f"survey-{files[0].resolve().stem}"
     levels = {"MM": mortar, "SM": state}
     given = {name: given_grade(level.value) for name, level in levels.items() if level is not None}
     with progress_bars() as listener:
-        report = report_surveys(files, folder, format.value, options, listener, given, overwrite)
+        report = report_surveys(files, folder, name, options, listener, given, overwrite)
     for warning in report.study.warnings:
         say(f"warning: {warning}")
     lines = survey_report_lines(report, verbose)

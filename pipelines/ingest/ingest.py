@@ -4,6 +4,7 @@ import hashlib
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from sqlalchemy.orm import Session
@@ -12,7 +13,7 @@ from archmodel.database.session import home_of, open_database
 from archmodel.store.bulk import first_free_id
 from archmodel.store.stone_record import StoneRecord
 from archmodel.store.stones import store_survey
-from archmodel.tables.entities import Entity, kind_named
+from archmodel.tables.entities import Entity, kind_named, kinds
 from mechanics.dynamics.progress import Listener, Progress, silent
 from moma.errors import NoDatabaseError, SurveyError, UsageError
 from pipelines.ingest.kind_rules import KindRule, apply_rules, check_kinds
@@ -85,6 +86,7 @@ def ingest(
     with ExitStack() as held:
         _open_if_there(url, held)
         check_kinds(rules)
+        options = replace(options or ReadingOptions(), known_kinds=frozenset(kinds()))
         spools = [held.enter_context(Spool()) for _ in surveys]
         tallies = [
             _measure(source, spool, format, options, rules, bool(keep_going), progress)
@@ -95,7 +97,9 @@ def ingest(
         for path, target, tally in zip(surveys, targets, tallies, strict=True):
             if tally.refused:
                 stations = _listed_stations(tally, options) if format in _LISTS else []
-                text = rejects_text(path, format, tally.refused, stations)
+                sheet = None if options is None else options.sheet
+                header = tally.stream.header
+                text = rejects_text(path, format, tally.refused, stations, header=header, sheet=sheet)
                 held.enter_context(_published(target, text))
         with open_database(url, lock_timeout=_PATIENCE) as database, database.session() as session:
             solids = KnownSolids()
@@ -131,7 +135,7 @@ def _check_codes(tallies: Sequence[Tally], spools: Sequence[Spool]) -> None:
                 raise SurveyError(what, where=place, remedy="give each stone a code of its own")
 
 
-_LISTS = ("pnezd", "penzd")
+_LISTS = ("csv", "pnezd", "penzd", "gsi")
 
 
 def _listed_stations(tally: Tally, options: ReadingOptions | None) -> list[int]:
@@ -152,10 +156,19 @@ def _measure(
 ) -> Tally:
     """Write the good stones of one file into a spool; raise at the first bad one, or keep it for the rejects."""
     path = source.path
-    tally = Tally(path, survey_stones(open_survey(path, format, source.options(options))), source.files)
+    tally = Tally(
+        path,
+        survey_stones(open_survey(path, format, source.options(options))),
+        source.files,
+        options or ReadingOptions(),
+    )
     stage, head, kinds = f"fit {path.name}", tally.stream.head, set[str]()
     for one in tally.stream.stones:
-        made = one if isinstance(one, Reject) else _of_known_kind(apply_rules(one, rules), head.path, kinds)
+        made = (
+            one
+            if isinstance(one, Reject)
+            else _of_known_kind(apply_rules(one, rules), head.path, kinds, format not in ("moma", "solids"))
+        )
         if not isinstance(made, Reject):
             tally.count(made)
             spool.append(stone_record(made))
@@ -168,6 +181,9 @@ def _measure(
         first = f"; the first: {tally.refused[0].error}" if tally.refused else ""
         what = f"none of its {len(tally.refused)} stones can be ingested{first}"
         raise SurveyError(what, where=str(path), remedy="correct the file")
+    if format not in ("moma", "solids") and (question := tally.unit_question()) is not None:
+        what, _, remedy = question.partition(": ")
+        raise SurveyError(what, where=str(path), remedy=f"{remedy}, or --unit m if they are that large")
     return tally
 
 
@@ -201,7 +217,7 @@ def _kept(stones: Iterator[StoneRecord], session: Session, solids: KnownSolids) 
         yield stone
 
 
-def _of_known_kind(block: SurveyedBlock, path: str, known: set[str]) -> SurveyedBlock | Reject:
+def _of_known_kind(block: SurveyedBlock, path: str, known: set[str], tables: bool) -> SurveyedBlock | Reject:
     """Return the stone, or a reject if the hierarchy has no such kind; `known` collects kinds found there."""
     if block.kind in known:
         return block
@@ -210,7 +226,10 @@ def _of_known_kind(block: SurveyedBlock, path: str, known: set[str]) -> Surveyed
     except UsageError as error:
         record = block.face.record
         where = f"{path}:{record.line}: stone {block.code}"
-        return Reject(block.code, SurveyError(error.what, where=where, remedy=error.remedy), record.spans)
+        remedy = error.remedy
+        if tables:
+            remedy = f'{remedy} Or say what it stands for, e.g. --kinds "{block.kind}=ashlar"'
+        return Reject(block.code, SurveyError(error.what, where=where, remedy=remedy), record.spans)
     known.add(block.kind)
     return block
 

@@ -6,21 +6,43 @@ from pathlib import Path
 
 from moma.errors import UsageError
 from survey.formats.options import ReadingOptions
-from survey.formats.reading import solid_files, with_header
+from survey.formats.reading import ENDINGS, format_of, solid_files, with_header
+from survey.formats.tables.columns import UNITS
+from survey.formats.tables.kinds import read_kinds
 
-__all__ = ["UNITS", "Source", "reading_options", "survey_sources"]
+__all__ = ["UNITS", "Source", "format_of_all", "reading_options", "survey_sources"]
 
-UNITS: Mapping[str, float] = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "in": 0.0254}
-"""Units in which solids may be given, by their length [m]."""
-
-
-_ENDINGS: Mapping[str, tuple[str, ...]] = {
-    "moma": (".moma",),
-    "csv": (".csv",),
-    "pnezd": (".txt", ".csv"),
-    "penzd": (".txt", ".csv"),
-}
+_ENDINGS: Mapping[str, tuple[str, ...]] = {**ENDINGS, "pnezd": (".txt", ".csv"), "penzd": (".txt", ".csv")}
 """Endings of the files that are read of a folder, by format."""
+
+
+def format_of_all(paths: Sequence[str | Path]) -> str:
+    """Return the format of survey files, or of those in folders, by their endings and first lines.
+
+    Raises
+    ------
+    UsageError : a file does not tell its format, or they differ
+    """
+    found: dict[str, Path] = {}
+    for path in map(Path, paths):
+        if not path.exists():
+            raise UsageError("no such file", where=str(path), remedy="name a survey file")
+        if path.is_dir():
+            known = {one for ends in ENDINGS.values() for one in ends} - {".json", ".xml"}
+            inside = {
+                format_of(one): one
+                for one in sorted(path.iterdir())
+                if one.suffix.lower() in known and one.is_file()
+            }
+            found.update(inside or {"moma": path})
+        else:
+            found.setdefault(format_of(path), path)
+    if len(found) > 1:
+        names = " and ".join(f"{path.name} ({name})" for name, path in sorted(found.items()))
+        raise UsageError(
+            f"files of different formats: {names}", remedy="ingest them one after the other, or give --format"
+        )
+    return next(iter(found), "moma")
 
 
 @dataclass(frozen=True)
@@ -97,6 +119,11 @@ def reading_options(
     unit: str | None = None,
     snap: float | None = None,
     planes: float | None = None,
+    columns: str | None = None,
+    sheet: str | None = None,
+    kinds: str | None = None,
+    up: str | None = None,
+    repair: float | None = None,
 ) -> ReadingOptions:
     """Gather the options of a reader; None keeps the default.
 
@@ -106,16 +133,29 @@ def reading_options(
     codes : template of the codes of a point list
     kind : of stones without one
     sigma : of a coordinate, where the file has none; it takes precedence over the header file [m]
-    unit : one of `UNITS`, in which solids are given
+    unit : one of `UNITS`, in which coordinates are given
     snap : tolerance within which faces of neighbouring solids are brought into one plane [m]
     planes : distance within which the facets of a scanned solid are one plane face [m]
+    columns : names of columns of a table by what they are, e.g. ``block=Stein,x=Rechts``
+    sheet : of a workbook
+    kinds : abbreviations of kinds, e.g. ``SPR=springer``, or a file with them
+    up : axis that points upwards in files of solids, "y" or "z"
+    repair : distance within which faults of solids are repaired [m]; 0: none is
 
     Raises
     ------
     UsageError : the sigma is not positive, there is no such header file or unit, or the tolerance is negative
     SurveyError : naming the line of the header file that is wrong
     """
-    options = ReadingOptions(codes=codes)
+    options = ReadingOptions(codes=codes, columns=columns, sheet=sheet, up=up, repair=repair)
+    if repair is not None and not 0.0 <= repair < 1.0:
+        what, remedy = (
+            f"the tolerance is {repair:g} m",
+            "give it in metres, e.g. 0.001; 0: nothing is repaired",
+        )
+        raise UsageError(what, where="--repair", remedy=remedy)
+    if kinds is not None:
+        options = replace(options, kinds=read_kinds(kinds))
     if kind is not None:
         options = replace(options, kind=kind.lower())
     if header is not None:

@@ -4,14 +4,17 @@ A file of rejects has the format and the header of the survey: once corrected, i
 """
 
 import codecs
+import csv
 import hashlib
+import io
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import BinaryIO
 
 from moma.errors import UsageError
-from survey.formats.reading import SOLIDS
+from survey.formats.reading import ENDINGS, SOLIDS
+from survey.formats.tables.rows import is_workbook, open_rows
+from survey.formats.text_lines import TextLines
 from survey.records.survey import Reject
 
 __all__ = ["MARK", "check_targets", "default_path", "rejects_text"]
@@ -19,13 +22,19 @@ __all__ = ["MARK", "check_targets", "default_path", "rejects_text"]
 MARK = b"# rejected by moma"
 """First or second line of the files, by which they are recognised."""
 
+_BY_LINES = ("moma", "csv", "pnezd", "penzd", "gsi")
+"""Formats of which each line is of one stone; of others, reasons alone are written."""
+
+_PLAIN = (*SOLIDS, *ENDINGS["landxml"], *ENDINGS["jobxml"], *ENDINGS["geojson"])
+_BOOKS = (".xlsx", ".xls", ".xlsb", ".ods")
 _STONE = re.compile(rb"\s*stone\b")
 
 
 def default_path(survey: Path) -> Path:
     """Return the default file for the rejects of a survey file: beside it, ``NAME.rejects.SUFFIX``."""
     plain = survey.resolve() if survey.is_dir() else survey
-    suffix = ".txt" if survey.is_dir() or survey.suffix.lower() in SOLIDS else survey.suffix
+    ending = survey.suffix.lower()
+    suffix = ".csv" if ending in _BOOKS else ".txt" if survey.is_dir() or ending in _PLAIN else survey.suffix
     return plain.with_name(f"{plain.stem}.rejects{suffix}")
 
 
@@ -50,8 +59,16 @@ def check_targets(targets: Sequence[Path], surveys: Sequence[Path]) -> None:
         _check_replaceable(target)
 
 
-def rejects_text(survey: Path, format: str, rejects: Sequence[Reject], kept: Iterable[int] = ()) -> bytes:
-    """Write the rejected stones of a survey file in its own format.
+def rejects_text(
+    survey: Path,
+    format: str,
+    rejects: Sequence[Reject],
+    kept: Iterable[int] = (),
+    *,
+    header: int = 0,
+    sheet: str | None = None,
+) -> bytes:
+    """Write the rejected stones of a survey file in its own format; those of a workbook as text.
 
     Parameters
     ----------
@@ -59,11 +76,16 @@ def rejects_text(survey: Path, format: str, rejects: Sequence[Reject], kept: Ite
     format : name of its format
     rejects : stones that could not be ingested
     kept : lines of the survey that its stones depend on, such as stations in a list of points
+    header : number of lines at the beginning of a table that hold for all stones
+    sheet : of a workbook
     """
-    head = [] if format == "solids" else _head_lines(survey, format)
+    by_lines = format in _BY_LINES
+    head = _head_lines(survey) if format == "moma" else []
+    if by_lines and header:
+        head = [line for _, line in _picked(survey, set(range(1, header + 1)), sheet)]
     ordered = sorted(rejects, key=lambda one: one.spans[0].start if one.spans else 0)
-    wanted = {line for one in ordered for span in one.spans for line in span} if format != "solids" else set()
-    lines = dict(_picked(survey, wanted.union(kept))) if wanted else {}
+    wanted = {line for one in ordered for span in one.spans for line in span} if by_lines else set()
+    lines = dict(_picked(survey, wanted.union(kept), sheet)) if wanted else {}
     text = head + [lines[line] for line in sorted(kept) if line in lines]
     for one in ordered:
         reason = " ".join(str(one.error).split())
@@ -96,30 +118,34 @@ def _check_replaceable(path: Path) -> None:
     raise UsageError(what, where=str(path), remedy="move it away, or name another file with --rejects")
 
 
-def _head_lines(survey: Path, format: str) -> list[bytes]:
-    """Return the lines that hold for all stones of a file."""
+def _head_lines(survey: Path) -> list[bytes]:
+    """Return the lines of a native file before its first stone."""
     head = []
-    with survey.open("rb") as file:
-        for line in _ended(file):
-            if format == "moma" and _STONE.match(line):
-                break
-            head.append(line)
-            if format == "csv" and line.strip() and not line.lstrip().startswith(b"#"):
-                break
-            if format not in ("moma", "csv"):
-                return []
+    for _, line in _lines(survey):
+        if _STONE.match(line):
+            break
+        head.append(line)
     return head
 
 
-def _picked(survey: Path, wanted: set[int]) -> Iterator[tuple[int, bytes]]:
-    with survey.open("rb") as file:
-        for number, line in enumerate(_ended(file), start=1):
-            if number in wanted:
-                yield number, line
+def _picked(survey: Path, wanted: set[int], sheet: str | None) -> Iterator[tuple[int, bytes]]:
+    return (one for one in _lines(survey, sheet) if one[0] in wanted)
 
 
-def _ended(file: BinaryIO) -> Iterator[bytes]:
+def _lines(survey: Path, sheet: str | None = None) -> Iterator[tuple[int, bytes]]:
     """Yield lines that end in a line feed, without a byte order mark, since other lines will precede them."""
-    for number, line in enumerate(file):
-        plain = line.removeprefix(codecs.BOM_UTF8) if number == 0 else line
-        yield plain if plain.endswith(b"\n") else plain + b"\n"
+    if is_workbook(survey):
+        for number, row in open_rows(survey, sheet):
+            text = io.StringIO()
+            csv.writer(text, delimiter=";", lineterminator="\n").writerow(row)
+            yield number, text.getvalue().encode("utf-8")
+        return
+    text_lines = TextLines(survey)
+    if text_lines.is_converted:
+        for number, line in text_lines:
+            yield number, f"{line}\n".encode()
+        return
+    with survey.open("rb") as file:
+        for number, raw in enumerate(file, start=1):
+            plain = raw.removeprefix(codecs.BOM_UTF8) if number == 1 else raw
+            yield number, plain if plain.endswith(b"\n") else plain + b"\n"

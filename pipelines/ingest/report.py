@@ -1,7 +1,7 @@
 """Report on ingested survey files, counted stone by stone."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,8 +11,9 @@ import numpy as np
 from mechanics.arrays import Array
 from pipelines.ingest.records import frame_record
 from survey.extrusion.extrusion import SurveyedBlock
+from survey.formats.options import ReadingOptions
 from survey.geometry.convexity import is_convex
-from survey.quality.plausible import LENGTH, doubt_of
+from survey.quality.plausible import LENGTH, doubt_of, lies_on_its_side
 from survey.records.snapping import Snapping
 from survey.records.survey import Reject
 from survey.stones import SurveyedStream
@@ -72,6 +73,8 @@ class FileReport:
     solids : properties of the stones, in a file of solids
     remarks : changes that made the outlines of measured faces polygons, by stone code
     doubts : sizes that hardly any stone has, in words, by stone code
+    reading : how the file was read, in words
+    questions : what the file as a whole makes doubtful, with the option that would answer it
     """
 
     path: str
@@ -88,6 +91,8 @@ class FileReport:
     solids: SolidsReport | None = None
     remarks: dict[str, tuple[str, ...]] = field(default_factory=dict)
     doubts: dict[str, str] = field(default_factory=dict)
+    reading: tuple[str, ...] = ()
+    questions: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -105,6 +110,7 @@ class Tally:
     path: Path
     stream: SurveyedStream
     files: Sequence[Path]
+    options: ReadingOptions = field(default_factory=ReadingOptions)
     stones: Counter[str] = field(default_factory=Counter)
     rejected: dict[str, int] = field(default_factory=dict)
     shapes: dict[str, str] = field(default_factory=dict)
@@ -119,6 +125,8 @@ class Tally:
     decimals: int = 0
     changed: dict[str, tuple[str, ...]] = field(default_factory=dict)
     doubts: dict[str, str] = field(default_factory=dict)
+    units: Counter[str] = field(default_factory=Counter)
+    boxes: list[Array] = field(default_factory=list)
 
     def count(self, block: SurveyedBlock) -> None:
         """Count one more accepted stone."""
@@ -134,12 +142,15 @@ class Tally:
             self.changed[block.code] = face.remarks
         if (doubt := doubt_of(float(np.ptp(block.solid.vertices, axis=0).max()), LENGTH)) is not None:
             self.doubts[block.code] = doubt.text
+            self.units[doubt.option] += 1
         if face.provenance.source == "points" and face.fit.rms >= self.rms:
             self.rms, self.worst = face.fit.rms, block.code
 
     def _count_solid(self, block: SurveyedBlock) -> None:
         convex = is_convex(block.solid)
         self.convex[convex] += 1
+        vertices = block.solid.vertices
+        self.boxes.append(np.concatenate([vertices.min(axis=0), vertices.max(axis=0)]))
         if not convex:
             self.not_convex.append(block.code)
         if block.face.remarks:
@@ -171,7 +182,24 @@ class Tally:
             solids=self._solids(),
             remarks=self.changed,
             doubts=self.doubts,
+            reading=self.stream.remarks,
+            questions=tuple(self._questions()),
         )
+
+    def unit_question(self) -> str | None:
+        """Ask for the unit if most stones are of an impossible size; None if they are not, or it was given."""
+        (unit, count), *_ = [*self.units.most_common(1), ("", 0)]
+        total = self.stones.total()
+        if not unit or 2 * count <= total or self.options.unit is not None:
+            return None
+        return f"{count} of {total} stones have the size of stones in {unit}, not metres: give --unit {unit}"
+
+    def _questions(self) -> Iterator[str]:
+        """Ask for the unit, and for the axis if the stones lie on their side."""
+        if (question := self.unit_question()) is not None:
+            yield question
+        if self.boxes and self.options.up is None and lies_on_its_side(np.array(self.boxes)):
+            yield "few stones stand on others along z, but some do along y: if y points upwards, give --up y"
 
 
 def _has_decimals(places: Array, count: int) -> bool:

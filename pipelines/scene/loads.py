@@ -12,7 +12,7 @@ from mechanics.scene.loads.gravity import GravityRamp, TiltingTable
 from mechanics.scene.loads.ground_motion import Component, GroundMotion
 from mechanics.scene.loads.load import Force, GravityChange, Loads, Motion
 from mechanics.scene.loads.motions import ImposedMotion, settlement, spreading
-from mechanics.scene.loads.record_files import UNITS, read_accelerogram
+from mechanics.scene.loads.record_files import UNITS, read_accelerogram, read_station
 from mechanics.scene.loads.record_processing import band_pass, without_drift
 from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import Block, Fidelity
@@ -33,6 +33,8 @@ __all__ = [
     "read_throws",
     "thrown",
 ]
+
+_TABLES = (".csv", ".txt", ".dat", ".tsv")  # endings of records that seldom state a unit
 
 Codes = frozenset[str]
 Groups = Mapping[tuple[str, ...], Sequence[Codes]]
@@ -94,14 +96,25 @@ LOAD_TYPES: Mapping[str, tuple[Key, ...]] = {
         Key(
             "x",
             ValueKind.TEXT,
-            "File of the record along x: PEER's .AT2, or a table of time and acceleration.",
+            "File of the record along x: of PEER, ESM or ITACA, K-NET, SMC, MiniSEED, SAC, or a table.",
             default=None,
         ),
         Key("y", ValueKind.TEXT, "File of the record along y.", default=None),
         Key("z", ValueKind.TEXT, "File of the record along z.", default=None),
         Key(
-            "unit", ValueKind.TEXT, "Unit of the acceleration in tables.", default=None, choices=tuple(UNITS)
+            "station",
+            ValueKind.TEXT,
+            "Instead of x, y and z: all components of one station, e.g. `IT.AQV.*.ASC`; east is x, north is y.",
+            default=None,
         ),
+        Key(
+            "unit",
+            ValueKind.TEXT,
+            "Unit of the acceleration in files that state none.",
+            default=None,
+            choices=tuple(UNITS),
+        ),
+        Key("dt", ValueKind.NUMBER, "Time step of records in files that state none.", "s", None, above=0),
         Key("azimuth", ValueKind.NUMBER, "Angle by which x and y are first turned about z.", "°", 0.0),
         *keys_of(GroundMotion),
         Key("low", ValueKind.NUMBER, "Lower corner of a Butterworth filter, if any.", "Hz", None, above=0),
@@ -260,25 +273,33 @@ def thrown(
 def _with_records(document: TomlDocument, entry: ArrayTable) -> ArrayTable:
     """Return the entry with records in place of their file names."""
     values = dict(entry.values)
-    if not any(values[axis] for axis in "xyz"):
-        document.fail("a ground motion without a record", *entry.path, remedy="give at least one of x, y, z")
-    for axis in "xyz":
-        if values[axis] is not None:
-            values[axis] = _record(document, entry, axis)
+    given = [axis for axis in "xyz" if values[axis] is not None]
+    if bool(given) == (values["station"] is not None):
+        document.fail(
+            "a ground motion without a record" if not given else "records by axes and by station",
+            *entry.path,
+            remedy="give at least one of x, y, z, or station",
+        )
+    for axis in given:
+        path = file_beside(document, values[axis])
+        if values["unit"] is None and path.suffix.lower() in _TABLES and not path.exists():
+            what = f"the unit of the acceleration in {values[axis]!r} is not known, and there is no such file"
+            document.fail(what, *entry.path, axis, remedy="give 'unit', and check the path")
+        record = read_accelerogram(path, values["unit"], values["dt"], axis)
+        with document.at(*entry.path, axis):
+            values[axis] = _processed(record, values)
+    if not given:
+        found = read_station(file_beside(document, values["station"]), values["unit"], values["dt"])
+        with document.at(*entry.path, "station"):
+            values["station"] = tuple(_processed(one, values) for one in found)
     return ArrayTable(entry.path, entry.type, values, entry.groups)
 
 
-def _record(document: TomlDocument, entry: ArrayTable, axis: str) -> Accelerogram:
-    values = entry.values
-    path = file_beside(document, values[axis])
-    if path.suffix.lower() != ".at2" and values["unit"] is None:
-        what = f"the unit of the acceleration in {values[axis]!r} is not known"
-        document.fail(what, *entry.path, axis, remedy="give 'unit'")
-    record = read_accelerogram(path, values["unit"])
-    with document.at(*entry.path, axis):
-        if values["low"] is not None or values["high"] is not None:
-            record = band_pass(record, values["low"], values["high"], values["order"])
-        return without_drift(record, values["baseline"]) if values["baseline"] else record
+def _processed(record: Accelerogram, values: Mapping[str, Any]) -> Accelerogram:
+    """Return a record filtered and corrected as the keys of its load ask for."""
+    if values["low"] is not None or values["high"] is not None:
+        record = band_pass(record, values["low"], values["high"], values["order"])
+    return without_drift(record, values["baseline"]) if values["baseline"] else record
 
 
 def _tilt(values: Mapping[str, Any]) -> TiltingTable:
@@ -358,6 +379,10 @@ def _ground_motion(values: Mapping[str, Any], groups: Sequence[Codes]) -> tuple[
     directions = {"x": along, "y": across, "z": (0.0, 0.0, 1.0)}
     components = tuple(
         Component(directions[axis], values[axis]) for axis in "xyz" if values[axis] is not None
+    )
+    axes = np.array([directions[axis] for axis in "xyz"])
+    components += tuple(
+        Component(tuple((np.array(one.direction) @ axes).tolist()), one) for one in values["station"] or ()
     )
     return (GroundMotion(groups[0], components, values["scale"], values["start"]),)
 

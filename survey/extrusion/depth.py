@@ -59,8 +59,8 @@ def depth_for(record: BlockRecord, rules: Sequence[DepthRule]) -> Depth:
         raise SurveyError(
             f"no depth is known for a {record.kind}",
             where=where,
-            remedy=f"measure it, or state 'depth {record.kind} D source TEXT' in the head of the survey or a header "
-            "file",
+            remedy=f"measure it, or state 'depth {record.kind} D source TEXT' in the head of the survey, or in a "
+            "header file (begun by 'moma-survey 1') that --header names",
         )
     best = max(holding, key=_rank)
     alike = sorted(rule.line for rule in holding if _rank(rule) == _rank(best))

@@ -1,6 +1,7 @@
 """Options of the readers, and the reading of a whole file at once."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from moma.errors import UsageError
@@ -21,11 +22,17 @@ class ReadingOptions:
     kind : of stones without a kind in the file
     sigma : standard deviation of a coordinate, where the file states none [m]
     head : from a header file, for formats that have no head of their own
-    unit : length of the unit in which solids are given [m]
+    unit : length of the unit in which coordinates are given, where columns state none [m]; None: metres, unless asked
+    columns : names of columns by what they are, e.g. ``block=Stein,x=Rechts``; None: known names
+    sheet : of a workbook; None: the only one
+    kinds : kinds of stones by their abbreviation in lower case
+    known_kinds : all kinds that there are; empty: any
     flat : distance from a plane within which the corners of a polygon of a solid count as plane [m]; at least `snap`
     snap : tolerance within which matching faces of neighbouring solids are brought into one plane [m]; 0: none is
     planes : distance of the facets of a scanned solid from a plane within which they are one face [m]; 0: every
         facet is kept
+    up : axis that points upwards in files of solids, "y" or "z"; None: z, unless asked
+    repair : distance within which faults of solids are repaired [m]; None: 10⁻⁵ of their size; 0: none is
     files : files of solids that are one survey together; none: only the given one
     """
 
@@ -33,11 +40,22 @@ class ReadingOptions:
     kind: str = "ashlar"
     sigma: float = 0.003
     head: SurveyHead | None = None
-    unit: float = 1.0
+    unit: float | None = None
+    columns: str | None = None
+    sheet: str | None = None
+    kinds: Mapping[str, str] = field(default_factory=dict)
+    known_kinds: frozenset[str] = frozenset()
     flat: float = 0.0
     snap: float = 0.0
     planes: float = 0.005
+    up: str | None = None
+    repair: float | None = None
     files: tuple[Path, ...] = ()
+
+    @property
+    def scale(self) -> float:
+        """Length of the unit of coordinates [m]."""
+        return 1.0 if self.unit is None else self.unit
 
     def head_for(self, path: Path) -> SurveyHead:
         """Make the head of a file without one of its own: that of the header file, under the file's own path."""

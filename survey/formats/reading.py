@@ -4,17 +4,22 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from moma.errors import UsageError
+from survey.formats.fields import unreadable
 from survey.formats.native.reader import open_moma, read_head, with_header
 from survey.formats.options import ReadingOptions, whole
-from survey.formats.points.csv import open_csv
-from survey.formats.points.pnezd import open_penzd, open_pnezd
+from survey.formats.points.geojson import open_geojson
+from survey.formats.points.gsi import open_gsi
+from survey.formats.points.survey_xml import open_jobxml, open_landxml
+from survey.formats.tables.reader import open_csv, open_penzd, open_pnezd
 from survey.records.survey import Survey, SurveyStream
 
 __all__ = [
+    "ENDINGS",
     "FORMATS",
     "SOLIDS",
     "Reader",
     "ReadingOptions",
+    "format_of",
     "open_survey",
     "read_head",
     "read_survey",
@@ -47,14 +52,71 @@ def solid_files(folder: Path) -> tuple[Path, ...]:
     return tuple(found)
 
 
-SOLIDS = (".obj", ".ply", ".stl", ".msh")
+ENDINGS: Mapping[str, tuple[str, ...]] = {
+    "moma": (".moma",),
+    "csv": (".csv", ".tsv", ".xlsx", ".xls", ".xlsb", ".ods", ".wkt"),
+    "gsi": (".gsi",),
+    "jobxml": (".jxl", ".jobxml"),
+    "landxml": (".landxml", ".xml"),
+    "geojson": (".geojson", ".json"),
+    "solids": (".obj", ".ply", ".stl", ".msh"),
+}
+"""Endings of files by their format; ``.xml`` may be JobXML too, and ``.txt`` any list."""
+
+_LISTS = (
+    "give --format pnezd (northing first), penzd (easting first), or csv for a table with names of columns"
+)
+_DRAWN = "export closed solids as OBJ or STL, or outlines with z as GeoJSON"
+WAYS_OUT: Mapping[str, str] = {
+    **dict.fromkeys((".txt", ".asc", ".dat", ".pnt", ".pts", ".xyz", ".tab", ".prn", ".coo"), _LISTS),
+    **dict.fromkeys((".dxf", ".dwg", ".dgn", ".3dm", ".skp", ".blend", ".ifc", ".step", ".stp", ".igs"), _DRAWN),
+    **dict.fromkeys((".fbx", ".glb", ".gltf", ".dae", ".3ds", ".off", ".wrl", ".vtk", ".vtu"), _DRAWN),
+    **dict.fromkeys((".gpkg", ".shp", ".kml", ".gml", ".fgb"), "export the layer as GeoJSON with z, in metres"),
+    **dict.fromkeys((".las", ".laz", ".e57", ".ptx"), "a point cloud has no stones: see moma ingest --help for clouds"),
+    **dict.fromkeys((".raw", ".fld", ".idx", ".job", ".sdr", ".are", ".cor", ".m5", ".rw5"),
+                    "export the coordinates with their codes as a point list (CSV), GSI, LandXML or JobXML"),
+    **dict.fromkeys((".pdf", ".docx", ".doc", ".numbers"), "export the table itself as CSV or XLSX"),
+}  # fmt: skip
+"""Ways out for files that are not read, or not without a format, by ending."""
+
+SOLIDS = ENDINGS["solids"]
 """Endings of files of solids."""
+
+
+def format_of(path: Path) -> str:
+    """Return the format of a file by its first line and its ending.
+
+    Raises
+    ------
+    UsageError
+        if they do not say, with the way out
+    """
+    try:
+        with path.open("rb") as handle:
+            start = handle.read(2000)
+    except OSError as error:
+        raise unreadable(path, error, "give an existing survey file") from error
+    ending = path.suffix.lower()
+    if start.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"moma-survey"):
+        return "moma"
+    if ending == ".xml" and b"<JOBFile" in start:
+        return "jobxml"
+    for format, endings in ENDINGS.items():
+        if ending in endings:
+            return format
+    remedy = WAYS_OUT.get(ending, f"give --format, one of {', '.join(FORMATS)}")
+    raise UsageError(f"the ending {ending!r} does not tell the format", where=str(path), remedy=remedy)
+
 
 FORMATS: Mapping[str, Reader] = {
     "moma": open_moma,
     "csv": open_csv,
     "pnezd": open_pnezd,
     "penzd": open_penzd,
+    "gsi": open_gsi,
+    "jobxml": open_jobxml,
+    "landxml": open_landxml,
+    "geojson": open_geojson,
     "solids": _open_solids,
 }
 """Readers by the name of their format."""

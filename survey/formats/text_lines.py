@@ -4,11 +4,14 @@ A file is read twice, each time in blocks of whole lines, so that memory does no
 encoding and to refuse control characters, then for its lines. UTF-8 is tried first, with or without a byte order
 mark: hardly any text in another encoding is valid UTF-8 by chance. Everything else is taken as Latin-1, with the
 quotation marks and dashes that Windows adds to it (code page 1252), in which nearly every byte is a character; other
-encodings and binary files show by their control characters.
+encodings and binary files show by their control characters. UTF-16 with its mark, which Excel writes as "Unicode
+text", and lines that end in carriage returns alone, as on old Macintoshes, are converted in memory.
 """
 
+import io
 from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO
 
 from moma.errors import SurveyError
 from survey.formats.fields import unreadable
@@ -20,6 +23,17 @@ _LONGEST = 1 << 16  # bytes of one line: far beyond any table that people write
 _MARK = b"\xef\xbb\xbf"
 _CONTROLS = bytes([*range(9), 11, 12, *range(14, 32), 127])  # all but tab, line feed and carriage return
 _SAVE_AS = "save the file as UTF-8 text"
+_WIDE = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
+_WIDEST = (b"\xff\xfe\x00\x00", b"\x00\x00\xfe\xff")  # UTF-32
+_LARGEST = 1 << 28  # bytes of a file that is converted in memory
+_BINARY = (
+    (b"PK\x03\x04", "a workbook (XLSX, ODS) or another compressed file", "read it with --format csv"),
+    (b"\xd0\xcf\x11\xe0", "an old workbook (XLS)", "read it with --format csv"),
+    (b"%PDF", "a PDF", "export the table itself"),
+    (b"LASF", "a point cloud (LAS)", "it has no stones: see moma ingest --help for clouds"),
+    (b"ASTM-E57", "a point cloud (E57)", "it has no stones: see moma ingest --help for clouds"),
+    (b"SQLite format 3", "a database (GeoPackage or another)", "export it as GeoJSON with z, or as a table with WKT"),
+)  # fmt: skip
 
 
 class TextLines:
@@ -44,8 +58,14 @@ class TextLines:
         """
         self.path = str(path)
         self._skip = 0
+        self._converted: bytes | None = None
         self.encoding = self._find_encoding()
         self.end = self._check_characters()
+
+    @property
+    def is_converted(self) -> bool:
+        """True if the file has another encoding or other line ends than its lines here."""
+        return self._converted is not None
 
     def __iter__(self) -> Iterator[tuple[int, str]]:
         number = 0
@@ -69,12 +89,42 @@ class TextLines:
         """Make an error that names a line of this file."""
         return SurveyError(what, where=f"{self.path}:{line}", remedy=remedy)
 
+    def _convert(self) -> None:
+        """Convert UTF-16, or lines that end in carriage returns alone, to UTF-8 with line feeds."""
+        try:
+            with Path(self.path).open("rb") as handle:
+                start = handle.read(_BLOCK)
+                wide = next((code for mark, code in _WIDE.items() if start.startswith(mark)), None)
+                if start.startswith(_WIDEST):
+                    raise self.fail(1, "the text is UTF-32", _SAVE_AS)
+                if wide is None and (b"\r" not in start or b"\n" in start):
+                    return
+                data = start + handle.read(_LARGEST)
+                if handle.read(1):
+                    raise self.fail(1, f"UTF-16, or old line ends, in more than {_LARGEST} bytes", _SAVE_AS)
+        except (OSError, ValueError) as error:
+            raise unreadable(self.path, error, "give an existing survey file") from error
+        if wide is not None:
+            try:
+                data = data.decode(wide).encode("utf-8")
+            except UnicodeError as error:
+                raise self.fail(1, "the file begins with the mark of UTF-16, but is not", _SAVE_AS) from error
+            if b"\r" in data and b"\n" not in data:
+                data = data.replace(b"\r", b"\n")
+        elif b"\n" not in data:
+            data = data.replace(b"\r", b"\n")
+        else:
+            return
+        self._converted = data
+
     def _find_encoding(self) -> str:
+        self._convert()
         marked, line = False, 1
         for number, block in enumerate(self._blocks()):
             if number == 0:
-                if block.startswith((b"\xff\xfe", b"\xfe\xff")):
-                    raise self.fail(1, "the text is UTF-16 or UTF-32", _SAVE_AS)
+                for start, what, remedy in _BINARY:
+                    if block.startswith(start):
+                        raise self.fail(1, f"this is {what}, not text", remedy)
                 marked = block.startswith(_MARK)
             try:
                 block.decode("utf-8")
@@ -119,7 +169,7 @@ class TextLines:
         """Read blocks of whole lines."""
         line, rest = 1, b""
         try:
-            with Path(self.path).open("rb") as handle:
+            with self._open() as handle:
                 handle.seek(self._skip)
                 while block := handle.read(_BLOCK):
                     block = rest + block
@@ -134,6 +184,9 @@ class TextLines:
             raise unreadable(self.path, error, "give an existing survey file") from error
         if rest:
             yield self._checked(rest, line)
+
+    def _open(self) -> BinaryIO:
+        return Path(self.path).open("rb") if self._converted is None else io.BytesIO(self._converted)
 
     def _checked(self, block: bytes, line: int) -> bytes:
         """Return the block unless one of its lines is too long."""

@@ -5,6 +5,9 @@ boundary of the stone is carried along in pieces: a region between cuts is conve
 boundary lies in front of the plane of another; it is then the intersection of the half-spaces of its pieces and
 cuts. Regions are never represented in any other way, so no cut faces with holes arise.
 
+A stone that no such cuts divide, as with many facets that fold this way and that, is divided into pyramids on its
+faces, with their common apex at the place from which all faces are seen best, if there is one.
+
 A cut is better the fewer reflex edges it leaves: planes through two of them come before the continuation of a face,
 and this before the bisector. Of the possible first cuts, the one is taken that ends in the fewest parts, and of
 these the one whose thinnest part is thickest.
@@ -14,6 +17,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import linprog
 
 from moma.errors import GeometryError
 from survey.arrays import Array
@@ -84,18 +88,21 @@ class _Cutter:
         beginnings = [cut for rank, cut in ranked if rank[0] == ranked[0][0][0]][:_BEGINNINGS]
         starts: list[Plane | None] = [*beginnings] or [None]
         found = [parts for parts in (self._follow(whole, first) for first in starts) if parts is not None]
-        if not found:
+        filling = [parts for parts in found if self._is_filled(parts)]
+        if not filling:
+            pyramids = self._pyramids()
+            filling = [pyramids] if pyramids is not None and self._is_filled(pyramids) else []
+        if not filling and found:
+            raise GeometryError(
+                "its convex parts do not fill it: its faces are not quite planar, or cross each other",
+                where=f"stone {self._solid.code}",
+                remedy="divide it into several stones, or export its faces as triangles",
+            )
+        if not filling:
             raise GeometryError(
                 f"it is not convex, and would take more than {self._most} convex parts",
                 where=f"stone {self._solid.code}",
                 remedy="simplify it, or divide it into several stones",
-            )
-        filling = [parts for parts in found if self._is_filled(parts)]
-        if not filling:
-            raise GeometryError(
-                "its convex parts do not fill it: its faces are not quite planar",
-                where=f"stone {self._solid.code}",
-                remedy="make them planar: moma ingest --snap",
             )
         best = max(filling, key=self._worth)
         return tuple(replace(part, vertices=self._placed(part.vertices)) for part in best)
@@ -116,6 +123,25 @@ class _Cutter:
                     longest = max(float(np.linalg.norm(one)) for one in (b - a, c - b, a - c))
                     if float(np.linalg.norm(np.cross(b - a, c - a))) > self._flat * longest:
                         yield k, tuple(corners[i] for i in triangle)
+
+    def _pyramids(self) -> list[Solid] | None:
+        """Return pyramids on all faces; None if there are too many, or no place from which all faces are seen."""
+        pieces = list(self._pieces())
+        planes = np.array([self._planes[k] for k, _ in pieces])
+        apex = _farthest_behind(planes)
+        if (
+            len(pieces) > self._most
+            or apex is None
+            or (planes[:, 3] - planes[:, :3] @ apex).min() <= self._flat
+        ):
+            return None
+        parts = []
+        for _, polygon in pieces:
+            n = len(polygon)
+            sides = [(n, (i + 1) % n, i) for i in range(n)]
+            vertices = np.array([*polygon, apex])
+            parts.append(Solid(self._solid.code, vertices, (tuple(range(n)), *sides)))
+        return parts
 
     def _follow(self, whole: _Region, first: Plane | None) -> list[Solid] | None:
         """Cut until all regions are convex; return None if that takes too many parts."""
@@ -234,6 +260,15 @@ class _Cutter:
     def _is_filled(self, parts: Sequence[Solid]) -> bool:
         whole = volume_of(self._local)
         return abs(sum(map(volume_of, parts)) - whole) <= _SAME_VOLUME * whole
+
+
+def _farthest_behind(planes: Array) -> Array | None:
+    """Return the place (3,) whose least distance behind planes (n, 4) is the largest; None if there is none."""
+    rows = np.column_stack([planes[:, :3], np.ones(len(planes))])
+    found = linprog(
+        [0.0, 0.0, 0.0, -1.0], A_ub=rows, b_ub=planes[:, 3], bounds=[(None, None)] * 3 + [(0.0, None)]
+    )
+    return None if found.x is None else np.asarray(found.x[:3], dtype=np.float64)
 
 
 def _place(row: Sequence[float]) -> Place:

@@ -8,7 +8,21 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-__all__ = ["DENSITY", "FRICTION", "LENGTH", "POISSON", "YOUNG", "Doubt", "Range", "doubt_of"]
+import numpy as np
+
+from survey.arrays import Array
+
+__all__ = [
+    "DENSITY",
+    "FRICTION",
+    "LENGTH",
+    "POISSON",
+    "YOUNG",
+    "Doubt",
+    "Range",
+    "doubt_of",
+    "lies_on_its_side",
+]
 
 
 @dataclass(frozen=True)
@@ -96,6 +110,37 @@ FRICTION = Range(
 )
 
 
+_OPTIONS = {"millimetres": "mm", "centimetres": "cm", "feet": "ft", "inches": "in"}
+_MANY = 1000  # stones of which it is asked on what they stand
+_LOWER = 0.25  # of its height: how much lower the centre of a stone is on which another stands
+
+
+def lies_on_its_side(boxes: Array) -> bool:
+    """Return whether solids stand on others along y, but not along z: the axes of another program.
+
+    Parameters
+    ----------
+    boxes : (n, 6) lower and upper corner of each [m]
+    """
+    along_y, along_z = (_standing(boxes, axis) for axis in (1, 2))
+    flat = np.ptp(boxes.reshape(-1, 2, 3), axis=(0, 1))
+    thin = flat[2] < min(flat[0], flat[1])
+    return along_y > 0 and (along_z == 0 or (bool(thin) and along_y > 3 * along_z))
+
+
+def _standing(boxes: Array, axis: int) -> int:
+    """Count the solids, of at most a thousand, whose box meets that of a lower one."""
+    lower, upper = boxes[:, :3], boxes[:, 3:]
+    centre = 0.5 * (lower + upper)[:, axis]
+    count = 0
+    for k in np.linspace(0, len(boxes) - 1, min(len(boxes), _MANY)).astype(int):
+        reach = 0.01 * (upper[k] - lower[k])
+        near = ((lower <= upper[k] + reach) & (upper >= lower[k] - reach)).all(axis=1)
+        below = centre[k] - centre > _LOWER * (upper[k] - lower[k])[axis]
+        count += bool((near & below).any())
+    return count
+
+
 @dataclass(frozen=True)
 class Doubt:
     """A value outside the usual range.
@@ -104,10 +149,12 @@ class Doubt:
     ----------
     text : the value, the usual range, and the likely unit
     impossible : no stone has such a value
+    option : name of the unit of length in which it would be usual, as an option has it; empty if there is none
     """
 
     text: str
     impossible: bool
+    option: str = ""
 
 
 def doubt_of(value: float, of: Range) -> Doubt | None:
@@ -127,5 +174,6 @@ def doubt_of(value: float, of: Range) -> Doubt | None:
     text = f"{of.quantity} {value:.4g}{unit} {found}: {of.reason}"
     for name, meant in of.units if impossible else ():
         if of.usual[0] <= meant(value) <= of.usual[1]:
-            return Doubt(f"{text}; in {name} it would be {meant(value):.4g}{unit}", impossible)
+            text = f"{text}; in {name} it would be {meant(value):.4g}{unit}"
+            return Doubt(text, impossible, _OPTIONS.get(name, ""))
     return Doubt(text, impossible)

@@ -325,11 +325,15 @@ class SurveyStream:
     blocks : the stones in the order of the file, an iterator to be consumed once; a wrong stone comes as a
         Reject, a file that is wrong as a whole raises SurveyError
     snapping : of solids, the changes that brought their faces into common planes; None if not asked for
+    header : number of the lines at its beginning that hold for all stones
+    remarks : on how the file was read, in words
     """
 
     head: SurveyHead
     blocks: Iterator[BlockRecord | SolidRecord | Reject]
     snapping: Snapping | None = None
+    header: int = 0
+    remarks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

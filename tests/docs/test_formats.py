@@ -15,8 +15,8 @@ from pipelines.results.vtk import body_cells, body_grid, contact_grid, joint_gri
 from survey.formats.native import reader as moma_ascii
 from survey.formats.native.header import HeadReader
 from survey.formats.native.stone import STONE_WORDS
-from survey.formats.points.csv import NEEDED, OPTIONAL
 from survey.formats.reading import FORMATS, ReadingOptions, open_survey, with_header
+from survey.formats.tables.reader import NEEDED, OPTIONAL
 from survey.geometry.solids import Solid
 from survey.records.survey import Reject
 from tests.paths import ROOT
@@ -120,9 +120,11 @@ def test_the_tables_are_read(tmp_path):
     _, (block,) = stones(tmp_path / "a.csv", one, "csv")
     assert (block.code, block.depth, block.sigmas.tolist()) == ("W01-01", 0.51, [0.003, 0.003, 0.003, 0.010])
     _, (block,) = stones(tmp_path / "b.csv", other, "csv")
-    assert (block.zone, block.depth, block.depth_sigma) == ("west bay", 0.45, 0.02)
+    assert (block.code, block.kind, block.zone) == ("B_1", "sill", "west bay")
+    assert (block.depth, block.depth_sigma) == pytest.approx((0.45, 0.02))
     assert block.depth_source == "drilled; see report"
-    assert block.points.tolist() == [[10.16, 37.98, 6.86]]
+    assert block.notes == {"name": "B 1", "bemerkung": "rissig"}
+    np.testing.assert_allclose(block.points, [[10.16, 37.98, 6.86]])
 
 
 def test_the_point_lists_are_read(tmp_path):

@@ -8,7 +8,10 @@ import numpy as np
 from mechanics.arrays import Array
 from moma.errors import SceneError
 
-__all__ = ["Accelerogram"]
+__all__ = ["Accelerogram", "Direction"]
+
+Direction = tuple[float, float, float]
+"""Direction (east, north, up) of a component."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,12 +27,14 @@ class Accelerogram:
     acceleration : (n,) [m/s²]
     name : of the record
     source : file, and processing of the record
+    direction : of the component; None if the file does not state it
     """
 
     dt: float
     acceleration: Array
     name: str
     source: str
+    direction: Direction | None = None
 
     def __post_init__(self) -> None:
         acceleration = np.array(self.acceleration, dtype=np.float64)

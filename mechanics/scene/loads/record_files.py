@@ -1,106 +1,238 @@
-"""Accelerograms from files: two columns of text, and the format of the PEER ground motion database."""
+"""Accelerograms from files: by their content, of PEER, ESM and ITACA, K-NET, SMC, MiniSEED and SAC, and tables."""
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from mechanics.scene.loads.accelerogram import Accelerogram
-from mechanics.scene.loads.tables import fail_at, number_at, numbered_lines, read_columns
+from mechanics.arrays import Array
+from mechanics.scene.loads.accelerogram import Accelerogram, Direction
+from mechanics.scene.loads.record_formats import UNITS, direction_of, read_at2, reader_of, unit_of
+from mechanics.scene.loads.tables import Table, fail_at, numbered_lines, read_table
+from mechanics.scene.loads.waveforms import is_waveform, read_waveforms
 from moma.errors import SceneError
 
-__all__ = ["UNITS", "read_accelerogram", "read_at2", "read_csv"]
-
-UNITS = {"g": 9.80665, "m/s2": 1.0, "cm/s2": 0.01}
+__all__ = ["UNITS", "read_accelerogram", "read_accelerograms", "read_at2", "read_csv", "read_station"]
 
 _UNEVEN = 0.1  # largest deviation of the times of a table from equal steps, of a step [-]: tables round them
-
-_NUMBER = r"([0-9]*\.?[0-9]+(?:[Ee][+-]?[0-9]+)?|[0-9]+\.)"
-# both generations of the database: "NPTS=  7817, DT=   .0050 SEC" and "7817    .0050    NPTS, DT"
-_STEPS = (
-    re.compile(rf"NPTS\s*=\s*([0-9]+)\s*,?\s*DT\s*=\s*{_NUMBER}", re.IGNORECASE),
-    re.compile(rf"^\s*([0-9]+)\s*,?\s+{_NUMBER}\s*,?\s*NPTS\s*,?\s*DT", re.IGNORECASE),
+_TIMES = ("t", "time", "times", "zeit", "temps", "tempo", "tiempo", "s", "sec", "seconds")
+_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+_UNIT = re.compile(
+    r"\[\s*([^\]]+?)\s*\]|\(\s*([^)]+?)\s*\)|\bin\s+(\S+)|\bunits?\s*[:=]\s*(\S+)", re.IGNORECASE
 )
-_HEADER = 4
+_SQUARE = 0.02  # cosine from which two components are not square to each other
 
 
-def read_accelerogram(path: str | Path, unit: str | None = None) -> Accelerogram:
-    """Read a record: PEER's format if the name ends in .at2; otherwise a table, with its `unit` of UNITS.
+def read_accelerogram(
+    path: str | Path, unit: str | None = None, dt: float | None = None, axis: str = "x"
+) -> Accelerogram:
+    """Read one component of a record.
+
+    Parameters
+    ----------
+    path : of a file whose content tells its format; otherwise a table
+    unit : of UNITS, for files that state none
+    dt : step of time, for files that state none [s]
+    axis : "x", "y" or "z": the component that is taken of a file with several
 
     Raises
     ------
     SceneError : with file and line
     """
-    if Path(path).suffix.lower() == ".at2":
-        return read_at2(path)
-    if unit is None:
+    found = read_accelerograms(path, unit, dt)
+    if len(found) == 1:
+        return found[0]
+    alike = [one for one in found if one.direction == _AXES[axis]]
+    if len(alike) != 1:
+        names = ", ".join(one.name for one in found)
         raise SceneError(
-            "the unit of the acceleration is not known", where=str(path), remedy=f"give {', '.join(UNITS)}"
+            f"{len(found)} components ({names}), and {len(alike)} of them along {axis}",
+            where=str(path),
+            remedy="give one component per file, or name the columns x, y, z or E, N, Z",
         )
-    return read_csv(path, unit)
+    return alike[0]
 
 
-def read_csv(path: str | Path, unit: str) -> Accelerogram:
-    """Read a table of times [s], at equal steps, and accelerations in `unit`; see `read_columns` for the format.
+def read_accelerograms(
+    path: str | Path, unit: str | None = None, dt: float | None = None
+) -> tuple[Accelerogram, ...]:
+    """Read all components of a file; see `read_accelerogram`."""
+    if is_waveform(path):
+        return read_waveforms(path, _size(path, unit, None))
+    start = "\n".join(
+        line for _, line in zip(range(100), (text for _, text in numbered_lines(path)), strict=False)
+    )
+    reader = reader_of(path, start)
+    if reader is not None:
+        return (reader(path),)
+    return _of_table(path, unit, dt)
+
+
+def read_station(
+    pattern: str | Path, unit: str | None = None, dt: float | None = None
+) -> tuple[Accelerogram, ...]:
+    """Read the components of one station: all files that a pattern such as ``IT.AQV.*.ASC`` matches, or one file.
 
     Raises
     ------
-    SceneError : with file and line
+    SceneError : there is none, a direction is not known, or two components are in one direction
     """
-    if unit not in UNITS:
+    folder = Path(Path(pattern).anchor or ".") if Path(pattern).is_absolute() else Path()
+    rest = str(Path(pattern).relative_to(folder)) if Path(pattern).is_absolute() else str(pattern)
+    files = sorted(one for one in folder.glob(rest) if one.is_file())
+    if not files:
+        raise SceneError("no such file", where=str(pattern), remedy="name files, with * for what differs")
+    found = [one for file in files for one in read_accelerograms(file, unit, dt)]
+    for one in found:
+        if one.direction is None:
+            raise SceneError(
+                f"the direction of {one.name!r} is not stated",
+                where=one.source,
+                remedy="give its files by x, y and z instead of station",
+            )
+    for k, one in enumerate(found):
+        for other in found[k + 1 :]:
+            if abs(float(np.dot(one.direction or (), other.direction or ()))) > _SQUARE:
+                raise SceneError(
+                    f"{one.name!r} and {other.name!r} are not square to each other",
+                    where=other.source,
+                    remedy="name the three components of one instrument",
+                )
+            if abs(one.dt - other.dt) > 1e-9 or len(one) != len(other):
+                raise SceneError(
+                    f"{len(other)} values at {other.dt:g} s, but {len(one)} at {one.dt:g} s of {one.name!r}",
+                    where=other.source,
+                    remedy="cut the components to the same time, or give them by x, y and z",
+                )
+    return tuple(found)
+
+
+def read_csv(path: str | Path, unit: str | None, dt: float | None = None) -> Accelerogram:
+    """Read a table with one component; see `read_accelerogram`."""
+    found = _of_table(path, unit, dt)
+    if len(found) > 1:
+        raise SceneError(
+            f"{len(found)} components",
+            where=str(path),
+            remedy="give time, acceleration, or name it by station",
+        )
+    return found[0]
+
+
+def _of_table(path: str | Path, unit: str | None, dt: float | None) -> tuple[Accelerogram, ...]:
+    """Read a table of one to four columns: times [s] if it has any, then up to three components."""
+    if unit is not None and unit not in UNITS:
         raise SceneError(f"unknown unit {unit!r}", where=str(path), remedy=f"give {', '.join(UNITS)}")
-    lines, rows = read_columns(path, "time, acceleration")
-    time, acceleration = rows.T
-    dt = (time[-1] - time[0]) / (len(time) - 1)
+    table = read_table(path, "time, acceleration")
+    count = table.rows.shape[1]
+    if count > 4:
+        fail_at(path, int(table.lines[0]), f"{count} columns", "give time, and one to three accelerations")
+    size = _size(path, unit, table)
+    timed = _has_times(table, dt)
+    if timed:
+        dt = _step(path, table, dt)
+    elif dt is None:
+        raise SceneError(
+            "the table has no times",
+            where=str(path),
+            remedy="give 'dt', the time step in seconds, or a column of times",
+        )
+    values = table.rows[:, 1:] if timed else table.rows
+    names = table.names[1:] if timed else table.names
+    directions = _directions(names, values.shape[1])
+    stem = Path(path).stem
+    return tuple(
+        Accelerogram(
+            float(dt),
+            size * values[:, k],
+            stem if values.shape[1] == 1 else f"{stem} {'xyz'[k]}",
+            str(path),
+            direction,
+        )
+        for k, direction in enumerate(directions)
+    )
+
+
+def _has_times(table: Table, dt: float | None) -> bool:
+    """Return whether the first column is times: by its name, or because it rises in equal steps."""
+    if table.names:
+        return _bare(table.names[0]) in _TIMES
+    count = table.rows.shape[1]
+    if count in (2, 4):
+        return count == 4 or dt is None or _rises(table.rows[:, 0])
+    return count == 3 and _rises(table.rows[:, 0])
+
+
+def _rises(column: Array) -> bool:
+    steps = np.diff(column)
+    return bool((steps > 0.0).all() and steps.max() < 1.5 * steps.min())
+
+
+def _step(path: str | Path, table: Table, given: float | None) -> float:
+    """Return the step of the times of a table [s]."""
+    found = _unit_in(table.names[0]) if table.names else None
+    time = table.rows[:, 0] * (1e-3 if found == "ms" else 1.0)
+    dt = float((time[-1] - time[0]) / (len(time) - 1))
     uneven = np.flatnonzero(~(np.abs(time - time[0] - dt * np.arange(len(time))) < _UNEVEN * dt))
     if len(uneven):
         at = int(uneven[0])
-        fail_at(
-            path,
-            int(lines[at]),
-            f"time {time[at]:g} s is not at equal steps of {dt:g} s",
-            "resample the record",
+        what = f"time {time[at]:g} s is not at equal steps of {dt:g} s"
+        fail_at(path, int(table.lines[at]), what, "resample the record")
+    if given is not None and abs(given - dt) > 1e-3 * dt:
+        raise SceneError(
+            f"the times are {dt:g} s apart, but dt = {given:g} s", where=str(path), remedy="leave dt out"
         )
-    return Accelerogram(float(dt), UNITS[unit] * acceleration, Path(path).stem, str(path))
+    return dt
 
 
-def read_at2(path: str | Path) -> Accelerogram:
-    """Read PEER's AT2: three lines of text, a line with NPTS and DT, then NPTS accelerations in units of g.
-
-    Raises
-    ------
-    SceneError : with file and line
-    """
-    lines = list(numbered_lines(path))
-    count, dt = _steps(path, lines)
-    values: list[float] = []
-    for number, line in lines[_HEADER:]:
-        for text in line.split():
-            if len(values) == count:
-                fail_at(
-                    path, number, f"more values than NPTS = {count}", "correct NPTS, or take the rest away"
-                )
-            values.append(number_at(path, number, text))
-    if len(values) < count:
-        what = f"{len(values)} values, but NPTS = {count}"
-        fail_at(path, lines[-1][0], what, "the file is cut off: get it again, or correct NPTS")
-    name = lines[1][1].strip()
-    return Accelerogram(dt, UNITS["g"] * np.array(values), name or Path(path).stem, str(path))
+def _bare(name: str) -> str:
+    return re.split(r"[\[(,_]|\bin\b", name.strip().casefold())[0].strip()
 
 
-def _steps(path: str | Path, lines: list[tuple[int, str]]) -> tuple[int, float]:
-    """Return NPTS and DT from the four lines of the header, whose third must give the unit g."""
-    header = [line for _, line in lines[:_HEADER]]
-    if len(header) < _HEADER:
-        fail_at(path, len(header) or 1, "less than four lines", "give a file of PEER's AT2 format")
-    if not re.search(r"ACCELERATION.*\bG\b", header[2], re.IGNORECASE):
-        fail_at(path, 3, f"not an acceleration in units of g: {header[2].strip()!r}", "give the .AT2 file")
-    for pattern in _STEPS:
-        found = pattern.search(header[3])
-        if found and int(found[1]) > 1 and float(found[2]) > 0:
-            return int(found[1]), float(found[2])
-    raise SceneError(
-        f"no number of samples and step of time: {header[3].strip()!r}",
-        where=f"{path}:4",
-        remedy="write for example: NPTS=  4000, DT=   .0050 SEC",
-    )
+def _unit_in(text: str) -> str | None:
+    found = _UNIT.search(text)
+    return None if found is None else next(one for one in found.groups() if one).casefold()
+
+
+def _size(path: str | Path, unit: str | None, table: Table | None) -> float:
+    """Return the size of the unit [m/s²]: the one that the table states, else the given one."""
+    stated = {}
+    for text in (*table.names, *table.notes) if table is not None else ():
+        word = _unit_in(text)
+        size = None if word is None else unit_of(word.rstrip(".;,"))
+        if size is not None:
+            stated[size] = word
+    if len(stated) > 1:
+        raise SceneError(
+            f"two units: {', '.join(map(str, stated.values()))}", where=str(path), remedy="keep one"
+        )
+    given = None if unit is None else UNITS.get(unit)
+    if unit is not None and given is None:
+        raise SceneError(f"unknown unit {unit!r}", where=str(path), remedy=f"give {', '.join(UNITS)}")
+    for size, word in stated.items():
+        if given is not None and given != size:
+            raise SceneError(
+                f"the file states {word!r}, but unit = {unit!r}",
+                where=str(path),
+                remedy="leave 'unit' out, or correct it",
+            )
+        return size
+    if given is None:
+        raise SceneError(
+            "the unit of the acceleration is not known", where=str(path), remedy=f"give {', '.join(UNITS)}"
+        )
+    return given
+
+
+def _directions(names: Sequence[str], count: int) -> list[Direction | None]:
+    """Return the direction of each column by its name; of several without known names x, y and z in order."""
+    named: list[Direction | None] = []
+    for name in names:
+        word = re.sub(r"^(acc\w*|a)[\s_.-]*", "", _bare(re.sub("_", " ", name))) or _bare(name)
+        named.append(_AXES.get(word) or direction_of(word.split()[-1] if word.split() else ""))
+    if count == 1:
+        return named or [None]
+    if named and all(one is not None for one in named):
+        return named
+    return [_AXES[axis] for axis in "xyz"[:count]]

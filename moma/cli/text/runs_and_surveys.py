@@ -20,6 +20,8 @@ def ingest_lines(report: "IngestReport", verbose: bool) -> list[str]:
     for file in report.files:
         kinds = ", ".join(f"{count} {kind}" for kind, count in file.stones.items())
         lines.append(f"{file.path}: {sum(file.stones.values())} stones of survey {file.survey!r} ({kinds})")
+        lines += [f"  question: {one}" for one in file.questions]
+        lines += [f"  {one}" for one in file.reading]
         if file.again:
             lines.append(f"  {file.again} of them were in the database and have a new measurement")
         if file.worst:

@@ -1,4 +1,4 @@
-"""Point lists: CSV, PNEZD and PENZD.
+"""Points and outlines as instruments and other programs exchange them.
 
-Public: `open_csv`, `read_csv` (csv); `open_pnezd`, `open_penzd` (pnezd); `CodeTemplate` (code_template).
+Public: `open_gsi` (gsi); `open_landxml`, `open_jobxml` (survey_xml); `open_geojson` (geojson).
 """

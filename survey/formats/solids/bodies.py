@@ -1,7 +1,8 @@
 """Closed stones with planar faces, from the polygons of a file of solids.
 
-Nothing is repaired: corners are the same only where their coordinates are. Three things are inferred from neighbouring
-polygons: which of them make one body, which side of each is outside, and how a polygon that is not plane is folded.
+Faces without area are dropped; a surface that is not closed is repaired within a tolerance (`survey.repair`), and what
+was done is remarked; closed ones stay as they are. Three things are inferred from neighbouring polygons: which of them
+make one body, which side of each is outside, and how a polygon that is not plane is folded.
 """
 
 from collections.abc import Iterator, Sequence
@@ -18,12 +19,17 @@ from survey.formats.solids.scanned_stone import is_scanned, plane_faces
 from survey.geometry.folds import fold, warp
 from survey.geometry.solids import Solid
 from survey.geometry.watertight import check_watertight
+from survey.repair.polygons import is_flat_line, simple_polygons, without_repeats
+from survey.repair.repair import Repaired, holes_of, open_edges, repair
 
 __all__ = ["ClosedBody", "RawBody", "check_coordinates", "closed_bodies", "compact"]
 
 Polygon = tuple[int, ...]
 
 _COARSEST = 1e-3  # a third of the precision of a measured point [m]
+_TOLERANCE = 1e-5  # of repairs, over the size of the body
+_MORE = (10.0, 100.0, 1000.0)  # times the tolerance, with which a repair is tried to advise on it
+_MOST = 0.01  # largest tolerance that is advised [m]
 
 
 @dataclass(frozen=True)
@@ -59,17 +65,19 @@ class ClosedBody:
     solid : under the name of all bodies of the file's object
     folded : number of polygons that are not plane and were cut along folds
     doubled : number of duplicate faces of the file's object
+    repairs : of the file's object, what was done, in words
     scanned : of a scan, how its plane faces were recognised, or why not, in words; otherwise empty
     """
 
     solid: Solid
     folded: int = 0
     doubled: int = 0
+    repairs: tuple[str, ...] = ()
     scanned: str = ""
 
 
 def closed_bodies(
-    raw: RawBody, flat: float = 0.0, planes: float = 0.0
+    raw: RawBody, flat: float = 0.0, planes: float = 0.0, tolerance: float | None = None
 ) -> Iterator[ClosedBody | GeometryError]:
     """Make the closed bodies of one name, each with its planar faces counter-clockwise seen from outside.
 
@@ -85,8 +93,13 @@ def closed_bodies(
     For each body the solid, or the error
     """
     try:
-        vertices, polygons = _welded(raw)
-        doubled = len(raw.polygons) - len(polygons)
+        vertices, polygons, doubled, dropped = _welded(raw)
+        repairs = (f"{dropped} faces without area dropped",) if dropped else ()
+        if open_edges(polygons):
+            if tolerance is None:
+                tolerance = _TOLERANCE * float(np.linalg.norm(np.ptp(vertices, axis=0)))
+            repaired = _repaired(vertices, polygons, max(tolerance, raw.resolution if tolerance else 0.0))
+            polygons, repairs = repaired.polygons, (*repairs, *repaired.deeds)
         groups = body_groups(vertices, polygons)
         volumes = [signed_volume(vertices, group) for group in groups]
         if groups and min(volumes) < 0.0 < max(volumes) and set().union(*groups) <= set(polygons):
@@ -105,16 +118,44 @@ def closed_bodies(
                 check_watertight(_solid(raw.name, vertices, outward))
                 found = plane_faces(raw.name, vertices, outward, planes)
             if found is not None and found.solid is not None:
-                yield ClosedBody(found.solid, doubled=doubled, scanned=found.text)
+                yield ClosedBody(found.solid, doubled=doubled, repairs=repairs, scanned=found.text)
             else:
                 body = _closed(raw, vertices, outward, flat)
-                yield replace(body, doubled=doubled, scanned="" if found is None else found.text)
+                text = "" if found is None else found.text
+                yield replace(body, doubled=doubled, repairs=repairs, scanned=text)
         except GeometryError as error:
             yield error
 
 
-def _welded(raw: RawBody) -> tuple[Array, list[Polygon]]:
-    """Merge corners with the same coordinates and duplicate faces."""
+def _repaired(vertices: Array, polygons: list[Polygon], tolerance: float) -> Repaired:
+    """Close a surface within the tolerance.
+
+    Raises
+    ------
+    GeometryError
+        if it cannot be closed, with the largest hole, and the tolerance that would do
+    """
+    edges = len(open_edges(polygons))
+    found = repair(vertices, polygons, tolerance) if tolerance > 0.0 else None
+    if found is not None and not found.left:
+        return found
+    least = max(tolerance, _TOLERANCE * float(np.linalg.norm(np.ptp(vertices, axis=0))))
+    for wider in (least, *(least * more for more in _MORE)):
+        if (
+            wider <= max(_MOST, tolerance)
+            and (wider > tolerance)
+            and not repair(vertices, polygons, wider).left
+        ):
+            remedy = f"close it, or give --repair {wider:.1g}, which would"
+            break
+    else:
+        remedy = "close it there"
+    hole = (found.left if found is not None else holes_of(vertices, polygons))[0]
+    raise GeometryError(f"the solid is not closed: {edges} edges have one face; {hole.text}", remedy=remedy)
+
+
+def _welded(raw: RawBody) -> tuple[Array, list[Polygon], int, int]:
+    """Merge corners with the same coordinates; drop duplicate faces and faces without area, and count them."""
     if not raw.polygons:
         raise GeometryError("it has no faces", remedy="export closed surfaces")
     if raw.resolution > _COARSEST:
@@ -126,16 +167,24 @@ def _welded(raw: RawBody) -> tuple[Array, list[Polygon]]:
     rank = np.argsort(np.argsort(first))  # in the order of the file
     vertices, new = raw.vertices[np.sort(first)], rank[indices.reshape(-1)].tolist()
     polygons: dict[Polygon, None] = {}
+    doubled, dropped = 0, 0
     for polygon in raw.polygons:
-        renumbered = tuple(new[i] for i in polygon)
-        if len(set(renumbered)) < max(len(renumbered), 3):
-            raise GeometryError(
-                "a face has fewer than three corners, or one of them twice",
-                remedy="export it without such faces",
-            )
-        start = renumbered.index(min(renumbered))
-        polygons[renumbered[start:] + renumbered[:start]] = None
-    return vertices, list(polygons)
+        ring = tuple(new[i] for i in polygon)
+        parts = [ring]
+        if len(set(ring)) < len(ring) or len(ring) < 3:
+            ring = without_repeats(ring)
+            parts = simple_polygons(vertices, ring) if len(ring) > 2 else []
+        if not parts or (len(parts) == 1 and is_flat_line(vertices, parts[0])):
+            dropped += 1
+            continue
+        for one in parts:
+            start = one.index(min(one))
+            turned = one[start:] + one[:start]
+            doubled += turned in polygons
+            polygons[turned] = None
+    if not polygons:
+        raise GeometryError("none of its faces has an area", remedy="export closed surfaces")
+    return vertices, list(polygons), doubled, dropped
 
 
 def _closed(raw: RawBody, vertices: Array, polygons: list[Polygon], flat: float) -> ClosedBody:

@@ -16,7 +16,10 @@ from survey.formats.text_lines import TextLines
 __all__ = ["obj_bodies"]
 
 _CORNER = re.compile(r"(-?[0-9]{1,9})(?:/-?[0-9]*){0,2}").fullmatch
-_PASSED_OVER = {"vt", "vn", "vp", "s", "usemtl", "mtllib", "l", "p"}
+_PASSED_OVER = {
+    *("vt", "vn", "vp", "s", "usemtl", "mtllib", "l", "p", "mg", "bevel", "c_interp", "d_interp", "lod"),
+    *("maplib", "usemap", "shadow_obj", "trace_obj"),
+}
 _NOWHERE = float("nan")
 
 
@@ -39,8 +42,9 @@ def obj_bodies(path: Path) -> Iterator[RawBody]:
     lines = TextLines(path)
     reader = _ObjReader(str(path))
     current, objects = _Object(path.stem, 1), False
-    for number, line in lines:
-        word, _, rest = line.strip().partition(" ")
+    for number, line in _joined(lines):
+        word, *others = line.split(None, 1)
+        rest = others[0] if others else ""
         if word in ("o", "g"):
             if word == "g" and objects:
                 continue
@@ -48,13 +52,29 @@ def obj_bodies(path: Path) -> Iterator[RawBody]:
             if current.polygons or current.error is not None:
                 yield reader.body(current, number)
             current = _Object(rest.strip() or path.stem, number)
-        elif word and not word.startswith("#"):
+        elif not word.startswith("#"):
             try:
                 reader.take(word, rest.split("#", 1)[0].split(), current, number)
             except SurveyError as error:
                 current.error = current.error or error
     if current.polygons or current.error is not None:
         yield reader.body(current, lines.end + 1)
+
+
+def _joined(lines: TextLines) -> Iterator[tuple[int, str]]:
+    """Iterate over the lines that are not empty; a backslash at the end of one joins the next."""
+    first, whole = 0, ""
+    for number, line in lines:
+        text = line.rstrip()
+        first = first or number
+        if text.endswith("\\") and not text.lstrip().startswith("#"):
+            whole += text[:-1] + " "
+            continue
+        if (whole := whole + text).strip():
+            yield first, whole
+        first, whole = 0, ""
+    if whole.strip():
+        yield first, whole
 
 
 class _ObjReader:
@@ -81,10 +101,10 @@ class _ObjReader:
         try:
             if len(words) not in (3, 4, 6, 7):  # with a weight, with colours
                 raise SurveyError(f"a vertex of {len(words)} numbers", where=where, remedy="write: v X Y Z")
-            numbers = [parse_number(one, "coordinate", where) for one in words]
-            if len(words) in (4, 7) and numbers[3] != 1.0:
+            numbers = [parse_number(one, "coordinate", where) for one in words[:3]]
+            if len(words) in (4, 7) and parse_number(words[3], "weight", where) != 1.0:
                 raise SurveyError(f"weight {words[3]}", where=where, remedy="write: v X Y Z")
-            self._places.extend(numbers[:3])
+            self._places.extend(numbers)
         except SurveyError as error:
             self._wrong[len(self._places) // 3] = error
             self._places.extend((_NOWHERE, _NOWHERE, _NOWHERE))
@@ -102,7 +122,7 @@ class _ObjReader:
                     remedy="count vertices from 1 through the whole file",
                 )
             corners.append(index)
-        if len(corners) < 3:
+        if len(corners) < 2:  # one of two bounds nothing
             raise SurveyError(f"a face of {len(corners)} corners", where=where, remedy="write: f 1 2 3 …")
         return tuple(corners)
 

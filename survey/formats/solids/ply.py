@@ -30,8 +30,6 @@ _SINGLE = 2.0**-23  # relative resolution of single precision
 _LONGEST_HEADER = 1 << 16  # bytes
 _REMEDY = "export the PLY again"
 
-Row = dict[str, tuple[float, ...]]
-
 
 @dataclass(frozen=True)
 class _Property:
@@ -113,21 +111,25 @@ class _TextRows:
         self._lines, self._path = lines, lines.path
         self._rows = ((number, line) for number, line in lines if number > header and line.strip())
 
-    def row(self, properties: Sequence[_Property]) -> Row:
-        """Read the next row."""
+    def column(self, element: _Element, names: Sequence[str]) -> list[list[tuple[float, ...]]]:
+        """Read the rows of an element; return the values of some of its properties, row by row."""
+        return [self._row(element.properties, names) for _ in range(element.length)]
+
+    def _row(self, properties: Sequence[_Property], names: Sequence[str]) -> list[tuple[float, ...]]:
         number, line = next(self._rows, (self._lines.end, ""))
-        words, at, row = line.split(), 0, Row()
+        words, at, row = line.split(), 0, dict[str, tuple[float, ...]]()
         where = f"{self._path}:{number}"
         for one in properties:
             length = 1
             if one.count is not None:
                 length = int(self._numbers(words, at, 1, "i", where)[0])
                 at += 1
-            row[one.name] = self._numbers(words, at, length, one.kind, where)
+            if one.name in names or length < 0 or at + length > len(words):
+                row[one.name] = self._numbers(words, at, length, one.kind, where)
             at += length
         if at != len(words):
             raise SurveyError(f"{len(words)} numbers for {at}", where=where, remedy=_REMEDY)
-        return row
+        return [row[name] for name in names]
 
     def _numbers(self, words: list[str], at: int, length: int, kind: str, where: str) -> tuple[float, ...]:
         some = words[at : at + length]
@@ -151,13 +153,51 @@ class _BinaryRows:
     def __init__(self, data: bytes, start: int, order: str, path: str) -> None:
         self._data, self._at, self._order, self._path = data, start, order, path
 
-    def row(self, properties: Sequence[_Property]) -> Row:
-        """Read the next row."""
-        row = Row()
+    def column(self, element: _Element, names: Sequence[str]) -> list[list[tuple[float, ...]]]:
+        """Read the rows of an element; return the values of some of its properties, row by row."""
+        alike = self._alike(element, names)
+        return (
+            [self._row(element.properties, names) for _ in range(element.length)] if alike is None else alike
+        )
+
+    def _alike(self, element: _Element, names: Sequence[str]) -> list[list[tuple[float, ...]]] | None:
+        """Read all rows at once if their lists are as long as those of the first; None if they are not."""
+        if not element.length:
+            return []
+        start = self._at
+        lengths = [0 if one.count is None else -1 for one in element.properties]
+        if -1 in lengths:
+            for k, one in enumerate(element.properties):
+                lengths[k] = 0 if one.count is None else int(self._take(one.count, 1)[0])
+                self._take(one.kind, 1 if one.count is None else lengths[k])
+            self._at = start
+            if min(lengths) < 0:
+                return None
+        fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
+        for k, one in enumerate(element.properties):
+            kind = self._order + one.kind
+            if one.count is None:
+                fields.append((f"v{k}", kind))
+            else:
+                fields += [(f"n{k}", self._order + one.count), (f"v{k}", kind, (lengths[k],))]
+        row = np.dtype(fields)
+        if self._at + element.length * row.itemsize > len(self._data):
+            return None
+        table = np.frombuffer(self._data, row, element.length, self._at)
+        for k, one in enumerate(element.properties):
+            if one.count is not None and (table[f"n{k}"] != lengths[k]).any():
+                return None
+        self._at += element.length * row.itemsize
+        place = {one.name: k for k, one in enumerate(element.properties)}
+        columns = [table[f"v{place[name]}"].reshape(element.length, -1).tolist() for name in names]
+        return [[tuple(one) for one in values] for values in zip(*columns, strict=True)]
+
+    def _row(self, properties: Sequence[_Property], names: Sequence[str]) -> list[tuple[float, ...]]:
+        row = dict[str, tuple[float, ...]]()
         for one in properties:
             length = 1 if one.count is None else int(self._take(one.count, 1)[0])
             row[one.name] = self._take(one.kind, length)
-        return row
+        return [row[name] for name in names]
 
     def _take(self, kind: str, length: int) -> tuple[float, ...]:
         size = struct.calcsize(kind) * length
@@ -190,12 +230,13 @@ def _body(
                 _SINGLE if any(one.kind == "f" for one in element.properties if one.name in "xyz") else 0.0
             )
         lists = [name for name in names if name in _LISTS]
-        for _ in range(element.length):
-            row = rows.row(element.properties)
+        wanted = ["x", "y", "z"] if element.name == "vertex" else lists[:1] if element.name == "face" else []
+        for values in rows.column(element, wanted):
             if element.name == "vertex":
-                places.append((row["x"][0], row["y"][0], row["z"][0]))
-            elif element.name == "face" and lists:
-                polygons.append(tuple(int(one) for one in row[lists[0]]))
+                (x, *_), (y, *_), (z, *_) = values
+                places.append((x, y, z))
+            elif wanted:
+                polygons.append(tuple(map(int, values[0])))
     rows.check_end()
     vertices = np.array(places, dtype=np.float64).reshape(-1, 3)
     check_coordinates(vertices, "corner", where)

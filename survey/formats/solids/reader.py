@@ -8,7 +8,7 @@ Coordinates stay as they are in the file unless snapping is asked for: then face
 tolerance are brought into common planes (`survey.joints.snapping.snapping`), which needs all stones at once.
 """
 
-import re
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -16,14 +16,14 @@ from pathlib import Path
 import numpy as np
 
 from moma.errors import GeometryError, SurveyError, UsageError
-from survey.formats.fields import CODE, shown
+from survey.formats.fields import CODE, code_of, shown
 from survey.formats.options import ReadingOptions
-from survey.formats.points.code_template import CodeTemplate
 from survey.formats.solids.bodies import ClosedBody, RawBody, closed_bodies
 from survey.formats.solids.msh.bodies import msh_bodies
 from survey.formats.solids.obj import obj_bodies
 from survey.formats.solids.ply import ply_bodies
 from survey.formats.solids.stl import stl_bodies
+from survey.formats.tables.code_template import CodeTemplate
 from survey.geometry.solids import Solid, volume_of
 from survey.geometry.watertight import check_watertight
 from survey.joints.snapping.snapping import snap
@@ -87,11 +87,10 @@ def _records(
     file: Path, template: CodeTemplate, options: ReadingOptions, known: set[str]
 ) -> Iterator[SolidRecord | Reject]:
     """Read the solids of one file; `known` collects the codes."""
-    raw = _BODIES[file.suffix.lower()](file)
-    first = next(raw, None)
-    if first is None:
+    raw = list(_BODIES[file.suffix.lower()](file))
+    if not raw:
         raise SurveyError("the file has no solids", where=str(file), remedy="export closed surfaces")
-    return _Solids(file, template, options, known).records(first, raw)
+    return _Solids(file, template, options, known).records(raw)
 
 
 def _of_all(
@@ -112,6 +111,8 @@ def _snapped(
 ) -> tuple[list[SolidRecord | Reject], Snapping]:
     """Bring matching faces of the stones into common planes."""
     records = [one for one in found if isinstance(one, SolidRecord)]
+    if not records:
+        return found, Snapping(tolerance, 0, 0, {}, {}, ())
     given = [Solid(one.code, one.vertices, one.faces) for one in records]
     solids, snapping = snap(given, tolerance)
     made = {one.code: _moved(one, solid, snapping, path) for one, solid in zip(records, solids, strict=True)}
@@ -148,25 +149,38 @@ class _Solids:
     def __init__(self, path: Path, template: CodeTemplate, options: ReadingOptions, known: set[str]) -> None:
         self._path, self._template, self._options, self._known = path, template, options, known
 
-    def records(self, first: RawBody, others: Iterator[RawBody]) -> Iterator[SolidRecord | Reject]:
-        """Iterate over the bodies of a file."""
-        yield from self._stones(first)
-        for raw in others:
-            yield from self._stones(raw)
+    def records(self, bodies: Sequence[RawBody]) -> Iterator[SolidRecord | Reject]:
+        """Iterate over the bodies of a file; those of one name are numbered."""
+        names = Counter(self._name(raw) for raw in bodies)
+        numbers: Counter[str] = Counter()
+        for raw in bodies:
+            name = self._name(raw)
+            yield from self._stones(raw, name, numbers if names[name] > 1 else None)
 
-    def _stones(self, raw: RawBody) -> Iterator[SolidRecord | Reject]:
+    def _name(self, raw: RawBody) -> str:
         parsed = self._template.parse(raw.name)
-        name = re.sub(r"\s+", "_", raw.name) if parsed is None else parsed.block
+        name = raw.name if parsed is None else parsed.block
+        return code_of(name) or name
+
+    def _stones(
+        self, raw: RawBody, name: str, numbers: Counter[str] | None
+    ) -> Iterator[SolidRecord | Reject]:
+        parsed = self._template.parse(raw.name)
         kind, course = (None, None) if parsed is None else (parsed.kind, parsed.course)
-        if raw.error is not None:
+        found: list[ClosedBody | GeometryError] = []
+        if raw.error is None:
+            found = list(self._bodies(raw))
+            numbers = numbers if numbers is not None or len(found) == 1 else Counter()
+        elif numbers is None:
             yield self._reject(name, raw, raw.error)
-            return
-        unit = self._options.unit
-        metric = replace(raw, vertices=raw.vertices * unit, resolution=raw.resolution * unit)
-        flat = max(self._options.flat, self._options.snap)
-        found = list(closed_bodies(metric, flat, self._options.planes))
-        for number, body in enumerate(found, start=1):
-            code = name if len(found) == 1 else f"{name}-{number}"
+        else:
+            numbers[name] += 1
+            yield self._reject(f"{name}-{numbers[name]}", raw, raw.error)
+        for body in found:
+            code = name
+            if numbers is not None:
+                numbers[name] += 1
+                code = f"{name}-{numbers[name]}"
             if isinstance(body, GeometryError):
                 yield self._reject(code, raw, self._error(code, raw, body.what, body.remedy))
             elif CODE.fullmatch(code) is None:
@@ -181,6 +195,17 @@ class _Solids:
                 own = kind or self._options.kind
                 yield SolidRecord(code, own, course, vertices, faces, raw.line, remarks=_remarks(body))
 
+    def _bodies(self, raw: RawBody) -> Iterator[ClosedBody | GeometryError]:
+        """Make the closed bodies of one name, in metres and with z upwards."""
+        options, unit = self._options, self._options.scale
+        vertices = raw.vertices * unit
+        if options.up == "y":
+            x, y, z = vertices.T
+            vertices = np.column_stack([x, -z, y])
+        metric = replace(raw, vertices=vertices, resolution=raw.resolution * unit)
+        repair = options.snap if options.repair is None and options.snap > 0.0 else options.repair
+        return closed_bodies(metric, max(options.flat, options.snap), options.planes, repair)
+
     def _error(self, code: str, raw: RawBody, what: str, remedy: str | None) -> SurveyError:
         where = f"{self._path}:{raw.line}" if raw.line else str(self._path)
         return SurveyError(f"solid {shown(code)}: {what}", where=where, remedy=remedy)
@@ -192,7 +217,7 @@ class _Solids:
 
 def _remarks(body: ClosedBody) -> tuple[str, ...]:
     """Describe the changes made to the faces."""
-    out = [body.scanned] if body.scanned else []
+    out = [*body.repairs, *([body.scanned] if body.scanned else [])]
     if body.doubled:
         out.append(f"{body.doubled} faces were there twice")
     if body.folded:

@@ -49,13 +49,17 @@ def test_a_folder_of_scans_is_one_survey_whose_joints_close(tmp_path, scans, nam
 
 def test_bad_files_of_a_folder_are_rejects_and_the_others_a_survey(tmp_path, scans):
     points, triangles = scanned_box((0.5, 0.3, 0.24), 0.03)
-    write_ply(scans / "open.ply", points + 10.0, triangles[:-1])
+    write_ply(scans / "open.ply", points + 10.0, triangles[: 4 * len(triangles) // 5])
+    write_ply(scans / "small.ply", points + 20.0, triangles[:-3])  # a hole that is covered
     (scans / "torn.ply").write_bytes(b"ply\nformat ascii 1.0\n")
     url, rejects = f"sqlite:///{tmp_path}/wall.db", tmp_path / "rejects.txt"
     with pytest.raises(SurveyError, match=r"open\.ply: solid 'open': the solid is not closed"):
         ingest([scans], url, "solids")
-    told = prints("ingest", scans, "--format", "solids", "--keep-going", "--rejects", rejects, "--db", url)
-    assert "13 stones of survey 'wall'" in told
+    told = prints(
+        "ingest", scans, "--format", "solids", "--keep-going", "--rejects", rejects, "--db", url, "-v"
+    )
+    assert "14 stones of survey 'wall'" in told
+    assert "small: 1 hole covered, the largest" in told
     assert "2 stones rejected" in told
     text = rejects.read_text()
     assert "open.ply: solid 'open': the solid is not closed" in text

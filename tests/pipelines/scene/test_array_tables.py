@@ -454,3 +454,21 @@ def test_check_reports_laws_and_loads(url, tmp_path):
         "azimuth 0, scale 1, start 0, order 4, baseline 0",
         "throw, 1 stones: velocity (1, 0, 0), spin (0, 0, 0)",
     )
+
+
+def test_a_station_gives_all_its_components(tmp_path):
+    """East is x and north is y, before the azimuth turns both."""
+    for stream, peak in (("HNE", 100.0), ("HNN", 200.0), ("HNZ", 50.0)):
+        header = f"SAMPLING_INTERVAL_S: 1.0\nNDATA: 3\nSTREAM: {stream}\nUNITS: cm/s^2\n"
+        (tmp_path / f"XX.ABC.{stream}.ASC").write_text(f"{header}0\n{peak}\n0\n")
+    head = "[[loads]]\ntype = 'ground_motion'\nstones = ['S']\nstation = 'XX.ABC.*.ASC'\n"
+    values = parse_scene(head + STONE, str(tmp_path / "scene.toml")).loads[0].values
+    assert [(one.direction, one.peak) for one in values["station"]] == [
+        ((1.0, 0.0, 0.0), 1.0),
+        ((0.0, 1.0, 0.0), 2.0),
+        ((0.0, 0.0, 1.0), 0.5),
+    ]
+    with pytest.raises(SceneError, match="records by axes and by station"):
+        parse_scene(head + "x = 'XX.ABC.HNE.ASC'\n" + STONE, str(tmp_path / "scene.toml"))
+    with pytest.raises(SceneError, match="no such file"):
+        parse_scene(head.replace("XX", "YY") + STONE, str(tmp_path / "scene.toml"))

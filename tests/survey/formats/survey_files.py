@@ -1,5 +1,7 @@
 """Small valid survey files of every format, as bytes."""
 
+import csv
+import re
 import struct
 import tempfile
 from collections.abc import Mapping
@@ -8,6 +10,8 @@ from pathlib import Path
 
 import meshio
 import numpy as np
+
+from tests.survey.formats.workbooks import ods, xlsx
 
 MOMA = """\
 moma-survey 1
@@ -77,6 +81,65 @@ Point,Northing,Easting,Elevation,Description
 6,5000.123,1002.5,10.25,W01-02:v
 7,5000.124,1003.5,10.25,W01-02:v
 8,5000.122,1003.5,11.25,W01-02:v
+"""
+
+TITLED = """\
+sep=;
+Aufmaß Nordwand;;;;;;;
+Stein-Nr.;Steinart;Schicht;Punktart;Rechtswert [mm];Hochwert [mm];Höhe [mm];Bemerkung
+A 1;Binder;1,0;v;0;0;0;"rissig; alt"
+A 1;Binder;1,0;v;1500,5;0;0;
+A 1;Binder;1,0;v;1500,5;0;1000;
+B°2;Läufer;;v;2500;0;0;
+B°2;Läufer;;v;3500;0;0;
+B°2;Läufer;;p;3000;0;500;
+B°2;Läufer;;v;3500;0;1000;
+"""
+
+WKT = """\
+WKT,Stein,Tiefe
+"POLYGON Z ((0 0 0, 1 0 0, 1 0 1, 0 0 0))",A,0.5
+"LINESTRING Z (2 0 0, 3 0 0, 3 0 1, 2 0 1)",B,
+"""
+
+GSI = """\
+*110001+00000000000000S1 84..00+0000000000012000 85..00-0000000000028500 86..00+0000000000007900
+*110002+0000000000000101 81..00+0000000000010070 82..00+0000000000037965 83..00+0000000000006826 71....+00000000000000A1
+*110003+0000000000000102 81..00+0000000000010436 82..00+0000000000038011 83..00+0000000000006828 71....+00000000000000A1
+*110004+0000000000000103 81..00+0000000000010435 82..00+0000000000038010 83..00+0000000000007140 71....+00000000000000A1
+*110005+0000000000000104 81..00+0000000000011435 82..00+0000000000038010 83..00+0000000000007140 71....+00000000000000B2
+*110006+0000000000000105 81..00+0000000000012435 82..00+0000000000038010 83..00+0000000000007140 71....+00000000000000B2
+*110007+0000000000000106 81..00+0000000000012435 82..00+0000000000038010 83..00+0000000000008140 71....+00000000000000B2
+"""
+
+LANDXML = """\
+<?xml version="1.0"?>
+<LandXML xmlns="http://www.landxml.org/schema/LandXML-1.2">
+<Units><Metric linearUnit="meter"/></Units>
+<CgPoints>
+<CgPoint name="1" code="A:v">0 10 5</CgPoint>
+<CgPoint name="2" code="A:v">0 11 5</CgPoint>
+<CgPoint name="3" code="A:v">0.5 11 6</CgPoint>
+</CgPoints>
+</LandXML>
+"""
+
+JOBXML = """\
+<?xml version="1.0"?>
+<JOBFile><Reductions>
+<Point><Name>1</Name><Code>A:v</Code><Grid><North>0</North><East>10</East><Elevation>5</Elevation></Grid></Point>
+<Point><Name>2</Name><Code>A:v</Code><Grid><North>0</North><East>11</East><Elevation>5</Elevation></Grid></Point>
+<Point><Name>3</Name><Code>A:v</Code><Grid><North>0.5</North><East>11</East><Elevation>6</Elevation></Grid></Point>
+</Reductions></JOBFile>
+"""
+
+GEOJSON = """\
+{"type": "FeatureCollection", "features": [
+{"type": "Feature", "properties": {"block": "A", "depth": 0.5},
+ "geometry": {"type": "Polygon", "coordinates": [[[0, 0, 0], [1, 0, 0], [1, 0, 1], [0, 0, 0]]]}},
+{"type": "Feature", "properties": {"block": "B", "depth": null},
+ "geometry": {"type": "Polygon", "coordinates": [[[2, 0, 0], [3, 0, 0], [3, 0, 1], [2, 0, 0]]]}}
+]}
 """
 
 PENZD = """\
@@ -158,6 +221,16 @@ def msh(version: str, binary: bool) -> bytes:
         return path.read_bytes()
 
 
+def _table() -> list[list[str | float | None]]:
+    """The rows of CSV as a sheet has them: numbers as numbers."""
+    rows: list[list[str | float | None]] = []
+    for line in csv.reader(CSV.splitlines()):
+        if not line[0].startswith("#"):
+            numbers = [float(one) if re.fullmatch(r"[\d.]+", one) else one or None for one in line]
+            rows.append(list(numbers))
+    return rows
+
+
 @dataclass(frozen=True)
 class Example:
     """A valid file.
@@ -182,6 +255,15 @@ EXAMPLES: Mapping[str, Example] = {
     "csv with commas": Example("csv", "csv", CSV_COMMAS.encode("latin-1"), ("A", "B")),
     "pnezd": Example("pnezd", "txt", PNEZD.encode(), ("W01-01", "W01-02")),
     "penzd": Example("penzd", "txt", PENZD.encode(), ("W01-01",)),
+    "table with a title": Example("csv", "csv", TITLED.encode("cp1252"), ("A_1", "B2")),
+    "table in UTF-16": Example("csv", "csv", TITLED.encode("utf-16"), ("A_1", "B2")),
+    "well-known text": Example("csv", "csv", WKT.encode(), ("A", "B")),
+    "workbook": Example("csv", "xlsx", xlsx({"S": _table()}), ("A", "B")),
+    "workbook ods": Example("csv", "ods", ods({"S": _table()}), ("A", "B")),
+    "gsi": Example("gsi", "gsi", GSI.replace("00A1", "A1:v").replace("00B2", "B2:v").encode(), ("A1", "B2")),
+    "landxml": Example("landxml", "xml", LANDXML.encode(), ("A",)),
+    "jobxml": Example("jobxml", "jxl", JOBXML.encode(), ("A",)),
+    "geojson": Example("geojson", "geojson", GEOJSON.encode(), ("A", "B")),
     "obj": Example("solids", "obj", obj(), ("W1", "W2")),
     "ply": Example("solids", "ply", ply("ascii", SQUARES), ("m-1", "m-2")),
     "ply little": Example("solids", "ply", ply("binary_little_endian", TRIANGLES), ("m-1", "m-2")),

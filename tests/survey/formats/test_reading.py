@@ -12,7 +12,10 @@ from tests.survey.formats.survey_files import CSV, EXAMPLES, MOMA, PNEZD
 
 
 def test_a_format_that_there_is_not_is_a_wrong_use(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match=r"'dxf'; known formats: moma, csv, pnezd, penzd, solids"):
+    with pytest.raises(
+        UsageError,
+        match=r"'dxf'; known formats: moma, csv, pnezd, penzd, gsi, jobxml, landxml, geojson, solids",
+    ):
         open_survey(tmp_path / "a.dxf", "dxf")
     assert {one.format for one in EXAMPLES.values()} == set(FORMATS)
 

@@ -25,6 +25,20 @@ def test_text_is_read_in_the_encoding_it_is_in(tmp_path: Path, encoding: str, en
     assert lines(tmp_path / "a.txt", (end.join(text) + end).encode(encoding))[2] == 5
 
 
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be"])
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_wide_characters_and_old_line_ends_are_read(tmp_path: Path, encoding: str, end: str) -> None:
+    """As Excel writes "Unicode text", and as old Macintoshes end lines."""
+    text = end.join(["façade sud", "σ ≤ 3 mm", ""])
+    mark = "" if encoding == "utf-16" else "\ufeff"
+    assert lines(tmp_path / "a.txt", (mark + text).encode(encoding)) == (
+        ["façade sud", "σ ≤ 3 mm"],
+        "utf-8",
+        3,
+    )
+    assert lines(tmp_path / "a.txt", text.encode()) == (["façade sud", "σ ≤ 3 mm"], "utf-8", 3)
+
+
 def test_quotation_marks_of_windows_are_read(tmp_path: Path) -> None:
     text = "“gate” – façade, 12 €"
     assert lines(tmp_path / "a.txt", text.encode("cp1252"))[:2] == ([text], "cp1252")
@@ -60,8 +74,10 @@ def test_a_file_longer_than_a_block_is_read_line_by_line(tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("data", "line", "words"),
     [
-        ("a\nb".encode("utf-16"), 1, "UTF-16"),
-        ("a\nb".encode("utf-32"), 1, "UTF-16 or UTF-32"),
+        (b"\xff\xfea\0b", 1, "mark of UTF-16, but is not"),
+        ("a\nb".encode("utf-32"), 1, "UTF-32"),
+        (b"PK\x03\x04...", 1, "a workbook"),
+        (b"%PDF-1.7", 1, "a PDF"),
         ("a\nb".encode("utf-16-le"), 1, "0x00"),
         (b"a\nb\0c", 2, "0x00"),
         (b"a\rb\nc", 1, "0x0d"),

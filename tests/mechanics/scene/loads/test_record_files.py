@@ -119,7 +119,7 @@ def test_a_table_needs_no_header_and_may_round_its_times(tmp_path):
     [
         ("time,a\n0.0,1.0\n0.1,x\n", 3, "'x' is not a number"),
         ("0.0,1.0\nagain,1\n", 2, "'again' is not a number"),
-        ("0.0,1.0,2.0\n", 1, "3 columns; give time, acceleration"),
+        ("0,1,2,3,4\n1,1,2,3,4\n", 1, "5 columns; give time, and one to three"),
         ("0.0,1.0\n0.1\n", 2, "1 columns"),
         ("0.0,1\n0.1,1\n0.3,1\n0.4,1\n", 2, "time 0.1 s is not at equal steps of 0.133333 s; resample"),
         ("0.1,1\n0.1,1\n0.1,1\n", 1, "time 0.1 s is not at equal steps of 0 s"),
@@ -138,6 +138,7 @@ def test_a_table_without_rows_unit_or_file_is_refused(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text("time,a\n0.0,1.0\n")
     assert "1 rows of numbers" in message_of(read_csv, path, "g")
+    path.write_text("time,a\n0.0,1.0\n0.1,1.0\n")
     assert "the unit of the acceleration is not known; give g, m/s2, cm/s2" in message_of(
         read_accelerogram, path
     )

@@ -178,7 +178,9 @@ def test_a_missing_file_and_other_encodings_are_named(tmp_path: Path) -> None:
         read_moma(tmp_path)
     path = tmp_path / "wide.moma"
     path.write_text(HEAD + STONE, encoding="utf-16")
-    with pytest.raises(SurveyError, match=r"wide\.moma:1: the text is UTF-16"):
+    assert len(read_moma(path).blocks) == 1
+    path.write_text(HEAD + STONE, encoding="utf-32")
+    with pytest.raises(SurveyError, match=r"wide\.moma:1: the text is UTF-32"):
         read_moma(path)
 
 

@@ -130,16 +130,15 @@ def test_a_face_that_is_there_twice_counts_once(tmp_path: Path) -> None:
         (HEAD + FACES.split("\n", 1)[1], 1, "not closed: 4 edges"),
         (HEAD, 1, "no solids"),
         (HEAD + FACES + "f 1 2 9\n", 16, "corner '9' of a face, after 8 vertices"),
-        (HEAD + FACES + "f 1 2\n", 16, "a face of 2 corners"),
+        (HEAD + FACES + "f 1\n", 16, "a face of 1 corners"),
         (HEAD + FACES + "f 1 2 -9\n", 16, "corner '-9'"),
         (HEAD + FACES + "curv 1 2\n", 16, "unknown word 'curv'"),
-        (HEAD + FACES + "f 1 2 2\n", 1, "one of them twice"),
         (HEAD + FACES + "f 1 2 7\n", 1, "not closed: 2 edges"),
         (HEAD.replace("v 0.0 0 0", "v 0 0 nan") + FACES, 2, "'nan'"),
         (HEAD.replace("v 0.0 0 0", "v 0 0") + FACES, 2, "2 numbers"),
         (HEAD.replace("v 0.0 0 0", "v 0 0 0 2") + FACES, 2, "weight 2"),
-        (HEAD.replace("1\n", "0\n") + FACES, 1, "twice"),
-        (HEAD.replace("o A", "o A!") + FACES, 1, "not a code"),
+        (HEAD.replace("1\n", "0\n") + FACES, 1, "inside out or flat"),
+        (HEAD.replace("o A", "o ?!") + FACES, 1, "not a code"),
     ],
 )
 def test_a_wrong_object_is_named_with_its_line(tmp_path: Path, text: str, line: int, words: str) -> None:
@@ -162,12 +161,12 @@ def test_a_wrong_object_is_left_out_and_the_others_are_read(tmp_path: Path) -> N
     text += HEAD.replace("o A", "g C\no C 1") + later
     found = read(tmp_path / "a.obj", text)
     assert [(type(one), one.code) for one in found] == [
-        *((SolidRecord, "A"), (Reject, "A"), (Reject, "B")),
+        *((SolidRecord, "A-1"), (SolidRecord, "A-2"), (Reject, "B")),
         (SolidRecord, "C_1"),
     ]
-    assert isinstance(found[1], Reject)
-    assert "a second of that name" in str(found[1].error)
-    assert found[1].spans == (range(16, 31),)
+    assert isinstance(found[2], Reject)
+    assert "corner '-5g'" in str(found[2].error)
+    assert found[2].spans == (range(31, 45),)
 
 
 def test_groups_are_stones_where_there_are_no_objects(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import pytest
 
 from moma.errors import SurveyError
 from survey.formats.options import ReadingOptions
-from survey.formats.points.csv import open_csv, read_csv
+from survey.formats.tables.reader import open_csv, read_csv
 from survey.records.survey import BlockRecord, Reject, Station, Survey, SurveyHead
 
 HEAD = "block,kind,course,role,x,y,z\n"
@@ -45,13 +45,13 @@ def test_what_is_left_out_has_a_default(tmp_path: Path) -> None:
     [
         ("", 1, "no column 'block'"),
         ("block,kind,course,role,x,y\n", 1, "no column 'z'"),
-        (HEAD.replace("z\n", "z,colour\n"), 1, "'colour'"),
+        (HEAD.replace("z\n", "z,detph\n"), 1, "'detph', nearly depth"),
         (HEAD, 2, "no points"),
         (HEAD + "A,header,1,vertex,0,0\n", 2, "6 fields for 7 columns"),
-        (HEAD + "A,header,1,corner,0,0,0\n", 2, "'corner'"),
+        (HEAD + "A,header,1,blob,0,0,0\n", 2, "'blob'"),
         (HEAD + "A,header,one,vertex,0,0,0\n", 2, "'one'"),
         (HEAD + "A,header,1,vertex,0,0,inf\n", 2, "'inf'"),
-        (HEAD + "A b,header,1,vertex,0,0,0\n", 2, "'A b'"),
+        (HEAD + "?!,header,1,vertex,0,0,0\n", 2, "'?!'"),
         (HEAD + 'A,header,1,vertex,0,0,"0\n', 2, "table line"),
         (HEAD + ROWS + "A,jamb,1,point,0,0,0\n", 5, "line 2"),
         (HEAD + ROWS[:48], 2, "2 vertices"),
@@ -71,7 +71,7 @@ def test_what_is_left_out_has_a_default(tmp_path: Path) -> None:
             "'a' before",
         ),
         (HEAD.replace("z\n", "z,sigma\n") + ROWS.replace("\n", ",0\n"), 2, "greater than 0"),
-        (HEAD.replace("course", "kind"), 1, "no column 'course'"),
+        (HEAD.replace("course", "kind"), 1, "are both kind"),
         (HEAD.replace("z\n", "z,x\n"), 1, "'x'"),
     ],
 )

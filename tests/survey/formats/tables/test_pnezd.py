@@ -8,9 +8,9 @@ import pytest
 
 from moma.errors import SurveyError, UsageError
 from survey.formats.options import ReadingOptions
-from survey.formats.points.code_template import CodeFields, CodeTemplate
-from survey.formats.points.pnezd import open_penzd, open_pnezd
 from survey.formats.reading import read_survey
+from survey.formats.tables.code_template import CodeFields, CodeTemplate
+from survey.formats.tables.reader import open_penzd, open_pnezd
 from survey.records.survey import BlockRecord, Reject, Station, SurveyHead
 from tests.survey.formats.survey_files import PNEZD
 
@@ -91,7 +91,17 @@ def test_a_description_may_hold_separators_and_say_more(tmp_path: Path) -> None:
         ("{block}:{role}", "W01:01:P", CodeFields("W01:01", None, None, None, "point")),
         ("{block}:{role}", "W01-01:x", None),
         ("{block}:{role}", "W01-01", None),
-        ("{block}:{role}", "W 01:v", None),
+        ("{block}:{role}", "W 01:v", CodeFields("W 01", None, None, None, "vertex")),
+        ("{block}:{role}", "N° 5 (neu):p", CodeFields("N° 5 (neu)", None, None, None, "point")),
+        ("{block} {role}", "W 01 v", None),
+        ("{block} {kind} {course?} {role}", "A header 3 v", CodeFields("A", "header", 3, None, "vertex")),
+        ("{block} {kind} {course?} {role}", "A header p", CodeFields("A", "header", None, None, "point")),
+        ("{block} {kind?} {role?}", "A v", CodeFields("A", None, None, None, "vertex")),
+        ("{block} {kind?} {role?}", "A jamb", CodeFields("A", "jamb", None, None, "vertex")),
+        ("{block}:{role} {*}", "A:p seen twice", CodeFields("A", None, None, None, "point")),
+        ("{*} {block} {role}", "MW A BEG", CodeFields("A", None, None, None, "vertex")),
+        ("{block} {role}", "A END", CodeFields("A", None, None, None, "vertex")),
+        ("{block} {kind} {role}", "A Läufer v", CodeFields("A", "läufer", None, None, "vertex")),
         ("{block}", "W01-01", CodeFields("W01-01", None, None, None, "vertex")),
         ("{block}-{course}", "W01-01-12", CodeFields("W01-01", None, 12, None, "vertex")),
         (
@@ -206,7 +216,7 @@ def readings(names: list[str], literals: list[str], text: str) -> list[dict[str,
         ("# x\n1;2;x;4;A:v\n", 2, "not a point with two coordinates"),
         (ROWS + "5,1,2\n", 5, "3 fields"),
         (ROWS + "5,1,2,3,A\n", 5, "'A' is not of the form {block}:{role}"),
-        (ROWS + "5,1,2,3,A:corner\n", 5, "'A:corner' is not of the form"),
+        (ROWS + "5,1,2,3,A:blob\n", 5, "'A:blob' is not of the form"),
         (ROWS + "4,1,2,3,A:p\n", 5, "point 4 a second time"),
         (ROWS + ",1,2,3,A:p\n", 5, "not a number or name"),
         (ROWS + "5,1,nan,3,A:p\n", 5, "'nan'"),

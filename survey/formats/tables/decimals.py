@@ -17,25 +17,38 @@ class Decimals:
     ----------
     path : of the table, for errors
     commas : whether decimal commas are possible, because other characters separate the columns
+    any_mark : numbers with both marks may stand in one table, as in workbooks, where each cell is a number or a text
+    scales : units of the three coordinates [m]
     """
 
-    def __init__(self, path: str, commas: bool) -> None:
-        self._path, self._commas = path, commas
+    def __init__(
+        self,
+        path: str,
+        commas: bool,
+        any_mark: bool = False,
+        scales: tuple[float, float, float] = (1.0, 1.0, 1.0),
+    ) -> None:
+        self._path, self._commas, self._any_mark = path, commas, any_mark
+        self._scales = None if scales == (1.0, 1.0, 1.0) else scales
+        self._far = FARTHEST / min(scales)
         self._mark: str | None = None
         self._line = 0  # first line with that mark
         self._lengths: dict[str, float] = {}
 
     def place(self, texts: tuple[str, str, str], names: str, line: int) -> tuple[float, float, float]:
-        """Read three coordinates; `names` has a letter for each."""
-        if self._mark is not None:
-            plain = self._plain(texts)
-            if plain is not None:
-                return plain
-        a, b, c = (self.number(text, name, line) for text, name in zip(texts, names, strict=True))
-        return a, b, c
+        """Read three coordinates [m]; `names` has a letter for each."""
+        plain = self._plain(texts) if self._mark is not None else None
+        if plain is not None:
+            a, b, c = plain
+        else:
+            a, b, c = (self.number(text, name, line) for text, name in zip(texts, names, strict=True))
+        if self._scales is None:
+            return a, b, c
+        u, v, w = self._scales
+        return u * a, v * b, w * c
 
     def number(self, text: str, what: str, line: int) -> float:
-        """Read one finite decimal number; `what` names it in the error."""
+        """Read one finite decimal number, as it stands; `what` names it in the error."""
         where = f"{self._path}:{line}"
         mark = "," if "," in text else "." if "." in text else None
         if mark == "," and not self._commas:
@@ -48,27 +61,26 @@ class Decimals:
             raise SurveyError(
                 f"{what} is {shown(text)}, with a comma and a point", where=where, remedy="write e.g. 1234,5"
             )
-        if None not in (mark, self._mark) and mark != self._mark:
+        if None not in (mark, self._mark) and mark != self._mark and not self._any_mark:
             raise SurveyError(
                 f"{what} is {shown(text)}, but line {self._line} writes decimals with {self._mark!r}",
                 where=where,
                 remedy="keep to one decimal mark in a file",
             )
-        value = parse_number(text.replace(",", "."), what, where)
+        value = parse_number(text.replace(",", "."), what, where, self._far)
         if self._mark is None and mark is not None:
             self._mark, self._line = mark, line
         return value
 
-    def length(self, text: str, what: str, line: int) -> float:
-        """Read one number that must be positive."""
+    def length(self, text: str, what: str, line: int, scale: float = 1.0) -> float:
+        """Read one number that must be positive, in units of `scale` [m]."""
         known = self._lengths.get(text)  # such as the one sigma that all lines repeat
         if known is None:
-            value = self.number(text, what, line)
+            self.number(text, what, line)
             known = parse_length(text.replace(",", "."), what, f"{self._path}:{line}")
             if len(self._lengths) < 1000:
                 self._lengths[text] = known
-            return value
-        return known
+        return scale * known if scale != 1.0 else known
 
     def _plain(self, texts: tuple[str, str, str]) -> tuple[float, float, float] | None:
         """Read plain numbers, the fast path for most of a table; None for numbers that need a full check."""
@@ -84,5 +96,5 @@ class Decimals:
             a, b, c = float(texts[0]), float(texts[1]), float(texts[2])
         except ValueError:
             return None
-        inside = -FARTHEST <= a <= FARTHEST and -FARTHEST <= b <= FARTHEST and -FARTHEST <= c <= FARTHEST
-        return (a, b, c) if inside else None
+        far = self._far
+        return (a, b, c) if -far <= a <= far and -far <= b <= far and -far <= c <= far else None

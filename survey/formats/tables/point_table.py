@@ -24,16 +24,21 @@ class TableStone:
 
     Attributes
     ----------
-    code, kind, course, zone, station : as in BlockRecord
+    code, course, zone, station : as in BlockRecord
+    kind : as in BlockRecord; None until a line states it
+    name : as people write it
+    agreed : what the last of its rows states of it, checked against the others
+    notes : the different texts of each column that is kept as a note, in order
     line : the first of its lines
     error : the first error in its lines; None if there is none
     depth, depth_sigma, depth_source : as in BlockRecord
     """
 
     code: str
-    kind: str
+    kind: str | None
     course: int | None
     line: int
+    name: str = ""
     zone: str | None = None
     station: str | None = None
     error: SurveyError | None = None
@@ -47,25 +52,35 @@ class TableStone:
     vertex_names: list[str] = field(default_factory=list)
     point_names: list[str] = field(default_factory=list)
     runs: list[int] = field(default_factory=list)
+    agreed: object = None
+    notes: dict[str, dict[str, None]] | None = None
 
-    def add_line(self, line: int) -> None:
-        """Record a line of the stone; the first and the next line of every run are kept."""
+    def add_line(self, line: int, count: int = 1) -> None:
+        """Record `count` lines of the stone; the first and the next line of every run are kept."""
         if self.runs and self.runs[-1] == line:
-            self.runs[-1] = line + 1
+            self.runs[-1] = line + count
         else:
-            self.runs += (line, line + 1)
+            self.runs += (line, line + count)
 
-    def add_place(self, is_vertex: bool, place: tuple[float, float, float], sigma: float, name: str) -> None:
-        """Add a corner, or a point on the face; sigma is NaN and the name empty if the table has none."""
+    def add_note(self, key: str, text: str) -> None:
+        """Add a text to a note."""
+        if self.notes is None:
+            self.notes = {}
+        self.notes.setdefault(key, {})[text] = None
+
+    def add_place(
+        self, is_vertex: bool, place: tuple[float, float, float], sigma: float, name: str | None
+    ) -> None:
+        """Add a corner, or a point on the face; sigma is NaN, and the name None, if the table has none."""
         if is_vertex:
             self.vertices.extend(place)
             self.vertex_sigmas.append(sigma)
-            if name:
+            if name is not None:
                 self.vertex_names.append(name)
         else:
             self.points.extend(place)
             self.point_sigmas.append(sigma)
-            if name:
+            if name is not None:
                 self.point_names.append(name)
 
     def spans(self) -> tuple[range, ...]:
@@ -80,23 +95,24 @@ class PointTable:
     ----------
     path : of the table, for errors
     sigma : standard deviation of a coordinate whose line states none [m]
+    kind : of stones whose lines state none
 
     Attributes
     ----------
     stones : by code, in the order of the file
     """
 
-    def __init__(self, path: str, sigma: float) -> None:
-        self._path, self._sigma = path, sigma
+    def __init__(self, path: str, sigma: float, kind: str) -> None:
+        self._path, self._sigma, self._kind = path, sigma, kind
         self.stones: dict[str, TableStone] = {}
-        self._astray: list[tuple[int, SurveyError]] = []
+        self._astray: list[tuple[range, SurveyError]] = []
 
     @property
     def is_empty(self) -> bool:
         """True if no line has been read."""
         return not (self.stones or self._astray)
 
-    def refuse(self, code: str | None, error: SurveyError, line: int) -> None:
+    def refuse(self, code: str | None, error: SurveyError, line: int, count: int = 1) -> None:
         """Record a wrong line, which spoils its stone if that is known.
 
         Raises
@@ -105,11 +121,11 @@ class PointTable:
             the first of these errors, if a thousand lines have been read and none names its stone
         """
         if code is not None:
-            stone = self.stones.setdefault(code, TableStone(code, "", None, line))
+            stone = self.stones.setdefault(code, TableStone(code, None, None, line))
             stone.error = stone.error or error
-            stone.add_line(line)
+            stone.add_line(line, count)
             return
-        self._astray.append((line, error))
+        self._astray.append((range(line, line + count), error))
         if not self.stones and len(self._astray) >= _HOPELESS:
             raise self._astray[0][1]
 
@@ -118,7 +134,7 @@ class PointTable:
         astray, at = self._astray, 0
         for code in list(self.stones):
             stone = self.stones.pop(code)  # popped, so that memory holds each stone only once
-            while at < len(astray) and astray[at][0] < stone.line:
+            while at < len(astray) and astray[at][0].start < stone.line:
                 yield _reject(*astray[at])
                 at += 1
             yield self._record(stone)
@@ -143,9 +159,13 @@ class PointTable:
             return Reject(stone.code, stone.error, stone.spans())
         sigma, sigmas = self._precision(stone)
         source = stone.depth_source or (None if stone.depth is None else "column depth of the table")
+        names = (*stone.point_names, *stone.vertex_names)
+        notes = {} if stone.name in ("", stone.code) else {"name": stone.name}
+        for key, texts in (stone.notes or {}).items():
+            notes[key] = "; ".join(texts)
         return BlockRecord(
             code=stone.code,
-            kind=stone.kind,
+            kind=stone.kind or self._kind,
             course=stone.course,
             vertices=_rows(stone.vertices),
             points=_rows(stone.points),
@@ -157,7 +177,8 @@ class PointTable:
             zone=stone.zone,
             station=stone.station,
             sigmas=sigmas,
-            names=(*stone.point_names, *stone.vertex_names),
+            names=names if all(names) else (),
+            notes=notes,
             spans=stone.spans(),
         )
 
@@ -174,8 +195,8 @@ def _rows(flat: "array[float]") -> Array:
     return np.array(flat, dtype=np.float64).reshape(-1, 3)
 
 
-def _reject(line: int, error: SurveyError) -> Reject:
-    return Reject(None, error, (range(line, line + 1),))
+def _reject(lines: range, error: SurveyError) -> Reject:
+    return Reject(None, error, (lines,))
 
 
 def check_station(name: str, head: SurveyHead, where: str) -> None:

@@ -1,0 +1,131 @@
+"""Outlines of GeoJSON: one stone per feature, its polygon or closed line with x, y and z.
+
+The properties of a feature are the columns of a table (`survey.formats.tables.columns`); without a property for the
+stone, the ``id`` of the feature is its name. A feature of points (``Point`` with z) is a row of a table of points.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from moma.errors import SurveyError
+from survey.formats.fields import unreadable
+from survey.formats.options import ReadingOptions
+from survey.formats.tables.columns import kind_of_column
+from survey.formats.tables.reader import open_table
+from survey.formats.tables.rows import ListRows, cell_text
+from survey.formats.tables.wkt import ring_of
+from survey.records.survey import SurveyStream
+
+__all__ = ["open_geojson"]
+
+_DEGREES = 1e-3  # extents below which coordinates of stones are degrees, beside heights of metres
+_LARGEST = 1 << 29  # bytes
+
+
+def open_geojson(path: Path, options: ReadingOptions | None = None) -> SurveyStream:
+    """Read the features of a file and return its stones one by one; see `open_csv` for what columns mean.
+
+    Raises
+    ------
+    SurveyError
+        if the file is not GeoJSON, or its coordinates are degrees or have no z
+    """
+    path = Path(path)
+    features = _features(path)
+    names = list(dict.fromkeys(name for one in features for name in _properties(one)))
+    known = {kind_of_column(one) for one in names}
+    ids = not known & {"block", "description", "name"}
+    rows: list[tuple[int, list[str]]] = [(0, [*names, *(["block"] if ids else []), "outline"])]
+    corners: list[Any] = []
+    for number, one in enumerate(features, start=1):
+        values = _properties(one)
+        ring = _ring(one, f"{path}:{number}")
+        corners.append(ring)
+        text = ", ".join(" ".join(map(repr, corner)) for corner in ring.tolist())
+        own = [cell_text(one.get("id", ""))] if ids else []
+        rows.append(
+            (number, [*(cell_text(values.get(name, "")) for name in names), *own, f"POLYGON Z (({text}))"])
+        )
+    _check_degrees(corners, path)
+    remarks = (f"{len(features)} features; places in messages are their numbers",)
+    return open_table(path, ListRows(str(path), rows, remarks), options or ReadingOptions())
+
+
+def _features(path: Path) -> list[Mapping[str, Any]]:
+    try:
+        if path.stat().st_size > _LARGEST:
+            raise SurveyError(f"more than {_LARGEST} bytes", where=str(path), remedy="export it in parts")
+        document = json.loads(path.read_bytes())
+    except json.JSONDecodeError as error:
+        raise SurveyError(
+            f"not JSON: {error.msg}", where=f"{path}:{error.lineno}", remedy="export it again"
+        ) from error
+    except (OSError, ValueError, RecursionError) as error:
+        raise unreadable(path, error, "give an existing GeoJSON file") from error
+    found = document.get("features") if isinstance(document, dict) else None
+    if not isinstance(found, list) or not all(isinstance(one, dict) for one in found):
+        raise SurveyError(
+            "not a FeatureCollection of GeoJSON", where=str(path), remedy="export a layer as GeoJSON"
+        )
+    if not found:
+        raise SurveyError("the file has no features", where=str(path), remedy="export a layer with outlines")
+    return found
+
+
+def _properties(feature: Mapping[str, Any]) -> Mapping[str, Any]:
+    found = feature.get("properties")
+    return found if isinstance(found, dict) else {}
+
+
+def _ring(feature: Mapping[str, Any], where: str) -> Any:
+    """Return the corners (n, 3) of the outline of a feature.
+
+    Raises
+    ------
+    SurveyError
+        if it has no single outline with z
+    """
+    geometry = feature.get("geometry")
+    geometry = geometry if isinstance(geometry, dict) else {}
+    kind, found = geometry.get("type"), geometry.get("coordinates")
+    if not isinstance(found, list):
+        raise SurveyError(
+            "a feature without coordinates", where=where, remedy="draw one outline around each stone"
+        )
+    if kind == "MultiPolygon" and len(found) == 1:
+        kind, found = "Polygon", found[0]
+    if kind == "LineString":
+        kind, found = "Polygon", [found]
+    if kind != "Polygon" or not _is_nested(found):
+        raise SurveyError(
+            f"a feature of type {str(kind)[:40]!r}, not one outline", where=where,
+            remedy="draw one polygon around each stone; points are read from a table (--format csv)",
+        )  # fmt: skip
+    return ring_of(found, where)
+
+
+def _is_nested(found: Any) -> bool:
+    return isinstance(found, list) and all(
+        isinstance(ring, list) and all(isinstance(one, list) for one in ring) for ring in found
+    )
+
+
+def _check_degrees(corners: Sequence[Any], path: Path) -> None:
+    """Refuse longitudes and latitudes."""
+    extents = np.array([np.ptp(one, axis=0) for one in corners if len(one)]).reshape(-1, 3)
+    inside = all((np.abs(one[:, :2]) <= (180.0, 90.0)).all() for one in corners)
+    if (
+        len(extents)
+        and inside
+        and extents[:, :2].max() < _DEGREES
+        and extents[:, 2].max() > 50.0 * extents[:, :2].max()
+    ):
+        raise SurveyError(
+            "the coordinates look like degrees beside heights in metres",
+            where=str(path),
+            remedy="export the layer in a projected system in metres (in QGIS: CRS of the export)",
+        )

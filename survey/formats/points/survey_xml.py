@@ -1,0 +1,141 @@
+"""Points of LandXML and of Trimble's JobXML.
+
+LandXML: ``CgPoint`` with northing, easting and elevation, in the linear unit of ``Units``; the description is its
+``code``, else ``desc``, else its name. JobXML: the reduced points (``Reductions/Point``), else those of the field book
+with a ``Grid``; metres; deleted ones are passed over, and points of instrument stations are stations. Files are read
+piece by piece.
+"""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from xml.parsers import expat
+
+from moma.errors import SurveyError
+from survey.formats.fields import code_of, parse_number, shown, unreadable
+from survey.formats.options import ReadingOptions
+from survey.formats.tables.reader import PointCollector
+from survey.records.survey import SurveyStream
+
+__all__ = ["open_jobxml", "open_landxml"]
+
+_METRIC = {"meter": 1.0, "metre": 1.0, "millimeter": 1e-3, "centimeter": 1e-2, "kilometer": 1e3}
+_LINEAR = {**_METRIC, "foot": 0.3048, "ussurveyfoot": 1200.0 / 3937.0, "inch": 0.0254}
+
+Element = Callable[[str, Mapping[str, str], str, int], None]
+
+
+def open_landxml(path: Path, options: ReadingOptions | None = None) -> SurveyStream:
+    """Read the points of a LandXML file and return its stones one by one; see `open_gsi`."""
+    path, options = Path(path), options or ReadingOptions()
+    collector = PointCollector(path, options, unique=False)
+    unit = [options.scale]
+    count = [0]
+
+    def element(where: str, given: Mapping[str, str], text: str, line: int) -> None:
+        name = where.rpartition("/")[2]
+        if name in ("Metric", "Imperial"):
+            linear = given.get("linearUnit", "meter").casefold()
+            if linear not in _LINEAR:
+                raise collector.fail(line, f"unknown linear unit {shown(linear)}", "export in metres")
+            unit[0] = _LINEAR[linear]
+        elif name == "CgPoint" and text.strip():
+            words = text.split()
+            if len(words) != 3:
+                raise collector.fail(
+                    line, f"a point of {len(words)} numbers", "give northing, easting and elevation"
+                )
+            at = f"{path}:{line}"
+            north, east, up = (unit[0] * parse_number(one, "coordinate", at) for one in words)
+            number = given.get("name") or given.get("oID") or ""
+            count[0] += 1
+            collector.add(number, given.get("code") or given.get("desc") or number, (east, north, up), line)
+
+    _parse(path, element)
+    return _stream(collector, path, count[0], "CgPoint")
+
+
+def open_jobxml(path: Path, options: ReadingOptions | None = None) -> SurveyStream:
+    """Read the points of a JobXML file and return its stones one by one; see `open_gsi`."""
+    path, options = Path(path), options or ReadingOptions()
+    collector = PointCollector(path, options, unique=False)
+    found: dict[str, list[tuple[dict[str, str], int]]] = {"Point": [], "PointRecord": []}
+    stations: set[str] = set()
+    now: dict[str, str] = {}
+
+    def element(where: str, given: Mapping[str, str], text: str, line: int) -> None:
+        parent, _, name = where.rpartition("/")
+        if name in found and parent.rpartition("/")[2] in ("Reductions", "FieldBook"):
+            found[name].append((dict(now), line))
+            now.clear()
+        elif name == "StationRecord" and "StationName" in now:
+            stations.add(now["StationName"])
+            now.clear()
+        elif name.endswith("Record"):
+            now.clear()
+        elif name in ("North", "East", "Elevation"):
+            if parent.rpartition("/")[2] in ("Grid", "ComputedGrid"):
+                now.setdefault(name, text.strip())
+        elif name in ("Name", "Code", "StationName", "Deleted", "Description1"):
+            now.setdefault(name, text.strip())
+
+    _parse(path, element)
+    count = 0
+    for one, line in found["Point"] or found["PointRecord"]:
+        if one.get("Deleted", "").casefold() == "true" or not all(
+            one.get(k) for k in ("North", "East", "Elevation")
+        ):
+            continue
+        at = f"{path}:{line}"
+        north, east, up = (parse_number(one[k], k.lower(), at) for k in ("North", "East", "Elevation"))
+        name = one.get("Name", "")
+        if name in stations:
+            collector.add_station(code_of(name) or name, (east, north, up), line)
+            continue
+        count += 1
+        collector.add(name, one.get("Code") or one.get("Description1") or name, (east, north, up), line)
+    return _stream(collector, path, count, "Point with a Grid")
+
+
+def _stream(collector: PointCollector, path: Path, count: int, what: str) -> SurveyStream:
+    collector.close()
+    if not count:
+        raise SurveyError(
+            f"the file has no {what}", where=str(path), remedy="export its points with coordinates"
+        )
+    return SurveyStream(collector.head, collector.table.records())
+
+
+def _parse(path: Path, element: Element) -> None:
+    """Call `element` at the end of each, with its path, attributes, text and line."""
+    open_: list[tuple[str, Mapping[str, str], list[str], int]] = []
+    parser = expat.ParserCreate(namespace_separator="|")
+    parser.buffer_text = True
+
+    def start(name: str, given: Mapping[str, str]) -> None:
+        bare = name.rpartition("|")[2]
+        where = f"{open_[-1][0]}/{bare}" if open_ else bare
+        open_.append((where, given, [], parser.CurrentLineNumber))
+
+    def end(_: str) -> None:
+        where, given, text, line = open_.pop()
+        element(where, given, "".join(text), line)
+
+    def text(some: str) -> None:
+        if open_:
+            open_[-1][2].append(some)
+
+    def refuse(*_: object) -> None:
+        raise SurveyError(
+            "the file declares entities", where=f"{path}:{parser.CurrentLineNumber}", remedy="export it again"
+        )
+
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.CharacterDataHandler, parser.EntityDeclHandler = text, refuse
+    try:
+        with path.open("rb") as handle:
+            parser.ParseFile(handle)
+    except expat.ExpatError as error:
+        what = f"not whole XML: {expat.ErrorString(error.code)}"
+        raise SurveyError(what, where=f"{path}:{error.lineno}", remedy="export the file again") from error
+    except (OSError, ValueError) as error:
+        raise unreadable(path, error, "give an existing survey file") from error

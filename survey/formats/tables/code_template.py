@@ -1,0 +1,233 @@
+"""Templates of the codes that surveyors key into an instrument.
+
+A template is text with fields in braces, e.g. ``{block}:{role}`` or ``{block} {kind} {course?} {role}``; the text
+between them stands for itself, a blank for one or more. A field with a question mark may be missing, together with the
+text before it; ``{*}`` is read and ignored. A description has one reading or none: an ambiguous template is refused.
+"""
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+from moma.errors import UsageError
+from survey.formats.fields import code_of
+
+__all__ = ["ROLES", "STATION", "CodeFields", "CodeTemplate"]
+
+STATION = "station"
+"""The role of a position of the instrument."""
+
+ROLES: Mapping[str, str] = {
+    **dict.fromkeys(("v", "vertex", "corner", "edge", "outline"), "vertex"),
+    **dict.fromkeys(("e", "ecke", "eckpunkt", "rand", "sommet", "coin", "vertice", "spigolo", "esquina"), "vertex"),
+    **dict.fromkeys(("vértice",), "vertex"),
+    # line codes of field software: a line begins, goes on, ends, is closed
+    **dict.fromkeys(("b", "beg", "begin", "start", "l", "line", "end", "c", "cls", "close"), "vertex"),
+    **dict.fromkeys(("p", "point", "pt", "face", "surface", "f", "punkt", "fläche", "flaeche"), "point"),
+    **dict.fromkeys(("flächenpunkt", "face point", "punto", "superficie", "faccia", "cara"), "point"),
+    **dict.fromkeys(("s", "stn", "station", "standpunkt", "stazione", "estación"), STATION),
+}  # fmt: skip
+"""Roles of points by the words for them."""
+
+_ROLE_WORDS = "|".join(sorted((re.escape(one) for one in ROLES if " " not in one), key=len, reverse=True))
+_ROLE_LETTERS = re.escape("".join(sorted(set("".join(ROLES)) - {" "})))
+_CODE, _CODE_LETTERS = r"[^\W_][\w.+/:-]{0,63}", r"\w.+/:-"
+_FREE, _FREE_LETTERS = r"[^\W_][^\t%s]{0,63}", r"^\t%s"  # all but what separates fields
+_FIELDS = {  # pattern of each field, and its characters
+    "block": (_CODE, _CODE_LETTERS),
+    "zone": (_CODE, _CODE_LETTERS),
+    "kind": (r"[^\W\d_][\w-]{0,31}", r"\w-"),
+    "course": (r"[0-9]{1,6}", r"0-9"),
+    "role": (rf"(?i:{_ROLE_WORDS})", _ROLE_LETTERS + _ROLE_LETTERS.upper()),
+}
+_IGNORED = "*"
+_PART = re.compile(r"\{([^{}]*)\}")
+_REMEDY = "write e.g. {block}:{role} or {block} {kind} {course} {role}"
+_USUAL = (
+    *("{block}:{role}", "{block} {role}", "{block} {kind} {role}", "{block} {kind} {course} {role}"),
+    *(
+        "{block} {kind} {course?} {role}",
+        "{block} {course} {role}",
+        "{block}:{kind}:{role}",
+        "{block}_{role}",
+    ),
+    *(
+        "{block}-{role}",
+        "{block}.{role}",
+        "{block},{role}",
+        "{block};{role}",
+        "{role} {block}",
+        "{role}:{block}",
+    ),
+    *(
+        "{block} {kind}",
+        "{kind} {block} {role}",
+        "{kind} {block}",
+        "{block}:{role} {*}",
+        "{block} {role} {*}",
+    ),
+    *("{block} {kind} {role} {*}", "{block}", "{block} {*}"),
+)
+
+
+@dataclass(frozen=True)
+class CodeFields:
+    """The fields of one description.
+
+    Attributes
+    ----------
+    block : name of the stone; of the station, if that is its role
+    kind, course, zone : of the stone; None if the template has no such field
+    role : "vertex", "point" or "station"
+    """
+
+    block: str
+    kind: str | None
+    course: int | None
+    zone: str | None
+    role: str
+
+
+class CodeTemplate:
+    """A parsed template.
+
+    Parameters
+    ----------
+    text : the template
+
+    Raises
+    ------
+    UsageError
+        if it has no block, has an unknown field, or is ambiguous
+    """
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        parts = _PART.split(text.strip())
+        self.fields = tuple(one.removesuffix("?") for one in parts[1::2])
+        self._literals = parts[::2]
+        self._optional = [one.endswith("?") for one in parts[1::2]]
+        if any("{" in one or "}" in one for one in self._literals):
+            raise UsageError(f"code template {text!r} has a brace without its other", remedy=_REMEDY)
+        self._check_fields()
+        self._matches = [self._compiled(kept) for kept in self._variants()]
+
+    def parse(self, description: str) -> CodeFields | None:
+        """Split a description into its fields; None if it does not fit the template."""
+        found = next((one for match in self._matches if (one := match(description))), None)
+        if found is None:
+            return None
+        fields = found.groupdict()
+        kind, course = fields.get("kind"), fields.get("course")
+        return CodeFields(
+            block=fields["block"].rstrip(),
+            kind=None if kind is None else kind.lower(),
+            course=None if course is None else int(course),
+            zone=fields.get("zone"),
+            role=ROLES[(fields.get("role") or "v").casefold()],
+        )
+
+    def expected(self, description: str, others: Sequence[str]) -> str:
+        """Return the remedy for a description that does not fit: the usual template that fits it and others."""
+        rows = [description, *others]
+        for text in _USUAL:
+            other = CodeTemplate(text)
+            found = [other.parse(one) for one in rows]
+            if all(one is not None and code_of(one.block) for one in found) and text != self.text:
+                return f'it would be read by --codes "{text}"'
+        return 'correct it, or give the template of its codes, such as --codes "{block} {kind} {role}"'
+
+    def _check_fields(self) -> None:
+        named = [one for one in self.fields if one != _IGNORED]
+        for name in named:
+            if name not in _FIELDS:
+                known = ", ".join((*_FIELDS, _IGNORED))
+                raise UsageError(
+                    f"code template {self.text!r} has a field {name!r}", remedy=f"fields: {known}"
+                )
+            if named.count(name) > 1:
+                raise UsageError(f"code template {self.text!r} has {{{name}}} twice", remedy="keep one")
+        if "block" not in named or self._optional[self.fields.index("block")]:
+            raise UsageError(f"code template {self.text!r} has no {{block}}", remedy=_REMEDY)
+
+    def _variants(self) -> Iterable[tuple[bool, ...]]:
+        """Iterate over which fields are there: all first, and those with a closed list of words before others."""
+        choices = [(True, False) if one else (True,) for one in self._optional]
+        closed = [name in ("role", "course") for name in self.fields]
+        return sorted(
+            product(*choices),
+            key=lambda kept: (-sum(kept), -sum(a and b for a, b in zip(kept, closed, strict=True))),
+        )
+
+    def _compiled(self, kept: tuple[bool, ...]) -> Callable[[str], "re.Match[str] | None"]:
+        """Return the match of a description that has these fields."""
+        first = self._literals[0]
+        names: list[str] = []
+        between: list[str] = []
+        last = ""
+        for k, (name, there) in enumerate(zip(self.fields, kept, strict=True)):
+            before, after = self._literals[k], self._literals[k + 1]
+            if not there:
+                if names:  # with the text before it
+                    last = after
+                elif k == 0:  # with the text after it
+                    first = before
+                continue
+            if names:
+                between.append(before)
+            names.append(name)
+            last = after
+        literals = set("".join(between) + last + first)
+        free = "".join(re.escape(one) for one in sorted(literals) if not re.match(f"[{_CODE_LETTERS}]", one))
+        wide = {**_FIELDS, "block": (_FREE % free, _FREE_LETTERS % free)}
+        fields = wide if _is_clear(wide, names, between) else _FIELDS
+        if not _is_clear(fields, names, between):
+            one, two, literal = _unclear(fields, names, between)
+            raise UsageError(
+                f"code template {self.text!r} can be read in two ways: {literal!r} does not separate "
+                f"{{{one}}} from {{{two}}}",
+                remedy="separate them by a character that neither of them has, such as a blank",
+            )
+        pattern = _literal(first)
+        for name, literal in zip(names, [*between, last], strict=True):
+            if name == _IGNORED:
+                pattern += (rf"[^{re.escape(literal[0])}]*" if literal else ".*") + _literal(literal)
+            else:
+                pattern += f"(?P<{name}>{fields[name][0]}){_literal(literal)}"
+        return re.compile(pattern).fullmatch
+
+
+Fields = Mapping[str, tuple[str, str]]
+
+
+def _unclear(fields: Fields, names: Sequence[str], between: Sequence[str]) -> tuple[str, str, str]:
+    """Return two fields whose separation is not clear, and the text between them; empty if all are separated.
+
+    A field ends where the text after it has a character that the field cannot have; from the right likewise. If the
+    fields can be peeled off from both ends in this way until one is left, there is one reading.
+    """
+    names, between = list(names), list(between)
+    while between:
+        if _ends(fields, names[0], between[0]):
+            del names[0], between[0]
+        elif _ends(fields, names[-1], between[-1]):
+            del names[-1], between[-1]
+        else:
+            return names[0], names[1], between[0]
+    return "", "", ""
+
+
+def _is_clear(fields: Fields, names: Sequence[str], between: Sequence[str]) -> bool:
+    return not _unclear(fields, names, between)[0]
+
+
+def _ends(fields: Fields, field: str, literal: str) -> bool:
+    if field == _IGNORED:
+        return bool(literal)
+    character = re.compile(f"[{fields[field][1]}]")
+    return any(character.fullmatch(one) is None for one in literal)
+
+
+def _literal(text: str) -> str:
+    return r"[ \t]+".join(re.escape(one) for one in re.split(r"[ \t]+", text))

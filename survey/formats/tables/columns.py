@@ -1,0 +1,362 @@
+"""Columns of tables: what each is, by its name in five languages, and in which unit.
+
+Names are compared without case, accents, blanks and punctuation. A unit may follow in brackets, after ``in``, or after
+an underscore: ``x [mm]``, ``Tiefe (cm)``, ``Höhe in m``, ``x_mm``. A column without a name is skipped: spreadsheets and
+pandas write their index so.
+"""
+
+import difflib
+import re
+import unicodedata
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from moma.errors import SurveyError, UsageError
+from survey.formats.fields import shown
+
+__all__ = [
+    "ALIASES",
+    "UNITS",
+    "ColumnMap",
+    "Columns",
+    "find_columns",
+    "kind_of_column",
+    "plain",
+    "read_map",
+    "unit_of",
+]
+
+UNITS: Mapping[str, float] = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "in": 0.0254}
+"""Units of length [m]."""
+
+ALIASES: Mapping[str, Sequence[str]] = {
+    # English; German; French; Italian; Spanish
+    "block": (
+        *("block", "stone", "block id", "stone id", "stone no", "stone number", "stone code", "block code"),
+        *("Stein", "Steinnummer", "Stein Nr", "Quader", "Stein ID", "Steincode", "Steinbezeichnung"),
+        *("pierre", "bloc", "numéro de pierre", "n° pierre", "id pierre", "code pierre"),
+        *("pietra", "blocco", "concio", "sasso", "numero pietra", "n pietra", "id pietra"),
+        *("piedra", "bloque", "sillar", "dovela", "número de piedra", "n piedra", "id piedra"),
+    ),
+    "kind": (
+        *("kind", "type", "stone type", "stone kind", "block type", "Art", "Typ", "Steinart", "Steintyp"),
+        *("genre", "type de pierre", "nature", "tipo", "tipo di pietra", "genere", "tipo de piedra", "clase"),
+    ),
+    "course": (
+        *("course", "course no", "layer", "row", "Schicht", "Steinlage", "Lage", "Steinschicht", "Reihe"),
+        *("assise", "rang", "lit", "corso", "filare", "fila", "hilada"),
+    ),
+    "role": (
+        *("role", "point type", "point role", "point kind", "Rolle", "Punktart", "Punkttyp", "Punktrolle"),
+        *("rôle", "type de point", "ruolo", "tipo punto", "tipo di punto", "rol", "papel", "tipo de punto"),
+    ),
+    "x": (
+        *("x", "easting", "east", "e", "coord x", "x coord", "x coordinate", "pos x", "point x"),
+        *("Rechts", "Rechtswert", "Ost", "Ostwert", "rw", "x Koordinate", "x Wert", "y Rechts"),
+        *("est", "coordonnée x", "abscisse", "coordinata x", "este", "coordenada x"),
+    ),
+    "y": (
+        *("y", "northing", "north", "n", "coord y", "y coord", "y coordinate", "pos y", "point y"),
+        *("Hoch", "Hochwert", "Nord", "Nordwert", "hw", "y Koordinate", "y Wert", "x Hoch"),
+        *("coordonnée y", "ordonnée", "coordinata y", "norte", "coordenada y"),
+    ),
+    "z": (
+        *("z", "elevation", "elev", "height", "h", "coord z", "z coord", "z coordinate", "pos z"),
+        *("Höhe", "z Koordinate", "z Wert", "Punkthöhe", "altitude", "alt", "hauteur", "coordonnée z"),
+        *("quota", "altezza", "coordinata z", "cota", "altura", "elevación", "coordenada z", "point z"),
+    ),
+    "sigma": (
+        *("sigma", "σ", "std", "std dev", "stdev", "standard deviation", "accuracy", "precision"),
+        *("Genauigkeit", "Standardabweichung", "mittlerer Fehler", "Punktfehler", "mittlerer Punktfehler"),
+        *("écart type", "précision", "scarto tipo", "deviazione standard", "precisione"),
+        *("desviación estándar", "desviación típica", "precisión"),
+    ),
+    "depth": (
+        *("depth", "stone depth", "block depth", "Tiefe", "Steintiefe", "Einbindetiefe"),
+        *("profondeur", "profondità", "profundidad"),
+    ),
+    "depth_sigma": (
+        *("depth sigma", "sigma depth", "depth std", "Sigma Tiefe", "Tiefe Sigma", "Genauigkeit Tiefe"),
+        *("sigma profondeur", "sigma profondità", "sigma profundidad"),
+    ),
+    "depth_source": (
+        *("depth source", "source depth", "Quelle Tiefe", "Tiefe Quelle", "source profondeur"),
+        *("fonte profondità", "fuente profundidad"),
+    ),
+    "zone": (
+        *("zone", "part", "sector", "bay", "wall", "facade", "Bereich", "Zone", "Bauteil", "Wand"),
+        *("Joch", "Fassade", "secteur", "mur", "façade", "travée", "zona", "settore", "muro", "facciata"),
+        *("campata", "sector", "fachada", "tramo"),
+    ),
+    "station": (
+        *("station", "setup", "instrument station", "Standpunkt", "Stationierung"),
+        *("stazione", "estación"),
+    ),
+    "name": (
+        *("point", "point number", "point no", "point id", "point name", "pid", "pt", "pt id", "vertex id"),
+        *("Punkt", "Punktnummer", "Punkt Nr", "PktNr", "Pkt", "Pkt Nr", "PNr", "Punkt ID", "Punktname"),
+        *("numéro de point", "n° point", "numero punto", "n punto", "punto", "id punto"),
+        *("número de punto", "nombre del punto", "nome punto", "no", "nr", "num", "number"),
+        *("Nummer", "numéro", "numero", "número", "id"),
+    ),
+    "description": (
+        *("description", "desc", "point code", "feature code", "code", "Beschreibung", "Punktcode", "text"),
+        *("codice", "descrizione", "código", "descripción", "codigo punto"),
+    ),
+    "outline": (
+        "wkt",
+        "wkt geom",
+        "geometry",
+        "geom",
+        "the geom",
+        "outline",
+        "shape wkt",
+        "Umriss",
+        "contour",
+    ),
+}
+"""Names of columns by what they are; in doubt the first."""
+
+_FALLBACK = ("name", "description")  # of the stone, if it has no column of its own: `ID`, `Nr`, `Code`
+_LENGTHS = ("x", "y", "z", "sigma", "depth", "depth_sigma")
+_UNIT = re.compile(
+    r"(?P<name>.*?)(?:\s*[\[(]\s*(?P<a>[^\])]*?)\s*[\])]|\s+in\s+(?P<b>[a-z]+)|[_/](?P<c>mm|cm|dm|m|ft|in))",
+    re.IGNORECASE,
+)
+_BRACKETS = re.compile(r"[\[(][^\])]*[\])]")
+_WORDS = {"metre": "m", "metres": "m", "meter": "m", "meters": "m", "millimeter": "mm", "centimeter": "cm"} | {
+    "millimetre": "mm", "millimetres": "mm", "centimetre": "cm", "feet": "ft", "foot": "ft", "inch": "in",
+    "inches": "in", '"': "in", "'": "ft",
+}  # fmt: skip
+_MISSPELT = (
+    *("course", "depth", "depth sigma", "depth source", "sigma", "station", "Tiefe", "Schicht", "profondeur"),
+    *("profondità", "profundidad", "assise", "filare", "hilada"),
+)
+_ALIKE = 0.8  # similarity from which an unknown name is taken for a misspelt one
+
+
+@dataclass(frozen=True)
+class ColumnMap:
+    """Columns named by the user, before all aliases.
+
+    Attributes
+    ----------
+    names : name of the column, or its number from 1, by what it is
+    ignored : names of columns to leave out; "*": all that are not known
+    """
+
+    names: Mapping[str, str] = field(default_factory=dict)
+    ignored: frozenset[str] = frozenset()
+
+    @property
+    def numbered(self) -> bool:
+        """True if all columns are given by number, so that the table may have no names."""
+        return bool(self.names) and all(one.isascii() and one.isdigit() for one in self.names.values())
+
+
+@dataclass(frozen=True)
+class Columns:
+    """The columns of one table.
+
+    Attributes
+    ----------
+    count : number of fields in a row
+    at : place of each column that is known, from 0
+    scales : unit [m] of those that state one
+    notes : place and name of the columns that are kept as notes
+    """
+
+    count: int
+    at: Mapping[str, int]
+    scales: Mapping[str, float] = field(default_factory=dict)
+    notes: tuple[tuple[int, str], ...] = ()
+
+
+def read_map(text: str | None) -> ColumnMap:
+    """Read a map such as ``block=Stein,x=Rechts [m],ignore=Datum``.
+
+    Raises
+    ------
+    UsageError
+        if it is wrong
+    """
+    names: dict[str, str] = {}
+    ignored: set[str] = set()
+    for part in (text or "").split(","):
+        if not part.strip():
+            continue
+        what, equals, name = (one.strip() for one in part.partition("="))
+        known = ", ".join((*ALIASES, "ignore"))
+        if not equals or not name:
+            raise UsageError(f"{part.strip()!r} is not of the form WHAT=COLUMN", where="--columns",
+                             remedy="write e.g. block=Stein,x=Rechts,ignore=Datum")  # fmt: skip
+        if what == "ignore":
+            ignored.add(plain(name) or name)
+        elif what not in ALIASES:
+            near = difflib.get_close_matches(what, ALIASES, n=1)
+            raise UsageError(f"unknown column {what!r}", where="--columns",
+                             remedy=f"did you mean {near[0]}?" if near else f"write one of {known}")  # fmt: skip
+        elif what in names:
+            raise UsageError(f"{what} is given twice", where="--columns", remedy="give it once")
+        else:
+            names[what] = name
+    return ColumnMap(names, frozenset(ignored))
+
+
+def plain(name: str) -> str:
+    """Return a name without case, accents, blanks and punctuation, by which names are compared."""
+    folded = unicodedata.normalize("NFKD", name.casefold())
+    return "".join(one for one in folded if one.isalnum())
+
+
+def unit_of(name: str) -> tuple[str, str | None]:
+    """Split the name of a column into the name itself and its unit, None if it has none.
+
+    Examples
+    --------
+    >>> unit_of("Rechts [mm]"), unit_of("depth_cm"), unit_of("Höhe")
+    (('Rechts', 'mm'), ('depth', 'cm'), ('Höhe', None))
+    """
+    found = _UNIT.fullmatch(name.strip())
+    if found is None:
+        return name.strip(), None
+    unit = found["a"] or found["b"] or found["c"] or ""
+    unit = _WORDS.get(unit.casefold(), unit.casefold())
+    return (found["name"].strip(), unit) if unit in UNITS else (name.strip(), None)
+
+
+def _spellings(name: str) -> Iterable[str]:
+    yield plain(name)
+    for umlaut, letters in (("ä", "ae"), ("ö", "oe"), ("ü", "ue")):
+        if umlaut in name.casefold():
+            yield plain(name.casefold().replace(umlaut, letters))
+
+
+_KNOWN: Mapping[str, str] = {
+    spelling: what
+    for what, names in reversed(list(ALIASES.items()))
+    for one in (*names, what)
+    for spelling in _spellings(one)
+}
+
+
+def find_columns(names: Sequence[str], given: ColumnMap, where: str, codes: bool) -> Columns:
+    """Find out what the columns of a table are.
+
+    Parameters
+    ----------
+    names : of the columns, in order
+    given : by the user
+    where : place of the names, for errors
+    codes : whether a template is given for descriptions, so that ``Code`` is one, not the name of the stone
+
+    Raises
+    ------
+    SurveyError
+        naming a column that is missing, there twice, or misspelt
+    """
+    names = list(names)
+    while names and not names[-1]:
+        del names[-1]
+    at: dict[str, int] = {}
+    scales: dict[str, float] = {}
+    free: list[int] = []
+    mine = {what: _place(names, name, what, where, given.numbered) for what, name in given.names.items()}
+    taken = set(mine.values())
+    for what, k in mine.items():
+        _take(what, k, names, at, scales, where)
+    for k, name in enumerate(names):
+        if k in taken or not name or re.fullmatch(r"(?i)unnamed: \d+", name):
+            continue
+        found = kind_of_column(name)
+        if {plain(name), plain(unit_of(name)[0])} & given.ignored or (found is None and "*" in given.ignored):
+            continue
+        if found is None or found in mine or (found in _FALLBACK and found in at):
+            free.append(k)
+        elif found in at:
+            raise SurveyError(
+                f"columns {shown(names[at[found]])} and {shown(name)} are both {found}",
+                where=where,
+                remedy=f'say which with --columns "{found}=…", and leave out others with ignore=…',
+            )
+        else:
+            _take(found, k, names, at, scales, where)
+    free += _fall_back(at, codes)
+    _check_missing(names, at, where)
+    for k in free:
+        _check_spelling(names[k], at, where)
+    return Columns(len(names), at, scales, tuple((k, names[k]) for k in sorted(free)))
+
+
+def kind_of_column(name: str) -> str | None:
+    """Return what a column of this name is; None if it is not known."""
+    return _KNOWN.get(plain(_BRACKETS.sub("", unit_of(name)[0]))) or _KNOWN.get(plain(name))
+
+
+def _place(names: Sequence[str], name: str, what: str, where: str, numbered: bool) -> int:
+    """Return the place of a column that the user gives by name, or by number if all are."""
+    if numbered and 1 <= int(name) <= len(names):
+        return int(name) - 1
+    wanted = plain(name)
+    for spelling in (str, plain, lambda one: plain(unit_of(one)[0])):
+        found = [k for k, one in enumerate(names) if spelling(one) == (name if spelling is str else wanted)]
+        if len(found) == 1:
+            return found[0]
+    shown_names = ", ".join(one or "(none)" for one in names)
+    raise SurveyError(
+        f"no column {shown(name)} for {what}", where=where, remedy=f"the columns are: {shown_names[:300]}"
+    )
+
+
+def _take(
+    what: str, k: int, names: Sequence[str], at: dict[str, int], scales: dict[str, float], where: str
+) -> None:
+    at[what] = k
+    unit = unit_of(names[k])[1]
+    if unit is not None and what in _LENGTHS:
+        scales[what] = UNITS[unit]
+    elif what in _LENGTHS and (found := re.search(r"\[\s*([^\]]+?)\s*\]", names[k])):
+        raise SurveyError(
+            f"column {shown(names[k])} is in {shown(found[1])}, which is not a unit of length",
+            where=where,
+            remedy=f"units are {', '.join(UNITS)}",
+        )
+
+
+def _fall_back(at: dict[str, int], codes: bool) -> list[int]:
+    """Let ``Code``, ``ID`` or ``Nr`` be the stone if no other column is; return columns that become notes."""
+    if codes and "description" in at:
+        return []
+    if "block" not in at:
+        for what in ("description", "name"):
+            if what in at:
+                at["block"] = at.pop(what)
+                break
+    return [at.pop("description")] if "description" in at else []
+
+
+def _check_missing(names: Sequence[str], at: Mapping[str, int], where: str) -> None:
+    needed = ("outline",) if "outline" in at else ("x", "y", "z")
+    if "block" not in at and "description" not in at:
+        needed = ("block", *needed)
+    for what in needed:
+        if what not in at:
+            raise SurveyError(
+                f"no column {what!r} among {', '.join(one or '(none)' for one in names)[:200]}",
+                where=where,
+                remedy=f'name it with --columns "{what}=…", or begin the table with e.g. '
+                "block,kind,course,role,x,y,z",
+            )
+
+
+def _check_spelling(name: str, at: Mapping[str, int], where: str) -> None:
+    """Refuse a column that is nearly one that is missing, rather than keep it as a note."""
+    known = [spelling for one in _MISSPELT if _KNOWN[spelling := plain(one)] not in at]
+    near = difflib.get_close_matches(plain(unit_of(name)[0]), known, n=1, cutoff=_ALIKE)
+    if near:
+        what = _KNOWN[near[0]]
+        raise SurveyError(
+            f"unknown column {shown(name)}, nearly {what}",
+            where=where,
+            remedy=f'say what it is: --columns "{what}={name[:40]}", or --columns "ignore={name[:40]}"',
+        )

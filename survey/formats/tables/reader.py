@@ -1,0 +1,645 @@
+"""Tables of points: one measured point or one outline per row, with or without names of columns.
+
+With names (``--format csv``) the columns come in any order and language (`survey.formats.tables.columns`), after any
+title rows. Without names they are lists of a total station: point, northing, easting, elevation, description
+(``pnezd``), or with the easting first (``penzd``); everything after the fourth separator is the description. A stone is
+given by columns, or by a description that a code template takes apart (`survey.formats.tables.code_template`). The rows
+of a stone may lie anywhere. Empty fields mean "not known".
+"""
+
+import math
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain, islice
+from operator import itemgetter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from moma.errors import SurveyError
+from survey.formats.fields import CODE, KIND, code_of, parse_course, shown
+from survey.formats.options import ReadingOptions, whole
+from survey.formats.tables.code_template import ROLES, STATION, CodeFields, CodeTemplate
+from survey.formats.tables.columns import ColumnMap, Columns, find_columns, kind_of_column, plain, read_map
+from survey.formats.tables.decimals import Decimals
+from survey.formats.tables.kinds import kind_of, meant
+from survey.formats.tables.point_table import PointTable, TableStone, check_station
+from survey.formats.tables.rows import ListRows, Row, TextRows, open_rows
+from survey.formats.tables.wkt import outline_of
+from survey.records.survey import Station, Survey, SurveyHead, SurveyStream
+
+__all__ = [
+    "CODES",
+    "NEEDED",
+    "OPTIONAL",
+    "PointCollector",
+    "open_csv",
+    "open_penzd",
+    "open_pnezd",
+    "open_table",
+    "read_csv",
+]
+
+CODES = "{block}:{role}"
+"""Template of descriptions, if none is given."""
+
+NEEDED = ("block", "x", "y", "z")
+"""Required columns; `description` serves for `block`, `outline` for the coordinates."""
+
+OPTIONAL = (
+    *("kind", "course", "role", "sigma", "depth", "depth_sigma", "depth_source", "zone", "station"),
+    *("name", "description", "outline"),
+)
+"""Optional columns."""
+
+_OF_STONES = ("depth", "depth_sigma", "depth_source", "zone", "station")
+_IDENTITY = ("block", "kind", "course", "role", "description")
+_LIST = {"pnezd": ("name", "y", "x", "z", "description"), "penzd": ("name", "x", "y", "z", "description")}
+_SEPARATORS = ("\t", ";", ",", "|", "")  # empty: any blanks
+_LOOK_AHEAD = 100  # rows in which the first good one, or the names of the columns, must be found
+_TITLES = 30  # rows before the names of the columns
+_LISTED = 12  # unknown kinds in a message
+_CACHED = 4096  # identities
+_LONGEST_NAME = 64
+_NOTHING = float("nan")
+
+AnyRows = TextRows | ListRows
+
+
+def open_csv(path: Path, options: ReadingOptions | None = None) -> SurveyStream:
+    """Read a table with names of columns and return its stones one by one.
+
+    Parameters
+    ----------
+    path : the file, text or a workbook
+    options : map of the columns, sheet, code template, kinds, unit; sigma of rows without one; the head of another file
+
+    Returns
+    -------
+    SurveyStream : without the head of another file, corners must run counter-clockwise seen from outside
+
+    Raises
+    ------
+    SurveyError
+        naming file and line, if the table as a whole is wrong
+    UsageError
+        if the map of the columns or the code template is wrong
+    """
+    options = options or ReadingOptions()
+    return open_table(Path(path), open_rows(Path(path), options.sheet), options)
+
+
+def open_table(path: Path, rows: AnyRows, options: ReadingOptions) -> SurveyStream:
+    """Read a table from its rows; see `open_csv`."""
+    iterator = iter(rows)
+    ahead = list(islice(iterator, _LOOK_AHEAD))
+    header, columns = _find_header(rows, ahead, read_map(options.columns), options.codes is not None)
+    return _read(path, rows, chain(ahead[header:], iterator), columns, options)
+
+
+def open_pnezd(path: Path, options: ReadingOptions | None = None) -> SurveyStream:
+    """Read a list of point, northing, easting, elevation, description, otherwise as `open_csv`."""
+    return _open_list(Path(path), options or ReadingOptions(), "pnezd")
+
+
+def open_penzd(path: Path, options: ReadingOptions | None = None) -> SurveyStream:
+    """Read a list of point, easting, northing, elevation, description, otherwise as `open_csv`."""
+    return _open_list(Path(path), options or ReadingOptions(), "penzd")
+
+
+def read_csv(path: Path, default_sigma: float = 0.003) -> Survey:
+    """Read a table of points as a whole.
+
+    Parameters
+    ----------
+    path : the file
+    default_sigma : standard deviation of a coordinate whose row states none [m]
+
+    Raises
+    ------
+    SurveyError
+        naming file and line, when any row is wrong
+    """
+    return whole(open_csv(path, ReadingOptions(sigma=default_sigma)), Path(path))
+
+
+def _open_list(path: Path, options: ReadingOptions, form: str) -> SurveyStream:
+    if options.columns:
+        return open_csv(path, options)
+    rows = open_rows(path, options.sheet)
+    iterator = iter(rows)
+    ahead = list(islice(iterator, _LOOK_AHEAD))
+    header = 0
+    while header < len(ahead) - 1 and header < _TITLES and not _has_digits(ahead[header][1]):
+        header += 1
+    if ahead and not _has_digits(ahead[header][1]):
+        del ahead[:]
+    columns = Columns(5, {name: k for k, name in enumerate(_LIST[form])})
+    if ahead[header:]:
+        rows.delimiter = _list_delimiter(rows, ahead[header:])
+        if header:
+            _check_axes(rows, ahead[header - 1], form)
+    return _read(path, rows, chain(ahead[header:], iterator), columns, options, form)
+
+
+def _has_digits(row: Row) -> bool:
+    return any(one.isdigit() for text in ([row] if isinstance(row, str) else row) for one in text)
+
+
+def _read(
+    path: Path,
+    rows: AnyRows,
+    data: Iterator[tuple[int, Any]],
+    columns: Columns,
+    options: ReadingOptions,
+    form: str = "",
+) -> SurveyStream:
+    reader = _RowReader(path, rows, columns, options, form)
+    first = 0
+    for number, row in data:
+        first = first or number
+        reader.take(row, number)
+    collector = reader.collector
+    collector.close()
+    if not first:
+        what = "list has no points" if form else "table has no points"
+        raise rows.fail(rows.end, f"the {what}", "add one line per point")
+    head = collector.head
+    remarks = (*rows.remarks, *reader.remarks)
+    return SurveyStream(head, collector.table.records(), header=first - 1, remarks=remarks)
+
+
+def _find_header(
+    rows: AnyRows, ahead: Sequence[tuple[int, Any]], given: ColumnMap, codes: bool
+) -> tuple[int, Columns]:
+    """Return the number of rows up to the names of the columns, and the columns; sets the separator."""
+    stated = rows.delimiter
+    best: tuple[int, SurveyError] | None = None
+    for k, (number, row) in enumerate(ahead[:_TITLES]):
+        rows.delimiter = stated
+        for delimiter in rows.delimiters(row):
+            rows.delimiter, known = delimiter, 0
+            try:
+                names = rows.cells(row, number)
+                known = sum(kind_of_column(one) is not None for one in names if one)
+                where = f"{rows.path}:{number}" if number else rows.path
+                columns = find_columns(names, given, where, codes)
+            except SurveyError as error:
+                if best is None or known > best[0]:
+                    best = known, error
+                continue
+            if given.numbered and _is_data(rows, names, columns, number):
+                return k, replace(columns, notes=())
+            return k + 1, columns
+    rows.delimiter = stated
+    if best is None:
+        raise rows.fail(rows.end, "the table is empty: no column 'block'", "begin it with e.g. block,x,y,z")
+    raise best[1]
+
+
+def _is_data(rows: AnyRows, names: Sequence[str], columns: Columns, number: int) -> bool:
+    """Return whether the first row holds numbers already, where all columns are given by number."""
+    if "outline" in columns.at:
+        return True
+    decimals = Decimals(rows.path, commas=rows.delimiter != ",", any_mark=True)
+    try:
+        for axis in "xyz":
+            decimals.number(names[columns.at[axis]], axis, number)
+    except SurveyError:
+        return False
+    return True
+
+
+def _list_delimiter(rows: AnyRows, ahead: Sequence[tuple[int, Any]]) -> str:
+    """Return the separator of the fields in the first line that has coordinates."""
+    stated = rows.delimiter
+    for number, row in ahead:
+        for delimiter in _SEPARATORS if stated is None else (stated,):
+            rows.delimiter = delimiter
+            if _is_point(rows, row, number):
+                return delimiter
+    rows.delimiter = stated
+    number, row = ahead[0]
+    text = row if isinstance(row, str) else " ".join(row)
+    raise rows.fail(
+        number,
+        f"{shown(text)} is not a point with two coordinates, an elevation and a description",
+        "separate the fields by commas, semicolons, tabs or blanks; for other columns give "
+        '--format csv --columns "block=1,x=2,y=3,z=4"',
+    )
+
+
+def _is_point(rows: AnyRows, row: Any, number: int) -> bool:
+    """Return whether a row has five fields with three coordinates among them."""
+    decimals = Decimals(rows.path, commas=rows.delimiter != ",", any_mark=rows.any_mark)
+    try:
+        parts = rows.cells(row, number, 5)
+        if len(parts) == 5:
+            decimals.place((parts[1], parts[2], parts[3]), "abc", number)
+    except SurveyError:
+        return False
+    return len(parts) == 5
+
+
+def _check_axes(rows: AnyRows, header: tuple[int, Any], form: str) -> None:
+    """Refuse a list whose own names put the easting where the format has the northing, or the other way."""
+    number, row = header
+    try:
+        names = rows.cells(row, number, 5)
+    except SurveyError:
+        return
+    found = [kind_of_column(one) if plain(one) not in ("x", "y") else None for one in names[1:3]]
+    other = "penzd" if form == "pnezd" else "pnezd"
+    if found == list(_LIST[other][1:3]):
+        raise rows.fail(
+            number,
+            f"the columns are {', '.join(names)[:200]}, which is not the order of {form}",
+            f"give --format {other}",
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Identity:
+    """The stone and role that a row states."""
+
+    code: str
+    name: str
+    kind: str | None
+    course: int | None
+    zone: str | None
+    role: str
+
+
+class PointCollector:
+    """Collector of the points of a list, which makes stones of them.
+
+    Parameters
+    ----------
+    path : of the file, for errors
+    options : code template, kinds, sigma, the head of another file
+    unique : whether each point has a number of its own
+
+    Attributes
+    ----------
+    table : the stones
+    template : of the descriptions
+    """
+
+    def __init__(self, path: Path, options: ReadingOptions, unique: bool) -> None:
+        self._path, self._options, self._unique = str(path), options, unique
+        self.template = CodeTemplate(options.codes or CODES)
+        self.table = PointTable(str(path), options.sigma, options.kind)
+        self._head = options.head_for(path)
+        self._known = {one.name: one for one in self._head.stations}
+        self._stations: dict[str, Station] = {}
+        self._lines_of: dict[str, int] = {}
+        self._misfits: list[tuple[int, str]] | None = []  # until a description fits
+
+    @property
+    def head(self) -> SurveyHead:
+        """The head of the other file, with the stations of the list."""
+        return replace(self._head, stations=(*self._head.stations, *self._stations.values()))
+
+    def close(self) -> None:
+        """Check that the template fits any description, and that most kinds are known."""
+        if self._misfits and not self._stations:
+            self._refuse_template(self._misfits)
+        stones = [one for one in self.table.stones.values() if one.kind is not None and one.error is None]
+        unknown = [one for one in stones if one.kind not in self._options.known_kinds]
+        if self._options.known_kinds and 2 * len(unknown) > len(stones):
+            words = list(dict.fromkeys(str(one.kind) for one in unknown))
+            table = ",".join(f"{one}={meant(one, self._options.known_kinds)}" for one in words[:_LISTED])
+            raise self.fail(
+                unknown[0].line,
+                f"unknown kinds: {', '.join(words[:_LISTED])}",
+                f'say what they stand for: --kinds "{table}"',
+            )
+
+    def fail(self, line: int, what: str, remedy: str) -> SurveyError:
+        """Make an error that names a line of the file."""
+        return SurveyError(what, where=f"{self._path}:{line}", remedy=remedy)
+
+    def fields(self, description: str, line: int) -> CodeFields:
+        """Take a description apart.
+
+        Raises
+        ------
+        SurveyError
+            if it does not fit the template; of the whole file, if no description so far has
+        """
+        found = self.template.parse(description)
+        if found is not None:
+            if found.role != STATION:
+                self._misfits = None
+            return found
+        remedy = "correct it, or give the code template that the list was made with: --codes"
+        if self._misfits is not None:
+            if not self._misfits:
+                remedy = self.template.expected(description, ())
+            self._misfits.append((line, description))
+            if len(self._misfits) >= _LOOK_AHEAD:
+                self._refuse_template(self._misfits)
+        raise self.fail(
+            line, f"description {shown(description)} is not of the form {self.template.text}", remedy
+        )
+
+    def _refuse_template(self, misfits: Sequence[tuple[int, str]]) -> None:
+        line, description = misfits[0]
+        more = f", nor is any other of {len(misfits)}" if len(misfits) > 1 else ""
+        raise _WrongTemplateError(
+            f"description {shown(description)} is not of the form {self.template.text}{more}",
+            where=f"{self._path}:{line}",
+            remedy=self.template.expected(description, [text for _, text in misfits[1:]]),
+        )
+
+    def identity(
+        self, block: str, kind: str | None, course: int | None, zone: str | None, role: str, line: int
+    ) -> _Identity:
+        """Check the names of a stone.
+
+        Raises
+        ------
+        SurveyError
+            if no code can be made of the name, or the kind is not one
+        """
+        code = code_of(block)
+        if not code or len(block) > 2 * _LONGEST_NAME or not block.isprintable():
+            what = f"block {shown(block)} is not a block name"
+            raise self.fail(line, what, "write e.g. W01-01, at most 64 letters and digits")
+        found = None
+        if kind:
+            found = kind_of(kind, self._options.kinds)
+            if KIND.fullmatch(found) is None:
+                raise self.fail(
+                    line, f"kind {shown(kind)} is not a kind name",
+                    f'write e.g. header, or say what it stands for: --kinds "{kind[:20]}=header"',
+                )  # fmt: skip
+        return _Identity(code, block, found, course, zone, role)
+
+    def stone(self, one: _Identity, line: int) -> TableStone:
+        """Return the stone of a row, made if it is not there yet; not yet kept.
+
+        Raises
+        ------
+        SurveyError
+            if it has another name, kind or course than before
+        """
+        stone = self.table.stones.get(one.code)
+        if stone is not None and stone.agreed is one:  # the usual case: the row before was of the same stone
+            return stone
+        if stone is None:
+            return TableStone(one.code, one.kind, one.course, line, one.name, zone=one.zone)
+        if stone.error is not None:
+            return stone
+        if stone.name != one.name:
+            raise self.fail(
+                line,
+                f"the names {shown(stone.name)} and {shown(one.name)} both give the code {one.code}",
+                "write one name for one stone, and names that differ in letters or digits for two",
+            )
+        for name in ("kind", "course", "zone"):
+            new, old = getattr(one, name), getattr(stone, name)
+            if new is not None and old is None:
+                setattr(stone, name, new)
+            elif new is not None and new != old:
+                raise self.fail(
+                    line,
+                    f"kind, course or zone of block {one.code} differs from line {stone.line}",
+                    "give every line of a block the same kind and course",
+                )
+        stone.agreed = one
+        return stone
+
+    def check_name(self, name: str, line: int) -> None:
+        """Check the number of a point, and that it is the only one."""
+        if not name or not name.isprintable() or len(name) > _LONGEST_NAME:
+            raise self.fail(line, f"point {shown(name)} is not a number or name", "number the points")
+        if self._unique and (before := self._lines_of.setdefault(name, line)) != line:
+            raise self.fail(line, f"point {name} a second time", f"the first is on line {before}")
+
+    def add_station(self, name: str, place: tuple[float, float, float], line: int) -> None:
+        """Add a position of the instrument.
+
+        Raises
+        ------
+        SurveyError
+            if there is one of that name
+        """
+        before = self._known.get(name) or self._stations.get(name)
+        if before is not None:
+            raise self.fail(line, f"station {name} a second time", f"the first is on line {before.line}")
+        self._stations[name] = Station(name, np.array(place), line)
+
+    def add(
+        self, name: str, description: str, place: tuple[float, float, float], line: int, count: int = 1
+    ) -> None:
+        """Add a point with a description; a wrong one spoils its stone."""
+        code: str | None = None
+        try:
+            found = self.fields(description, line)
+            one = self.identity(found.block, found.kind, found.course, found.zone, found.role, line)
+            if found.role != STATION:
+                code = one.code
+            if not all(math.isfinite(value) and abs(value) <= 1e8 for value in place):
+                raise self.fail(
+                    line, "a coordinate is not finite, or beyond 1e+08 m", "coordinates are in metres"
+                )
+            self.check_name(name, line)
+            if found.role == STATION:
+                self.add_station(one.code, place, line)
+                return
+            stone = self.stone(one, line)
+            if stone.error is None:
+                stone.add_place(found.role == "vertex", place, _NOTHING, name)
+                self.table.stones[one.code] = stone
+            stone.add_line(line, count)
+        except _WrongTemplateError:
+            raise
+        except SurveyError as error:
+            self.table.refuse(code, error, line, count)
+
+
+class _WrongTemplateError(SurveyError):
+    """The code template fits no description of a file."""
+
+
+class _RowReader:
+    """Reader of the rows of a table."""
+
+    def __init__(
+        self, path: Path, rows: AnyRows, columns: Columns, options: ReadingOptions, form: str
+    ) -> None:
+        self._rows, self._path, self._fail = rows, rows.path, rows.fail
+        self._columns, self._options, self._limit = columns, options, 5 if form else 0
+        self._form = form
+        self.collector = PointCollector(path, options, unique=bool(form))
+        self._table = self.collector.table
+        at = columns.at
+        self._count = columns.count
+        self._pick = itemgetter(
+            *(at[one] for one in _IDENTITY if one in at), at.get("block", at.get("description", 0))
+        )
+        self._by = [one for one in _IDENTITY if one in at]
+        self._outline_at = at.get("outline")
+        self._place = None if self._outline_at is not None else itemgetter(at["x"], at["y"], at["z"])
+        self._name_at, self._sigma_at = at.get("name"), at.get("sigma")
+        self._of_stones = [(one, at[one]) for one in _OF_STONES if one in at]
+        self._notes = [(k, _note_key(name)) for k, name in columns.notes]
+        unit = options.scale
+        self._scale = {
+            one: columns.scales.get(one, unit) for one in (*"xyz", "sigma", "depth", "depth_sigma")
+        }
+        scales = (self._scale["x"], self._scale["y"], self._scale["z"])
+        self._decimals = Decimals(rows.path, rows.delimiter != ",", rows.any_mark, scales)
+        self._known: dict[Any, _Identity] = {}
+        self.remarks: tuple[str, ...] = ()
+        if columns.notes:
+            kept = ", ".join(name[:40] for _, name in columns.notes)
+            self.remarks = (f'kept as notes: {kept}; --columns "ignore=…" leaves columns out',)
+
+    def take(self, row: Any, number: int) -> None:
+        """Read one row."""
+        values: list[str] | None = None
+        try:
+            values = self._rows.cells(row, number, self._limit)
+            if len(values) != self._count:
+                self._fit(values, number)
+            key = self._pick(values)
+            one = self._known.get(key)
+            if one is None:
+                one = self._identified(values, number)
+                if len(self._known) >= _CACHED:
+                    self._known.clear()
+                self._known[key] = one
+            stone = self._table.stones.get(one.code)
+            if stone is not None and stone.error is not None and one.role != STATION:
+                stone.add_line(number, self._rows.lines_of(row))
+            else:
+                self._add(one, values, number, self._rows.lines_of(row))
+        except _WrongTemplateError:
+            raise
+        except SurveyError as error:
+            self._table.refuse(self._likely_code(row, values), error, number, self._rows.lines_of(row))
+
+    def _fit(self, values: list[str], number: int) -> None:
+        """Cut empty fields at the end."""
+        if self._form:
+            raise self._fail(
+                number, f"{len(values)} fields, not 5", "write point, two coordinates, elevation, code"
+            )
+        if len(values) > self._count and not any(values[self._count :]):
+            del values[self._count :]
+        if len(values) != self._count:
+            raise self._fail(number, f"{len(values)} fields for {self._count} columns", "fill every column")
+
+    def _identified(self, values: Sequence[str], number: int) -> _Identity:
+        """Find out which stone a row is of, and what its point is."""
+        cells = {one: values[self._columns.at[one]] for one in self._by}
+        role = "vertex"
+        block, kind, course, zone = cells.get("block", ""), cells.get("kind"), None, None
+        if "description" in cells:
+            found = self.collector.fields(cells["description"], number)
+            block, kind = block or found.block, kind or found.kind
+            course, zone, role = found.course, found.zone, found.role
+        if cells.get("course"):
+            course = parse_course(cells["course"], f"{self._path}:{number}")
+        if "role" in cells:
+            text = cells["role"].casefold()
+            if text not in ROLES:
+                raise self._fail(
+                    number, f"role {shown(cells['role'])}", "write vertex (v) or point (p), or station (s)"
+                )
+            role = ROLES[text]
+        return self.collector.identity(block, kind, course, zone, role, number)
+
+    def _add(self, one: _Identity, values: Sequence[str], number: int, count: int) -> None:
+        name = None
+        if self._name_at is not None:
+            name = values[self._name_at]
+            if name or self._form:
+                self.collector.check_name(name, number)
+        if self._place is None:
+            self._add_outline(one, values, number, count)
+            return
+        texts = self._place(values)
+        place = self._decimals.place(texts, "xyz", number)
+        if one.role == STATION:
+            self.collector.add_station(one.code, place, number)
+            return
+        sigma = _NOTHING
+        if self._sigma_at is not None and (text := values[self._sigma_at]):
+            sigma = self._decimals.length(text, "sigma", number, self._scale["sigma"])
+        stone = self._stone_of(one, values, number)
+        stone.add_place(one.role == "vertex", place, sigma, name)
+        stone.add_line(number, count)
+
+    def _add_outline(self, one: _Identity, values: Sequence[str], number: int, count: int) -> None:
+        corners = self._options.scale * outline_of(values[self._outline_at or 0], f"{self._path}:{number}")
+        sigma = _NOTHING
+        if self._sigma_at is not None and (text := values[self._sigma_at]):
+            sigma = self._decimals.length(text, "sigma", number, self._scale["sigma"])
+        if one.code in self._table.stones:
+            before = self._table.stones[one.code].line
+            raise self._fail(
+                number,
+                f"block {one.code} a second time",
+                f"the first is on line {before}; draw one outline for each",
+            )
+        stone = self._stone_of(one, values, number)
+        for corner in corners.tolist():
+            stone.add_place(True, (corner[0], corner[1], corner[2]), sigma, None)
+        stone.add_line(number, count)
+
+    def _stone_of(self, one: _Identity, values: Sequence[str], number: int) -> TableStone:
+        """Return the stone of a row, with what the row says of all of it."""
+        stone = self.collector.stone(one, number)
+        if stone.agreed is one and not self._of_stones and not self._notes:
+            return stone
+        for name, k in self._of_stones:
+            if values[k]:
+                self._set(stone, name, values[k], number)
+        for k, key in self._notes:
+            if values[k]:
+                stone.add_note(key, values[k])
+        self._table.stones[one.code] = stone
+        return stone
+
+    def _set(self, stone: TableStone, name: str, text: str, number: int) -> None:
+        """Set a value of the whole block from one of its rows."""
+        value: float | str = text
+        if name in ("depth", "depth_sigma"):
+            value = self._decimals.length(text, name, number, self._scale[name])
+        elif name == "station":
+            check_station(text, self.collector.head, f"{self._path}:{number}")
+        elif not text.isprintable() or (name == "zone" and ('"' in text or len(text) > _LONGEST_NAME)):
+            raise self._fail(number, f"{name} {shown(text)} is not a name", "write printable words")
+        before = getattr(stone, name)
+        if before not in (None, value):
+            found, first = (f"{one:g} m" if isinstance(one, float) else shown(one) for one in (value, before))
+            raise self._fail(number, f"{name} {found}, but {first} before", f"give a block one {name}")
+        setattr(stone, name, value)
+
+    def _likely_code(self, row: Any, values: list[str] | None) -> str | None:
+        """Return the stone that a wrong row names; None if it cannot be known."""
+        at = self._columns.at
+        if values is not None and len(values) == self._count and "description" in at:
+            found = self.collector.template.parse(values[at["description"]])
+            if found is not None:
+                return code_of(found.block) or None if found.role != STATION else None
+        if "block" in at:
+            rough = self._rows.rough_cells(row) if values is None else values
+            name = rough[at["block"]] if at["block"] < len(rough) else ""
+            return (code_of(name) or None) if len(name) <= 2 * _LONGEST_NAME else None
+        rest = [row if isinstance(row, str) else ";".join(row)]
+        while len(rest := rest[-1].split(self._rows.delimiter or None, 1)) == 2:
+            found = self.collector.template.parse(rest[1].strip())
+            if found is not None and found.role != STATION and CODE.fullmatch(found.block):
+                return found.block
+        return None
+
+
+def _note_key(name: str) -> str:
+    """Return the key of a note, one word, from the name of a column."""
+    return re.sub(r"[^\w-]+", "_", name.strip()).strip("_").lower() or "note"
