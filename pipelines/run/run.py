@@ -25,6 +25,8 @@ from mechanics.stones.meshing.mesh import VolumeMesh
 from moma.errors import MissingLibraryError
 from pipelines.draw.pictures import OF_RESULTS, draw_pictures, drawing_process, missing
 from pipelines.draw.plots import history_svg
+from pipelines.reports.page.known import Known, known_stones
+from pipelines.reports.page.scenes import run_model
 from pipelines.reports.run import write_report
 from pipelines.results.folder import check_replaceable, replacing
 from pipelines.results.joints_csv import write_joints
@@ -129,6 +131,7 @@ def run_scene(
                 ),
                 inputs=run_inputs(scene, assembly, groups, session),
             )
+            known = known_stones(session, [model.record.code for model in models])
         if meshes is not None:
             check_mesh_file(meshes, _elements(assembly))
         with _timed(seconds, "mesh"):
@@ -160,7 +163,7 @@ def run_scene(
             stones, reached = stone_results(result), profile_report(profile, scene, result)
             with replacing(folder) as fresh:
                 summary, warnings = write_results(
-                    result, stones, scene, assembly, fresh, seconds, progress, reached, unfinished, ready
+                    result, stones, scene, assembly, fresh, seconds, progress, reached, unfinished, ready, known
                 )
                 unfinished.hand_over(fresh)
         if meshes is not None:
@@ -183,11 +186,12 @@ def write_results(
     profile: ProfileReport | None = None,
     unfinished: UnfinishedRun | None = None,
     ready: "subprocess.Popen[str] | None" = None,
+    known: Known | None = None,
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Write all files of a run into an empty folder; return the summary and the warnings.
 
     Pictures that cannot be drawn on this machine cause a warning; everything else is written. They are drawn by
-    another process, `ready` if it is given, beside the other files.
+    another process, `ready` if it is given, beside the other files. `known` is what the database holds of the stones.
     """
     warnings = [*assembly.remarks, *(() if unfinished is None else unfinished.warnings)]
     # of a relaxation only the final equilibrium counts, whose steps are all solved
@@ -227,7 +231,8 @@ def write_results(
     summary = summarise(result, version=version("moma-masonry"), seconds=seconds, profile=reached)
     summary["inputs"] = {title: list(lines) for title, lines in assembly.inputs.items()}
     summary["versions"] = dict(versions())
-    write_report(folder / "report.html", result, summary, stones, warnings, history)
+    model = run_model(result, stones, assembly.towards, assembly.origin, known)
+    write_report(folder / "report.html", result, summary, stones, warnings, history, model)
     (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
     summary["resumed"] = [] if unfinished is None else unfinished.resumed
     summary["origin"] = assembly.origin.tolist()
