@@ -10,6 +10,7 @@ from moma.cli.database import export, import_, migrate
 from moma.cli.entities import query, schema, show
 from moma.cli.geology import geology
 from moma.cli.knowledge import record
+from moma.cli.pages import report, serve, view
 from moma.cli.proposals import propose
 from moma.cli.relations import load_path, relate
 from moma.cli.runs import runs
@@ -73,6 +74,9 @@ _COMMANDS = (
     trade,
     geology,
     runs,
+    view,
+    report,
+    serve,
     export,
     import_,
     migrate,

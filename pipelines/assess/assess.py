@@ -23,6 +23,8 @@ from pipelines.assess.questions import LoadQuestion, Question, parse_question, s
 from pipelines.draw.mechanism import draw_mechanisms
 from pipelines.draw.plots import draw_capacity
 from pipelines.reports.assessment import write_assessment
+from pipelines.reports.page.known import known_stones
+from pipelines.reports.page.scenes import assessment_model
 from pipelines.results.folder import check_replaceable, replacing
 from pipelines.results.summary import as_json
 from pipelines.run.assemble import Assembly, assemble_stones
@@ -123,6 +125,7 @@ def assess(
         progress(Progress("blocks", 0, None, f"closing the joints of {len(models)} stones"))
         groups = select_groups(scene, session, models)
         assembled = assemble_stones(scene, models, groups)
+        known = known_stones(session, [model.record.code for model in models])
     questions = [
         _asked(one, confirm, code) for one in asked or scene_questions(scene, groups, assembled.origin)
     ]
@@ -158,7 +161,14 @@ def assess(
             )
         except MissingLibraryError as error:
             warnings.append(f"no pictures: {error}")
-        write_assessment(fresh / REPORT, summary)
+        limits = [
+            (one.told["name"], one.told["headline"], one.mechanism, forces)
+            for one, forces in zip(answers, carried, strict=True)
+        ]
+        model = assessment_model(
+            scene.name, assembled.scene.blocks, on, limits, assembled.towards, assembled.origin, known
+        )
+        write_assessment(fresh / REPORT, summary, model)
         (fresh / "scene.toml").write_text(scene.text, encoding="utf-8")
         (fresh / INDEX).write_text(as_json(summary), encoding="utf-8")
     with open_database(url, create=False) as database:

@@ -163,7 +163,17 @@ def run_scene(
             stones, reached = stone_results(result), profile_report(profile, scene, result)
             with replacing(folder) as fresh:
                 summary, warnings = write_results(
-                    result, stones, scene, assembly, fresh, seconds, progress, reached, unfinished, ready, known
+                    result,
+                    stones,
+                    scene,
+                    assembly,
+                    fresh,
+                    seconds,
+                    progress,
+                    reached,
+                    unfinished,
+                    ready,
+                    known,
                 )
                 unfinished.hand_over(fresh)
         if meshes is not None:

@@ -14,6 +14,8 @@ from pipelines.assess.diagnosis.ranking import Ranked, verdict
 from pipelines.assess.diagnosis.search import Case, Fitted
 from pipelines.assess.motions import Motions
 from pipelines.draw.elevations.movement import draw_bed_movement
+from pipelines.reports.movement import write_diagnosis_page
+from pipelines.reports.page.surveys import bed_lines, survey_model
 from pipelines.results.summary import as_json
 from pipelines.run.record import versions
 from pipelines.toml.writer import toml_text
@@ -60,6 +62,9 @@ def write_diagnosis(
     write_best(folder, file, case, best)
     summary = _summary(file, found, done, dating)
     summary["cautions"] += cautions
+    lines = bed_lines(courses, {facade.name: facade.frame.axes[2] for facade in found.facades})
+    model = survey_model(best.title, found.stones, moved=motions.displacement, lines=lines, colour="course")
+    write_diagnosis_page(folder / "report.html", Path(file.scene_path).stem, summary, model)
     summary["files"] = sorted([INDEX, *(entry.name for entry in folder.iterdir())])
     (folder / INDEX).write_text(as_json(summary), encoding="utf-8")
     return summary

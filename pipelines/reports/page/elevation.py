@@ -60,7 +60,8 @@ def elevation(model: Model, most: int = 6000, scale: int | None = None) -> Eleva
     codes = _codes(paper, order, stones.codes)
     bar = _bar(chosen, float(high_mm), float(wide))
     svg = (
-        f'<svg xmlns="http://www.w3.org/2000/svg" class="elevation" width="{wide + 4:.1f}mm" height="{high_mm + 14:.1f}mm" '
+        f'<svg xmlns="http://www.w3.org/2000/svg" class="elevation" '
+        f'width="{wide + 4:.1f}mm" height="{high_mm + 14:.1f}mm" '
         f'viewBox="-2 -2 {wide + 4:.2f} {high_mm + 14:.2f}" role="img" aria-label="elevation, 1 : {chosen}">'
         f'<g fill="#fff" stroke="#000" stroke-width="0.18" stroke-linejoin="round">{"".join(parts)}</g>'
         f'<g font-family="sans-serif" font-size="{_LETTER}" text-anchor="middle">{codes}</g>{bar}</svg>'
@@ -134,7 +135,12 @@ def _codes(paper: Array, faces: list[tuple[int, Ints]], codes: Sequence[str]) ->
 def _bar(scale: int, below: float, wide: float) -> str:
     """Return a bar of a round length, at most a third of the width."""
     metres = max(
-        (digit * 10.0**power for power in range(-2, 4) for digit in _BAR if digit * 10.0**power * 1e3 / scale < wide / 3),
+        (
+            digit * 10.0**power
+            for power in range(-2, 4)
+            for digit in _BAR
+            if digit * 10.0**power * 1e3 / scale < wide / 3
+        ),
         default=0.01,
     )
     long = metres * 1e3 / scale

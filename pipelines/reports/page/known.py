@@ -62,7 +62,9 @@ def known_stones(
         if (index := number.get(str(row["code"]))) is not None:
             rows[index] = row
     columns = [column_of(one, [row.get(name) for row in rows]) for name, one in asked.items()]
-    ids = {id_: number[code] for code, id_ in session.execute(select(Entity.code, Entity.id)) if code in number}
+    ids = {
+        id_: number[code] for code, id_ in session.execute(select(Entity.code, Entity.id)) if code in number
+    }
     return Known(
         tuple(one for one in columns if one is not None),
         _relations(session, ids),
@@ -82,7 +84,10 @@ def column_of(attribute: Attribute, values: Sequence[Any]) -> Column | None:
     if attribute.is_number:
         numbers = np.array([np.nan if value is None else float(value) for value in values])
         return Column(name, label, attribute.unit, numbers, group)
-    texts = [None if value is None else "yes" if value is True else "no" if value is False else str(value) for value in values]
+    texts = [
+        None if value is None else "yes" if value is True else "no" if value is False else str(value)
+        for value in values
+    ]
     return Column(name, label, None, texts, group)
 
 
@@ -99,7 +104,9 @@ def _relations(session: Session, ids: dict[int, int]) -> Relations:
     )
     table = np.array(rows, dtype=np.int64).reshape(-1, 3)
     names = [name.replace("_", " ") for name in RELATIONS]
-    return Relations(table[:, :2], table[:, 2], names, [INVERSE[name].replace("_", " ") for name in RELATIONS])
+    return Relations(
+        table[:, :2], table[:, 2], names, [INVERSE[name].replace("_", " ") for name in RELATIONS]
+    )
 
 
 def _events(session: Session, ids: dict[int, int]) -> Iterator[Event]:

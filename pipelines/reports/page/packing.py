@@ -101,7 +101,12 @@ def _head(model: Model, packer: _Packer) -> dict[str, Any]:
         "edges": packer.indices(stones.edges),
         "columns": [_column(one, packer) for one in model.columns],
         "fields": [
-            {"name": one.name, "label": one.label, "unit": one.unit, "values": packer.add(one.values, "float32")}
+            {
+                "name": one.name,
+                "label": one.label,
+                "unit": one.unit,
+                "values": packer.add(one.values, "float32"),
+            }
             for one in model.fields
         ],
         "motion": None if model.motion is None else _motion(model.motion, packer),

@@ -14,7 +14,7 @@ from markupsafe import Markup, escape
 
 from moma.errors import MomaError, UsageError
 
-__all__ = ["NO_SUM", "check_sum", "contents", "print_pdf", "sealed", "title_block"]
+__all__ = ["NO_SUM", "appraise_page", "check_sum", "contents", "print_pdf", "sealed", "title_block"]
 
 NO_SUM = "0" * 64
 """Stands in a page where its checksum will."""
@@ -37,7 +37,11 @@ def title_block(title: str, versions: Mapping[str, str] | str) -> Markup:
 
     The author is that of the environment variable ``MOMA_AUTHOR``; without one there is room to sign.
     """
-    told = versions if isinstance(versions, str) else ", ".join(f"{name} {one}" for name, one in versions.items())
+    told = (
+        versions
+        if isinstance(versions, str)
+        else ", ".join(f"{name} {one}" for name, one in versions.items())
+    )
     rows = (
         ("Building", escape(title)),
         ("Author", escape(os.environ.get("MOMA_AUTHOR", "")) or Markup("&nbsp;")),
@@ -58,8 +62,12 @@ def contents(page: str) -> str:
         return f'<h2 id="part-{len(titles)}">{found[1]}</h2>'
 
     page = _HEADING.sub(named, page)
-    items = "".join(f'<li><a href="#part-{number}">{title}</a></li>\n' for number, title in enumerate(titles, 1))
-    return page.replace('<nav class="contents"></nav>', f'<nav class="contents">\n<ol>\n{items}</ol>\n</nav>', 1)
+    items = "".join(
+        f'<li><a href="#part-{number}">{title}</a></li>\n' for number, title in enumerate(titles, 1)
+    )
+    return page.replace(
+        '<nav class="contents"></nav>', f'<nav class="contents">\n<ol>\n{items}</ol>\n</nav>', 1
+    )
 
 
 def sealed(page: str) -> str:
@@ -73,6 +81,21 @@ def check_sum(page: str) -> bool | None:
     return None if found is None else found[2] == _digest(_SUM.sub(rf"\g<1>{NO_SUM}\g<3>", page, count=1))
 
 
+def appraise_page(page: Path) -> bool | None:
+    """Return `check_sum` of a page in a file.
+
+    Raises
+    ------
+    UsageError : it cannot be read
+    """
+    try:
+        return check_sum(page.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise UsageError(
+            f"cannot be read: {error}", where=str(page), remedy="name a page, or a folder of results"
+        ) from error
+
+
 def _digest(page: str) -> str:
     return hashlib.sha256(page.encode()).hexdigest()
 
@@ -82,15 +105,14 @@ def print_pdf(page: Path, target: Path, language: str = "en") -> None:
 
     Raises
     ------
-    UsageError : no such page
     MomaError : there is no Chromium, or it fails
     """
-    if not page.is_file():
-        raise UsageError("there is no page", where=str(page), remedy="name the folder of a run")
     browser = next((found for name in _BROWSERS if (found := shutil.which(name))), None)
     browser = browser or next((place for place in _PLACES if Path(place).is_file()), None)
     if browser is None:
-        raise MomaError("no Chromium, Chrome or Edge is installed", where="--pdf", remedy=f"install one, or {_BY_HAND}")
+        raise MomaError(
+            "no Chromium, Chrome or Edge is installed", where="--pdf", remedy=f"install one, or {_BY_HAND}"
+        )
     with tempfile.TemporaryDirectory() as folder:
         printed = Path(folder) / "page.pdf"
         command = [
@@ -110,7 +132,9 @@ def print_pdf(page: Path, target: Path, language: str = "en") -> None:
         try:
             done = subprocess.run(command, capture_output=True, text=True, timeout=_PATIENCE, check=False)
         except subprocess.TimeoutExpired as error:
-            raise MomaError(f"{browser} did not print within {_PATIENCE:g} s", where=str(page), remedy=_BY_HAND) from error
+            raise MomaError(
+                f"{browser} did not print within {_PATIENCE:g} s", where=str(page), remedy=_BY_HAND
+            ) from error
         if not printed.is_file():
             last = (done.stderr.strip().splitlines() or ["it printed nothing"])[-1]
             raise MomaError(f"{browser} failed: {last}", where=str(page), remedy=_BY_HAND)

@@ -72,15 +72,25 @@ def run_model(
     rest = _rest(bodies, centres, shift[-1], turn[-1], rows)
     fixed = np.array([body.fidelity is Fidelity.FIXED for body in bodies])
     motion = Motion(
-        np.array([frame.time for frame in frames]), centres, shift, turn, fixed, rest, _in_time(frames, bodies)
+        np.array([frame.time for frame in frames]),
+        centres,
+        shift,
+        turn,
+        fixed,
+        rest,
+        _in_time(frames, bodies),
     )
     stress = _stress_field(bodies, rows)
     columns = _result_columns(stones)
     notes = []
     if len(frames) < len(result.frames):
-        notes.append(f"{len(frames)} of {len(result.frames)} instants are in this page; results.vtkhdf has them all.")
+        notes.append(
+            f"{len(frames)} of {len(result.frames)} instants are in this page; results.vtkhdf has them all."
+        )
     if soft.any():
-        notes.append("Stress on the surface and the deformation of elastic stones are those of the last instant.")
+        notes.append(
+            "Stress on the surface and the deformation of elastic stones are those of the last instant."
+        )
     model = Model(
         title=result.scene.name,
         stones=mesh,
@@ -116,7 +126,9 @@ def assessment_model(
     mesh, _ = stones_of(codes, [(block.vertices, block.faces) for block in blocks])
     centres = np.asarray(on.state.centre)
     mechanisms = [
-        Mechanism(load, about, centres, moving.velocity, None if carried is None else _resultants(on, carried))
+        Mechanism(
+            load, about, centres, moving.velocity, None if carried is None else _resultants(on, carried)
+        )
         for load, about, moving, carried in limits
     ]
     model = Model(
@@ -137,7 +149,9 @@ def _chosen(frames: Sequence[Frame], stones: int) -> list[Frame]:
     return [frames[row] for row in rows.tolist()]
 
 
-def _rest(bodies: Sequence[BodyResult], centres: Array, shift: Array, turn: Array, rows: Ints) -> Array | None:
+def _rest(
+    bodies: Sequence[BodyResult], centres: Array, shift: Array, turn: Array, rows: Ints
+) -> Array | None:
     """Return the displacement (nv, 3) of the vertices at the end beyond that of rigid stones; None if all are."""
     if all(body.element is None for body in bodies):
         return None
@@ -162,7 +176,10 @@ def _stress_field(bodies: Sequence[BodyResult], rows: Ints) -> VertexField | Non
     if all(body.von_mises is None for body in bodies):
         return None
     values = np.concatenate(
-        [np.full(len(body.reference), np.nan) if body.von_mises is None else body.von_mises for body in bodies]
+        [
+            np.full(len(body.reference), np.nan) if body.von_mises is None else body.von_mises
+            for body in bodies
+        ]
     )
     return VertexField("von_mises", "Von Mises stress", "Pa", values[rows].astype(np.float32))
 
@@ -188,21 +205,50 @@ def _von_mises(stress: Array) -> Array:
 
 def _result_columns(stones: Sequence[StoneResult]) -> list[Column]:
     """Return the results of the stones, those of which any stone has a value."""
+
     def numbers(values: Sequence[float | None]) -> Array:
         return np.array([np.nan if value is None else value for value in values], dtype=float)
 
     columns = [
         Column("fidelity", "modelled as", None, [one.fidelity for one in stones], "Results"),
-        Column("displacement_max", "displacement at the end", "m", numbers([s.displacement_max for s in stones]), "Results"),
-        Column("von_mises_max", "largest Von Mises stress", "Pa", numbers([s.von_mises_max for s in stones]), "Results"),
-        Column("von_mises_mean", "mean Von Mises stress", "Pa", numbers([s.von_mises_mean for s in stones]), "Results"),
-        Column("contact_force_max", "largest contact force", "N", numbers([s.contact_force_max for s in stones]), "Results"),
+        Column(
+            "displacement_max",
+            "displacement at the end",
+            "m",
+            numbers([s.displacement_max for s in stones]),
+            "Results",
+        ),
+        Column(
+            "von_mises_max",
+            "largest Von Mises stress",
+            "Pa",
+            numbers([s.von_mises_max for s in stones]),
+            "Results",
+        ),
+        Column(
+            "von_mises_mean",
+            "mean Von Mises stress",
+            "Pa",
+            numbers([s.von_mises_mean for s in stones]),
+            "Results",
+        ),
+        Column(
+            "contact_force_max",
+            "largest contact force",
+            "N",
+            numbers([s.contact_force_max for s in stones]),
+            "Results",
+        ),
     ]
     columns += [
-        Column(name, name.replace("_", " "), unit, numbers([one.values.get(name) for one in stones]), "Results")
+        Column(
+            name, name.replace("_", " "), unit, numbers([one.values.get(name) for one in stones]), "Results"
+        )
         for name, (unit, _) in STONE_VALUES.items()
     ]
-    return [one for one in columns if one.unit is None or np.isfinite(np.asarray(one.values, dtype=float)).any()]
+    return [
+        one for one in columns if one.unit is None or np.isfinite(np.asarray(one.values, dtype=float)).any()
+    ]
 
 
 def _joints(joints: JointResult, centres: Array, shift: Array, turn: Array) -> Joints:

@@ -18,7 +18,9 @@ Shape = tuple[Array, Faces]
 _CREASE = np.cos(np.radians(20.0))  # of the angle between facets from which their edge is drawn [-]
 
 
-def stones_of(codes: Sequence[str], shapes: Sequence[Shape], meshed: Sequence[bool] = ()) -> tuple[Stones, Ints]:
+def stones_of(
+    codes: Sequence[str], shapes: Sequence[Shape], meshed: Sequence[bool] = ()
+) -> tuple[Stones, Ints]:
     """Return the mesh of all surfaces, and the row of each vertex among the points of all stones.
 
     Parameters
@@ -88,7 +90,9 @@ def _creases(points: Array, triangles: Ints) -> Ints:
     corners = points[triangles]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-    sides = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+    sides = np.sort(
+        np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1
+    )
     facet = np.tile(np.arange(len(triangles)), 3)
     edges, place, count = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
     order = np.argsort(place.ravel(), kind="stable")
@@ -144,7 +148,7 @@ def _axes(three: Array) -> Array:
 
 
 def _fit(arms: Array, places: Array) -> tuple[Array, Array]:
-    """Return the rotation nearest to the motion of arms (n, 3) about their mean to places (Kabsch 1976), and the mean."""
+    """Return the rotation nearest to that of arms (n, 3) about their mean to places (Kabsch 1976), and the mean."""
     mean = places.mean(axis=0)
     u, _, vt = np.linalg.svd((places - mean).T @ arms)
     u[:, 2] *= np.sign(np.linalg.det(u @ vt))
