@@ -23,6 +23,7 @@ __all__ = [
     "percent",
     "picture",
     "ratio",
+    "render",
     "scientific",
     "write_page",
 ]
@@ -44,6 +45,11 @@ def write_page(path: Path, template: str, model: Model | None = None, **values: 
     values : of the template
     """
     path.write_text(page_text(template, model, **values), encoding="utf-8")
+
+
+def render(template: str, **values: object) -> str:
+    """Fill a template with plain values, without a viewer; escape every text among them."""
+    return _templates().get_template(template).render(values)
 
 
 def page_text(template: str, model: Model | None = None, **values: object) -> str:

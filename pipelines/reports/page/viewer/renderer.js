@@ -80,7 +80,6 @@ void main() {
   int stone = int(owner + 0.5);
   place = placed(stone, corner) + rest * beyond; line = vec4(0.1, 0.1, 0.1, 1.0);
   gl_Position = shown(stone) > 0.5 ? camera * vec4(place, 1.0) : NOWHERE;
-  gl_Position.z -= 0.0004 * gl_Position.w;
 }`;
 const POINT_VERTEX = `${HEAD}
 uniform float nearer;
@@ -98,7 +97,7 @@ export class Renderer {
   /** @param canvas to draw on. Throws where the browser has no WebGL 2. */
   constructor(canvas) {
     this.canvas = canvas;
-    const gl = canvas.getContext("webgl2", { antialias: true, preserveDrawingBuffer: true });
+    const gl = canvas.getContext("webgl2", { antialias: false, preserveDrawingBuffer: true });
     if (!gl) throw new Error("no WebGL 2");
     this.gl = gl;
     this.programs = {
@@ -112,6 +111,7 @@ export class Renderer {
     this.colours = gl.createTexture();
     this.meshes = {};
     gl.enable(gl.DEPTH_TEST);
+    gl.polygonOffset(1, 2); // faces behind their own edges
   }
 
   program(vertex, fragment) {
@@ -184,16 +184,19 @@ export class Renderer {
   setPoses(values) { this.texture(this.poses, values, values.length / 4, true); }
   setColours(values) { this.texture(this.colours, values, values.length / 4, false); }
 
-  /** Fit the drawing buffer to the canvas; return width over height. */
-  resize() {
-    const ratio = Math.min(window.devicePixelRatio || 1, 2);
+  /** Fit the drawing buffer to the canvas, with so many pixels for one of CSS. */
+  resize(ratio) {
     const width = Math.max(1, Math.round(this.canvas.clientWidth * ratio));
     const height = Math.max(1, Math.round(this.canvas.clientHeight * ratio));
     if (this.canvas.width !== width || this.canvas.height !== height) {
       this.canvas.width = width;
       this.canvas.height = height;
     }
-    return width / height;
+  }
+
+  /** Wait until all is drawn. */
+  finish() {
+    this.gl.readPixels(0, 0, 1, 1, this.gl.RGBA, this.gl.UNSIGNED_BYTE, new Uint8Array(4));
   }
 
   use(name, view) {
@@ -233,7 +236,9 @@ export class Renderer {
       const at = this.use("stone", view);
       gl.uniform1i(at("byVertex"), view.byVertex ? 1 : 0);
       gl.uniform1f(at("alpha"), view.seeThrough ? 0.16 : 1);
+      gl.enable(gl.POLYGON_OFFSET_FILL);
       this.drawMesh("stones", gl.TRIANGLES);
+      gl.disable(gl.POLYGON_OFFSET_FILL);
     };
     if (!view.seeThrough) stones();
     if (view.edges) {
@@ -266,9 +271,9 @@ export class Renderer {
     }
   }
 
-  /** Return the number of the stone under a pixel of the drawing buffer, or -1. */
+  /** Return the number of the stone under a CSS pixel of the canvas, or -1. */
   pick(view, x, y) {
-    const gl = this.gl, { width, height } = this.canvas;
+    const gl = this.gl, width = this.canvas.clientWidth, height = this.canvas.clientHeight;
     if (!this.target || this.target.width !== width || this.target.height !== height) this.makeTarget(width, height);
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.target.frame);
     gl.viewport(0, 0, width, height);

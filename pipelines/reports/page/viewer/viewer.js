@@ -10,11 +10,14 @@ import { say } from "./words.js";
 const TURN = 0.008; // by a pixel of the mouse [rad]
 const PLAY = 8; // seconds that a whole run plays, at most
 const FEW = 12; // words of a legend
+const FRAME = 25; // time for a frame in motion, which decides its resolution [ms]
+const COARSEST = 0.3; // of that resolution
+const REST = 200; // time without motion after which the full resolution is drawn [ms]
 
 export class Viewer {
   /** @param root element of the viewer; @param model unpacked */
   constructor(root, model) {
-    Object.assign(this, { root, model, playing: false, listeners: [] });
+    Object.assign(this, { root, model, playing: false, listeners: [], fineness: 1 });
     this.canvas = element("canvas", { tabindex: 0, role: "img", "aria-label": `3D view of ${model.title}; arrow keys turn it, N selects the next stone` });
     this.legend = element("div", { class: "legend" });
     this.bar = element("div", { class: "scale" });
@@ -136,11 +139,25 @@ export class Viewer {
 
   draw() {
     if (this.waiting) return;
-    this.waiting = requestAnimationFrame(() => { this.waiting = null; this.drawNow(); });
+    this.waiting = requestAnimationFrame(() => {
+      this.waiting = null;
+      this.drawMoving();
+      clearTimeout(this.resting);
+      this.resting = setTimeout(() => this.drawNow(), REST);
+    });
+  }
+
+  /** Draw at the resolution that this machine manages in motion. */
+  drawMoving() {
+    const begun = performance.now();
+    this.drawNow(this.fineness);
+    this.renderer.finish();
+    const change = Math.sqrt(FRAME / Math.max(performance.now() - begun, 1));
+    this.fineness = Math.min(Math.max(this.fineness * Math.min(Math.max(change, 0.6), 1.15), COARSEST), 1);
   }
 
   view() {
-    const { show } = this.state, aspect = this.renderer.resize(), dark = document.documentElement.dataset.theme === "dark";
+    const { show } = this.state, aspect = this.canvas.clientWidth / this.canvas.clientHeight, dark = document.documentElement.dataset.theme === "dark";
     return {
       matrix: this.camera.matrix(aspect), section: this.stage.section(this.state), sight: this.camera.axes().back,
       rest: this.state.mechanism < 0 && this.state.instant === this.stage.instants - 1 ? this.state.factor : 0,
@@ -151,8 +168,10 @@ export class Viewer {
     };
   }
 
-  drawNow() {
+  /** Draw with so many pixels for one of CSS; without a number, with enough for smooth edges. */
+  drawNow(ratio = Math.min(1.5 * (window.devicePixelRatio || 1), 2)) {
     if (!this.canvas.clientWidth) return;
+    this.renderer.resize(ratio);
     this.renderer.draw(this.view());
     this.drawScale();
   }
@@ -191,8 +210,7 @@ export class Viewer {
 
   /** The stone at a place of the canvas in CSS pixels, or -1. */
   stoneAt(x, y) {
-    const ratio = this.canvas.width / this.canvas.clientWidth;
-    return this.renderer.pick(this.view(), Math.floor(x * ratio), Math.floor(y * ratio));
+    return this.renderer.pick(this.view(), Math.floor(x), Math.floor(y));
   }
 
   listen() {
@@ -326,11 +344,10 @@ export class Viewer {
 
   /** Mean milliseconds of a drawn frame while the camera turns, with the drawing done. */
   measure(frames = 30) {
-    const gl = this.renderer.gl, pixel = new Uint8Array(4), begun = performance.now();
+    const begun = performance.now();
     for (let i = 0; i < frames; i++) {
       this.camera.orbit(0.05, 0);
-      this.drawNow();
-      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+      this.drawMoving();
     }
     return (performance.now() - begun) / frames;
   }
