@@ -1,8 +1,8 @@
 """`results.vtkhdf`: stones and contact points of all frames in one file, which ParaView plays, also while it grows.
 
-VTKHDF 2.1, read by VTK since 9.4, ParaView since 5.13 and PyVista. The mesh of the stones stands in the file once, with their
-places in every frame; rigid stones are polygons, as polyhedra need VTK 9.6. Both blocks change with time, as a block
-that does not makes the other unreadable.
+VTKHDF 2.1, read by VTK since 9.4, ParaView since 5.13 and PyVista. The mesh of the stones stands in the file once, with
+their places in every frame; rigid stones are polygons, as polyhedra need VTK 9.6. Both blocks change with time, as a
+block that does not makes the other unreadable.
 
 HDF5 leaves a file that no library opens if its writer dies with it open. So no file under the name that users see is
 ever open for writing: each frame is added to a second copy, which then takes the name

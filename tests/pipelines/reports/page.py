@@ -12,7 +12,7 @@ OWN = ("module", "application/json", "application/octet-stream")
 class Page(HTMLParser):
     """Texts of a page that closes its elements, and the addresses outside of itself that it loads from.
 
-    Contents, menus and the viewer's own script and data are no texts; `tags` has a script only if it is not the viewer's.
+    Contents, menus and the viewer's script and data are no texts; `tags` has a script only if it is not the viewer's.
     """
 
     def __init__(self, path):

@@ -19,17 +19,17 @@ export class Camera {
   /** @param box low and high corner of the scene; @param towards direction to the observer of the main elevation */
   constructor(box, towards) {
     this.main = Math.atan2(towards[1], towards[0]);
+    this.size = Math.hypot(...minus(box.high, box.low)) || 1;
     this.state = { yaw: this.main, pitch: 0, target: [0, 0, 0], height: 1, ortho: true };
-    this.fit(box);
-    this.look("3D");
-    this.state.ortho = false;
   }
 
-  /** Show the whole of a box. */
-  fit(box) {
-    this.size = Math.hypot(...minus(box.high, box.low)) || 1;
+  /** Show the whole of a box; `aspect` is width over height of the picture. */
+  fit(box, aspect) {
+    const { side, above, back } = this.axes(), half = times(minus(box.high, box.low), 0.5);
+    const reach = (axis) => 2 * axis.reduce((sum, one, k) => sum + Math.abs(one) * half[k], 0);
     this.state.target = times(add(box.low, box.high), 0.5);
-    this.state.height = this.size * 0.85;
+    const near = this.state.ortho ? 0 : 0.5 * reach(back); // what is nearer than the target looks larger
+    this.state.height = 1.12 * Math.max(reach(above), reach(side) / aspect) + near;
   }
 
   /** Turn to a named view; all but the last are orthographic. */

@@ -194,11 +194,6 @@ export class Renderer {
     }
   }
 
-  /** Wait until all is drawn. */
-  finish() {
-    this.gl.readPixels(0, 0, 1, 1, this.gl.RGBA, this.gl.UNSIGNED_BYTE, new Uint8Array(4));
-  }
-
   use(name, view) {
     const gl = this.gl, { program, at } = this.programs[name];
     gl.useProgram(program);

@@ -12,6 +12,7 @@ export class Stage {
   constructor(model, renderer) {
     Object.assign(this, { model, renderer, count: model.codes.length, box: boxOf(model.vertices) });
     this.size = length(minus(this.box.high, this.box.low)) || 1;
+    this.flat = this.box.high[1] - this.box.low[1] < 1e-6 * this.size; // disks in the plane of x and z
     this.number = new Map(model.codes.map((code, index) => [code, index]));
     this.middles = this.meanPlaces();
     this.scales = this.listScales();

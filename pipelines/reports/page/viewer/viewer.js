@@ -29,13 +29,15 @@ export class Viewer {
       colour: { by: model.colour, map: mapNames[0], low: 0, high: 1 }, instant: this.stage.instants - 1, factor: 1,
       relative: false, section: { axis: "", at: 0.5, flip: false }, explode: { by: "", amount: 0 }, hidden: [],
       selected: -1, joint: { by: (model.joints ?? model.mechanisms.find((one) => one.joints)?.joints)?.columns[0].name ?? "" },
-      mechanism: model.mechanisms.length ? 0 : -1, show: ["edges", "arrows", ...model.lines.map((one) => `line ${one.name}`)],
+      mechanism: model.mechanisms.length ? 0 : -1, show: ["edges", "arrows", ...(this.stage.flat ? [] : model.lines.map((one) => `line ${one.name}`))],
     };
     this.panel = new Panel(this);
     const notes = model.notes.map((one) => element("p", { class: "note" }, one));
     root.replaceChildren(this.tools(), element("div", { class: "stage" }, this.canvas, this.legend, this.bar), this.panel.root, this.status, ...notes);
+    this.look(this.stage.flat ? "Front" : "3D");
     this.listen();
     this.colourBy(model.colour);
+    this.fit();
     new ResizeObserver(() => this.draw()).observe(this.canvas);
   }
 
@@ -48,8 +50,8 @@ export class Viewer {
       button("Link", () => this.copyLink(), "Link to this view"), button("PNG", () => this.savePicture(), "Picture of this view"));
   }
 
-  look(name) { this.camera.look(name); this.moved(); }
-  fit() { this.camera.fit(this.stage.box); this.moved(); }
+  look(name) { this.camera.look(name); this.fit(); }
+  fit() { this.camera.fit(this.stage.box, this.canvas.clientWidth / this.canvas.clientHeight || 1.5); this.moved(); }
   toggleScale() { this.camera.state.ortho = !this.camera.state.ortho; this.moved(); }
 
   /** Change part of the state, and draw it. */
@@ -139,21 +141,23 @@ export class Viewer {
 
   draw() {
     if (this.waiting) return;
-    this.waiting = requestAnimationFrame(() => {
+    this.waiting = requestAnimationFrame((now) => {
       this.waiting = null;
-      this.drawMoving();
+      this.drawMoving(now);
       clearTimeout(this.resting);
       this.resting = setTimeout(() => this.drawNow(), REST);
     });
   }
 
-  /** Draw at the resolution that this machine manages in motion. */
-  drawMoving() {
-    const begun = performance.now();
+  /** Draw at the resolution that this machine manages in motion, told by the time since the frame before. */
+  drawMoving(now) {
+    const passed = now - (this.drawn ?? 0);
+    this.drawn = now;
+    if (passed < REST) {
+      const change = Math.sqrt(FRAME / passed);
+      this.fineness = Math.min(Math.max(this.fineness * Math.min(Math.max(change, 0.6), 1.1), COARSEST), 1);
+    }
     this.drawNow(this.fineness);
-    this.renderer.finish();
-    const change = Math.sqrt(FRAME / Math.max(performance.now() - begun, 1));
-    this.fineness = Math.min(Math.max(this.fineness * Math.min(Math.max(change, 0.6), 1.15), COARSEST), 1);
   }
 
   view() {
@@ -342,14 +346,15 @@ export class Viewer {
     });
   }
 
-  /** Mean milliseconds of a drawn frame while the camera turns, with the drawing done. */
-  measure(frames = 30) {
-    const begun = performance.now();
-    for (let i = 0; i < frames; i++) {
-      this.camera.orbit(0.05, 0);
-      this.drawMoving();
+  /** Turn the camera for so many frames; return the milliseconds between them. */
+  async turn(frames = 60) {
+    const times = [];
+    for (let i = 0; i <= frames; i++) {
+      this.camera.orbit(0.03, 0);
+      this.draw();
+      times.push(await new Promise(requestAnimationFrame));
     }
-    return (performance.now() - begun) / frames;
+    return times.slice(1).map((time, i) => time - times[i]);
   }
 }
 
