@@ -82,7 +82,8 @@ def report(
         bool, typer.Option("--pdf", help="Print it to PDF through an installed Chromium, Chrome or Edge.")
     ] = False,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="FILE", help="The PDF; default: beside the page.")
+        Path | None,
+        typer.Option("--out", metavar="FILE", help="The PDF; default: RUN.pdf beside the folder or page."),
     ] = None,
     language: Annotated[
         str, typer.Option("--language", metavar="TAG", help="en, de, fr or it, for the page's fixed words.")
@@ -98,7 +99,8 @@ def report(
     sound = appraise_page(page)
     target = None
     if pdf:
-        target = out or page.with_suffix(".pdf")
+        # beside the folder, which holds what the run wrote and nothing else
+        target = out or run.with_name(f"{run.resolve().name if run.is_dir() else run.stem}.pdf")
         print_pdf(page, target, language)
     if json:
         print(

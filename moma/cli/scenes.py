@@ -64,6 +64,9 @@ def run(
             help="Write the meshes of deformable stones for Gmsh, Code_Aster, Abaqus, …; see docs/runs.md.",
         ),
     ] = None,
+    animate: Annotated[
+        bool, typer.Option("--animate", help="Draw the motion as motion.gif too, of up to 60 pictures.")
+    ] = False,
     resume: Resume = None,
     accept_unsound: AcceptUnsound = False,
     profile: Profile = None,
@@ -86,7 +89,16 @@ def run(
         return
     with compiling_beside("run"), progress_bars() as listener, stop.handled():
         done = run_scene(
-            scene, db, folder, stop.listening(listener), profile, meshes, accept_unsound, stop, resume
+            scene,
+            db,
+            folder,
+            stop.listening(listener),
+            profile,
+            meshes,
+            accept_unsound,
+            stop,
+            resume,
+            animate,
         )
     for warning in done.warnings:
         say(f"warning: {warning}")

@@ -23,6 +23,7 @@ from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.files import check_mesh_file, write_meshes
 from mechanics.stones.meshing.mesh import VolumeMesh
 from moma.errors import MissingLibraryError
+from pipelines.draw.animation import draw_motion
 from pipelines.draw.pictures import OF_RESULTS, draw_pictures, drawing_process, missing
 from pipelines.draw.plots import history_svg
 from pipelines.reports.page.known import Known, known_stones
@@ -82,6 +83,7 @@ def run_scene(
     accept_unsound: bool = False,
     stop: Callable[[], bool] = lambda: False,
     resume: bool | None = None,
+    animate: bool = False,
 ) -> RunReport:
     """Run a scene file on the stones of a database, and write the results into a folder.
 
@@ -96,6 +98,7 @@ def run_scene(
     accept_unsound : run a scene that `check_scene` finds unsound all the same; every result says so then
     stop : asked after every step; where it says True, the run ends there as interrupted, with results of what there is
     resume : go on with the unfinished run in the folder, if there is one; False: give it up; None: refuse to run then
+    animate : draw the motion as motion.gif too
 
     Raises
     ------
@@ -174,6 +177,7 @@ def run_scene(
                     unfinished,
                     ready,
                     known,
+                    animate,
                 )
                 unfinished.hand_over(fresh)
         if meshes is not None:
@@ -197,6 +201,7 @@ def write_results(
     unfinished: UnfinishedRun | None = None,
     ready: "subprocess.Popen[str] | None" = None,
     known: Known | None = None,
+    animate: bool = False,
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Write all files of a run into an empty folder; return the summary and the warnings.
 
@@ -234,6 +239,8 @@ def write_results(
             progress(Progress("write", 1, 3, "pictures"))
             try:
                 drawing.result()
+                if animate:
+                    draw_motion(result, folder, assembly.towards)
             except MissingLibraryError as error:
                 warnings.append(f"no pictures: {error}")
     progress(Progress("write", 2, 3, "report.html"))
