@@ -54,12 +54,12 @@ def title_block(title: str, versions: Mapping[str, str] | str) -> Markup:
 
 
 def contents(page: str) -> str:
-    """Give the headings of a page names, and put a list of them where the page has ``<nav class="contents">``."""
+    """Put an anchor before each heading of a page, and a list of them where the page has ``<nav class="contents">``."""
     titles: list[str] = []
 
     def named(found: re.Match[str]) -> str:
         titles.append(found[1])
-        return f'<h2 id="part-{len(titles)}">{found[1]}</h2>'
+        return f'<a id="part-{len(titles)}"></a><h2>{found[1]}</h2>'
 
     page = _HEADING.sub(named, page)
     items = "".join(
