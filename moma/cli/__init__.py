@@ -6,14 +6,13 @@ from typing import Annotated
 import typer
 
 from moma.cli.assess import assess, compare, diagnose
-from moma.cli.database import export, import_, migrate
+from moma.cli.database import export, import_, migrate, serve, view
 from moma.cli.entities import query, schema, show
 from moma.cli.geology import geology
 from moma.cli.knowledge import record
-from moma.cli.pages import report, serve, view
 from moma.cli.proposals import propose
 from moma.cli.relations import load_path, relate
-from moma.cli.runs import runs
+from moma.cli.runs import report, runs
 from moma.cli.scenes import check, run, trade
 from moma.cli.surveys import ingest, sample, survey_report
 

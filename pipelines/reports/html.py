@@ -8,7 +8,7 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from pipelines.reports.page.elevation import elevation
-from pipelines.reports.page.inline import languages_json, script, style, viewer_html
+from pipelines.reports.page.inline import languages_packed, script, style, viewer_html
 from pipelines.reports.page.languages import catalogues
 from pipelines.reports.page.model import Model
 from pipelines.reports.page.paper import contents, sealed, title_block
@@ -60,7 +60,7 @@ def page_text(template: str, model: Model | None = None, **values: object) -> st
         "elevation": None if model is None else elevation(model),
         "title_block": title_block(str(values["name"]), versions),  # type: ignore[arg-type]
         "languages": {tag: one["name"] for tag, one in catalogues().items()},
-        "languages_json": languages_json(),
+        "languages_packed": languages_packed(),
         "viewer_style": style(),
         "viewer_script": script(),
     }

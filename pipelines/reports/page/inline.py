@@ -4,6 +4,8 @@ The modules of `viewer` are plain ES modules that name each other by ``import { 
 stand one after another as one module: imports left out, ``export`` too. So no name may stand in two of them.
 """
 
+import base64
+import gzip
 import json
 import re
 from functools import cache
@@ -18,7 +20,7 @@ from pipelines.reports.page.packing import pack
 __all__ = [
     "MODULES",
     "again",
-    "languages_json",
+    "languages_packed",
     "module_text",
     "packed_models",
     "script",
@@ -53,9 +55,10 @@ def script() -> Markup:
 
 
 @cache
-def languages_json() -> Markup:
-    """Return the catalogues of all languages as JSON that may stand in a script element."""
-    return Markup(json.dumps(catalogues(), ensure_ascii=False).replace("<", "\\u003c"))
+def languages_packed() -> Markup:
+    """Return the catalogues of all languages as JSON, gzipped, in base64."""
+    text = json.dumps(catalogues(), ensure_ascii=False).encode()
+    return Markup(base64.b64encode(gzip.compress(text, 9, mtime=0)).decode("ascii"))
 
 
 def viewer_html(model: Model, number: int = 1) -> Markup:

@@ -32,7 +32,7 @@ _OMITTED = ("code", "x", "y", "z")
 
 @dataclass(frozen=True)
 class Known:
-    """What a database holds of stones, in the order of their codes."""
+    """Knowledge of stones in a database, in the order of their codes."""
 
     columns: tuple[Column, ...]
     relations: Relations

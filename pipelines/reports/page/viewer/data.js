@@ -4,13 +4,17 @@ const TYPES = { f4: Float32Array, i2: Int16Array, i4: Int32Array, u1: Uint8Array
 
 /** Decode the text of a packed model: base64, gzip, head, arrays. */
 export async function readModel(text) {
-  const packed = fromBase64(text.trim());
-  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
-  const bytes = await new Response(stream).arrayBuffer();
+  const bytes = await unpacked(text);
   const length = new DataView(bytes).getUint32(0, true);
   const head = JSON.parse(new TextDecoder().decode(new Uint8Array(bytes, 4, length)));
   const arrays = head.arrays.map((entry) => readArray(bytes, 4 + length, entry));
   return resolved(head, arrays);
+}
+
+/** Return the bytes of a gzipped text in base64. */
+export async function unpacked(text) {
+  const stream = new Blob([fromBase64(text.trim())]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return new Response(stream).arrayBuffer();
 }
 
 function fromBase64(text) {

@@ -1,6 +1,6 @@
 // Start: the viewers of a page, its language and its theme, and what is printed.
 
-import { readModel } from "./data.js";
+import { readModel, unpacked } from "./data.js";
 import { element } from "./panel.js";
 import { Viewer } from "./viewer.js";
 import { say, setCatalogue, translate } from "./words.js";
@@ -22,7 +22,7 @@ async function start() {
   viewers[0]?.takeHash(location.hash);
   window.addEventListener("hashchange", () => viewers[0]?.takeHash(location.hash));
   if (viewers.length > 1) link(viewers);
-  languages();
+  await languages();
   themes(viewers);
   window.addEventListener("beforeprint", () => viewers.forEach(print));
   document.documentElement.dataset.ready = viewers.length;
@@ -52,10 +52,10 @@ function print(viewer) {
   viewer.root.append(element("img", { class: "printed", alt: viewer.model.title, src: viewer.picture().toDataURL("image/png") }));
 }
 
-function languages() {
+async function languages() {
   const source = document.getElementById("moma-languages"), menu = document.querySelector("select.language");
   if (!source || !menu) return;
-  const catalogues = JSON.parse(source.textContent);
+  const catalogues = JSON.parse(new TextDecoder().decode(await unpacked(source.textContent)));
   const choose = (language) => {
     setCatalogue(catalogues[language]?.words ?? {});
     document.documentElement.lang = language;
