@@ -187,6 +187,7 @@ def serve(
     verbose: Verbose = False,
 ) -> None:
     """Serve a database over HTTP, to be read only: viewer, queries, entities, runs, schema, downloads."""
-    from pipelines.reports.serve.settings import ServeSettings, serve_database
+    from pipelines.reports.serve.serve import serve_database
+    from pipelines.reports.serve.settings import ServeSettings
 
     serve_database(db, ServeSettings(host=host, port=port, token=token, seconds=seconds, rows=rows), say)

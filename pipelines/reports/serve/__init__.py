@@ -1,4 +1,4 @@
 """A database over HTTP, to be read only: viewer, queries, entities, runs, schema and downloads.
 
-Public: `ServeSettings`, `serve_database` (settings).
+Public: `ServeSettings` (settings); `serve_database` (serve).
 """
