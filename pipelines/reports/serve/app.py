@@ -4,6 +4,7 @@ import base64
 import hashlib
 import hmac
 import re
+import threading
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
@@ -63,20 +64,25 @@ def application(database: Database, settings: ServeSettings) -> FastAPI:
         docs_url=None,
         redoc_url=None,
     )
-    answers = Answers(settings.rows)
+    answers, room = Answers(settings.rows), threading.Semaphore(settings.at_once)
     _refusals(app)
     _guards(app, settings)
 
     @contextmanager
     def asking() -> Iterator[Session]:
-        with database.session(read_only=True) as session, deadline(session, settings.seconds) as limit:
-            try:
-                yield session
-            except Exception as error:
-                if limit.passed or "statement timeout" in str(error):
-                    told = f"The query took longer than {settings.seconds:g} s and was stopped."
-                    raise HTTPException(503, told) from error
-                raise
+        if not room.acquire(timeout=settings.patience):
+            raise HTTPException(503, "Too many questions at once; try again.", {"Retry-After": "5"})
+        try:
+            with database.session(read_only=True) as session, deadline(session, settings.seconds) as limit:
+                try:
+                    yield session
+                except Exception as error:
+                    if limit.passed or "statement timeout" in str(error):
+                        told = f"The query took longer than {settings.seconds:g} s and was stopped."
+                        raise HTTPException(503, told) from error
+                    raise
+        finally:
+            room.release()
 
     @app.get("/", response_class=HTMLResponse)
     def home() -> Response:

@@ -18,6 +18,8 @@ class ServeSettings:
     token : asked of every request; None: none
     seconds : longest time of one query [s]
     rows : most rows of one answer, and stones of one view
+    at_once : questions that the database answers at a time; others wait
+    patience : longest time that they wait [s]
     """
 
     host: str = "127.0.0.1"
@@ -25,6 +27,8 @@ class ServeSettings:
     token: str | None = None
     seconds: float = 5.0
     rows: int = 10_000
+    at_once: int = 4
+    patience: float = 60.0
 
     @property
     def hosts(self) -> list[str]:
