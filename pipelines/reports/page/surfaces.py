@@ -115,16 +115,17 @@ def rigid_motion(
     frames : the same points in each instant
     soft : (n,) deformable stones
     """
-    chosen = [_three(points) for points in references]
+    starts = np.concatenate([[0], np.cumsum([len(points) for points in references])]).astype(np.int64)
+    chosen = starts[:-1, None] + np.array([_three(points) for points in references]).reshape(-1, 3)
     centres = np.array([points.mean(axis=0) for points in references]).reshape(-1, 3)
-    then = _axes(np.stack([points[rows] for points, rows in zip(references, chosen, strict=True)]))
+    start = np.concatenate([np.zeros((0, 3)), *references])
+    then = _axes(start[chosen])
     shift = np.zeros((len(frames), len(references), 3))
     turn = np.zeros_like(shift)
     for number, places in enumerate(frames):
-        three = np.stack([points[rows] for points, rows in zip(places, chosen, strict=True)])
+        three = np.concatenate([np.zeros((0, 3)), *places])[chosen]
         matrix = _axes(three) @ then.transpose(0, 2, 1)
-        first = np.array([points[rows[0]] for points, rows in zip(references, chosen, strict=True)])
-        centre = three[:, 0] + np.einsum("nij,nj->ni", matrix, centres - first)
+        centre = three[:, 0] + np.einsum("nij,nj->ni", matrix, centres - start[chosen[:, 0]])
         for body in np.flatnonzero(soft).tolist():
             matrix[body], centre[body] = _fit(references[body] - centres[body], places[body])
         shift[number], turn[number] = centre - centres, _rotation_vectors(matrix)

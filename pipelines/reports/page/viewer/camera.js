@@ -64,6 +64,15 @@ export class Camera {
     return { back, side, above: cross(back, side) };
   }
 
+  /** Where the ray through a place of the picture begins, and its way; both sides of the picture go from -1 to 1. */
+  ray(x, y, aspect) {
+    const { back, side, above } = this.axes(), { target, height, ortho } = this.state;
+    const across = add(times(side, 0.5 * x * height * aspect), times(above, 0.5 * y * height)), reach = 2.5 * this.size + height;
+    if (ortho) return { eye: add(add(target, across), times(back, reach)), way: times(back, -1) };
+    const distance = height / (2 * OPENING), eye = add(target, times(back, distance));
+    return { eye, way: add(across, times(back, -distance)) };
+  }
+
   /** 4 × 4 matrix, by columns, from places to clip space; `aspect` is width over height. */
   matrix(aspect) {
     const { back, side, above } = this.axes();

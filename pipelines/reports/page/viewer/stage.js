@@ -16,11 +16,21 @@ export class Stage {
     this.number = new Map(model.codes.map((code, index) => [code, index]));
     this.middles = this.meanPlaces();
     this.scales = this.listScales();
-    this.keepStones(null);
-    const owner = Float32Array.from(model.owner), beyond = this.beyond();
-    renderer.keep("edges", [[model.vertices, 3], [owner, 1], [beyond, 3]], 0, Uint32Array.from(model.edges));
+    this.shapes = new Map(); // of each layer: places at the start, and the stone of each
+    this.keep("stones", model.vertices, model.owner);
     if (model.points) this.keepPoints(model.points);
     for (const one of model.lines) this.keepPolylines(one);
+  }
+
+  /** Keep a layer whose places move with their stones; -1 for places that stay. */
+  keep(name, places, owner, strokes = false) {
+    this.renderer.add(name, strokes);
+    this.shapes.set(name, { places, owner, each: strokes ? 2 : 1, moved: new Float32Array(places.length) });
+  }
+
+  drop(name) {
+    this.renderer.remove(name);
+    this.shapes.delete(name);
   }
 
   meanPlaces() {
@@ -30,17 +40,6 @@ export class Stage {
       sums[4 * owner[i] + 3] += 1;
     }
     return Array.from({ length: this.count }, (_, i) => [0, 1, 2].map((k) => sums[4 * i + k] / (sums[4 * i + 3] || 1)));
-  }
-
-  beyond() {
-    const rest = this.model.motion?.rest;
-    return rest ? Float32Array.from(rest.values, (step, i) => step * rest.scale[Math.floor(i / 3)]) : null;
-  }
-
-  keepStones(own) {
-    const { vertices, owner, triangles } = this.model;
-    const attributes = [[vertices, 3], [Float32Array.from(owner), 1], [this.beyond(), 3], [own, 4, this.renderer.gl.UNSIGNED_BYTE]];
-    this.renderer.keep("stones", attributes, 0, Uint32Array.from(triangles));
   }
 
   /** What can colour the stones: columns, fields on the surface, results in time. */
@@ -115,10 +114,20 @@ export class Stage {
     return largest > 0 ? Math.max(1, Number(((0.05 * this.size) / largest).toPrecision(1))) : 1;
   }
 
+  /** Compute where all stones are, and what of them is shown. */
   setPoses(state) {
-    const poses = new Float32Array(16 * this.count), apart = this.apart(state);
-    const hidden = new Set(state.hidden), mechanism = this.model.mechanisms[state.mechanism];
-    const { motion } = this.model;
+    this.hidden = new Uint8Array(this.count);
+    for (const stone of state.hidden) this.hidden[stone] = 1;
+    this.poses = this.posesAt(state);
+    const rest = state.mechanism < 0 && state.instant === this.instants - 1 ? this.model.motion?.rest : null;
+    for (const name of this.shapes.keys()) this.move(name, name === "stones" ? rest : null, state.factor);
+    this.showFaces();
+  }
+
+  /** Maps (12 n) from the start to now, three rows of four for each stone. */
+  posesAt(state) {
+    const poses = new Float32Array(12 * this.count), apart = this.apart(state);
+    const mechanism = this.model.mechanisms[state.mechanism], { motion } = this.model;
     this.carried = this.supportsAt(state);
     const way = mechanism ? this.mechanismWay(mechanism) * state.factor : 0;
     for (let i = 0; i < this.count; i++) {
@@ -134,11 +143,60 @@ export class Stage {
         a = g.map((value, k) => value + (k % 4 === 0 ? 1 : 0));
         for (let k = 0; k < 3; k++) t[k] += s * shift[k] - g[3 * k] * c[0] - g[3 * k + 1] * c[1] - g[3 * k + 2] * c[2];
       }
-      for (let k = 0; k < 3; k++) poses.set([a[3 * k], a[3 * k + 1], a[3 * k + 2], t[k]], 16 * i + 4 * k);
-      poses[16 * i + 12] = hidden.has(i) ? 0 : 1;
+      for (let k = 0; k < 3; k++) poses.set([a[3 * k], a[3 * k + 1], a[3 * k + 2], t[k]], 12 * i + 4 * k);
     }
-    this.renderer.setPoses(poses);
-    this.placed = poses;
+    return poses;
+  }
+
+  /** Move the places of a layer with their stones; strokes and points of hidden ones shrink to nothing far away. */
+  move(name, rest = null, factor = 1) {
+    const { places, owner, each, moved } = this.shapes.get(name), poses = this.poses, solid = name === "stones" || name === "joints";
+    for (let i = 0; i < moved.length / 3; i++) {
+      const stone = owner[each === 2 ? i >> 1 : i], x = places[3 * i], y = places[3 * i + 1], z = places[3 * i + 2], p = 12 * stone;
+      if (stone < 0) moved.set([x, y, z], 3 * i);
+      else if (!solid && this.hidden[stone]) moved.fill(1e9, 3 * i, 3 * i + 3);
+      else for (let k = 0; k < 3; k++) {
+        const row = p + 4 * k;
+        moved[3 * i + k] = poses[row] * x + poses[row + 1] * y + poses[row + 2] * z + poses[row + 3];
+        if (rest) moved[3 * i + k] += factor * rest.values[3 * i + k] * rest.scale[i];
+      }
+    }
+    this.renderer.set(name, "places", moved);
+  }
+
+  /** Let only shown stones and joints have faces and edges. */
+  showFaces() {
+    const { triangles, edges, owner } = this.model;
+    const shown = (index, each, of) => this.hidden.includes(1) ? Uint32Array.from(rowsOf(index, each, (row) => !this.hidden[of[row]])) : Uint32Array.from(index);
+    this.faces = shown(triangles, 3, owner);
+    this.renderer.set("stones", "faces", this.faces);
+    this.renderer.set("stones", "edges", shown(edges, 2, owner));
+    if (this.shapes.has("joints")) this.renderer.set("joints", "faces", shown(this.jointFaces, 3, this.shapes.get("joints").owner));
+  }
+
+  /** The stone that a ray from `eye` along `way` meets first behind the section, or -1 (Möller and Trumbore 1997). */
+  hit(eye, way, section) {
+    const place = this.shapes.get("stones").moved, { owner } = this.model, faces = this.faces;
+    let nearest = Infinity, stone = -1;
+    for (let f = 0; f < faces.length; f += 3) {
+      const i = 3 * faces[f], j = 3 * faces[f + 1], k = 3 * faces[f + 2];
+      const ax = place[i], ay = place[i + 1], az = place[i + 2];
+      const ux = place[j] - ax, uy = place[j + 1] - ay, uz = place[j + 2] - az;
+      const vx = place[k] - ax, vy = place[k + 1] - ay, vz = place[k + 2] - az;
+      const px = way[1] * vz - way[2] * vy, py = way[2] * vx - way[0] * vz, pz = way[0] * vy - way[1] * vx;
+      const size = ux * px + uy * py + uz * pz;
+      if (size === 0) continue;
+      const sx = eye[0] - ax, sy = eye[1] - ay, sz = eye[2] - az;
+      const a = (sx * px + sy * py + sz * pz) / size;
+      if (a < 0 || a > 1) continue;
+      const qx = sy * uz - sz * uy, qy = sz * ux - sx * uz, qz = sx * uy - sy * ux;
+      const b = (way[0] * qx + way[1] * qy + way[2] * qz) / size;
+      if (b < 0 || a + b > 1) continue;
+      const t = (vx * qx + vy * qy + vz * qz) / size;
+      const cut = section[0] * (eye[0] + t * way[0]) + section[1] * (eye[1] + t * way[1]) + section[2] * (eye[2] + t * way[2]) + section[3];
+      if (t < nearest && cut <= 0) [nearest, stone] = [t, owner[faces[f]]];
+    }
+    return stone;
   }
 
   velocityOf(mechanism, i) {
@@ -185,24 +243,21 @@ export class Stage {
     const share = (value) => (value - state.colour.low) / (state.colour.high - state.colour.low || 1);
     const tint = (value) => !scale ? [214, 205, 188] : scale.text ? (value < 0 ? GREY : wordColour(value))
       : Number.isNaN(value) ? GREY : colourOf(state.colour.map, share(value));
-    const colours = new Uint8Array(4 * this.count);
-    for (let i = 0; i < this.count; i++)
-      colours.set([...(scale?.byVertex ? GREY : tint(values?.[i])), i === state.selected ? 255 : 128], 4 * i);
-    this.renderer.setColours(colours);
-    const own = scale?.byVertex ? `${scale.name} ${state.colour.map} ${state.colour.low} ${state.colour.high}` : "";
-    if (own !== (this.own ?? "")) {
-      const table = own && new Uint8Array(4 * values.length);
-      if (own) values.forEach((value, i) => table.set(Number.isNaN(value) ? [0, 0, 0, 0] : [...tint(value), 255], 4 * i));
-      this.keepStones(own ? table : null);
-      this.own = own;
+    const { owner } = this.model, whole = new Uint8Array(3 * this.count), table = new Uint8Array(4 * owner.length);
+    for (let i = 0; i < this.count; i++) whole.set(marked(scale?.byVertex ? GREY : tint(values?.[i]), i === state.selected), 3 * i);
+    for (let i = 0; i < owner.length; i++) {
+      const stone = owner[i];
+      if (scale?.byVertex && !Number.isNaN(values[i])) table.set(marked(tint(values[i]), stone === state.selected), 4 * i);
+      else for (let k = 0; k < 3; k++) table[4 * i + k] = whole[3 * stone + k];
     }
+    this.renderer.set("stones", "tint", table);
   }
 
   keepPoints(points) {
     const tint = new Uint8Array(4 * points.owner.length);
     points.rejected.forEach((out, i) => tint.set([...(out ? RED : BLUE), 255], 4 * i));
-    const attributes = [[points.places, 3], [Float32Array.from(points.owner), 1], [tint, 4, this.renderer.gl.UNSIGNED_BYTE]];
-    this.renderer.keep("points", attributes, points.owner.length);
+    this.keep("points", points.places, points.owner);
+    this.renderer.set("points", "tint", tint);
   }
 
   keepPolylines(one) {
@@ -216,16 +271,15 @@ export class Stage {
     this.keepSegments(`line ${one.name}`, segments);
   }
 
+  /** Keep strokes: begin, end, stone, colour and width [px] of each. */
   keepSegments(name, segments) {
+    if (!segments.length) return this.drop(name);
     const tint = new Uint8Array(4 * segments.length);
     segments.forEach((one, i) => tint.set([...one[3], 255], 4 * i));
-    this.renderer.keepLines(name, {
-      begin: Float32Array.from(segments.flatMap((one) => one[0])),
-      end: Float32Array.from(segments.flatMap((one) => one[1])),
-      owner: Float32Array.from(segments, (one) => one[2]),
-      tint,
-      width: Float32Array.from(segments, (one) => one[4]),
-    });
+    this.keep(name, Float32Array.from(segments.flatMap((one) => [...one[0], ...one[1]])), Int32Array.from(segments, (one) => one[2]), true);
+    this.renderer.set(name, "tint", tint);
+    this.renderer.set(name, "width", Float32Array.from(segments, (one) => one[4]));
+    if (this.poses) this.move(name);
   }
 
   /** The joints that are shown: those of the run, or of the mechanism. */
@@ -237,13 +291,13 @@ export class Stage {
   /** Make the sheets of the joints, their resultants, and the paths of forces through the stones. */
   setJoints(state) {
     const joints = this.joints(state);
-    for (const name of ["joints", "forces", "thrust"]) this.renderer.forget(name);
+    for (const name of ["joints", "forces", "thrust"]) this.drop(name);
     if (!joints) return;
     const column = joints.columns.find((one) => one.name === state.joint.by) ?? joints.columns[0];
     let high = 0;
     for (const value of column.values) if (value > high) high = value;
     this.jointScale = { ...column, low: 0, high: high || 1 };
-    const index = [], owner = new Float32Array(joints.corners.length / 3), tint = new Uint8Array(4 * owner.length);
+    const index = [], owner = new Int32Array(joints.corners.length / 3), tint = new Uint8Array(4 * owner.length);
     let first = 0;
     joints.counts.forEach((count, joint) => {
       const value = column.values[joint];
@@ -255,8 +309,13 @@ export class Stage {
       }
       first += count;
     });
-    const attributes = [[joints.corners, 3], [owner, 1], [null, 3], [tint, 4, this.renderer.gl.UNSIGNED_BYTE]];
-    if (index.length) this.renderer.keep("joints", attributes, 0, Uint32Array.from(index));
+    if (index.length) {
+      this.keep("joints", joints.corners, owner);
+      this.renderer.set("joints", "tint", tint);
+      this.jointFaces = Uint32Array.from(index);
+      this.move("joints");
+      this.showFaces();
+    }
     this.keepForces(joints);
   }
 
@@ -279,7 +338,7 @@ export class Stage {
   /** Make the arrows of a mechanism. */
   setArrows(state) {
     const mechanism = this.model.mechanisms[state.mechanism];
-    if (!mechanism) return this.renderer.forget("arrows");
+    if (!mechanism) return this.drop("arrows");
     const way = 1.5 * this.mechanismWay(mechanism), segments = [];
     for (let i = 0; i < this.count; i++) {
       const [v, w, c] = this.velocityOf(mechanism, i), start = this.middles[i];
@@ -301,4 +360,12 @@ export class Stage {
     plane[k] = sign;
     return plane;
   }
+}
+
+/** A colour, towards orange if it marks the selected stone. */
+const marked = (colour, selected) => selected ? [0.45 * colour[0] + 140, 0.45 * colour[1] + 87, 0.45 * colour[2]] : colour;
+
+/** Yield the numbers of the rows of an index whose first vertex passes. */
+function* rowsOf(index, each, passes) {
+  for (let i = 0; i < index.length; i += each) if (passes(index[i])) for (let k = 0; k < each; k++) yield index[i + k];
 }

@@ -100,7 +100,7 @@ export class Viewer {
   }
 
   placeOf(stone) {
-    const p = this.stage.middles[stone], m = this.stage.placed.subarray(16 * stone, 16 * stone + 12);
+    const p = this.stage.middles[stone], m = this.stage.poses.subarray(12 * stone, 12 * stone + 12);
     return [0, 4, 8].map((k) => m[k] * p[0] + m[k + 1] * p[1] + m[k + 2] * p[2] + m[k + 3]);
   }
 
@@ -143,32 +143,30 @@ export class Viewer {
     if (this.waiting) return;
     this.waiting = requestAnimationFrame((now) => {
       this.waiting = null;
-      this.drawMoving(now);
+      const passed = this.moving ? now - this.drawn : 0;
+      Object.assign(this, { moving: true, drawn: now });
+      if (passed) this.adapt(passed);
+      this.drawNow(this.fineness);
       clearTimeout(this.resting);
-      this.resting = setTimeout(() => this.drawNow(), REST);
+      this.resting = setTimeout(() => { this.moving = false; this.drawNow(); }, Math.max(REST, 3 * passed));
     });
   }
 
-  /** Draw at the resolution that this machine manages in motion, told by the time since the frame before. */
-  drawMoving(now) {
-    const passed = now - (this.drawn ?? 0);
-    this.drawn = now;
-    if (passed < REST) {
-      const change = Math.sqrt(FRAME / passed);
-      this.fineness = Math.min(Math.max(this.fineness * Math.min(Math.max(change, 0.6), 1.1), COARSEST), 1);
-    }
-    this.drawNow(this.fineness);
+  /** Choose the resolution that this machine manages in motion, by the time between two frames. */
+  adapt(passed) {
+    const change = Math.min(Math.max(Math.sqrt(FRAME / passed), 0.6), 1.1);
+    this.fineness = Math.min(Math.max(this.fineness * change, COARSEST), 1);
   }
 
-  view() {
+  /** What the renderer draws; in motion without edges where they would make it stop. */
+  view(moving = false) {
     const { show } = this.state, aspect = this.canvas.clientWidth / this.canvas.clientHeight, dark = document.documentElement.dataset.theme === "dark";
     return {
       matrix: this.camera.matrix(aspect), section: this.stage.section(this.state), sight: this.camera.axes().back,
-      rest: this.state.mechanism < 0 && this.state.instant === this.stage.instants - 1 ? this.state.factor : 0,
-      background: dark ? [0.11, 0.12, 0.13] : [0.97, 0.97, 0.96], byVertex: Boolean(this.stage.scale(this.state.colour.by)?.byVertex),
-      seeThrough: show.includes("glass"), edges: show.includes("edges"), points: show.includes("points"),
+      background: dark ? [0.11, 0.12, 0.13] : [0.97, 0.97, 0.96],
+      seeThrough: show.includes("glass"), closed: !this.stage.flat && !this.state.section.axis && !show.includes("glass"), edges: show.includes("edges") && !(moving && this.fineness <= COARSEST), points: show.includes("points"),
       sheets: show.includes("joints") ? ["joints"] : [],
-      lines: ["forces", "thrust", "arrows", ...this.model.lines.map((one) => `line ${one.name}`)].filter((one) => show.includes(one)),
+      strokes: ["forces", "thrust", "arrows", ...this.model.lines.map((one) => `line ${one.name}`)].filter((one) => show.includes(one)),
     };
   }
 
@@ -176,7 +174,7 @@ export class Viewer {
   drawNow(ratio = Math.min(1.5 * (window.devicePixelRatio || 1), 2)) {
     if (!this.canvas.clientWidth) return;
     this.renderer.resize(ratio);
-    this.renderer.draw(this.view());
+    this.renderer.draw(this.view(this.moving));
     this.drawScale();
   }
 
@@ -214,7 +212,9 @@ export class Viewer {
 
   /** The stone at a place of the canvas in CSS pixels, or -1. */
   stoneAt(x, y) {
-    return this.renderer.pick(this.view(), Math.floor(x), Math.floor(y));
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    const { eye, way } = this.camera.ray((2 * (Math.floor(x) + 0.5)) / width - 1, 1 - (2 * (Math.floor(y) + 0.5)) / height, width / height);
+    return this.stage.hit(eye, way, this.stage.section(this.state));
   }
 
   listen() {
