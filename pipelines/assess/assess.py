@@ -27,6 +27,7 @@ from pipelines.reports.page.known import known_stones
 from pipelines.reports.page.scenes import assessment_model
 from pipelines.results.folder import check_replaceable, replacing
 from pipelines.results.summary import as_json
+from pipelines.results.table_csv import inert
 from pipelines.run.assemble import Assembly, assemble_stones
 from pipelines.run.record import store_record, versions
 from pipelines.run.soundness import problems_of, refuse_unsound
@@ -271,7 +272,9 @@ def _write_forces(
             table = csv.writer(file)
             table.writerow(JOINT_COLUMNS)
             for (a, b), row in zip(on.joints.bodies.tolist(), numbers.tolist(), strict=True):
-                table.writerow([codes[a], codes[b], *("" if np.isnan(v) else f"{v:.7g}" for v in row)])
+                table.writerow(
+                    [inert(codes[a]), inert(codes[b]), *("" if np.isnan(v) else f"{v:.7g}" for v in row)]
+                )
     return names
 
 

@@ -71,7 +71,7 @@ def as_table(columns: Mapping[str, str | None], rows: Sequence[Mapping[str, obje
 
 def as_csv(columns: Iterable[str], rows: Iterable[Mapping[str, object]]) -> str:
     """Format rows as CSV with a header line; unknown values are empty."""
-    from pipelines.reports.table_csv import csv_text
+    from pipelines.results.table_csv import csv_text
 
     return csv_text(columns, rows).rstrip("\n")
 

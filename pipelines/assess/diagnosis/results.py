@@ -17,6 +17,7 @@ from pipelines.draw.elevations.movement import draw_bed_movement
 from pipelines.reports.movement import write_diagnosis_page
 from pipelines.reports.page.surveys import bed_lines, survey_model
 from pipelines.results.summary import as_json
+from pipelines.results.table_csv import inert
 from pipelines.run.record import versions
 from pipelines.toml.writer import toml_text
 from survey.quality.courses import measure_courses
@@ -174,7 +175,7 @@ def _write_stones(path: Path, courses: tuple[CourseMovement, ...]) -> None:
         for line in courses:
             for code, one in line.stones.items():
                 table.writerow(
-                    [code, line.line.facade, line.line.course, one.measured, one.simulated, one.sigma]
+                    [inert(code), line.line.facade, line.line.course, one.measured, one.simulated, one.sigma]
                 )
 
 

@@ -15,8 +15,8 @@ from archmodel.tables.entities import Entity
 from archmodel.tables.runs import Run
 from archmodel.tables.surveys import Survey
 from moma.errors import UsageError
-from pipelines.reports.table_csv import csv_text
 from pipelines.reports.view import database_model, view_page
+from pipelines.results.table_csv import csv_text
 
 __all__ = ["COLUMNS", "Answers"]
 

@@ -18,7 +18,7 @@ import pytest
 from archmodel.database.session import open_database
 from moma.errors import MissingLibraryError
 from pipelines.reports.serve.settings import ServeSettings
-from pipelines.reports.table_csv import csv_text
+from pipelines.results.table_csv import csv_text
 
 pytest.importorskip("fastapi")
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore:.*httpx.*")
