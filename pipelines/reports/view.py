@@ -11,9 +11,11 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from archmodel.database.session import open_database
-from archmodel.query.api import find, find_rows
-from archmodel.store.stones import load_stones
+from archmodel.query.api import FoundFace, find_faces, find_rows
+from archmodel.store.stone_arrays import ENTITY, id_conditions, stone_shapes
+from archmodel.tables.entities import Entity
 from archmodel.tables.surveys import Survey
+from mechanics.arrays import Array
 from moma.errors import UsageError
 from pipelines.reports.html import page_text
 from pipelines.reports.page.elevation import elevation
@@ -25,6 +27,7 @@ from pipelines.reports.page.surfaces import stones_of
 
 __all__ = ["View", "database_model", "view_page", "write_comparison_view", "write_elevation", "write_view"]
 
+_FACING = 0.2  # length of the mean normal from which stones have one direction [-]
 _MOST = 500  # rows of the table of stones
 _TABLE = ("code", "kind", "course", "zone", "phase", "depth", "depth_origin", "rms")
 
@@ -46,32 +49,50 @@ def database_model(
     Parameters
     ----------
     title : of the building
-    kind, where, run : as of `archmodel.query.api.find`
+    kind, where, run : as of `archmodel.query.api.find_faces`
 
     Raises
     ------
     UsageError, QueryError : the query is wrong, or finds no stone with a solid
     """
-    entities = [one for one in find(session, kind, where, run) if one.measurement is not None]
-    if not entities:
+    faces = find_faces(session, kind, where, run, ("code", "area"))
+    numbers = {str(code): number for code, number in session.execute(select(Entity.code, Entity.id))}
+    wanted = [numbers[str(face.row["code"])] for face in faces]
+    shapes = {
+        number: (vertices, polygons)
+        for condition in id_conditions(ENTITY.id, wanted)
+        for number, vertices, polygons in stone_shapes(session, condition)
+    }
+    there = [face for face, number in zip(faces, wanted, strict=True) if number in shapes]
+    if not there:
         raise UsageError(
             "no stone with a solid is found",
             where=f"{kind} {' and '.join(where)}".strip(),
             remedy="ask for more",
         )
-    records = load_stones(session, entities)
-    codes = [one.code for one in records]
-    normals = np.array([one.area * one.normal for one in records])
-    towards = normals.sum(axis=0)
-    if np.linalg.norm(towards) < 0.2 * np.linalg.norm(normals, axis=1).sum():
-        towards = normals[np.argmax(np.linalg.norm(normals, axis=1))]  # walls all around: the largest face
-    corners = np.concatenate([one.solid_vertices for one in records])
-    origin = np.floor(corners.mean(axis=0))
-    mesh, _ = stones_of(codes, [(one.solid_vertices - origin, one.solid_faces) for one in records])
-    model = Model(
-        title=title, stones=mesh, colour="kind", towards=towards / np.linalg.norm(towards), origin=origin
-    )
+    codes = [str(face.row["code"]) for face in there]
+    solids = [shapes[numbers[code]] for code in codes]
+    origin = np.floor(np.concatenate([vertices for vertices, _ in solids]).mean(axis=0))
+    towards = _towards(there)
+    mesh, _ = stones_of(codes, [(vertices - origin, polygons) for vertices, polygons in solids])
+    model = Model(title=title, stones=mesh, colour="kind", towards=towards, origin=origin)
     return with_known(model, known_stones(session, codes, results=True, run=run))
+
+
+def _towards(faces: Sequence[FoundFace]) -> Array:
+    """Return the mean direction of faces; of walls all around, that of the largest face; without any, to the south."""
+    sized = [
+        float(face.row["area"] or 0.0) * face.normal  # type: ignore[arg-type]
+        for face in faces
+        if face.normal is not None
+    ]
+    if not sized:
+        return np.array([0.0, -1.0, 0.0])
+    normals = np.array(sized)
+    lengths = np.linalg.norm(normals, axis=1)
+    mean = normals.sum(axis=0)
+    chosen = mean if np.linalg.norm(mean) >= _FACING * lengths.sum() else normals[np.argmax(lengths)]
+    return np.asarray(chosen / max(float(np.linalg.norm(chosen)), 1e-300))
 
 
 def view_page(
@@ -113,7 +134,7 @@ def write_view(
     ----------
     url : of the database
     path : of the page
-    kind, where, run : as of `archmodel.query.api.find`
+    kind, where, run : as of `archmodel.query.api.find_faces`
     title : of the building; None: the name of the first survey
     drawing : SVG of the main elevation; None: none
     scale : 1 : scale of it; None: so that it fits a sheet of A4

@@ -7,7 +7,7 @@ import { say, setCatalogue, translate } from "./words.js";
 
 /** Fill each `.moma-viewer`, one of several linked to the first; without WebGL say so, and leave tables and pictures. */
 async function start() {
-  const viewers = [];
+  const viewers = [], language = new URLSearchParams(location.hash.replace(/^#/, "")).get("lang"); // before a view takes its place
   for (const root of document.querySelectorAll(".moma-viewer")) {
     const data = document.getElementById(root.dataset.model);
     try {
@@ -22,7 +22,7 @@ async function start() {
   viewers[0]?.takeHash(location.hash);
   window.addEventListener("hashchange", () => viewers[0]?.takeHash(location.hash));
   if (viewers.length > 1) link(viewers);
-  await languages();
+  await languages(language);
   themes(viewers);
   window.addEventListener("beforeprint", () => viewers.forEach(print));
   document.documentElement.dataset.ready = viewers.length;
@@ -52,7 +52,7 @@ function print(viewer) {
   viewer.root.append(element("img", { class: "printed", alt: viewer.model.title, src: viewer.picture().toDataURL("image/png") }));
 }
 
-async function languages() {
+async function languages(asked) {
   const source = document.getElementById("moma-languages"), menu = document.querySelector("select.language");
   if (!source || !menu) return;
   const catalogues = JSON.parse(new TextDecoder().decode(await unpacked(source.textContent)));
@@ -64,8 +64,7 @@ async function languages() {
     menu.value = language;
   };
   menu.addEventListener("change", () => choose(menu.value));
-  const asked = new URLSearchParams(location.hash.replace(/^#/, "")).get("lang") ?? document.documentElement.lang;
-  if (asked !== "en" && catalogues[asked]) choose(asked);
+  if (catalogues[asked] && asked !== "en") choose(asked);
 }
 
 function themes(viewers) {

@@ -269,8 +269,8 @@ export class Viewer {
 
   /** The view as the part of an address after #. */
   hash() {
-    const { hidden, selected, ...rest } = this.state, codes = this.model.codes;
-    return `view=${encodeURIComponent(JSON.stringify({ ...rest, camera: this.camera.state, selected: codes[selected] ?? null, hidden: hidden.map((i) => codes[i]) }))}`;
+    const { hidden, selected, ...rest } = this.state, codes = this.model.codes, { lang } = document.documentElement;
+    return `${lang && lang !== "en" ? `lang=${lang}&` : ""}view=${encodeURIComponent(JSON.stringify({ ...rest, camera: this.camera.state, selected: codes[selected] ?? null, hidden: hidden.map((i) => codes[i]) }))}`;
   }
 
   /** Take the view of an address; what does not fit this model is left out. */
