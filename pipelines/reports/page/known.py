@@ -55,7 +55,7 @@ def known_stones(
     asked = {
         name: one
         for name, one in attributes_of(session).items()
-        if name not in _OMITTED and (results or not (one.of_run or name == "run"))
+        if name not in _OMITTED and (results or not (one.of_run or name in ("run", "runs")))
     }
     rows: list[dict[str, object]] = [{} for _ in codes]
     for row in find_rows(session, "entity", run=run, columns=["code", *asked]):

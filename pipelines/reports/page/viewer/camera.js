@@ -28,7 +28,7 @@ export class Camera {
     const { side, above, back } = this.axes(), half = times(minus(box.high, box.low), 0.5);
     const reach = (axis) => 2 * axis.reduce((sum, one, k) => sum + Math.abs(one) * half[k], 0);
     this.state.target = times(add(box.low, box.high), 0.5);
-    const near = this.state.ortho ? 0 : 0.5 * reach(back); // what is nearer than the target looks larger
+    const near = this.state.ortho ? 0 : 0.25 * reach(back); // what is nearer than the target looks larger
     this.state.height = 1.12 * Math.max(reach(above), reach(side) / aspect) + near;
   }
 

@@ -189,7 +189,8 @@ export class Panel {
       const value = scale.at(state)[stone], text = scale.text ? scale.words[value] : Number.isNaN(value) ? undefined : quantity(value, scale.unit);
       if (text !== undefined) groups.set(scale.group, [...(groups.get(scale.group) ?? []), [say(scale.label), text]]);
     }
-    for (const [title, rows] of groups) parts.push(this.table(title, rows));
+    // what a run found comes after what was known
+    for (const [title, rows] of [...groups].sort(([a], [b]) => (a === "Results") - (b === "Results"))) parts.push(this.table(title, rows));
     parts.push(this.table("Relations", this.relations(stone)), this.table("Joints", this.jointRows(stone)),
       this.table("Measured points", this.pointRows(stone)),
       this.table("History", model.events.filter((one) => one[0] === stone).map(([, when, who, what]) => [`${when} ${who}`, what])));
