@@ -40,7 +40,6 @@ void main() {
   vec4 at = mix(p, q, corner.x);
   place = mix(begin, end, corner.x); paint = tint;
   at.xy += across * corner.y * max(width * grain, 1.0) / size * at.w;
-  at.z -= nearer * at.w;
   gl_Position = at;
 }`;
 const LINE_FRAGMENT = `${FRAGMENT}
@@ -175,7 +174,9 @@ export class Renderer {
     if (!view.seeThrough) stones(1);
     if (view.edges) this.drawLayer("stones", "line", "edges", view);
     for (const name of view.sheets) this.drawLayer(name, "face", "faces", view);
-    for (const name of view.strokes) this.drawLayer(name, "stroke", "", view, view.seeThrough ? 0 : 0.001);
+    gl.disable(gl.DEPTH_TEST); // forces act within the stones
+    for (const name of view.strokes) this.drawLayer(name, "stroke", "", view);
+    gl.enable(gl.DEPTH_TEST);
     if (view.points) this.drawLayer("points", "point", "points", view, 0.0006);
     if (!view.seeThrough) return;
     gl.enable(gl.BLEND);
