@@ -99,15 +99,17 @@ def find_rows(
     where: Sequence[str] = (),
     run: int | None = None,
     columns: Sequence[str] | None = None,
+    limit: int | None = None,
 ) -> list[dict[str, object]]:
     """Return attributes of entities by name, as rows; the fast way to a table. Arguments as of `find`.
 
     Parameters
     ----------
     columns : names of the attributes that are wanted, also ``von_mises_max@12``; None: those of ``attributes``
+    limit : most rows; None: all
     """
     names = list(ATTRIBUTES) if columns is None else columns
-    found = _select(session, kind, where, run, lambda scope: _columns(scope, names))
+    found = _select(session, kind, where, run, lambda scope: _columns(scope, names), limit)
     return [dict(zip(names, row, strict=True)) for row in found]
 
 
@@ -190,12 +192,13 @@ def _select(
     where: Sequence[str],
     run: int | None,
     chosen: Callable[[Scope], list[ColumnElement[Any]]],
+    limit: int | None = None,
 ) -> Iterable[Sequence[Any]]:
     """Select columns of the entities of a kind that satisfy all expressions, in the order of the survey."""
     scope, conditions = _asked(session, where, run)
     columns = chosen(scope)
     statement = scope.joined(select(*columns)).where(*_of_kind(scope, kind), *conditions)
-    return session.execute(statement.order_by(scope.entity.c.id))
+    return session.execute(statement.order_by(scope.entity.c.id).limit(limit))
 
 
 def _of_kind(scope: Scope, kind: str) -> list[ColumnElement[bool]]:

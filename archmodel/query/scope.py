@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
+from threading import Lock
 from typing import Any, TypeVar
 
 from sqlalchemy import CTE, ColumnElement, FromClause, Select, and_, func, select
@@ -27,6 +28,7 @@ MAX_RUNS = 12
 S = TypeVar("S", bound=Select[Any])
 
 _ALIASES: dict[tuple[type[Base], int], list[FromClause]] = {}
+_MAKING = Lock()
 
 
 @dataclass
@@ -56,8 +58,14 @@ class Context:
         pool = _ALIASES.setdefault((cls, len(cls.__table__.c)), [])
         number = self._aliases[cls]
         self._aliases[cls] += 1
-        if number == len(pool):
-            pool.append(cls.__table__.alias())
+        if number >= len(pool):
+            with _MAKING:
+                while number >= len(pool):
+                    fresh = cls.__table__.alias()
+                    _ = (
+                        fresh.c
+                    )  # columns are made when first asked for, which two threads must not do at once
+                    pool.append(fresh)
         return pool[number]
 
     def count_function(self, token: Token) -> None:

@@ -8,13 +8,13 @@ import typer
 
 from moma.cli.assess import assess, compare, diagnose
 from moma.cli.console import PlainCommand, PlainGroup
-from moma.cli.database import export, import_, migrate
+from moma.cli.database import export, import_, migrate, serve, view
 from moma.cli.entities import query, schema, show
 from moma.cli.geology import geology
 from moma.cli.knowledge import record
 from moma.cli.proposals import propose
 from moma.cli.relations import load_path, relate
-from moma.cli.runs import runs
+from moma.cli.runs import report, runs
 from moma.cli.scenes import check, run, trade
 from moma.cli.surveys import ingest, sample, survey_report
 
@@ -77,6 +77,9 @@ _COMMANDS = (
     trade,
     geology,
     runs,
+    view,
+    report,
+    serve,
     export,
     import_,
     migrate,

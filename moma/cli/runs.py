@@ -1,5 +1,6 @@
-"""Command that lists, shows and compares simulation runs."""
+"""Commands that list, show and compare simulation runs, and print their reports."""
 
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -8,7 +9,7 @@ from moma.cli.console import reporting, say
 from moma.cli.options import DEFAULT_DB, Db, Json, Verbose
 from moma.errors import UsageError
 
-__all__ = ["runs"]
+__all__ = ["report", "runs"]
 
 _LIST = {
     **dict.fromkeys(("run", "scene", "stored_at", "outcome")),
@@ -121,3 +122,43 @@ def _comparison(change: dict[str, Any]) -> str:
             columns = {"code": None, "run": unit, "against": unit, "change": unit}
             parts.append(f"{heading}\n{as_table(columns, rows)}")
     return "\n\n".join(parts)
+
+
+@reporting
+def report(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of results, or a page.")],
+    pdf: Annotated[
+        bool, typer.Option("--pdf", help="Print it to PDF through an installed Chromium, Chrome or Edge.")
+    ] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="FILE", help="The PDF; default: RUN.pdf beside the folder or page."),
+    ] = None,
+    language: Annotated[
+        str, typer.Option("--language", metavar="TAG", help="en, de, fr or it, for the page's fixed words.")
+    ] = "en",
+    json: Json = False,
+    verbose: Verbose = False,
+) -> None:
+    """Check that a report is as it was written, and print it to PDF."""
+    from moma.cli.text.formats import as_json
+    from pipelines.reports.page.paper import appraise_page, print_pdf
+
+    page = run / "report.html" if run.is_dir() else run
+    sound = appraise_page(page)
+    target = None
+    if pdf:
+        # beside the folder, which holds what the run wrote and nothing else
+        target = out or run.with_name(f"{run.resolve().name if run.is_dir() else run.stem}.pdf")
+        print_pdf(page, target, language)
+    if json:
+        print(
+            as_json({"page": str(page), "as_written": sound, "pdf": None if target is None else str(target)})
+        )
+        return
+    states = {True: "as it was written", False: "CHANGED since it was written", None: "states no checksum"}
+    print(f"{page}: {states[sound]}")
+    if target is not None:
+        print(target)
+    else:
+        say("to print it: --pdf, or open it in a browser and print to A4")

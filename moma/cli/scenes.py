@@ -76,6 +76,9 @@ def run(
             help="Write the meshes of deformable stones for Gmsh, Code_Aster, Abaqus, …; see docs/runs.md.",
         ),
     ] = None,
+    animate: Annotated[
+        bool, typer.Option("--animate", help="Draw the motion as motion.gif too, of up to 60 pictures.")
+    ] = False,
     resume: Resume = None,
     overwrite: Overwrite = False,
     accept_unsound: AcceptUnsound = False,
@@ -109,6 +112,7 @@ def run(
             stop,
             resume,
             overwrite,
+            animate,
         )
     for warning in done.warnings:
         say(f"warning: {warning}")

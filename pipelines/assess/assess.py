@@ -29,8 +29,11 @@ from pipelines.assess.questions import LoadQuestion, Question, parse_question, s
 from pipelines.draw.mechanism import draw_mechanisms
 from pipelines.draw.plots import draw_capacity
 from pipelines.reports.assessment import write_assessment
+from pipelines.reports.page.known import known_stones
+from pipelines.reports.page.scenes import assessment_model
 from pipelines.results.folder import UNFINISHED_ASSESSMENT, check_replaceable, replacing, source_of
 from pipelines.results.summary import as_json
+from pipelines.results.table_csv import inert
 from pipelines.run.assemble import Assembly, assemble_stones
 from pipelines.run.record import store_record, versions
 from pipelines.run.soundness import problems_of, refuse_unsound
@@ -146,6 +149,7 @@ def assess(
         progress(Progress("blocks", 0, None, f"closing the joints of {len(models)} stones"))
         groups = select_groups(scene, session, models)
         assembled = assemble_stones(scene, models, groups)
+        known = known_stones(session, [model.record.code for model in models])
     questions = [
         _asked(one, confirm, code) for one in asked or scene_questions(scene, groups, assembled.origin)
     ]
@@ -193,7 +197,14 @@ def assess(
         except MissingLibraryError as error:
             warnings.append(f"no pictures: {error}")
         summary["source"] = source_of([path], fresh)
-        write_assessment(fresh / REPORT, summary)
+        limits = [
+            (one.told["name"], one.told["headline"], one.mechanism, forces)
+            for one, forces in zip(answers, carried, strict=True)
+        ]
+        model = assessment_model(
+            scene.name, on.model.scene.blocks, on, limits, assembled.towards, assembled.origin, known
+        )
+        write_assessment(fresh / REPORT, summary, model)
         (fresh / "scene.toml").write_text(scene.text, encoding="utf-8")
         (fresh / INDEX).write_text(as_json(summary), encoding="utf-8")
     with open_database(url, create=False) as database:
@@ -386,7 +397,9 @@ def _write_forces(
             table = csv.writer(file)
             table.writerow(JOINT_COLUMNS)
             for (a, b), row in zip(on.joints.bodies.tolist(), numbers.tolist(), strict=True):
-                table.writerow([codes[a], codes[b], *("" if np.isnan(v) else f"{v:.7g}" for v in row)])
+                table.writerow(
+                    [inert(codes[a]), inert(codes[b]), *("" if np.isnan(v) else f"{v:.7g}" for v in row)]
+                )
     return names
 
 

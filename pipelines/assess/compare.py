@@ -18,6 +18,11 @@ from mechanics.simulate import simulate
 from pipelines.assess.motions import stone_motions
 from pipelines.draw.elevations.movement import draw_bed_movement, draw_misfit
 from pipelines.ingest.records import surveyed_block
+from pipelines.reports.movement import write_comparison
+from pipelines.reports.page.known import known_stones
+from pipelines.reports.page.model import Lines
+from pipelines.reports.page.scenes import run_model
+from pipelines.reports.page.surveys import bed_lines
 from pipelines.results.folder import check_replaceable, replacing, source_of
 from pipelines.results.stone_values import stone_results
 from pipelines.results.summary import as_json, summarise
@@ -43,6 +48,9 @@ __all__ = ["INDEX", "SurveyComparison", "compare", "facades_of", "measured_stone
 
 INDEX = "comparison.json"
 """Index of the results of a comparison."""
+
+REPORT = "report.html"
+"""Page for people."""
 
 _MEASURED = ("points", "photograph")  # provenance of faces whose place is measured
 _WORST = 5.0  # standard deviations at which the colours of a map of misfits end
@@ -101,6 +109,7 @@ def compare(
             as_of, models = latest_entry(session), select_stones(scene, session)
             progress(Progress("blocks", 0, None, f"closing the joints of {len(models)} stones"))
             assembly = assemble_stones(scene, models, select_groups(scene, session, models))
+            known = known_stones(session, [model.record.code for model in models])
         built = build_model(assembly.scene, lambda done, total: progress(Progress("mesh", done, total)))
         problems = problems_of(scene, assembly, loose_blocks(*built))
         if not accept_unsound:
@@ -112,15 +121,21 @@ def compare(
         plumb = compare_plumb(stones, facades, moved, battered)
         progress(Progress("write", 0, 1, "pictures"))
         summary = _summary(result, assembly, courses, plumb, battered)
+        values = _values(courses, plumb)
+        results = tuple(_with_values(one, values.get(one.code, {})) for one in stone_results(result))
+        lines = [
+            Lines(one.name, one.colour, [line - assembly.origin for line in one.lines])
+            for one in bed_lines(courses, {facade.name: facade.frame.axes[2] for facade in facades})
+        ]
+        model = run_model(result, results, assembly.towards, assembly.origin, known, lines)
         with replacing(folder, INDEX) as fresh:
             _draw(fresh, facades, stones, courses)
+            write_comparison(fresh / REPORT, summary, model)
             (fresh / "scene.toml").write_text(scene.text, encoding="utf-8")
             summary["source"] = source_of([path], fresh)
             summary["files"] = sorted([INDEX, *(entry.name for entry in fresh.iterdir())])
             (fresh / INDEX).write_text(as_json(summary), encoding="utf-8")
         kept = summarise(result, version=versions()["moma"], seconds=result.wall_time)
-        values = _values(courses, plumb)
-        results = tuple(_with_values(one, values.get(one.code, {})) for one in stone_results(result))
         run = store_record(database, folder, run_record(result, results, scene, assembly, kept, as_of))
     progress(Progress("write", 1, 1))
     return SurveyComparison(folder, summary, run)

@@ -8,7 +8,6 @@ import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from textwrap import shorten
 from typing import Any
 
 import numpy as np
@@ -22,7 +21,7 @@ from mechanics.stones.materials import Material
 from moma.errors import MissingLibraryError
 from pipelines.draw.catalogue import PICTURES
 from pipelines.draw.offscreen.jobs import save_job
-from pipelines.draw.offscreen.surfaces import FIELDS, stone_fields, wall_surface
+from pipelines.draw.offscreen.surfaces import FIELDS, stone_fields, support_motion, wall_surface
 from pipelines.results.peaks import peak_records
 
 __all__ = ["OF_RESULTS", "draw_apart", "draw_pictures", "drawing_process", "missing", "package_of"]
@@ -32,7 +31,6 @@ OF_RESULTS = "pipelines.draw.offscreen.result"
 
 
 _PASSED = 1.05  # peak over the value at the end, from which a picture of the end states it [-]
-_LONGEST = 100  # characters of a caution in a heading, which has one line
 _WINDOWS = (
     "vtkEGLRenderWindow",
     None,
@@ -141,8 +139,13 @@ def _top(result: Result, name: str) -> float | None:
 def _heading(result: Result, name: str) -> list[str]:
     """Return the lines above a picture: content and outcome, the gravest caution, the largest value."""
     picture, ending = PICTURES[name], f"{_ENDINGS[result.outcome]} after {result.time:.3g} s"
-    lines = [f"{result.scene.name}: {picture.title}, {ending}"]
-    lines += [shorten(caution, _LONGEST, placeholder=" …") for caution in result.cautions[:1]]
+    seen = ""
+    if (
+        name == "displacement"
+        and support_motion(result.bodies, [one.position for one in result.bodies]).any()
+    ):
+        seen = ", seen from the supports"
+    lines = [f"{result.scene.name}: {picture.title}{seen}, {ending}", *result.cautions[:1]]
     passed = peak_records(result)["displacement"] if name == "displacement" else None
     if passed is not None and passed["value"] > _PASSED * passed["end"]:
         factor, unit = picture.unit_of(passed["value"])

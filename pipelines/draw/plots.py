@@ -2,6 +2,7 @@
 
 import io
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +16,7 @@ __all__ = ["draw_capacity", "history_svg"]
 if TYPE_CHECKING:
     from mechanics.limit.pushover import Pushover
 
+_ROW = 80  # characters in a line of a title
 _CURVES = (
     ("speed", "speed [m/s]", "#8a3b12"),
     ("balance", "unbalanced force / weight", "#1f5f8b"),
@@ -31,7 +33,7 @@ def history_svg(history: RunHistory) -> str:
         axes.semilogy(history.time, values, label=label, color=colour, marker="." if len(values) < 30 else "")
     axes.set_xlabel("simulated time [s]")
     axes.grid(alpha=0.3)
-    axes.legend(frameon=False, loc="upper right")
+    axes.legend(frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3)  # above the curves
     out = io.StringIO()
     figure.savefig(out, format="svg")
     text = out.getvalue()
@@ -54,7 +56,8 @@ def draw_capacity(path: Path, title: str, curve: "Pushover", bound: float) -> No
     axes.set_ylim(0.0, 1.2 * bound)
     axes.set_xlabel(f"way of {curve.control} along the load [mm]")
     axes.set_ylabel("λ [-]")
-    axes.set_title(title, fontsize=9, parse_math=False)
+    wrapped = "\n".join(part for line in title.splitlines() for part in wrap(line, _ROW))
+    axes.set_title(wrapped, fontsize=10, parse_math=False)
     axes.grid(alpha=0.3)
     axes.legend(frameon=False, loc="upper right")
     figure.savefig(path)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,10 +14,12 @@ from pipelines.geology.observe import WHOLE, Fields
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 __all__ = ["draw_curves", "draw_instant", "draw_trishear"]
 
 _WIDE = 10.0  # of a figure [inch]
+_ROW = 130  # characters in a line of a footnote
 _LAYERS = (
     "#c9a26b",
     "#8a3b12",
@@ -54,7 +57,7 @@ def draw_instant(
         title = draw(axes, fields, radius, layer)
         _frame(axes, fields, radius, walls)
         axes.set_title(f"{title}, t = {fields.time:g} s, step {fields.step}", fontsize=9)
-        figure.text(0.01, 0.01, quality, fontsize=6)
+        _footnote(figure, quality)
         names.append(f"{name}-{fields.step:08d}.png")
         figure.savefig(folder / names[-1], dpi=150)
     return names
@@ -64,6 +67,11 @@ def _size(fields: Fields, radius: Array) -> tuple[float, float]:
     place = fields.position[: len(radius), :2]
     wide, high = np.ptp(place, axis=0)
     return _WIDE, float(np.clip(1.2 + _WIDE * high / wide, 2.0, _WIDE))
+
+
+def _footnote(figure: "Figure", quality: str) -> None:
+    """Write the line about overlaps and residuals below the axes, which make room for it."""
+    figure.supxlabel("\n".join(wrap(quality, _ROW)), x=0.01, ha="left", fontsize=8)
 
 
 def _frame(axes: "Axes", fields: Fields, radius: Array, walls: Array) -> None:
@@ -187,7 +195,7 @@ def draw_trishear(
         )
         _frame(axes, fields, radius, np.array(sides))
         axes.set_title(f"{title}, t = {fields.time:g} s", fontsize=9)
-    figure.text(0.01, 0.01, quality, fontsize=6)
+    _footnote(figure, quality)
     name = f"trishear-{fields.step:08d}.png"
     figure.savefig(folder / name, dpi=150)
     return name
@@ -226,5 +234,5 @@ def draw_curves(
     figure.axes[0].legend(frameon=False, fontsize=7, ncols=2)
     for axes in figure.axes[-2:]:
         axes.set_xlabel("time [s]", fontsize=8)
-    figure.text(0.01, 0.005, quality, fontsize=6)
+    _footnote(figure, quality)
     figure.savefig(path, dpi=150)

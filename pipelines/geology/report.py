@@ -10,6 +10,7 @@ import numpy as np
 from mechanics.arrays import Array
 from pipelines.geology.file import GeologyScene
 from pipelines.reports.html import kilopascals, percent, picture, ratio, scientific, write_page
+from pipelines.reports.page.model import Model
 
 __all__ = ["write_report"]
 
@@ -30,7 +31,11 @@ _OUTCOMES = {
 
 
 def write_report(
-    path: Path, scene: GeologyScene, summary: Mapping[str, Any], rows: Mapping[str, Mapping[str, Array]]
+    path: Path,
+    scene: GeologyScene,
+    summary: Mapping[str, Any],
+    rows: Mapping[str, Mapping[str, Array]],
+    model: Model | None = None,
 ) -> None:
     """Write the page and embed the figures of its folder.
 
@@ -39,22 +44,25 @@ def write_report(
     path : report.html
     summary : as in summary.json
     rows : columns by cell; the table shows the last
+    model : content of the viewer; None: the page has none
     """
     figures = [(one, words) for name, words in _CAPTIONS.items() for one in path.parent.glob(f"{name}*.png")]
     write_page(
         path,
         "geology.html",
+        model,
         name=summary["scene"],
         lead=f"{summary['disks']} disks, {summary['steps']} steps, {summary['time']['simulated']:g} s of a "
         f"{summary['kind']} scene. {_OUTCOMES[summary['outcome']]}",
         cautions=summary["cautions"],
         warnings=summary["warnings"],
         version=summary["version"],
+        versions=summary.get("versions"),
         measures=[(name, ratio(value)) for name, value in summary["measures"].items()],
         quality=_quality(summary),
         head=_HEAD,
         cells=[_cell(name, columns) for name, columns in rows.items()],
-        figures=[picture(one, words) for one, words in figures],
+        figures=[picture(one, f"{words} Quality: {summary['headline']}.") for one, words in figures],
         settings=_settings(scene),
     )
 

@@ -19,6 +19,7 @@ from pipelines.geology.observe import CELL_COLUMNS, WHOLE, Fields, Instants
 from pipelines.geology.paraview import write_series
 from pipelines.geology.report import write_report
 from pipelines.geology.sample import PreparedSample
+from pipelines.geology.viewer import disks_model
 from pipelines.results.folder import RUN_INDEX, source_of
 from pipelines.results.summary import as_json
 from pipelines.run.record import versions
@@ -119,7 +120,8 @@ def write_results(
         "warnings": list(archive.warnings),
     }
     (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
-    write_report(folder / "report.html", scene, summary, rows)
+    model = disks_model(scene.name, sample.radius, sample.layer, sample.centre, scene.cells, instants)
+    write_report(folder / "report.html", scene, summary, rows, model)
     summary["source"] = source_of([scene.document.path], folder)
     summary["files"] = sorted([RUN_INDEX, *(entry.name for entry in folder.iterdir())])
     (folder / RUN_INDEX).write_text(as_json(summary), encoding="utf-8")

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.reports.html import picture, write_page
+from pipelines.reports.page.model import Model
 
 __all__ = ["write_assessment"]
 
@@ -19,24 +20,27 @@ _CAPTIONS = {
 _FEW = 12  # stones of a mechanism that are named
 
 
-def write_assessment(path: Path, summary: Mapping[str, Any]) -> None:
+def write_assessment(path: Path, summary: Mapping[str, Any], model: Model | None = None) -> None:
     """Write the page and embed the pictures of its folder.
 
     Parameters
     ----------
     path : report.html
     summary : as in assessment.json
+    model : content of the viewer; None: the page has none
     """
     loads = summary["loads"]
     write_page(
         path,
         "assessment.html",
+        model,
         name=summary["scene"],
         lead=f"{summary['headline']}. {summary['free']} stones that may move, {summary['contacts']} contact points, "
         f"weight {1e-3 * summary['weight']:.2f} kN.",
         cautions=summary["cautions"],
         warnings=(),
         version=summary["versions"]["moma"],
+        versions=summary["versions"],
         head=_HEAD,
         loads=[_row(one) for one in loads],
         value_head=_VALUES,

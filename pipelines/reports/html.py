@@ -7,15 +7,23 @@ from pathlib import Path
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from pipelines.reports.page.elevation import elevation
+from pipelines.reports.page.inline import languages_packed, script, style, viewer_html
+from pipelines.reports.page.languages import catalogues
+from pipelines.reports.page.model import Model
+from pipelines.reports.page.paper import contents, sealed, title_block
+
 __all__ = [
     "Picture",
     "kilonewtons",
     "kilopascals",
     "megapascals",
     "millimetres",
+    "page_text",
     "percent",
     "picture",
     "ratio",
+    "render",
     "scientific",
     "write_page",
 ]
@@ -26,9 +34,37 @@ Picture = dict[str, str]
 _LONGEST = 32  # characters of a number with its precision and unit; a longer cell is a sentence
 
 
-def write_page(path: Path, template: str, **values: object) -> None:
-    """Fill a template of `pipelines/reports/templates` with plain values; escape every text among them."""
-    path.write_text(_templates().get_template(template).render(values), encoding="utf-8")
+def write_page(path: Path, template: str, model: Model | None = None, **values: object) -> None:
+    """Fill a template of `pipelines/reports/templates` with plain values; escape every text among them.
+
+    Parameters
+    ----------
+    path : of the page
+    template : its name
+    model : content of the page's viewer and of its elevation; None: it has neither
+    values : of the template
+    """
+    path.write_text(page_text(template, model, **values), encoding="utf-8")
+
+
+def render(template: str, **values: object) -> str:
+    """Fill a template with plain values, without a viewer; escape every text among them."""
+    return _templates().get_template(template).render(values)
+
+
+def page_text(template: str, model: Model | None = None, **values: object) -> str:
+    """Return a page; arguments as of `write_page`."""
+    versions = values.get("versions") or f"MOMA {values.get('version', '')}"
+    own = {
+        "viewer": None if model is None else viewer_html(model),
+        "elevation": None if model is None else elevation(model),
+        "title_block": title_block(str(values["name"]), versions),  # type: ignore[arg-type]
+        "languages": {tag: one["name"] for tag, one in catalogues().items()},
+        "languages_packed": languages_packed(),
+        "viewer_style": style(),
+        "viewer_script": script(),
+    }
+    return sealed(contents(_templates().get_template(template).render(own | values)))
 
 
 def picture(path: Path, caption: str) -> Picture:

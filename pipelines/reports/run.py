@@ -22,6 +22,7 @@ from pipelines.reports.html import (
     scientific,
     write_page,
 )
+from pipelines.reports.page.model import Model
 from pipelines.reports.peaks import peak_rows
 
 __all__ = ["write_report"]
@@ -114,6 +115,7 @@ def write_report(
     stones: Sequence[StoneResult],
     warnings: Sequence[str],
     history: str | None = None,
+    model: Model | None = None,
 ) -> None:
     """Write the page and embed the pictures of its folder.
 
@@ -124,11 +126,13 @@ def write_report(
     stones : one per stone
     warnings : shown at the top
     history : the result's `history_svg`, where it has been drawn already
+    model : content of the viewer; None: the page has none
     """
     pictures = [path.parent / name for name in _CAPTIONS]
     write_page(
         path,
         "run.html",
+        model,
         name=result.scene.name,
         lead=_OUTCOMES[str(result.outcome)],
         decided=str(result.outcome) not in _OPEN,
@@ -152,6 +156,7 @@ def write_report(
         history=history or history_svg(result.history),
         stages=[(stage, f"{seconds:.2f} s") for stage, seconds in summary["time"]["by_stage"].items()],
         version=summary["version"],
+        versions=summary.get("versions"),
     )
 
 

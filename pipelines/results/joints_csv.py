@@ -9,6 +9,7 @@ import numpy as np
 from mechanics.arrays import Array
 from mechanics.results.contact_result import JointResult
 from mechanics.results.result import Result
+from pipelines.results.table_csv import inert
 
 __all__ = ["JOINT_COLUMNS", "normal_and_shear", "write_joints"]
 
@@ -54,7 +55,7 @@ def write_joints(path: Path, result: Result, origin: Array) -> None:
         writer.writerow(JOINT_COLUMNS)
         for number, (first, second) in enumerate(result.joints.bodies):
             numbers = (columns[name][number] for name in list(JOINT_COLUMNS)[2:])
-            writer.writerow([codes[first], codes[second], *map(_cell, numbers)])
+            writer.writerow([inert(codes[first]), inert(codes[second]), *map(_cell, numbers)])
 
 
 def normal_and_shear(joints: JointResult) -> tuple[Array, Array]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from mechanics.arrays import Array
 from mechanics.results.result import Result
+from pipelines.results.table_csv import inert
 
 __all__ = ["SERIES_COLUMNS", "write_series"]
 
@@ -73,4 +74,4 @@ def _write(folder: Path, name: str, time: Array, named: Iterable[Sequence[object
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(SERIES_COLUMNS[name])
         for instant, words, numbers in zip(time.tolist(), named, (values + 0.0).tolist(), strict=True):
-            writer.writerow([f"{instant:.12g}", *words, *(f"{one:.12g}" for one in numbers)])
+            writer.writerow([f"{instant:.12g}", *map(inert, words), *(f"{one:.12g}" for one in numbers)])

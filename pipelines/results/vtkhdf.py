@@ -1,8 +1,8 @@
 """`results.vtkhdf`: stones and contact points of all frames in one file, which ParaView plays, also while it grows.
 
-VTKHDF 2.1, read by VTK since 9.4 and ParaView since 5.13. The mesh of the stones stands in the file once, with their
-places in every frame; rigid stones are polygons, as polyhedra need VTK 9.6. Both blocks change with time, as a block
-that does not makes the other unreadable.
+VTKHDF 2.1, read by VTK since 9.4, ParaView since 5.13 and PyVista. The mesh of the stones stands in the file once, with
+their places in every frame; rigid stones are polygons, as polyhedra need VTK 9.6. Both blocks change with time, as a
+block that does not makes the other unreadable.
 
 HDF5 leaves a file that no library opens if its writer dies with it open. So no file under the name that users see is
 ever open for writing: each frame is added to a second copy, which then takes the name
@@ -144,7 +144,7 @@ class _Writer:
         """Write what all frames share, and make room for the frames, which are like the first."""
         root = self._file.create_group(_ROOT, track_order=True)
         root.attrs["Version"] = np.array(_VERSION)
-        root.attrs["Type"] = np.bytes_("PartitionedDataSetCollection")
+        root.attrs["Type"] = np.bytes_("MultiBlockDataSet")  # the composite that PyVista wraps
         tree = root.create_group("Assembly", track_order=True)
         for number, (name, block) in enumerate(self._blocks.items()):
             self._create_block(root.create_group(name), number, block, first[name])

@@ -24,8 +24,11 @@ from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.files import check_mesh_file, write_meshes
 from mechanics.stones.meshing.mesh import VolumeMesh
 from moma.errors import MissingLibraryError, MomaError, storing
+from pipelines.draw.animation import draw_motion
 from pipelines.draw.pictures import OF_RESULTS, draw_pictures, drawing_process, missing
 from pipelines.draw.plots import history_svg
+from pipelines.reports.page.known import Known, known_stones
+from pipelines.reports.page.scenes import run_model
 from pipelines.reports.run import write_report
 from pipelines.results.folder import check_replaceable, replacing, source_of
 from pipelines.results.joints_csv import write_joints
@@ -82,6 +85,7 @@ def run_scene(
     stop: Callable[[], bool] = lambda: False,
     resume: bool | None = None,
     overwrite: bool = False,
+    animate: bool = False,
 ) -> RunReport:
     """Run a scene file on the stones of a database, and write the results into a folder.
 
@@ -97,6 +101,7 @@ def run_scene(
     stop : asked after every step; where it says True, the run ends there as interrupted, with results of what there is
     resume : go on with the unfinished run in the folder, if there is one; False: give it up; None: refuse to run then
     overwrite : replace the results of another scene in the folder
+    animate : draw the motion as motion.gif too
 
     Raises
     ------
@@ -132,6 +137,7 @@ def run_scene(
                 ),
                 inputs=run_inputs(scene, assembly, groups, session),
             )
+            known = known_stones(session, [model.record.code for model in models])
         if meshes is not None:
             check_mesh_file(meshes, _elements(assembly))
         with _timed(seconds, "mesh"):
@@ -165,7 +171,18 @@ def run_scene(
             stones, reached = stone_results(result), profile_report(profile, scene, result)
             with replacing(folder) as fresh:
                 summary, warnings = write_results(
-                    result, stones, scene, assembly, fresh, seconds, progress, reached, unfinished, ready
+                    result,
+                    stones,
+                    scene,
+                    assembly,
+                    fresh,
+                    seconds,
+                    progress,
+                    reached,
+                    unfinished,
+                    ready,
+                    known,
+                    animate,
                 )
                 unfinished.hand_over(fresh)
         if meshes is not None:
@@ -189,11 +206,13 @@ def write_results(
     profile: ProfileReport | None = None,
     unfinished: UnfinishedRun | None = None,
     ready: "subprocess.Popen[str] | None" = None,
+    known: Known | None = None,
+    animate: bool = False,
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Write all files of a run into an empty folder; return the summary and the warnings.
 
     Pictures that cannot be drawn on this machine cause a warning; everything else is written. They are drawn by
-    another process, `ready` if it is given, beside the other files.
+    another process, `ready` if it is given, beside the other files. `known` is what the database holds of the stones.
     """
     warnings = [*assembly.remarks, *(() if unfinished is None else unfinished.warnings)]
     # of a relaxation only the final equilibrium counts, whose steps are all solved
@@ -226,6 +245,8 @@ def write_results(
             progress(Progress("write", 1, 3, "pictures"))
             try:
                 drawing.result()
+                if animate:
+                    draw_motion(result, folder, assembly.towards)
             except MissingLibraryError as error:
                 warnings.append(f"no pictures: {error}")
     progress(Progress("write", 2, 3, "report.html"))
@@ -233,7 +254,8 @@ def write_results(
     summary = summarise(result, version=version("moma-masonry"), seconds=seconds, profile=reached)
     summary["inputs"] = {title: list(lines) for title, lines in assembly.inputs.items()}
     summary["versions"] = dict(versions())
-    write_report(folder / "report.html", result, summary, stones, warnings, history)
+    model = run_model(result, stones, assembly.towards, assembly.origin, known)
+    write_report(folder / "report.html", result, summary, stones, warnings, history, model)
     (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
     summary["resumed"] = [] if unfinished is None else unfinished.resumed
     summary["source"] = source_of([scene.document.path], folder)

@@ -1,7 +1,5 @@
 """Formats of rows and entities: tables for people, CSV and JSON for programs."""
 
-import csv
-import io
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -73,11 +71,9 @@ def as_table(columns: Mapping[str, str | None], rows: Sequence[Mapping[str, obje
 
 def as_csv(columns: Iterable[str], rows: Iterable[Mapping[str, object]]) -> str:
     """Format rows as CSV with a header line; unknown values are empty."""
-    out = io.StringIO()
-    writer = csv.DictWriter(out, list(columns), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return out.getvalue().rstrip("\n")
+    from pipelines.results.table_csv import csv_text
+
+    return csv_text(columns, rows).rstrip("\n")
 
 
 def shorten(lines: Sequence[str], shown: int, margin: str = "", hint: str = "") -> list[str]:

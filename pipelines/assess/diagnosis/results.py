@@ -14,8 +14,11 @@ from pipelines.assess.diagnosis.ranking import Ranked, verdict
 from pipelines.assess.diagnosis.search import RECORDS, Case, Fitted
 from pipelines.assess.motions import Motions
 from pipelines.draw.elevations.movement import draw_bed_movement
+from pipelines.reports.movement import write_diagnosis_page
+from pipelines.reports.page.surveys import bed_lines, survey_model
 from pipelines.results.folder import source_of
 from pipelines.results.summary import as_json
+from pipelines.results.table_csv import inert
 from pipelines.run.record import versions
 from pipelines.toml.writer import toml_text
 from survey.quality.courses import measure_courses
@@ -61,6 +64,9 @@ def write_diagnosis(
     summary = _summary(file, found, done, dating)
     summary["cautions"] += cautions
     summary["source"] = source_of([file.document.path], folder)
+    lines = bed_lines(courses, {facade.name: facade.frame.axes[2] for facade in found.facades})
+    model = survey_model(best.title, found.stones, moved=motions.displacement, lines=lines, colour="course")
+    write_diagnosis_page(folder / "report.html", Path(file.scene_path).stem, summary, model)
     summary["files"] = sorted([INDEX, *(entry.name for entry in folder.iterdir())])
     (folder / INDEX).write_text(as_json(summary), encoding="utf-8")
     return summary
@@ -170,7 +176,7 @@ def _write_stones(path: Path, courses: tuple[CourseMovement, ...]) -> None:
         for line in courses:
             for code, one in line.stones.items():
                 table.writerow(
-                    [code, line.line.facade, line.line.course, one.measured, one.simulated, one.sigma]
+                    [inert(code), line.line.facade, line.line.course, one.measured, one.simulated, one.sigma]
                 )
 
 

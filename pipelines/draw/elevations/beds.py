@@ -19,6 +19,7 @@ __all__ = ["draw_courses"]
 
 
 _LARGEST = 0.45  # the largest deviation as drawn, over the distance between courses [-]
+_FINER = 10.0  # largest exaggeration of a course over the smallest [-]
 
 
 def draw_courses(path: Path, lines: Sequence[CourseLine], walls: Sequence[WallBeds] = ()) -> None:
@@ -31,27 +32,27 @@ def draw_courses(path: Path, lines: Sequence[CourseLine], walls: Sequence[WallBe
     walls : movements of its walls
     """
     levels = np.array([line.level for line in lines])
-    factor = _exaggeration(lines, levels)
+    factors = _exaggerations(lines, levels)
     figure = new_sheet((10.0, float(np.clip(2.0 + 0.42 * len(lines), 3.5, 24.0))))
     axes = figure.subplots()
     right = max(float(line.along[-1]) for line in lines)
     left = min(float(line.along[0]) for line in lines)
     small = len(lines) > 60
-    for line, y in zip(lines, levels, strict=True):
+    for line, y, factor in zip(lines, levels, factors, strict=True):
         moved = _movements(line, walls)
         colour = FLAG if moved else PLAIN
         _draw_bed(axes, line, factor, moved, small)
         if not small:
             axes.annotate(
-                _label(line), (right, y), (8, 0), textcoords="offset points", va="center", fontsize=8, color=colour,
-                annotation_clip=False, parse_math=False,
+                f"{_label(line)}, × {factor:g}", (right, y), (8, 0), textcoords="offset points", va="center",
+                fontsize=8, color=colour, annotation_clip=False, parse_math=False,
             )  # fmt: skip
     margin = max(0.02 * (right - left), 0.01)  # a single corner has a place but no width
     axes.set_xlim(left - margin, right + margin)
     axes.set_xlabel("along the facade, to the right of the viewer [m]")
     axes.set_ylabel("height of the bed [m]")
     axes.set_title(
-        f"Bed lines of {lines[0].facade}: deviations from level drawn {factor:g} times as large\n"
+        f"Bed lines of {lines[0].facade}: deviations from level drawn {_told(factors)} times as large\n"
         "bars: ± one standard deviation of a corner; grey: level; orange: movement that courses share",
         fontsize=10, color=INK, parse_math=False,
     )  # fmt: skip
@@ -131,12 +132,25 @@ def _label(line: CourseLine) -> str:
     return text
 
 
-def _exaggeration(lines: Sequence[CourseLine], levels: Array) -> float:
-    """Choose a round factor by which the deviations fill a good part of the space between courses."""
+def _exaggerations(lines: Sequence[CourseLine], levels: Array) -> list[float]:
+    """Choose for each course a round factor by which its deviations fill a good part of the space between courses.
+
+    None is more than `_FINER` times the least: the scatter of straight courses would look like movement.
+    """
     gaps = np.diff(np.unique(np.round(levels, 3)))
     room = float(np.median(gaps)) if len(gaps) else 0.3
-    largest = max(float((np.abs(line.height - line.level) + line.sigma).max()) for line in lines)
-    wanted = _LARGEST * room / largest
-    decade = 10.0 ** math.floor(math.log10(wanted))
-    steps = (1.0, 2.0, 5.0, 10.0)
-    return max(1.0, decade * max(step for step in steps if step * decade <= wanted))
+    largest = [float((np.abs(line.height - line.level) + line.sigma).max()) for line in lines]
+    wanted = [_LARGEST * room / max(one, 1e-6) for one in largest]
+    return [max(1.0, _round_down(min(one, _FINER * min(wanted)))) for one in wanted]
+
+
+def _round_down(value: float) -> float:
+    """Return the largest of 1, 2, 5, 10, … that is not above a value."""
+    decade = 10.0 ** math.floor(math.log10(value))
+    return decade * max(step for step in (1.0, 2.0, 5.0, 10.0) if step * decade <= value)
+
+
+def _told(factors: Sequence[float]) -> str:
+    """Return the factors in words."""
+    low, high = min(factors), max(factors)
+    return f"{low:g}" if low == high else f"{low:g} to {high:g} (× at the right)"

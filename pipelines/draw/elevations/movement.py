@@ -24,6 +24,7 @@ from survey.quality.movement import CourseMovement
 __all__ = ["draw_bed_movement", "draw_misfit"]
 
 _LARGEST = 0.45  # the largest deviation as drawn, over the distance between courses [-]
+_FINER = 10.0  # largest exaggeration of a course over the smallest [-]
 _DIVERGING = "RdBu_r"  # low is blue, high is red: the same for colour-blind readers
 
 
@@ -39,14 +40,19 @@ def draw_bed_movement(path: Path, courses: Sequence[CourseMovement]) -> None:
     room = float(np.median(np.diff(sorted(set(levels))))) if len(set(levels)) > 1 else 0.3
     lines = [(one.line.height - level, one.simulated) for one, level in zip(courses, levels, strict=True)]
     simulated = [moved - moved.mean() for _, moved in lines]
-    largest = max(
-        float(max(np.abs(measured).max(), np.abs(own).max()))
+    largest = [
+        float(max(np.abs(measured).max(), np.abs(own).max(), 1e-6))
         for (measured, _), own in zip(lines, simulated, strict=True)
-    )
-    factor = max(1.0, float(f"{_LARGEST * room / max(largest, 1e-6):.1g}"))
+    ]
+    # one bent course does not flatten the others, and their scatter does not look like movement
+    reach = [max(one, max(largest) / _FINER) for one in largest]
+    factors = [max(1.0, float(f"{_LARGEST * room / one:.1g}")) for one in reach]
     figure = new_sheet((10.0, float(np.clip(2.0 + 0.42 * len(courses), 3.5, 24.0))))
     axes = figure.subplots()
-    for one, level, (measured, _), own in zip(courses, levels, lines, simulated, strict=True):
+    right = max(float(one.line.along.max()) for one in courses)
+    for one, level, (measured, _), own, factor in zip(
+        courses, levels, lines, simulated, factors, strict=True
+    ):
         along = one.line.along
         axes.plot(along[[0, -1]], [level] * 2, color=PALE, linewidth=0.8, zorder=1)
         axes.errorbar(
@@ -54,12 +60,16 @@ def draw_bed_movement(path: Path, courses: Sequence[CourseMovement]) -> None:
             color=FLAG, ecolor=PALE, linewidth=0.8, elinewidth=0.8, zorder=2,
         )  # fmt: skip
         axes.plot(along, level + factor * own, color=PLAIN, linewidth=1.6, zorder=3)
+        axes.annotate(
+            f"{one.line.course}: × {factor:g}", (right, level), (8, 0), textcoords="offset points", va="center",
+            fontsize=8, annotation_clip=False, parse_math=False,
+        )  # fmt: skip
     line = courses[0].line
     axes.set_xlabel("along the facade, to the right of the viewer [m]")
     axes.set_ylabel("height of the bed [m]")
     axes.set_title(
-        f"Bed lines of {line.facade}{f', {line.zone}' if line.zone else ''}: departure from level drawn {factor:g} "
-        "times as large\norange: measured, bars ± one standard deviation of a corner; blue: simulated",
+        f"Bed lines of {line.facade}{f', {line.zone}' if line.zone else ''}: departure from level drawn as many times "
+        "as large as stated at the right\norange: measured, bars ± one standard deviation of a corner; blue: simulated",
         fontsize=10, color=INK, parse_math=False,
     )  # fmt: skip
     axes.spines[["top", "right"]].set_visible(False)

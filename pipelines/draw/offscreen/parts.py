@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil, floor, log10
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,7 @@ __all__ = [
 _INSIDE, _OUTSIDE = "#1f5f8b", "#c4302b"  # resultants within and outside the kern
 _LONGEST = 0.12  # the longest stroke of a resultant, over the wall's diagonal
 _SIZE = (1600, 1300)
+_ROW, _LINES = 84, 3  # characters in a line of a title, and lines for which there is room
 _EDGE = "#3a3733"
 PLAIN, INK = "#c9c6c0", "#222222"
 LIGHT: dict[str, Any] = {"ambient": 0.55, "diffuse": 0.5, "specular": 0.0}
@@ -106,9 +108,13 @@ def new_plotter(pyvista: Any) -> Any:
 
 def save_picture(plotter: Any, path: Path, title: str, note: str) -> None:
     """Write a picture as PNG, with a title above and an optional note below."""
-    plotter.add_text("\n" + title, position="upper_edge", font_size=15, color=INK)
+    lines = [part for line in title.splitlines() for part in wrap(line, _ROW) or [""]]
+    size = 15 if len(lines) <= _LINES else 12
+    if size < 15:
+        lines = [part for line in title.splitlines() for part in wrap(line, _ROW * 15 // size) or [""]]
+    plotter.add_text("\n" + "\n".join(lines), position="upper_edge", font_size=size, color=INK)
     if note:
-        plotter.add_text(note + "\n", position="lower_edge", font_size=13, color=INK)
+        plotter.add_text("\n".join(wrap(note, _ROW)) + "\n", position="lower_edge", font_size=15, color=INK)
     plotter.enable_anti_aliasing("ssaa")
     plotter.screenshot(str(path))
     plotter.close()

@@ -1,5 +1,6 @@
 """Surfaces for the pictures of a result: faces, edges and fields of the stones, joints and resultants."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,12 +13,13 @@ from mechanics.stones.materials import Material
 from pipelines.draw.catalogue import PICTURES
 from pipelines.draw.offscreen.parts import fan_polygons
 
-__all__ = ["FIELDS", "WallSurface", "stone_fields", "wall_surface"]
+__all__ = ["FIELDS", "WallSurface", "stone_fields", "support_motion", "wall_surface"]
 
 
 FIELDS = tuple(name for name, picture in PICTURES.items() if picture.shows != "joints")
 """Columns of `WallSurface.fields`."""
 
+_TOGETHER = 0.05  # part of the mean motion of the supports by which each may differ from it [-]
 _EDGE_ANGLE = np.deg2rad(20.0)  # triangles that meet at a smaller angle belong to one face
 
 
@@ -32,8 +34,9 @@ class WallSurface:
     deformable : (nt,) whether the triangle belongs to a deformable stone
     fixed : (nt,) whether it belongs to a fixed one
     edges : (ne, 2) edges of the stones
-    fields : (n, len(FIELDS)) Von Mises stress [Pa], length of the displacement [m], σ1 and -σ3 where they are positive
-        [Pa], utilisation and estimated error of the stress [-]; NaN where they are not known
+    fields : (n, len(FIELDS)) Von Mises stress [Pa], length of the displacement seen from supports that move as one [m],
+        σ1 and -σ3 where they are positive [Pa], utilisation and estimated error of the stress [-]; NaN where they are
+        not known
     joint_points : (m, 3) corners of the pressed joints [m]
     joint_triangles : (k, 3) of these joints
     joint_pressure : (k,) mean pressure of the joint of each triangle [Pa]
@@ -67,6 +70,7 @@ def wall_surface(result: Result) -> WallSurface:
     offsets = np.concatenate([[0], np.cumsum(sizes)[:-1]])
     triangles = [_fans(body.faces) for body in result.bodies]
     counts = [len(one) for one in triangles]
+    carried = support_motion(result.bodies, [body.position for body in result.bodies])
     pressed = np.flatnonzero(result.joints.pressed)
     corners, of_joints, owners = fan_polygons([result.joints.polygon[number] for number in pressed])
     return WallSurface(
@@ -82,7 +86,7 @@ def wall_surface(result: Result) -> WallSurface:
         ),
         fields=np.concatenate(
             [
-                stone_fields(body, block.material)
+                stone_fields(body, block.material, carried)
                 for body, block in zip(result.bodies, result.scene.blocks, strict=True)
             ]
         ),
@@ -95,9 +99,28 @@ def wall_surface(result: Result) -> WallSurface:
     )
 
 
-def stone_fields(body: BodyResult, material: Material) -> Array:
-    """Compute the FIELDS of the points of one stone, (n, len(FIELDS)), as in `WallSurface`."""
-    known = {"displacement": np.linalg.norm(body.displacement, axis=1)}
+def support_motion(bodies: Sequence[BodyResult], positions: Sequence[Array]) -> Array:
+    """Return the displacement (3,) of the supports where they move as one, as in an earthquake; zero elsewhere [m]."""
+    fixed = [
+        place - body.reference
+        for body, place in zip(bodies, positions, strict=True)
+        if body.fidelity is Fidelity.FIXED
+    ]
+    if not fixed:
+        return np.zeros(3)
+    moved = np.concatenate(fixed)
+    mean = moved.mean(axis=0)
+    together = np.abs(moved - mean).max() <= _TOGETHER * np.linalg.norm(mean)
+    return np.asarray(mean if together else np.zeros(3))
+
+
+def stone_fields(body: BodyResult, material: Material, carried: Array | None = None) -> Array:
+    """Compute the FIELDS of the points of one stone, (n, len(FIELDS)), as in `WallSurface`.
+
+    Displacements are relative to `carried` (3,), that of the supports [m]; None: absolute.
+    """
+    displacement = body.displacement if carried is None else body.displacement - carried
+    known = {"displacement": np.linalg.norm(displacement, axis=1)}
     if body.von_mises is not None and body.principal is not None and body.values is not None:
         known |= {
             "von_mises": body.von_mises,

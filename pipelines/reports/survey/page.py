@@ -6,6 +6,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from pipelines.reports.html import picture, write_page
+from pipelines.reports.page.model import Column
+from pipelines.reports.page.surveys import survey_model
 from pipelines.reports.survey.document import finding_of
 from pipelines.reports.survey.study import SurveyFile, SurveyStudy
 from survey.quality.canon import Deviation
@@ -42,6 +44,7 @@ def write_survey_page(path: Path, study: SurveyStudy, pictures: Mapping[str, str
     write_page(
         path,
         "survey.html",
+        survey_model(study.name, study.stones, [_facades_column(study, facade_of), _again_column(study)]),
         name=study.name,
         lead=_lead(study),
         warnings=study.warnings,
@@ -71,6 +74,19 @@ def write_survey_page(path: Path, study: SurveyStudy, pictures: Mapping[str, str
         ),
         version=version,
     )
+
+
+def _facades_column(study: SurveyStudy, facade_of: Mapping[int, str]) -> Column:
+    return Column("facade", "facade", None, [facade_of.get(i) for i in range(len(study.stones))], "Stone")
+
+
+def _again_column(study: SurveyStudy) -> Column:
+    """Return what to measure again, and why."""
+    reasons: dict[str, list[str]] = {}
+    for one in study.remeasures:
+        reasons.setdefault(one.code or "", []).append(f"{one.reason}: {one.action}")
+    texts = ["; ".join(reasons[one.code]) if one.code in reasons else None for one in study.stones]
+    return Column("again", "to measure again", None, texts, "Survey")
 
 
 def _first(items: Sequence[T], row: Callable[[T], Row]) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from dataclasses import replace
 import h5py
 import numpy as np
 import pytest
+import pyvista
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 from vtkmodules.vtkIOHDF import vtkHDFReader
@@ -59,7 +60,7 @@ class Read:
         """A block in one step: points, point data, cell data, cells as lists of points."""
         self._reader.SetStep(step)
         self._reader.Update()
-        grid = self._reader.GetOutputDataObject(0).GetPartitionedDataSet(block).GetPartition(0)
+        grid = self._reader.GetOutputDataObject(0).GetBlock(block)
         data = [
             {one.GetArrayName(k): vtk_to_numpy(one.GetArray(k)) for k in range(one.GetNumberOfArrays())}
             for one in (grid.GetPointData(), grid.GetCellData())
@@ -254,3 +255,13 @@ def test_a_scene_without_contacts_can_be_read(tmp_path):
     result = simulate(scene(box("alone", (0, 0, 0), (1, 1, 1), LIMESTONE), step=1e-2, duration=0.03))
     write_vtkhdf(tmp_path / "a.vtkhdf", result.bodies, result.scene.blocks, result.frames)
     same(Read(tmp_path / "a.vtkhdf"), result, result.frames)
+
+
+def test_pyvista_opens_the_file_as_named_blocks(mixed, tmp_path):
+    write_vtkhdf(tmp_path / "a.vtkhdf", mixed.bodies, mixed.scene.blocks, mixed.frames)
+    reader = pyvista.get_reader(tmp_path / "a.vtkhdf")
+    reader.reader.SetStep(len(mixed.frames) - 1)
+    blocks = reader.read()
+    assert blocks.keys() == ["stones", "contacts"]
+    np.testing.assert_array_equal(blocks["stones"].points, np.concatenate(mixed.frames[-1].positions))
+    assert np.isfinite(blocks["stones"]["von_mises"]).any()

@@ -1,0 +1,148 @@
+"""report.html of comparisons and diagnoses: measured against simulated deformation, by wall and course."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pipelines.reports.html import millimetres, picture, ratio, write_page
+from pipelines.reports.page.model import Model
+
+__all__ = ["write_comparison", "write_diagnosis_page"]
+
+_BEDS = (
+    "Bed lines at their heights; departure from level, exaggerated as stated. Orange: measured, bars ± one standard "
+    "deviation of a corner. Blue: simulated."
+)
+_CAPTIONS = {
+    "beds": _BEDS,
+    "misfit": "Measured less simulated height of the bed of each stone over its standard deviation: pale stones are "
+    "explained, dark blue ones lie lower than simulated, dark red ones higher.",
+}
+_WALLS = ("Wall", "Zone", "Quantity", "χ²", "χ² if nothing had moved", "Degrees of freedom")
+_COURSES = (
+    "Wall",
+    "Zone",
+    "Course",
+    "Sag, measured",
+    "Sag, simulated",
+    "σ",
+    "Slope, measured",
+    "Slope, simulated",
+    "σ",
+)
+_HYPOTHESES = (
+    "Hypothesis",
+    "χ²",
+    "Degrees of freedom",
+    "Probability",
+    "AICc behind the best",
+    "Amplitude",
+    "Value",
+    "From",
+    "To",
+)
+
+
+def write_comparison(path: Path, summary: Mapping[str, Any], model: Model | None) -> None:
+    """Write the page of a comparison and embed the pictures of its folder.
+
+    Parameters
+    ----------
+    path : report.html
+    summary : as in comparison.json
+    model : content of the viewer
+    """
+    write_page(
+        path,
+        "movement.html",
+        model,
+        name=summary["scene"],
+        lead=f"Measured against simulated deformation: χ² {summary['chi2']:.1f} of {summary['dof']} degrees of "
+        f"freedom; {summary['chi2_still']:.1f} if nothing had moved.",
+        cautions=summary["cautions"],
+        warnings=(),
+        version=summary["versions"]["moma"],
+        versions=summary["versions"],
+        figures=_figures(path.parent),
+        tables=[
+            ("Walls", _WALLS, [_wall(one) for one in summary["walls"]]),
+            ("Courses", _COURSES, [_course(one) for one in summary["courses"]]),
+        ],
+        notes=(),
+    )
+
+
+def write_diagnosis_page(path: Path, name: str, summary: Mapping[str, Any], model: Model | None) -> None:
+    """Write the page of a diagnosis and embed the pictures of its folder; `summary` as in diagnosis.json."""
+    dating = summary["dating"]
+    notes = [] if dating is None else [dating["verdict"], *dating["evidence"]]
+    write_page(
+        path,
+        "movement.html",
+        model,
+        name=name,
+        lead=summary["verdict"],
+        cautions=summary["cautions"],
+        warnings=(),
+        version=summary["versions"]["moma"],
+        versions=summary["versions"],
+        figures=_figures(path.parent),
+        tables=[
+            ("Hypotheses", _HYPOTHESES, [row for one in summary["hypotheses"] for row in _hypothesis(one)]),
+            (
+                "Walls and courses",
+                (*_WALLS[:3], "Course", *_WALLS[3:]),
+                [_group(one) for one in summary["groups"]],
+            ),
+        ],
+        notes=notes,
+    )
+
+
+def _figures(folder: Path) -> list[dict[str, str]]:
+    return [
+        picture(one, words)
+        for name, words in _CAPTIONS.items()
+        for one in sorted(folder.glob(f"{name}-*.png"))
+    ]
+
+
+def _wall(one: Mapping[str, Any]) -> tuple[str, ...]:
+    return (
+        one["facade"],
+        one["zone"] or "–",
+        one["quantity"],
+        f"{one['chi2']:.1f}",
+        f"{one['chi2_still']:.1f}",
+        str(one["dof"]),
+    )
+
+
+def _group(one: Mapping[str, Any]) -> tuple[str, ...]:
+    wall = _wall(one)
+    return (*wall[:3], "–" if one["course"] is None else str(one["course"]), *wall[3:])
+
+
+def _course(one: Mapping[str, Any]) -> tuple[str, ...]:
+    slope = one["slope"]
+    return (
+        one["facade"],
+        one["zone"] or "–",
+        str(one["course"]),
+        *("–" if one[key] is None else millimetres(one[key]) for key in ("measured", "simulated", "sigma")),
+        *(f"{1e3 * slope[key]:z.3g} mm/m" for key in ("measured", "simulated", "sigma")),
+    )
+
+
+def _hypothesis(one: Mapping[str, Any]) -> list[tuple[str, ...]]:
+    head = (
+        one["name"] + (f", stood: {', '.join(one['stood'])}" if one["stood"] else ""),
+        ratio(one["chi2"]),
+        str(one["dof"]),
+        ratio(one["probability"]),
+        ratio(one["behind"]),
+    )
+    return [
+        (*head, own["name"], f"{own['value']:.4g} {own['unit']}", ratio(own["low"]), ratio(own["high"]))
+        for own in one["amplitudes"]
+    ] or [(*head, "–", "–", "–", "–")]

@@ -1,0 +1,294 @@
+"""Models of what the mechanics knows: runs, and mechanisms of assessments."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from archmodel.store.run_record import STONE_VALUES, StoneResult
+from mechanics.arrays import Array, Ints
+from mechanics.limit.assembly import RigidAssembly
+from mechanics.limit.joints import Resultants
+from mechanics.limit.limit_load import Mechanism as Falling
+from mechanics.results.contact_result import JointResult
+from mechanics.results.result import BodyResult, Frame, Result
+from mechanics.scene.scene import Block, Fidelity
+from pipelines.reports.page.known import Known
+from pipelines.reports.page.model import (
+    Column,
+    Joints,
+    Lines,
+    Mechanism,
+    Model,
+    Motion,
+    VertexField,
+)
+from pipelines.reports.page.surfaces import rigid_motion, stones_of
+
+__all__ = ["assessment_model", "run_model", "with_known"]
+
+_MOST = 1_200_000  # stones times instants in a page; of longer runs every second instant, or every third, …
+_INSTANTS = 400  # at most
+
+
+def with_known(model: Model, known: Known | None) -> Model:
+    """Add what a database holds of the stones."""
+    if known is None:
+        return model
+    points = replace(known.points, places=known.points.places - model.origin)
+    return replace(
+        model,
+        columns=(*known.columns, *model.columns),
+        relations=known.relations,
+        events=known.events,
+        points=points,
+    )
+
+
+def run_model(
+    result: Result,
+    stones: Sequence[StoneResult],
+    towards: Array,
+    origin: Array,
+    known: Known | None = None,
+    lines: Sequence[Lines] = (),
+) -> Model:
+    """Return the model of a run: motion, joints at the end, results of the stones, and what is known of them.
+
+    Parameters
+    ----------
+    result, stones : of the run
+    towards, origin : (3,) of the assembly
+    known : from the database
+    lines : further polylines, in the frame of the scene
+    """
+    bodies = result.bodies
+    codes = [body.code for body in bodies]
+    soft = np.array([body.element is not None for body in bodies])
+    mesh, rows = stones_of(codes, [(body.reference, body.faces) for body in bodies], soft.tolist())
+    frames = _chosen(result.frames, len(bodies))
+    references = [body.reference for body in bodies]
+    centres, shift, turn = rigid_motion(references, [frame.positions for frame in frames], soft)
+    rest = _rest(bodies, centres, shift[-1], turn[-1], rows)
+    fixed = np.array([body.fidelity is Fidelity.FIXED for body in bodies])
+    motion = Motion(
+        np.array([frame.time for frame in frames]),
+        centres,
+        shift,
+        turn,
+        fixed,
+        rest,
+        _in_time(frames, bodies),
+    )
+    stress = _stress_field(bodies, rows)
+    columns = _result_columns(stones)
+    notes = []
+    if len(frames) < len(result.frames):
+        notes.append(
+            f"{len(frames)} of {len(result.frames)} instants are in this page; results.vtkhdf has them all."
+        )
+    if soft.any():
+        notes.append(
+            "Stress on the surface and the deformation of elastic stones are those of the last instant."
+        )
+    model = Model(
+        title=result.scene.name,
+        stones=mesh,
+        columns=columns,
+        fields=() if stress is None else (stress,),
+        motion=motion,
+        joints=_joints(result.joints, centres, shift[-1], turn[-1]),
+        lines=lines,
+        colour="von_mises" if stress is not None else "displacement",
+        towards=towards,
+        origin=origin,
+        notes=notes,
+    )
+    return with_known(model, known)
+
+
+def assessment_model(
+    name: str,
+    blocks: Sequence[Block],
+    on: RigidAssembly,
+    limits: Sequence[tuple[str, str, Falling, Resultants | None]],
+    towards: Array,
+    origin: Array,
+    known: Known | None = None,
+) -> Model:
+    """Return the model of an assessment: the mechanism of each load, with the resultants of the joints at its limit.
+
+    Parameters
+    ----------
+    limits : name of the load, its answer in a sentence, mechanism, and resultants if anything balances
+    """
+    codes = [block.code for block in blocks]
+    mesh, _ = stones_of(codes, [(block.vertices, block.faces) for block in blocks])
+    centres = np.asarray(on.state.centre)
+    mechanisms = [
+        Mechanism(
+            load, about, centres, moving.velocity, None if carried is None else _resultants(on, carried)
+        )
+        for load, about, moving, carried in limits
+    ]
+    model = Model(
+        title=name,
+        stones=mesh,
+        mechanisms=mechanisms,
+        colour="kind" if known is not None else None,
+        towards=towards,
+        origin=origin,
+    )
+    return with_known(model, known)
+
+
+def _chosen(frames: Sequence[Frame], stones: int) -> list[Frame]:
+    """Return the instants that a page holds: the first, the last, and evenly between."""
+    most = int(np.clip(_MOST // max(stones, 1), 2, _INSTANTS))
+    rows = np.unique(np.linspace(0, len(frames) - 1, min(len(frames), most)).round().astype(int))
+    return [frames[row] for row in rows.tolist()]
+
+
+def _rest(
+    bodies: Sequence[BodyResult], centres: Array, shift: Array, turn: Array, rows: Ints
+) -> Array | None:
+    """Return the displacement (nv, 3) of the vertices at the end beyond that of rigid stones; None if all are."""
+    if all(body.element is None for body in bodies):
+        return None
+    matrices = _matrices(turn)
+    beyond = [
+        np.zeros_like(body.reference)
+        if body.element is None
+        else body.position - (body.reference - centre) @ matrix.T - centre - moved
+        for body, centre, matrix, moved in zip(bodies, centres, matrices, shift, strict=True)
+    ]
+    rest: Array = np.concatenate(beyond)[rows]
+    return rest
+
+
+def _matrices(turn: Array) -> Array:
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_rotvec(turn).as_matrix())
+
+
+def _stress_field(bodies: Sequence[BodyResult], rows: Ints) -> VertexField | None:
+    if all(body.von_mises is None for body in bodies):
+        return None
+    values = np.concatenate(
+        [
+            np.full(len(body.reference), np.nan) if body.von_mises is None else body.von_mises
+            for body in bodies
+        ]
+    )
+    return VertexField("von_mises", "Von Mises stress", "Pa", values[rows].astype(np.float32))
+
+
+def _in_time(frames: Sequence[Frame], bodies: Sequence[BodyResult]) -> list[tuple[str, str, Array]]:
+    """Return the largest Von Mises stress of each stone in each instant, where there is any."""
+    if all(body.von_mises is None for body in bodies) or len(frames) < 3:
+        return []
+    values = np.full((len(frames), len(bodies)), np.nan)
+    for row, frame in enumerate(frames):
+        for column, stress in enumerate(frame.stresses):
+            if stress is not None:
+                values[row, column] = _von_mises(stress).max()
+    return [("largest Von Mises stress", "Pa", values)]
+
+
+def _von_mises(stress: Array) -> Array:
+    xx, yy, zz, xy, yz, zx = stress.T
+    shear = 3.0 * (xy**2 + yz**2 + zx**2)
+    value: Array = np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + shear)
+    return value
+
+
+def _result_columns(stones: Sequence[StoneResult]) -> list[Column]:
+    """Return the results of the stones, those of which any stone has a value."""
+
+    def numbers(values: Sequence[float | None]) -> Array:
+        return np.array([np.nan if value is None else value for value in values], dtype=float)
+
+    columns = [
+        Column("fidelity", "modelled as", None, [one.fidelity for one in stones], "Results"),
+        Column(
+            "displacement_max",
+            "displacement at the end",
+            "m",
+            numbers([s.displacement_max for s in stones]),
+            "Results",
+        ),
+        Column(
+            "von_mises_max",
+            "largest Von Mises stress",
+            "Pa",
+            numbers([s.von_mises_max for s in stones]),
+            "Results",
+        ),
+        Column(
+            "von_mises_mean",
+            "mean Von Mises stress",
+            "Pa",
+            numbers([s.von_mises_mean for s in stones]),
+            "Results",
+        ),
+        Column(
+            "contact_force_max",
+            "largest contact force",
+            "N",
+            numbers([s.contact_force_max for s in stones]),
+            "Results",
+        ),
+    ]
+    columns += [
+        Column(
+            name, name.replace("_", " "), unit, numbers([one.values.get(name) for one in stones]), "Results"
+        )
+        for name, (unit, _) in STONE_VALUES.items()
+    ]
+    return [
+        one for one in columns if one.unit is None or np.isfinite(np.asarray(one.values, dtype=float)).any()
+    ]
+
+
+def _joints(joints: JointResult, centres: Array, shift: Array, turn: Array) -> Joints:
+    """Return the joints at the end, each where its second stone was at the start."""
+    second = joints.bodies[:, 1]
+    matrices = _matrices(turn)
+
+    def back(places: Array, body: Ints) -> Array:
+        away = places - centres[body] - shift[body]
+        place: Array = np.einsum("nji,nj->ni", matrices[body], away) + centres[body]
+        return place
+
+    counts = [len(one) for one in joints.polygon]
+    corners = back(np.concatenate([np.zeros((0, 3)), *joints.polygon]), np.repeat(second, counts))
+    whole = joints.sliver
+    columns = [
+        Column("pressure", "mean pressure", "Pa", np.where(whole, np.nan, joints.pressure_mean)),
+        Column("pressure_max", "largest pressure", "Pa", np.where(whole, np.nan, joints.pressure_max)),
+        Column("opening", "opening", "m", joints.opening),
+        Column("sliding", "sliding", "m", joints.sliding),
+        Column("kern", "over the kern", "-", np.where(whole, np.nan, joints.kern)),
+        Column("friction_use", "friction used", "-", joints.friction_use),
+        Column("area", "area", "m²", joints.area),
+    ]
+    return Joints(
+        joints.bodies,
+        np.split(corners, np.cumsum(counts)[:-1]) if counts else [],
+        back(joints.centre_of_pressure, second),
+        joints.force,
+        joints.kern,
+        columns,
+    )
+
+
+def _resultants(on: RigidAssembly, carried: Resultants) -> Joints:
+    section = on.joints.section
+    columns = [
+        Column("normal", "normal force", "N", carried.normal),
+        Column("shear", "shear force", "N", carried.shear),
+        Column("kern", "over the kern", "-", carried.kern),
+        Column("friction_use", "friction used", "-", carried.friction_use),
+    ]
+    return Joints(on.joints.bodies, section.polygons(), carried.place, carried.force, carried.kern, columns)
