@@ -1,5 +1,6 @@
 """How tests run: byte code, threads, kernels, seeds; and the databases that tests of several packages share."""
 
+import importlib
 import os
 import sys
 from collections.abc import Callable, Iterator
@@ -38,7 +39,11 @@ FIRST = ("tests/validation/wild/", "tests/validation/", "tests/docs/", "tests/me
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Try the same examples of properties in every run; where slow tests are asked for, others each time."""
+    """Try the same examples of properties in every run; where slow tests are asked for, others each time.
+
+    What draws is replaced before any test module imports it.
+    """
+    importlib.import_module("tests.drawing")
     config.stash[FREE] = "slow" in config.getoption("markexpr").replace("not slow", "")
     settings.load_profile("free" if config.stash[FREE] else "fixed")
 

@@ -34,7 +34,7 @@ from moma.cli.options import (
 from moma.cli.progress import progress_bars
 from moma.errors import UsageError
 
-__all__ = ["Moved", "ingest", "sample", "survey_report"]
+__all__ = ["Level", "Moved", "ingest", "sample", "survey_report"]
 
 
 class Level(StrEnum):

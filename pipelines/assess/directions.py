@@ -48,7 +48,8 @@ def facade_pushes(blocks: Sequence[Block]) -> tuple[LoadQuestion, ...]:
         if weight[peak] < _PART * area.sum():
             break
         own = near[:, peak] & left
-        turns.append(float(np.degrees(np.angle(area[own] @ np.exp(4j * angle[own])) / 4.0)) % 90.0)
+        turn = float(np.degrees(np.angle(area[own] @ np.exp(4j * angle[own])) / 4.0))
+        turns.append(round(turn, 6) % 90.0)
         left &= ~own
     sides = (0.0, 180.0, 90.0, 270.0)
     return tuple(push(turn + side) for turn in turns or [0.0] for side in sides)

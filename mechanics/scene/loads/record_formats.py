@@ -15,7 +15,7 @@ from mechanics.scene.loads.accelerogram import Accelerogram, Direction
 from mechanics.scene.loads.tables import fail_at, number_at, numbered_lines
 from moma.errors import SceneError
 
-__all__ = ["UNITS", "direction_of", "read_at2", "read_esm", "read_knet", "read_smc", "reader_of"]
+__all__ = ["UNITS", "direction_of", "read_at2", "read_esm", "read_knet", "read_smc", "reader_of", "unit_of"]
 
 UNITS = {"g": 9.80665, "m/s2": 1.0, "cm/s2": 0.01}
 

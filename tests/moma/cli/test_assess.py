@@ -34,7 +34,10 @@ def scene(tmp_path):
 def test_four_directions_have_bound_candidate_and_mechanism(url, scene, tmp_path):
     out = tmp_path / "out"
     told = answer("assess", scene, "--db", url, "--out", out)
-    assert [one["name"] for one in told["loads"]] == [f"horizontal {axis}" for axis in ("x", "-x", "y", "-y")]
+    # the facade is turned by 7°: along it, both ways, and square to it
+    angles = [float(one["name"].split()[1]) for one in told["loads"]]
+    assert [angle - angles[0] for angle in angles] == pytest.approx([0, 180, 90, 270], abs=1)
+    assert angles[0] == pytest.approx(7, abs=0.5)
     for one in told["loads"]:
         assert one["candidate"] <= one["bound"] * 1.003
         # stones of one course on a fixed one slide, at their friction; beds are level to a hundredth
@@ -288,7 +291,7 @@ def test_runs_confirm_a_candidate(url, scene, tmp_path):
         "assess", scene, "--db", url, "--out", tmp_path / "out", "--load", "horizontal y", "--confirm"
     )["loads"]
     assert told["confirmation"]["agrees"]
-    assert 0.97 * told["confirmation"]["lost"] <= told["confirmation"]["held"] < told["bound"]
+    assert 0.97 * told["confirmation"]["lost"] <= told["confirmation"]["held"] <= told["bound"]
     assert "CONFIRMED" in told["headline"]
     alike = told["confirmation"]["likeness"]
     assert f"the mechanism (cosine {alike['cosine']:.2f})" in told["headline"]
