@@ -230,7 +230,7 @@ def test_the_command_serves_until_it_is_told_to_stop(url):
     command = [sys.executable, "-m", "moma", "serve", "--port", "18765", "--db", url]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
         try:
-            for _ in range(100):
+            for _ in range(300):
                 time.sleep(0.2)
                 try:
                     with urllib.request.urlopen(
