@@ -287,7 +287,7 @@ def measured(name: str, case: LimitCase) -> Row:
         "candidate": found.multiplier,
         "converged": found.converged,
         "beyond": found.beyond,
-        "lowest": found.lowest,
+        "lowest": found.lowest.multiplier,
         "programmes": found.programmes,
         "held": around.held or None,
         "lost": None if fallen is None else around.lost,

