@@ -11,6 +11,7 @@ from survey.extrusion.extrusion import SurveyedBlock, extrude
 from survey.extrusion.imported_solids import block_of_solid
 from survey.faces.faces import Face, Provenance, face_on, outline_face
 from survey.faces.shapes import FaceShape, ShapeKind
+from survey.records.review import Doubtful
 from survey.records.snapping import Snapping
 from survey.records.survey import BlockRecord, Reject, SolidRecord, SurveyHead, SurveyStream
 from survey.registration.photographed_stones import LiftedFace, lift_faces
@@ -30,12 +31,14 @@ class SurveyedStream:
     stones : the stones with their hidden side, in the frame of the site, and the rejects; an iterator to be
         consumed once. Stones measured on photographs come last, because they need the faces of their neighbours.
     snapping : of solids, the changes that brought their faces into common planes; None if not asked for
+    review : of outlines, what to look at
     """
 
     head: SurveyHead
     transform: SiteTransform | None
     stones: Iterator[SurveyedBlock | Reject]
     snapping: Snapping | None = None
+    review: tuple[Doubtful, ...] = ()
 
 
 def survey_stones(stream: SurveyStream) -> SurveyedStream:
@@ -60,7 +63,7 @@ def survey_stones(stream: SurveyStream) -> SurveyedStream:
     """
     transform = fit_similarity(stream.head.control) if stream.head.control else None
     head = stream.head if transform is None else to_site(stream.head, transform)
-    return SurveyedStream(head, transform, _stones(stream, head, transform), stream.snapping)
+    return SurveyedStream(head, transform, _stones(stream, head, transform), stream.snapping, stream.review)
 
 
 def _stones(

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from moma.cli.assess import assess, compare, diagnose
+from moma.cli.clouds import cloud
 from moma.cli.database import export, import_, migrate
 from moma.cli.entities import query, schema, show
 from moma.cli.geology import geology
@@ -56,6 +57,7 @@ def _common(
 # in the usual order of use
 _COMMANDS = (
     sample,
+    cloud,
     ingest,
     survey_report,
     record,

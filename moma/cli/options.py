@@ -30,6 +30,7 @@ __all__ = [
     "Support",
     "SurveyFiles",
     "SurveyFormat",
+    "SurveyOrCloud",
     "Unit",
     "Verbose",
 ]
@@ -94,6 +95,13 @@ Json = Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")]
 Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Print more; show the traceback of an error.")]
 SurveyFiles = Annotated[
     list[Path], typer.Argument(metavar="FILE…", help="Survey files, or folders of them; see docs/formats.md.")
+]
+SurveyOrCloud = Annotated[
+    list[Path] | None,
+    typer.Argument(
+        metavar="FILE…",
+        help="Survey files, or folders of them; see docs/formats.md. None with --cloud or --masks.",
+    ),
 ]
 Format = Annotated[SurveyFormat, typer.Option(help="Format of the survey files.")]
 Header = Annotated[

@@ -7,6 +7,20 @@ from typing import Annotated
 
 import typer
 
+from moma.cli.clouds import (
+    CloudFiles,
+    Depth,
+    Fields,
+    Layer,
+    Margin,
+    Masks,
+    Outlines,
+    OutlineSigma,
+    Size,
+    Slab,
+    Wall,
+    outlined,
+)
 from moma.cli.console import reporting, say
 from moma.cli.options import (
     DEFAULT_DB,
@@ -21,8 +35,8 @@ from moma.cli.options import (
     Sigma,
     Snap,
     Support,
-    SurveyFiles,
     SurveyFormat,
+    SurveyOrCloud,
     Unit,
     Verbose,
 )
@@ -58,6 +72,9 @@ def sample(
         bool,
         typer.Option("--phases", help="Upper courses were laid later: the wall with --moved settlement."),
     ] = False,
+    scan: Annotated[
+        bool, typer.Option("--scan", help="With a scan and outlines of the stones: the window.")
+    ] = False,
     courses: Annotated[
         int | None, typer.Option(help="Courses of the tower; default: 40, or 12 with --small.")
     ] = None,
@@ -72,7 +89,14 @@ def sample(
 
     with progress_bars() as listener:
         written = write_sample(
-            kind, out or Path(kind), listener, moved=moved, small=small, phases=phases, courses=courses
+            kind,
+            out or Path(kind),
+            listener,
+            moved=moved,
+            small=small,
+            phases=phases,
+            scan=scan,
+            courses=courses,
         )
     lines = [
         f"{written.title}: a synthetic survey of {written.stones} stones",
@@ -85,7 +109,7 @@ def sample(
 
 @reporting
 def ingest(
-    files: SurveyFiles,
+    files: SurveyOrCloud = None,
     format: Format = SurveyFormat.MOMA,
     header: Header = None,
     codes: Codes = None,
@@ -114,6 +138,21 @@ def ingest(
             "--again", help="Accept new measurements of stones in the database; earlier ones are kept."
         ),
     ] = False,
+    cloud: CloudFiles = None,
+    outlines: Outlines = None,
+    wall: Wall = None,
+    layer: Layer = None,
+    fields: Fields = None,
+    outline_sigma: OutlineSigma = None,
+    margin: Margin = None,
+    slab: Slab = None,
+    masks: Masks = None,
+    size: Size = None,
+    depth: Depth = None,
+    review: Annotated[
+        Path | None,
+        typer.Option("--review", metavar="FILE.csv", help="List of the outlines that should be looked at."),
+    ] = None,
     db: Db = DEFAULT_DB,
     json: Json = False,
     verbose: Verbose = False,
@@ -133,28 +172,66 @@ def ingest(
             raise UsageError(f"{name} with format {format}", remedy="it is for --format solids")
     options = reading_options(header, codes, kind, sigma, unit, snap, planes)
     rules = kind_rules(kind_where or (), support or ())
+    drawn = outlined(
+        options,
+        files,
+        cloud,
+        masks,
+        outlines=outlines,
+        wall=wall,
+        layer=layer,
+        fields=fields,
+        outline_sigma=outline_sigma,
+        margin=margin,
+        slab=slab,
+        size=size,
+        depth=depth,
+    )
+    if review is not None and drawn is None:
+        raise UsageError("--review without --cloud or --masks", remedy="it lists outlines")
+    name, paths, options = drawn or (format.value, files or [], options)
     with compiling_beside("ingest"), progress_bars() as listener:
         report = ingest_files(
-            files,
+            paths,
             db,
-            format.value,
+            name,
             listener,
             options=options,
             keep_going=rejects or keep_going,
             again=again,
             rules=rules,
         )
+    if review is not None:
+        from pipelines.ingest.outlined import write_review
+
+        write_review(review, [one for file in report.files for one in file.review])
     print(as_json(asdict(report)) if json else "\n".join(ingest_lines(report, verbose)))
 
 
 @reporting
 def survey_report(
-    files: SurveyFiles,
+    files: SurveyOrCloud = None,
     format: Format = SurveyFormat.MOMA,
     header: Header = None,
     codes: Codes = None,
     kind: Kind = None,
     sigma: Sigma = None,
+    cloud: CloudFiles = None,
+    outlines: Outlines = None,
+    wall: Wall = None,
+    layer: Layer = None,
+    fields: Fields = None,
+    outline_sigma: OutlineSigma = None,
+    margin: Margin = None,
+    slab: Slab = None,
+    orthophoto: Annotated[
+        Path | None,
+        typer.Option(
+            "--orthophoto",
+            metavar="FILE.png",
+            help="Draw elevations on it: with a world file, and FILE.toml, the frame of its wall.",
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option("--out", metavar="DIR", help="Folder for the report; default: out/survey-FILE."),
@@ -168,9 +245,25 @@ def survey_report(
     from pipelines.reports.survey.report import INDEX, report_surveys
 
     options = reading_options(header, codes, kind, sigma)
-    folder = out or Path("out") / f"survey-{files[0].resolve().stem}"
+    drawn = outlined(
+        options,
+        files,
+        cloud,
+        None,
+        outlines=outlines,
+        wall=wall,
+        layer=layer,
+        fields=fields,
+        outline_sigma=outline_sigma,
+        margin=margin,
+        slab=slab,
+    )
+    name, paths, options = drawn or (format.value, files or [], options)
+    if not paths:
+        raise UsageError("no survey file", remedy="name at least one")
+    folder = out or Path("out") / f"survey-{(outlines or paths[0]).resolve().stem}"
     with progress_bars() as listener:
-        report = report_surveys(files, folder, format.value, options, listener)
+        report = report_surveys(paths, folder, name, options, listener, orthophoto)
     for warning in report.study.warnings:
         say(f"warning: {warning}")
     lines = survey_report_lines(report, verbose)

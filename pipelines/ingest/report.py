@@ -13,6 +13,7 @@ from pipelines.ingest.records import frame_record
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.convexity import is_convex
 from survey.quality.plausible import LENGTH, doubt_of
+from survey.records.review import Doubtful
 from survey.records.snapping import Snapping
 from survey.records.survey import Reject
 from survey.stones import SurveyedStream
@@ -72,6 +73,7 @@ class FileReport:
     solids : properties of the stones, in a file of solids
     remarks : changes that made the outlines of measured faces polygons, by stone code
     doubts : sizes that hardly any stone has, in words, by stone code
+    review : of outlines, what to look at
     """
 
     path: str
@@ -88,6 +90,7 @@ class FileReport:
     solids: SolidsReport | None = None
     remarks: dict[str, tuple[str, ...]] = field(default_factory=dict)
     doubts: dict[str, str] = field(default_factory=dict)
+    review: tuple[Doubtful, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -171,6 +174,7 @@ class Tally:
             solids=self._solids(),
             remarks=self.changed,
             doubts=self.doubts,
+            review=self.stream.review,
         )
 
 

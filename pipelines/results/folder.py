@@ -34,6 +34,7 @@ UNFINISHED = "unfinished"
 _INDEXES = (
     RUN_INDEX,
     "check.json",
+    "cloud.json",
     "survey.json",
     "assessment.json",
     "comparison.json",

@@ -7,6 +7,7 @@ import numpy as np
 
 from moma.errors import MomaError, SurveyError
 from survey.arrays import Array
+from survey.records.review import Doubtful
 from survey.records.snapping import Snapping
 
 __all__ = [
@@ -325,11 +326,13 @@ class SurveyStream:
     blocks : the stones in the order of the file, an iterator to be consumed once; a wrong stone comes as a
         Reject, a file that is wrong as a whole raises SurveyError
     snapping : of solids, the changes that brought their faces into common planes; None if not asked for
+    review : of outlines, what to look at
     """
 
     head: SurveyHead
     blocks: Iterator[BlockRecord | SolidRecord | Reject]
     snapping: Snapping | None = None
+    review: tuple[Doubtful, ...] = ()
 
 
 @dataclass(frozen=True)

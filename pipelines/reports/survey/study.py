@@ -9,10 +9,10 @@ import numpy as np
 from archmodel.tables.entities import kind_named
 from mechanics.dynamics.progress import Listener, Progress, silent
 from moma.errors import UsageError
+from pipelines.ingest.outlined import open_source
 from pipelines.ingest.reading_options import Source, survey_sources
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.formats.options import ReadingOptions
-from survey.formats.reading import open_survey
 from survey.quality.canon import Deviation, KindStandard, deviations, standards
 from survey.quality.contradictions import Contradiction, contradictions
 from survey.quality.corners import SeenFace, misplaced_corners
@@ -120,7 +120,7 @@ def _read(
     rejects: list[Reject],
     progress: Listener,
 ) -> SurveyFile:
-    stream = open_survey(source.path, format, source.options(options))
+    stream = open_source(source, format, options, progress)
     survey = survey_stones(replace(stream, head=_with_some_depth(stream.head)))
     for number, one in enumerate(survey.stones, start=1):
         if isinstance(one, Reject):
