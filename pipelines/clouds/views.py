@@ -16,7 +16,7 @@ from survey.clouds.extras import optional
 from survey.clouds.orthophoto import STEP, Picture, find_wall, paint_wall, write_picture
 from survey.clouds.points.chunks import PointCloud
 from survey.clouds.points.reading import open_points
-from survey.clouds.sections import Section, section_plane
+from survey.clouds.sections import Section, contour, section_plane
 from survey.clouds.wall import read_wall, wall_lines
 
 __all__ = ["INDEX", "DrawnCloud", "DrawnSection", "draw_views"]
@@ -24,6 +24,7 @@ __all__ = ["INDEX", "DrawnCloud", "DrawnSection", "draw_views"]
 INDEX = "cloud.json"
 """Name of the file that lists all files of the folder."""
 
+_SHORTEST = 20  # pixels of a contour; shorter ones are noise
 _THINNED = 0.25  # distance of a section's line from the middles of its cells, of a cell
 
 
@@ -113,15 +114,19 @@ def draw_views(
     frame = find_wall(clouds, listen) if wall is None else read_wall(wall)
     planes = [section_plane(one, frame) for one in sections]
     picture, read, shown = paint_wall(clouds, frame, pixel, slab, listen)
-    cut = [Section(plane, thickness, max(pixel, 0.5 * thickness)) for plane in planes]
+    cell = max(pixel, 0.5 * thickness)
+    cut = [Section(plane, thickness, cell) for plane in planes if not plane.name.startswith("d")]
     if cut:
         _cut(clouds, cut, listen)
     with replacing(folder, INDEX) as fresh:
         names, drawn = ["wall.png", "wall.pgw", "depth.png", "depth.pgw", "wall.toml"], []
         lowest = write_picture(picture, fresh / "wall.png", fresh / "depth.png")
         (fresh / "wall.toml").write_text(wall_lines(frame), encoding="utf-8")
-        if cut:
-            lines = {one.plane.name: one.lines(_THINNED * max(pixel, 0.5 * thickness)) for one in cut}
+        if planes:
+            lines = {one.plane.name: one.lines(_THINNED * cell) for one in cut}
+            for plane in planes:
+                if plane.name.startswith("d"):
+                    lines[plane.name] = contour(picture, plane, _SHORTEST * pixel, 0.5 * pixel)
             _write_sections(lines, fresh)
             names += ["sections.dxf", "sections.csv"]
             drawn = [DrawnSection(name, len(own), _length(own)) for name, own in lines.items()]

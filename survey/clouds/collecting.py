@@ -19,6 +19,8 @@ from survey.clouds.points.chunks import PointCloud
 __all__ = ["Collected", "collect_points", "divide"]
 
 _PATCHES = 36  # of a face: the fit of planes tells outliers apart best among 20 to 50 points
+_DENSE = 5  # points of a patch whose mean says something
+_FEWEST = 9  # patches from which a plane and its scatter are known
 _KEPT = 24  # points of a patch: beyond, the mean of a patch is known better than its roughness lets it matter
 _SMALLEST = 0.01  # side of a patch: less than the roughness of a stone is long [m]
 _MOST = 144  # patches of a face that is much longer than high
@@ -44,9 +46,35 @@ class Collected:
     inside: int
 
     def of(self, k: int) -> tuple[Ints, NDArray[np.float32], int]:
-        """Return counts and sampled places of the patches of an outline, and the patches in a row."""
+        """Return counts and sampled places of the patches of an outline, and the patches in a row.
+
+        In a sparse scan, four patches are one, until most of them have some points.
+        """
         rows = slice(self.patches.first[k], self.patches.first[k + 1])
-        return self.samples.counts[rows], self.samples.places[rows], int(self.patches.columns[k])
+        counts, places, columns = (
+            self.samples.counts[rows],
+            self.samples.places[rows],
+            int(self.patches.columns[k]),
+        )
+        while len(counts) >= 2 * _FEWEST and np.count_nonzero(counts >= _DENSE) < _FEWEST:
+            counts, places, columns = _coarser(counts, places, columns)
+        return counts, places, columns
+
+
+def _coarser(
+    counts: Ints, places: NDArray[np.float32], columns: int
+) -> tuple[Ints, NDArray[np.float32], int]:
+    """Join two by two patches; of sparse ones, which keep all their points."""
+    rows, wide, high = len(counts) // columns, (columns + 1) // 2, (len(counts) // columns + 1) // 2
+    new_counts = np.zeros(wide * high, np.int64)
+    new_places = np.zeros((wide * high, 4 * places.shape[1], 3), np.float32)
+    for p in range(rows * columns):
+        target = (p // columns // 2) * wide + p % columns // 2
+        held = min(int(counts[p]), places.shape[1])
+        start = int(new_counts[target])
+        new_places[target, start : start + held] = places[p, :held]
+        new_counts[target] += held
+    return new_counts, new_places, wide
 
 
 def divide(placed: Sequence[PlacedOutline], margins: Array) -> Patches:

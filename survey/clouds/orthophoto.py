@@ -15,7 +15,7 @@ from survey.clouds.wall import Wall
 from survey.clouds.world import world_file
 from survey.quality.facades import upright_frame
 
-__all__ = ["STEP", "Picture", "find_wall", "paint_wall", "write_picture"]
+__all__ = ["STEP", "Picture", "filled", "find_wall", "paint_wall", "write_picture"]
 
 STEP = 1e-4
 """Step of the numbers of a depth map [m]."""
@@ -56,7 +56,7 @@ class Picture:
 
 
 def find_wall(clouds: Sequence[PointCloud], progress: Progress) -> Wall:
-    """Find the frame of the largest upright plane, seen from a scanner, else from where most other points are.
+    """Find the frame of the largest upright plane, seen from a scanner, else from the side where joints are recessed.
 
     s begins at the left end of the wall, t is the height z.
 
@@ -84,9 +84,9 @@ def find_wall(clouds: Sequence[PointCloud], progress: Progress) -> Wall:
     normal = np.linalg.svd(sample[kept] - sample[kept].mean(axis=0), full_matrices=False)[2][2]
     middle = sample[kept].mean(axis=0)
     seen = [one.position - origin for cloud in clouds for one in cloud.stations]
-    # without a scanner, most of what is not the wall stands before it
-    side = np.mean(seen, axis=0) - middle if seen else sample.mean(axis=0) - middle
-    if normal @ side < 0.0:
+    heights = (sample[kept] - middle) @ normal
+    # joints lie behind the faces of stones, which are more
+    if (normal @ (np.mean(seen, axis=0) - middle) if seen else np.median(heights) - heights.mean()) < 0.0:
         normal = -normal
     flat = np.array([normal[0], normal[1], 0.0]) / np.hypot(normal[0], normal[1])
     frame = upright_frame(flat, middle)
@@ -170,32 +170,42 @@ def paint_wall(
     with np.errstate(invalid="ignore", divide="ignore"):
         depths = canvas.depths / counts
         mean = canvas.tints / counts[..., None] if coloured else None
-    colours = _relief(depths, pixel) if mean is None else _closed(mean, counts)
+    colours = _relief(filled(depths), pixel) if mean is None else _closed(mean, counts)
     return Picture(wall, low, pixel, counts, depths, colours, coloured), read, shown
 
 
 def _closed(mean: NDArray[np.float32], counts: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """Close small gaps between points with the mean of the neighbours; larger ones are black."""
-    known = counts > 0
-    tints = np.where(known[..., None], mean, 0.0).astype(np.float32)
-    for _ in range(_FILLED):
-        total, number = np.zeros_like(tints), np.zeros(known.shape, np.float32)
-        for axis, step in ((0, 1), (0, -1), (1, 1), (1, -1)):
-            rolled, there = np.roll(tints, step, axis), np.roll(known, step, axis)
-            total += np.where(there[..., None], rolled, 0.0)
-            number += there
-        fill = ~known & (number >= 2)
-        tints[fill] = total[fill] / number[fill][:, None]
-        known = known | fill
-    out: NDArray[np.uint8] = np.clip(np.round(tints), 0.0, 255.0).astype(np.uint8)
+    """Close small gaps between points; larger ones are black."""
+    tints = filled(np.where((counts > 0)[..., None], mean, np.nan))
+    out: NDArray[np.uint8] = np.clip(np.round(np.nan_to_num(tints)), 0.0, 255.0).astype(np.uint8)
     return out
+
+
+def filled(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Close gaps of a few pixels, which are NaN, with the mean of their neighbours.
+
+    Parameters
+    ----------
+    values : (h, w) or (h, w, 3)
+    """
+    out: NDArray[np.float32] = values.reshape(*values.shape[:2], -1).copy()
+    for _ in range(_FILLED):
+        known = ~np.isnan(out[..., 0])
+        total, number = np.zeros_like(out), np.zeros(known.shape, np.float32)
+        for axis, step in ((0, 1), (0, -1), (1, 1), (1, -1)):
+            there = np.roll(known, step, axis)
+            total += np.where(there[..., None], np.roll(out, step, axis), 0.0)
+            number += there
+        gaps = ~known & (number >= 2)
+        out[gaps] = total[gaps] / number[gaps][:, None]
+    return out.reshape(values.shape)
 
 
 def _relief(depths: NDArray[np.float32], pixel: float) -> NDArray[np.uint8]:
     """Shade a depth map as if lit from the upper left."""
-    filled = np.where(np.isfinite(depths), depths, np.nanmedian(depths))
-    down, right = np.gradient(filled, pixel) if min(filled.shape) > 1 else (filled * 0.0, filled * 0.0)
-    normal = np.stack([-right, down, np.ones_like(filled)], axis=-1)
+    known = np.where(np.isfinite(depths), depths, np.nanmedian(depths))
+    down, right = np.gradient(known, pixel) if min(known.shape) > 1 else (known * 0.0, known * 0.0)
+    normal = np.stack([-right, down, np.ones_like(known)], axis=-1)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     shade = np.clip(normal @ _LIGHT / np.linalg.norm(_LIGHT), 0.0, 1.0) * 230.0
     shade[~np.isfinite(depths)] = 0.0

@@ -1,4 +1,8 @@
-"""Sections through point clouds: the points near a plane, thinned to cells and joined to polylines."""
+"""Sections through point clouds as polylines.
+
+Level sections and those across a wall thin the points near a plane to cells and join these. A section along a wall
+nearly touches its surface, so that points near it fill areas; there the line is the contour of the depth map.
+"""
 
 import re
 from collections.abc import Iterator
@@ -8,9 +12,10 @@ import numpy as np
 
 from moma.errors import UsageError
 from survey.arrays import Array, Ints
+from survey.clouds.orthophoto import Picture, filled
 from survey.clouds.wall import Wall
 
-__all__ = ["Section", "SectionPlane", "join", "section_plane"]
+__all__ = ["Section", "SectionPlane", "contour", "join", "section_plane"]
 
 _PLANE = re.compile(r"\s*([zsd])\s*=\s*([-+]?\d+(?:[.,]\d+)?)\s*(?:m\s*)?")
 _REACH = 2.3  # cells between neighbours on a line: one may be empty
@@ -102,7 +107,7 @@ class Section:
         if not self._held:
             return []
         sums = self._sums[0]
-        flat = sums[:, :2] / sums[:, 2:]
+        flat = _drawn_together(sums[:, :2] / sums[:, 2:], sums[:, 2], self._cell)
         return [
             self.plane.origin + line @ self.plane.axes[:2]
             for line in join(flat, _REACH * self._cell, tolerance, _SHORTEST)
@@ -117,6 +122,56 @@ class Section:
         total = np.zeros((len(cells), 3))
         np.add.at(total, which.ravel(), sums)
         self._keys, self._sums, self._held = [cells], [total], len(cells)
+
+
+def _drawn_together(places: Array, weights: Array, cell: float) -> Array:
+    """Move places (n, 2) to the mean of those around, and thin them: noise makes a line two or three cells thick."""
+    from scipy.spatial import cKDTree
+
+    pairs = cKDTree(places).query_pairs(1.2 * cell, output_type="ndarray")
+    sums, total = places * weights[:, None], weights.copy()
+    for one, other in ((0, 1), (1, 0)):
+        np.add.at(sums, pairs[:, one], places[pairs[:, other]] * weights[pairs[:, other], None])
+        np.add.at(total, pairs[:, one], weights[pairs[:, other]])
+    moved = sums / total[:, None]
+    near: list[list[int]] = [[] for _ in moved]
+    for one, other in cKDTree(moved).query_pairs(0.7 * cell):
+        near[one].append(other)
+        near[other].append(one)
+    free = np.ones(len(moved), dtype=bool)
+    kept = []
+    for k in np.argsort(-total, kind="stable").tolist():
+        if free[k]:
+            kept.append(k)
+            free[near[k]] = False
+    return moved[np.sort(kept)]
+
+
+def contour(picture: Picture, plane: SectionPlane, shortest: float, tolerance: float) -> list[Array]:
+    """Return where the surface of a wall crosses a plane along it, (n, 3) in space [m], the longest first.
+
+    Parameters
+    ----------
+    picture : of the wall
+    plane : d=DISTANCE
+    shortest : length of the shortest line [m]
+    tolerance : largest distance of the contour from the line [m]
+    """
+    from contourpy import contour_generator
+
+    height = float((plane.origin - picture.wall.origin) @ picture.wall.axes[2])
+    depths = np.ma.masked_invalid(filled(picture.depths).astype(np.float64))
+    lines = []
+    for line in contour_generator(z=depths).lines(height):
+        ring = np.asarray(line, dtype=np.float64)
+        # the picture's first row is at the top
+        flat = (
+            picture.low
+            + np.column_stack([ring[:, 0] + 0.5, len(picture.depths) - 0.5 - ring[:, 1]]) * picture.pixel
+        )
+        if float(np.linalg.norm(np.diff(flat, axis=0), axis=1).sum()) >= shortest:
+            lines.append(plane.origin + _thinned(flat, tolerance) @ plane.axes[:2])
+    return sorted(lines, key=lambda line: -float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum()))
 
 
 def join(places: Array, reach: float, tolerance: float, shortest: int) -> list[Array]:

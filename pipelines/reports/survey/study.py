@@ -28,6 +28,7 @@ from survey.stones import survey_stones
 __all__ = ["SurveyFile", "SurveyStudy", "study_surveys"]
 
 _SOME_DEPTH = DepthRule(None, 0.3, None, "\0")  # no file can give this source
+_OF_PATCHES = "the sigma of each patch follows from the scatter of all, so that the scatter cannot check it"
 _INTERVAL = 200  # stones between two reports of progress
 
 
@@ -109,7 +110,10 @@ def study_surveys(
         before = len(stones), len(rejects)
         file = _read(source, format, options, stones, rejects, progress)
         files.append(replace(file, stones=len(stones) - before[0], rejects=len(rejects) - before[1]))
-    return _judge(tuple(files), tuple(stones), tuple(rejects))
+    study = _judge(tuple(files), tuple(stones), tuple(rejects))
+    if format != "cloud" or not stones:
+        return study
+    return replace(study, quality=replace(study.quality, verdict=_OF_PATCHES))
 
 
 def _read(

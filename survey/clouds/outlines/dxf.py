@@ -11,6 +11,7 @@ from moma.errors import SurveyError
 from survey.arrays import Array
 from survey.clouds.extras import optional
 from survey.clouds.outlines.outline import Attributes, Outline, made_code
+from survey.geometry.solids import area_vector
 
 __all__ = ["read_dxf"]
 
@@ -111,8 +112,10 @@ def _coded(
 
 
 def _is_inside(place: Array, ring: Array) -> bool:
-    """Return whether a text lies in an outline, both seen along the axis across which the outline is widest."""
-    axes = [0, 1] if ring.shape[1] == 2 else sorted(np.argsort(np.ptp(ring, axis=0))[1:])
+    """Return whether a text lies in an outline, both seen along the axis that the outline faces most."""
+    axes = [0, 1]
+    if ring.shape[1] == 3:
+        axes = [k for k in range(3) if k != int(np.argmax(np.abs(area_vector(ring))))]
     x, y = place[axes]
     (ax, ay), (bx, by) = ring[:, axes].T, np.roll(ring[:, axes], -1, axis=0).T
     spans = (ay > y) != (by > y)

@@ -20,6 +20,7 @@ __all__ = ["open_e57"]
 
 _CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
 _SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
+_UNLIMITED = 1e9  # bounds of a field beyond which a program states none [m]
 _COLOURS = ("colorRed", "colorGreen", "colorBlue")
 
 
@@ -134,13 +135,14 @@ def _warnings(pye57: Any, path: Path, headers: list[Any]) -> tuple[str, ...]:
     for header in headers:
         if not set(_CARTESIAN) <= set(header.point_fields):
             continue
-        node = pye57.libe57.StructureNode(header.points.prototype()).get("cartesianX")
-        if not isinstance(node, pye57.libe57.FloatNode) or node.precision() != pye57.libe57.E57_SINGLE:
-            continue
-        for name in _CARTESIAN:
-            field = pye57.libe57.StructureNode(header.points.prototype()).get(name)
+        prototype = pye57.libe57.StructureNode(header.points.prototype())
+        for node in map(prototype.get, _CARTESIAN):
+            if node.type() != pye57.libe57.NodeType.E57_FLOAT:
+                continue
+            field = pye57.libe57.FloatNode(node)
             reach = max(abs(field.minimum()), abs(field.maximum()))
-            farthest = max(farthest, reach if reach < 1e9 else 0.0)
+            if field.precision() == pye57.libe57.E57_SINGLE and reach < _UNLIMITED:
+                farthest = max(farthest, reach)
     return lost_digits(path, farthest) if farthest else ()
 
 
