@@ -87,9 +87,14 @@ def check_outline_rejects(target: Path) -> None:
     UsageError
         naming the file that would be lost
     """
-    if target.is_dir() or (target.exists() and _MARK not in target.open("rb").readline()):
+    if target.is_dir() or (target.exists() and not _is_ours(target)):
         what = "exists and is not a file of rejected outlines, or was changed since"
         raise UsageError(what, where=str(target), remedy="move it away, or name another file with --rejects")
+
+
+def _is_ours(target: Path) -> bool:
+    with target.open("rb") as file:
+        return _MARK in file.readline()
 
 
 def outline_rejects(source: Path, options: ReadingOptions | None, rejects: Sequence[Reject]) -> bytes:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from moma.errors import SurveyError, UsageError
-from survey.arrays import Array
+from survey.arrays import Array, Bools
 from survey.clouds._kernels.paint import Canvas, paint
 from survey.clouds.points.chunks import PointCloud
 from survey.clouds.wall import Wall
@@ -25,6 +25,9 @@ _SAMPLE = 4000  # points from which the plane of a wall is found
 _CLOSE = 0.05  # distance of a wall's points from its plane [m]
 _TRIES = 400  # planes that are tried: a wall with a fifth of the points is met by three in 125
 _UPRIGHT = 0.35  # vertical component of the normal up to which a plane is a wall: 20°
+_BEFORE = 0.3  # distance of ground from a wall [m]
+_FOOT = 0.2  # part of a wall's points below which the ground lies
+_GROUND = 0.05  # part of all points that makes it certain that there is ground
 _FILLED = 2  # pixels by which gaps between points are closed
 _LIGHT = np.array([-0.5, 0.6, 0.62])  # direction to the light of a relief: from the upper left
 
@@ -56,7 +59,7 @@ class Picture:
 
 
 def find_wall(clouds: Sequence[PointCloud], progress: Progress) -> Wall:
-    """Find the frame of the largest upright plane, seen from a scanner, else from the side where joints are recessed.
+    """Find the frame of the largest upright plane, seen from a scanner or from the ground before it.
 
     s begins at the left end of the wall, t is the height z.
 
@@ -84,14 +87,25 @@ def find_wall(clouds: Sequence[PointCloud], progress: Progress) -> Wall:
     normal = np.linalg.svd(sample[kept] - sample[kept].mean(axis=0), full_matrices=False)[2][2]
     middle = sample[kept].mean(axis=0)
     seen = [one.position - origin for cloud in clouds for one in cloud.stations]
-    heights = (sample[kept] - middle) @ normal
-    # joints lie behind the faces of stones, which are more
-    if (normal @ (np.mean(seen, axis=0) - middle) if seen else np.median(heights) - heights.mean()) < 0.0:
+    towards = normal @ (np.mean(seen, axis=0) - middle) if seen else _front(sample, kept, middle, normal)
+    if towards < 0.0:
         normal = -normal
     flat = np.array([normal[0], normal[1], 0.0]) / np.hypot(normal[0], normal[1])
     frame = upright_frame(flat, middle)
     start = middle + float(((sample[kept] - middle) @ frame.axes[0]).min()) * frame.axes[0] + origin
     return Wall(np.array([start[0], start[1], 0.0]), frame.axes)
+
+
+def _front(sample: Array, kept: Bools, middle: Array, normal: Array) -> float:
+    """Return a number that is positive if a wall is seen from the side of its normal.
+
+    The ground before it was scanned too; without ground, joints lie behind the faces of stones, which are more.
+    """
+    apart = (sample - middle) @ normal
+    ground = (np.abs(apart) > _BEFORE) & (sample[:, 2] < np.quantile(sample[kept, 2], _FOOT))
+    if np.count_nonzero(ground) > _GROUND * len(sample):
+        return float(np.median(apart[ground]))
+    return float(np.median(apart[kept]) - apart[kept].mean())
 
 
 def _sample(clouds: Sequence[PointCloud], origin: Array, progress: Progress) -> Array:

@@ -18,7 +18,7 @@ from survey.clouds.wall import Wall
 __all__ = ["Section", "SectionPlane", "contour", "join", "section_plane"]
 
 _PLANE = re.compile(r"\s*([zsd])\s*=\s*([-+]?\d+(?:[.,]\d+)?)\s*(?:m\s*)?")
-_REACH = 2.3  # cells between neighbours on a line: one may be empty
+_REACH = 3.0  # cells between neighbours on a line: two may be empty, and joints are recessed
 _SHORTEST = 4  # cells of the shortest line; fewer are stray points
 _MANY = 2_000_000  # cells in memory before equal ones are added up
 

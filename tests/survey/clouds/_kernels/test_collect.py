@@ -21,7 +21,7 @@ def test_points_are_in_the_outlines_that_a_slow_search_finds(tmp_path):
     for k in range(9):
         angle = np.sort(rng.uniform(0.0, 2.0 * np.pi, 9))
         ring = rng.uniform(0.2, 0.5, (9, 1)) * np.column_stack([np.cos(angle), np.sin(angle)])
-        stars.append(Outline(k, str(k), ring + (0.4 * k, 0.1 * (k % 3)), Attributes(), ""))
+        stars.append(Outline(k, str(k), ring + np.array([0.4 * k, 0.1 * (k % 3)]), Attributes(), ""))
     wall = read_wall("3,1 5,4")
     placed = place_outlines(stars, wall, ())
     local = np.column_stack(
@@ -100,7 +100,7 @@ def test_half_a_face_behind_leaves_and_few_points():
     rng = np.random.default_rng(11)
     counts, places = patches(rng, np.zeros(36), 0.001)
     places[:16, :, 2] += rng.uniform(0.02, 0.12, (16, 24))
-    status, rows, _, plane, numbers = fit_patches(counts, places, 6, RULES)
+    status, rows, _, plane, _ = fit_patches(counts, places, 6, RULES)
     assert status == FINE
     assert abs(plane[2]) < 0.001
     assert len(rows) <= 21
