@@ -6,7 +6,6 @@ from typing import Annotated
 import typer
 
 from moma.cli.assess import assess, compare, diagnose
-from moma.cli.clouds import cloud
 from moma.cli.database import export, import_, migrate
 from moma.cli.entities import query, schema, show
 from moma.cli.geology import geology
@@ -15,7 +14,7 @@ from moma.cli.proposals import propose
 from moma.cli.relations import load_path, relate
 from moma.cli.runs import runs
 from moma.cli.scenes import check, run, trade
-from moma.cli.surveys import ingest, sample, survey_report
+from moma.cli.surveys import cloud, ingest, sample, survey_report
 
 __all__ = ["app", "main"]
 

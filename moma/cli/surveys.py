@@ -3,47 +3,47 @@
 from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from moma.cli.clouds import (
-    CloudFiles,
-    Depth,
-    Fields,
-    Layer,
-    Margin,
-    Masks,
-    Outlines,
-    OutlineSigma,
-    Size,
-    Slab,
-    Wall,
-    outlined,
-)
 from moma.cli.console import reporting, say
 from moma.cli.options import (
     DEFAULT_DB,
+    CloudFiles,
     Codes,
     Db,
+    Depth,
+    Fields,
     Format,
     Header,
     Json,
     Kind,
     KindWhere,
+    Layer,
+    Margin,
+    Masks,
+    Outlines,
+    OutlineSigma,
     Planes,
     Sigma,
+    Size,
+    Slab,
     Snap,
     Support,
     SurveyFormat,
     SurveyOrCloud,
     Unit,
     Verbose,
+    Wall,
 )
 from moma.cli.progress import progress_bars
 from moma.errors import UsageError
 
-__all__ = ["Moved", "ingest", "sample", "survey_report"]
+if TYPE_CHECKING:
+    from survey.formats.options import ReadingOptions
+
+__all__ = ["Moved", "cloud", "ingest", "sample", "survey_report"]
 
 
 class Moved(StrEnum):
@@ -268,3 +268,114 @@ def survey_report(
         say(f"warning: {warning}")
     lines = survey_report_lines(report, verbose)
     print((folder / INDEX).read_text(encoding="utf-8").rstrip() if json else "\n".join(lines))
+
+
+@reporting
+def cloud(
+    files: Annotated[
+        list[Path], typer.Argument(metavar="FILE…", help="Point clouds: LAS, LAZ, E57, PLY, XYZ or PTS.")
+    ],
+    wall: Annotated[
+        str | None,
+        typer.Option(
+            "--wall",
+            metavar="FRAME",
+            help='FILE.toml, or two points on the wall\'s foot, "X,Y X,Y"; default: the largest upright plane.',
+        ),
+    ] = None,
+    pixel: Annotated[float, typer.Option(metavar="T", help="Side of a pixel in metres.")] = 0.005,
+    slab: Annotated[
+        float, typer.Option(metavar="T", help="Largest distance of a drawn point from the plane of the wall.")
+    ] = 0.5,
+    section: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="PLANE",
+            help="Section, e.g. z=1.5 level, s=2.0 upright across the wall, or d=-0.01 along it; may be repeated.",
+        ),
+    ] = None,
+    thickness: Annotated[float, typer.Option(metavar="T", help="Thickness of a section in metres.")] = 0.02,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="Folder for the files; default: out/cloud-FILE."),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Draw a point cloud: orthophoto and depth map of a wall, sections as polylines."""
+    from dataclasses import asdict
+
+    from moma.cli.text.formats import as_json
+    from pipelines.draw.cloud_views import draw_views
+
+    folder = out or Path("out") / f"cloud-{files[0].stem}"
+    with progress_bars() as listener:
+        drawn = draw_views(
+            files,
+            folder,
+            wall,
+            pixel=pixel,
+            slab=slab,
+            sections=section or (),
+            thickness=thickness,
+            progress=listener,
+        )
+    for warning in drawn.warnings:
+        say(f"warning: {warning}")
+    lines = [
+        f"{drawn.points} points, {drawn.shown} of them on the wall, {drawn.width:.2f} × {drawn.height:.2f} m",
+        *(f"  section {one.name}: {one.lines} polylines, {one.length:.2f} m" for one in drawn.sections),
+        *(f"  {path}" for path in drawn.files),
+    ]
+    print(as_json(asdict(drawn)) if json else "\n".join(lines))
+
+
+def outlined(
+    base: "ReadingOptions",
+    files: list[Path] | None,
+    clouds: list[Path] | None,
+    masks: Path | None,
+    **given: object,
+) -> "tuple[str, list[Path], ReadingOptions] | None":
+    """Return format, files and options of a cloud with outlines or of masks; None if neither is given.
+
+    Raises
+    ------
+    UsageError
+        if options contradict each other, or are of another format
+    """
+    named = {f"--{name.replace('_', '-')}": value for name, value in given.items() if value is not None}
+    if clouds is None and masks is None:
+        for name in named:
+            what = f"{name} without --cloud" + (" or --masks" if name in ("--wall", "--fields") else "")
+            remedy = (
+                "give --masks too"
+                if name in ("--size", "--depth")
+                else "give --cloud FILE and --outlines FILE"
+            )
+            raise UsageError(
+                what if name not in ("--size", "--depth") else f"{name} without --masks", remedy=remedy
+            )
+        return None
+    if files or (clouds and masks):
+        other = "--masks" if clouds and masks else "survey files"
+        raise UsageError(
+            f"{other} beside --{'cloud' if clouds else 'masks'}", remedy="ingest one after the other"
+        )
+    from pipelines.ingest.outlined import cloud_options, mask_options
+
+    fitting = ("size", "depth", "wall", "fields") if masks else _OF_CLOUDS
+    for name in named:
+        if name.strip("-").replace("-", "_") not in fitting:
+            raise UsageError(f"{name} with --{'masks' if masks else 'cloud'}", remedy="leave it out")
+    if masks is not None:
+        chosen = {"chosen" if name == "fields" else name: given[name] for name in fitting}
+        return "masks", [masks], mask_options(base, **chosen)  # type: ignore[arg-type]
+    if given["outlines"] is None:
+        raise UsageError(
+            "--cloud without --outlines", remedy="name the outlines of its stones: --outlines FILE"
+        )
+    chosen = {"chosen" if name == "fields" else name: given[name] for name in fitting}
+    return "cloud", list(clouds or ()), cloud_options(base, **chosen)  # type: ignore[arg-type]
+
+
+_OF_CLOUDS = ("outlines", "wall", "layer", "fields", "outline_sigma", "margin", "slab")

@@ -99,7 +99,7 @@ def _is_ours(target: Path) -> bool:
 
 def outline_rejects(source: Path, options: ReadingOptions | None, rejects: Sequence[Reject]) -> bytes:
     """Write rejected outlines as GeoJSON, in the coordinates in which they were drawn."""
-    from survey.clouds.rejected import rejected_outlines
+    from survey.clouds.outlines.rejected import rejected_outlines
 
     if isinstance(options, CloudOptions):
         path, layer, chosen = options.outlines, options.layer, options.chosen

@@ -17,7 +17,7 @@ from pipelines.samples.measure import MeasuredStone, inset
 from survey.arrays import Array, Bools
 from survey.clouds.extras import optional
 
-__all__ = ["JITTER", "Scan", "outlines_text", "scan_window", "visible_corners", "write_scan"]
+__all__ = ["JITTER", "Scan", "outlines_text", "scan_window", "visible_corners", "write_masks", "write_scan"]
 
 JITTER = 0.005
 """Standard deviation of a drawn corner, across and up [m]."""
@@ -38,6 +38,7 @@ _TUBE = (
     0.14,
 )  # place along the wall of a scaffold tube, its radius, its distance before the wall [m]
 _MIXED = 0.01  # part of the points between two surfaces, anywhere in space
+_PIXEL = 0.003  # side of a pixel of masks [m]
 _BEHIND = 0.35  # distance of what is seen through the window behind the wall [m]
 
 
@@ -184,6 +185,21 @@ def outlines_text(scan: Scan) -> str:
     return (
         f'{{"type": "FeatureCollection", "about": {about}, "features": [\n' + ",\n".join(features) + "\n]}\n"
     )
+
+
+def write_masks(scan: Scan, path: Path) -> None:
+    """Write the drawn outlines as a picture: stones in white, mortar in black, of the panel and nothing else."""
+    from PIL import Image, ImageDraw
+
+    corners = np.concatenate([one.plan.corners for one in scan.bay.stones])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    columns, rows = (int(one) for one in np.round((high - low) / _PIXEL))
+    picture = Image.new("L", (columns, rows))
+    drawing = ImageDraw.Draw(picture)
+    for ring in scan.outlines:
+        flat = (ring - low) / _PIXEL
+        drawing.polygon([(float(x) - 0.5, rows - float(y) - 0.5) for x, y in flat], fill=255)
+    picture.save(path)
 
 
 def write_scan(scan: Scan, path: Path) -> None:

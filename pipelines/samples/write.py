@@ -8,7 +8,7 @@ from mechanics.dynamics.progress import Listener, silent
 from moma.errors import UsageError
 from pipelines.samples.causes import PULSE, Cause
 from pipelines.samples.samples import Recipe, recipe_of
-from pipelines.samples.scan import Scan, outlines_text, write_scan
+from pipelines.samples.scan import Scan, outlines_text, write_masks, write_scan
 from survey.arrays import Array
 from survey.clouds.wall import Wall, wall_lines
 from survey.formats.native.writer import write_head, write_moma
@@ -82,7 +82,7 @@ friction = 0.6
 normal_stiffness = {across:g}  # Pa/m
 shear_stiffness = {along:g}
 """
-_SCANNED = ("scan.laz", "stones.geojson", "wall.toml", "head.moma")  # files of a scan
+_SCANNED = ("scan.laz", "stones.geojson", "wall.toml", "head.moma", "masks.png")  # files of a scan
 _HEAD = "head.moma"  # header file of closed solids
 _LONGEST = 3.0  # duration of the scene of a building that has moved [s]
 
@@ -210,8 +210,9 @@ def write_sample(
 
 
 def _write_scan(scan: Scan, folder: Path) -> None:
-    cloud, outlines, frame, head = (folder / name for name in _SCANNED)
+    cloud, outlines, frame, head, masks = (folder / name for name in _SCANNED)
     write_scan(scan, cloud)
+    write_masks(scan, masks)
     outlines.write_text(outlines_text(scan), encoding="utf-8", newline="\n")
     wall = Wall(scan.bay.frame.origin, scan.bay.frame.axes)
     frame.write_text(wall_lines(wall), encoding="utf-8", newline="\n")
@@ -355,7 +356,7 @@ def _commands(
 ) -> Iterator[str]:
     database = f"--db sqlite:///{survey.with_suffix('.db')}"
     if recipe.scan:
-        cloud, outlines, frame, head = (survey.with_name(name) for name in _SCANNED)
+        cloud, outlines, frame, head, _ = (survey.with_name(name) for name in _SCANNED)
         drawn = f"--outlines {outlines} --wall {frame} --header {head}"
         yield f"moma ingest --cloud {cloud} {drawn} --sigma 0.0015 {database}"
     else:

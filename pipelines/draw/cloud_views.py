@@ -13,10 +13,10 @@ from moma.errors import UsageError
 from pipelines.results.folder import check_replaceable, replacing
 from survey.arrays import Array
 from survey.clouds.extras import optional
-from survey.clouds.orthophoto import STEP, Picture, find_wall, paint_wall, write_picture
 from survey.clouds.points.chunks import PointCloud
 from survey.clouds.points.reading import open_points
-from survey.clouds.sections import Section, contour, section_plane
+from survey.clouds.views.orthophoto import STEP, Picture, find_wall, paint_wall, write_picture
+from survey.clouds.views.sections import Section, contour, section_plane
 from survey.clouds.wall import read_wall, wall_lines
 
 __all__ = ["INDEX", "DrawnCloud", "DrawnSection", "draw_views"]

@@ -12,7 +12,7 @@ import numpy as np
 
 from moma.errors import UsageError
 from survey.arrays import Array, Ints
-from survey.clouds.orthophoto import Picture, filled
+from survey.clouds.views.orthophoto import Picture, filled
 from survey.clouds.wall import Wall
 
 __all__ = ["Section", "SectionPlane", "contour", "join", "section_plane"]

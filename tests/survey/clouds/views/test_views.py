@@ -5,9 +5,9 @@ import pytest
 from PIL import Image
 
 from moma.errors import SurveyError, UsageError
-from survey.clouds.orthophoto import STEP, find_wall, paint_wall, write_picture
 from survey.clouds.points.chunks import Chunk, PointCloud
-from survey.clouds.sections import Section, contour, join, section_plane
+from survey.clouds.views.orthophoto import STEP, find_wall, paint_wall, write_picture
+from survey.clouds.views.sections import Section, contour, join, section_plane
 from survey.clouds.wall import Wall, read_wall, wall_lines
 from survey.clouds.world import world_of
 from survey.records.survey import Station

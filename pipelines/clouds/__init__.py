@@ -1,4 +1,0 @@
-"""Drawings of point clouds, over which outlines of stones are drawn.
-
-Public: `DrawnCloud`, `draw_views` (views).
-"""
