@@ -191,14 +191,17 @@ def write_masks(scan: Scan, path: Path) -> None:
     """Write the drawn outlines as a picture: stones in white, mortar in black, of the panel and nothing else."""
     from PIL import Image, ImageDraw
 
-    corners = np.concatenate([one.plan.corners for one in scan.bay.stones])
-    low, high = corners.min(axis=0), corners.max(axis=0)
+    panel = np.concatenate([one.plan.corners for one in scan.bay.stones])
+    low, high = panel.min(axis=0), panel.max(axis=0)
     columns, rows = (int(one) for one in np.round((high - low) / _PIXEL))
     picture = Image.new("L", (columns, rows))
     drawing = ImageDraw.Draw(picture)
     for ring in scan.outlines:
         flat = (ring - low) / _PIXEL
-        drawing.polygon([(float(x) - 0.5, rows - float(y) - 0.5) for x, y in flat], fill=255)
+        corners = [(float(x) - 0.5, rows - float(y) - 0.5) for x, y in flat]
+        drawing.polygon(corners, fill=255)
+        # neighbours whose outlines touch stay two pieces
+        drawing.line([*corners, corners[0]], fill=0, width=2)
     picture.save(path)
 
 

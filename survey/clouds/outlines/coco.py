@@ -92,8 +92,8 @@ def _outlines(
             code = f"S{int(code):03d}"
         segmentation = one.get("segmentation")
         if isinstance(segmentation, dict):
-            mask = run_lengths(segmentation, where)
-            found = outline_of_mask(number, mask, (0, 0), tolerance, where, said)
+            mask, column = _columns(segmentation, where)
+            found = outline_of_mask(number, mask, (column, 0), tolerance, where, said)
             if found is None:
                 raise SurveyError("the mask is empty", where=where, remedy="leave it out")
             yield Outline(number, code, found.corners, said, where, found.doubts)
@@ -145,6 +145,14 @@ def run_lengths(coded: Mapping[str, Any], where: str = "") -> NDArray[np.bool_]:
     >>> run_lengths({"size": [2, 3], "counts": [1, 2, 3]}).astype(int).tolist()
     [[0, 1, 0], [1, 0, 0]]
     """
+    mask, first = _columns(coded, where)
+    whole = np.zeros([int(one) for one in coded["size"]], dtype=np.bool_)
+    whole[:, first : first + mask.shape[1]] = mask
+    return whole
+
+
+def _columns(coded: Mapping[str, Any], where: str) -> tuple[NDArray[np.bool_], int]:
+    """Decode the columns of a mask from the first to the last that it has pixels in; a picture has thousands."""
     try:
         height, width = (int(one) for one in coded["size"])
         counts = coded["counts"]
@@ -154,8 +162,15 @@ def run_lengths(coded: Mapping[str, Any], where: str = "") -> NDArray[np.bool_]:
     if sum(runs) != height * width or min(runs, default=0) < 0:
         what = f"run lengths of {sum(runs)} pixels for a picture of {width} × {height}"
         raise SurveyError(what, where=where, remedy=_REMEDY)
-    values = np.arange(len(runs)) % 2 == 1
-    return np.repeat(values, runs).reshape(width, height).T
+    ends = np.cumsum(runs, dtype=np.int64)
+    inside = np.flatnonzero((np.arange(len(runs)) % 2 == 1) & (np.array(runs) > 0))
+    if not len(inside):
+        return np.zeros((height, 0), dtype=np.bool_), 0
+    first, last = int((ends[inside[0]] - runs[inside[0]]) // height), int((ends[inside[-1]] - 1) // height)
+    columns = np.zeros((last + 1 - first) * height, dtype=np.bool_)
+    for k in inside:
+        columns[ends[k] - runs[k] - first * height : ends[k] - first * height] = True
+    return columns.reshape(-1, height).T, first
 
 
 def _uncompressed(text: str) -> list[int]:

@@ -16,6 +16,7 @@ from survey.clouds.world import PixelPlace, world_of
 
 __all__ = ["Labels", "outlines_of", "read_labels"]
 
+_LARGEST = 2**24  # number of a stone: as many as there are colours
 _GREY = 0.02  # share of pixels that are neither black nor white in a picture of two colours: blurred edges
 _DARK, _WHITE = 32, 223  # of 255
 _SPECK = 0.02  # area of a piece over the median of all below which it is a speck, not a stone [-]
@@ -64,11 +65,10 @@ def read_labels(path: Path) -> Labels:
         return Labels(path, numbers, None, specks, places)
     colours = pixels.ndim == 3
     flat = _colour_numbers(pixels) if colours else pixels
-    values, ranks = np.unique(flat, return_inverse=True)
+    values, numbers = _ranked(flat, path)
     if len(values) < 2 or values[0] != 0:
         raise SurveyError(f"{len(values)} numbers and no 0 among them", where=str(path), remedy=_REMEDY)
-    numbers = ranks.reshape(flat.shape).astype(np.int32)
-    return Labels(path, numbers, None if colours else values.astype(np.int64), 0, places)
+    return Labels(path, numbers, None if colours else values, 0, places)
 
 
 _REMEDY = "a picture of labels has stones in white and mortar in black, or one number for each stone and 0 for mortar"
@@ -187,7 +187,20 @@ def _rows_from_below(middles: Array, heights: Array) -> NDArray[np.intp]:
     return np.lexsort((middles[:, 1], row))
 
 
-def _colour_numbers(pixels: NDArray[Any]) -> NDArray[np.int64]:
+def _ranked(pixels: NDArray[Any], path: Path) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+    """Return the numbers of a picture, and the rank of that of each pixel, without sorting millions of pixels."""
+    if pixels.dtype.kind not in "ui" or int(pixels.min()) < 0 or int(pixels.max()) > _LARGEST:
+        what = f"numbers from {pixels.min():g} to {pixels.max():g}"
+        raise SurveyError(what, where=str(path), remedy=f"number stones with whole numbers up to {_LARGEST}")
+    there = np.zeros(int(pixels.max()) + 1, dtype=np.bool_)
+    there[pixels] = True
+    values = np.flatnonzero(there)
+    ranks = np.zeros(len(there), dtype=np.int32)
+    ranks[values] = np.arange(len(values), dtype=np.int32)
+    return values, ranks[pixels]
+
+
+def _colour_numbers(pixels: NDArray[Any]) -> NDArray[np.int32]:
     """Return the colours of a picture as numbers, black as 0."""
-    red, green, blue = (pixels[..., k].astype(np.int64) for k in range(3))
+    red, green, blue = (pixels[..., k].astype(np.int32) for k in range(3))
     return (red << 16) | (green << 8) | blue

@@ -31,6 +31,8 @@ def trace(mask: Bools) -> tuple[Array, int, float]:
     """
     from contourpy import contour_generator
 
+    if not mask.any():
+        return np.empty((0, 2)), 0, 0.0
     padded = np.zeros((mask.shape[0] + 2, mask.shape[1] + 2))
     padded[1:-1, 1:-1] = mask
     rings = [np.asarray(one)[:-1] - 1.0 for one in contour_generator(z=padded).lines(0.5)]
@@ -68,13 +70,22 @@ def few_corners(ring: Array, tolerance: float) -> Array:
 
     Returns
     -------
-    (m, 2) m ≥ 3, or the ring itself if it has three corners or fewer
+    (m, 2) m ≥ 3, whose sides do not cross; the ring itself if it has three corners or fewer, or winds too closely
     """
     if len(ring) <= _FEWEST:
         return ring
-    kept = _douglas_peucker(ring, tolerance)
-    if len(kept) < _FEWEST:
-        return ring[_extreme(ring)]
+    for finer in (1.0, 0.5, 0.25):
+        kept = _douglas_peucker(ring, finer * tolerance)
+        if len(kept) < _FEWEST:
+            return ring[_extreme(ring)]
+        for corners in (_met(ring, kept, tolerance), ring[kept]):
+            if not _crosses(corners):
+                return corners
+    return ring
+
+
+def _met(ring: Array, kept: list[int], tolerance: float) -> Array:
+    """Return the corners where lines fitted to neighbouring sides meet, near those of the ring."""
     lines = [_line(_side(ring, kept[k], kept[(k + 1) % len(kept)])) for k in range(len(kept))]
     out = ring[kept].copy()
     for k, index in enumerate(kept):
@@ -87,6 +98,17 @@ def few_corners(ring: Array, tolerance: float) -> Array:
         if math.dist(meet, ring[index]) <= 2.5 * tolerance:
             out[k] = meet
     return out
+
+
+def _crosses(ring: Array) -> bool:
+    """Return whether two sides of a polygon that are no neighbours meet."""
+    a, b = ring, np.roll(ring, -1, axis=0)
+    (dx, dy), (ax, ay) = (b - a).T, a.T
+    # side of each start and end from each line
+    start = dx[:, None] * (ay[None] - ay[:, None]) - dy[:, None] * (ax[None] - ax[:, None])
+    stop = np.roll(start, -1, axis=1)
+    apart = start * stop < 0.0
+    return bool((apart & apart.T).any())
 
 
 def _extreme(ring: Array) -> NDArray[np.intp]:
