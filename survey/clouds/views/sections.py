@@ -144,7 +144,8 @@ def _drawn_together(places: Array, weights: Array, cell: float) -> Array:
         if free[k]:
             kept.append(k)
             free[near[k]] = False
-    return moved[np.sort(kept)]
+    out: Array = moved[np.sort(kept)]
+    return out
 
 
 def contour(picture: Picture, plane: SectionPlane, shortest: float, tolerance: float) -> list[Array]:
