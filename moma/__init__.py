@@ -48,12 +48,15 @@ if TYPE_CHECKING:
     from pipelines.run.assemble import assemble
     from pipelines.run.run import run_scene
     from pipelines.scene.file import read_scene
+    from survey.clouds.settings import CloudOptions, MaskOptions
     from survey.formats.reading import ReadingOptions, open_survey
     from survey.stones import survey_stones
 
 __all__ = [
     "Block",
+    "CloudOptions",
     "Fidelity",
+    "MaskOptions",
     "Material",
     "MomaError",
     "ReadingOptions",
@@ -82,7 +85,9 @@ __all__ = [
 
 _HOMES = {
     "Block": "mechanics.scene.scene",
+    "CloudOptions": "survey.clouds.settings",
     "Fidelity": "mechanics.scene.scene",
+    "MaskOptions": "survey.clouds.settings",
     "Material": "mechanics.stones.materials",
     "ReadingOptions": "survey.formats.reading",
     "Result": "mechanics.results.result",

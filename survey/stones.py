@@ -11,6 +11,7 @@ from survey.extrusion.extrusion import SurveyedBlock, extrude
 from survey.extrusion.imported_solids import block_of_solid
 from survey.faces.faces import Face, Provenance, face_on, outline_face
 from survey.faces.shapes import FaceShape, ShapeKind
+from survey.records.review import Doubtful
 from survey.records.snapping import Snapping
 from survey.records.survey import BlockRecord, Reject, SolidRecord, SurveyHead, SurveyStream
 from survey.registration.photographed_stones import LiftedFace, lift_faces
@@ -32,6 +33,7 @@ class SurveyedStream:
     snapping : of solids, the changes that brought their faces into common planes; None if not asked for
     header : number of lines at the beginning of the file that hold for all stones
     remarks : on how the file was read, in words
+    review : of outlines, what to look at
     """
 
     head: SurveyHead
@@ -40,6 +42,7 @@ class SurveyedStream:
     snapping: Snapping | None = None
     header: int = 0
     remarks: tuple[str, ...] = ()
+    review: tuple[Doubtful, ...] = ()
 
 
 def survey_stones(stream: SurveyStream) -> SurveyedStream:
@@ -65,7 +68,9 @@ def survey_stones(stream: SurveyStream) -> SurveyedStream:
     transform = fit_similarity(stream.head.control) if stream.head.control else None
     head = stream.head if transform is None else to_site(stream.head, transform)
     stones = _stones(stream, head, transform)
-    return SurveyedStream(head, transform, stones, stream.snapping, stream.header, stream.remarks)
+    return SurveyedStream(
+        head, transform, stones, stream.snapping, stream.header, stream.remarks, stream.review
+    )
 
 
 def _stones(

@@ -10,17 +10,25 @@ __all__ = [
     "DEFAULT_DB",
     "AcceptUnsound",
     "At",
+    "CloudFiles",
     "Codes",
     "Columns",
     "Db",
+    "Depth",
+    "Fields",
     "Format",
     "Header",
     "Json",
     "Kind",
     "KindWhere",
     "Kinds",
+    "Layer",
     "ListFormat",
+    "Margin",
+    "Masks",
     "Out",
+    "OutlineSigma",
+    "Outlines",
     "Overwrite",
     "Planes",
     "Profile",
@@ -30,15 +38,18 @@ __all__ = [
     "SceneArgument",
     "Sheet",
     "Sigma",
+    "Size",
+    "Slab",
     "Snap",
     "StoreDb",
     "Support",
-    "SurveyFiles",
     "SurveyFormat",
+    "SurveyOrCloud",
     "Unit",
     "Up",
     "UpAxis",
     "Verbose",
+    "Wall",
 ]
 
 DEFAULT_DB = "sqlite:///moma.db"
@@ -110,8 +121,12 @@ Profile = Annotated[
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")]
 Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Print more; show the traceback of an error.")]
-SurveyFiles = Annotated[
-    list[Path], typer.Argument(metavar="FILE…", help="Survey files, or folders of them; see docs/formats.md.")
+SurveyOrCloud = Annotated[
+    list[Path] | None,
+    typer.Argument(
+        metavar="FILE…",
+        help="Survey files, or folders of them; see docs/formats.md. None with --cloud or --masks.",
+    ),
 ]
 Format = Annotated[
     SurveyFormat | None,
@@ -231,5 +246,104 @@ AcceptUnsound = Annotated[
     bool,
     typer.Option(
         "--accept-unsound", help="Run a scene that moma check finds unsound; mark all results accordingly."
+    ),
+]
+
+_PANEL = "Point clouds and masks"
+
+CloudFiles = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--cloud",
+        metavar="FILE",
+        help="Point cloud: LAS, LAZ, E57, PLY, XYZ or PTS; may be repeated.",
+        rich_help_panel=_PANEL,
+    ),
+]
+Outlines = Annotated[
+    Path | None,
+    typer.Option(
+        "--outlines",
+        metavar="FILE",
+        help="Outlines of its stones: GeoPackage, GeoJSON, Shapefile, DXF, label PNG or TIFF, COCO JSON.",
+        rich_help_panel=_PANEL,
+    ),
+]
+Wall = Annotated[
+    str | None,
+    typer.Option(
+        "--wall",
+        metavar="FRAME",
+        help='Frame of the plane of the outlines: FILE.toml, or two points on the wall\'s foot, "X,Y X,Y".',
+        rich_help_panel=_PANEL,
+    ),
+]
+Layer = Annotated[
+    str | None,
+    typer.Option(
+        "--layer",
+        metavar="NAME",
+        help="Layer of the outlines, if the file has several.",
+        rich_help_panel=_PANEL,
+    ),
+]
+Fields = Annotated[
+    str | None,
+    typer.Option(
+        "--fields",
+        metavar="MAP",
+        help="Attributes of outlines by meaning, e.g. 'code=Stein_Nr,course=Lage'.",
+        rich_help_panel=_PANEL,
+    ),
+]
+OutlineSigma = Annotated[
+    float | None,
+    typer.Option(
+        "--outline-sigma",
+        metavar="S",
+        help="Standard deviation of a drawn corner in metres; default: 0.005.",
+        rich_help_panel=_PANEL,
+    ),
+]
+Margin = Annotated[
+    float | None,
+    typer.Option(
+        "--margin",
+        metavar="T",
+        help="Points nearer to an outline than this are left out; default: three times its sigma.",
+        rich_help_panel=_PANEL,
+    ),
+]
+Slab = Annotated[
+    float | None,
+    typer.Option(
+        "--slab",
+        metavar="T",
+        help="Points farther from the plane of an outline are not of its stone; default: 0.15.",
+        rich_help_panel=_PANEL,
+    ),
+]
+Masks = Annotated[
+    Path | None,
+    typer.Option(
+        "--masks",
+        metavar="FILE",
+        help="Label picture or COCO JSON without a cloud: one plane face for each stone.",
+        rich_help_panel=_PANEL,
+    ),
+]
+Size = Annotated[
+    str | None,
+    typer.Option(
+        "--size",
+        metavar="WxH",
+        help="Width and height of the picture in metres, e.g. 1.0x1.2.",
+        rich_help_panel=_PANEL,
+    ),
+]
+Depth = Annotated[
+    float | None,
+    typer.Option(
+        "--depth", metavar="D", help="Depth of all masked stones in metres.", rich_help_panel=_PANEL
     ),
 ]

@@ -1,40 +1,56 @@
 """Commands that read survey files, or write one to start from."""
 
+from collections.abc import Mapping
 from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from moma.cli.console import reporting, say
 from moma.cli.options import (
     DEFAULT_DB,
+    CloudFiles,
     Codes,
     Columns,
     Db,
+    Depth,
+    Fields,
     Format,
     Header,
     Json,
     Kind,
     Kinds,
     KindWhere,
+    Layer,
+    Margin,
+    Masks,
+    Outlines,
+    OutlineSigma,
     Overwrite,
     Planes,
     Repair,
     Sheet,
     Sigma,
+    Size,
+    Slab,
     Snap,
     Support,
-    SurveyFiles,
+    SurveyFormat,
+    SurveyOrCloud,
     Unit,
     Up,
     Verbose,
+    Wall,
 )
 from moma.cli.progress import progress_bars
 from moma.errors import UsageError
 
-__all__ = ["Level", "Moved", "ingest", "sample", "survey_report"]
+if TYPE_CHECKING:
+    from survey.formats.options import ReadingOptions
+
+__all__ = ["Level", "Moved", "cloud", "ingest", "sample", "survey_report"]
 
 
 class Level(StrEnum):
@@ -71,6 +87,9 @@ def sample(
         bool,
         typer.Option("--phases", help="Upper courses were laid later: the wall with --moved settlement."),
     ] = False,
+    scan: Annotated[
+        bool, typer.Option("--scan", help="With a scan and outlines of the stones: the window.")
+    ] = False,
     courses: Annotated[
         int | None, typer.Option(help="Courses of the tower; default: 40, or 12 with --small.")
     ] = None,
@@ -85,7 +104,14 @@ def sample(
 
     with progress_bars() as listener:
         written = write_sample(
-            kind, out or Path(kind), listener, moved=moved, small=small, phases=phases, courses=courses
+            kind,
+            out or Path(kind),
+            listener,
+            moved=moved,
+            small=small,
+            phases=phases,
+            scan=scan,
+            courses=courses,
         )
     lines = [
         f"{written.title}: a synthetic survey of {written.stones} stones",
@@ -98,7 +124,7 @@ def sample(
 
 @reporting
 def ingest(
-    files: SurveyFiles,
+    files: SurveyOrCloud = None,
     format: Format = None,
     header: Header = None,
     columns: Columns = None,
@@ -132,6 +158,21 @@ def ingest(
             "--again", help="Accept new measurements of stones in the database; earlier ones are kept."
         ),
     ] = False,
+    cloud: CloudFiles = None,
+    outlines: Outlines = None,
+    wall: Wall = None,
+    layer: Layer = None,
+    fields: Fields = None,
+    outline_sigma: OutlineSigma = None,
+    margin: Margin = None,
+    slab: Slab = None,
+    masks: Masks = None,
+    size: Size = None,
+    depth: Depth = None,
+    review: Annotated[
+        Path | None,
+        typer.Option("--review", metavar="FILE.csv", help="List of the outlines that should be looked at."),
+    ] = None,
     db: Db = DEFAULT_DB,
     json: Json = False,
     verbose: Verbose = False,
@@ -146,24 +187,42 @@ def ingest(
 
     if rejects is not None and not keep_going:
         raise UsageError("--rejects without --keep-going", remedy="give --keep-going too")
-    name = format_of_all(files) if format is None else format.value
-    solids = {"--snap": snap, "--planes": planes, "--up": up, "--repair": repair}
-    tables = {"--columns": columns, "--sheet": sheet, "--kinds": kinds}
-    for option, given in solids.items():
-        if given is not None and name != "solids":
-            raise UsageError(f"{option} with format {name}", remedy="it is for --format solids")
-    for option, text in tables.items():
-        if text is not None and name in ("moma", "solids"):
-            raise UsageError(f"{option} with format {name}", remedy="it is for tables and lists of points")
-    if unit is not None and name == "moma":
-        raise UsageError("--unit with format moma", remedy="its lengths are metres")
     options = reading_options(
         *(header, codes, kind, sigma, unit, snap, planes, columns, sheet, kinds, up and up.value, repair)
     )
     rules = kind_rules(kind_where or (), support or ())
+    drawn = outlined(
+        options,
+        files,
+        cloud,
+        masks,
+        format=format,
+        outlines=outlines,
+        wall=wall,
+        layer=layer,
+        fields=fields,
+        outline_sigma=outline_sigma,
+        margin=margin,
+        slab=slab,
+        size=size,
+        depth=depth,
+    )
+    if review is not None and drawn is None:
+        raise UsageError("--review without --cloud or --masks", remedy="it lists outlines")
+    name, paths, options = drawn or (
+        format.value if format else format_of_all(files or ()),
+        files or [],
+        options,
+    )
+    _check_fitting(
+        name,
+        unit,
+        {"--columns": columns, "--sheet": sheet, "--kinds": kinds},
+        {"--snap": snap, "--planes": planes, "--up": up, "--repair": repair},
+    )
     with compiling_beside("ingest"), progress_bars() as listener:
         report = ingest_files(
-            files,
+            paths,
             db,
             name,
             listener,
@@ -172,12 +231,16 @@ def ingest(
             again=again,
             rules=rules,
         )
+    if review is not None:
+        from pipelines.ingest.outlined import write_review
+
+        write_review(review, [one for file in report.files for one in file.review])
     print(as_json(asdict(report)) if json else "\n".join(ingest_lines(report, verbose)))
 
 
 @reporting
 def survey_report(
-    files: SurveyFiles,
+    files: SurveyOrCloud = None,
     format: Format = None,
     header: Header = None,
     columns: Columns = None,
@@ -187,6 +250,22 @@ def survey_report(
     kinds: Kinds = None,
     sigma: Sigma = None,
     unit: Unit = None,
+    cloud: CloudFiles = None,
+    outlines: Outlines = None,
+    wall: Wall = None,
+    layer: Layer = None,
+    fields: Fields = None,
+    outline_sigma: OutlineSigma = None,
+    margin: Margin = None,
+    slab: Slab = None,
+    orthophoto: Annotated[
+        Path | None,
+        typer.Option(
+            "--orthophoto",
+            metavar="FILE.png",
+            help="Draw elevations on it: with a world file, and FILE.toml, the frame of its wall.",
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option("--out", metavar="DIR", help="Folder for the report; default: out/survey-FILE."),
@@ -207,14 +286,167 @@ def survey_report(
     from pipelines.reports.survey.report import INDEX, report_surveys
     from survey.quality.masonry.index import given_grade
 
-    name = format_of_all(files) if format is None else format.value
     options = reading_options(header, codes, kind, sigma, unit, columns=columns, sheet=sheet, kinds=kinds)
-    folder = out or Path("out") / f"survey-{files[0].resolve().stem}"
+    drawn = outlined(
+        options,
+        files,
+        cloud,
+        None,
+        format=format,
+        outlines=outlines,
+        wall=wall,
+        layer=layer,
+        fields=fields,
+        outline_sigma=outline_sigma,
+        margin=margin,
+        slab=slab,
+    )
+    name, paths, options = drawn or (
+        format.value if format else format_of_all(files or ()),
+        files or [],
+        options,
+    )
+    if not paths:
+        raise UsageError("no survey file", remedy="name at least one")
+    _check_fitting(name, unit, {"--columns": columns, "--sheet": sheet, "--kinds": kinds}, {})
+    folder = out or Path("out") / f"survey-{(outlines or paths[0]).resolve().stem}"
     levels = {"MM": mortar, "SM": state}
     given = {name: given_grade(level.value) for name, level in levels.items() if level is not None}
     with progress_bars() as listener:
-        report = report_surveys(files, folder, name, options, listener, given, overwrite)
+        report = report_surveys(paths, folder, name, options, listener, given, overwrite, orthophoto)
     for warning in report.study.warnings:
         say(f"warning: {warning}")
     lines = survey_report_lines(report, verbose)
     print((folder / INDEX).read_text(encoding="utf-8").rstrip() if json else "\n".join(lines))
+
+
+@reporting
+def cloud(
+    files: Annotated[
+        list[Path], typer.Argument(metavar="FILE…", help="Point clouds: LAS, LAZ, E57, PLY, XYZ or PTS.")
+    ],
+    wall: Annotated[
+        str | None,
+        typer.Option(
+            "--wall",
+            metavar="FRAME",
+            help='FILE.toml, or two points on the wall\'s foot, "X,Y X,Y"; default: the largest upright plane.',
+        ),
+    ] = None,
+    pixel: Annotated[float, typer.Option(metavar="T", help="Side of a pixel in metres.")] = 0.005,
+    slab: Annotated[
+        float, typer.Option(metavar="T", help="Largest distance of a drawn point from the plane of the wall.")
+    ] = 0.5,
+    section: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="PLANE",
+            help="Section, e.g. z=1.5 level, s=2.0 upright across the wall, or d=-0.01 along it; may be repeated.",
+        ),
+    ] = None,
+    thickness: Annotated[float, typer.Option(metavar="T", help="Thickness of a section in metres.")] = 0.02,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="Folder for the files; default: out/cloud-FILE."),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Draw a point cloud: orthophoto and depth map of a wall, sections as polylines."""
+    from dataclasses import asdict
+
+    from moma.cli.text.formats import as_json
+    from pipelines.draw.cloud_views import draw_views
+
+    folder = out or Path("out") / f"cloud-{files[0].stem}"
+    with progress_bars() as listener:
+        drawn = draw_views(
+            files,
+            folder,
+            wall,
+            pixel=pixel,
+            slab=slab,
+            sections=section or (),
+            thickness=thickness,
+            progress=listener,
+        )
+    for warning in drawn.warnings:
+        say(f"warning: {warning}")
+    lines = [
+        f"{drawn.points} points, {drawn.shown} of them on the wall, {drawn.width:.2f} × {drawn.height:.2f} m",
+        *(f"  section {one.name}: {one.lines} polylines, {one.length:.2f} m" for one in drawn.sections),
+        *(f"  {path}" for path in drawn.files),
+    ]
+    print(as_json(asdict(drawn)) if json else "\n".join(lines))
+
+
+def outlined(
+    base: "ReadingOptions",
+    files: list[Path] | None,
+    clouds: list[Path] | None,
+    masks: Path | None,
+    *,
+    format: SurveyFormat | None,
+    **given: object,
+) -> "tuple[str, list[Path], ReadingOptions] | None":
+    """Return format, files and options of a cloud with outlines or of masks; None if neither is given.
+
+    Raises
+    ------
+    UsageError
+        if options contradict each other, or are of another format
+    """
+    named = {f"--{name.replace('_', '-')}": value for name, value in given.items() if value is not None}
+    if clouds is None and masks is None:
+        for name in named:
+            what = f"{name} without --cloud" + (" or --masks" if name in ("--wall", "--fields") else "")
+            remedy = (
+                "give --masks too"
+                if name in ("--size", "--depth")
+                else "give --cloud FILE and --outlines FILE"
+            )
+            raise UsageError(
+                what if name not in ("--size", "--depth") else f"{name} without --masks", remedy=remedy
+            )
+        return None
+    if files or (clouds and masks):
+        other = "--masks" if clouds and masks else "survey files"
+        raise UsageError(
+            f"{other} beside --{'cloud' if clouds else 'masks'}", remedy="ingest one after the other"
+        )
+    if format is not None:
+        raise UsageError(f"--format beside --{'cloud' if clouds else 'masks'}", remedy="leave it out")
+    from pipelines.ingest.outlined import cloud_options, mask_options
+
+    fitting = ("size", "depth", "wall", "fields") if masks else _OF_CLOUDS
+    for name in named:
+        if name.strip("-").replace("-", "_") not in fitting:
+            raise UsageError(f"{name} with --{'masks' if masks else 'cloud'}", remedy="leave it out")
+    if masks is not None:
+        chosen = {"chosen" if name == "fields" else name: given[name] for name in fitting}
+        return "masks", [masks], mask_options(base, **chosen)  # type: ignore[arg-type]
+    if given["outlines"] is None:
+        raise UsageError(
+            "--cloud without --outlines", remedy="name the outlines of its stones: --outlines FILE"
+        )
+    chosen = {"chosen" if name == "fields" else name: given[name] for name in fitting}
+    return "cloud", list(clouds or ()), cloud_options(base, **chosen)  # type: ignore[arg-type]
+
+
+def _check_fitting(
+    name: str,
+    unit: str | None,
+    tables: Mapping[str, str | None],
+    solids: Mapping[str, object],
+) -> None:
+    """Refuse options of tables and of solids with other formats, and a unit where lengths are metres."""
+    for option, given in solids.items():
+        if given is not None and name != "solids":
+            raise UsageError(f"{option} with format {name}", remedy="it is for --format solids")
+    for option, text in tables.items():
+        if text is not None and name in ("moma", "solids", "cloud", "masks"):
+            raise UsageError(f"{option} with format {name}", remedy="it is for tables and lists of points")
+    if unit is not None and name in ("moma", "cloud", "masks"):
+        raise UsageError(f"--unit with format {name}", remedy="its lengths are metres")
+
+
+_OF_CLOUDS = ("outlines", "wall", "layer", "fields", "outline_sigma", "margin", "slab")

@@ -17,6 +17,13 @@ from archmodel.tables.entities import Entity, kind_named, kinds
 from mechanics.dynamics.progress import Listener, Progress, silent
 from moma.errors import NoDatabaseError, SurveyError, UsageError
 from pipelines.ingest.kind_rules import KindRule, apply_rules, check_kinds
+from pipelines.ingest.outlined import (
+    check_outline_rejects,
+    open_source,
+    outline_rejects,
+    outline_rejects_path,
+    read_files,
+)
 from pipelines.ingest.reading_options import Source, survey_sources
 from pipelines.ingest.records import frame_record, stone_record
 from pipelines.ingest.rejects import check_targets, default_path, rejects_text
@@ -24,7 +31,7 @@ from pipelines.ingest.relate import KnownSolids, relate
 from pipelines.ingest.report import IngestReport, Tally
 from pipelines.ingest.spool import Spool
 from survey.extrusion.extrusion import SurveyedBlock
-from survey.formats.reading import ReadingOptions, open_survey
+from survey.formats.reading import ReadingOptions
 from survey.records.survey import Reject
 from survey.stones import survey_stones
 
@@ -80,8 +87,15 @@ def ingest(
     if rules and format != "solids":
         remedy = "give it with --format solids; surveys give the kind of each stone"
         raise UsageError(f"a rule for solids with format {format}", where=rules[0].option, remedy=remedy)
-    targets = [rejects or default_path(survey) for survey in surveys]
-    if keep_going:
+    outlined = format in ("cloud", "masks")
+    targets = [
+        rejects or (outline_rejects_path(survey, options) if outlined else default_path(survey))
+        for survey in surveys
+    ]
+    if keep_going and outlined:
+        for target in targets:
+            check_outline_rejects(target)
+    elif keep_going:
         check_targets(targets, [file for one in sources for file in one.files])
     with ExitStack() as held:
         _open_if_there(url, held)
@@ -97,9 +111,11 @@ def ingest(
         for path, target, tally in zip(surveys, targets, tallies, strict=True):
             if tally.refused:
                 stations = _listed_stations(tally, options) if format in _LISTS else []
-                sheet = None if options is None else options.sheet
-                header = tally.stream.header
-                text = rejects_text(path, format, tally.refused, stations, header=header, sheet=sheet)
+                if outlined:
+                    text = outline_rejects(path, options, tally.refused)
+                else:
+                    header, sheet = tally.stream.header, options.sheet
+                    text = rejects_text(path, format, tally.refused, stations, header=header, sheet=sheet)
                 held.enter_context(_published(target, text))
         with open_database(url, lock_timeout=_PATIENCE) as database, database.session() as session:
             solids = KnownSolids()
@@ -136,6 +152,7 @@ def _check_codes(tallies: Sequence[Tally], spools: Sequence[Spool]) -> None:
 
 
 _LISTS = ("csv", "pnezd", "penzd", "gsi")
+_TABLES = (*_LISTS, "jobxml", "landxml", "geojson")
 
 
 def _listed_stations(tally: Tally, options: ReadingOptions | None) -> list[int]:
@@ -156,18 +173,14 @@ def _measure(
 ) -> Tally:
     """Write the good stones of one file into a spool; raise at the first bad one, or keep it for the rejects."""
     path = source.path
-    tally = Tally(
-        path,
-        survey_stones(open_survey(path, format, source.options(options))),
-        source.files,
-        options or ReadingOptions(),
-    )
+    stream = survey_stones(open_source(source, format, options, progress))
+    tally = Tally(path, stream, read_files(source, options), options or ReadingOptions())
     stage, head, kinds = f"fit {path.name}", tally.stream.head, set[str]()
     for one in tally.stream.stones:
         made = (
             one
             if isinstance(one, Reject)
-            else _of_known_kind(apply_rules(one, rules), head.path, kinds, format not in ("moma", "solids"))
+            else _of_known_kind(apply_rules(one, rules), head.path, kinds, format in _TABLES)
         )
         if not isinstance(made, Reject):
             tally.count(made)
@@ -181,7 +194,7 @@ def _measure(
         first = f"; the first: {tally.refused[0].error}" if tally.refused else ""
         what = f"none of its {len(tally.refused)} stones can be ingested{first}"
         raise SurveyError(what, where=str(path), remedy="correct the file")
-    if format not in ("moma", "solids") and (question := tally.unit_question()) is not None:
+    if format in _TABLES and (question := tally.unit_question()) is not None:
         what, _, remedy = question.partition(": ")
         raise SurveyError(what, where=str(path), remedy=f"{remedy}, or --unit m if they are that large")
     return tally

@@ -12,7 +12,13 @@ from survey.formats.tables.kinds import read_kinds
 
 __all__ = ["UNITS", "Source", "format_of_all", "reading_options", "survey_sources"]
 
-_ENDINGS: Mapping[str, tuple[str, ...]] = {**ENDINGS, "pnezd": (".txt", ".csv"), "penzd": (".txt", ".csv")}
+_ENDINGS: Mapping[str, tuple[str, ...]] = {
+    **ENDINGS,
+    "pnezd": (".txt", ".csv"),
+    "penzd": (".txt", ".csv"),
+    "cloud": (".las", ".laz", ".e57", ".ply", ".xyz", ".pts"),
+    "masks": (".png", ".tif", ".tiff", ".json"),
+}
 """Endings of the files that are read of a folder, by format."""
 
 
@@ -47,7 +53,7 @@ def format_of_all(paths: Sequence[str | Path]) -> str:
 
 @dataclass(frozen=True)
 class Source:
-    """One survey: a file, or several files of solids.
+    """One survey: a file, or several files of solids or of a point cloud.
 
     Attributes
     ----------
@@ -65,7 +71,7 @@ class Source:
 
 
 def survey_sources(paths: Sequence[str | Path], format: str) -> tuple[Source, ...]:
-    """Group files into surveys: all files of solids are one, of other formats each is one.
+    """Group files into surveys: all files of solids, or of a cloud, are one; of other formats each is one.
 
     Parameters
     ----------
@@ -88,7 +94,7 @@ def survey_sources(paths: Sequence[str | Path], format: str) -> tuple[Source, ..
         if file.resolve() in seen:
             raise UsageError("is given twice", where=str(file), remedy="name each survey file once")
         seen.add(file.resolve())
-    if format != "solids":
+    if format not in ("solids", "cloud"):
         return tuple(Source(file, (file,)) for file in files)
     if len(paths) == 1 or len({file.parent for file in files}) > 1:
         return (Source(Path(paths[0]), tuple(files)),)

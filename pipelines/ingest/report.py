@@ -14,6 +14,7 @@ from survey.extrusion.extrusion import SurveyedBlock
 from survey.formats.options import ReadingOptions
 from survey.geometry.convexity import is_convex
 from survey.quality.plausible import LENGTH, doubt_of, lies_on_its_side
+from survey.records.review import Doubtful
 from survey.records.snapping import Snapping
 from survey.records.survey import Reject
 from survey.stones import SurveyedStream
@@ -75,6 +76,7 @@ class FileReport:
     doubts : sizes that hardly any stone has, in words, by stone code
     reading : how the file was read, in words
     questions : what the file as a whole makes doubtful, with the option that would answer it
+    review : of outlines, what to look at
     """
 
     path: str
@@ -93,6 +95,7 @@ class FileReport:
     doubts: dict[str, str] = field(default_factory=dict)
     reading: tuple[str, ...] = ()
     questions: tuple[str, ...] = ()
+    review: tuple[Doubtful, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -184,6 +187,7 @@ class Tally:
             doubts=self.doubts,
             reading=self.stream.remarks,
             questions=tuple(self._questions()),
+            review=self.stream.review,
         )
 
     def unit_question(self) -> str | None:

@@ -49,6 +49,7 @@ UNFINISHED_ASSESSMENT, UNFINISHED_DIAGNOSIS = "unfinished-assessment", "unfinish
 _INDEXES = (
     RUN_INDEX,
     "check.json",
+    "cloud.json",
     "survey.json",
     "assessment.json",
     "comparison.json",

@@ -29,6 +29,7 @@ from pipelines.samples.causes import (
     Cause,
     tower_settled,
 )
+from pipelines.samples.scan import Scan, scan_window
 from pipelines.samples.true_movement import true_movement
 from survey.records.survey import SolidRecord, Survey
 
@@ -49,12 +50,14 @@ class Sample:
     truth : JSON text: the true geometry of every stone
     knowledge : TOML text: what is known besides the geometry; empty if nothing
     modelled : stones that are not in the survey, as closed solids
+    scan : a scan of the same stones, with drawn outlines
     """
 
     survey: Survey
     truth: str
     knowledge: str = ""
     modelled: tuple[SolidRecord, ...] = ()
+    scan: Scan | None = None
 
 
 @dataclass(frozen=True)
@@ -68,6 +71,7 @@ class Recipe:
     make : the generator, told of every step of a simulation; the sample is the same each time
     core : whether a core between two facings has to be proposed before the scene is run
     cause : of the movement of a building that has moved
+    scan : whether it comes with a scan
     """
 
     title: str
@@ -75,6 +79,7 @@ class Recipe:
     make: Callable[[Listener], Sample]
     core: bool = False
     cause: Cause | None = None
+    scan: bool = False
 
 
 def recipe_of(
@@ -83,6 +88,7 @@ def recipe_of(
     moved: str | None = None,
     small: bool = False,
     phases: bool = False,
+    scan: bool = False,
     courses: int | None = None,
 ) -> Recipe:
     """Look up a sample.
@@ -93,6 +99,7 @@ def recipe_of(
     moved : cause of its movement; None: it stands as built
     small : a smaller building, plainer
     phases : its upper courses were laid after it moved
+    scan : it was scanned too, and outlines were drawn
     courses : number of courses of the tower; None: 40, or 12 of a small one
 
     Raises
@@ -101,6 +108,7 @@ def recipe_of(
         if there is no such sample
     """
     options = [f"--moved {moved}"] * (moved is not None) + ["--small"] * small + ["--phases"] * phases
+    options += ["--scan"] * scan
     name = " ".join([kind, *options])
     if kind in _RENAMED:
         raise UsageError(f"no sample {kind!r} any more", remedy=f"it is now: moma sample {_RENAMED[kind]}")
@@ -178,6 +186,11 @@ text = "the rib vault, after the walls"
 def _window() -> Sample:
     sample = make_window()
     return Sample(sample.survey, truth_text(sample))
+
+
+def _scanned_window() -> Sample:
+    sample = make_window()
+    return Sample(sample.survey, truth_text(sample), scan=scan_window(sample))
 
 
 def _rib_vault() -> Sample:
@@ -348,6 +361,7 @@ SAMPLES: Mapping[str, Recipe] = MappingProxyType(
         "wall --moved thrust": _moved("Wall that the thrust of a vault has pushed out", PUSHED),
         "wall --moved earthquake": _moved("Small wall shaken by an earthquake pulse", SHAKEN),
         "window": Recipe("Window bay", "course = 1", lambda _: _window()),
+        "window --scan": Recipe("Window bay", "course = 1", lambda _: _scanned_window(), scan=True),
     }
 )
 """All samples by what is written after `moma sample`."""

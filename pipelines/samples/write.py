@@ -9,7 +9,9 @@ from mechanics.dynamics.progress import Listener, silent
 from moma.errors import UsageError, storing
 from pipelines.samples.causes import PULSE, Cause
 from pipelines.samples.samples import Recipe, recipe_of
+from pipelines.samples.scan import Scan, outlines_text, write_masks, write_scan
 from survey.arrays import Array
+from survey.clouds.wall import Wall, wall_lines
 from survey.formats.native.writer import write_head, write_moma
 from survey.formats.solids.obj_writer import write_obj
 
@@ -81,6 +83,7 @@ friction = 0.6
 normal_stiffness = {across:g}  # Pa/m
 shear_stiffness = {along:g}
 """
+_SCANNED = ("scan.laz", "stones.geojson", "wall.toml", "head.moma", "masks.png")  # files of a scan
 _HEAD = "head.moma"  # header file of closed solids
 _LONGEST = 3.0  # duration of the scene of a building that has moved [s]
 
@@ -154,15 +157,17 @@ def write_sample(
     moved: str | None = None,
     small: bool = False,
     phases: bool = False,
+    scan: bool = False,
     courses: int | None = None,
 ) -> WrittenSample:
     """Write KIND.moma, truth.json and KIND.toml into a folder, created if necessary.
 
-    Some come with knowledge.toml, with solids.obj and its head.moma, or with diagnosis.toml.
+    Some come with knowledge.toml, with solids.obj and its head.moma, with diagnosis.toml, or with scan.laz, the
+    outlines stones.geojson, the frame wall.toml and head.moma.
 
     Parameters
     ----------
-    kind, moved, small, phases, courses : as of `recipe_of`
+    kind, moved, small, phases, scan, courses : as of `recipe_of`
     folder : in which none of these files exists; created if necessary
     progress : called at every step of the simulation that moves the stones of some
 
@@ -173,7 +178,7 @@ def write_sample(
     StorageError
         if the disk is full, for example; none of the files is left then
     """
-    recipe = recipe_of(kind, moved=moved, small=small, phases=phases, courses=courses)
+    recipe = recipe_of(kind, moved=moved, small=small, phases=phases, scan=scan, courses=courses)
     cause = recipe.cause
     survey, scene, truth = folder / f"{kind}.moma", folder / f"{kind}.toml", folder / "truth.json"
     diagnosis = None if cause is None else folder / "diagnosis.toml"
@@ -188,7 +193,9 @@ def write_sample(
         texts[diagnosis] = _diagnosis(kind, recipe.fixed, cause, commands)
     if knowledge is not None:
         texts[knowledge] = sample.knowledge
-    extra = () if solids is None else (solids, solids.with_name(_HEAD))
+    extra: tuple[Path, ...] = () if solids is None else (solids, solids.with_name(_HEAD))
+    if sample.scan is not None:
+        extra = tuple(folder / name for name in _SCANNED)
     _must_be_new(*texts, *extra)
     paths = (survey, *texts, *extra)
     with storing(str(folder)):
@@ -201,6 +208,8 @@ def write_sample(
                 write_obj(sample.modelled, solids)
                 head = sample.survey.head
                 write_head(replace(head, name=f"{head.name}, closed solids"), solids.with_name(_HEAD))
+            if sample.scan is not None:
+                _write_scan(sample.scan, folder)
     files = tuple(map(str, paths))
     stones = len(sample.survey.blocks) + len(sample.modelled)
     return WrittenSample(kind, recipe.title, stones, files, commands)
@@ -215,6 +224,16 @@ def _all_or_none(paths: Sequence[Path]) -> Iterator[None]:
         for path in paths:
             path.unlink(missing_ok=True)
         raise
+
+
+def _write_scan(scan: Scan, folder: Path) -> None:
+    cloud, outlines, frame, head, masks = (folder / name for name in _SCANNED)
+    write_scan(scan, cloud)
+    write_masks(scan, masks)
+    outlines.write_text(outlines_text(scan), encoding="utf-8", newline="\n")
+    wall = Wall(scan.bay.frame.origin, scan.bay.frame.axes)
+    frame.write_text(wall_lines(wall), encoding="utf-8", newline="\n")
+    write_head(replace(scan.bay.survey.head, name=f"{scan.bay.survey.head.name}, scanned"), head)
 
 
 def _must_be_new(*paths: Path) -> None:
@@ -353,7 +372,12 @@ def _commands(
     diagnosis: Path | None,
 ) -> Iterator[str]:
     database = f"--db sqlite:///{survey.with_suffix('.db')}"
-    yield f"moma ingest {survey} {database}"
+    if recipe.scan:
+        cloud, outlines, frame, head, _ = (survey.with_name(name) for name in _SCANNED)
+        drawn = f"--outlines {outlines} --wall {frame} --header {head}"
+        yield f"moma ingest --cloud {cloud} {drawn} --sigma 0.0015 {database}"
+    else:
+        yield f"moma ingest {survey} {database}"
     if solids is not None:
         yield f"moma ingest {solids} --format solids --header {solids.with_name(_HEAD)} {database}"
     if knowledge is not None:

@@ -7,6 +7,7 @@ import numpy as np
 
 from moma.errors import MomaError, SurveyError
 from survey.arrays import Array
+from survey.records.review import Doubtful
 from survey.records.snapping import Snapping
 
 __all__ = [
@@ -327,6 +328,7 @@ class SurveyStream:
     snapping : of solids, the changes that brought their faces into common planes; None if not asked for
     header : number of the lines at its beginning that hold for all stones
     remarks : on how the file was read, in words
+    review : of outlines, what to look at
     """
 
     head: SurveyHead
@@ -334,6 +336,7 @@ class SurveyStream:
     snapping: Snapping | None = None
     header: int = 0
     remarks: tuple[str, ...] = ()
+    review: tuple[Doubtful, ...] = ()
 
 
 @dataclass(frozen=True)

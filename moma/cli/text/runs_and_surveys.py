@@ -1,5 +1,7 @@
 """Reports of `moma ingest`, `run` and `survey-report` as text."""
 
+from collections import Counter
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from moma.cli.text.formats import shorten, some
@@ -8,6 +10,7 @@ if TYPE_CHECKING:
     from pipelines.ingest.report import IngestReport, SolidsReport
     from pipelines.reports.survey.report import SurveyReport
     from pipelines.run.run import RunReport
+    from survey.records.review import Doubtful
 
 __all__ = ["ingest_lines", "profile_lines", "run_lines", "survey_report_lines"]
 
@@ -42,11 +45,21 @@ def ingest_lines(report: "IngestReport", verbose: bool) -> list[str]:
             lines += [f"  {code}: {text}" for code, text in file.shapes.items()]
         if file.solids is not None:
             lines += _solid_lines(file.solids, verbose)
+        if file.review:
+            lines += _review_lines(file.review, verbose)
         if file.refused:
             lines.append(f"  {len(file.refused)} stones rejected, to be corrected in {file.rejects}:")
             reasons = [f"    {one.reason}" for one in file.refused]
             lines += reasons if verbose else shorten(reasons, 5, "    ")
     return lines
+
+
+def _review_lines(review: "Sequence[Doubtful]", verbose: bool) -> list[str]:
+    """Describe the outlines that should be looked at."""
+    counts = Counter(one.reason for one in review)
+    lines = [f"  look at {len(review)}: {', '.join(f'{count} {reason}' for reason, count in counts.items())}"]
+    texts = [f"    {one.code or one.where}: {one.reason}: {one.text}" for one in review]
+    return lines + (texts if verbose else shorten(texts, 5, "    ", ", with -v or in --review FILE"))
 
 
 def _solid_lines(solids: "SolidsReport", verbose: bool) -> list[str]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mechanics.arrays import Array
+from pipelines.draw.elevations.orthophoto import Orthophoto
 from pipelines.draw.elevations.sheet import (
     CODES,
     FLAG,
@@ -36,10 +37,17 @@ __all__ = ["draw_departure", "draw_elevation", "draw_residuals"]
 _UNKNOWN = "#dcd9d4"
 _DIVERGING = "RdBu_r"  # blue behind, red in front: safe for colour-blind readers
 _LEAST = 1.0  # shortest scale of departures [mm]
+_OVER_PHOTO = 0.45  # opacity of stones on a photograph [-]
 _FINEST = 0.01  # shortest colour scale: smaller residuals are not worth a colour [mm]
 
 
-def draw_elevation(path: Path, facade: Facade, stones: Sequence[StoneQuality], flagged: set[str]) -> None:
+def draw_elevation(
+    path: Path,
+    facade: Facade,
+    stones: Sequence[StoneQuality],
+    flagged: set[str],
+    photo: Orthophoto | None = None,
+) -> None:
     """Draw the stones of a facade, coloured by the misfit of their planes; outline those to measure again.
 
     Parameters
@@ -48,6 +56,7 @@ def draw_elevation(path: Path, facade: Facade, stones: Sequence[StoneQuality], f
     facade : its stones are drawn, in its frame
     stones : all stones of the survey
     flagged : codes of stones to measure again
+    photo : of the wall, drawn under the stones
     """
     from matplotlib.collections import PolyCollection
 
@@ -62,6 +71,9 @@ def draw_elevation(path: Path, facade: Facade, stones: Sequence[StoneQuality], f
     faces = PolyCollection(
         polygons, array=rms, cmap=palette(_UNKNOWN), clim=(0.0, end), edgecolors=PALE, linewidths=fine
     )
+    if photo is not None:
+        photo.draw(axes, facade)
+        faces.set_alpha(_OVER_PHOTO)
     axes.add_collection(faces)
     marked = [polygon for polygon, one in zip(polygons, own, strict=True) if one.code in flagged]
     if marked:

@@ -8,11 +8,13 @@ from typing import Any
 
 from mechanics.dynamics.progress import Listener, Progress, silent
 from pipelines.draw.elevations.beds import draw_courses
+from pipelines.draw.elevations.orthophoto import Orthophoto, read_orthophoto
 from pipelines.draw.elevations.survey import draw_departure, draw_elevation, draw_residuals
 from pipelines.reports.survey.document import survey_json, write_survey_json
 from pipelines.reports.survey.page import write_survey_page
 from pipelines.reports.survey.study import SurveyStudy, study_surveys
 from pipelines.results.folder import check_replaceable, replacing, source_of
+from survey.clouds.settings import CloudOptions
 from survey.formats.options import ReadingOptions
 from survey.quality.masonry.index import Grade
 
@@ -48,6 +50,7 @@ def report_surveys(
     progress: Listener = silent,
     given: Mapping[str, Grade] | None = None,
     overwrite: bool = False,
+    orthophoto: str | Path | None = None,
 ) -> SurveyReport:
     """Judge survey files and write the report, which includes the stones that could not be made.
 
@@ -60,28 +63,37 @@ def report_surveys(
     progress : called at every stage
     given : grades of the masonry that no survey tells: "SM", the state of the stones, and "MM", the mortar
     overwrite : replace a report on other files in the folder
+    orthophoto : picture of a wall on which its elevation is drawn, with a world file and the wall's frame, FILE.toml
 
     Raises
     ------
-    UsageError : no such file or format; the folder holds other things, or a report on other files
+    UsageError : no such file or format; the folder holds other things, or a report on other files; nothing says where
+        the orthophoto lies
     SurveyError : a file that cannot be read at all, or control points that contradict each other
     """
     folder = Path(folder)
     source = [Path(one) for one in paths]
+    if isinstance(options, CloudOptions):
+        source.append(options.outlines)
     check_replaceable(folder, INDEX, () if overwrite else source)
+    photo = None if orthophoto is None else read_orthophoto(Path(orthophoto))
     study = study_surveys(paths, format, options or ReadingOptions(), progress, given)
     with replacing(folder, INDEX) as fresh:
-        content = write_survey_report(study, fresh, progress, source)
+        content = write_survey_report(study, fresh, progress, source, photo)
     return SurveyReport(folder, study, content)
 
 
 def write_survey_report(
-    study: SurveyStudy, folder: Path, progress: Listener = silent, source: Sequence[Path] = ()
+    study: SurveyStudy,
+    folder: Path,
+    progress: Listener = silent,
+    source: Sequence[Path] = (),
+    photo: Orthophoto | None = None,
 ) -> dict[str, Any]:
     """Write all files of a report into an empty folder; return survey.json without its parts."""
     release = version("moma-masonry")
     progress(Progress("write", 0, 3, "pictures"))
-    pictures = _draw(study, folder)
+    pictures = _draw(study, folder, photo)
     progress(Progress("write", 1, 3, "report.html"))
     write_survey_page(folder / "report.html", study, pictures, release)
     progress(Progress("write", 2, 3, INDEX))
@@ -93,14 +105,15 @@ def write_survey_report(
     return content
 
 
-def _draw(study: SurveyStudy, folder: Path) -> dict[str, str]:
+def _draw(study: SurveyStudy, folder: Path, photo: Orthophoto | None) -> dict[str, str]:
     """Draw the pictures; return captions by file name. Those of the first facade have no number."""
     captions = {}
     flagged = {one.code for one in study.again.rows if one.code is not None}
     for number, facade in enumerate(study.facades[:_FACADES], start=1):
         ending = ".png" if number == 1 else f"-{number}.png"
         name = f"elevation{ending}"
-        draw_elevation(folder / name, facade, study.stones, flagged)
+        under = photo if photo is not None and photo.shows(facade) else None
+        draw_elevation(folder / name, facade, study.stones, flagged, under)
         captions[name] = (
             f"{facade.name[:1].upper()}{facade.name[1:]}, seen from outside, coloured by the distance of the points of "
             "each stone from its plane. Stones with an orange outline are to be measured again."

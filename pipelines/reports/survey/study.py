@@ -11,10 +11,10 @@ from archmodel.tables.entities import kind_named
 from mechanics.arrays import Array
 from mechanics.dynamics.progress import Listener, Progress, silent
 from moma.errors import UsageError
+from pipelines.ingest.outlined import open_source
 from pipelines.ingest.reading_options import Source, survey_sources
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.formats.options import ReadingOptions
-from survey.formats.reading import open_survey
 from survey.quality.canon import Deviation, KindStandard, deviations, standards
 from survey.quality.contradictions import Contradiction, contradictions
 from survey.quality.corners import SeenFace, misplaced_corners
@@ -38,6 +38,7 @@ CHANCES = {"beds": 0.003, "faces": 0.003, "depths": 0.001}
 """Probability that a survey without fault or movement is given a finding of each sort."""
 
 _SOME_DEPTH = DepthRule(None, 0.3, None, "\0")  # no file can give this source
+_OF_PATCHES = "the sigma of each patch follows from the scatter of all, so that the scatter cannot check it"
 _INTERVAL = 200  # stones between two reports of progress
 
 
@@ -134,7 +135,10 @@ def study_surveys(
         before = len(stones), len(rejects)
         file = _read(source, format, options, stones, rejects, progress)
         files.append(replace(file, stones=len(stones) - before[0], rejects=len(rejects) - before[1]))
-    return _judge(tuple(files), tuple(stones), tuple(rejects), given or {}, progress)
+    study = _judge(tuple(files), tuple(stones), tuple(rejects), given or {}, progress)
+    if format != "cloud" or not stones:
+        return study
+    return replace(study, quality=replace(study.quality, verdict=_OF_PATCHES))
 
 
 def _read(
@@ -145,7 +149,7 @@ def _read(
     rejects: list[Reject],
     progress: Listener,
 ) -> SurveyFile:
-    stream = open_survey(source.path, format, source.options(options))
+    stream = open_source(source, format, options, progress)
     survey = survey_stones(replace(stream, head=_with_some_depth(stream.head)))
     for number, one in enumerate(survey.stones, start=1):
         if isinstance(one, Reject):

@@ -25,7 +25,7 @@ FORMER = {
     "tower-settled-small": "tower --moved settlement --small",
     "tower-small": "tower --small",
 }
-LARGE = {name for name, recipe in SAMPLES.items() if recipe.cause is not None} | {"tower"}
+LARGE = {name for name, recipe in SAMPLES.items() if recipe.cause is not None or recipe.scan} | {"tower"}
 
 
 def test_the_help_names_the_samples_and_the_causes_of_movement():

@@ -1,0 +1,1 @@
+"""Numba kernels of clouds: points into stones, and planes of their patches."""

@@ -1,0 +1,255 @@
+"""From a point cloud and outlines to the records of measured faces.
+
+Points of a stone lie within its outline, but for a margin, and within a slab along the line of sight. A robust plane is
+sought among them; each patch of the face then becomes one measured point, the mean of the cloud's points within three
+standard deviations of the patch's median. Its standard deviation comes from the scatter of the patches about a smooth
+surface, not from the number of points: neighbouring points of a scan share the stone's roughness and the scanner's
+errors. Patches that lie near each other may still tell the same; their correlation, which is estimated from all stones
+together, makes all of them less precise. So the covariance of the plane is what the usual fit finds
+(docs/design/clouds.md).
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from moma.errors import GeometryError, SurveyError, UsageError
+from survey.arrays import Array
+from survey.clouds._kernels.planes import COVERED, FEW, FINE, Rules, fit_patches, patch_sigmas
+from survey.clouds.collecting import Collected, collect_points
+from survey.clouds.outlines.reading import Drawing, read_outlines
+from survey.clouds.placing import PlacedOutline, facing_station, place_outlines
+from survey.clouds.points.reading import open_points
+from survey.clouds.review import drawn_doubts, measured_doubts
+from survey.clouds.settings import CloudOptions
+from survey.clouds.wall import Wall
+from survey.formats.fields import CODE
+from survey.records.review import Doubtful
+from survey.records.survey import OBSERVER, BlockRecord, Reject, Station, SurveyHead, SurveyStream
+
+__all__ = ["Progress", "first_codes", "open_cloud", "viewed"]
+
+Progress = Callable[[int, int | None], None]
+"""A function that is told how many points are read, and how many there are."""
+
+_WIDE = 3.0  # standard deviations of an outline within which its edge lies
+_NEAR = 4.0  # standard deviations of a point within which it lies on a plane
+_NEAREST = 0.008  # the same for a very precise scan: stones are rough [m]
+_BAND = 0.025  # roughness of a dressed face from its plane [m]
+_LEAST = 0.0001  # standard deviation of a patch: no scanner is better [m]
+_LARGEST_CORRELATION = 0.6  # of neighbouring patches: beyond, they are one
+_PRIOR = 50.0  # pairs of patches without correlation, as if they had been seen before
+_ROUNDS = 5  # until the correlation and what a fit takes of it agree
+_AWAY = 10.0  # distance of the viewer of an orthophoto from the wall [m]
+_ROOM = 0.25  # part of the width of a stone that margins may take
+
+
+def open_cloud(
+    files: Sequence[Path], options: CloudOptions, progress: Progress = lambda done, total: None
+) -> SurveyStream:
+    """Measure the stones of point clouds.
+
+    Parameters
+    ----------
+    files : the clouds, which are one survey together
+    options : outlines, and how they are used
+    progress : told of the points that are read
+
+    Returns
+    -------
+    SurveyStream : a stone whose points define no plane comes as a Reject; `review` lists what to look at
+
+    Raises
+    ------
+    UsageError, SurveyError
+        if a file cannot be read, or outlines and cloud lie apart
+    """
+    drawing = read_outlines(
+        options.outlines,
+        layer=options.layer,
+        chosen=options.chosen,
+        sigma=options.outline_sigma,
+        smooth=options.smooth,
+    )
+    if drawing.pixels:
+        remedy = "put its world file beside the picture (.pgw, .tfw), as moma cloud writes it"
+        raise UsageError("nothing says where the picture lies", where=str(drawing.path), remedy=remedy)
+    clouds = [open_points(path) for path in files]
+    head = options.head_for(options.outlines)
+    stations = head.stations or tuple(one for cloud in clouds for one in cloud.stations)
+    placed = place_outlines(drawing.outlines, options.wall, stations)
+    sigmas = np.array([_outline_sigma(one, drawing, options) for one in placed])
+    margins = _margins(placed, sigmas, options.margin)
+    collected = collect_points(clouds, placed, margins, options.slab, progress)
+    if not collected.inside:
+        raise _apart(clouds[0].near, placed, collected, options)
+    head = _seen(head, stations, placed, options.wall)
+    doubts = [warning for cloud in clouds for warning in cloud.warnings]
+    review = [Doubtful("", "precision", text, str(files[0])) for text in doubts]
+    review += drawn_doubts(placed, drawing)
+    stones = list(_stones(placed, sigmas, collected, head, options, files[0].name, review))
+    return SurveyStream(head, iter(stones), review=tuple(review))
+
+
+def _outline_sigma(one: PlacedOutline, drawing: Drawing, options: CloudOptions) -> float:
+    sigma = one.outline.said.sigma or options.outline_sigma
+    return max(sigma, drawing.pixel or 0.0)
+
+
+def _margins(placed: Sequence[PlacedOutline], sigmas: Array, margin: float | None) -> Array:
+    """Return the width along the edge of each stone that is left out, at most a quarter of a narrow stone."""
+    wanted = _WIDE * sigmas if margin is None else np.full(len(placed), margin)
+    width = np.array([float(np.ptp(one.ring, axis=0).min()) for one in placed])
+    return np.minimum(wanted, _ROOM * width)
+
+
+def _apart(
+    near: Array, placed: Sequence[PlacedOutline], collected: Collected, options: CloudOptions
+) -> SurveyError:
+    middle = np.mean([one.origin for one in placed], axis=0)
+    where = f"about ({', '.join(f'{one:.2f}' for one in middle)})"
+    cloud = f"about ({', '.join(f'{one:.2f}' for one in near)})"
+    what = f"none of its {collected.read} points lies in an outline: outlines lie {where}, the cloud {cloud}"
+    remedy = f"check --wall, the world file and units; points count up to {options.slab:g} m from the plane (--slab)"
+    return SurveyError(what, where=str(options.outlines), remedy=remedy)
+
+
+def viewed(head: SurveyHead, wall: Wall, middle: Array) -> SurveyHead:
+    """Return a head whose observer stands before a wall, unless it has stations already."""
+    if head.stations:
+        return head
+    return replace(head, stations=(Station(OBSERVER, middle + _AWAY * wall.axes[2]),))
+
+
+def _seen(
+    head: SurveyHead, stations: Sequence[Station], placed: Sequence[PlacedOutline], wall: Wall | None
+) -> SurveyHead:
+    if wall is not None and all(one.axes is wall.axes for one in placed):
+        return viewed(head, wall, np.mean([one.origin for one in placed], axis=0))
+    return replace(head, stations=tuple(stations))
+
+
+def first_codes(codes: Sequence[str]) -> list[int]:
+    """Return for each code the place of the first that is the same."""
+    seen: dict[str, int] = {}
+    return [seen.setdefault(code, k) for k, code in enumerate(codes)]
+
+
+@dataclass(frozen=True)
+class _Fitted:
+    """Patches of a face: `fit_patches` of its samples."""
+
+    status: int
+    rows: Array
+    cells: Array
+    plane: Array
+    numbers: Array
+
+    @property
+    def noise(self) -> float:
+        """Standard deviation of a single point [m]."""
+        return float(self.numbers[0])
+
+
+def _correlation(fitted: Sequence[_Fitted]) -> float:
+    """Return the correlation of neighbouring patches, the mean over the pairs of all faces.
+
+    That of a single face is known to a tenth or two only, too little to be used for it alone. A fit takes away the
+    elements of its hat matrix times the factor by which correlation makes a mean less precise, which is
+    1 + Σ r^d over the patches around, 1 + 4 r + 4 r^√2 + 4 r² + … in the middle of a large face.
+    """
+    products, hat, pairs = sum(
+        (one.numbers[4:7] for one in fitted if one.status == FINE), np.array([0, 0, _PRIOR])
+    )
+    correlation = 0.0
+    for _ in range(_ROUNDS):
+        factor = 1.0 + 4.0 * (correlation + correlation**1.414 + correlation**2) + 8.0 * correlation**2.236
+        correlation = min(max((products + factor * hat) / pairs, 0.0), _LARGEST_CORRELATION)
+    return float(correlation)
+
+
+def _stones(
+    placed: Sequence[PlacedOutline],
+    sigmas: Array,
+    collected: Collected,
+    head: SurveyHead,
+    options: CloudOptions,
+    name: str,
+    review: list[Doubtful],
+) -> Iterator[BlockRecord | Reject]:
+    rules = Rules(max(_NEAR * options.sigma, _NEAREST), max(_BAND, _NEAR * options.sigma), _LEAST)
+    fitted = [_Fitted(*fit_patches(*collected.of(k), rules)) for k in range(len(placed))]
+    correlation = _correlation(fitted)
+    first = first_codes([one.outline.code for one in placed])
+    for k, one in enumerate(placed):
+        try:
+            if first[k] != k:
+                earlier = placed[first[k]].outline.where
+                what, remedy = f"a second stone {one.outline.code}", f"the first is {earlier}"
+                raise SurveyError(what, where=one.outline.where, remedy=remedy)
+            if CODE.fullmatch(one.outline.code) is None:
+                what, remedy = f"code {one.outline.code!r}", "begin it with a letter or digit"
+                raise SurveyError(what, where=one.outline.where, remedy=remedy)
+            if fitted[k].status != FINE:
+                raise _no_plane(fitted[k], one, options)
+            review += measured_doubts(one, fitted[k].plane, fitted[k].numbers)
+            station = None if options.wall is not None else facing_station(one.origin, head.stations)
+            record = _record(one, float(sigmas[k]), fitted[k], correlation, options)
+            notes = {"cloud": name, **record.notes}
+            yield replace(record, notes=notes, station=None if station is None else station.name)
+        except (SurveyError, GeometryError) as error:
+            review.append(Doubtful(one.outline.code, "rejected", error.what, one.outline.where))
+            yield Reject(one.outline.code, error, (_span(one),))
+
+
+def _record(
+    one: PlacedOutline, sigma: float, fitted: _Fitted, correlation: float, options: CloudOptions
+) -> BlockRecord:
+    """Make the record of a stone whose plane is found."""
+    said, rows = one.outline.said, fitted.rows
+    patch_sigma, worth = patch_sigmas(rows, fitted.cells, fitted.numbers, correlation)
+    local = np.column_stack([one.ring, one.ring @ fitted.plane[:2] + fitted.plane[2]])
+    sigmas = np.concatenate([np.maximum(patch_sigma, _LEAST), np.full(len(local), sigma)])
+    clear, count = fitted.numbers[2:4].tolist()
+    notes = {
+        "points": f"{int(count)} in {len(rows)} patches, as good as {worth:.0f} independent ones",
+        "noise": f"{fitted.noise * 1e3:.1f} mm for one point; {clear:.0%} of the patches are clear, neighbours "
+        f"correlated by {correlation:.2f}",
+    }
+    if said.score is not None:
+        notes["score"] = f"{said.score:g}"
+    return BlockRecord(
+        code=one.outline.code,
+        kind=said.kind or options.kind,
+        course=said.course,
+        vertices=one.origin + local @ one.axes,
+        points=one.origin + rows[:, :3] @ one.axes,
+        sigma=float(np.sqrt((sigmas**2).mean())),
+        depth=said.depth,
+        depth_sigma=said.depth_sigma,
+        depth_source=None if said.depth is None else f"attribute of {one.outline.where}",
+        line=one.outline.number,
+        notes={**said.notes, **notes},
+        zone=said.zone,
+        sigmas=sigmas,
+        spans=(_span(one),),
+    )
+
+
+def _span(one: PlacedOutline) -> range:
+    return range(one.outline.number, one.outline.number + 1)
+
+
+def _no_plane(fitted: _Fitted, one: PlacedOutline, options: CloudOptions) -> GeometryError:
+    count = int(fitted.numbers[3])
+    if fitted.status == FEW:
+        what = f"too few points: {count} within its outline and {options.slab:g} m of its plane"
+        remedy = "check its place, or scan it; margins are set with --margin, the slab with --slab"
+    elif fitted.status == COVERED:
+        what = f"no plane: {count} points, most of which lie before or behind each other"
+        remedy = "check the outline; something may cover the stone"
+    else:
+        what, remedy = f"no plane: {count} points on a line", "check the outline"
+    return GeometryError(what, where=one.outline.where, remedy=remedy)

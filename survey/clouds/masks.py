@@ -1,0 +1,123 @@
+"""From masks alone to the records of faces: one plane face for each stone of a picture, at a stated scale."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from moma.errors import SurveyError, UsageError
+from survey.arrays import Array
+from survey.clouds.cloud import first_codes, viewed
+from survey.clouds.outlines.outline import Outline
+from survey.clouds.outlines.reading import Drawing, read_outlines
+from survey.clouds.review import flat_doubts
+from survey.clouds.settings import MaskOptions
+from survey.clouds.wall import Wall
+from survey.clouds.world import PixelPlace
+from survey.records.review import Doubtful
+from survey.records.survey import BlockRecord, DepthRule, Reject, SurveyHead, SurveyStream
+
+__all__ = ["open_masks"]
+
+_STRETCHED = 0.02  # by which the two sides of a pixel may differ before it is doubtful [-]
+_UPRIGHT = Wall(np.zeros(3), np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]))
+_SOURCE = "stated for all masks"
+
+
+def open_masks(path: Path, options: MaskOptions) -> SurveyStream:
+    """Make faces of the masks of a picture.
+
+    Parameters
+    ----------
+    path : picture of labels, or COCO's JSON
+    options : its size, and the depth of the stones
+
+    Returns
+    -------
+    SurveyStream : plane faces, whose corners are as precise as a pixel; `review` lists what to look at
+
+    Raises
+    ------
+    UsageError, SurveyError
+        if the picture cannot be read, or its scale is not known
+    """
+    drawing = read_outlines(path, chosen=options.chosen, smooth=options.smooth)
+    places, stretched = _places(drawing, options)
+    outlines = drawing.outlines
+    if places is not None:
+        outlines = tuple(replace(one, corners=places.place(one.corners)) for one in outlines)
+    pixel = places.pixel if places is not None else drawing.pixel
+    wall = options.wall or _UPRIGHT
+    head = options.head_for(path)
+    if options.depth is not None:
+        head = replace(head, depth_rules=(*head.depth_rules, DepthRule(None, options.depth, None, _SOURCE)))
+    middle = wall.origin + np.mean([one.corners.mean(axis=0) for one in outlines], axis=0) @ wall.axes[:2]
+    head = viewed(head, wall, middle)
+    review = [*stretched, *flat_doubts(outlines, [one.corners for one in outlines], drawing)]
+    return SurveyStream(
+        head, iter(list(_stones(outlines, wall, pixel or options.sigma, options, head))), review=tuple(review)
+    )
+
+
+def _places(drawing: Drawing, options: MaskOptions) -> tuple[PixelPlace | None, list[Doubtful]]:
+    """Return the scale of a picture that has no place of its own, and whether its pixels are not square."""
+    if options.size is None:
+        if drawing.pixels:
+            what, remedy = "the size of the picture is not known", "give it in metres, e.g. --size 1.0x1.2"
+            raise UsageError(what, where=str(drawing.path), remedy=remedy)
+        return None, []
+    if not drawing.pixels or drawing.size is None:
+        what = (
+            "--size with outlines in metres"
+            if not drawing.pixels
+            else "the file does not say how large its picture is"
+        )
+        remedy = (
+            "leave --size out" if not drawing.pixels else "give width and height of the image in the JSON"
+        )
+        raise UsageError(what, where=str(drawing.path), remedy=remedy)
+    (columns, rows), (width, height) = drawing.size, options.size
+    across, up = width / columns, height / rows
+    places = PixelPlace(np.diag([across, -up]), np.array([0.5 * across, height - 0.5 * up]))
+    if abs(across / up - 1.0) <= _STRETCHED:
+        return places, []
+    text = f"{columns} × {rows} pixels are {width:g} × {height:g} m: pixels of {across * 1e3:.2f} by {up * 1e3:.2f} mm"
+    return places, [Doubtful("", "stretched", text, str(drawing.path))]
+
+
+def _stones(
+    outlines: tuple[Outline, ...], wall: Wall, pixel: float, options: MaskOptions, head: SurveyHead
+) -> Iterator[BlockRecord | Reject]:
+    first = first_codes([one.code for one in outlines])
+    for k, one in enumerate(outlines):
+        span = (range(one.number, one.number + 1),)
+        if first[k] != k:
+            remedy = f"the first is {outlines[first[k]].where}"
+            error = SurveyError(f"a second stone {one.code}", where=one.where, remedy=remedy)
+            yield Reject(one.code, error, span)
+            continue
+        said = one.said
+        notes = dict(said.notes) | {"mask": f"outline of a picture with pixels of {pixel * 1e3:.1f} mm"}
+        if said.score is not None:
+            notes["score"] = f"{said.score:g}"
+        yield BlockRecord(
+            code=one.code,
+            kind=said.kind or options.kind,
+            course=said.course,
+            vertices=_in_space(one.corners, wall),
+            points=np.empty((0, 3)),
+            sigma=max(pixel, said.sigma or 0.0),
+            depth=said.depth,
+            depth_sigma=said.depth_sigma,
+            depth_source=None if said.depth is None else f"attribute of {one.where}",
+            line=one.number,
+            notes=notes,
+            zone=said.zone,
+            spans=span,
+        )
+
+
+def _in_space(corners: Array, wall: Wall) -> Array:
+    out: Array = wall.origin + corners @ wall.axes[:2]
+    return out

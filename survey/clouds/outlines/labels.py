@@ -1,0 +1,206 @@
+"""Label pictures: PNG or TIFF with one number or colour for each stone, or stones in white and mortar in black."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from moma.errors import SurveyError
+from survey.arrays import Array
+from survey.clouds.outlines.outline import Attributes, Outline
+from survey.clouds.outlines.tracing import few_corners, ring_area, trace
+from survey.clouds.world import PixelPlace, world_of
+
+__all__ = ["Labels", "outlines_of", "read_labels"]
+
+_LARGEST = 2**24  # number of a stone: as many as there are colours
+_GREY = 0.02  # share of pixels that are neither black nor white in a picture of two colours: blurred edges
+_DARK, _WHITE = 32, 223  # of 255
+_SPECK = 0.02  # area of a piece over the median of all below which it is a speck, not a stone [-]
+_SMALLEST = 12  # pixels of the smallest piece that can be a stone
+_WHOLE = 0.95  # share of the largest piece above which the others are specks
+
+
+@dataclass(frozen=True)
+class Labels:
+    """Stones of a picture by number.
+
+    Attributes
+    ----------
+    path : the file
+    numbers : (h, w) number of the stone of each pixel; 0: mortar
+    values : number of each stone in the picture, by its number here; None if stones were numbered here
+    specks : number of pieces that were too small for a stone
+    places : from pixels to metres of the wall; None if the file does not say
+    """
+
+    path: Path
+    numbers: NDArray[np.int32]
+    values: NDArray[np.int64] | None
+    specks: int
+    places: PixelPlace | None
+
+
+def read_labels(path: Path) -> Labels:
+    """Read a picture of labels.
+
+    A picture with blacks and whites alone has stones in white and mortar in black, and each piece of white is a stone.
+    In any other, each number or colour is a stone, and 0 or black is mortar.
+
+    Raises
+    ------
+    SurveyError
+        if it cannot be read, or has no stones
+    """
+    pixels, tags = _pixels(path)
+    places = world_of(path, tags)
+    two = _two_colours(pixels)
+    if two is not None:
+        numbers, specks = _pieces(two)
+        if not numbers.any():
+            raise SurveyError("no white piece is large enough for a stone", where=str(path), remedy=_REMEDY)
+        return Labels(path, numbers, None, specks, places)
+    colours = pixels.ndim == 3
+    flat = _colour_numbers(pixels) if colours else pixels
+    values, numbers = _ranked(flat, path)
+    if len(values) < 2 or values[0] != 0:
+        raise SurveyError(f"{len(values)} numbers and no 0 among them", where=str(path), remedy=_REMEDY)
+    return Labels(path, numbers, None if colours else values, 0, places)
+
+
+_REMEDY = "a picture of labels has stones in white and mortar in black, or one number for each stone and 0 for mortar"
+
+
+def outlines_of(labels: Labels, tolerance: float) -> Iterator[Outline]:
+    """Trace the stones of a picture.
+
+    Parameters
+    ----------
+    labels : the picture
+    tolerance : largest distance of the boundary of a stone from the sides of its outline [px]
+
+    Yields
+    ------
+    outlines in pixels: column and row, whole at the middle of a pixel
+    """
+    from scipy.ndimage import find_objects
+
+    for number, box in enumerate(find_objects(labels.numbers), start=1):
+        if box is None:
+            continue
+        mask = labels.numbers[box] == number
+        if np.count_nonzero(mask) < _SMALLEST:
+            continue
+        own = number if labels.values is None else int(labels.values[number])
+        where = f"{labels.path}, label {own}"
+        outline = outline_of_mask(number, mask, (box[1].start, box[0].start), tolerance, where)
+        if outline is not None:
+            yield replace(outline, code=f"S{own:03d}")
+
+
+def outline_of_mask(
+    number: int,
+    mask: NDArray[np.bool_],
+    corner: tuple[int, int],
+    tolerance: float,
+    where: str,
+    said: Attributes | None = None,
+) -> Outline | None:
+    """Trace a mask, whose upper left pixel has this column and row; None if it has no area."""
+    ring, pieces, share = trace(mask)
+    if len(ring) < 3 or abs(ring_area(ring)) < 1.0:
+        return None
+    doubts = []
+    if share < _WHOLE:
+        doubts.append(("in pieces", f"{pieces} pieces; the largest, with {share:.0%} of the area, is taken"))
+    corners = few_corners(ring, tolerance) + corner
+    return Outline(number, f"S{number:03d}", corners, said or Attributes(), where, tuple(doubts))
+
+
+def _pixels(path: Path) -> tuple[NDArray[Any], dict[int, tuple[float, ...]]]:
+    """Return the pixels of a picture, (h, w) or (h, w, 3), and the tags that say where they lie."""
+    from PIL import Image
+
+    limit = Image.MAX_IMAGE_PIXELS
+    try:
+        Image.MAX_IMAGE_PIXELS = None  # pictures of walls are large, and come from the user
+        with Image.open(path) as picture:
+            found = getattr(picture, "tag_v2", {})
+            tags = {tag: tuple(found[tag]) for tag in (33550, 33922, 34264) if tag in found}
+            plain = {"RGBA": "RGB", "PA": "RGB", "CMYK": "RGB", "YCbCr": "RGB", "LA": "L"}.get(picture.mode)
+            return np.asarray(picture if plain is None else picture.convert(plain)), tags
+    except (OSError, ValueError, SyntaxError) as error:
+        what = f"cannot be read as a picture: {' '.join(str(error).split())[:120]}"
+        raise SurveyError(what, where=str(path), remedy="save it as PNG or TIFF") from error
+    finally:
+        Image.MAX_IMAGE_PIXELS = limit
+
+
+def _two_colours(pixels: NDArray[Any]) -> NDArray[np.bool_] | None:
+    """Return where a picture of black and white is white; None if it has other colours."""
+    if pixels.dtype == np.bool_:
+        return pixels.astype(np.bool_)
+    if pixels.dtype != np.uint8:
+        values = np.unique(pixels)
+        return np.asarray(pixels != 0) if len(values) == 2 and values[0] == 0 else None
+    grey = pixels if pixels.ndim == 2 else pixels[..., :3].max(axis=2)
+    if pixels.ndim == 3 and int((grey - pixels[..., :3].min(axis=2)).max()) > 16:
+        return None
+    counts = np.bincount(grey.ravel(), minlength=256)
+    used = np.flatnonzero(counts)
+    if len(used) == 2 and used[0] == 0:
+        return np.asarray(grey > 0)
+    between = counts[_DARK : _WHITE + 1].sum() / grey.size
+    if used[-1] > _WHITE and between < _GREY and counts[:_DARK].sum() and counts[_WHITE:].sum():
+        # labels that are counted from 1 fill the dark range without ever being white
+        return np.asarray(grey > 127) if counts[1:_DARK].sum() < 0.5 * counts[_WHITE:].sum() else None
+    return None
+
+
+def _pieces(white: NDArray[np.bool_]) -> tuple[NDArray[np.int32], int]:
+    """Number the pieces of white from the ground up, row by row, and leave specks out."""
+    from scipy.ndimage import find_objects, label
+
+    numbers, count = label(white)
+    sizes = np.bincount(numbers.ravel(), minlength=count + 1)
+    sizes[0] = 0
+    fine = sizes >= _SMALLEST
+    if fine.any():
+        fine &= sizes >= max(_SMALLEST, _SPECK * float(np.median(sizes[fine])))
+    boxes = find_objects(numbers)
+    good = np.flatnonzero(fine)
+    middles = np.array([[0.5 * (boxes[k - 1][a].start + boxes[k - 1][a].stop) for a in (0, 1)] for k in good])
+    order = _rows_from_below(middles, np.array([boxes[k - 1][0].stop - boxes[k - 1][0].start for k in good]))
+    renumbered = np.zeros(count + 1, dtype=np.int32)
+    renumbered[good[order]] = np.arange(1, len(good) + 1)
+    return renumbered[numbers], int(np.count_nonzero(sizes)) - len(good)
+
+
+def _rows_from_below(middles: Array, heights: Array) -> NDArray[np.intp]:
+    """Order places (row, column) in rows of about a stone's height, from the lowest, each from left to right."""
+    if not len(middles):
+        return np.empty(0, dtype=np.intp)
+    row = np.floor((middles[:, 0].max() - middles[:, 0]) / max(float(np.median(heights)), 1.0) + 0.5)
+    return np.lexsort((middles[:, 1], row))
+
+
+def _ranked(pixels: NDArray[Any], path: Path) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+    """Return the numbers of a picture, and the rank of that of each pixel, without sorting millions of pixels."""
+    if pixels.dtype.kind not in "ui" or int(pixels.min()) < 0 or int(pixels.max()) > _LARGEST:
+        what = f"numbers from {pixels.min():g} to {pixels.max():g}"
+        raise SurveyError(what, where=str(path), remedy=f"number stones with whole numbers up to {_LARGEST}")
+    there = np.zeros(int(pixels.max()) + 1, dtype=np.bool_)
+    there[pixels] = True
+    values = np.flatnonzero(there)
+    ranks = np.zeros(len(there), dtype=np.int32)
+    ranks[values] = np.arange(len(values), dtype=np.int32)
+    return values, ranks[pixels]
+
+
+def _colour_numbers(pixels: NDArray[Any]) -> NDArray[np.int32]:
+    """Return the colours of a picture as numbers, black as 0."""
+    red, green, blue = (pixels[..., k].astype(np.int32) for k in range(3))
+    return (red << 16) | (green << 8) | blue

@@ -1,0 +1,240 @@
+"""An outline of a stone, and what its attributes say of the stone."""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from moma.errors import SurveyError, UsageError
+from survey.arrays import Array
+from survey.formats.fields import KIND
+
+__all__ = ["FIELDS", "Attributes", "Outline", "attributes_of", "field_map", "made_code"]
+
+FIELDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "code": (
+            "code", "name", "id", "label", "stone", "block", "number", "nr", "no", "fid",
+            "stein", "steinnr", "steinnummer", "nummer", "bezeichnung",
+            "pierre", "numero", "nom", "bloc", "pietra", "concio", "codice", "nome", "blocco",
+            "piedra", "sillar", "codigo", "nombre", "bloque",
+        ),
+        "kind": (
+            "kind", "type", "class", "art", "typ", "steinart", "klasse", "genre", "classe", "tipo", "clase",
+        ),
+        "course": ("course", "row", "layer", "lage", "schicht", "assise", "corso", "filare", "hilada"),
+        "zone": ("zone", "area", "wall", "facade", "bereich", "wand", "mur", "parete", "muro", "zona"),
+        "depth": ("depth", "tiefe", "profondeur", "profondita", "profundidad"),
+        "depth_sigma": ("depth_sigma", "sigma_depth"),
+        "sigma": ("sigma", "accuracy", "genauigkeit", "precision", "precisione"),
+        "score": ("score", "confidence", "probability"),
+    }
+)  # fmt: skip
+"""Names under which attributes are known, in English, German, French, Italian and Spanish."""
+
+_PLAIN = str.maketrans("àáâäãåçèéêëìíîïñòóôöõùúûü", "aaaaaaceeeeiiiinooooouuuu")
+
+
+@dataclass(frozen=True)
+class Attributes:
+    """The attributes of an outline.
+
+    Attributes
+    ----------
+    code : as written; None if there is none
+    kind, course, zone : of the stone; None if not stated
+    depth, depth_sigma : measured on the stone [m]; None if not stated
+    sigma : standard deviation of a coordinate of the outline [m]; None if not stated
+    score : confidence of the program that drew it, from 0 to 1; None if not stated
+    notes : other attributes
+    """
+
+    code: str | None = None
+    kind: str | None = None
+    course: int | None = None
+    zone: str | None = None
+    depth: float | None = None
+    depth_sigma: float | None = None
+    sigma: float | None = None
+    score: float | None = None
+    notes: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Outline:
+    """The outline of one stone as it was drawn.
+
+    Attributes
+    ----------
+    number : of the feature, annotation or label in its file, counted from 1
+    code : name of the stone
+    corners : (n, 2) in the plane of the wall or picture, or (n, 3) in space, in order, not closed
+    said : its attributes
+    where : its place in the file, for messages
+    doubts : what is odd about it, in words: (reason, text)
+    """
+
+    number: int
+    code: str
+    corners: Array
+    said: Attributes
+    where: str
+    doubts: tuple[tuple[str, str], ...] = ()
+
+
+def field_map(text: str | None) -> dict[str, str]:
+    """Read which attribute is which column, e.g. "code=Stein_Nr,course=Lage".
+
+    Raises
+    ------
+    UsageError
+        if it is written otherwise, or names an attribute that there is not
+    """
+    out = {}
+    for part in (text or "").split(","):
+        if not part.strip():
+            continue
+        name, _, column = (one.strip() for one in part.partition("="))
+        if name not in FIELDS or not column:
+            what = f"cannot be read at {part.strip()!r}"
+            remedy = f"write e.g. code=Stein_Nr,course=Lage with {', '.join(FIELDS)}"
+            raise UsageError(what, where="--fields", remedy=remedy)
+        out[name] = column
+    return out
+
+
+def attributes_of(values: Mapping[str, Any], chosen: Mapping[str, str], where: str) -> Attributes:
+    """Find what the attributes of a feature mean.
+
+    Parameters
+    ----------
+    values : by name, as the file has them
+    chosen : names that the user has given, by meaning
+    where : for messages
+
+    Raises
+    ------
+    SurveyError
+        if a chosen attribute is missing, or a value cannot be read
+    """
+    columns = _columns(tuple(values), chosen, where)
+    found = {meaning: _text(values[name]) for meaning, name in columns.items()}
+    used = set(columns.values())
+    notes = {
+        _key(name): text[:200]
+        for name, value in values.items()
+        if name not in used and (text := _text(value)) is not None
+    }
+    sigma = _number(found, "sigma", where)
+    depth = _number(found, "depth", where)
+    return Attributes(
+        code=found.get("code"),
+        kind=_kind(found.get("kind"), where),
+        course=_course(found.get("course"), where),
+        zone=found.get("zone"),
+        depth=None if depth is None else _positive(depth, "depth", where),
+        depth_sigma=_number(found, "depth_sigma", where),
+        sigma=None if sigma is None else _positive(sigma, "sigma", where),
+        score=_number(found, "score", where),
+        notes=notes,
+    )
+
+
+def made_code(text: str) -> str:
+    """Make the code of a stone of what people write: what a code cannot have becomes a hyphen.
+
+    >>> made_code("Stein 12 °a")
+    'Stein-12-a'
+    >>> made_code("12.0")
+    '12'
+    """
+    plain = re.sub(r"\.0+$", "", text.strip()) if re.fullmatch(r"\d+\.0+", text.strip()) else text
+    return re.sub(r"[^\w.+/:-]+", "-", plain.strip()).strip("-_")[:64].strip("-_")
+
+
+def _columns(names: Sequence[str], chosen: Mapping[str, str], where: str) -> dict[str, str]:
+    plain = {_plainly(name): name for name in reversed(names)}
+    out = {}
+    for meaning, aliases in FIELDS.items():
+        if meaning in chosen:
+            if chosen[meaning] not in names:
+                known = ", ".join(names) or "none"
+                raise SurveyError(
+                    f"no attribute {chosen[meaning]!r}", where=where, remedy=f"attributes are: {known}"
+                )
+            out[meaning] = chosen[meaning]
+            continue
+        for alias in aliases:
+            if alias in plain and plain[alias] not in (*out.values(), *chosen.values()):
+                out[meaning] = plain[alias]
+                break
+    return out
+
+
+def _plainly(name: str) -> str:
+    return re.sub(r"[\s.°-]+", "", name.lower().translate(_PLAIN)) if name else name
+
+
+def _text(value: Any) -> str | None:
+    """Return a value as text; None if it says nothing."""
+    if value is None or (isinstance(value, float | np.floating) and not np.isfinite(value)):
+        return None
+    text = " ".join(str(value).split())
+    return text if text and text.isprintable() else None
+
+
+def _key(name: str) -> str:
+    return re.sub(r"\s+", "_", name.strip()) or "attribute"
+
+
+def _number(found: Mapping[str, str | None], meaning: str, where: str) -> float | None:
+    text = found.get(meaning)
+    if text is None:
+        return None
+    try:
+        return float(text.replace(",", "."))
+    except ValueError as error:
+        raise SurveyError(
+            f"{meaning} is {text!r}, not a number", where=where, remedy="write e.g. 0.3"
+        ) from error
+
+
+def _positive(value: float, meaning: str, where: str) -> float:
+    if not 0.0 < value < 10.0:
+        what = f"{meaning} is {value:g} m"
+        raise SurveyError(what, where=where, remedy="give it in metres, e.g. 0.3; or leave it empty")
+    return value
+
+
+def _course(text: str | None, where: str) -> int | None:
+    if text is None:
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        value = -0.5
+    if value != int(value) or not 0 <= value < 1e6:
+        remedy = "count courses from the ground: 1, 2, …; or name another attribute with --fields"
+        raise SurveyError(f"course {text!r} is not a whole number", where=where, remedy=remedy)
+    return int(value)
+
+
+def _kind(text: str | None, where: str) -> str | None:
+    if text is None:
+        return None
+    kind = re.sub(r"\s+", "_", text.lower())
+    if KIND.fullmatch(kind) is None:
+        remedy = "kinds are words like ashlar, see moma schema; or name another attribute with --fields"
+        raise SurveyError(f"kind is {text!r}", where=where, remedy=remedy)
+    return kind
+
+
+def distinct(outlines: Sequence[Outline]) -> Iterator[tuple[Outline, Outline | None]]:
+    """Yield each outline with the earlier one of the same code, if there is one."""
+    seen: dict[str, Outline] = {}
+    for one in outlines:
+        yield one, seen.get(one.code)
+        seen.setdefault(one.code, one)

@@ -1,0 +1,147 @@
+"""Common entry to the readers of outlines, by the ending of the file."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from moma.errors import SurveyError, UsageError
+from survey.arrays import Array
+from survey.clouds.outlines.coco import is_coco, load_json, read_coco
+from survey.clouds.outlines.dxf import read_dxf
+from survey.clouds.outlines.labels import outlines_of, read_labels
+from survey.clouds.outlines.outline import Outline
+from survey.clouds.outlines.tracing import few_corners
+from survey.clouds.outlines.vector import read_vector
+from survey.clouds.world import PixelPlace
+
+__all__ = ["PICTURES", "Drawing", "read_outlines"]
+
+PICTURES = (".png", ".tif", ".tiff", ".bmp")
+"""Endings of label pictures."""
+
+_VECTORS = (".gpkg", ".geojson", ".json", ".shp", ".fgb", ".kml", ".gml", ".sqlite")
+_DENSE = 12  # corners beyond which an outline was traced or drawn as a curve, and is described by fewer
+_LIKELY = 2.0  # standard deviations of a drawn corner that a curve may differ from its sides
+_FARTHEST = 1e8  # largest coordinate [m]
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """Outlines of stones in one file.
+
+    Attributes
+    ----------
+    path : the file
+    outlines : in metres of the wall's plane (n, 2) or of space (n, 3); in pixels where `pixels`
+    pixels : whether coordinates are pixels because nothing says where the picture lies
+    pixel : side of a pixel [m]; None if they were not traced from a picture or its place is not known
+    size : columns and rows of the picture; None without one
+    specks : pieces of a picture that were too small for a stone
+    """
+
+    path: Path
+    outlines: tuple[Outline, ...]
+    pixels: bool = False
+    pixel: float | None = None
+    size: tuple[int, int] | None = None
+    specks: int = 0
+
+
+def read_outlines(
+    path: Path,
+    *,
+    layer: str | None = None,
+    chosen: Mapping[str, str] | None = None,
+    sigma: float = 0.005,
+    smooth: float = 1.5,
+) -> Drawing:
+    """Read outlines of stones.
+
+    Parameters
+    ----------
+    path : GeoPackage, GeoJSON, Shapefile, DXF, a picture of labels, or COCO's JSON
+    layer : of a file with several
+    chosen : names of attributes that the user has given, by meaning
+    sigma : standard deviation of a drawn corner [m], to which curves are described by straight sides
+    smooth : largest distance of the boundary of a mask from the sides of its outline [px]
+
+    Raises
+    ------
+    UsageError
+        if there is no such file or format, or a package is missing
+    SurveyError
+        naming the feature that is wrong
+    """
+    if not path.is_file():
+        raise UsageError("no such file", where=str(path), remedy="name a file of outlines with --outlines")
+    drawing = _read(path, layer, chosen or {}, smooth)
+    if not drawing.outlines:
+        raise SurveyError("has no outlines", where=str(path), remedy="draw each stone as a polygon")
+    if drawing.pixel is None and not drawing.pixels:
+        drawing = replace(drawing, outlines=tuple(_sparse(one, _LIKELY * sigma) for one in drawing.outlines))
+    for one in drawing.outlines:
+        _check(one)
+    return drawing
+
+
+def _read(path: Path, layer: str | None, chosen: Mapping[str, str], smooth: float) -> Drawing:
+    ending = path.suffix.lower()
+    if ending == ".dxf":
+        return Drawing(path, read_dxf(path, layer, chosen))
+    if ending in PICTURES:
+        labels = read_labels(path)
+        size = labels.numbers.shape[1], labels.numbers.shape[0]
+        return _placed(path, tuple(outlines_of(labels, smooth)), labels.places, size, labels.specks)
+    if ending == ".json" and is_coco(content := load_json(path)):
+        return _placed(path, *read_coco(path, content, smooth, chosen))
+    if ending in _VECTORS:
+        return Drawing(path, read_vector(path, layer, chosen))
+    known = ", ".join((*_VECTORS, ".dxf", *PICTURES))
+    raise UsageError(
+        f"unknown ending {ending!r}",
+        where=str(path),
+        remedy=f"outlines are read from {known} and COCO's .json",
+    )
+
+
+def _placed(
+    path: Path,
+    outlines: tuple[Outline, ...],
+    places: PixelPlace | None,
+    size: tuple[int, int] | None,
+    specks: int = 0,
+) -> Drawing:
+    """Move outlines from pixels to metres, if it is known where the picture lies."""
+    if places is None:
+        return Drawing(path, outlines, True, None, size, specks)
+    moved = tuple(replace(one, corners=places.place(one.corners)) for one in outlines)
+    return Drawing(path, moved, False, places.pixel, size, specks)
+
+
+def _sparse(outline: Outline, tolerance: float) -> Outline:
+    """Describe an outline of many corners by few."""
+    corners = outline.corners
+    if len(corners) <= _DENSE or corners.shape[1] != 2:
+        return outline
+    return replace(outline, corners=few_corners(_dense(corners, tolerance), tolerance))
+
+
+def _dense(corners: Array, step: float) -> Array:
+    """Put further points on long sides, so that each side weighs by its length."""
+    out = []
+    for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        count = max(1, min(50, int(np.ceil(float(np.linalg.norm(b - a)) / step))))
+        out.append(a + np.linspace(0.0, 1.0, count, endpoint=False)[:, None] * (b - a))
+    return np.concatenate(out)
+
+
+def _check(outline: Outline) -> None:
+    corners = outline.corners
+    if len(corners) < 3:
+        raise SurveyError(f"{len(corners)} corners", where=outline.where, remedy="an outline has 3 or more")
+    if not np.isfinite(corners).all() or np.abs(corners).max() > _FARTHEST:
+        raise SurveyError(
+            "a coordinate is not finite, or too large", where=outline.where, remedy="draw it again"
+        )

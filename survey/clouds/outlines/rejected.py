@@ -1,0 +1,68 @@
+"""Rejected outlines as GeoJSON, each with the reason: once corrected, they are read like others."""
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+from survey.clouds.outlines.outline import Outline
+from survey.clouds.outlines.reading import read_outlines
+from survey.records.survey import Reject
+
+__all__ = ["MARK", "rejected_outlines"]
+
+MARK = "outlines rejected by moma"
+"""Text in the first line of the files, by which they are recognised."""
+
+
+def rejected_outlines(
+    path: Path,
+    layer: str | None,
+    chosen: Mapping[str, str],
+    sigma: float,
+    smooth: float,
+    rejects: Sequence[Reject],
+) -> bytes:
+    """Write rejected outlines of a file, in its coordinates.
+
+    Parameters
+    ----------
+    path, layer, chosen, sigma, smooth : with which the outlines were read
+    rejects : whose spans are the numbers of outlines
+    """
+    outlines = read_outlines(path, layer=layer, chosen=chosen, sigma=sigma, smooth=smooth).outlines
+    by_number = {one.number: one for one in outlines}
+    features = [
+        _feature(by_number[span.start], str(one.error))
+        for one in rejects
+        for span in one.spans
+        if span.start in by_number
+    ]
+    head = {"type": "FeatureCollection", "about": f"{MARK}: {len(features)} of {path.name}"}
+    lines = json.dumps(head, ensure_ascii=False)[:-1] + ', "features": [\n'
+    return (lines + ",\n".join(_lines(features)) + "\n]}\n").encode()
+
+
+def _lines(features: Iterable[Mapping[str, object]]) -> Iterable[str]:
+    return (json.dumps(one, ensure_ascii=False) for one in features)
+
+
+def _feature(one: Outline, reason: str) -> dict[str, object]:
+    said = one.said
+    known = {
+        "code": one.code,
+        "kind": said.kind,
+        "course": said.course,
+        "zone": said.zone,
+        "depth": said.depth,
+        "depth_sigma": said.depth_sigma,
+        "sigma": said.sigma,
+        "score": said.score,
+    }
+    ring = [*one.corners.tolist(), one.corners[0].tolist()]
+    return {
+        "type": "Feature",
+        "properties": {key: value for key, value in known.items() if value is not None}
+        | dict(said.notes)
+        | {"reason": reason},
+        "geometry": {"type": "Polygon", "coordinates": [ring]},
+    }

@@ -1,0 +1,88 @@
+"""Outlines in GeoPackage, GeoJSON, Shapefile and other vector formats of GDAL, read with pyogrio and shapely."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from moma.errors import SurveyError, UsageError
+from survey.arrays import Array
+from survey.clouds.extras import optional
+from survey.clouds.outlines.outline import Attributes, Outline, attributes_of, made_code
+
+__all__ = ["read_vector"]
+
+_SMALL = 0.02  # share of the area of the largest part up to which other parts are specks [-]
+
+
+def read_vector(path: Path, layer: str | None, chosen: Mapping[str, str]) -> tuple[Outline, ...]:
+    """Read the polygons of a file.
+
+    Parameters
+    ----------
+    path : the file
+    layer : its name; None: the only one
+    chosen : names of attributes that the user has given, by meaning
+
+    Raises
+    ------
+    UsageError
+        if pyogrio or shapely is not installed, or there are several layers
+    SurveyError
+        if the file cannot be read, or a feature is no polygon
+    """
+    pyogrio = optional("pyogrio", f"{path.suffix} files")
+    shapely = optional("shapely", f"{path.suffix} files")
+    try:
+        layers = [str(name) for name, kind in pyogrio.list_layers(path) if kind is not None]
+        if layer is None and len(layers) != 1:
+            remedy = f"name one with --layer: {', '.join(layers) or 'none has geometry'}"
+            raise UsageError(f"{len(layers)} layers", where=str(path), remedy=remedy)
+        if layer is not None and layer not in layers:
+            raise UsageError(
+                f"no layer {layer!r}", where=str(path), remedy=f"layers are: {', '.join(layers)}"
+            )
+        meta, fids, geometries, columns = pyogrio.raw.read(path, layer=layer or layers[0], return_fids=True)
+    except UsageError:
+        raise
+    except Exception as error:  # pyogrio lets GDAL's errors through under several classes
+        what = f"cannot be read: {' '.join(str(error).split())[:120]}"
+        raise SurveyError(what, where=str(path), remedy="export it again, e.g. as GeoPackage") from error
+    names = [str(name) for name in meta["fields"]]
+    shapes = shapely.from_wkb(geometries, on_invalid="ignore")
+    out = []
+    for k, shape in enumerate(shapes):
+        where = f"{path}, feature {int(fids[k])}"
+        said = attributes_of(
+            {name: column[k] for name, column in zip(names, columns, strict=True)}, chosen, where
+        )
+        out.append(_outline(k + 1, int(fids[k]), shape, said, where))
+    return tuple(out)
+
+
+def _outline(number: int, fid: int, shape: Any, said: Attributes, where: str) -> Outline:
+    if shape is None or shape.is_empty or shape.geom_type not in ("Polygon", "MultiPolygon", "LineString"):
+        found = "no geometry" if shape is None or shape.is_empty else f"a {shape.geom_type}"
+        raise SurveyError(f"{found}, not a polygon", where=where, remedy="draw each stone as a polygon")
+    if shape.geom_type == "LineString":
+        if not shape.is_closed:
+            raise SurveyError("the line is not closed", where=where, remedy="draw each stone as a polygon")
+        rings, doubts = [_ring(shape.coords)], []
+    else:
+        parts = [shape] if shape.geom_type == "Polygon" else sorted(shape.geoms, key=lambda one: -one.area)
+        rings = [_ring(one.exterior.coords) for one in parts]
+        large = [one for one in parts[1:] if one.area > _SMALL * parts[0].area]
+        doubts = [("in pieces", f"{len(large) + 1} pieces; the largest is taken")] if large else []
+        if any(parts[0].interiors):
+            doubts.append(("holes", f"{len(parts[0].interiors)} holes, which are ignored"))
+    code = made_code(said.code or f"S{fid}") or f"S{fid}"
+    return Outline(number, code, rings[0], said, where, tuple(doubts))
+
+
+def _ring(coordinates: Any) -> Array:
+    ring = np.array(coordinates, dtype=np.float64)
+    if len(ring) > 1 and np.array_equal(ring[0], ring[-1]):
+        ring = ring[:-1]
+    keep = np.any(ring != np.roll(ring, 1, axis=0), axis=1)
+    return ring[keep] if keep.any() else ring[:1]

@@ -1,0 +1,94 @@
+"""LAS and LAZ files, read with laspy and lazrs."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from moma.errors import SurveyError
+from survey.arrays import Array
+from survey.clouds.extras import optional
+from survey.clouds.points.chunks import CHUNK, Chunk, PointCloud
+
+__all__ = ["open_las"]
+
+
+def open_las(path: Path) -> PointCloud:
+    """Open a LAS or LAZ file.
+
+    Raises
+    ------
+    UsageError
+        if laspy or lazrs is not installed
+    SurveyError
+        if it is not such a file
+    """
+    laspy = optional("laspy", "LAS and LAZ files")
+    if path.suffix.lower() == ".laz":
+        optional("lazrs", "LAZ files")
+    try:
+        with laspy.open(path) as file:
+            header = file.header
+            count, near = int(header.point_count), (np.array(header.mins) + np.array(header.maxs)) / 2.0
+    except Exception as error:  # laspy lets through what lazrs, struct and numpy raise
+        raise _damaged(path, error) from error
+    if count and not np.isfinite(near).all():
+        near = np.zeros(3)
+
+    def chunks(origin: Array, colours: bool) -> Iterator[Chunk]:
+        try:
+            with laspy.open(path, **_selection(laspy, path, colours)) as file:
+                read = 0
+                for points in file.chunk_iterator(CHUNK):
+                    read += len(points)
+                    yield Chunk(_places(points, file.header, origin), _colours(points) if colours else None)
+        except GeneratorExit:
+            raise
+        except Exception as error:
+            raise _damaged(path, error) from error
+        if read != count:
+            raise SurveyError(
+                f"the file announces {count} points and holds {read}",
+                where=str(path),
+                remedy="export it again",
+            )
+
+    return PointCloud(path, count, near, chunks)
+
+
+def _places(points: Any, header: Any, origin: Array) -> Array:
+    """Scale the integers of a file, and shift them before they are rounded to the digits of a large coordinate."""
+    out = np.empty((len(points), 3))
+    for k, name in enumerate("XYZ"):
+        np.multiply(points.array[name], header.scales[k], out=out[:, k])
+        out[:, k] += header.offsets[k] - origin[k]
+    return out
+
+
+def _colours(points: Any) -> Any:
+    names = set(points.array.dtype.names)
+    if {"red", "green", "blue"} <= names:
+        found = np.column_stack([points.array[name] for name in ("red", "green", "blue")])
+        return (found >> 8 if found.max(initial=0) > 255 else found).astype(np.uint8)
+    found = points.array["intensity"].astype(np.float64)
+    top = max(float(np.quantile(found, 0.99)) if len(found) else 1.0, 1.0)
+    return np.repeat(np.clip(found * (255.0 / top), 0.0, 255.0).astype(np.uint8)[:, None], 3, axis=1)
+
+
+def _selection(laspy: Any, path: Path, colours: bool) -> dict[str, Any]:
+    """Return options that keep lazrs from decompressing fields that nobody asked for (point formats 6 to 10)."""
+    if path.suffix.lower() != ".laz":
+        return {}
+    wanted = laspy.DecompressionSelection.base() | laspy.DecompressionSelection.Z
+    if colours:
+        wanted |= laspy.DecompressionSelection.RGB | laspy.DecompressionSelection.INTENSITY
+    return {"decompression_selection": wanted}
+
+
+def _damaged(path: Path, error: Exception) -> SurveyError:
+    return SurveyError(
+        f"cannot be read as LAS or LAZ: {' '.join(str(error).split())[:120]}",
+        where=str(path),
+        remedy="export it again",
+    )

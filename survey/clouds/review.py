@@ -1,0 +1,148 @@
+"""Doubts about outlines: overlaps, odd sizes, masks that leak, faces that something covers."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from survey.arrays import Array, Ints
+from survey.clouds.extras import optional
+from survey.clouds.outlines.outline import Outline
+from survey.clouds.outlines.reading import PICTURES, Drawing
+from survey.clouds.placing import PlacedOutline
+from survey.records.review import Doubtful
+
+__all__ = ["drawn_doubts", "flat_doubts", "measured_doubts"]
+
+_OVERLAP = 0.05  # part of the smaller stone's area that two outlines may share: jitter of neighbours
+_THICK = 0.02  # by which boxes of outlines are widened: neighbours do not lie in one plane [m]
+_SOLID = (
+    0.80  # area over that of the convex hull below which an outline leaks: a stone with a deep notch has more
+)
+_ODD = 4.5  # robust standard deviations of the logarithm of the area beyond which a size is odd
+_SPREAD = 0.25  # least standard deviation of that logarithm, since stones of one course differ by more
+_FEWEST = 12  # outlines from which sizes have a usual range
+_UNSURE = 0.5  # score below which a program is not sure of a mask
+_FEW = 100  # points of a stone that is hardly measured
+_COVERED = 0.7  # share of clear patches below which something covers a stone, or its mask leaks
+_TURNED = 20.0  # angle of a face from the plane of its outline [degrees]
+
+
+def drawn_doubts(placed: Sequence[PlacedOutline], drawing: Drawing) -> list[Doubtful]:
+    """List what is odd about outlines in themselves.
+
+    Parameters
+    ----------
+    placed : outlines in their planes
+    drawing : the file that they come from
+    """
+    found = list(flat_doubts([one.outline for one in placed], [one.ring for one in placed], drawing))
+    if drawing.path.suffix.lower() not in PICTURES:
+        found += _overlaps(placed)
+    return found
+
+
+def flat_doubts(outlines: Sequence[Outline], rings: Sequence[Array], drawing: Drawing) -> Iterator[Doubtful]:
+    """Yield what is odd about the shape and size of outlines, whose rings (n, 2) are given in metres."""
+    if drawing.specks:
+        text = f"{drawing.specks} pieces are too small for a stone and are left out"
+        yield Doubtful("", "specks", text, str(drawing.path))
+    areas = np.array([_area(ring) for ring in rings])
+    logs = np.log(np.maximum(areas, 1e-12))
+    middle = float(np.median(logs))
+    spread = max(1.4826 * float(np.median(np.abs(logs - middle))), _SPREAD)
+    for one, ring, area, log in zip(outlines, rings, areas, logs, strict=True):
+        for reason, text in one.doubts:
+            yield Doubtful(one.code, reason, text, one.where)
+        if one.said.score is not None and one.said.score < _UNSURE:
+            yield Doubtful(one.code, "low score", f"a score of {one.said.score:g}", one.where)
+        if len(outlines) >= _FEWEST and abs(log - middle) > _ODD * spread:
+            text = f"{area:.3g} m², the usual outline has {np.exp(middle):.3g} m²"
+            yield Doubtful(one.code, "odd size", text, one.where)
+        if (solid := area / max(_hull_area(ring), 1e-12)) < _SOLID:
+            text = f"it fills {solid:.0%} of its convex hull: a mask may leak into a joint or a neighbour"
+            yield Doubtful(one.code, "leak", text, one.where)
+
+
+def measured_doubts(one: PlacedOutline, plane: Array, numbers: Array) -> Iterator[Doubtful]:
+    """Yield what is odd about the points of a stone.
+
+    Parameters
+    ----------
+    one : its outline
+    plane : (3,) slopes and height of its face in the frame of the outline
+    numbers : as `fit_patches` returns them
+    """
+    code, where = one.outline.code, one.outline.where
+    clear, count = numbers[2:4].tolist()
+    if count < _FEW:
+        yield Doubtful(code, "few points", f"{int(count)} points", where)
+    if clear < _COVERED:
+        text = f"{clear:.0%} of its patches are clear: something covers it, or its mask reaches beyond it"
+        yield Doubtful(code, "covered", text, where)
+    if (turned := float(np.degrees(np.arctan(np.hypot(*plane[:2]))))) > _TURNED:
+        yield Doubtful(
+            code, "turned", f"its face is turned {turned:.0f}° from the plane of its outline", where
+        )
+
+
+def _overlaps(placed: Sequence[PlacedOutline]) -> Iterator[Doubtful]:
+    """Yield pairs of outlines that share much of their area, seen along the line of sight of the first."""
+    shapely = optional("shapely", "overlaps of outlines")
+    corners = [one.corners for one in placed]
+    low = np.array([one.min(axis=0) for one in corners]) - _THICK
+    high = np.array([one.max(axis=0) for one in corners]) + _THICK
+    pairs = _near_pairs(low, high)
+    pairs = pairs[[abs(float(placed[i].axes[2] @ placed[j].axes[2])) > 0.5 for i, j in pairs]]
+    if not len(pairs):
+        return
+    first = _polygons(shapely, [placed[i].ring for i, _ in pairs])
+    second = _polygons(shapely, [((corners[j] - placed[i].origin) @ placed[i].axes[:2].T) for i, j in pairs])
+    shared = shapely.area(shapely.intersection(first, second))
+    smaller = np.minimum(shapely.area(first), shapely.area(second))
+    for k in np.flatnonzero(shared > _OVERLAP * smaller):
+        a, b = (placed[i].outline for i in pairs[k])
+        text = f"it shares {shared[k]:.2g} m² with {b.code}, {shared[k] / max(smaller[k], 1e-12):.0%} of the smaller"
+        yield Doubtful(a.code, "overlap", text, a.where)
+
+
+def _near_pairs(low: Array, high: Array) -> Ints:
+    """Return the pairs (m, 2) of boxes that overlap, the smaller number first."""
+    order = np.argsort(low[:, 0], kind="stable")
+    ends = np.searchsorted(low[order, 0], high[order, 0])
+    found = [np.empty((0, 2), dtype=np.int64)]
+    for place, k in enumerate(order):
+        others = order[place + 1 : ends[place]]
+        near = others[((low[others] <= high[k]) & (high[others] >= low[k])).all(axis=1)]
+        if len(near):
+            found.append(np.sort(np.column_stack([np.full(len(near), k), near]), axis=1))
+    pairs = np.concatenate(found)
+    return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+
+
+def _polygons(shapely: Any, rings: Sequence[Array]) -> Any:
+    """Make valid polygons of many rings (n, 2) at once."""
+    which = np.repeat(np.arange(len(rings)), [len(ring) for ring in rings])
+    return shapely.make_valid(shapely.polygons(shapely.linearrings(np.concatenate(rings), indices=which)))
+
+
+def _area(ring: Array) -> float:
+    x, y = (ring - ring[0]).T
+    return 0.5 * abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1)))
+
+
+def _hull_area(ring: Array) -> float:
+    """Return the area of the convex hull of a polygon by Andrew's chain."""
+    points = ring[np.lexsort((ring[:, 1], ring[:, 0]))].tolist()
+    hull: list[list[float]] = []
+    for way in (points, points[::-1]):
+        chain: list[list[float]] = []
+        for x, y in way:
+            while len(chain) >= 2:
+                (ax, ay), (bx, by) = chain[-2:]
+                if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 0.0:
+                    break
+                chain.pop()
+            chain.append([x, y])
+        hull += chain[:-1]
+    return _area(np.array(hull)) if len(hull) >= 3 else 0.0

@@ -1,0 +1,56 @@
+"""Settings with which clouds with outlines, and masks alone, are read."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from survey.clouds.wall import Wall
+from survey.formats.options import ReadingOptions
+
+__all__ = ["CloudOptions", "MaskOptions"]
+
+
+@dataclass(frozen=True)
+class CloudOptions(ReadingOptions):
+    """Settings of a cloud with outlines; `sigma` is that of a single point of the cloud.
+
+    Attributes
+    ----------
+    outlines : file of outlines
+    wall : frame of the plane that outlines without heights lie in; None: they lie in space
+    layer : of a file of outlines with several
+    chosen : names of attributes of outlines, by meaning
+    outline_sigma : standard deviation of a drawn corner along the wall, where the outline states none [m]
+    margin : width along the edge of a stone whose points are left out [m]; None: three times the sigma of its outline
+    slab : largest distance of a point of a stone from the plane that its outline lies in [m]
+    smooth : largest distance of the boundary of a mask from the sides of its outline [px]
+    """
+
+    outlines: Path = field(default_factory=Path)
+    wall: Wall | None = None
+    layer: str | None = None
+    chosen: Mapping[str, str] = field(default_factory=dict)
+    outline_sigma: float = 0.005
+    margin: float | None = None
+    slab: float = 0.15
+    smooth: float = 1.5
+
+
+@dataclass(frozen=True)
+class MaskOptions(ReadingOptions):
+    """Settings of masks without a cloud.
+
+    Attributes
+    ----------
+    size : width and height of the picture [m]; None: its world file says where its pixels lie
+    depth : of all stones [m]; None: by the rules of the header file
+    wall : frame of the picture in space; None: it stands on the x axis, seen along y
+    chosen : names of attributes of masks, by meaning
+    smooth : largest distance of the boundary of a mask from the sides of its outline [px]
+    """
+
+    size: tuple[float, float] | None = None
+    depth: float | None = None
+    wall: Wall | None = None
+    chosen: Mapping[str, str] = field(default_factory=dict)
+    smooth: float = 1.5
