@@ -21,7 +21,7 @@ def test_a_facade_without_returns_tips_as_its_candidate_says(monkeypatch, capsys
     (row,) = json.loads(measured(monkeypatch, capsys, tmp_path / "kept", "--json"))
     # a wall of 0.04 m, 6 courses of 0.028 m high
     assert row["candidate"] == pytest.approx(0.04 / 0.168, rel=1e-3)
-    assert row["held"] < row["candidate"] < row["lost"]
+    assert row["held"] <= row["candidate"] * (1 + 1e-12) < row["lost"]
     assert row["verdict"] == "yes"
     assert row["cosine"] > 0.99
     assert row["common"] == 1.0

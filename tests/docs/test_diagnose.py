@@ -33,6 +33,7 @@ def place(tmp_path_factory):
     return folder, ran(folder, "".join(blocks(PAGE, "bash")))
 
 
+@pytest.mark.slow
 def test_the_true_cause_is_found_with_its_amount(place):
     folder, said = place
     (headline,) = blocks(PAGE, "text")
@@ -66,6 +67,7 @@ def test_the_true_cause_is_found_with_its_amount(place):
     assert chi2 == pytest.approx(best["chi2"], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_best_scene_goes_into_the_database(place):
     folder, _ = place
     compared = json.loads((folder / "out/small-best/comparison.json").read_text(encoding="utf-8"))
@@ -74,6 +76,7 @@ def test_the_best_scene_goes_into_the_database(place):
     assert len(stones) == 28
 
 
+@pytest.mark.slow
 def test_what_the_best_scene_explains_stillness_does_not(place):
     folder, _ = place
     compared = json.loads((folder / "out/small-best/comparison.json").read_text(encoding="utf-8"))
@@ -84,6 +87,7 @@ def test_what_the_best_scene_explains_stillness_does_not(place):
     assert pictures == {"beds-1.png", "misfit-1.png"} <= set(compared["files"])
 
 
+@pytest.mark.slow
 def test_what_the_surveyor_finds_of_each_stone_is_what_is_true(place):
     folder, _ = place
     truth = json.loads((folder / "out/small/truth.json").read_text(encoding="utf-8"))

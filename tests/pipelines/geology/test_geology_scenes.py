@@ -401,6 +401,7 @@ def test_the_command_knows_all_experiments():
     assert {one.value for one in ExperimentName} == set(EXPERIMENTS)
 
 
+@pytest.mark.slow
 def test_the_commands_of_the_how_to_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     small_geology(tmp_path / "data/samples/geology")

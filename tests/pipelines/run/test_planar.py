@@ -38,6 +38,7 @@ def names(folder):
     return sorted(path.name for path in (folder / "unfinished").glob("checkpoint-*"))
 
 
+@pytest.mark.slow
 def test_a_killed_run_goes_on_with_the_same_bits_on_one_and_two_threads(tmp_path):
     whole = ended(child(tmp_path / "whole"))
     assert not (tmp_path / "whole" / "unfinished").exists()

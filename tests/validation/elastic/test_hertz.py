@@ -187,7 +187,7 @@ def test_a_ball_presses_as_hertz_says(monkeypatch, cells, width, allowed):
     time = TimeSettings(step=0.05, duration=3.0, relaxation=True)
     scene = pressed(monkeypatch, cells, width=width, time=time, solver=SolverSettings(tolerance=1e-6))
     result = simulate(scene)
-    assert result.outcome is Outcome.EQUILIBRIUM
+    assert result.outcome.rests
     c = result.contacts
     found = patch(c.bodies, c.point, c.normal, c.area, c.force, 0.3)
     exact = found.hertz

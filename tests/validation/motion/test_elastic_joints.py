@@ -251,6 +251,7 @@ def swing(law, placement=Placement.CORNERS):
 PULSED = ElasticJoint(float(np.tan(np.radians(35.0))), 1e10, 1e10, damping_time=5e-4)
 
 
+@pytest.mark.slow
 def test_the_pulsed_arch_of_lemos_moves_as_in_3dec_where_joints_stay_closed():
     """Case K10: 3DEC's crown moves by 0.27 to 0.34 mm."""
     glued = replace(PULSED, tension=1e9, shear=1e9)

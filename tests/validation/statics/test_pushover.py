@@ -78,6 +78,7 @@ def test_loads_that_grow_with_time_stay_as_they_are_at_the_start():
     assert curve.onset == pytest.approx(0.1, rel=0.03)
 
 
+@pytest.mark.slow
 def test_a_published_wall_bears_its_limit_load_and_less_from_then_on():
     wall_03 = WALLS["W03"]
     _, found, curve = led(wall_03.blocks(), reach=0.1, points=25)

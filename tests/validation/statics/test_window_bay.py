@@ -55,6 +55,7 @@ def jamb_and_springers(assembly, side):
     }
 
 
+@pytest.mark.slow
 def test_the_wall_of_rigid_stones_stands_and_every_stone_is_in_balance(assembly):
     result = simulate(rigid(assembly.scene))
     assert result.outcome is Outcome.EQUILIBRIUM
@@ -65,6 +66,7 @@ def test_the_wall_of_rigid_stones_stands_and_every_stone_is_in_balance(assembly)
     assert max(np.abs(b.displacement).max() for b in result.bodies) < 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("side", [-1, 1])
 def test_the_arch_falls_without_the_jamb_and_springers_of_one_side(assembly, side):
     gone = jamb_and_springers(assembly, side)
