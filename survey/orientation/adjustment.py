@@ -13,7 +13,7 @@ from scipy.linalg import cho_factor, cho_solve
 from moma.errors import GeometryError
 from survey.arrays import Array
 from survey.orientation._kernels.adjustment import Rays, Unknowns, back_substitute, reduced_normals
-from survey.orientation.network import INTERIOR, Network
+from survey.orientation.network import INTERIOR, Network, Photo
 from survey.orientation.rotations import angle_slopes, turned
 
 __all__ = ["Prepared", "Solution", "adjust", "prepare"]
@@ -111,11 +111,10 @@ def prepare(network: Network, start: Unknowns | None = None, keep: NDArray[np.bo
             free,
         )
     start.point[~free] = place[~free]
-    stations = sum(
-        3 for one in photos if one.station_sigma is not None and not one.fixed
-    ) + sum(3 for one in photos if one.angle_sigma is not None and not one.fixed)
+    observed = [one for one in photos if not one.fixed]
+    stations = 3 * sum((one.observed_station is not None) + (one.observed_rotation is not None) for one in observed)
     held = weighted or bool(np.count_nonzero(~free)) or any(one.fixed for one in photos)
-    held = held or any(one.station_sigma is not None for one in photos)
+    held = held or any(one.observed_station is not None for one in photos)
     seen = free & ((counts > 0) | information.any(axis=(1, 2)))
     return Prepared(
         rays,
@@ -240,21 +239,21 @@ def normals(
     return normal, right, square, behind
 
 
-def _observed_photo(photo, f: int, unknowns: Unknowns, normal: Array, right: Array) -> float:  # type: ignore[no-untyped-def]
+def _observed_photo(photo: Photo, f: int, unknowns: Unknowns, normal: Array, right: Array) -> float:
     """Add the observed station and angles of one photograph; return their sum of squares."""
     square = 0.0
     place = unknowns.column[f]
     if photo.fixed:
         return 0.0
-    if photo.station_sigma is not None:
-        off, weight = photo.station - unknowns.station[f], photo.station_sigma**-2.0
+    if photo.observed_station is not None and photo.station_sigma is not None:
+        off, weight = photo.observed_station - unknowns.station[f], photo.station_sigma**-2.0
         normal[place[3:6], place[3:6]] += weight
         right[place[3:6]] += weight * off
         square += float((weight * off**2).sum())
-    if photo.angle_sigma is not None:
-        slopes = angle_slopes(photo.rotation)
+    if photo.observed_rotation is not None and photo.angle_sigma is not None:
+        slopes = angle_slopes(photo.observed_rotation)
         weight = slopes.T @ np.diag(photo.angle_sigma**-2.0) @ slopes
-        off = rotation_vector(unknowns.rotation[f].T @ photo.rotation)
+        off = rotation_vector(unknowns.rotation[f].T @ photo.observed_rotation)
         normal[np.ix_(place[:3], place[:3])] += np.tril(weight)
         right[place[:3]] += weight @ off
         square += float(off @ weight @ off)

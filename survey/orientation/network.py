@@ -55,10 +55,11 @@ class Photo:
     ----------
     name : unique in its network
     camera : index of its camera
-    rotation : (3, 3) the camera's axes in columns: x to the right, y upwards, z backwards; None: not known
-    station : (3,) place of the projection centre [m]; None: not known
-    station_sigma : (3,) standard deviation of `station` as an observation [m]; None: it is a start value only
-    angle_sigma : (3,) standard deviations of ω, φ, κ as observations [rad]; None: they are start values only
+    rotation : (3, 3) to start from, the camera's axes in columns: x to the right, y upwards, z backwards; None: not known
+    station : (3,) place of the projection centre to start from [m]; None: not known
+    observed_station, station_sigma : (3,) observed place and its standard deviations [m]; None: not observed
+    observed_rotation, angle_sigma : (3, 3) observed rotation, and (3,) standard deviations of its ω, φ, κ [rad]; None: not
+        observed
     fixed : its orientation is not estimated
     where : ``file:line``
     """
@@ -67,7 +68,9 @@ class Photo:
     camera: int
     rotation: Array | None = None
     station: Array | None = None
+    observed_station: Array | None = None
     station_sigma: Array | None = None
+    observed_rotation: Array | None = None
     angle_sigma: Array | None = None
     fixed: bool = False
     where: str = ""

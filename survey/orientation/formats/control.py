@@ -150,7 +150,7 @@ def with_control(
         remarks.append(f"control points that are marked nowhere: {listed(left)}")
     start = network.start.copy()
     for one in control:
-        if not np.isfinite(start[one.point]).all() or one.fixed:
+        if not np.isfinite(start[one.point]).all():
             start[one.point] = one.place
     return replace(network, control=control, start=start, remarks=tuple(remarks))
 
