@@ -11,6 +11,7 @@ from survey.extrusion.extrusion import SurveyedBlock, extrude
 from survey.extrusion.imported_solids import block_of_solid
 from survey.faces.faces import Face, Provenance, face_on, outline_face
 from survey.faces.shapes import FaceShape, ShapeKind
+from survey.orientation.marked_stones import located_stones
 from survey.records.snapping import Snapping
 from survey.records.survey import BlockRecord, Reject, SolidRecord, SurveyHead, SurveyStream
 from survey.registration.photographed_stones import LiftedFace, lift_faces
@@ -68,7 +69,8 @@ def _stones(
 ) -> Iterator[SurveyedBlock | Reject]:
     faces: list[Face] = []
     on_photographs: list[BlockRecord] = []
-    for item in stream.blocks:
+    blocks = stream.blocks if stream.head.orientation is None else located_stones(stream.blocks, stream.head)
+    for item in blocks:
         if isinstance(item, Reject):
             yield item
             continue
@@ -90,7 +92,10 @@ def _made(item: BlockRecord | SolidRecord, head: SurveyHead) -> SurveyedBlock | 
     try:
         if isinstance(item, SolidRecord):
             return block_of_solid(item, head.viewpoint(None), item.file or head.path)
-        return _extruded(outline_face(item, head.viewpoint(item.station)), head)
+        viewpoint = item.seen_from
+        if viewpoint is None or item.station is not None:
+            viewpoint = head.viewpoint(item.station)
+        return _extruded(outline_face(item, viewpoint), head)
     except MomaError as error:
         return _reject(item, head, error)
 

@@ -10,6 +10,7 @@ from moma.cli.database import export, import_, migrate
 from moma.cli.entities import query, schema, show
 from moma.cli.geology import geology
 from moma.cli.knowledge import record
+from moma.cli.photographs import orient
 from moma.cli.proposals import propose
 from moma.cli.relations import load_path, relate
 from moma.cli.runs import runs
@@ -56,6 +57,7 @@ def _common(
 # in the usual order of use
 _COMMANDS = (
     sample,
+    orient,
     ingest,
     survey_report,
     record,

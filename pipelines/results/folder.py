@@ -38,6 +38,7 @@ _INDEXES = (
     "assessment.json",
     "comparison.json",
     "diagnosis.json",
+    "orientation.json",
 )  # their "files" list the files that MOMA wrote
 _MARK = ".moma-"  # in the names of hidden folders
 _EARLIER = f"{_MARK}earlier"

@@ -1,0 +1,4 @@
+"""Orientation of photographs (`moma orient`).
+
+Public: `read_project` (project); `orient_photographs`, `OrientReport` (orient).
+"""
