@@ -61,6 +61,9 @@ def sample(
     courses: Annotated[
         int | None, typer.Option(help="Courses of the tower; default: 40, or 12 with --small.")
     ] = None,
+    photographs: Annotated[
+        bool, typer.Option("--photographs", help="Twelve photographs of the window too, to orient.")
+    ] = False,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="DIR", help="Folder for the files; default: KIND.")
     ] = None,
@@ -72,7 +75,14 @@ def sample(
 
     with progress_bars() as listener:
         written = write_sample(
-            kind, out or Path(kind), listener, moved=moved, small=small, phases=phases, courses=courses
+            kind,
+            out or Path(kind),
+            listener,
+            moved=moved,
+            small=small,
+            phases=phases,
+            courses=courses,
+            photographs=photographs,
         )
     lines = [
         f"{written.title}: a synthetic survey of {written.stones} stones",

@@ -14,7 +14,16 @@ from survey.geometry.half_spaces import intersection
 from survey.geometry.solids import Solid, planes_of_solid
 from survey.records.survey import BlockRecord
 
-__all__ = ["HALF_JOINT", "SIGMA", "MeasuredStone", "add_blunders", "measure_stone", "modelled_solid"]
+__all__ = [
+    "HALF_JOINT",
+    "SIGMA",
+    "MeasuredStone",
+    "add_blunders",
+    "inset",
+    "margin_points",
+    "measure_stone",
+    "modelled_solid",
+]
 
 
 # of one coordinate [m]: 3 mm in space (√3 · 1.73 mm), the mean error of a photogrammetric point
@@ -60,12 +69,12 @@ class MeasuredStone:
 def measure_stone(stone: TrueStone, frame: WallFrame, rng: Random) -> MeasuredStone:
     """Measure one face: its corners and 17 to 20 points along its margin."""
     halves = tuple(rng.uniform(*HALF_JOINT) if joint else 0.0 for joint in stone.plan.joint)
-    visible = _inset(stone.plan.corners, halves)
+    visible = inset(stone.plan.corners, halves)
     chance = rng.random()
     worn = "eroded" if chance < ERODED else "bevelled" if chance < ERODED + BEVELLED else None
     corner = rng.randrange(4) if worn else None
     flat, behind = _corners(visible, worn, corner, rng)
-    points = _margin_points(visible, rng.randint(*COUNTS), rng)
+    points = margin_points(visible, rng.randint(*COUNTS), rng)
     points_behind = np.zeros(len(points))
     if worn == "eroded" and corner is not None:
         nearest = np.argsort(np.linalg.norm(points - visible[corner], axis=1), kind="stable")[
@@ -142,7 +151,7 @@ def modelled_solid(solid: Solid, joints: Iterable[int], rng: Random) -> Solid:
     return Solid(solid.code, cut.vertices + middle, cut.faces)
 
 
-def _inset(corners: Array, distances: tuple[float, ...]) -> Array:
+def inset(corners: Array, distances: tuple[float, ...]) -> Array:
     """Move each side of a counter-clockwise polygon inwards and intersect neighbouring sides again."""
     lines = []
     for k, distance in enumerate(distances):
@@ -175,9 +184,9 @@ def _towards(start: Array, stop: Array) -> Array:
     return unit
 
 
-def _margin_points(visible: Array, count: int, rng: Random) -> Array:
+def margin_points(visible: Array, count: int, rng: Random) -> Array:
     """Choose points along the dressed margin, densest near its corners, and two further in."""
-    ring = _inset(visible, (rng.uniform(*MARGIN),) * 4)
+    ring = inset(visible, (rng.uniform(*MARGIN),) * 4)
     edges = np.roll(ring, -1, axis=0) - ring
     reach = np.cumsum(np.hypot(edges[:, 0], edges[:, 1]))
     points = []

@@ -7,6 +7,7 @@ from pathlib import Path
 from mechanics.dynamics.progress import Listener, silent
 from moma.errors import UsageError
 from pipelines.samples.causes import PULSE, Cause
+from pipelines.samples.photographs import write_photographs
 from pipelines.samples.samples import Recipe, recipe_of
 from survey.arrays import Array
 from survey.formats.native.writer import write_head, write_moma
@@ -154,6 +155,7 @@ def write_sample(
     small: bool = False,
     phases: bool = False,
     courses: int | None = None,
+    photographs: bool = False,
 ) -> WrittenSample:
     """Write KIND.moma, truth.json and KIND.toml into a folder, created if necessary.
 
@@ -164,12 +166,15 @@ def write_sample(
     kind, moved, small, phases, courses : as of `recipe_of`
     folder : in which none of these files exists; created if necessary
     progress : called at every step of the simulation that moves the stones of some
+    photographs : photographs.toml, marks.txt, control.txt and marked.moma too: of the window
 
     Raises
     ------
     UsageError
         if there is no such sample, or a file would be overwritten
     """
+    if photographs and kind != "window":
+        raise UsageError(f"--photographs with the sample {kind!r}", remedy="it is for the window")
     recipe = recipe_of(kind, moved=moved, small=small, phases=phases, courses=courses)
     cause = recipe.cause
     survey, scene, truth = folder / f"{kind}.moma", folder / f"{kind}.toml", folder / "truth.json"
@@ -196,6 +201,10 @@ def write_sample(
         head = sample.survey.head
         write_head(replace(head, name=f"{head.name}, closed solids"), solids.with_name(_HEAD))
     files = tuple(str(path) for path in (survey, *texts, *extra))
+    if photographs:
+        files += write_photographs(folder)
+        project, result = folder / "photographs.toml", folder / "photographs"
+        commands = (f"moma orient {project} --out {result}", *commands)
     stones = len(sample.survey.blocks) + len(sample.modelled)
     return WrittenSample(kind, recipe.title, stones, files, commands)
 

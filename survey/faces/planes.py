@@ -207,7 +207,7 @@ def with_shared_errors(fit: FaceFit, points: Array, sigma: Array, joint: Array) 
     ----------
     fit : of the points
     points, sigma : (n, 3) and (n,) as for `fit_plane` [m]
-    joint : (3n, 3n) covariance of their coordinates [m²]
+    joint : (9n²,) covariance of their coordinates, by rows [m²]
     """
     used = np.setdiff1d(np.arange(len(points)), fit.rejected)
     rows = np.column_stack([(points[used] - fit.centroid) @ fit.axes.T, np.ones(len(used))])

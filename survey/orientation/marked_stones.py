@@ -196,7 +196,7 @@ def _in_space(
         photograph=None,
         image=np.empty((0, 2)),
         seen_from=np.mean(stations, axis=0),
-        joint=joint,
+        joint=joint.ravel(),
         evidence=tuple(
             _evidence(one, k >= len(located), joint[3 * k : 3 * k + 3, 3 * k : 3 * k + 3]) for k, one in enumerate(every)
         ),

@@ -40,7 +40,7 @@ class Orientation:
     ----------
     network : with the start values that were used
     prepared, solution, statistics : of the adjustment
-    removed : marks left out as blunders
+    removed : marks left out as blunders, each with its standardised residual before
     suspected : marks whose standardised residual exceeds the limit, those left out among them
     remarks : what was changed or left out, in words
     """
@@ -49,7 +49,7 @@ class Orientation:
     prepared: Prepared
     solution: Solution
     statistics: Statistics
-    removed: tuple[int, ...]
+    removed: dict[int, float]
     suspected: tuple[int, ...]
     remarks: tuple[str, ...]
 
@@ -84,7 +84,7 @@ def orient(network: Network, blunders: Blunders = "report") -> Orientation:
     with _few_threads(network):
         network, prepared, solution = _oriented(network, used)
         result = statistics(network, prepared, solution)
-        removed = list[int]()
+        removed = dict[int, float]()
         if blunders == "remove":
             used, prepared, solution, result = _snooped(network, used, prepared, solution, result, removed)
     remarks += _tested_control(network, solution, result)
@@ -92,7 +92,7 @@ def orient(network: Network, blunders: Blunders = "report") -> Orientation:
     if removed:
         remarks.append(f"{len(removed)} marks left out as blunders")
     return Orientation(
-        network, prepared, solution, result, tuple(removed), tuple(sorted(suspected)), (*network.remarks, *remarks)
+        network, prepared, solution, result, removed, tuple(sorted(suspected)), (*network.remarks, *remarks)
     )
 
 
@@ -294,7 +294,7 @@ def _snooped(
     prepared: Prepared,
     solution: Solution,
     result: Statistics,
-    removed: list[int],
+    removed: dict[int, float],
 ) -> tuple[NDArray[np.bool_], Prepared, Solution, Statistics]:
     """Leave out blunders, the worst of each photograph and point at a time, until none is left."""
     held = np.zeros(len(network.names), dtype=bool)
@@ -313,7 +313,7 @@ def _snooped(
             out.append(int(k))
         if not out:
             break
-        removed.extend(out)
+        removed |= {k: float(tests[k]) for k in out}
         used = used.copy()
         used[out] = False
         values = solution.unknowns

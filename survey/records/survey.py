@@ -284,8 +284,8 @@ class BlockRecord:
     marks : its points marked on oriented photographs, from which `points` and `vertices` are located
     surface : name of the surface that its face lies on; None: the plane of its own points
     seen_from : (3,) mean of the stations of the photographs that show it [m]; None if it was not marked on any
-    joint : (3n, 3n) covariance of the coordinates of the n points, then corners, with the errors that they share [m²];
-        None: their errors are independent
+    joint : (9n²,) covariance of the coordinates of the n points, then corners, by rows, with the errors that they share
+        [m²]; None: their errors are independent
     evidence : of each point, then of each corner, how it was located, in plain values; () if they were measured in space
     """
 

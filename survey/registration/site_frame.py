@@ -202,11 +202,11 @@ def record_to_site(record: Stone, transform: SiteTransform) -> Stone:
 
 
 def _turned_joint(joint: Array, transform: SiteTransform) -> Array:
-    """Return the covariance of points in the site frame, (3n, 3n)."""
-    count = len(joint) // 3
+    """Return the covariance of points in the site frame, (9n²,)."""
+    count = round(np.sqrt(len(joint) / 9))
     blocks = joint.reshape(count, 3, count, 3)
     out: Array = transform.scale**2 * np.einsum("ab,ibjc,dc->iajd", transform.rotation, blocks, transform.rotation)
-    return out.reshape(3 * count, 3 * count)
+    return out.ravel()
 
 
 def _turned(extrusion: Extrusion, transform: SiteTransform) -> Extrusion:

@@ -125,7 +125,7 @@ def _control(result: Orientation) -> list[dict[str, Any]]:
 def _marks(result: Orientation) -> dict[str, Any]:
     """Describe the marks by columns: rows of their own would make the file three times as long."""
     network, statistics = result.network, result.statistics
-    removed = set(result.removed)
+    removed = result.removed
     taken = [k for k in range(len(network.photo)) if np.isfinite(statistics.residuals[k]).all() or k in removed]
     tests, residuals = np.abs(statistics.standardised), result.residuals
     suspected = set(result.suspected)
@@ -137,7 +137,7 @@ def _marks(result: Orientation) -> dict[str, Any]:
         "y": network.image[taken, 1].tolist(),
         "vx": [_finite(one) for one in residuals[taken, 0].round(5).tolist()],
         "vy": [_finite(one) for one in residuals[taken, 1].round(5).tolist()],
-        "test": [_finite(one) for one in tests[taken].max(axis=1).round(3).tolist()],
+        "test": [removed.get(k, _finite(one)) for k, one in zip(taken, tests[taken].max(axis=1).round(3).tolist(), strict=True)],
         "redundancy": [_finite(one) for one in statistics.parts[taken].sum(axis=1).round(4).tolist()],
         "external": [_finite(one) for one in statistics.external[taken].max(axis=1).round(7).tolist()],
         "verdict": ["removed" if k in removed else "suspected" if k in suspected else "" for k in taken],
