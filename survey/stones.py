@@ -11,7 +11,7 @@ from survey.extrusion.extrusion import SurveyedBlock, extrude
 from survey.extrusion.imported_solids import block_of_solid
 from survey.faces.faces import Face, Provenance, face_on, outline_face
 from survey.faces.shapes import FaceShape, ShapeKind
-from survey.orientation.marked_stones import located_stones
+from survey.orientation.stones.marked_stones import located_stones
 from survey.records.snapping import Snapping
 from survey.records.survey import BlockRecord, Reject, SolidRecord, SurveyHead, SurveyStream
 from survey.registration.photographed_stones import LiftedFace, lift_faces

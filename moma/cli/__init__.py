@@ -10,12 +10,11 @@ from moma.cli.database import export, import_, migrate
 from moma.cli.entities import query, schema, show
 from moma.cli.geology import geology
 from moma.cli.knowledge import record
-from moma.cli.photographs import orient
 from moma.cli.proposals import propose
 from moma.cli.relations import load_path, relate
 from moma.cli.runs import runs
 from moma.cli.scenes import check, run, trade
-from moma.cli.surveys import ingest, sample, survey_report
+from moma.cli.surveys import ingest, orient, sample, survey_report
 
 __all__ = ["app", "main"]
 

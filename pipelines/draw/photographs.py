@@ -23,7 +23,7 @@ _VISIBLE = 0.02  # semi-axis of a typical ellipse over the extent of the network
 
 
 def draw_network(path: Path, values: Mapping[str, Any]) -> float:
-    """Draw stations, rays, points and their ellipses from above and from the side; return how much ellipses are enlarged.
+    """Draw stations, rays, points and their ellipses from above and from the side; return the ellipses' scale.
 
     Parameters
     ----------
@@ -41,7 +41,9 @@ def draw_network(path: Path, values: Mapping[str, Any]) -> float:
     some = np.linspace(0, len(points) - 1, min(len(points), _ELLIPSES)).astype(int)
     everything = np.concatenate([stations, points])
     extent = float(np.ptp(everything, axis=0).max()) or 1.0
-    sizes = np.sqrt(np.maximum(np.linalg.eigvalsh(covariances[some])[:, -1], 0.0)) if len(some) else np.zeros(1)
+    sizes = (
+        np.sqrt(np.maximum(np.linalg.eigvalsh(covariances[some])[:, -1], 0.0)) if len(some) else np.zeros(1)
+    )
     typical = float(np.median(sizes[sizes > 0.0])) if (sizes > 0.0).any() else 1.0
     factor = float(f"{_VISIBLE * extent / typical:.1g}")
     figure = new_sheet((11.0, 6.0))
@@ -49,7 +51,7 @@ def draw_network(path: Path, values: Mapping[str, Any]) -> float:
         figure.subplots(1, 2), ((0, 1), (0, 2)), (("x [m]", "y [m]"), ("x [m]", "z [m]")), strict=True
     ):
         flat = [across, up]
-        axes.add_collection(LineCollection(rays[:, :, flat], colors=PALE, linewidths=0.25, alpha=0.6))
+        axes.add_collection(LineCollection(list(rays[:, :, flat]), colors=PALE, linewidths=0.25, alpha=0.6))
         axes.plot(*points[~held][:, flat].T, ".", color=INK, markersize=1.5)
         axes.plot(*points[held][:, flat].T, "^", color=PLAIN, markersize=5, label="control and check points")
         axes.plot(*stations[:, flat].T, "s", color=FLAG, markersize=4, label="photographs")
@@ -104,7 +106,9 @@ def draw_photo_residuals(path: Path, values: Mapping[str, Any]) -> tuple[int, fl
     photos = sorted(values["photos"], key=lambda one: -(one["rms"] or 0.0))[:_PHOTOS]
     names = {one["name"] for one in photos}
     photos = [one for one in values["photos"] if one["name"] in names]
-    off = np.array([(a, b) if a is not None else (0.0, 0.0) for a, b in zip(marks["vx"], marks["vy"], strict=True)])
+    off = np.array(
+        [(a, b) if a is not None else (0.0, 0.0) for a, b in zip(marks["vx"], marks["vy"], strict=True)]
+    )
     at = np.column_stack([marks["x"], marks["y"]]).reshape(-1, 2)
     of = np.array(marks["photo"])
     verdict = np.array(marks["verdict"])
@@ -122,7 +126,9 @@ def draw_photo_residuals(path: Path, values: Mapping[str, Any]) -> tuple[int, fl
         w, h = size[one["camera"]]
         axes.set_xlim(0, w)
         axes.set_ylim(h, 0)
-        axes.set_title(f"{one['name']}: {one['marks']} marks, rms {one['rms'] or 0.0:.2f} px", fontsize=7, color=INK)
+        axes.set_title(
+            f"{one['name']}: {one['marks']} marks, rms {one['rms'] or 0.0:.2f} px", fontsize=7, color=INK
+        )
     for axes in grid:
         axes.set_aspect("equal")
         axes.set_xticks([])

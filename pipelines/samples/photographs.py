@@ -1,7 +1,7 @@
 """Twelve synthetic photographs of the window bay: a project to orient them, and its stones marked on them.
 
-Nothing is rendered: points of the true stones are projected by known cameras with lens distortion, with noise, as if they had
-been marked. Joints are open as in the survey; corners are sound.
+Nothing is rendered: points of the true stones are projected by known cameras with lens distortion, with noise, as
+if they had been marked. Joints are open as in the survey; corners are sound.
 """
 
 from collections.abc import Iterator
@@ -124,7 +124,9 @@ def _targets(bay: WindowBay, rng: Random) -> tuple[list[str], Array]:
         for r in range(rows)
         for c in range(columns)
     ]
-    flat += [(rng.uniform(-2.3, 2.4), rng.uniform(0.05, 3.85), rng.uniform(-0.02, 0.05)) for _ in range(_TIES)]
+    flat += [
+        (rng.uniform(-2.3, 2.4), rng.uniform(0.05, 3.85), rng.uniform(-0.02, 0.05)) for _ in range(_TIES)
+    ]
     names = [f"T{k + 1:02d}" for k in range(columns * rows)] + [f"{k + 1}" for k in range(_TIES)]
     return names, bay.frame.origin + np.array(flat) @ bay.frame.axes
 
@@ -153,15 +155,23 @@ def _control(names: list[str], points: Array, rng: Random) -> str:
     for name, place in zip(names, points, strict=True):
         if name.startswith("T"):
             x, y, z = (value + rng.gauss(0.0, _CONTROL_SIGMA) for value in place.tolist())
-            lines.append(f"{name}, target, {x:.4f}, {y:.4f}, {z:.4f}, {_CONTROL_SIGMA}, {_CONTROL_SIGMA}, {_CONTROL_SIGMA}")
+            lines.append(
+                f"{name}, target, {x:.4f}, {y:.4f}, {z:.4f}, {_CONTROL_SIGMA}, {_CONTROL_SIGMA}, {_CONTROL_SIGMA}"
+            )
     return "\n".join([*lines, ""])
 
 
 def _stones(bay: WindowBay, cameras: list[TrueCamera], rng: Random) -> str:
     """Return the stones as a native survey whose points are marked."""
-    lines = ["moma-survey 1", "name window bay, photographs (synthetic)", "orientation photographs/orientation.json"]
-    for rule in bay.survey.head.depth_rules:
-        lines.append(f"depth {rule.kind} {rule.depth:.4f} sigma {rule.sigma:.4f} source {rule.source}")
+    lines = [
+        "moma-survey 1",
+        "name window bay, photographs (synthetic)",
+        "orientation photographs/orientation.json",
+    ]
+    lines += [
+        f"depth {rule.kind} {rule.depth:.4f} sigma {rule.sigma:.4f} source {rule.source}"
+        for rule in bay.survey.head.depth_rules
+    ]
     for number, (stone, measured) in enumerate(zip(bay.stones, bay.measured, strict=True)):
         visible = inset(stone.plan.corners, measured.half_joints)
         corners = stone.on_face(bay.frame, visible)
@@ -170,7 +180,9 @@ def _stones(bay: WindowBay, cameras: list[TrueCamera], rng: Random) -> str:
         course = "" if record.course is None else f" course {record.course}"
         lines += ["", f"stone {record.code} {record.kind}{course}"]
         if record.depth is not None:
-            lines.append(f"  depth {record.depth:.4f} sigma {record.depth_sigma:.4f} source {record.depth_source}")
+            lines.append(
+                f"  depth {record.depth:.4f} sigma {record.depth_sigma:.4f} source {record.depth_source}"
+            )
         shown = rng.sample(range(len(cameras)), len(cameras))
         if number % _DRAWN == 4:
             one = next(cameras[k] for k in shown if _inside(cameras[k].see(corners)).all())
@@ -195,11 +207,8 @@ def _point(
     while len(chosen) < min(count, len(able)):
         left = [k for k in able if k not in chosen]
         chosen.append(max(left, key=lambda k: min(_apart(cameras[k], cameras[o]) for o in chosen)))
-    lines = []
-    for k in sorted(chosen):
-        x, y = _marked(cameras[k], place[None], rng)[0].tolist()
-        lines.append(f"  mark {name} {role} {cameras[k].photo.name} {x:.2f} {y:.2f}")
-    return lines
+    seen = {k: _marked(cameras[k], place[None], rng)[0].tolist() for k in sorted(chosen)}
+    return [f"  mark {name} {role} {cameras[k].photo.name} {x:.2f} {y:.2f}" for k, (x, y) in seen.items()]
 
 
 def _apart(one: TrueCamera, other: TrueCamera) -> float:

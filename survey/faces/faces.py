@@ -112,7 +112,9 @@ def _measured_face(record: BlockRecord, observer: Array | None) -> Face:
         fit = with_shared_errors(fit, measured, record.point_and_vertex_sigmas, record.joint)
     corners = record.vertices - np.outer(fit.residuals[len(record.points) :], fit.normal)
     shape = judge_shape(fit, measured, sigma)
-    return face_on(fit, corners, shape, _MARKS if record.evidence else _POINTS, record, keep_order=observer is None)
+    return face_on(
+        fit, corners, shape, _MARKS if record.evidence else _POINTS, record, keep_order=observer is None
+    )
 
 
 def face_on(

@@ -201,7 +201,8 @@ def _extent(xyz: Array) -> tuple[float, float]:
 def with_shared_errors(fit: FaceFit, points: Array, sigma: Array, joint: Array) -> FaceFit:
     """Return a fit whose covariance counts the errors that its points share.
 
-    The plane stays. Its axes and its centre are chosen anew, so that its tilts and its height there are uncorrelated again.
+    The plane stays. Its axes and its centre are chosen anew, so that its tilts and its height there are
+    uncorrelated again.
 
     Parameters
     ----------
@@ -221,7 +222,9 @@ def with_shared_errors(fit: FaceFit, points: Array, sigma: Array, joint: Array) 
     across = turn.T @ covariance[:2, 2]
     shift = -across / tilts
     reach = float(np.abs(rows[:, :2]).max())
-    shift = np.clip(shift, -10.0 * reach, 10.0 * reach)  # two perfectly correlated errors would send it far away
+    shift = np.clip(
+        shift, -10.0 * reach, 10.0 * reach
+    )  # two perfectly correlated errors would send it far away
     axes = turn.T @ fit.axes
     centroid = fit.centroid + shift @ axes
     height = covariance[2, 2] + 2.0 * shift @ across + shift**2 @ tilts

@@ -21,8 +21,8 @@ class Camera:
     Attributes
     ----------
     name : unique in its network
-    inner : (10,) values of `INTERIOR`: camera constant, principal point from the upper left corner to the right and down
-        [unit], affinity and skew [-], radial [unit⁻², unit⁻⁴, unit⁻⁶] and decentring [unit⁻¹] distortion
+    inner : (10,) values of `INTERIOR`: camera constant, principal point from the upper left corner to the right
+        and down [unit], affinity and skew [-], radial [unit⁻², unit⁻⁴, unit⁻⁶] and decentring [unit⁻¹] distortion
     size : width and height of a photograph [px]
     pixel : height of a pixel [unit]
     unit : of the image, "mm" or "px"
@@ -55,11 +55,12 @@ class Photo:
     ----------
     name : unique in its network
     camera : index of its camera
-    rotation : (3, 3) to start from, the camera's axes in columns: x to the right, y upwards, z backwards; None: not known
+    rotation : (3, 3) to start from, the camera's axes in columns: x to the right, y upwards, z backwards; None:
+        not known
     station : (3,) place of the projection centre to start from [m]; None: not known
     observed_station, station_sigma : (3,) observed place and its standard deviations [m]; None: not observed
-    observed_rotation, angle_sigma : (3, 3) observed rotation, and (3,) standard deviations of its ω, φ, κ [rad]; None: not
-        observed
+    observed_rotation, angle_sigma : (3, 3) observed rotation, and (3,) standard deviations of its ω, φ, κ [rad];
+        None: not observed
     fixed : its orientation is not estimated
     where : ``file:line``
     """
@@ -97,7 +98,7 @@ class Control:
 
     @property
     def fixed(self) -> bool:
-        """Whether the place is not to be estimated."""
+        """True if the place is not estimated."""
         return not self.covariance.any()
 
 

@@ -1,4 +1,4 @@
-"""Oriented photographs: what `moma orient` leaves behind for the stones that are measured on them."""
+"""Oriented photographs, as `moma orient` leaves them behind for the stones that are measured on them."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from moma.errors import SurveyError
 from survey.arrays import Array
-from survey.orientation._kernels.adjustment import Unknowns
 from survey.orientation.network import Camera, Photo, listed
 
 __all__ = ["Oriented"]
@@ -22,7 +21,8 @@ class Oriented:
     path : the file that they were read from
     cameras : with adjusted values
     photos : with adjusted rotations and stations
-    table : (nf, 16) columns of each photograph's rotation, station and interior orientation in `covariance`; -1: without error
+    table : (nf, 16) columns of each photograph's rotation, station and interior orientation in `covariance`; -1:
+        without error
     covariance : (nr, nr) of all of them together, with σ₀² in it [rad, m, camera unit]
     mark_sigma : standard deviation of a coordinate marked on them, as the adjustment found it [px]
     """
@@ -46,7 +46,9 @@ class Oriented:
             if one.name == name:
                 return number
         names = [one.name for one in self.photos]
-        raise SurveyError(f"no photograph {name} in {self.path}", where=where, remedy=f"oriented are {listed(names)}")
+        raise SurveyError(
+            f"no photograph {name} in {self.path}", where=where, remedy=f"oriented are {listed(names)}"
+        )
 
     def camera(self, photo: int) -> Camera:
         """Return the camera of a photograph."""
@@ -63,16 +65,3 @@ class Oriented:
         station = self.photos[photo].station
         assert station is not None
         return station
-
-    def unknowns(self, points: Array) -> Unknowns:
-        """Return the values as kernels take them, with points that are all free."""
-        return Unknowns(
-            np.array([one.camera for one in self.photos], dtype=np.int64),
-            np.array([one.forward for one in self.cameras]),
-            np.array([one.inner for one in self.cameras]),
-            np.array([self.rotation(f) for f in range(len(self.photos))]),
-            np.array([self.station(f) for f in range(len(self.photos))]),
-            np.ascontiguousarray(points),
-            self.table,
-            np.ones(len(points), dtype=bool),
-        )

@@ -82,4 +82,6 @@ def project(camera: Camera, rotation: Array, station: Array, points: Array) -> A
     else:
         at = _undo(np.column_stack([ideal[:, 0] - inner[4] * ideal[:, 1], ideal[:, 1]]), inner)
         at = at / (1.0 + inner[3], 1.0)
-    return (at + (inner[1], -inner[2])) / camera.pixel * (1.0, -1.0)
+    middle = np.array([inner[1], -inner[2]])
+    out: Array = (at + middle) / camera.pixel * (1.0, -1.0)
+    return out

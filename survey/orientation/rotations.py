@@ -1,7 +1,7 @@
 """Rotations of a camera: by ω, φ, κ, and by a small rotation vector.
 
-The columns of R are the camera's axes, R = R₁(ω) R₂(φ) R₃(κ), so that q = Rᵀ(X - X₀). A correction δ is a rotation about
-the camera's own axes, R exp([δ]×).
+The columns of R are the camera's axes, R = R₁(ω) R₂(φ) R₃(κ), so that q = Rᵀ(X - X₀). A correction δ is a rotation
+about the camera's own axes, R exp([δ]×).
 """
 
 import numpy as np
@@ -63,5 +63,6 @@ def turned(rotations: Array, by: Array) -> Array:
     # sin(a)/a and (1 - cos(a))/a² by sinc, which is sound at zero
     first = np.sinc(angle / np.pi)
     second = 0.5 * np.sinc(0.5 * angle / np.pi) ** 2
-    turn = np.eye(3) + first[:, None, None] * cross + second[:, None, None] * (cross @ cross)
-    return rotations @ turn
+    turn: Array = np.eye(3) + first[:, None, None] * cross + second[:, None, None] * (cross @ cross)
+    out: Array = rotations @ turn
+    return out

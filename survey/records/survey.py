@@ -286,7 +286,8 @@ class BlockRecord:
     seen_from : (3,) mean of the stations of the photographs that show it [m]; None if it was not marked on any
     joint : (9n²,) covariance of the coordinates of the n points, then corners, by rows, with the errors that they share
         [m²]; None: their errors are independent
-    evidence : of each point, then of each corner, how it was located, in plain values; () if they were measured in space
+    evidence : of each point, then of each corner, how it was located, in plain values; () if they were measured in
+        space
     """
 
     code: str

@@ -205,7 +205,9 @@ def _turned_joint(joint: Array, transform: SiteTransform) -> Array:
     """Return the covariance of points in the site frame, (9n²,)."""
     count = round(np.sqrt(len(joint) / 9))
     blocks = joint.reshape(count, 3, count, 3)
-    out: Array = transform.scale**2 * np.einsum("ab,ibjc,dc->iajd", transform.rotation, blocks, transform.rotation)
+    out: Array = transform.scale**2 * np.einsum(
+        "ab,ibjc,dc->iajd", transform.rotation, blocks, transform.rotation
+    )
     return out.ravel()
 
 

@@ -44,7 +44,9 @@ def _located(one: Values) -> str:
         for ray in one["rays"]
     ]
     what = "corner" if one["role"] == "vertex" else "point"
-    return f"{what} {one['point']} at ({place}) ± ({precision}) mm: {one['how']}" + "".join(f"; {ray}" for ray in rays)
+    return f"{what} {one['point']} at ({place}) ± ({precision}) mm: {one['how']}" + "".join(
+        f"; {ray}" for ray in rays
+    )
 
 
 def history_lines(code: str, events: Sequence[Values]) -> str:

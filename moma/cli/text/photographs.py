@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from moma.cli.text.formats import shorten
 
 if TYPE_CHECKING:
-    from pipelines.orient.orient import OrientReport
+    from pipelines.reports.photographs.orient import OrientReport
 
 __all__ = ["orient_lines"]
 
@@ -15,7 +15,8 @@ def orient_lines(report: "OrientReport", verbose: bool) -> list[str]:
     values = report.values
     marks = values["marks"]
     lines = [
-        f"{values['name']}: {len(values['photos'])} photographs, {len(values['points'])} points, {len(marks['x'])} marks",
+        f"{values['name']}: {len(values['photos'])} photographs, {len(values['points'])} points, "
+        f"{len(marks['x'])} marks",
         f"  {values['observations']} observations, {values['unknowns']} unknowns, redundancy {values['redundancy']}"
         + ("" if values["sigma0"] is None else f", σ₀ {values['sigma0']:.6g}"),
     ]
@@ -35,13 +36,17 @@ def orient_lines(report: "OrientReport", verbose: bool) -> list[str]:
         if ones:
             worst = max(ones, key=lambda one: one["test"])
             what = "control" if use == "weighted" else "check"
-            lines.append(f"  {len(ones)} {what} points; farthest off is {worst['id']}, by {worst['test']:.1f} σ")
-    suspected = sorted((k for k, one in enumerate(marks["verdict"]) if one), key=lambda k: -(marks["test"][k] or 0.0))
+            lines.append(
+                f"  {len(ones)} {what} points; farthest off is {worst['id']}, by {worst['test']:.1f} σ"
+            )
+    suspected = sorted(
+        (k for k, one in enumerate(marks["verdict"]) if one), key=lambda k: -(marks["test"][k] or 0.0)
+    )
     if suspected:
         lines.append(f"  {len(suspected)} marks suspected or left out:")
         ones = [
-            f"    point {marks['point'][k]} on {marks['photo'][k]}, line {marks['line'][k]}: {marks['test'][k] or 0.0:.1f} σ"
-            + (", left out" if marks["verdict"][k] == "removed" else "")
+            f"    point {marks['point'][k]} on {marks['photo'][k]}, line {marks['line'][k]}: "
+            f"{marks['test'][k] or 0.0:.1f} σ" + (", left out" if marks["verdict"][k] == "removed" else "")
             for k in suspected
         ]
         lines += ones if verbose else shorten(ones, 5, "    ", ", with -v")

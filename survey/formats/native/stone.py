@@ -156,7 +156,9 @@ class StoneReader:
     def _take_mark(self, cursor: Cursor, line: int) -> None:
         remedy = "write: mark POINT vertex PHOTO X Y [sigma PIXELS], or point instead of vertex"
         if self._head.orientation is None:
-            raise cursor.fail("a mark, but the head names no orientation", "write in the head: orientation FILE")
+            raise cursor.fail(
+                "a mark, but the head names no orientation", "write in the head: orientation FILE"
+            )
         name = cursor.name("point")
         role = cursor.word()
         if role not in ("vertex", "point"):
@@ -167,9 +169,13 @@ class StoneReader:
         cursor.end(remedy)
         for one in self._marks:
             if one.name == name and one.role != role:
-                raise cursor.fail(f"point {name} is a {role} here and a {one.role} on line {one.line}", "keep one role")
+                raise cursor.fail(
+                    f"point {name} is a {role} here and a {one.role} on line {one.line}", "keep one role"
+                )
             if one.name == name and one.photograph == photograph:
-                raise cursor.fail(f"point {name} is marked twice on {photograph}, first on line {one.line}", "keep one")
+                raise cursor.fail(
+                    f"point {name} is marked twice on {photograph}, first on line {one.line}", "keep one"
+                )
         self._marks.append(PointMark(name, role, photograph, image, sigma, line))
 
     def _take_note(self, cursor: Cursor) -> None:

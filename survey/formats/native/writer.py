@@ -146,7 +146,9 @@ def _stone_lines(block: BlockRecord, common_sigma: float) -> list[str]:
         lines.append(f"  on {_name(block.surface)}")
     for mark in block.marks:
         own = "" if mark.sigma is None else f" sigma {_number(mark.sigma)}"
-        lines.append(f"  mark {_name(mark.name)} {mark.role} {_name(mark.photograph)} {_row(mark.image)}{own}")
+        lines.append(
+            f"  mark {_name(mark.name)} {mark.role} {_name(mark.photograph)} {_row(mark.image)}{own}"
+        )
     precisions = [""] * (len(block.points) + len(block.vertices))
     if block.sigmas is not None:
         precisions = [f" sigma {_number(sigma)}" for sigma in block.sigmas]

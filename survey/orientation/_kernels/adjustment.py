@@ -1,6 +1,7 @@
 """Numba kernels of the bundle adjustment: normal equations reduced to the cameras, points, covariances.
 
-Of the normal equations [N, W; Wᵀ, V] [dc; dp] = [g_c; g_p] the matrix V of the points is made of 3 × 3 blocks: each point is
+Of the normal equations [N, W; Wᵀ, V] [dc; dp] = [g_c; g_p] the matrix V of the points is made of 3 × 3 blocks:
+each point is
 eliminated as soon as its rays are summed, so that nothing but the system of the cameras, N - W V⁻¹ Wᵀ, is ever stored.
 """
 
@@ -155,7 +156,8 @@ def reduced_normals(rays, unknowns, prior, damping, normal, right):
     -------
     normal : (nr, nr) float64, to which the lower triangle of N - W V⁻¹ Wᵀ is added
     right : (nr,) float64, to which g_c - W V⁻¹ g_p is added
-    sum of squares of the weighted residuals of rays; rays from behind; first point that its rays do not determine, or -1
+    sum of squares of the weighted residuals of rays; rays from behind; first point that its rays do not determine,
+    or -1
     """
     width = len(right)
     scratch = _scratch(rays, width)

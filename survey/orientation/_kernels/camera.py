@@ -1,6 +1,7 @@
 """Numba kernels of the collinearity equations: one ray, its residual and its derivatives.
 
-The image system has x to the right and y upwards, its origin at the upper left corner of the photograph; the camera looks
+The image system has x to the right and y upwards, its origin at the upper left corner of the photograph; the
+camera looks
 along -z. With the camera's axes as columns of R and its station X₀, a point X has the camera coordinates q = Rᵀ(X - X₀)
 and its image is p = -c (q₁, q₂) / q₃ from the principal point (x_p, -y_p). Brown's distortion of a place (x, y) with
 r² = x² + y² is

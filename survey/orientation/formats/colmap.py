@@ -87,7 +87,9 @@ def read_colmap(folder: Path, sigma: float = 1.0) -> Network:
 
 def _number(text: str, what: str, where: str) -> int:
     if not (text.isascii() and text.lstrip("-").isdigit()):
-        raise SurveyError(f"{what} is {shown(text)}, not a whole number", where=where, remedy="export the model again")
+        raise SurveyError(
+            f"{what} is {shown(text)}, not a whole number", where=where, remedy="export the model again"
+        )
     return int(text)
 
 
@@ -106,7 +108,9 @@ def _cameras(path: Path) -> dict[int, Camera]:
             raise SurveyError(
                 f"{len(words) - 4} parameters of {words[1]}", where=where, remedy=f"it has {', '.join(names)}"
             )
-        values = dict(zip(names, (parse_number(word, "a parameter", where) for word in words[4:]), strict=True))
+        values = dict(
+            zip(names, (parse_number(word, "a parameter", where) for word in words[4:]), strict=True)
+        )
         for name in ("k4", "k5", "k6"):
             if values.get(name):
                 raise SurveyError(
@@ -139,7 +143,9 @@ def _images(path: Path, cameras: dict[int, int]) -> list[_Image]:
     while rows and not rows[-1][1].strip() and len(rows) % 2:
         rows.pop()
     out: list[_Image] = []
-    for (line, head), (under, marks) in zip(rows[::2], [*rows[1::2], *([(lines.end, "")] * (len(rows) % 2))], strict=True):
+    for (line, head), (under, marks) in zip(
+        rows[::2], [*rows[1::2], *([(lines.end, "")] * (len(rows) % 2))], strict=True
+    ):
         where, words = f"{lines.path}:{line}", head.split(maxsplit=9)
         if len(words) != 10:
             raise SurveyError(
@@ -149,14 +155,18 @@ def _images(path: Path, cameras: dict[int, int]) -> list[_Image]:
             )
         number, camera = _number(words[0], "the image", where), _number(words[8], "the camera", where)
         if camera not in cameras:
-            raise SurveyError(f"camera {camera} is not in cameras.txt", where=where, remedy="export the model again")
+            raise SurveyError(
+                f"camera {camera} is not in cameras.txt", where=where, remedy="export the model again"
+            )
         q = np.array([parse_number(word, "the pose", where) for word in words[1:8]])
         turn, t = _rotation(q[:4], where), q[4:]
         photo = Photo(words[9].strip(), cameras[camera], turn.T @ _FLIP, -turn.T @ t, where=where)
         values = marks.split()
         if len(values) % 3:
             raise SurveyError(
-                f"{len(values)} values of marks", where=f"{lines.path}:{under}", remedy="write X Y POINT3D_ID for each"
+                f"{len(values)} values of marks",
+                where=f"{lines.path}:{under}",
+                remedy="write X Y POINT3D_ID for each",
             )
         found = list[tuple[int, Array, int]]()
         for k in range(0, len(values), 3):
@@ -206,7 +216,9 @@ def _points(path: Path) -> dict[int, Array]:
     for line, text in lines.rows():
         where, words = f"{lines.path}:{line}", text.split()
         if len(words) < 4:
-            raise SurveyError(f"a point of {len(words)} values", where=where, remedy="write: POINT3D_ID X Y Z R G B ERROR …")
+            raise SurveyError(
+                f"a point of {len(words)} values", where=where, remedy="write: POINT3D_ID X Y Z R G B ERROR …"
+            )
         out[_number(words[0], "the point", where)] = np.array(
             [parse_number(word, "a coordinate", where) for word in words[1:4]]
         )
@@ -223,19 +235,29 @@ def write_colmap(network: Network, folder: Path) -> None:
     """
     for name in network.names:
         if not name.isdigit():
-            raise SurveyError(f"point {shown(name)} is not a number", where=str(folder), remedy="number the points")
+            raise SurveyError(
+                f"point {shown(name)} is not a number", where=str(folder), remedy="number the points"
+            )
     folder.mkdir(parents=True, exist_ok=True)
-    _write(folder / "cameras.txt", [_camera_line(k, one, folder) for k, one in enumerate(network.cameras, start=1)])
+    _write(
+        folder / "cameras.txt",
+        [_camera_line(k, one, folder) for k, one in enumerate(network.cameras, start=1)],
+    )
     images, place_of = list[str](), np.zeros(len(network.photo), dtype=int)
     for k, photo in enumerate(network.photos):
         if photo.rotation is None or photo.station is None:
-            raise SurveyError(f"photograph {photo.name} is not oriented", where=str(folder), remedy="orient it first")
+            raise SurveyError(
+                f"photograph {photo.name} is not oriented", where=str(folder), remedy="orient it first"
+            )
         turn = (photo.rotation @ _FLIP).T
         pose = [*_quaternion(turn), *(-turn @ photo.station).tolist()]
         mine = np.flatnonzero(network.photo == k)
         place_of[mine] = np.arange(len(mine))
         images.append(" ".join([str(k + 1), *map(repr, pose), str(photo.camera + 1), photo.name]))
-        marks = [f"{x!r} {y!r} {network.names[i]}" for (x, y), i in zip(network.image[mine].tolist(), network.point[mine], strict=True)]
+        marks = [
+            f"{x!r} {y!r} {network.names[i]}"
+            for (x, y), i in zip(network.image[mine].tolist(), network.point[mine], strict=True)
+        ]
         images.append(" ".join(marks))
     _write(folder / "images.txt", images)
     points = []
@@ -250,7 +272,7 @@ def _camera_line(number: int, camera: Camera, folder: Path) -> str:
         raise SurveyError(
             f"camera {camera.name} has {camera.model} distortion and skew {camera.inner[4]:g}",
             where=str(folder),
-            remedy="COLMAP holds forward distortion without skew: calibrate with model = \"forward\"",
+            remedy='COLMAP holds forward distortion without skew: calibrate with model = "forward"',
         )
     c, xp, yp, a, _, k1, k2, k3, p1, p2 = camera.inner.tolist()
     f = c / camera.pixel

@@ -56,11 +56,15 @@ def read_control(path: Path) -> tuple[ControlRow, ...]:
         row = _row([one.strip() for one in line.split(",")], where)
         if row.number in rows:
             raise SurveyError(
-                f"point {row.number} is there twice, first at {rows[row.number].where}", where=where, remedy="keep one"
+                f"point {row.number} is there twice, first at {rows[row.number].where}",
+                where=where,
+                remedy="keep one",
             )
         rows[row.number] = row
     if not rows:
-        raise SurveyError("the file has no control points", where=lines.path, remedy="give one point per line")
+        raise SurveyError(
+            "the file has no control points", where=lines.path, remedy="give one point per line"
+        )
     return tuple(rows.values())
 
 
@@ -70,7 +74,7 @@ def _row(words: list[str], where: str) -> ControlRow:
         raise SurveyError(
             f"a control point of {len(words)} values",
             where=where,
-            remedy="write: number, name, X, Y, Z, and one or three standard deviations or nine covariances if it has any",
+            remedy="write: number, name, X, Y, Z, and deviations: none, one, three, or nine covariances",
         )
     if not words[0]:
         raise SurveyError("a control point without a number", where=where, remedy="write its number first")
@@ -79,17 +83,23 @@ def _row(words: list[str], where: str) -> ControlRow:
     place, rest = np.array(values[:3]), np.array(values[3:])
     if len(rest) <= 3:
         if (rest < 0.0).any():
-            raise SurveyError(f"a standard deviation of {rest.min():g}", where=where, remedy="it must not be negative")
+            raise SurveyError(
+                f"a standard deviation of {rest.min():g}", where=where, remedy="it must not be negative"
+            )
         if rest.any() and not rest.all():
             raise SurveyError(
-                "a standard deviation of 0 beside others", where=where, remedy="give all of them, or none for a fixed point"
+                "a standard deviation of 0 beside others",
+                where=where,
+                remedy="give all of them, or none for a fixed point",
             )
         covariance = np.diag(np.broadcast_to(rest, 3).astype(float) ** 2) if len(rest) else np.zeros((3, 3))
     else:
         covariance = rest.reshape(3, 3)
         if not np.allclose(covariance, covariance.T) or np.linalg.eigvalsh(covariance).min() <= 0.0:
             raise SurveyError(
-                "its covariance is not symmetric and positive", where=where, remedy="give nine values row by row"
+                "its covariance is not symmetric and positive",
+                where=where,
+                remedy="give nine values row by row",
             )
     return ControlRow(words[0], words[1].strip('"') if labelled else "", place, covariance, where)
 
@@ -121,10 +131,12 @@ def with_control(
             remedy=f"marked points: {listed(network.names)}",
         )
     names = {row.number for row in known} | {row.name for row in known if row.name}
-    for one in check:
-        if one not in names:
+    for wanted in check:
+        if wanted not in names:
             raise SurveyError(
-                f"no control point {shown(one)} to check", where=network.path, remedy=f"known: {listed(sorted(names))}"
+                f"no control point {shown(wanted)} to check",
+                where=network.path,
+                remedy=f"known: {listed(sorted(names))}",
             )
     own = {one.point: one.place for one in network.control}
     pairs = [(own[index[row.number]], row.place) for row in known if index[row.number] in own]

@@ -1,7 +1,7 @@
 """Marks on photographs as plain text, one per line: photograph, point, x, y, and its standard deviation if it has one.
 
-Values are separated by commas, semicolons, tabs or blanks; places are in pixels, to the right and down from the upper left
-corner. Lines that begin with # are comments. The Damped Bundle Adjustment Toolbox reads the same columns.
+Values are separated by commas, semicolons, tabs or blanks; places are in pixels, to the right and down from the
+upper left corner. Lines that begin with # are comments. The Damped Bundle Adjustment Toolbox reads the same columns.
 """
 
 import re
@@ -64,7 +64,9 @@ def _rows(lines: TextLines) -> Iterator[MarkRow]:
         words = _BETWEEN.split(line.strip())
         if len(words) not in (4, 5):
             raise SurveyError(
-                f"a mark of {len(words)} values", where=where, remedy="write: photograph, point, x, y, sigma if it has one"
+                f"a mark of {len(words)} values",
+                where=where,
+                remedy="write: photograph, point, x, y, sigma if it has one",
             )
         x, y = (parse_number(word, name, where) for word, name in zip(words[2:4], "xy", strict=True))
         sigma = parse_length(words[4], "sigma", where) if len(words) == 5 else None
@@ -133,5 +135,7 @@ def write_marks(network: Network, path: Path) -> None:
     for k in range(len(network.photo)):
         x, y = network.image[k].tolist()
         sigma = float(np.sqrt((network.sigma[k] ** 2).mean()))
-        text.append(f"{network.photos[network.photo[k]].name}, {network.names[network.point[k]]}, {x!r}, {y!r}, {sigma!r}")
+        text.append(
+            f"{network.photos[network.photo[k]].name}, {network.names[network.point[k]]}, {x!r}, {y!r}, {sigma!r}"
+        )
     path.write_text("\n".join([*text, ""]), encoding="utf-8", newline="\n")

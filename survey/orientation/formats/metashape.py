@@ -1,8 +1,9 @@
 """XML of cameras and markers as Agisoft Metashape exports it, both in one file or in two.
 
-A chunk holds sensors with their calibrations, cameras with their transformation from the camera's axes (x to the right, y
-down, z forward) to those of the chunk, the chunk's own transformation to the world, markers with their places by survey, and
-their marks on the photographs. Distortion is forward, of coordinates over the depth:
+A chunk holds sensors with their calibrations, cameras with their transformation from the camera's axes (x to the
+right, y
+down, z forward) to those of the chunk, the chunk's own transformation to the world, markers with their places by
+survey, and their marks on the photographs. Distortion is forward, of coordinates over the depth:
 
     u = w/2 + c_x + x' f + x' B₁ + y' B₂,   v = h/2 + c_y + y' f
 """
@@ -46,13 +47,19 @@ def read_metashape(path: Path, markers: Path | None = None, sigma: float = 1.0) 
         if one.attributes.get("enabled", "true").lower() in ("0", "false"):
             continue
         if one.attribute("sensor_id") not in sensors:
-            raise one.fail(f"sensor {one.attributes['sensor_id']} is not in the file", "export the cameras again")
+            raise one.fail(
+                f"sensor {one.attributes['sensor_id']} is not in the file", "export the cameras again"
+            )
         photos[one.attribute("id")] = _photo(one, sensors[one.attributes["sensor_id"]], world)
     if not photos:
         raise chunk.fail("the chunk has no cameras", "export the cameras")
     other = chunk if markers is None else read_xml(markers, "document").need("chunk")
     remarks = []
-    if (reference := chunk.find("reference")) is not None and "LOCAL_CS" not in reference.text and reference.text.strip():
+    if (
+        (reference := chunk.find("reference")) is not None
+        and "LOCAL_CS" not in reference.text
+        and reference.text.strip()
+    ):
         remarks.append("the chunk is georeferenced: places are geocentric")
     return _network(path if markers is None else markers, other, cameras, photos, sigma, tuple(remarks))
 
@@ -88,7 +95,18 @@ def _camera(sensor: Element) -> Camera:
     stretch = fx + _value(one, "b1")
     skew = _value(one, "b2") + _value(one, "skew")
     k1, k2, k3 = (_value(one, name) for name in ("k1", "k2", "k3"))
-    inner = [fy, cx, cy, stretch / fy - 1.0, -skew / fy, k1 / fy**2, k2 / fy**4, k3 / fy**6, _value(one, "p1") / fy, -_value(one, "p2") / fy]
+    inner = [
+        fy,
+        cx,
+        cy,
+        stretch / fy - 1.0,
+        -skew / fy,
+        k1 / fy**2,
+        k2 / fy**4,
+        k3 / fy**6,
+        _value(one, "p1") / fy,
+        -_value(one, "p2") / fy,
+    ]
     return Camera(name, np.array(inner), (width, height), 1.0, "px", True, where=one.where)
 
 
@@ -119,13 +137,25 @@ def _photo(one: Element, camera: int, world: tuple[Array, Array, float]) -> Phot
 
 
 def _network(
-    path: Path, chunk: Element, cameras: tuple[Camera, ...], photos: dict[str, Photo], sigma: float, remarks: tuple[str, ...]
+    path: Path,
+    chunk: Element,
+    cameras: tuple[Camera, ...],
+    photos: dict[str, Photo],
+    sigma: float,
+    remarks: tuple[str, ...],
 ) -> Network:
     places = {one: k for k, one in enumerate(photos)}
     markers = {one.attribute("id"): one for one in _grouped(chunk, "markers", "marker")}
     names = [one.attributes.get("label") or number for number, one in markers.items()]
     index = {number: k for k, number in enumerate(markers)}
-    accuracy = next((one for one in chunk.all("settings", "property") if one.attributes.get("name") == "accuracy_projections"), None)
+    accuracy = next(
+        (
+            one
+            for one in chunk.all("settings", "property")
+            if one.attributes.get("name") == "accuracy_projections"
+        ),
+        None,
+    )
     if accuracy is not None:
         sigma = accuracy.number("value")
     control = tuple(
@@ -136,13 +166,21 @@ def _network(
         and "x" in found.attributes
         for place, covariance in [_reference(found)]
     )
-    photo, point, image, lines, seen = list[int](), list[int](), list[list[float]](), list[int](), set[tuple[int, int]]()
+    photo, point, image, lines, seen = (
+        list[int](),
+        list[int](),
+        list[list[float]](),
+        list[int](),
+        set[tuple[int, int]](),
+    )
     for marker in chunk.all("frames", "frame", "markers", "marker"):
         number = marker.attribute("marker_id")
         if number not in index:
             raise marker.fail(f"marker {number} is not in the file", "export the markers again")
         for location in marker.all("location"):
-            if location.attribute("camera_id") not in places or location.attributes.get("pinned", "true").lower() in ("0", "false"):
+            if location.attribute("camera_id") not in places or location.attributes.get(
+                "pinned", "true"
+            ).lower() in ("0", "false"):
                 continue
             key = places[location.attributes["camera_id"]], index[number]
             if key in seen:
@@ -186,32 +224,45 @@ def write_metashape(network: Network, path: Path) -> None:
     SurveyError
         if a camera has backward distortion, or an orientation is missing
     """
-    out = ['<?xml version="1.0" encoding="UTF-8"?>', '<document version="1.5.0">', '<chunk label="moma" enabled="true">', "<sensors>"]
+    out = [
+        '<?xml version="1.0" encoding="UTF-8"?>',
+        '<document version="1.5.0">',
+        '<chunk label="moma" enabled="true">',
+        "<sensors>",
+    ]
     for k, camera in enumerate(network.cameras):
         if not camera.forward:
             raise SurveyError(
                 f"camera {camera.name} has backward distortion",
                 where=str(path),
-                remedy="Metashape holds forward distortion: calibrate with model = \"forward\"",
+                remedy='Metashape holds forward distortion: calibrate with model = "forward"',
             )
         out += _sensor(k, camera)
     out += ["</sensors>", "<cameras>"]
     for k, photo in enumerate(network.photos):
         if photo.rotation is None or photo.station is None:
-            raise SurveyError(f"photograph {photo.name} is not oriented", where=str(path), remedy="orient it first")
+            raise SurveyError(
+                f"photograph {photo.name} is not oriented", where=str(path), remedy="orient it first"
+            )
         pose = np.eye(4)
         pose[:3, :3], pose[:3, 3] = photo.rotation @ _FLIP, photo.station
         numbers = " ".join(map(repr, pose.ravel().tolist()))
-        out.append(f'<camera id="{k}" sensor_id="{photo.camera}" label={quoteattr(photo.name)} enabled="true">')
+        out.append(
+            f'<camera id="{k}" sensor_id="{photo.camera}" label={quoteattr(photo.name)} enabled="true">'
+        )
         out += [f"<transform>{numbers}</transform>", "</camera>"]
     out += ["</cameras>", "<markers>"]
     control = {one.point: one for one in network.control}
-    for i, name in enumerate(network.names):
-        out.append(f'<marker id="{i}" label={quoteattr(name)}>')
-        if i in control:
-            x, y, z = control[i].place.tolist()
-            deviations = np.sqrt(np.diag(control[i].covariance)).tolist()
-            own = "".join(f' s{axis}="{value!r}"' for axis, value in zip("xyz", deviations, strict=True)) if any(deviations) else ""
+    for number, name in enumerate(network.names):
+        out.append(f'<marker id="{number}" label={quoteattr(name)}>')
+        if number in control:
+            x, y, z = control[number].place.tolist()
+            deviations = np.sqrt(np.diag(control[number].covariance)).tolist()
+            own = (
+                "".join(f' s{axis}="{value!r}"' for axis, value in zip("xyz", deviations, strict=True))
+                if any(deviations)
+                else ""
+            )
             out.append(f'<reference x="{x!r}" y="{y!r}" z="{z!r}"{own} enabled="true"/>')
         out.append("</marker>")
     out += ["</markers>", "<frames>", '<frame id="0">', "<markers>"]
@@ -223,7 +274,13 @@ def write_metashape(network: Network, path: Path) -> None:
         out.append("</marker>")
     sigma = float(np.sqrt((network.sigma**2).mean())) if len(network.sigma) else 1.0
     out += ["</markers>", "</frame>", "</frames>", "<settings>"]
-    out += [f'<property name="accuracy_projections" value="{sigma!r}"/>', "</settings>", "</chunk>", "</document>", ""]
+    out += [
+        f'<property name="accuracy_projections" value="{sigma!r}"/>',
+        "</settings>",
+        "</chunk>",
+        "</document>",
+        "",
+    ]
     path.write_text("\n".join(out), encoding="utf-8", newline="\n")
 
 
@@ -232,7 +289,8 @@ def _sensor(number: int, camera: Camera) -> list[str]:
     width, height = camera.size
     f = c / camera.pixel
     values = {
-        "f": f, "cx": xp / camera.pixel - 0.5 * width, "cy": yp / camera.pixel - 0.5 * height, "b1": a * f, "b2": -s * f,
+        "f": f, "b1": a * f, "b2": -s * f,
+        "cx": xp / camera.pixel - 0.5 * width, "cy": yp / camera.pixel - 0.5 * height,
         "k1": k1 * c**2, "k2": k2 * c**4, "k3": k3 * c**6, "p1": p1 * c, "p2": -p2 * c,
     }  # fmt: skip
     size = f'<resolution width="{width}" height="{height}"/>'

@@ -10,11 +10,12 @@ Lines, all of numbers separated by blanks, after the title in the first:
     an empty line; control points, an empty line; points: number, X Y Z, standard deviations of these; an empty line
     marks: photograph, point, x, y [px], their standard deviations; an empty line; features, which are not read
 
-The standard deviations of orientations and points are results, not observations. Points found by matching ("smart points")
-begin their own numbers, and their marks have standard deviations of zero; they get numbers above all others.
+The standard deviations of orientations and points are results, not observations. Points found by matching ("smart
+points") begin their own numbers, and their marks have standard deviations of zero; they get numbers above all others.
 """
 
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from pathlib import Path, PurePosixPath
 
 import numpy as np
@@ -83,7 +84,9 @@ class _Lines:
             return None
         number, _, file = line.partition(" ")
         if not number.isdigit():
-            raise self.fail(f"photograph {shown(number)} is not a number", "a photograph has its number first")
+            raise self.fail(
+                f"photograph {shown(number)} is not a number", "a photograph has its number first"
+            )
         return number, file.strip() or number
 
 
@@ -182,9 +185,13 @@ def _network(
         lines.number = line
         of, number = int(row[0]), int(row[1]) + (shift if shift and not row[4:].any() else 0)
         if of not in numbers:
-            raise lines.fail(f"a mark on photograph {of}, which is not in the file", "photographs count from 0")
+            raise lines.fail(
+                f"a mark on photograph {of}, which is not in the file", "photographs count from 0"
+            )
         if (first := seen.setdefault((of, number), line)) != line:
-            raise lines.fail(f"point {number} is marked twice on photograph {of}, first in line {first}", "keep one")
+            raise lines.fail(
+                f"point {number} is marked twice on photograph {of}, first in line {first}", "keep one"
+            )
         photo.append(numbers[of])
         point.append(index.setdefault(number, len(index)))
     rows = np.array([row for _, row in marks]).reshape(-1, 6)
@@ -196,7 +203,9 @@ def _network(
         tuple(photos),
         tuple(map(str, index)),
         start,
-        tuple(Control(index[number], place, np.zeros((3, 3)), where=where) for number, place, where in control),
+        tuple(
+            Control(index[number], place, np.zeros((3, 3)), where=where) for number, place, where in control
+        ),
         np.array(photo, dtype=np.int64),
         np.array(point, dtype=np.int64),
         rows[:, 2:4],
@@ -207,7 +216,7 @@ def _network(
 
 def _smart_points(numbers: list[int], marks: list[tuple[int, Array]]) -> tuple[int, int]:
     """Return what is added to the numbers of smart points, and the index of the first of these; 0 without any."""
-    falls = [k + 1 for k, (a, b) in enumerate(zip(numbers, numbers[1:], strict=False)) if b < a]
+    falls = [k + 1 for k, (a, b) in enumerate(pairwise(numbers)) if b < a]
     if len(falls) != 1 or not any(not row[4:].any() for _, row in marks):
         return 0, len(numbers)
     return max(numbers[: falls[0]]) + 1 - min(numbers[falls[0] :]), falls[0]
@@ -219,19 +228,21 @@ def write_photomodeler(network: Network, path: Path, title: str = "moma") -> Non
     Raises
     ------
     SurveyError
-        if a point has another name, a camera another model or unit, or affinity or skew, for which the format has no place
+        if a point has another name, or a camera another model or unit, affinity or skew: the format has no place
     """
     camera = network.cameras[0]
     for one in network.cameras:
         if one.forward or one.unit != "mm" or one.inner[3:5].any():
             raise SurveyError(
-                f"camera {one.name} has {one.model} distortion, affinity {one.inner[3]:g} and skew {one.inner[4]:g}, unit {one.unit}",
+                f"camera {one.name}: {one.model} distortion, as {one.inner[3]:g}, sk {one.inner[4]:g}, {one.unit}",
                 where=str(path),
                 remedy="this format holds backward distortion in millimetres, without affinity and skew",
             )
     for name in network.names:
         if not name.isdigit():
-            raise SurveyError(f"point {shown(name)} is not a number", where=str(path), remedy="number the points")
+            raise SurveyError(
+                f"point {shown(name)} is not a number", where=str(path), remedy="number the points"
+            )
 
     def row(values: Sequence[float] | Array) -> str:
         return " ".join(repr(float(one)) for one in values)
@@ -247,7 +258,14 @@ def write_photomodeler(network: Network, path: Path, title: str = "moma") -> Non
         if photo.rotation is not None and photo.station is not None:
             orientation = np.concatenate([photo.station, np.degrees(angles(photo.rotation))[::-1]])
         own = row(of(network.cameras[photo.camera]))
-        text += [f"{k} {photo.name}", f"{k} {row(orientation)}", f"{k} {row(np.zeros(6))}", "", f"{k} {own}", f"{k} {none}"]
+        text += [
+            f"{k} {photo.name}",
+            f"{k} {row(orientation)}",
+            f"{k} {row(np.zeros(6))}",
+            "",
+            f"{k} {own}",
+            f"{k} {none}",
+        ]
     sigmas = row(np.zeros(3))
     text.append("")
     text += [f"{network.names[one.point]} {row(one.place)} {sigmas}" for one in network.control]
@@ -256,5 +274,7 @@ def write_photomodeler(network: Network, path: Path, title: str = "moma") -> Non
     text += [f"{network.names[i]} {row(network.start[i])} {sigmas}" for i in np.flatnonzero(known)]
     text.append("")
     for k in range(len(network.photo)):
-        text.append(f"{network.photo[k]} {network.names[network.point[k]]} {row(network.image[k])} {row(network.sigma[k])}")
+        text.append(
+            f"{network.photo[k]} {network.names[network.point[k]]} {row(network.image[k])} {row(network.sigma[k])}"
+        )
     path.write_text("\n".join([*text, ""]), encoding="utf-8", newline="\n")

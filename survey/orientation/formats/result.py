@@ -1,6 +1,7 @@
 """orientation.json: the result of an orientation, for programs, reports, and the stones measured on its photographs.
 
-Angles in degrees, places in metres, cameras in their unit, marks in pixels; deviations and covariances have σ₀² in them.
+Angles in degrees, places in metres, cameras in their unit, marks in pixels; deviations and covariances have σ₀² in
+them.
 """
 
 import base64
@@ -13,11 +14,11 @@ import numpy as np
 from moma.errors import SurveyError
 from survey.arrays import Array
 from survey.formats.fields import unreadable
+from survey.orientation.bundle.orient import Orientation, control_tests
+from survey.orientation.bundle.statistics import photo_precision
 from survey.orientation.network import INTERIOR, Camera, Photo
-from survey.orientation.orient import Orientation, control_tests
 from survey.orientation.oriented import Oriented
 from survey.orientation.rotations import angles, from_angles
-from survey.orientation.statistics import photo_precision
 
 __all__ = ["orientation_values", "read_orientation", "write_orientation"]
 
@@ -31,8 +32,8 @@ def orientation_values(result: Orientation, *, name: str = "") -> dict[str, Any]
     Returns
     -------
     dict
-        sigma0, redundancy, observations, unknowns, iterations, camera, cameras, photos, points, control, marks, correlations,
-        remarks, covariance (lower triangle by rows, little-endian float64 in base64) with its columns
+        sigma0, redundancy, observations, unknowns, iterations, camera, cameras, photos, points, control, marks,
+        correlations, remarks, covariance (lower triangle by rows, little-endian float64 in base64) with its columns
     """
     network, statistics = result.network, result.statistics
     values = result.solution.unknowns
@@ -49,7 +50,9 @@ def orientation_values(result: Orientation, *, name: str = "") -> dict[str, Any]
             "parameters": {
                 parameter: {
                     "value": float(values.inner[m, k]),
-                    "sigma": float(deviations[column[one.name, parameter]]) if (one.name, parameter) in column else 0.0,
+                    "sigma": float(deviations[column[one.name, parameter]])
+                    if (one.name, parameter) in column
+                    else 0.0,
                 }
                 for k, parameter in enumerate(INTERIOR)
             },
@@ -68,7 +71,11 @@ def orientation_values(result: Orientation, *, name: str = "") -> dict[str, Any]
         "cameras": cameras,
         "photos": _photos(result),
         "points": [
-            {"id": network.names[i], "xyz": values.point[i].tolist(), "covariance": (scaled * statistics.points[i]).tolist()}
+            {
+                "id": network.names[i],
+                "xyz": values.point[i].tolist(),
+                "covariance": (scaled * statistics.points[i]).tolist(),
+            }
             for i in range(len(network.names))
             if np.isfinite(statistics.points[i]).all() and np.isfinite(values.point[i]).all()
         ],
@@ -86,7 +93,7 @@ def orientation_values(result: Orientation, *, name: str = "") -> dict[str, Any]
 
 def _photos(result: Orientation) -> list[dict[str, Any]]:
     network, values = result.network, result.solution.unknowns
-    covariance, _ = photo_precision(network, result.prepared, result.solution, result.statistics)
+    covariance = photo_precision(network, result.prepared, result.solution, result.statistics)
     deviations = result.scale * np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0))
     deviations[:, :3] = np.degrees(deviations[:, :3])
     residuals, out = result.residuals, []
@@ -126,7 +133,9 @@ def _marks(result: Orientation) -> dict[str, Any]:
     """Describe the marks by columns: rows of their own would make the file three times as long."""
     network, statistics = result.network, result.statistics
     removed = result.removed
-    taken = [k for k in range(len(network.photo)) if np.isfinite(statistics.residuals[k]).all() or k in removed]
+    taken = [
+        k for k in range(len(network.photo)) if np.isfinite(statistics.residuals[k]).all() or k in removed
+    ]
     tests, residuals = np.abs(statistics.standardised), result.residuals
     suspected = set(result.suspected)
     return {
@@ -137,7 +146,10 @@ def _marks(result: Orientation) -> dict[str, Any]:
         "y": network.image[taken, 1].tolist(),
         "vx": [_finite(one) for one in residuals[taken, 0].round(5).tolist()],
         "vy": [_finite(one) for one in residuals[taken, 1].round(5).tolist()],
-        "test": [removed.get(k, _finite(one)) for k, one in zip(taken, tests[taken].max(axis=1).round(3).tolist(), strict=True)],
+        "test": [
+            removed.get(k, _finite(one))
+            for k, one in zip(taken, tests[taken].max(axis=1).round(3).tolist(), strict=True)
+        ],
         "redundancy": [_finite(one) for one in statistics.parts[taken].sum(axis=1).round(4).tolist()],
         "external": [_finite(one) for one in statistics.external[taken].max(axis=1).round(7).tolist()],
         "verdict": ["removed" if k in removed else "suspected" if k in suspected else "" for k in taken],
@@ -149,7 +161,7 @@ def _correlations(result: Orientation) -> list[dict[str, Any]]:
     columns = result.prepared.columns
     size = np.sqrt(np.maximum(np.diag(result.statistics.cameras), 1e-300))
     labels = {"rx": "omega", "ry": "phi", "rz": "kappa"}
-    precision, _ = photo_precision(result.network, result.prepared, result.solution, result.statistics)
+    precision = photo_precision(result.network, result.prepared, result.solution, result.statistics)
     out = []
     for f, photo in enumerate(result.network.photos):
         own = precision[f]
@@ -196,7 +208,9 @@ def read_orientation(path: Path) -> Oriented:
     except OSError as error:
         raise unreadable(path, error, "write it with moma orient") from error
     except ValueError as error:
-        raise SurveyError(f"this is not JSON: {error}", where=str(path), remedy="write it with moma orient") from error
+        raise SurveyError(
+            f"this is not JSON: {error}", where=str(path), remedy="write it with moma orient"
+        ) from error
     try:
         return _oriented(path, values)
     except (KeyError, TypeError, ValueError, IndexError) as error:

@@ -101,7 +101,9 @@ def read_xml(path: Path, root: str) -> Element:
 
     def doctype(*_: object) -> None:
         raise SurveyError(
-            "the document has a DOCTYPE", where=f"{path}:{parser.CurrentLineNumber}", remedy="remove it: it is not needed"
+            "the document has a DOCTYPE",
+            where=f"{path}:{parser.CurrentLineNumber}",
+            remedy="remove it: it is not needed",
         )
 
     parser.StartElementHandler, parser.EndElementHandler, parser.CharacterDataHandler = begin, end, text

@@ -30,7 +30,9 @@ def looking(station, target, roll=0.0):
     return axes @ from_angles(0.0, 0.0, roll)
 
 
-def wall_block(columns=4, rows=2, points=200, seed=1, relief=0.4, free=(), forward=False, size=(8.0, 4.0), reach=None):
+def wall_block(
+    columns=4, rows=2, points=200, seed=1, relief=0.4, free=(), forward=False, size=(8.0, 4.0), reach=None
+):
     """Photographs of a wall in the plane y = 0, taken from 6 m in front of it, two rows of them, every other turned."""
     rng = np.random.default_rng(seed)
     width, height = size
@@ -38,7 +40,13 @@ def wall_block(columns=4, rows=2, points=200, seed=1, relief=0.4, free=(), forwa
     photos = []
     for r in range(rows):
         for c in range(columns):
-            at = np.array([(c + 0.5) * width / columns, -6.0 - 0.3 * (c % 2), 0.5 + r * (height - 1.0) / max(rows - 1, 1)])
+            at = np.array(
+                [
+                    (c + 0.5) * width / columns,
+                    -6.0 - 0.3 * (c % 2),
+                    0.5 + r * (height - 1.0) / max(rows - 1, 1),
+                ]
+            )
             target = np.array([at[0] + (1.5 if c < columns / 2 else -1.5) * (columns > 1), 0.0, height / 2])
             turn = looking(at, target, np.pi / 2 * ((r + c) % 2))
             photos.append(Photo(f"P{len(photos) + 1:02d}", 0, turn, at))
@@ -83,7 +91,8 @@ def noisy(network, rng, scale=1.0):
     """The network with noise in its marks and its control points, as their standard deviations say."""
     image = network.image + scale * rng.normal(size=network.image.shape) * network.sigma
     control = tuple(
-        replace(one, place=one.place + rng.multivariate_normal(np.zeros(3), one.covariance)) for one in network.control
+        replace(one, place=one.place + rng.multivariate_normal(np.zeros(3), one.covariance))
+        for one in network.control
     )
     return replace(network, image=image, control=control)
 

@@ -1,8 +1,8 @@
 """Plotting on one photograph (Drap, Grussenmeyer, Curtinot, Seinturier & Gaillard, CIPA 2001): a ray meets a surface.
 
 The point X lies on the ray of its mark and on the surface. With the rows A and B of the collinearity equations by the
-orientation and by the point, and the normal n of the surface, small errors of the mark m, the orientation c and the surface's
-height h give
+orientation and by the point, and the normal n of the surface, small errors of the mark m, the orientation c and
+the surface's height h give
 
     [B; nᵀ] dX = [dm - A dc; dh],   dh = Σ gᵢ nᵢ·dPᵢ + ds,
 
@@ -13,11 +13,11 @@ import numpy as np
 
 from moma.errors import GeometryError
 from survey.arrays import Array
-from survey.orientation.intersection import sight
-from survey.orientation.located import Located, Mark, line_up
 from survey.orientation.oriented import Oriented
 from survey.orientation.projection import directions
-from survey.orientation.surfaces import Surface
+from survey.orientation.stones.intersection import sight
+from survey.orientation.stones.located import Located, Mark, line_up
+from survey.orientation.stones.surfaces import Surface
 
 __all__ = ["plot"]
 
@@ -42,7 +42,9 @@ def plot(oriented: Oriented, name: str, mark: Mark, surface: Surface) -> Located
     photo = oriented.photos[mark.photo].name
     place = surface.meet(station, direction)
     if place is None:
-        raise GeometryError(f"the ray of point {name} from {photo} misses {surface.text}", remedy="check the mark")
+        raise GeometryError(
+            f"the ray of point {name} from {photo} misses {surface.text}", remedy="check the mark"
+        )
     normal = surface.normal(place)
     angle = float(np.degrees(np.arcsin(min(1.0, abs(float(normal @ direction))))))
     if angle < _GRAZING:

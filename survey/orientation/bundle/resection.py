@@ -1,12 +1,13 @@
 """Orientation of single photographs and pairs, from nothing: resection, relative orientation, intersection.
 
 Resection: three points give up to four orientations (Grunert's quartic in the form of Haralick et al. 1994); of random
-triples, the orientation that most other points agree with is taken. Relative orientation: five pairs of rays give up to ten
-essential matrices (Stewénius, Engels & Nistér 2006), chosen likewise. The plane of a wall leaves two orientations of a pair,
-of which both are returned.
+triples, the orientation that most other points agree with is taken. Relative orientation: five pairs of rays give
+up to ten
+essential matrices (Stewénius, Engels & Nistér 2006), chosen likewise. The plane of a wall leaves two orientations
+of a pair, of which both are returned.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -81,7 +82,9 @@ def _three_point(rays: Array, points: Array) -> Iterator[tuple[Array, Array]]:
         if u <= 0.0 or square <= 0.0:
             continue
         first = np.sqrt(b2 / square)
-        rotation, station, _ = similarity_between(rays * (first * np.array([1.0, u, v]))[:, None], points, scaled=False)
+        rotation, station, _ = similarity_between(
+            rays * (first * np.array([1.0, u, v]))[:, None], points, scaled=False
+        )
         yield rotation, station
 
 
@@ -200,21 +203,26 @@ def _times(a: Array, b: Array) -> Array:
     return out
 
 
+def _sum(terms: Iterable[Array]) -> Array:
+    return np.asarray(np.sum(list(terms), axis=0))
+
+
 def _essential(first: Array, second: Array) -> Iterator[Array]:
     """Yield the essential matrices of five pairs of rays."""
     rows = np.einsum("ni,nj->nij", first, second).reshape(len(first), 9)
     space = np.linalg.svd(rows)[2][5:].reshape(4, 3, 3)
     e = np.zeros((3, 3, 4, 4, 4))
     e[:, :, 1, 0, 0], e[:, :, 0, 1, 0], e[:, :, 0, 0, 1], e[:, :, 0, 0, 0] = space
-    eet = [[sum(_times(e[i, k], e[j, k]) for k in range(3)) for j in range(3)] for i in range(3)]
+    eet = [[_sum(_times(e[i, k], e[j, k]) for k in range(3)) for j in range(3)] for i in range(3)]
     half = 0.5 * (eet[0][0] + eet[1][1] + eet[2][2])
     for i in range(3):
         eet[i][i] = eet[i][i] - half
-    equations = [sum(_times(eet[i][k], e[k, j]) for k in range(3)) for i in range(3) for j in range(3)]
+    equations = [_sum(_times(eet[i][k], e[k, j]) for k in range(3)) for i in range(3) for j in range(3)]
     minor = [
-        _times(e[1, (j + 1) % 3], e[2, (j + 2) % 3]) - _times(e[1, (j + 2) % 3], e[2, (j + 1) % 3]) for j in range(3)
+        _times(e[1, (j + 1) % 3], e[2, (j + 2) % 3]) - _times(e[1, (j + 2) % 3], e[2, (j + 1) % 3])
+        for j in range(3)
     ]
-    equations.append(sum(_times(e[0, j], minor[j]) for j in range(3)))
+    equations.append(_sum(_times(e[0, j], minor[j]) for j in range(3)))
     matrix = np.array([[one[power] for power in (*_CUBIC, *_BASIS)] for one in equations])
     try:
         rest = -np.linalg.solve(matrix[:, :10], matrix[:, 10:])

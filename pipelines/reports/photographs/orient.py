@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Any
 
 from moma.errors import UsageError
-from pipelines.orient.project import Project, calibrated, read_project
+from pipelines.reports.photographs.project import Project, calibrated, read_project
 from pipelines.results.folder import check_replaceable, replacing
+from survey.orientation.bundle.orient import Orientation, orient
 from survey.orientation.formats.control import read_control, with_control
 from survey.orientation.formats.photomodeler import read_photomodeler
 from survey.orientation.formats.result import orientation_values, write_orientation
-from survey.orientation.orient import Orientation, orient
 
 __all__ = ["INDEX", "OrientReport", "orient_photographs", "photomodeler_project"]
 
@@ -21,7 +21,7 @@ INDEX = "orientation.json"
 
 @dataclass(frozen=True)
 class OrientReport:
-    """What was made.
+    """Result of an orientation, and its folder.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ def orient_photographs(project: Path | Project, folder: Path) -> OrientReport:
     UsageError, SurveyError, GeometryError
         if the project is wrong or contradicts itself; nothing is written
     """
-    from pipelines.reports.photographs import draw_photographs, write_photographs_page
+    from pipelines.reports.photographs.page import draw_photographs, write_photographs_page
 
     check_replaceable(folder, INDEX)
     read = project if isinstance(project, Project) else read_project(project)

@@ -25,20 +25,28 @@ def draw_photographs(values: Mapping[str, Any], folder: Path, prefix: str = "") 
     network, residuals = f"{prefix}network.png", f"{prefix}photo-residuals.png"
     larger = draw_network(folder / network, values)
     count, factor = draw_photo_residuals(folder / residuals, values)
-    which = "each photograph" if count == len(values["photos"]) else f"the {count} photographs with the largest"
+    which = (
+        "each photograph" if count == len(values["photos"]) else f"the {count} photographs with the largest"
+    )
     return {
-        network: f"The network from above and from the side: stations, rays, points with their precision ellipses, {larger:g} times "
+        network: f"The network from above and from the side: stations, rays, points, ellipses {larger:g} times "
         "enlarged.",
         residuals: f"Residuals of the marks on {which}, {factor:g} times enlarged; orange: suspected or left out.",
     }
 
 
-def write_photographs_page(path: Path, values: Mapping[str, Any], pictures: Mapping[str, str], version: str) -> None:
+def write_photographs_page(
+    path: Path, values: Mapping[str, Any], pictures: Mapping[str, str], version: str
+) -> None:
     """Write the page and embed the pictures of its folder."""
     redundancy = values["redundancy"]
     lead = (
         f"{len(values['photos'])} photographs, {len(values['points'])} points, {len(values['marks']['x'])} marks: "
-        + (f"σ₀ {values['sigma0']:.4g} with redundancy {redundancy}." if redundancy > 0 else "nothing checks the marks.")
+        + (
+            f"σ₀ {values['sigma0']:.4g} with redundancy {redundancy}."
+            if redundancy > 0
+            else "nothing checks the marks."
+        )
     )
     write_page(
         path,
@@ -51,7 +59,9 @@ def write_photographs_page(path: Path, values: Mapping[str, Any], pictures: Mapp
     )
 
 
-def photographs_section(values: Mapping[str, Any], pictures: Mapping[str, str], folder: Path) -> dict[str, Any]:
+def photographs_section(
+    values: Mapping[str, Any], pictures: Mapping[str, str], folder: Path
+) -> dict[str, Any]:
     """Describe the photographs for a template."""
     marks = values["marks"]
     suspected = sorted(
@@ -66,7 +76,8 @@ def photographs_section(values: Mapping[str, Any], pictures: Mapping[str, str], 
         "suspected": [_mark(marks, k) for k in suspected[:_MOST]],
         "suspects": len(suspected),
         "correlations": [
-            (one["of"], one["a"], one["b"], f"{100.0 * one['value']:.1f} %") for one in values["correlations"][:_MOST]
+            (one["of"], one["a"], one["b"], f"{100.0 * one['value']:.1f} %")
+            for one in values["correlations"][:_MOST]
         ],
         "most": _MOST,
     }
@@ -74,7 +85,11 @@ def photographs_section(values: Mapping[str, Any], pictures: Mapping[str, str], 
 
 def _adjustment(values: Mapping[str, Any]) -> list[Row]:
     marks = values["marks"]
-    external = [one for one, verdict in zip(marks["external"], marks["verdict"], strict=True) if one is not None and not verdict]
+    external = [
+        one
+        for one, verdict in zip(marks["external"], marks["verdict"], strict=True)
+        if one is not None and not verdict
+    ]
     unchecked = sum(one is None for one in marks["external"])
     return [
         ("Observations", str(values["observations"])),
@@ -83,7 +98,10 @@ def _adjustment(values: Mapping[str, Any]) -> list[Row]:
         ("σ₀: found over stated", "–" if values["sigma0"] is None else f"{values['sigma0']:.4g}"),
         ("Datum", values["datum"]),
         ("Iterations", str(values["iterations"])),
-        ("Movement of a point by a blunder that just escapes", f"up to {max(external) * 1e3:.1f} mm" if external else "–"),
+        (
+            "Movement of a point by a blunder that just escapes",
+            f"up to {max(external) * 1e3:.1f} mm" if external else "–",
+        ),
         ("Marks that nothing checks", str(unchecked)),
     ]
 
@@ -94,14 +112,23 @@ def _camera(one: Mapping[str, Any]) -> dict[str, Any]:
         for name, value in one["parameters"].items()
     ]
     width, height = one["size"]
-    return {"name": f"{one['name']}: {one['model']} model, {width} × {height} pixels, {one['unit']}", "rows": rows}
+    return {
+        "name": f"{one['name']}: {one['model']} model, {width} × {height} pixels, {one['unit']}",
+        "rows": rows,
+    }
 
 
 def _photo(one: Mapping[str, Any]) -> Row:
     sigma = one["sigma"]
     angles = (f"{one[name]:.4f} ± {sigma[name]:.4f}°" for name in ("omega", "phi", "kappa"))
     places = (f"{one[name]:.4f} ± {sigma[name]:.4f} m" for name in "xyz")
-    return (one["name"], *angles, *places, str(one["marks"]), "–" if one["rms"] is None else f"{one['rms']:.2f} px")
+    return (
+        one["name"],
+        *angles,
+        *places,
+        str(one["marks"]),
+        "–" if one["rms"] is None else f"{one['rms']:.2f} px",
+    )
 
 
 def _control(one: Mapping[str, Any]) -> Row:

@@ -1,7 +1,9 @@
 """Points located by marks, and the errors that they share.
 
-A point is a function of its marks, of the orientation of the photographs, and where it was plotted of the points that define
-the surface. To first order its error is a sum over these sources, so that the joint covariance of any points follows exactly.
+A point is a function of its marks, of the orientation of the photographs, and where it was plotted of the points
+that define
+the surface. To first order its error is a sum over these sources, so that the joint covariance of any points
+follows exactly.
 """
 
 from collections.abc import Sequence
@@ -106,7 +108,7 @@ def joint_covariance(points: Sequence[Located], oriented: Oriented, *, shared: b
 
 
 def line_up(oriented: Oriented, mark: Mark, place: Array) -> tuple[Array, Array, Array]:
-    """Return the weighted residual of a mark, (2,), and its derivatives by the orientation, (2, nr), and the point, (2, 3)."""
+    """Return the weighted residual of a mark, (2,), its derivatives by orientation, (2, nr), and point, (2, 3)."""
     camera = oriented.camera(mark.photo)
     work = np.zeros((5, PARAMETERS))
     measured = mark.image * camera.pixel * (1.0, -1.0)

@@ -74,7 +74,9 @@ EXTERIOR = ("rx", "ry", "rz", "x", "y", "z")
 """Parameters of the exterior orientation in the reduced system."""
 
 
-def prepare(network: Network, start: Unknowns | None = None, keep: NDArray[np.bool_] | None = None) -> Prepared:
+def prepare(
+    network: Network, start: Unknowns | None = None, keep: NDArray[np.bool_] | None = None
+) -> Prepared:
     """Arrange a network for the kernels.
 
     Parameters
@@ -112,7 +114,9 @@ def prepare(network: Network, start: Unknowns | None = None, keep: NDArray[np.bo
         )
     start.point[~free] = place[~free]
     observed = [one for one in photos if not one.fixed]
-    stations = 3 * sum((one.observed_station is not None) + (one.observed_rotation is not None) for one in observed)
+    stations = 3 * sum(
+        (one.observed_station is not None) + (one.observed_rotation is not None) for one in observed
+    )
     held = weighted or bool(np.count_nonzero(~free)) or any(one.fixed for one in photos)
     held = held or any(one.observed_station is not None for one in photos)
     seen = free & ((counts > 0) | information.any(axis=(1, 2)))
@@ -172,9 +176,9 @@ def adjust(network: Network, prepared: Prepared) -> Solution:
         if the observations do not determine the unknowns, or no step brings the residuals down
     """
     unknowns = prepared.unknowns
-    damping, count = 0.0, 0
+    damping, taken = 0.0, 0
     normal, right, square, behind = normals(network, prepared, unknowns, 0.0)
-    for count in range(1, _MOST + 1):
+    while taken < _MOST:
         while True:
             step = _step(normal, right, prepared, unknowns, damping)
             if step is not None:
@@ -190,7 +194,7 @@ def adjust(network: Network, prepared: Prepared) -> Solution:
                     remedy="check the marks, the control points and the start values",
                 )
             normal, right, _, _ = normals(network, prepared, unknowns, damping)
-        decrease = square - found[2]
+        decrease, taken = square - found[2], taken + 1
         unknowns, (normal, right, square, behind) = tried, found
         if damping == 0.0 and decrease <= _STILL * max(square, 1e-12):
             break
@@ -203,7 +207,7 @@ def adjust(network: Network, prepared: Prepared) -> Solution:
             where=network.path,
             remedy="check the marks, the control points and the start values",
         )
-    return Solution(unknowns, square, count, behind)
+    return Solution(unknowns, square, taken, behind)
 
 
 def prior(prepared: Prepared, unknowns: Unknowns) -> Array:
@@ -303,7 +307,8 @@ def with_datum(normal: Array, prepared: Prepared, unknowns: Unknowns) -> Array:
         return normal
     free = inner_constraints(prepared, unknowns)
     free = np.linalg.qr(free)[0] * np.sqrt(max(float(np.median(np.diag(normal))), 1.0))
-    return normal + np.tril(free @ free.T)
+    held: Array = normal + np.tril(free @ free.T)
+    return held
 
 
 def _step(

@@ -26,28 +26,80 @@ _NUMBERS = ValueKind.NUMBERS
 PROJECT_KEYS = (
     Key("name", ValueKind.TEXT, "Name of the project.", default=None),
     Key("marks", ValueKind.TEXT, "File of marks: photograph, point, x, y, sigma.", default=None),
-    Key("photomodeler", ValueKind.TEXT, "Text export of PhotoModeler, instead of marks and cameras.", default=None),
-    Key("colmap", ValueKind.TEXT, "Folder with a text model of COLMAP, instead of marks and cameras.", default=None),
-    Key("metashape", ValueKind.TEXT, "XML of cameras that Metashape exports, instead of cameras.", default=None),
+    Key(
+        "photomodeler",
+        ValueKind.TEXT,
+        "Text export of PhotoModeler, instead of marks and cameras.",
+        default=None,
+    ),
+    Key(
+        "colmap",
+        ValueKind.TEXT,
+        "Folder with a text model of COLMAP, instead of marks and cameras.",
+        default=None,
+    ),
+    Key(
+        "metashape",
+        ValueKind.TEXT,
+        "XML of cameras that Metashape exports, instead of cameras.",
+        default=None,
+    ),
     Key("markers", ValueKind.TEXT, "XML of markers that Metashape exports, with `metashape`.", default=None),
-    Key("dbat", ValueKind.TEXT, "Script of the Damped Bundle Adjustment Toolbox, instead of all others.", default=None),
-    Key("control", ValueKind.TEXT, "File of control points: number, name, X, Y, Z, deviations.", default=None),
-    Key("fixed_control", ValueKind.BOOLEAN, "Control points keep their places, whatever their deviations.", default=False),
+    Key(
+        "dbat",
+        ValueKind.TEXT,
+        "Script of the Damped Bundle Adjustment Toolbox, instead of all others.",
+        default=None,
+    ),
+    Key(
+        "control", ValueKind.TEXT, "File of control points: number, name, X, Y, Z, deviations.", default=None
+    ),
+    Key(
+        "fixed_control",
+        ValueKind.BOOLEAN,
+        "Control points keep their places, whatever their deviations.",
+        default=False,
+    ),
     Key("check", ValueKind.TEXTS, "Control points that only check the result.", default=()),
-    Key("sigma", ValueKind.NUMBER, "Standard deviation of marks without one of their own.", "px", 1.0, above=0),
-    Key("blunders", ValueKind.TEXT, "Whether marks that the test finds wrong are left out.", default="report", choices=("report", "remove")),
-    Key("calibrate", ValueKind.TEXTS, "Parameters of cameras without a list of their own that are estimated.", default=()),
+    Key(
+        "sigma", ValueKind.NUMBER, "Standard deviation of marks without one of their own.", "px", 1.0, above=0
+    ),
+    Key(
+        "blunders",
+        ValueKind.TEXT,
+        "Whether marks that the test finds wrong are left out.",
+        default="report",
+        choices=("report", "remove"),
+    ),
+    Key(
+        "calibrate",
+        ValueKind.TEXTS,
+        "Parameters of cameras without a list of their own that are estimated.",
+        default=(),
+    ),
 )
 """Keys at the top of a project file."""
 
 CAMERA_KEYS = (
     Key("name", ValueKind.TEXT, "Name of the camera."),
     Key("unit", ValueKind.TEXT, "Unit of its image.", default="mm", choices=("mm", "px")),
-    Key("model", ValueKind.TEXT, "Model of its distortion.", default="backward", choices=("backward", "forward")),
+    Key(
+        "model",
+        ValueKind.TEXT,
+        "Model of its distortion.",
+        default="backward",
+        choices=("backward", "forward"),
+    ),
     Key("size", _NUMBERS, "Width and height of its photographs.", "px"),
     Key("pixel", ValueKind.NUMBER, "Height of a pixel; 1 in the unit px.", "unit", None, above=0),
     *(
-        Key(name, ValueKind.NUMBER, f"Interior orientation, {name}.", "unit", None if name in ("c", "xp", "yp") else 0.0)
+        Key(
+            name,
+            ValueKind.NUMBER,
+            f"Interior orientation, {name}.",
+            "unit",
+            None if name in ("c", "xp", "yp") else 0.0,
+        )
         for name in INTERIOR
     ),
     Key("calibrate", ValueKind.TEXTS, "Parameters that are estimated.", default=None),
@@ -58,9 +110,23 @@ PHOTO_KEYS = (
     Key("name", ValueKind.TEXT, "Name of the photograph, as in the marks."),
     Key("camera", ValueKind.TEXT, "Its camera; not needed if there is one.", default=None),
     Key("station", ValueKind.VECTOR, "Place of the projection centre.", "m", None),
-    Key("station_sigma", ValueKind.VECTOR, "Its standard deviations, which make it an observation.", "m", None, above=0),
+    Key(
+        "station_sigma",
+        ValueKind.VECTOR,
+        "Its standard deviations, which make it an observation.",
+        "m",
+        None,
+        above=0,
+    ),
     Key("angles", ValueKind.VECTOR, "ω, φ, κ.", "°", None),
-    Key("angles_sigma", ValueKind.VECTOR, "Their standard deviations, which make them observations.", "°", None, above=0),
+    Key(
+        "angles_sigma",
+        ValueKind.VECTOR,
+        "Their standard deviations, which make them observations.",
+        "°",
+        None,
+        above=0,
+    ),
     Key("fixed", ValueKind.BOOLEAN, "Station and angles are not estimated.", default=False),
 )
 """Keys of `[[photos]]`."""
@@ -103,7 +169,9 @@ def read_project(path: Path) -> Project:
     network = _network(document, values, cameras, photos, path.parent)
     if (control := values["control"]) is not None:
         rows = read_control(path.parent / str(control))
-        network = with_control(network, rows, fixed=bool(values["fixed_control"]), check=_texts(values["check"]))
+        network = with_control(
+            network, rows, fixed=bool(values["fixed_control"]), check=_texts(values["check"])
+        )
     elif values["check"] or values["fixed_control"]:
         key = "check" if values["check"] else "fixed_control"
         document.fail(f"{key} without control points", key, remedy="give control = FILE")
@@ -121,10 +189,14 @@ def calibrated(network: Network, names: tuple[str, ...], where: str) -> Network:
     """
     for name in names:
         if name not in INTERIOR:
-            raise UsageError(f"no parameter {name!r} of a camera", where=where, remedy=nearest(name, INTERIOR))
+            raise UsageError(
+                f"no parameter {name!r} of a camera", where=where, remedy=nearest(name, INTERIOR)
+            )
     if not names:
         return network
-    return replace(network, cameras=tuple(one if one.free else replace(one, free=names) for one in network.cameras))
+    return replace(
+        network, cameras=tuple(one if one.free else replace(one, free=names) for one in network.cameras)
+    )
 
 
 _SOURCES = ("marks", "photomodeler", "colmap", "metashape", "dbat")
@@ -145,14 +217,19 @@ def _network(
         document.fail(f"{given[0]} and {given[1]}", given[1], remedy="give one of them")
     if main and (cameras or photos):
         document.fail(f"[[cameras]] or [[photos]] beside {main[0]}", "cameras", remedy="leave them out")
-    readers = {"photomodeler": read_photomodeler, "colmap": read_colmap, "dbat": read_dbat}
     if not main:
         return _marked(document, values, cameras, photos, folder)
     source = folder / str(values[main[0]])
-    if main[0] != "metashape":
-        return readers[main[0]](source)
+    if main[0] == "photomodeler":
+        return read_photomodeler(source)
+    if main[0] == "colmap":
+        return read_colmap(source, float(values["sigma"]))  # type: ignore[arg-type]
+    if main[0] == "dbat":
+        return read_dbat(source)
     markers = values["markers"]
-    network = read_metashape(source, None if markers is None else folder / str(markers), float(values["sigma"]))  # type: ignore[arg-type]
+    network = read_metashape(
+        source, None if markers is None else folder / str(markers), float(values["sigma"])
+    )  # type: ignore[arg-type]
     if values["marks"] is None:
         return network
     marks = folder / str(values["marks"])
@@ -178,7 +255,11 @@ def _marked(
     known = tuple(_photo(document, k, one, names) for k, one in enumerate(photos))
     if not known:
         if len(made) > 1:
-            document.fail(f"{len(made)} cameras, but no [[photos]]", "cameras", remedy="write [[photos]] with name and camera")
+            document.fail(
+                f"{len(made)} cameras, but no [[photos]]",
+                "cameras",
+                remedy="write [[photos]] with name and camera",
+            )
         known = tuple(Photo(name, 0, where=f"{marks}") for name in dict.fromkeys(row.photo for row in rows))
     return network_of(str(marks), rows, made, known, float(values["sigma"]))  # type: ignore[arg-type]
 
@@ -188,12 +269,16 @@ def _camera(document: TomlDocument, number: int, given: Mapping[str, Any]) -> Ca
     values = check_table(document, path, given, CAMERA_KEYS, "[[cameras]]")
     size = _texts(values["size"])
     if len(size) != 2 or not all(float(one) == int(one) > 0 for one in size):
-        document.fail("size is not a width and a height in pixels", *path, "size", remedy="e.g. size = [6000, 4000]")
+        document.fail(
+            "size is not a width and a height in pixels", *path, "size", remedy="e.g. size = [6000, 4000]"
+        )
     width, height = (int(one) for one in size)
     pixel = values["pixel"]
     if pixel is None:
         if values["unit"] != "px":
-            document.fail("[[cameras]] has no 'pixel'", *path, remedy="give pixel: the height of a pixel in mm")
+            document.fail(
+                "[[cameras]] has no 'pixel'", *path, remedy="give pixel: the height of a pixel in mm"
+            )
         pixel = 1.0
     if values["c"] is None:
         document.fail("[[cameras]] has no 'c'", *path, remedy="give c: the camera constant")
@@ -202,7 +287,9 @@ def _camera(document: TomlDocument, number: int, given: Mapping[str, Any]) -> Ca
     free = values["calibrate"]
     for name in _texts(free or ()):
         if name not in INTERIOR:
-            document.fail(f"no parameter {name!r} of a camera", *path, "calibrate", remedy=nearest(name, INTERIOR))
+            document.fail(
+                f"no parameter {name!r} of a camera", *path, "calibrate", remedy=nearest(name, INTERIOR)
+            )
     return Camera(
         str(values["name"]),
         np.array(inner, dtype=float),
@@ -252,5 +339,3 @@ def _photo(document: TomlDocument, number: int, given: Mapping[str, Any], camera
 def _texts(value: object) -> tuple[Any, ...]:
     assert isinstance(value, tuple | list)
     return tuple(value)
-
-

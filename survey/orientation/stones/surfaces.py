@@ -9,8 +9,8 @@ import numpy as np
 from moma.errors import GeometryError
 from survey.arrays import Array
 from survey.faces.planes import FaceFit, fit_plane
-from survey.orientation.located import Located, joint_covariance
 from survey.orientation.oriented import Oriented
+from survey.orientation.stones.located import Located, joint_covariance
 
 __all__ = ["Cylinder", "Plane", "Surface", "fit_surface"]
 
@@ -24,21 +24,20 @@ _VAGUE = 0.25  # standard deviation of the radius over it, beyond which an arc i
 class Surface(Protocol):
     """A surface, and how it follows the points that define it.
 
-    Attributes
-    ----------
-    points : that it was fitted to
-    scatter : standard deviation of the stones' faces about it: what the assumption costs [m]
-    text : description with the number of points and how they fit
+    The scatter of faces about it is what the assumption costs.
     """
 
     @property
-    def points(self) -> tuple[Located, ...]: ...
+    def points(self) -> tuple[Located, ...]:
+        """Points that it was fitted to."""
 
     @property
-    def scatter(self) -> float: ...
+    def scatter(self) -> float:
+        """Standard deviation of the stones' faces about it [m]."""
 
     @property
-    def text(self) -> str: ...
+    def text(self) -> str:
+        """Description with the number of points and how they fit."""
 
     def meet(self, origin: Array, direction: Array) -> Array | None:
         """Return the point where a ray meets the surface, (3,); None if it does not."""
@@ -122,7 +121,9 @@ class Cylinder:
         root = b * b - a * c
         if a < 1e-18 or root < 0.0:
             return None
-        found = [origin + one * direction for one in ((-b - root**0.5) / a, (-b + root**0.5) / a) if one > 0.0]
+        found = [
+            origin + one * direction for one in ((-b - root**0.5) / a, (-b + root**0.5) / a) if one > 0.0
+        ]
         middle = np.mean([one.place for one in self.points], axis=0)
         return min(found, key=lambda one: float(np.linalg.norm(one - middle))) if found else None
 
@@ -141,7 +142,8 @@ class Cylinder:
         at = _slopes(place[None], self.centre, self.axis, self.across)[1][0]
         weights = self.sigma**-2.0
         gains = at @ np.linalg.pinv(rows.T @ (weights[:, None] * rows)) @ (rows.T * weights)
-        return gains[:, None] * outward
+        out: Array = gains[:, None] * outward
+        return out
 
 
 def fit_surface(
@@ -168,7 +170,8 @@ def fit_surface(
 def _plane(points: tuple[Located, ...], own: Array, towards: Array, scatter: float | None) -> Plane:
     if len(points) < 3:
         raise GeometryError(
-            f"{len(points)} points define no plane", remedy="mark 3 or more points of the face on two photographs"
+            f"{len(points)} points define no plane",
+            remedy="mark 3 or more points of the face on two photographs",
         )
     places = np.array([one.place for one in points])
     normal = np.linalg.svd(places - places.mean(axis=0))[2][2]
@@ -207,7 +210,9 @@ def _cylinder(points: tuple[Located, ...], own: Array, towards: Array, scatter: 
 
 def _told(count: int, rms: float, redundancy: int, scatter: float) -> str:
     checked = f"rms {rms * 1e3:.1f} mm" if redundancy > 0 else "which nothing checks"
-    return f"{count} points, {checked}" + (f", faces within {scatter * 1e3:.1f} mm of it" if scatter > 0.0 else "")
+    return f"{count} points, {checked}" + (
+        f", faces within {scatter * 1e3:.1f} mm of it" if scatter > 0.0 else ""
+    )
 
 
 def _scatter(residuals: Array, sigma: Array, redundancy: int) -> float:
@@ -254,8 +259,10 @@ def _slopes(points: Array, centre: Array, axis: Array, across: Array) -> tuple[A
     return distance, np.column_stack([side, side * along[:, None], np.ones(len(points))])
 
 
-def _refined(points: Array, covariances: Array, axis: Array) -> tuple[float, Array, Array, Array, float, Array, Array]:
-    """Fit by Gauss–Newton steps; return square, centre, axis, axes across it, radius, normal matrix, σ along the radius."""
+def _refined(
+    points: Array, covariances: Array, axis: Array
+) -> tuple[float, Array, Array, Array, float, Array, Array]:
+    """Fit by Gauss–Newton steps; return square, centre, axis, axes across, radius, normal matrix, σ along it."""
     _, centre, radius = _circle(points, axis)
     square, normal, sigma, across = np.inf, np.eye(5), np.ones(len(points)), _frame(axis)
     for _ in range(_MOST):
@@ -267,7 +274,9 @@ def _refined(points: Array, covariances: Array, axis: Array) -> tuple[float, Arr
         rows = rows / sigma[:, None]
         square, normal = float(off @ off), rows.T @ rows
         step = np.linalg.lstsq(rows, off, rcond=1e-10)[0]
-        size = float(np.abs(step[:2]).max() + abs(step[4])) / max(radius, 1e-9) + float(np.abs(step[2:4]).max())
+        size = float(np.abs(step[:2]).max() + abs(step[4])) / max(radius, 1e-9) + float(
+            np.abs(step[2:4]).max()
+        )
         if not np.isfinite(size):
             return np.inf, centre, axis, across, radius, normal, sigma
         step *= min(1.0, 0.5 / size)

@@ -11,12 +11,12 @@ from threadpoolctl import ThreadpoolController
 
 from moma.errors import GeometryError, MomaError, SurveyError
 from survey.arrays import Array
-from survey.orientation.adjustment import Prepared, Solution, adjust, prepare
+from survey.orientation.bundle.adjustment import Prepared, Solution, adjust, prepare
+from survey.orientation.bundle.soundness import check_network
+from survey.orientation.bundle.start import aligned, check_mirrored, start_values, swapped, without_start
+from survey.orientation.bundle.statistics import CRITICAL, Statistics, statistics
 from survey.orientation.network import Network, Photo, listed
 from survey.orientation.projection import project
-from survey.orientation.soundness import check_network
-from survey.orientation.start import aligned, check_mirrored, start_values, swapped, without_start
-from survey.orientation.statistics import CRITICAL, Statistics, statistics
 
 __all__ = ["Blunders", "Orientation", "control_tests", "orient"]
 
@@ -104,20 +104,26 @@ def _tested_control(network: Network, solution: Solution, result: Statistics) ->
     SurveyError
     """
     tests = control_tests(network, solution, result)
-    wrong = [(test, one) for one, test in zip(network.control, tests, strict=True) if test > _MISSES and not one.check]
+    wrong = [
+        (test, one)
+        for one, test in zip(network.control, tests, strict=True)
+        if test > _MISSES and not one.check
+    ]
     if not wrong:
         return []
     if max(test for test, _ in wrong) > _FAR_OFF and (alone := _alone(network)) is not None:
         _check_hand(network, alone)
-    names = [f"{network.names[one.point]} ({test:.1f} σ)" for test, one in sorted(wrong, key=lambda pair: -pair[0])]
+    names = [
+        f"{network.names[one.point]} ({test:.1f} σ)" for test, one in sorted(wrong, key=lambda pair: -pair[0])
+    ]
     return [f"control points that miss their places: {listed(names)}"]
 
 
 def control_tests(network: Network, solution: Solution, result: Statistics) -> Array:
     """Return by how many standard deviations each control or check point misses its place; 0 where it is fixed.
 
-    The misfit d of a control point has the covariance Σ - C of what was stated and what was adjusted, that of a check point
-    Σ + C; returned is √(dᵀ(…)⁻¹d / 3).
+    The misfit d of a control point has the covariance Σ - C of what was stated and what was adjusted, that of a
+    check point Σ + C; returned is √(dᵀ(…)⁻¹d / 3).
     """
     out = np.zeros(len(network.control))
     for k, one in enumerate(network.control):
@@ -162,7 +168,14 @@ def _oriented(network: Network, used: NDArray[np.bool_]) -> tuple[Network, Prepa
     for given in (True, False):
         try:
             for start in start_values(chosen if given else without_start(chosen)):
-                found = replace(start, photo=network.photo, point=network.point, image=network.image, sigma=network.sigma, lines=network.lines)
+                found = replace(
+                    start,
+                    photo=network.photo,
+                    point=network.point,
+                    image=network.image,
+                    sigma=network.sigma,
+                    lines=network.lines,
+                )
                 prepared = prepare(found, keep=used)
                 solution = adjust(found, prepared)
                 rests.append((_misfit(found, prepared, solution), found, prepared, solution))
@@ -212,7 +225,8 @@ def _check_contradictions(
     """Refuse an orientation that contradicts its marks, its control points or its start values."""
     values = solution.unknowns
     photos = tuple(
-        replace(one, rotation=r, station=s) for one, r, s in zip(found.photos, values.rotation, values.station, strict=True)
+        replace(one, rotation=r, station=s)
+        for one, r, s in zip(found.photos, values.rotation, values.station, strict=True)
     )
     pair = swapped(network, replace(found, photos=photos))
     if pair is not None:
@@ -237,7 +251,7 @@ def _check_contradictions(
         raise failure
     worst = _worst(found, solution)
     raise GeometryError(
-        f"the marks contradict each other: half of them miss by more than {misfit:.1%} of a photograph, most on {worst.name}",
+        f"the marks contradict each other: half miss by over {misfit:.1%} of a photograph, most on {worst.name}",
         where=worst.where or network.path,
         remedy="check the marks of this photograph, and the camera",
     )
@@ -267,7 +281,12 @@ def _worst(network: Network, solution: Solution) -> Photo:
     values, off = solution.unknowns, list[float]()
     for f, one in enumerate(network.photos):
         mine = network.photo == f
-        seen = project(network.cameras[one.camera], values.rotation[f], values.station[f], values.point[network.point[mine]])
+        seen = project(
+            network.cameras[one.camera],
+            values.rotation[f],
+            values.station[f],
+            values.point[network.point[mine]],
+        )
         miss = np.linalg.norm(seen - network.image[mine], axis=1)
         off.append(float(np.median(np.where(np.isfinite(miss), miss, np.inf))))
     return network.photos[int(np.argmax(off))]

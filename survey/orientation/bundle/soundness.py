@@ -58,7 +58,9 @@ def check_cameras(network: Network) -> None:
     for camera in network.cameras:
         if (fault := _camera_fault(camera)) is not None:
             raise SurveyError(
-                fault, where=camera.where or network.path, remedy=f"give the camera in one unit, here {camera.unit}"
+                fault,
+                where=camera.where or network.path,
+                remedy=f"give the camera in one unit, here {camera.unit}",
             )
 
 
@@ -72,11 +74,14 @@ def _camera_fault(camera: Camera) -> str | None:
     ratio = c / max(width, height)
     if not _ANGLES[0] <= ratio <= _ANGLES[1]:
         return (
-            f"camera {camera.name} has a camera constant of {c:g} for a format of {width:g} × {height:g} {camera.unit}: "
-            "they are of different units"
+            f"camera {camera.name} has a camera constant of {c:g} for a format of {width:g} × {height:g} "
+            f"{camera.unit}: they are of different units"
         )
     if not (0.0 <= xp <= width and 0.0 <= yp <= height):
-        return f"camera {camera.name} has its principal point at ({xp:g}, {yp:g}), outside the format of {width:g} × {height:g} {camera.unit}"
+        return (
+            f"camera {camera.name} has its principal point at ({xp:g}, {yp:g}), outside the format of "
+            f"{width:g} × {height:g} {camera.unit}"
+        )
     if camera.forward:
         return None
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]) * camera.size
@@ -105,7 +110,7 @@ def _check_control(network: Network) -> None:
     if len(places) < 3:
         names = listed([network.names[one.point] for one in points])
         raise SurveyError(
-            f"{len(points)} control point{'' if len(points) == 1 else 's'} ({names}) cannot hold the photographs in place",
+            f"{len(points)} control point{'' if len(points) == 1 else 's'} ({names}) cannot hold the photographs",
             where=(points[0].where if points else network.photos[0].where) or network.path,
             remedy="give three or more that are not on one line, or none for a network in a frame of its own",
         )

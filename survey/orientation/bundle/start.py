@@ -9,12 +9,18 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from moma.errors import GeometryError, SurveyError
 from survey.arrays import Array
+from survey.orientation.bundle.resection import (
+    essential_orientations,
+    intersect_rays,
+    resect,
+    similarity_between,
+)
 from survey.orientation.network import Network, Photo
 from survey.orientation.projection import directions
-from survey.orientation.resection import essential_orientations, intersect_rays, resect, similarity_between
 
 __all__ = ["aligned", "check_mirrored", "start_values", "swapped", "without_start"]
 
@@ -65,7 +71,9 @@ def start_values(network: Network) -> Iterator[Network]:
             continue
         yield aligned(found, always=True)
     _filled(network, rays, {}, dict(control))  # names what cannot be oriented
-    raise GeometryError("no pair of photographs can be oriented", where=network.path, remedy="mark more common points")
+    raise GeometryError(
+        "no pair of photographs can be oriented", where=network.path, remedy="mark more common points"
+    )
 
 
 def check_mirrored(source: Array, target: Array, network: Network) -> None:
@@ -91,7 +99,7 @@ def check_mirrored(source: Array, target: Array, network: Network) -> None:
     if wrong < _BETTER * right and right > 1e-4 * extent:
         one = next(one for one in network.control if not one.check)
         raise SurveyError(
-            f"the control points are mirrored: they fit the photographs to {wrong:.3g} m as a reflection, to {right:.3g} m otherwise",
+            f"the control points are mirrored: they fit to {wrong:.3g} m as a reflection, to {right:.3g} m otherwise",
             where=one.where or network.path,
             remedy="check the order and the signs of their coordinates: they must form a right-handed system",
         )
@@ -105,7 +113,9 @@ def aligned(network: Network, always: bool = False) -> Network:
     SurveyError
         if the control points are mirrored
     """
-    control = [one for one in network.control if not one.check and np.isfinite(network.start[one.point]).all()]
+    control = [
+        one for one in network.control if not one.check and np.isfinite(network.start[one.point]).all()
+    ]
     stations = [one for one in network.photos if one.observed_station is not None and one.station is not None]
     if len(control) + len(stations) < 3:
         return network
@@ -187,7 +197,9 @@ def _filled(
     photos = list[Photo]()
     for f, one in enumerate(network.photos):
         if f in oriented:
-            photos.append(replace(one, rotation=oriented[f][0], station=oriented[f][1]) if one.rotation is None else one)
+            photos.append(
+                replace(one, rotation=oriented[f][0], station=oriented[f][1]) if one.rotation is None else one
+            )
         elif strict:
             raise _not_oriented(network, f, len(known.get(f, ())), misfits.get(f))
         else:
@@ -216,7 +228,7 @@ def _intersect(
     oriented: dict[int, tuple[Array, Array]],
     places: dict[int, Array],
     firm: set[int],
-    sorted_marks: tuple[Array, Array],
+    sorted_marks: tuple[NDArray[np.intp], NDArray[np.intp]],
 ) -> None:
     """Intersect the points that two oriented photographs show; `firm` collects those good for a resection."""
     order, bounds = sorted_marks
@@ -238,12 +250,18 @@ def _intersect(
 def _pairs(network: Network, rays: Array) -> Iterator[dict[int, tuple[Array, Array]]]:
     """Yield orientations of pairs of photographs, those with most common points first."""
     seen = [
-        {int(i): k for k, i in zip(np.flatnonzero(network.photo == f), network.point[network.photo == f], strict=True)}
+        {
+            int(i): k
+            for k, i in zip(
+                np.flatnonzero(network.photo == f), network.point[network.photo == f], strict=True
+            )
+        }
         for f in range(len(network.photos))
     ]
     count = len(seen)
     pairs = sorted(
-        ((len(seen[a].keys() & seen[b].keys()), a, b) for a in range(count) for b in range(a + 1, count)), reverse=True
+        ((len(seen[a].keys() & seen[b].keys()), a, b) for a in range(count) for b in range(a + 1, count)),
+        reverse=True,
     )
     for common, a, b in pairs[:3]:
         if common < 6:
@@ -255,7 +273,7 @@ def _pairs(network: Network, rays: Array) -> Iterator[dict[int, tuple[Array, Arr
     if pairs and pairs[0][0] < 6:
         common, a, b = pairs[0]
         raise GeometryError(
-            f"photographs {network.photos[a].name} and {network.photos[b].name} have {common} common points, and no pair more",
+            f"photographs {network.photos[a].name} and {network.photos[b].name} share {common} points, no pair more",
             where=network.path,
             remedy="mark 6 or more points on two photographs, or 4 control points on one",
         )
@@ -275,5 +293,3 @@ def swapped(network: Network, found: Network) -> tuple[str, str] | None:
             if max(apart[a, b], apart[b, a]) < 0.2 * min(own[a], own[b]):
                 return names[a], names[b]
     return None
-
-

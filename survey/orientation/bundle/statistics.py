@@ -1,8 +1,9 @@
 """Precision and reliability of a bundle adjustment.
 
-The covariance of cameras and points for σ₀ = 1 is the inverse of the normal matrix; with the estimated σ₀² in front of it, that
-of the result. Where there is no control, it refers to the datum in which the points have the least total variance (inner
-constraints over the points, by an S-transformation).
+The covariance of cameras and points for σ₀ = 1 is the inverse of the normal matrix; with the estimated σ₀² in
+front of it, that
+of the result. Where there is no control, it refers to the datum in which the points have the least total variance
+(inner constraints over the points, by an S-transformation).
 """
 
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ from scipy.linalg import cho_factor, cho_solve
 from moma.errors import GeometryError
 from survey.arrays import Array
 from survey.orientation._kernels.adjustment import datum_sums, point_statistics
-from survey.orientation.adjustment import (
+from survey.orientation.bundle.adjustment import (
     Prepared,
     Solution,
     inner_constraints,
@@ -25,7 +26,7 @@ from survey.orientation.adjustment import (
 from survey.orientation.network import Network
 from survey.orientation.rotations import angle_slopes
 
-__all__ = ["CRITICAL", "Statistics", "statistics"]
+__all__ = ["CRITICAL", "Statistics", "photo_precision", "statistics"]
 
 CRITICAL = 3.29
 """Two-sided normal quantile of Baarda's α₀ = 0.1 %, beyond which a standardised residual is a blunder."""
@@ -37,14 +38,14 @@ _ROUNDING = 1e-11  # smallest eigenvalue of the scaled normal matrix that is mor
 
 @dataclass(frozen=True)
 class Statistics:
-    """What an adjustment is worth.
+    """Precision and reliability of an adjustment.
 
     Attributes
     ----------
     redundancy : observations minus unknowns, the datum's included
     sigma0 : √(vᵀPv / redundancy); nan without redundancy
-    cameras : (nr, nr) covariance of what is estimated at the cameras' side, for σ₀ = 1: rotation vectors [rad], stations [m],
-        interior orientation
+    cameras : (nr, nr) covariance of what is estimated at the cameras' side, for σ₀ = 1: rotation vectors [rad],
+        stations [m], interior orientation
     points : (np, 3, 3) covariance of the points for σ₀ = 1 [m²]; zero where fixed, nan where unknown
     residuals : (n, 2) weighted residuals of the marks, measured minus computed, in the order of the network; nan where
         left out
@@ -64,13 +65,17 @@ class Statistics:
     def standardised(self) -> Array:
         """(n, 2) residuals over their own standard deviation, with the stated σ of the marks; 0 where unchecked."""
         with np.errstate(invalid="ignore", divide="ignore"):
-            return np.where(self.parts > _LEAST, self.residuals / np.sqrt(np.maximum(self.parts, _LEAST)), 0.0)
+            return np.where(
+                self.parts > _LEAST, self.residuals / np.sqrt(np.maximum(self.parts, _LEAST)), 0.0
+            )
 
     @property
     def detectable(self) -> Array:
         """(n, 2) smallest blunder that the test finds with a probability of 80 %, in σ; inf where unchecked."""
         with np.errstate(invalid="ignore", divide="ignore"):
-            return np.where(self.parts > _LEAST, _DETECTABLE / np.sqrt(np.maximum(self.parts, _LEAST)), np.inf)
+            return np.where(
+                self.parts > _LEAST, _DETECTABLE / np.sqrt(np.maximum(self.parts, _LEAST)), np.inf
+            )
 
     @property
     def external(self) -> Array:
@@ -126,7 +131,7 @@ def _inverse(normal: Array, network: Network, prepared: Prepared) -> Array:
             factor = cho_factor(normal * scale[:, None] * scale, lower=True, check_finite=False)
         except np.linalg.LinAlgError:
             full = np.tril(normal) + np.tril(normal, -1).T
-            values, vectors = np.linalg.eigh(full * scale[:, None] * scale)
+            _, vectors = np.linalg.eigh(full * scale[:, None] * scale)
             worst = int(np.argmax(np.abs(vectors[:, 0])))
         else:
             pivots = np.abs(np.diag(factor[0])) ** 2
@@ -135,10 +140,12 @@ def _inverse(normal: Array, network: Network, prepared: Prepared) -> Array:
                 out: Array = cho_solve(factor, np.diag(scale), check_finite=False) * scale[:, None]
                 return 0.5 * (out + out.T)
     owner, parameter = names[worst]
-    where = next((one.where for one in (*network.photos, *network.cameras) if one.name == owner), network.path)
+    places = {one.name: one.where for one in network.cameras} | {
+        one.name: one.where for one in network.photos
+    }
     raise GeometryError(
-        f"the marks do not determine {owner} ({parameter}): the network has no sound datum, or its points lie on a line",
-        where=where or network.path,
+        f"the marks do not determine {owner} ({parameter}): there is no sound datum, or points lie on a line",
+        where=places.get(owner) or network.path,
         remedy="mark more points that are spread over the photograph, or more control points, not all on one line",
     )
 
@@ -164,10 +171,8 @@ def _to_points(
     return cameras, points
 
 
-def photo_precision(
-    network: Network, prepared: Prepared, solution: Solution, result: Statistics
-) -> tuple[Array, Array]:
-    """Return the covariance of ω, φ, κ [rad], X, Y, Z [m] of each photograph for σ₀ = 1, (nf, 6, 6), and which are free."""
+def photo_precision(network: Network, prepared: Prepared, solution: Solution, result: Statistics) -> Array:
+    """Return the covariance of ω, φ, κ [rad], X, Y, Z [m] of each photograph for σ₀ = 1, (nf, 6, 6); 0 where held."""
     out = np.zeros((len(network.photos), 6, 6))
     for f, place in enumerate(prepared.unknowns.column[:, :6]):
         if place[0] < 0:
@@ -175,4 +180,4 @@ def photo_precision(
         turn = np.eye(6)
         turn[:3, :3] = angle_slopes(solution.unknowns.rotation[f])
         out[f] = turn @ result.cameras[np.ix_(place, place)] @ turn.T
-    return out, prepared.unknowns.column[:, 0] >= 0
+    return out

@@ -1,6 +1,7 @@
 """Stones marked on oriented photographs: from marks to points and corners in space.
 
-A point marked on two or more photographs is intersected. A corner marked on one meets the surface that the stone names, or the
+A point marked on two or more photographs is intersected. A corner marked on one meets the surface that the stone
+names, or the
 plane of the stone's own points; that outline can also be a polygon drawn on one photograph (`photo`, `pixel`).
 """
 
@@ -13,11 +14,11 @@ import numpy as np
 from moma.errors import MomaError, SurveyError
 from survey.arrays import Array
 from survey.orientation.formats.result import read_orientation
-from survey.orientation.intersection import intersect
-from survey.orientation.located import Located, Mark, joint_covariance
 from survey.orientation.oriented import Oriented
-from survey.orientation.plotting import plot
-from survey.orientation.surfaces import Surface, fit_surface
+from survey.orientation.stones.intersection import intersect
+from survey.orientation.stones.located import Located, Mark, joint_covariance
+from survey.orientation.stones.plotting import plot
+from survey.orientation.stones.surfaces import Surface, fit_surface
 from survey.records.survey import BlockRecord, PointMark, Reject, SolidRecord, SurfaceRule, SurveyHead
 
 __all__ = ["located_stones"]
@@ -67,7 +68,9 @@ def _located(records: Sequence[BlockRecord], head: SurveyHead, oriented: Oriente
             yield _record(record, head, oriented, points[record.code], surfaces)
         except MomaError as error:
             place = f"{head.path}:{record.line}"
-            where = error.where if error.where is not None and error.where.startswith(f"{head.path}:") else place
+            where = (
+                error.where if error.where is not None and error.where.startswith(f"{head.path}:") else place
+            )
             yield Reject(record.code, error.at(f"{where}: stone {record.code}"), record.spans)
 
 
@@ -86,7 +89,9 @@ def _mark(one: PointMark, head: SurveyHead, oriented: Oriented) -> Mark:
     where = f"{head.path}:{one.line}"
     photo = oriented.index(one.photograph, where)
     width, height = oriented.camera(photo).size
-    if not (-0.02 * width <= one.image[0] <= 1.02 * width and -0.02 * height <= one.image[1] <= 1.02 * height):
+    if not (
+        -0.02 * width <= one.image[0] <= 1.02 * width and -0.02 * height <= one.image[1] <= 1.02 * height
+    ):
         raise SurveyError(
             f"point {one.name} at ({one.image[0]:g}, {one.image[1]:g}) lies outside photograph {one.photograph} "
             f"of {width} × {height} pixels",
@@ -97,14 +102,16 @@ def _mark(one: PointMark, head: SurveyHead, oriented: Oriented) -> Mark:
 
 
 def _intersected(record: BlockRecord, head: SurveyHead, oriented: Oriented) -> dict[str, Located]:
-    """Return the points of a stone that are known in space: those that two photographs show, or that were measured otherwise."""
+    """Return the points of a stone that are known in space: two photographs show them, or they were measured."""
     if len(record.vertices):
         raise SurveyError("it has marks and vertices in space", remedy="give its outline in one way")
     out = {}
     for k, (place, sigma) in enumerate(zip(record.points, record.point_sigmas, strict=True), start=1):
         name = f"measured {k}"
         still = np.zeros((3, len(oriented.covariance)))
-        out[name] = Located(name, place, still, {f"{record.code} {name}": sigma * np.eye(3)}, (), "measured in space")
+        out[name] = Located(
+            name, place, still, {f"{record.code} {name}": sigma * np.eye(3)}, (), "measured in space"
+        )
     for name, ones in _marks(record).items():
         marks = [_mark(one, head, oriented) for one in ones]
         if len(marks) >= 2:
@@ -116,7 +123,10 @@ def _intersected(record: BlockRecord, head: SurveyHead, oriented: Oriented) -> d
 
 
 def _surface(
-    rule: SurfaceRule, records: Sequence[BlockRecord], points: Mapping[str, Mapping[str, Located]], oriented: Oriented
+    rule: SurfaceRule,
+    records: Sequence[BlockRecord],
+    points: Mapping[str, Mapping[str, Located]],
+    oriented: Oriented,
 ) -> Surface | MomaError:
     """Fit a surface to the points of all stones that lie on it."""
     own: dict[str, Located] = {}
@@ -131,7 +141,7 @@ def _surface(
 
 
 def _middle(oriented: Oriented) -> Array:
-    return np.mean([oriented.station(f) for f in range(len(oriented.photos))], axis=0)
+    return np.asarray(np.mean([oriented.station(f) for f in range(len(oriented.photos))], axis=0))
 
 
 def _record(
@@ -155,7 +165,9 @@ def _record(
     role = {name: ones[0].role for name, ones in grouped.items()}
     measured = [one for name, one in intersected.items() if name not in grouped]
     # points that only one photograph shows define nothing: they were put on the surface
-    located = measured + [intersected[name] for name in grouped if role[name] == "point" and name in intersected]
+    located = measured + [
+        intersected[name] for name in grouped if role[name] == "point" and name in intersected
+    ]
     corners = [plotted.get(name) or intersected[name] for name in grouped if role[name] == "vertex"]
     return _in_space(record, oriented, located, corners)
 
@@ -198,7 +210,8 @@ def _in_space(
         seen_from=np.mean(stations, axis=0),
         joint=joint.ravel(),
         evidence=tuple(
-            _evidence(one, k >= len(located), joint[3 * k : 3 * k + 3, 3 * k : 3 * k + 3]) for k, one in enumerate(every)
+            _evidence(one, k >= len(located), joint[3 * k : 3 * k + 3, 3 * k : 3 * k + 3])
+            for k, one in enumerate(every)
         ),
     )
 

@@ -1,7 +1,7 @@
 """Space intersection: a point from its marks on two or more oriented photographs.
 
-The place minimises the weighted squares of the marks' residuals. With the rows A and B of the collinearity equations by the
-orientation and by the point, V = Σ BᵀB,
+The place minimises the weighted squares of the marks' residuals. With the rows A and B of the collinearity
+equations by the orientation and by the point, V = Σ BᵀB,
 
     dX = V⁻¹ Σ Bᵀ (dm - A dc),
 
@@ -14,10 +14,10 @@ import numpy as np
 
 from moma.errors import GeometryError
 from survey.arrays import Array
-from survey.orientation.located import Located, Mark, Sight, line_up
+from survey.orientation.bundle.resection import intersect_rays
 from survey.orientation.oriented import Oriented
 from survey.orientation.projection import directions
-from survey.orientation.resection import intersect_rays
+from survey.orientation.stones.located import Located, Mark, Sight, line_up
 
 __all__ = ["intersect", "sight"]
 
@@ -42,7 +42,10 @@ def intersect(oriented: Oriented, name: str, marks: Sequence[Mark]) -> Located:
         if its rays run nearly the same way, it lies behind a photograph, or its marks are not of one point
     """
     rays = np.array(
-        [oriented.rotation(one.photo) @ directions(oriented.camera(one.photo), one.image[None])[0] for one in marks]
+        [
+            oriented.rotation(one.photo) @ directions(oriented.camera(one.photo), one.image[None])[0]
+            for one in marks
+        ]
     )
     stations = np.array([oriented.station(one.photo) for one in marks])
     seen = " and ".join(oriented.photos[one.photo].name for one in marks)
@@ -75,7 +78,7 @@ def intersect(oriented: Oriented, name: str, marks: Sequence[Mark]) -> Located:
     worst = max(sights, key=lambda one: one.test)
     if worst.test > _MISSES and max(abs(worst.residual)) > _MISSES * marks[0].sigma:
         raise GeometryError(
-            f"the marks of point {name} on {seen} miss each other by {np.hypot(*worst.residual):.1f} px ({worst.test:.0f} σ)",
+            f"the marks of point {name} on {seen} miss by {np.hypot(*worst.residual):.1f} px ({worst.test:.0f} σ)",
             remedy="check whether they show the same point",
         )
     return Located(

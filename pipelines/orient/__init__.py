@@ -1,4 +1,0 @@
-"""Orientation of photographs (`moma orient`).
-
-Public: `read_project` (project); `orient_photographs`, `OrientReport` (orient).
-"""
