@@ -1,5 +1,6 @@
 """`moma orient`: photographs from a project file, or from an export, to orientation.json and a report."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -9,9 +10,13 @@ from moma.errors import UsageError
 from pipelines.reports.photographs.project import Project, calibrated, read_project
 from pipelines.results.folder import check_replaceable, replacing
 from survey.orientation.bundle.orient import Orientation, orient
+from survey.orientation.formats.colmap import write_colmap
 from survey.orientation.formats.control import read_control, with_control
-from survey.orientation.formats.photomodeler import read_photomodeler
+from survey.orientation.formats.dbat import write_dbat
+from survey.orientation.formats.metashape import write_metashape
+from survey.orientation.formats.photomodeler import read_photomodeler, write_photomodeler
 from survey.orientation.formats.result import orientation_values, write_orientation
+from survey.orientation.network import Network
 
 __all__ = ["INDEX", "OrientReport", "orient_photographs", "photomodeler_project"]
 
@@ -33,6 +38,14 @@ class OrientReport:
     folder: Path
     orientation: Orientation
     values: dict[str, Any]
+
+
+_WRITERS: dict[str, Callable[[Network, Path], object]] = {
+    "photomodeler": lambda network, folder: write_photomodeler(network, folder / "photomodeler.txt"),
+    "colmap": lambda network, folder: write_colmap(network, folder / "colmap"),
+    "metashape": lambda network, folder: write_metashape(network, folder / "metashape.xml"),
+    "dbat": lambda network, folder: write_dbat(network, folder / "dbat"),
+}
 
 
 def photomodeler_project(
@@ -83,7 +96,9 @@ def orient_photographs(project: Path | Project, folder: Path) -> OrientReport:
     values = orientation_values(result, name=read.name)
     with replacing(folder, INDEX) as fresh:
         pictures = draw_photographs(values, fresh)
-        values["files"] = sorted([INDEX, "report.html", *pictures])
+        for one in read.write:
+            _WRITERS[one](result.adjusted, fresh)
+        values["files"] = sorted([INDEX, "report.html", *(entry.name for entry in fresh.iterdir())])
         write_photographs_page(fresh / "report.html", values, pictures, version("moma-masonry"))
         write_orientation(fresh / INDEX, values)
     return OrientReport(folder, result, values)

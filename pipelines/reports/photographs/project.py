@@ -19,7 +19,18 @@ from survey.orientation.formats.photomodeler import read_photomodeler
 from survey.orientation.network import INTERIOR, Camera, Network, Photo
 from survey.orientation.rotations import from_angles
 
-__all__ = ["CAMERA_KEYS", "PHOTO_KEYS", "PROJECT_KEYS", "Project", "calibrated", "read_project"]
+__all__ = [
+    "CAMERA_KEYS",
+    "PHOTO_KEYS",
+    "PROJECT_KEYS",
+    "WRITTEN",
+    "Project",
+    "calibrated",
+    "read_project",
+]
+
+WRITTEN = ("photomodeler", "colmap", "metashape", "dbat")
+"""Formats in which a result can be written."""
 
 _NUMBERS = ValueKind.NUMBERS
 
@@ -70,6 +81,12 @@ PROJECT_KEYS = (
         "Whether marks that the test finds wrong are left out.",
         default="report",
         choices=("report", "remove"),
+    ),
+    Key(
+        "write",
+        ValueKind.TEXTS,
+        "Formats in which the result is written too: photomodeler, colmap, metashape, dbat.",
+        default=(),
     ),
     Key(
         "calibrate",
@@ -141,11 +158,13 @@ class Project:
     name : of the project
     network : with its control points
     blunders : "report" or "remove"
+    write : formats in which the result is written too
     """
 
     name: str
     network: Network
     blunders: str
+    write: tuple[str, ...] = ()
 
 
 def read_project(path: Path) -> Project:
@@ -176,7 +195,11 @@ def read_project(path: Path) -> Project:
         key = "check" if values["check"] else "fixed_control"
         document.fail(f"{key} without control points", key, remedy="give control = FILE")
     network = calibrated(network, _texts(values["calibrate"]), document.where("calibrate"))
-    return Project(str(values["name"] or path.stem), network, str(values["blunders"]))
+    write = _texts(values["write"])
+    for one in write:
+        if one not in WRITTEN:
+            document.fail(f"no format {one!r}", "write", remedy=nearest(one, WRITTEN))
+    return Project(str(values["name"] or path.stem), network, str(values["blunders"]), write)
 
 
 def calibrated(network: Network, names: tuple[str, ...], where: str) -> Network:
@@ -219,21 +242,20 @@ def _network(
         document.fail(f"[[cameras]] or [[photos]] beside {main[0]}", "cameras", remedy="leave them out")
     if not main:
         return _marked(document, values, cameras, photos, folder)
-    source = folder / str(values[main[0]])
+    source, sigma = folder / str(values[main[0]]), float(str(values["sigma"]))
     if main[0] == "photomodeler":
         return read_photomodeler(source)
     if main[0] == "colmap":
-        return read_colmap(source, float(values["sigma"]))  # type: ignore[arg-type]
+        return read_colmap(source, sigma)
     if main[0] == "dbat":
         return read_dbat(source)
     markers = values["markers"]
-    network = read_metashape(
-        source, None if markers is None else folder / str(markers), float(values["sigma"])
-    )  # type: ignore[arg-type]
+    file = None if markers is None else folder / str(markers)
+    network = read_metashape(source, file, sigma)
     if values["marks"] is None:
         return network
     marks = folder / str(values["marks"])
-    return network_of(str(marks), read_marks(marks), network.cameras, network.photos, float(values["sigma"]))  # type: ignore[arg-type]
+    return network_of(str(marks), read_marks(marks), network.cameras, network.photos, sigma)
 
 
 def _marked(

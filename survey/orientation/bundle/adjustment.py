@@ -19,7 +19,8 @@ from survey.orientation.rotations import angle_slopes, turned
 __all__ = ["Prepared", "Solution", "adjust", "prepare"]
 
 _MOST = 100  # iterations
-_STILL = 1e-9  # relative decrease of the sum of squares at which the iteration has converged
+_STILL = 1e-13  # predicted decrease of the sum of squares, relative, at which the iteration has converged
+_ROUNDING = 1e-10  # relative change of the sum of squares that is rounding
 _FIRST = 1e-4  # first damping tried [-]
 _STRONGEST = 1e12  # damping beyond which no step brings the residuals down [-]
 
@@ -179,35 +180,32 @@ def adjust(network: Network, prepared: Prepared) -> Solution:
     damping, taken = 0.0, 0
     normal, right, square, behind = normals(network, prepared, unknowns, 0.0)
     while taken < _MOST:
-        while True:
-            step = _step(normal, right, prepared, unknowns, damping)
-            if step is not None:
-                tried = _moved(unknowns, *_corrections(prepared, unknowns, damping, step))
-                found = normals(network, prepared, tried, 0.0)
-                if found[2] <= square * (1.0 + 1e-12):
-                    break
-            damping = max(_FIRST, 10.0 * damping)
-            if damping > _STRONGEST:
-                raise GeometryError(
-                    "the adjustment does not converge: no step brings the residuals down",
-                    where=network.path,
-                    remedy="check the marks, the control points and the start values",
-                )
-            normal, right, _, _ = normals(network, prepared, unknowns, damping)
-        decrease, taken = square - found[2], taken + 1
-        unknowns, (normal, right, square, behind) = tried, found
-        if damping == 0.0 and decrease <= _STILL * max(square, 1e-12):
-            break
-        damping = 0.0 if damping <= _FIRST else 0.1 * damping
-        if damping:
-            normal, right, _, _ = normals(network, prepared, unknowns, damping)
-    else:
-        raise GeometryError(
-            f"the adjustment has not converged in {_MOST} iterations",
-            where=network.path,
-            remedy="check the marks, the control points and the start values",
-        )
-    return Solution(unknowns, square, taken, behind)
+        step = _step(normal, right, prepared, unknowns, damping)
+        if step is not None:
+            tried = _moved(unknowns, *_corrections(prepared, unknowns, damping, step))
+            taken += 1
+            if damping == 0.0 and abs(float(step @ right)) <= _STILL * max(square, 1e-12):
+                return Solution(tried, square, taken, behind)
+            found = normals(network, prepared, tried, 0.0)
+            if found[2] <= square * (1.0 + _ROUNDING):
+                unknowns, (normal, right, square, behind) = tried, found
+                damping = 0.0 if damping <= _FIRST else 0.1 * damping
+                if damping:
+                    normal, right, _, _ = normals(network, prepared, unknowns, damping)
+                continue
+        damping = max(_FIRST, 10.0 * damping)
+        if damping > _STRONGEST:
+            raise GeometryError(
+                "the adjustment does not converge: no step brings the residuals down",
+                where=network.path,
+                remedy="check the marks, the control points and the start values",
+            )
+        normal, right, _, _ = normals(network, prepared, unknowns, damping)
+    raise GeometryError(
+        f"the adjustment has not converged in {_MOST} iterations",
+        where=network.path,
+        remedy="check the marks, the control points and the start values",
+    )
 
 
 def prior(prepared: Prepared, unknowns: Unknowns) -> Array:

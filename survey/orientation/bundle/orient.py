@@ -59,6 +59,21 @@ class Orientation:
         return self.statistics.sigma0 if self.statistics.redundancy > 0 else 1.0
 
     @property
+    def adjusted(self) -> Network:
+        """Network with the adjusted values, without the marks that were left out."""
+        values, network = self.solution.unknowns, self.network
+        used = np.asarray(np.isfinite(self.statistics.residuals).all(axis=1))
+        pairs = zip(network.photos, values.rotation, values.station, strict=True)
+        return replace(
+            _only(network, used),
+            cameras=tuple(
+                replace(one, inner=inner) for one, inner in zip(network.cameras, values.inner, strict=True)
+            ),
+            photos=tuple(replace(one, rotation=turn, station=place) for one, turn, place in pairs),
+            start=values.point.copy(),
+        )
+
+    @property
     def residuals(self) -> Array:
         """(n, 2) residuals of the marks on the photographs, measured minus computed, right and down [px]."""
         return self.statistics.residuals * self.network.sigma * (1.0, -1.0)

@@ -27,6 +27,7 @@ __all__ = ["aligned", "check_mirrored", "start_values", "swapped", "without_star
 _APART = 0.05  # mean distance of start values from control points, over the extent of these, from which they are moved
 _BETTER = 0.2  # misfit of the right hand over that of the wrong one
 _FLAT = 5e-3  # extent of control points off their plane over that in it, below which either hand fits
+_ALIKE = 0.1  # difference of a reflection from an exchange or a change of sign of coordinates
 _MISFIT = 0.02  # median angle of a resection, beyond which its points contradict each other [rad]
 _FEWEST = 4  # known points of a resection
 _NARROW = np.radians(2.0)  # angle between rays below which a point is not used for resections
@@ -127,9 +128,8 @@ def aligned(network: Network, always: bool = False) -> Network:
     if not always and np.linalg.norm(source - target, axis=1).mean() <= _APART * extent:
         return network
     rotation, shift, scale = similarity_between(source, target)
-    flat = np.linalg.svd(target - target.mean(axis=0))
-    normal = flat[2][2]
-    if control and not always and flat[1][2] < _FLAT * flat[1][0] and float(normal @ rotation @ normal) < 0.0:
+    shape = np.linalg.svd(target - target.mean(axis=0), compute_uv=False)
+    if control and not always and shape[2] < _FLAT * shape[0] and _looks_mirrored(source, target):
         raise SurveyError(
             "the control points lie in a plane that shows its other side to the photographs: they are mirrored",
             where=control[0].where or network.path,
@@ -143,6 +143,16 @@ def aligned(network: Network, always: bool = False) -> Network:
     )
     start = scale * network.start @ rotation.T + shift
     return replace(network, photos=photos, start=start)
+
+
+def _looks_mirrored(source: Array, target: Array) -> bool:
+    """Return True if points of one plane differ by the sign of x or y, or by the order of the two.
+
+    A turn to the other side of the plane fits them as well, but nobody turns a frame like that.
+    """
+    fitted, _, _ = similarity_between(source, target, mirrored=True)
+    usual = (np.diag([-1.0, 1.0, 1.0]), np.diag([1.0, -1.0, 1.0]), np.eye(3)[[1, 0, 2]])
+    return any(float(np.abs(fitted - one).max()) < _ALIKE for one in usual)
 
 
 def _rays(network: Network) -> Array:

@@ -230,16 +230,16 @@ def write_metashape(network: Network, path: Path) -> None:
         '<chunk label="moma" enabled="true">',
         "<sensors>",
     ]
-    for k, camera in enumerate(network.cameras):
+    for index, camera in enumerate(network.cameras):
         if not camera.forward:
             raise SurveyError(
                 f"camera {camera.name} has backward distortion",
                 where=str(path),
                 remedy='Metashape holds forward distortion: calibrate with model = "forward"',
             )
-        out += _sensor(k, camera)
+        out += _sensor(index, camera)
     out += ["</sensors>", "<cameras>"]
-    for k, photo in enumerate(network.photos):
+    for index, photo in enumerate(network.photos):
         if photo.rotation is None or photo.station is None:
             raise SurveyError(
                 f"photograph {photo.name} is not oriented", where=str(path), remedy="orient it first"
@@ -248,7 +248,7 @@ def write_metashape(network: Network, path: Path) -> None:
         pose[:3, :3], pose[:3, 3] = photo.rotation @ _FLIP, photo.station
         numbers = " ".join(map(repr, pose.ravel().tolist()))
         out.append(
-            f'<camera id="{k}" sensor_id="{photo.camera}" label={quoteattr(photo.name)} enabled="true">'
+            f'<camera id="{index}" sensor_id="{photo.camera}" label={quoteattr(photo.name)} enabled="true">'
         )
         out += [f"<transform>{numbers}</transform>", "</camera>"]
     out += ["</cameras>", "<markers>"]
@@ -268,7 +268,7 @@ def write_metashape(network: Network, path: Path) -> None:
     out += ["</markers>", "<frames>", '<frame id="0">', "<markers>"]
     for i in range(len(network.names)):
         out.append(f'<marker marker_id="{i}">')
-        for k in np.flatnonzero(network.point == i):
+        for k in np.flatnonzero(network.point == i).tolist():
             x, y = network.image[k].tolist()
             out.append(f'<location camera_id="{network.photo[k]}" pinned="true" x="{x!r}" y="{y!r}"/>')
         out.append("</marker>")
