@@ -33,15 +33,15 @@ def project(name, calibrate=()):
     return replace(network, cameras=tuple(replace(one, free=calibrate) for one in network.cameras))
 
 
-def same(printed, value, wrap=False):
-    """Whether a value rounds to what was printed, with one unit of the last digit for their own iteration's end."""
+def same(printed, value, sigma=0.0, wrap=False):
+    """Whether a value rounds to what was printed; their iteration ends at a change of 10⁻⁶ of the deviations."""
     mantissa, _, power = printed.lower().partition("e")
     digits = len(mantissa.partition(".")[2])
     unit = 10.0 ** (int(power or 0) - digits)
     off = value - float(printed)
     if wrap:
         off = (off + 180.0) % 360.0 - 180.0
-    return abs(off) <= 0.5001 * unit
+    return abs(off) <= 0.5001 * unit + 1e-6 * sigma
 
 
 def published(name):
@@ -72,7 +72,7 @@ def check(name, values):
         else:
             value, sigma = photos[of][parameter], photos[of]["sigma"][parameter]
         count += len(one)
-        if not same(one["Value"], value, wrap=parameter in ("omega", "phi", "kappa")):
+        if not same(one["Value"], value, sigma, wrap=parameter in ("omega", "phi", "kappa")):
             wrong.append((of, parameter, one["Value"], value))
         if "Deviation" in one and not same(one["Deviation"], sigma):
             wrong.append((of, parameter, one["Deviation"], sigma))
@@ -99,7 +99,10 @@ def test_a_calibration_with_fixed_control_points_agrees_in_every_digit():
     assert [f"{one:.1e}" for one in sigma["90"]] == ["5.0e-05", "5.3e-05", "8.5e-05"]
     residuals = np.linalg.norm(result.residuals, axis=1)
     worst = int(np.argmax(residuals))
-    names = result.network.names[result.network.point[worst]], result.network.photos[result.network.photo[worst]].name
+    names = (
+        result.network.names[result.network.point[worst]],
+        result.network.photos[result.network.photo[worst]].name,
+    )
     assert (f"{residuals[worst]:.3f}", *names) == ("0.955", "1003", "P8250025.JPG")
     assert f"{np.sqrt((residuals**2).mean()):.3f}" == "0.216"
 
@@ -109,9 +112,11 @@ def test_weighted_control_points_of_aerial_photographs_agree_in_every_digit():
     values = orientation_values(result)
     assert f"{values['sigma0']:.6f}" == "0.965375"
     assert (values["redundancy"], values["observations"], values["unknowns"]) == (69, 150, 81)
-    assert check("sxb", values) == 5 * 6 * 2 + 3
+    assert check("sxb", values) == 5 * 6 * 2 + 9
     points = {one["id"]: one for one in values["points"]}
-    text = (DATA / "sxb-expected.txt").read_text(encoding="utf-8").partition("Posterior")[2].partition("Diff")[0]
+    text = (
+        (DATA / "sxb-expected.txt").read_text(encoding="utf-8").partition("Posterior")[2].partition("Diff")[0]
+    )
     rows = [[word.strip() for word in line.split(",")] for line in text.splitlines()[2:] if "," in line]
     assert len(rows) == 16
     for number, x, y, z, sx, sy, sz, *_ in rows:
@@ -119,7 +124,10 @@ def test_weighted_control_points_of_aerial_photographs_agree_in_every_digit():
         assert all(same(text, value) for text, value in zip((x, y, z), points[number]["xyz"], strict=True))
         assert all(same(text, value) for text, value in zip((sx, sy, sz), deviations, strict=True))
     pairs = {(one["of"], one["a"], one["b"]): one["value"] for one in values["correlations"]}
-    assert f"{100 * pairs['8936.jpg', 'omega', 'y']:.1f} {100 * pairs['8936.jpg', 'phi', 'x']:.1f}" == "-100.0 99.9"
+    assert (
+        f"{100 * pairs['8936.jpg', 'omega', 'y']:.1f} {100 * pairs['8936.jpg', 'phi', 'x']:.1f}"
+        == "-100.0 99.9"
+    )
 
 
 @pytest.mark.parametrize(("name", "sigma0"), [("camcal", 1.6148), ("sxb", 0.965375)])
