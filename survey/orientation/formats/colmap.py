@@ -238,11 +238,7 @@ def write_colmap(network: Network, folder: Path) -> None:
             raise SurveyError(
                 f"point {shown(name)} is not a number", where=str(folder), remedy="number the points"
             )
-    folder.mkdir(parents=True, exist_ok=True)
-    _write(
-        folder / "cameras.txt",
-        [_camera_line(k, one, folder) for k, one in enumerate(network.cameras, start=1)],
-    )
+    cameras = [_camera_line(k, one, folder) for k, one in enumerate(network.cameras, start=1)]
     images, place_of = list[str](), np.zeros(len(network.photo), dtype=int)
     for k, photo in enumerate(network.photos):
         if photo.rotation is None or photo.station is None:
@@ -259,12 +255,13 @@ def write_colmap(network: Network, folder: Path) -> None:
             for (x, y), i in zip(network.image[mine].tolist(), network.point[mine], strict=True)
         ]
         images.append(" ".join(marks))
-    _write(folder / "images.txt", images)
     points = []
     for i in np.flatnonzero(np.isfinite(network.start).all(axis=1)):
         track = [f"{network.photo[k] + 1} {place_of[k]}" for k in np.flatnonzero(network.point == i)]
         points.append(" ".join([network.names[i], *map(repr, network.start[i].tolist()), "0 0 0 0", *track]))
-    _write(folder / "points3D.txt", points)
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, lines in (("cameras", cameras), ("images", images), ("points3D", points)):
+        _write(folder / f"{name}.txt", lines)
 
 
 def _camera_line(number: int, camera: Camera, folder: Path) -> str:

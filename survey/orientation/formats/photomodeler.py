@@ -101,6 +101,9 @@ def read_photomodeler(path: Path) -> Network:
     lines = _Lines(path)
     lines.line("the title")
     settings = lines.numbers("the line of tolerance, iterations, width and height", (4,))
+    if not (settings[2:] >= 1.0).all():
+        width, height = settings[2:].astype(int)
+        raise lines.fail(f"the photographs have {width} × {height} pixels", "line 2 gives their size")
     default = lines.numbers("the line of standard deviations", (9,))
     common = lines.numbers("the camera", (10,))
     whole = _camera("camera1", common, settings[2:], lines.where)
@@ -140,10 +143,6 @@ def read_photomodeler(path: Path) -> Network:
 
 def _camera(name: str, row: Array, size: Array, where: str) -> Camera:
     width, height = (int(one) for one in size)
-    if not (width > 0 and height > 0):
-        raise SurveyError(
-            f"the photographs have {width} × {height} pixels", where=where, remedy="line 2 gives their size"
-        )
     if not (row[0] > 0.0 and row[3] > 0.0 and row[4] > 0.0):
         raise SurveyError(
             "camera constant and format must be greater than 0", where=where, remedy="they are in millimetres"
