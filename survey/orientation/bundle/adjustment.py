@@ -210,8 +210,10 @@ def adjust(network: Network, prepared: Prepared) -> Solution:
 
 def prior(prepared: Prepared, unknowns: Unknowns) -> Array:
     """Return what the kernels take of known places, (np, 3, 4): weights, and weights times differences."""
-    off = np.einsum("iab,ib->ia", prepared.information, prepared.place - unknowns.point)
-    return np.concatenate([prepared.information, np.where(np.isfinite(off), off, 0.0)[:, :, None]], axis=2)
+    off = prepared.place - unknowns.point
+    off[~np.isfinite(off)] = 0.0  # of points without rays
+    pulls = np.einsum("iab,ib->ia", prepared.information, off)
+    return np.concatenate([prepared.information, pulls[:, :, None]], axis=2)
 
 
 def normals(
@@ -231,7 +233,8 @@ def normals(
             remedy="mark it on two or more photographs taken from different places",
         )
     off = prepared.place - unknowns.point
-    square += float(np.einsum("ia,iab,ib->", off, prepared.information, np.where(np.isfinite(off), off, 0.0)))
+    off[~np.isfinite(off)] = 0.0  # of points without rays
+    square += float(np.einsum("ia,iab,ib->", off, prepared.information, off))
     for f, photo in enumerate(network.photos):
         square += _observed_photo(photo, f, unknowns, normal, right)
     if not np.isfinite(square):

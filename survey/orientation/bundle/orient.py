@@ -12,6 +12,7 @@ from threadpoolctl import ThreadpoolController
 from moma.errors import GeometryError, MomaError, SurveyError
 from survey.arrays import Array
 from survey.orientation.bundle.adjustment import Prepared, Solution, adjust, prepare
+from survey.orientation.bundle.resection import similarity_between
 from survey.orientation.bundle.soundness import check_network
 from survey.orientation.bundle.start import aligned, check_mirrored, start_values, swapped, without_start
 from survey.orientation.bundle.statistics import CRITICAL, Statistics, statistics
@@ -28,6 +29,8 @@ _GOOD = 5e-4  # the same, below which no other start is tried
 _SEARCHES = 30  # rounds of data snooping
 _MISSES = 2.33  # √(χ²₃ / 3) that a sound point exceeds once in a thousand
 _FAR_OFF = 10.0  # the same from which the hand of the control points is checked
+_STATIONS = 5  # observed stations of which one that is off can be told
+_TRIPLES = 200  # random triples of stations tried
 _NORMAL = 0.6745  # median of the absolute value of a standard normal variable
 _SMALL = 1500  # parameters of the cameras below which one thread of BLAS is faster than several
 
@@ -197,11 +200,12 @@ def _oriented(network: Network, used: NDArray[np.bool_]) -> tuple[Network, Prepa
                 if rests[-1][0] < _GOOD:
                     break
         except MomaError as error:
-            failure = failure or error
+            failure = error
         if rests and min(one[0] for one in rests) < _POOR:
             break
     if not rests:
         assert failure is not None
+        _check_control_alone(network)
         raise failure
     misfit, found, prepared, solution = min(rests, key=lambda one: one[0])
     _check_contradictions(network, found, solution, misfit, failure)
@@ -245,23 +249,11 @@ def _check_contradictions(
     )
     pair = swapped(network, replace(found, photos=photos))
     if pair is not None:
-        one = next(one for one in network.photos if one.name == pair[0])
-        raise SurveyError(
-            f"photographs {pair[0]} and {pair[1]} are swapped: each fits the orientation that is given for the other",
-            where=one.where or network.path,
-            remedy="give the marks to the photograph that they were made on",
-        )
+        raise _swapped(network, *pair)
+    _check_stations(network, solution)
     if misfit < _POOR:
         return
-    given = [one for one in network.control if not one.check]
-    alone = _alone(network) if given else None
-    if alone is not None:
-        _check_hand(network, alone)
-        raise SurveyError(
-            "the control points do not fit the photographs, which agree with each other without them",
-            where=given[0].where or network.path,
-            remedy="check the numbers, the order and the unit of their coordinates",
-        )
+    _check_control_alone(network)
     if failure is not None:
         raise failure
     worst = _worst(found, solution)
@@ -269,6 +261,77 @@ def _check_contradictions(
         f"the marks contradict each other: half miss by over {misfit:.1%} of a photograph, most on {worst.name}",
         where=worst.where or network.path,
         remedy="check the marks of this photograph, and the camera",
+    )
+
+
+def _check_control_alone(network: Network) -> None:
+    """Refuse control points that do not fit photographs which agree with each other without them."""
+    given = [one for one in network.control if not one.check]
+    if not given or (alone := _alone(network)) is None:
+        return
+    _check_hand(network, alone)
+    raise SurveyError(
+        "the control points do not fit the photographs, which agree with each other without them",
+        where=given[0].where or network.path,
+        remedy="check the numbers, the order and the unit of their coordinates",
+    )
+
+
+def _check_stations(network: Network, solution: Solution) -> None:
+    """Refuse observed stations that contradict the photographs, naming those that are swapped or one that is off."""
+    seen = [f for f, one in enumerate(network.photos) if one.observed_station is not None]
+    if len(seen) < _STATIONS:
+        return
+    there = np.array([network.photos[f].observed_station for f in seen])
+    sigma = np.array([network.photos[f].station_sigma for f in seen]).max(axis=1)
+    off = np.linalg.norm(solution.unknowns.station[seen] - there, axis=1)
+    if not (off > _FAR_OFF * sigma).any():
+        return
+    free = replace(
+        network,
+        control=(),
+        photos=tuple(replace(one, observed_station=None, observed_rotation=None) for one in network.photos),
+    )
+    if (alone := _alone(free)) is None:
+        return
+    here = _fitted(alone.unknowns.station[seen], there)
+    own = np.linalg.norm(here - there, axis=1)
+    apart = np.linalg.norm(here[:, None] - there[None], axis=2)
+    worst = int(np.argmax(own))
+    photo = network.photos[seen[worst]]
+    for other in range(len(seen)):
+        if other != worst and max(apart[worst, other], apart[other, worst]) < 0.2 * min(
+            own[worst], own[other]
+        ):
+            raise _swapped(network, *sorted((seen[worst], seen[other])))
+    if own[worst] > _FAR_OFF * sigma[worst]:
+        raise SurveyError(
+            f"the observed station of photograph {photo.name} is {own[worst]:.3g} m from where the others put it",
+            where=photo.where or network.path,
+            remedy="check its coordinates, and to which photograph they belong",
+        )
+
+
+def _fitted(source: Array, target: Array) -> Array:
+    """Move places by the similarity that most of them agree with: of all triples, that of the least median misfit."""
+    best, least = source, np.inf
+    rng = np.random.default_rng(0)
+    for _ in range(_TRIPLES):
+        three = rng.choice(len(source), 3, replace=False)
+        rotation, shift, scale = similarity_between(source[three], target[three])
+        moved = scale * source @ rotation.T + shift
+        misfit = float(np.median(np.linalg.norm(moved - target, axis=1)))
+        if misfit < least:
+            best, least = moved, misfit
+    return best
+
+
+def _swapped(network: Network, a: int, b: int) -> SurveyError:
+    first, second = network.photos[a], network.photos[b]
+    return SurveyError(
+        f"photographs {first.name} and {second.name} are swapped: each fits the orientation given for the other",
+        where=first.where or network.path,
+        remedy="give the marks to the photograph that they were made on",
     )
 
 

@@ -17,11 +17,12 @@ __all__ = ["essential_orientations", "intersect_rays", "resect", "similarity_bet
 
 _TRIPLES = 60  # random triples of points tried
 _FIVES = 80  # random fives of pairs of rays tried
+_ENOUGH = 12  # of these, after which nearly all pairs may end the search
 _AGREES = 0.01  # angle between a ray and the direction of its point [rad]
 _REAL = 1e-6  # imaginary part of a root that is rounding
 
 
-def resect(rays: Array, points: Array) -> tuple[Array, Array, float] | None:
+def resect(rays: Array, points: Array) -> tuple[Array, Array, int] | None:
     """Orient a photograph by known points.
 
     Parameters
@@ -31,7 +32,7 @@ def resect(rays: Array, points: Array) -> tuple[Array, Array, float] | None:
 
     Returns
     -------
-    rotation (3, 3), station (3,), median angle between rays and points [rad]; None if no triple gives any
+    rotation (3, 3), station (3,), number of points that agree; None if no triple gives any
     """
     rays = rays / np.linalg.norm(rays, axis=1)[:, None]
     rng = np.random.default_rng(0)
@@ -47,7 +48,7 @@ def resect(rays: Array, points: Array) -> tuple[Array, Array, float] | None:
             rest = float(np.median(angle))
             if best is None or (agree, -rest) > (best[0], -best[1]):
                 best = agree, rest, rotation, station
-    return None if best is None else (best[2], best[3], best[1])
+    return None if best is None else (best[2], best[3], best[0])
 
 
 def _three_point(rays: Array, points: Array) -> Iterator[tuple[Array, Array]]:
@@ -145,7 +146,9 @@ def essential_orientations(first: Array, second: Array) -> list[tuple[Array, Arr
     second = second / np.linalg.norm(second, axis=1)[:, None]
     rng = np.random.default_rng(0)
     found: list[tuple[Array, Array, int, float]] = []
-    for _ in range(_FIVES):
+    for count in range(_FIVES):
+        if count >= _ENOUGH and max((one[2] for one in found), default=0) > 0.9 * len(first):
+            break
         five = rng.choice(len(first), 5, replace=False)
         for essential in _essential(first[five], second[five]):
             for rotation, station in _decomposed(essential):

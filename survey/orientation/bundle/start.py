@@ -28,7 +28,7 @@ _APART = 0.05  # mean distance of start values from control points, over the ext
 _BETTER = 0.2  # misfit of the right hand over that of the wrong one
 _FLAT = 5e-3  # extent of control points off their plane over that in it, below which either hand fits
 _ALIKE = 0.1  # difference of a reflection from an exchange or a change of sign of coordinates
-_MISFIT = 0.02  # median angle of a resection, beyond which its points contradict each other [rad]
+_MOST_AGREE = 0.6  # part of the known points of a photograph that must agree on its orientation
 _FEWEST = 4  # known points of a resection
 _NARROW = np.radians(2.0)  # angle between rays below which a point is not used for resections
 
@@ -186,7 +186,7 @@ def _filled(
     of_photo = [np.flatnonzero(network.photo == f) for f in range(len(network.photos))]
     order = np.argsort(network.point, kind="stable")
     bounds = np.searchsorted(network.point[order], np.arange(len(network.names) + 1))
-    firm, misfits = set(places), dict[int, float]()
+    firm, misfits = set(places), set[int]()
     while True:
         _intersect(network, rays, oriented, places, firm, (order, bounds))
         waiting = [f for f in range(len(network.photos)) if f not in oriented]
@@ -197,8 +197,8 @@ def _filled(
             if len(known[f]) < 0.5 * len(known[ready[0]]):
                 break
             found = resect(rays[known[f]], np.array([places[network.point[k]] for k in known[f]]))
-            if found is None or found[2] > _MISFIT:
-                misfits[f] = np.inf if found is None else found[2]
+            if found is None or found[2] < max(_FEWEST, _MOST_AGREE * len(known[f])):
+                misfits.add(f)
                 continue
             oriented[f] = found[:2]
             progress = True
@@ -211,7 +211,7 @@ def _filled(
                 replace(one, rotation=oriented[f][0], station=oriented[f][1]) if one.rotation is None else one
             )
         elif strict:
-            raise _not_oriented(network, f, len(known.get(f, ())), misfits.get(f))
+            raise _not_oriented(network, f, len(known.get(f, ())), f in misfits)
         else:
             photos.append(one)
     start = network.start.copy()
@@ -220,10 +220,10 @@ def _filled(
     return replace(network, photos=tuple(photos), start=start)
 
 
-def _not_oriented(network: Network, f: int, known: int, misfit: float | None) -> SurveyError:
+def _not_oriented(network: Network, f: int, known: int, misfit: bool) -> SurveyError:
     photo = network.photos[f]
     what = f"photograph {photo.name} cannot be oriented: "
-    if misfit is not None:
+    if misfit:
         what += f"its {known} known points do not lie as it shows them"
         remedy = "check their marks, the control points (are they mirrored?) and the unit of the camera"
     else:
@@ -289,17 +289,16 @@ def _pairs(network: Network, rays: Array) -> Iterator[dict[int, tuple[Array, Arr
         )
 
 
-def swapped(network: Network, found: Network) -> tuple[str, str] | None:
+def swapped(network: Network, found: Network) -> tuple[int, int] | None:
     """Return two photographs of which each was oriented where the file has the other; None without such a pair."""
     given = [one.station if one.observed_station is None else one.observed_station for one in network.photos]
-    names = [one.name for one in network.photos]
     if any(one is None for one in given):
         return None
     there, here = np.array(given), np.array([one.station for one in found.photos])
     own = np.linalg.norm(here - there, axis=1)
     apart = np.linalg.norm(here[:, None] - there[None], axis=2)
-    for a in range(len(names)):
-        for b in range(a + 1, len(names)):
+    for a in range(len(given)):
+        for b in range(a + 1, len(given)):
             if max(apart[a, b], apart[b, a]) < 0.2 * min(own[a], own[b]):
-                return names[a], names[b]
+                return a, b
     return None

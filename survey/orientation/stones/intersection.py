@@ -24,7 +24,7 @@ __all__ = ["intersect", "sight"]
 _MOST = 20  # iterations
 _STILL = 1e-11  # movement of a point over its distance, below which it has converged
 _NARROWEST = 1.0  # angle between the outer rays of a point below which it is refused [°]
-_CHECKED = 1e-6  # redundancy number below which nothing checks a coordinate
+_CHECKED = 1e-3  # deviation of a residual, over that of its mark, below which nothing checks it
 _MISSES = 6.0  # test of a mark beyond which it is of another point
 
 
@@ -71,9 +71,14 @@ def intersect(oriented: Oriented, name: str, marks: Sequence[Mark]) -> Located:
             )
     rows = [line_up(oriented, one, place) for one in marks]
     gain = inverse @ by_point.T
-    parts = 1.0 - np.einsum("ij,ji->i", by_point, gain).reshape(-1, 2)
+    by_camera = np.concatenate([one[1] for one in rows])
+    # the residuals are those of the marks, and of the photographs' orientation
+    rest = np.eye(len(by_point)) - by_point @ gain
+    spread = rest @ (np.eye(len(by_point)) + by_camera @ oriented.covariance @ by_camera.T) @ rest
+    deviations = np.sqrt(np.maximum(np.diag(spread), 0.0)).reshape(-1, 2)
     sights = tuple(
-        sight(oriented, one, row[0], part, place) for one, row, part in zip(marks, rows, parts, strict=True)
+        sight(oriented, one, row[0], own, place)
+        for one, row, own in zip(marks, rows, deviations, strict=True)
     )
     worst = max(sights, key=lambda one: one.test)
     if worst.test > _MISSES and max(abs(worst.residual)) > _MISSES * marks[0].sigma:
@@ -84,7 +89,7 @@ def intersect(oriented: Oriented, name: str, marks: Sequence[Mark]) -> Located:
     return Located(
         name,
         place,
-        -gain @ np.concatenate([one[1] for one in rows]),
+        -gain @ by_camera,
         {_source(one): gain[:, 2 * k : 2 * k + 2] for k, one in enumerate(marks)},
         sights,
         f"intersection of {len(marks)} rays at {np.degrees(angle):.0f}°",
@@ -95,10 +100,10 @@ def _source(mark: Mark) -> str:
     return f"mark {mark.photo} {mark.image[0]!r} {mark.image[1]!r}"
 
 
-def sight(oriented: Oriented, mark: Mark, residual: Array, parts: Array, place: Array) -> Sight:
-    """Describe a mark behind a point; `residual` (2,) is weighted, `parts` (2,) are its redundancy numbers."""
-    checked = parts > _CHECKED
-    tests = np.where(checked, np.abs(residual) / np.sqrt(np.where(checked, parts, 1.0)), 0.0)
+def sight(oriented: Oriented, mark: Mark, residual: Array, deviations: Array, place: Array) -> Sight:
+    """Describe a mark behind a point; its residual (2,) and the deviations of that (2,) are weighted."""
+    checked = deviations > _CHECKED
+    tests = np.where(checked, np.abs(residual) / np.where(checked, deviations, 1.0), 0.0)
     return Sight(
         oriented.photos[mark.photo].name,
         mark.image,

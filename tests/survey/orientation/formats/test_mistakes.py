@@ -73,7 +73,7 @@ def test_photomodeler_point_marked_twice(tmp_path):
 )
 def test_control(tmp_path, text, message):
     path = tmp_path / "control.txt"
-    if "a, 0, 0" == text[3:]:
+    if text[3:] == "a, 0, 0":
         text = "1, a, 0"
     path.write_text(f"# control\n7, x, 1, 2, 3\n{text}\n", encoding="utf-8")
     with pytest.raises(SurveyError, match=message) as caught:
@@ -136,7 +136,7 @@ def test_colmap(tmp_path, file, line, text, message):
         ('sensor_id="0"', 'sensor_id="7"', "sensor 7 is not in the file"),
         ("<transform>1.0", "<transform>oops", "not a number"),
         ("<transform>", "<transform>3.5 ", "17 numbers"),
-        ('<?xml version="1.0" encoding="UTF-8"?>', '<!DOCTYPE a><!-- -->', "has a DOCTYPE"),
+        ('<?xml version="1.0" encoding="UTF-8"?>', "<!DOCTYPE a><!-- -->", "has a DOCTYPE"),
     ],
 )
 def test_metashape(tmp_path, old, new, message):
@@ -182,7 +182,9 @@ def test_dbat_tables_are_named_by_line(tmp_path):
     assert caught.value.where == f"{tmp_path / 'marks.txt'}:4"
 
 
-@pytest.mark.parametrize(("text", "message"), [("{", "not JSON"), ("{}", "not the result"), ("[1]", "not the result")])
+@pytest.mark.parametrize(
+    ("text", "message"), [("{", "not JSON"), ("{}", "not the result"), ("[1]", "not the result")]
+)
 def test_orientation(tmp_path, text, message):
     path = tmp_path / "orientation.json"
     with pytest.raises(SurveyError, match="moma orient"):
