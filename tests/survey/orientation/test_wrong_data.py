@@ -68,7 +68,7 @@ def test_points_on_one_line_do_not_orient_a_photograph():
     thin = replace(one, start=truth, image=image[inside], photo=one.photo[inside], point=one.point[inside],
                    sigma=one.sigma[inside], lines=one.lines[inside])  # fmt: skip
     with pytest.raises(
-        MomaError, match="do not determine|no sound datum|cannot be oriented|not determined|converge"
+        MomaError, match=r"do not determine|no sound datum|cannot be oriented|not determined|converge"
     ):
         orient(thin)
 
