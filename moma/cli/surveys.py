@@ -145,6 +145,7 @@ def orient(
     """Orient photographs: bundle adjustment with calibration, precision of every point, blunders."""
     from moma.cli.text.formats import as_json
     from moma.cli.text.photographs import orient_lines
+    from moma.kernels.beside import compiling_beside
     from pipelines.reports.photographs.orient import orient_photographs, photomodeler_project
     from pipelines.reports.photographs.project import read_project
 
@@ -169,7 +170,8 @@ def orient(
             (blunders or Blunders.REPORT).value,
         )
     folder = out or Path("out") / (project or photomodeler or Path("photographs")).stem
-    report = orient_photographs(read, folder)
+    with compiling_beside("orient"):
+        report = orient_photographs(read, folder)
     for remark in report.values["remarks"]:
         say(f"warning: {remark}")
     left = ("covariance", "marks")
