@@ -41,7 +41,8 @@ def write_moma(survey: Survey, path: Path) -> None:
         raise SurveyError(
             "the survey has no stones", where=str(path), remedy="write surveys of one stone or more"
         )
-    counts = Counter(block.sigma for block in survey.blocks if block.sigmas is None) or Counter([0.003])
+    own = (block.sigma for block in survey.blocks if block.sigmas is None and block.sigma > 0.0)
+    counts = Counter(own) or Counter([0.003])
     common = max(sorted(counts), key=counts.__getitem__)
     _write(Path(path), _survey_lines(survey, common))
 
@@ -128,8 +129,7 @@ def _stone_lines(block: BlockRecord, common_sigma: float) -> list[str]:
     course = "" if block.course is None else f" course {block.course}"
     zone = "" if block.zone is None else f" zone {_name(block.zone)}"
     lines = [f"stone {block.code} {block.kind}{course}{zone}"]
-    measured = len(block.vertices) + len(block.points) > 0 or not block.marks
-    if block.sigmas is None and block.sigma != common_sigma and measured:
+    if block.sigmas is None and block.sigma not in (common_sigma, 0.0):
         lines.append(f"  sigma {_number(block.sigma)}")
     if block.station is not None:
         lines.append(f"  station {_name(block.station)}")
