@@ -11,7 +11,6 @@ from survey.extrusion.extrusion import SurveyedBlock, extrude
 from survey.extrusion.imported_solids import block_of_solid
 from survey.faces.faces import Face, Provenance, face_on, outline_face
 from survey.faces.shapes import FaceShape, ShapeKind
-from survey.orientation.stones.marked_stones import located_stones
 from survey.records.snapping import Snapping
 from survey.records.survey import BlockRecord, Reject, SolidRecord, SurveyHead, SurveyStream
 from survey.registration.photographed_stones import LiftedFace, lift_faces
@@ -69,7 +68,12 @@ def _stones(
 ) -> Iterator[SurveyedBlock | Reject]:
     faces: list[Face] = []
     on_photographs: list[BlockRecord] = []
-    blocks = stream.blocks if stream.head.orientation is None else located_stones(stream.blocks, stream.head)
+    blocks = stream.blocks
+    if stream.head.orientation is not None:
+        # imports scipy and the kernels of photographs, which surveys in space do without
+        from survey.orientation.stones.marked_stones import located_stones
+
+        blocks = located_stones(blocks, stream.head)
     for item in blocks:
         if isinstance(item, Reject):
             yield item

@@ -19,7 +19,7 @@ from survey.orientation.network import Camera, Photo
 from survey.orientation.projection import project
 from survey.orientation.rotations import from_angles
 
-__all__ = ["PHOTOGRAPHS", "TrueCamera", "write_photographs"]
+__all__ = ["PHOTOGRAPHS", "TrueCamera", "true_cameras", "write_photographs"]
 
 PHOTOGRAPHS = 12
 _SEED = 12

@@ -16,7 +16,17 @@ from survey.orientation._kernels.adjustment import Rays, Unknowns, back_substitu
 from survey.orientation.network import INTERIOR, Network, Photo
 from survey.orientation.rotations import angle_slopes, turned
 
-__all__ = ["Prepared", "Solution", "adjust", "prepare"]
+__all__ = [
+    "Prepared",
+    "Solution",
+    "adjust",
+    "inner_constraints",
+    "normals",
+    "prepare",
+    "prior",
+    "similarity",
+    "with_datum",
+]
 
 _MOST = 100  # iterations
 _STILL = 1e-13  # predicted decrease of the sum of squares, relative, at which the iteration has converged
@@ -71,7 +81,7 @@ class Solution:
     behind: int
 
 
-EXTERIOR = ("rx", "ry", "rz", "x", "y", "z")
+_EXTERIOR = ("rx", "ry", "rz", "x", "y", "z")
 """Parameters of the exterior orientation in the reduced system."""
 
 
@@ -157,7 +167,7 @@ def _columns(network: Network) -> tuple[tuple[tuple[str, str], ...], NDArray[np.
     for f, photo in enumerate(network.photos):
         if not photo.fixed:
             table[f, :6] = len(names) + np.arange(6)
-            names += [(photo.name, one) for one in EXTERIOR]
+            names += [(photo.name, one) for one in _EXTERIOR]
     for m, camera in enumerate(network.cameras):
         own = np.full(len(INTERIOR), -1)
         for k, name in enumerate(INTERIOR):
@@ -258,14 +268,14 @@ def _observed_photo(photo: Photo, f: int, unknowns: Unknowns, normal: Array, rig
     if photo.observed_rotation is not None and photo.angle_sigma is not None:
         slopes = angle_slopes(photo.observed_rotation)
         weight = slopes.T @ np.diag(photo.angle_sigma**-2.0) @ slopes
-        off = rotation_vector(unknowns.rotation[f].T @ photo.observed_rotation)
+        off = _rotation_vector(unknowns.rotation[f].T @ photo.observed_rotation)
         normal[np.ix_(place[:3], place[:3])] += np.tril(weight)
         right[place[:3]] += weight @ off
         square += float(off @ weight @ off)
     return square
 
 
-def rotation_vector(rotation: Array) -> Array:
+def _rotation_vector(rotation: Array) -> Array:
     """Return δ of exp([δ]×), (3,) [rad]."""
     axis = 0.5 * np.array(
         [rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]]
