@@ -53,12 +53,15 @@ def wall_block(
     camera = Camera("camera1", INNER, SIZE, 24.0 / SIZE[1], forward=forward, free=tuple(free))
     of, which, image = [], [], []
     for f, photo in enumerate(photos):
-        seen = project(camera, photo.rotation, photo.station, place)
+        near = (
+            np.arange(points)
+            if reach is None
+            else np.flatnonzero(np.abs(place[:, 0] - photo.station[0]) < reach)
+        )
+        seen = project(camera, photo.rotation, photo.station, place[near])
         inside = ((seen > 0.0) & (seen < SIZE)).all(axis=1)
-        if reach is not None:
-            inside &= np.abs(place[:, 0] - photo.station[0]) < reach
         of.append(np.full(inside.sum(), f))
-        which.append(np.flatnonzero(inside))
+        which.append(near[inside])
         image.append(seen[inside])
     of, which, image = np.concatenate(of), np.concatenate(which), np.concatenate(image)
     often = np.bincount(which, minlength=points) >= 2
