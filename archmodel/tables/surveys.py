@@ -1,7 +1,5 @@
 """Survey files, measurements of entities, and the solids that stood for them in runs."""
 
-from typing import Any
-
 from sqlalchemy import ForeignKey, Index
 from sqlalchemy.orm import Mapped, mapped_column, relationship
 
@@ -116,7 +114,7 @@ class Measurement(Recorded, Base):
     sigmas: Mapped[Array | None] = mapped_column(ArrayType(-1))
     joint: Mapped[Array | None] = mapped_column(ArrayType(-1))
     names: Mapped[list[str]] = mapped_column(JSON_TYPE)
-    evidence: Mapped[list[dict[str, Any]]] = mapped_column(JSON_TYPE)
+    evidence: Mapped[list[dict[str, object]]] = mapped_column(JSON_TYPE)
     remarks: Mapped[list[str]] = mapped_column(JSON_TYPE)
     notes: Mapped[dict[str, str]] = mapped_column(JSON_TYPE)
 
