@@ -52,6 +52,12 @@ def main(record: bool = False) -> None:
 def _arguments(command: str, folder: Path, use: str = "") -> list[str]:
     """Return the arguments of a command for the sample."""
     database = ["--db", f"sqlite:///{folder}/{use}.db"]
+    if command == "orient":
+        bay = folder / "bay"
+        if not bay.exists():
+            call = [sys.executable, "-m", "moma", "sample", "window", "--photographs", "--out", str(bay)]
+            subprocess.run(call, check=True, stdout=subprocess.DEVNULL)
+        return [command, f"{bay}/photographs.toml", "--out", f"{folder}/{use}-photographs"]
     if command == "ingest":
         return [command, f"{_SAMPLE}/window.moma", *database]
     return [command, f"{_SAMPLE}/window.toml", *database, "--out", f"{folder}/{use}"]

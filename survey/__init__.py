@@ -3,6 +3,7 @@
 formats       readers of survey files → records
 records       content of a survey file
 registration  survey frames and photographs → site frame
+orientation   photographs → orientation, and points from marks on them
 faces         points → plane → outlined face
 extrusion     face and depth → solid block
 geometry      closed solids: cutting, convex parts, adjacency

@@ -78,7 +78,13 @@ def _stones(
 ) -> Iterator[SurveyedBlock | Reject]:
     faces: list[Face] = []
     on_photographs: list[BlockRecord] = []
-    for item in stream.blocks:
+    blocks = stream.blocks
+    if stream.head.orientation is not None:
+        # imports scipy and the kernels of photographs, which surveys in space do without
+        from survey.orientation.stones.marked_stones import located_stones
+
+        blocks = located_stones(blocks, stream.head)
+    for item in blocks:
         if isinstance(item, Reject):
             yield item
             continue
@@ -100,7 +106,10 @@ def _made(item: BlockRecord | SolidRecord, head: SurveyHead) -> SurveyedBlock | 
     try:
         if isinstance(item, SolidRecord):
             return block_of_solid(item, head.viewpoint(None), item.file or head.path)
-        return _extruded(outline_face(item, head.viewpoint(item.station)), head)
+        viewpoint = item.seen_from
+        if viewpoint is None or item.station is not None:
+            viewpoint = head.viewpoint(item.station)
+        return _extruded(outline_face(item, viewpoint), head)
     except MomaError as error:
         return _reject(item, head, error)
 

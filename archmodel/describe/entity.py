@@ -222,6 +222,7 @@ def _measured(measurement: Measurement) -> dict[str, object]:
         "provenance": measurement.provenance_text,
         "station": measurement.station,
         "remarks": list(measurement.remarks),
+        "evidence": list(measurement.evidence),
         "rms": measurement.rms,
         "redundancy": measurement.redundancy,
     }

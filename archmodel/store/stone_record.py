@@ -59,6 +59,8 @@ class StoneRecord:
     image: Array = field(default_factory=lambda: np.empty((0, 2)))
     sigmas: Array | None = None
     names: tuple[str, ...] = ()
+    joint: Array | None = None
+    evidence: tuple[Mapping[str, object], ...] = ()
     rejected_vertices: tuple[int, ...] = ()
     shape: str = "plane"
     shape_text: str = ""

@@ -179,6 +179,7 @@ _PLAIN: dict[object, Callable[[Any], object]] = {
     list[int]: lambda values: tuple(int(one) for one in values),
     list[str]: lambda values: values,
     list[list[int]]: _plain_faces,
+    list[dict[str, object]]: list,
     dict[str, str]: lambda notes: {str(key): str(value) for key, value in notes.items()},
 }
 """Values of a column by its annotation or, without a special one, by its type in Python."""

@@ -52,6 +52,8 @@ class Measurement(Recorded, Base):
     sigma : standard deviation of a measured coordinate [m]
     sigmas : (np + nv,) standard deviations of the points, then of the corners [m]; None: all `sigma`
     names : of the points, then of the corners, as the instrument numbers them; () if they have none
+    joint : (9n²,) covariance of the coordinates of the n points, then corners, by rows [m²]; None: they are independent
+    evidence : of each point, then of each corner, how it was located on photographs: photographs, marks, rays
     normal : (3,) unit normal n of the fitted plane n·x = d, towards the observer
     offset : signed distance d of the plane from the origin [m]
     centroid : (3,) mean of the accepted points, on the plane [m]
@@ -110,7 +112,9 @@ class Measurement(Recorded, Base):
     vertex_sigma: Mapped[Array] = mapped_column(ArrayType(-1, 3))
     image: Mapped[Array] = mapped_column(ArrayType(-1, 2))
     sigmas: Mapped[Array | None] = mapped_column(ArrayType(-1))
+    joint: Mapped[Array | None] = mapped_column(ArrayType(-1))
     names: Mapped[list[str]] = mapped_column(JSON_TYPE)
+    evidence: Mapped[list[dict[str, object]]] = mapped_column(JSON_TYPE)
     remarks: Mapped[list[str]] = mapped_column(JSON_TYPE)
     notes: Mapped[dict[str, str]] = mapped_column(JSON_TYPE)
 

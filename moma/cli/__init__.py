@@ -16,7 +16,7 @@ from moma.cli.proposals import propose
 from moma.cli.relations import load_path, relate
 from moma.cli.runs import report, runs
 from moma.cli.scenes import check, run, trade
-from moma.cli.surveys import cloud, ingest, sample, survey_report
+from moma.cli.surveys import cloud, ingest, orient, sample, survey_report
 
 __all__ = ["app", "main"]
 
@@ -61,6 +61,7 @@ def _common(
 _COMMANDS = (
     sample,
     cloud,
+    orient,
     ingest,
     survey_report,
     record,

@@ -17,7 +17,7 @@ from numba.core import event
 
 __all__ = ["COMMANDS", "LISTS", "KernelUse", "kernels_of", "recording"]
 
-COMMANDS = ("ingest", "run")
+COMMANDS = ("orient", "ingest", "run")
 """Commands with a list, in their usual order."""
 
 LISTS = Path(__file__).with_name("usual.json")

@@ -54,6 +54,7 @@ _INDEXES = (
     "assessment.json",
     "comparison.json",
     "diagnosis.json",
+    "orientation.json",
 )  # their "files" list the files that MOMA wrote
 _LEFT = {
     UNFINISHED: (RUN_INDEX, "run"),

@@ -14,7 +14,16 @@ from survey.geometry.half_spaces import intersection
 from survey.geometry.solids import Solid, planes_of_solid
 from survey.records.survey import BlockRecord
 
-__all__ = ["HALF_JOINT", "SIGMA", "MeasuredStone", "add_blunders", "inset", "measure_stone", "modelled_solid"]
+__all__ = [
+    "HALF_JOINT",
+    "SIGMA",
+    "MeasuredStone",
+    "add_blunders",
+    "inset",
+    "margin_points",
+    "measure_stone",
+    "modelled_solid",
+]
 
 
 # of one coordinate [m]: 3 mm in space (√3 · 1.73 mm), the mean error of a photogrammetric point
@@ -65,7 +74,7 @@ def measure_stone(stone: TrueStone, frame: WallFrame, rng: Random) -> MeasuredSt
     worn = "eroded" if chance < ERODED else "bevelled" if chance < ERODED + BEVELLED else None
     corner = rng.randrange(4) if worn else None
     flat, behind = _corners(visible, worn, corner, rng)
-    points = _margin_points(visible, rng.randint(*COUNTS), rng)
+    points = margin_points(visible, rng.randint(*COUNTS), rng)
     points_behind = np.zeros(len(points))
     if worn == "eroded" and corner is not None:
         nearest = np.argsort(np.linalg.norm(points - visible[corner], axis=1), kind="stable")[
@@ -175,7 +184,7 @@ def _towards(start: Array, stop: Array) -> Array:
     return unit
 
 
-def _margin_points(visible: Array, count: int, rng: Random) -> Array:
+def margin_points(visible: Array, count: int, rng: Random) -> Array:
     """Choose points along the dressed margin, densest near its corners, and two further in."""
     ring = inset(visible, (rng.uniform(*MARGIN),) * 4)
     edges = np.roll(ring, -1, axis=0) - ring

@@ -8,6 +8,7 @@ from pathlib import Path
 from mechanics.dynamics.progress import Listener, silent
 from moma.errors import UsageError, storing
 from pipelines.samples.causes import PULSE, Cause
+from pipelines.samples.photographs import PHOTOGRAPHED, write_photographs
 from pipelines.samples.samples import Recipe, recipe_of
 from pipelines.samples.scan import Scan, outlines_text, write_masks, write_scan
 from survey.arrays import Array
@@ -159,6 +160,7 @@ def write_sample(
     phases: bool = False,
     scan: bool = False,
     courses: int | None = None,
+    photographs: bool = False,
 ) -> WrittenSample:
     """Write KIND.moma, truth.json and KIND.toml into a folder, created if necessary.
 
@@ -170,6 +172,7 @@ def write_sample(
     kind, moved, small, phases, scan, courses : as of `recipe_of`
     folder : in which none of these files exists; created if necessary
     progress : called at every step of the simulation that moves the stones of some
+    photographs : photographs.toml, marks.txt, control.txt and marked.moma too: of the window
 
     Raises
     ------
@@ -178,6 +181,8 @@ def write_sample(
     StorageError
         if the disk is full, for example; none of the files is left then
     """
+    if photographs and kind != "window":
+        raise UsageError(f"--photographs with the sample {kind!r}", remedy="it is for the window")
     recipe = recipe_of(kind, moved=moved, small=small, phases=phases, scan=scan, courses=courses)
     cause = recipe.cause
     survey, scene, truth = folder / f"{kind}.moma", folder / f"{kind}.toml", folder / "truth.json"
@@ -196,6 +201,10 @@ def write_sample(
     extra: tuple[Path, ...] = () if solids is None else (solids, solids.with_name(_HEAD))
     if sample.scan is not None:
         extra = tuple(folder / name for name in _SCANNED)
+    if photographs:
+        extra += tuple(folder / name for name in PHOTOGRAPHED)
+        project, result = folder / "photographs.toml", folder / "photographs"
+        commands = (f"moma orient {project} --out {result}", *commands)
     _must_be_new(*texts, *extra)
     paths = (survey, *texts, *extra)
     with storing(str(folder)):
@@ -210,6 +219,8 @@ def write_sample(
                 write_head(replace(head, name=f"{head.name}, closed solids"), solids.with_name(_HEAD))
             if sample.scan is not None:
                 _write_scan(sample.scan, folder)
+            if photographs:
+                write_photographs(folder)
     files = tuple(map(str, paths))
     stones = len(sample.survey.blocks) + len(sample.modelled)
     return WrittenSample(kind, recipe.title, stones, files, commands)

@@ -127,6 +127,6 @@ def _vertex_sigma(face: Face, depth: Depth, extrusion: Extrusion, hidden: Array)
         depth_variance=np.nan if depth.sigma is None else depth.sigma**2,
     )
     plane = FacePlane(fit.normal, fit.centroid, fit.axes, fit.covariance)
-    deviations = face.record.vertex_sigmas[list(face.corner_of)]
+    deviations = face.record.lateral_sigmas(fit.normal)[list(face.corner_of)]
     out: Array = corner_deviations(face.outline, deviations, plane, behind)
     return out

@@ -8,7 +8,7 @@ import numpy as np
 from moma.errors import GeometryError
 from survey.arrays import Array
 from survey.faces.outline import OutlineMeasures, level_direction, measure_outline, outline_polygon
-from survey.faces.planes import FaceFit, fit_plane
+from survey.faces.planes import FaceFit, fit_plane, with_shared_errors
 from survey.faces.shapes import FaceShape, judge_shape
 from survey.geometry.solids import area_vector
 from survey.records.survey import BlockRecord
@@ -36,6 +36,7 @@ class Provenance:
 
 
 _POINTS = Provenance("points", "points measured on the face")
+_MARKS = Provenance("points", "points marked on oriented photographs")
 
 
 @dataclass(frozen=True)
@@ -107,9 +108,13 @@ def _measured_face(record: BlockRecord, observer: Array | None) -> Face:
     measured = np.concatenate([record.points.reshape(-1, 3), record.vertices])
     sigma = record.sigma if record.sigmas is None else record.sigmas
     fit = fit_plane(measured, sigma, _outside(record.vertices) if observer is None else observer)
+    if record.joint is not None:
+        fit = with_shared_errors(fit, measured, record.point_and_vertex_sigmas, record.joint)
     corners = record.vertices - np.outer(fit.residuals[len(record.points) :], fit.normal)
     shape = judge_shape(fit, measured, sigma)
-    return face_on(fit, corners, shape, _POINTS, record, keep_order=observer is None)
+    return face_on(
+        fit, corners, shape, _MARKS if record.evidence else _POINTS, record, keep_order=observer is None
+    )
 
 
 def face_on(

@@ -18,7 +18,7 @@ would outvote all others. Other estimators are compared on such faces in docs/de
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike
 from moma.errors import GeometryError
 from survey.arrays import Array
 
-__all__ = ["FaceFit", "fit_plane"]
+__all__ = ["FaceFit", "fit_plane", "with_shared_errors"]
 
 
 _NOWHERE = np.full(3, math.nan)
@@ -196,3 +196,36 @@ def _extent(xyz: Array) -> tuple[float, float]:
     along = np.linalg.svd(centred, full_matrices=False)[2]
     extents = np.ptp(centred @ along.T, axis=0)
     return float(extents[0]), float(extents[1])
+
+
+def with_shared_errors(fit: FaceFit, points: Array, sigma: Array, joint: Array) -> FaceFit:
+    """Return a fit whose covariance counts the errors that its points share.
+
+    The plane stays. Its axes and its centre are chosen anew, so that its tilts and its height there are
+    uncorrelated again.
+
+    Parameters
+    ----------
+    fit : of the points
+    points, sigma : (n, 3) and (n,) as for `fit_plane` [m]
+    joint : (9n²,) covariance of their coordinates, by rows [m²]
+    """
+    used = np.setdiff1d(np.arange(len(points)), fit.rejected)
+    rows = np.column_stack([(points[used] - fit.centroid) @ fit.axes.T, np.ones(len(used))])
+    weights = sigma[used] ** -2.0
+    gain = np.linalg.solve(rows.T @ (weights[:, None] * rows), rows.T * weights)
+    count = len(points)
+    heights = np.einsum("a,iajb,b->ij", fit.normal, joint.reshape(count, 3, count, 3), fit.normal)
+    covariance = gain @ heights[np.ix_(used, used)] @ gain.T
+    tilts, turn = np.linalg.eigh(covariance[:2, :2])
+    tilts = np.maximum(tilts, 1e-18)
+    across = turn.T @ covariance[:2, 2]
+    shift = -across / tilts
+    reach = float(np.abs(rows[:, :2]).max())
+    shift = np.clip(
+        shift, -10.0 * reach, 10.0 * reach
+    )  # two perfectly correlated errors would send it far away
+    axes = turn.T @ fit.axes
+    centroid = fit.centroid + shift @ axes
+    height = covariance[2, 2] + 2.0 * shift @ across + shift**2 @ tilts
+    return replace(fit, axes=axes, centroid=centroid, covariance=np.diag([*tilts, max(float(height), 1e-18)]))

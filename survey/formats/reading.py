@@ -72,7 +72,7 @@ WAYS_OUT: Mapping[str, str] = {
     **dict.fromkeys((".dxf", ".dwg", ".dgn", ".3dm", ".skp", ".blend", ".ifc", ".step", ".stp", ".igs"), _DRAWN),
     **dict.fromkeys((".fbx", ".glb", ".gltf", ".dae", ".3ds", ".off", ".wrl", ".vtk", ".vtu"), _DRAWN),
     **dict.fromkeys((".gpkg", ".shp", ".kml", ".gml", ".fgb"), "export the layer as GeoJSON with z, in metres"),
-    **dict.fromkeys((".las", ".laz", ".e57", ".ptx"), "give the cloud with --cloud, and the outlines of its stones with --outlines"),
+    **dict.fromkeys((".las", ".laz", ".e57", ".ptx"), "give it with --cloud, and outlines of stones with --outlines"),
     **dict.fromkeys((".raw", ".fld", ".idx", ".job", ".sdr", ".are", ".cor", ".m5", ".rw5"),
                     "export the coordinates with their codes as a point list (CSV), GSI, LandXML or JobXML"),
     **dict.fromkeys((".pdf", ".docx", ".doc", ".numbers"), "export the table itself as CSV or XLSX"),

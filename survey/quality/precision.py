@@ -51,6 +51,7 @@ class StoneQuality:
     worn_corners : indices of `outline` that lie off the plane
     standardised : residuals of the accepted points and corners over their own standard deviation [-]
     remarks : changes that made its outline a polygon, in words
+    evidence : of each point, then of each corner, how it was located on photographs; () if they were measured in space
     """
 
     code: str
@@ -86,6 +87,7 @@ class StoneQuality:
     worn_corners: tuple[int, ...]
     standardised: NDArray[np.float32]
     remarks: tuple[str, ...] = ()
+    evidence: tuple[Mapping[str, object], ...] = ()
 
     @property
     def measured(self) -> bool:
@@ -185,6 +187,7 @@ def appraise(block: SurveyedBlock) -> StoneQuality:
         worn_corners=face.rejected_vertices,
         standardised=_standardised(block) if measured else np.empty(0, np.float32),
         remarks=face.remarks,
+        evidence=record.evidence,
     )
 
 

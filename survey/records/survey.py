@@ -19,9 +19,11 @@ __all__ = [
     "Extrusion",
     "PhotoMark",
     "Photograph",
+    "PointMark",
     "Reject",
     "SolidRecord",
     "Station",
+    "SurfaceRule",
     "Survey",
     "SurveyHead",
     "SurveyStream",
@@ -109,6 +111,46 @@ class Photograph:
 
 
 @dataclass(frozen=True)
+class PointMark:
+    """A point of a stone marked on an oriented photograph.
+
+    Attributes
+    ----------
+    name : of the point; the same on all photographs that show it
+    role : "vertex", a corner of the face, or "point", any other point on it
+    photograph : name of the photograph
+    image : (2,) its place on the photograph, to the right and down from the upper left corner [px]
+    sigma : standard deviation of a coordinate of it [px]; None: as the orientation found it
+    line : line of the file, counted from 1
+    """
+
+    name: str
+    role: str
+    photograph: str
+    image: Array
+    sigma: float | None = None
+    line: int = 0
+
+
+@dataclass(frozen=True)
+class SurfaceRule:
+    """A surface that the faces of several stones lie on.
+
+    Attributes
+    ----------
+    name : unique in its survey
+    kind : "plane" or "cylinder"
+    sigma : standard deviation of faces about it [m]; None: as far as their points show it
+    line : line of the file, counted from 1
+    """
+
+    name: str
+    kind: str
+    sigma: float | None = None
+    line: int = 0
+
+
+@dataclass(frozen=True)
 class DepthRule:
     """The depth of stones that were not measured individually.
 
@@ -181,6 +223,8 @@ class SurveyHead:
     depth_rules : depths of stones without a depth of their own
     canons : usual dimensions, at most one per kind
     extrusion : of stones without an extrusion of their own
+    orientation : result of the orientation of the photographs that stones were marked on; None: none were
+    surfaces : that stones marked on one photograph lie on
     """
 
     name: str
@@ -191,6 +235,8 @@ class SurveyHead:
     depth_rules: tuple[DepthRule, ...] = ()
     canons: tuple[Canon, ...] = ()
     extrusion: Extrusion = Extrusion()
+    orientation: str | None = None
+    surfaces: tuple[SurfaceRule, ...] = ()
 
     def viewpoint(self, station: str | None) -> Array | None:
         """Return the viewpoint of a stone, (3,) [m]: its own station, then the observer, then the only station.
@@ -236,6 +282,13 @@ class BlockRecord:
     names : of each point, then of each corner, as the instrument numbers them; () if they have none
     extrusion : of its hidden side; None: as for the whole survey
     spans : lines of the file that it was read from
+    marks : its points marked on oriented photographs, from which `points` and `vertices` are located
+    surface : name of the surface that its face lies on; None: the plane of its own points
+    seen_from : (3,) mean of the stations of the photographs that show it [m]; None if it was not marked on any
+    joint : (9n²,) covariance of the coordinates of the n points, then corners, by rows, with the errors that they share
+        [m²]; None: their errors are independent
+    evidence : of each point, then of each corner, how it was located, in plain values; () if they were measured in
+        space
     """
 
     code: str
@@ -257,6 +310,25 @@ class BlockRecord:
     names: tuple[str, ...] = ()
     extrusion: Extrusion | None = None
     spans: tuple[range, ...] = ()
+    marks: tuple[PointMark, ...] = ()
+    surface: str | None = None
+    seen_from: Array | None = None
+    joint: Array | None = None
+    evidence: tuple[Mapping[str, object], ...] = ()
+
+    def lateral_sigmas(self, normal: Array) -> Array:
+        """Return the standard deviation of each corner along any direction square to a unit vector, (nv,) [m]."""
+        if self.joint is None:
+            return self.vertex_sigmas
+        count = len(self.points) + len(self.vertices)
+        blocks = np.einsum("iaib->iab", self.joint.reshape(count, 3, count, 3))[len(self.points) :]
+        across = np.trace(blocks, axis1=1, axis2=2) - np.einsum("a,iab,b->i", normal, blocks, normal)
+        return np.asarray(np.sqrt(0.5 * across))
+
+    @property
+    def point_and_vertex_sigmas(self) -> Array:
+        """Standard deviation of a coordinate of each point, then of each corner, (np + nv,) [m]."""
+        return np.concatenate([self.point_sigmas, self.vertex_sigmas])
 
     @property
     def point_sigmas(self) -> Array:

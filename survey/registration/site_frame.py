@@ -196,7 +196,19 @@ def record_to_site(record: Stone, transform: SiteTransform) -> Stone:
         sigma=record.sigma * transform.scale,
         sigmas=None if record.sigmas is None else record.sigmas * transform.scale,
         extrusion=None if record.extrusion is None else _turned(record.extrusion, transform),
+        seen_from=None if record.seen_from is None else transform.apply(record.seen_from),
+        joint=None if record.joint is None else _turned_joint(record.joint, transform),
     )
+
+
+def _turned_joint(joint: Array, transform: SiteTransform) -> Array:
+    """Return the covariance of points in the site frame, (9n²,)."""
+    count = round(np.sqrt(len(joint) / 9))
+    blocks = joint.reshape(count, 3, count, 3)
+    out: Array = transform.scale**2 * np.einsum(
+        "ab,ibjc,dc->iajd", transform.rotation, blocks, transform.rotation
+    )
+    return out.ravel()
 
 
 def _turned(extrusion: Extrusion, transform: SiteTransform) -> Extrusion:

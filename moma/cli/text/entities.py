@@ -20,6 +20,9 @@ def entity_lines(description: Values) -> str:
     shown["knowledge"] = {name: one for name, one in shown["knowledge"].items() if one}
     for name, one in (("structures", _structure), ("joints", _joint), ("corrections", _correction)):
         shown[name] = [one(each) for each in description.get(name, ())]
+    if description.get("measured"):
+        shown["measured"] = dict(description["measured"])
+        shown["measured"]["evidence"] = [_located(one) for one in description["measured"]["evidence"]]
     shown["own"] = {name: _with_unit(one) for name, one in description.get("own", {}).items()}
     shown["relations"] = {
         name: [_neighbour(one) for one in ones] for name, ones in description.get("relations", {}).items()
@@ -29,6 +32,21 @@ def entity_lines(description: Values) -> str:
     for name in ("recorded", "withdrawn"):
         shown[name] = _by(description[name]) if description.get(name) else None
     return as_lines({name: _listed(one) for name, one in shown.items()})
+
+
+def _located(one: Values) -> str:
+    """Format how a point of the face was located: its place, its precision, and the marks behind it."""
+    place = ", ".join(f"{value:.4f}" for value in one["place"])
+    precision = ", ".join(f"{1e3 * value:.1f}" for value in one["sigma"])
+    rays = [
+        f"{ray['photo']} at ({ray['x']:.2f}, {ray['y']:.2f}) px from {ray['distance']:.2f} m"
+        + (f", residual ({ray['residual'][0]:z.2f}, {ray['residual'][1]:z.2f}) px" if ray["test"] else "")
+        for ray in one["rays"]
+    ]
+    what = "corner" if one["role"] == "vertex" else "point"
+    return f"{what} {one['point']} at ({place}) ± ({precision}) mm: {one['how']}" + "".join(
+        f"; {ray}" for ray in rays
+    )
 
 
 def history_lines(code: str, events: Sequence[Values]) -> str:

@@ -28,7 +28,13 @@ T = TypeVar("T")
 Row = tuple[str, ...]
 
 
-def write_survey_page(path: Path, study: SurveyStudy, pictures: Mapping[str, str], version: str) -> None:
+def write_survey_page(
+    path: Path,
+    study: SurveyStudy,
+    pictures: Mapping[str, str],
+    version: str,
+    photographs: Sequence[Mapping[str, Any]] = (),
+) -> None:
     """Write the page and embed the pictures of its folder.
 
     Parameters
@@ -37,6 +43,7 @@ def write_survey_page(path: Path, study: SurveyStudy, pictures: Mapping[str, str
     study : findings
     pictures : caption of each picture by its file name, in order
     version : of the program
+    photographs : sections on oriented photographs that stones were marked on
     """
     inside = {name: picture(path.parent / name, caption) for name, caption in pictures.items()}
     facade_of = {i: facade.name for facade in study.facades for i in facade.members.tolist()}
@@ -65,6 +72,8 @@ def write_survey_page(path: Path, study: SurveyStudy, pictures: Mapping[str, str
         control=list(_control(study.files)),
         courses=list(_courses(study)),
         kinds=_kinds(study),
+        photographs=photographs,
+        located=_first(list(_located(study)), lambda row: row),
         contradictions=_first(study.contradictions, _contradiction_row),
         stones=_first(
             _by_urgency(study),
@@ -87,6 +96,22 @@ def _again_column(study: SurveyStudy) -> Column:
         reasons.setdefault(one.code or "", []).append(f"{one.reason}: {one.action}")
     texts = ["; ".join(reasons[one.code]) if one.code in reasons else None for one in study.stones]
     return Column("again", "to measure again", None, texts, "Survey")
+
+
+def _located(study: SurveyStudy) -> Iterator[Row]:
+    """Yield a row for each corner that was located on photographs, with the rays behind it."""
+    for stone in study.stones:
+        for one in stone.evidence:
+            if one["role"] == "vertex":
+                rays: Any = one["rays"]
+                sigma: Any = one["sigma"]
+                yield (
+                    stone.code,
+                    str(one["point"]),
+                    " × ".join(f"{1e3 * value:.1f}" for value in sigma) + " mm",
+                    str(one["how"]),
+                    "; ".join(f"{ray['photo']} ({ray['x']:.1f}, {ray['y']:.1f})" for ray in rays),
+                )
 
 
 def _first(items: Sequence[T], row: Callable[[T], Row]) -> dict[str, Any]:

@@ -1,6 +1,7 @@
 """Survey report: from survey files to a folder with numbers, a page and pictures, without a database."""
 
-from collections.abc import Mapping, Sequence
+import json
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -10,6 +11,7 @@ from mechanics.dynamics.progress import Listener, Progress, silent
 from pipelines.draw.elevations.beds import draw_courses
 from pipelines.draw.elevations.orthophoto import Orthophoto, read_orthophoto
 from pipelines.draw.elevations.survey import draw_departure, draw_elevation, draw_residuals
+from pipelines.reports.photographs.page import draw_photographs, photographs_section
 from pipelines.reports.survey.document import survey_json, write_survey_json
 from pipelines.reports.survey.page import write_survey_page
 from pipelines.reports.survey.study import SurveyStudy, study_surveys
@@ -95,7 +97,8 @@ def write_survey_report(
     progress(Progress("write", 0, 3, "pictures"))
     pictures = _draw(study, folder, photo)
     progress(Progress("write", 1, 3, "report.html"))
-    write_survey_page(folder / "report.html", study, pictures, release)
+    photographs = list(_photographs(study, folder))
+    write_survey_page(folder / "report.html", study, pictures, release, photographs)
     progress(Progress("write", 2, 3, INDEX))
     content = survey_json(study, release)
     content["source"] = source_of(source, folder)
@@ -103,6 +106,15 @@ def write_survey_report(
     write_survey_json(folder / INDEX, study, content)
     progress(Progress("write", 3, 3))
     return content
+
+
+def _photographs(study: SurveyStudy, folder: Path) -> Iterator[dict[str, Any]]:
+    """Draw the photographs that stones were marked on, and describe them for the page."""
+    paths = [Path(one.head.path).parent / one.head.orientation for one in study.files if one.head.orientation]
+    for number, path in enumerate(dict.fromkeys(paths), start=1):
+        values = json.loads(path.read_text(encoding="utf-8"))
+        pictures = draw_photographs(values, folder, f"photographs-{number}-")
+        yield photographs_section(values, pictures, folder)
 
 
 def _draw(study: SurveyStudy, folder: Path, photo: Orthophoto | None) -> dict[str, str]:

@@ -17,6 +17,7 @@ from survey.records.survey import (
     Photograph,
     PhotoMark,
     Station,
+    SurfaceRule,
     SurveyHead,
 )
 
@@ -58,6 +59,8 @@ class HeadReader:
         self._rules: list[DepthRule] = []
         self._canons: dict[str, Canon] = {}
         self._extrusion: Extrusion | None = None
+        self._orientation: str | None = None
+        self._surfaces: dict[str, SurfaceRule] = {}
         self._places: dict[str, str] = {}  # of entries that are checked once all lines are read
         self.takers: dict[str, Callable[[Cursor, int], None]] = {
             "name": self._take_name,
@@ -70,6 +73,8 @@ class HeadReader:
             "depth": self._take_rule,
             "canon": self._take_canon,
             "extrude": self._take_extrusion,
+            "orientation": self._take_orientation,
+            "surface": self._take_surface,
         }
 
     def finish(self, name: str, path: str) -> SurveyHead:
@@ -94,6 +99,8 @@ class HeadReader:
             depth_rules=tuple(self._rules),
             canons=tuple(self._canons.values()),
             extrusion=self._extrusion or Extrusion(),
+            orientation=self._orientation,
+            surfaces=tuple(self._surfaces.values()),
         )
 
     # --- lines ---
@@ -187,6 +194,21 @@ class HeadReader:
     def _take_extrusion(self, cursor: Cursor, line: int) -> None:
         cursor.check_first(self._extrusion, "extrude")
         self._extrusion = read_extrusion(cursor)
+
+    def _take_orientation(self, cursor: Cursor, line: int) -> None:
+        cursor.check_first(self._orientation, "orientation")
+        self._orientation = cursor.text("orientation")
+
+    def _take_surface(self, cursor: Cursor, line: int) -> None:
+        remedy = "write: surface NAME plane, or: surface NAME cylinder [sigma S]"
+        name = cursor.name("surface")
+        _new(name, self._surfaces, "surface", cursor)
+        kind = cursor.word()
+        if kind not in ("plane", "cylinder"):
+            raise cursor.fail(f"surface {name} is {kind!r}", remedy)
+        sigma = cursor.sigma("surface")
+        cursor.end(remedy)
+        self._surfaces[name] = SurfaceRule(name, kind, sigma, line)
 
     # --- checks once all lines are read ---
 

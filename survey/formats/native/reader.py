@@ -13,12 +13,16 @@ of a line or after a blank begins a comment, except in TEXT; blank lines are fre
             | "mark" PHOTO U V "at" X Y Z [ "sigma" S ]     (* four or more per photo *)
             | "depth" ( KIND | "*" ) [ "course" N [ "-" N ] ] [ "zone" NAME ] D [ "sigma" S ] "source" TEXT
             | "canon" KIND LENGTH HEIGHT "sigma" S "source" TEXT
-            | "extrude" [ "along" DX DY DZ ] [ "tail" T ] ;
+            | "extrude" [ "along" DX DY DZ ] [ "tail" T ]
+            | "orientation" TEXT                            (* result of moma orient *)
+            | "surface" NAME ( "plane" | "cylinder" ) [ "sigma" S ] ;
     stone   = "stone" CODE KIND [ "course" N ] [ "zone" NAME ] , { item } , "end" ;
     item    = "vertex" X Y Z [ "sigma" S ]                  (* 3 or more, in order around the face *)
             | "point" X Y Z [ "sigma" S ]
             | "photo" NAME
             | "pixel" U V                                   (* 3 or more, instead of vertices *)
+            | "mark" NAME ( "vertex" | "point" ) PHOTO X Y [ "sigma" PIXELS ]   (* on an oriented photograph *)
+            | "on" SURFACE
             | "station" NAME
             | "extrude" [ "along" DX DY DZ ] [ "tail" T ]
             | "sigma" S
@@ -204,7 +208,7 @@ class _Stones:
                 return stone.finish(cursor, number)
             if word not in STONE_WORDS:
                 raise _unknown(word, cursor, STONE_WORDS)
-            stone.take(word, cursor)
+            stone.take(word, cursor, number)
         except SurveyError as error:
             self._error = error
         return None

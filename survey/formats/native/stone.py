@@ -9,11 +9,13 @@ from survey.arrays import Array
 from survey.formats.fields import FARTHEST
 from survey.formats.native.cursor import Cursor
 from survey.formats.native.header import missing, read_extrusion
-from survey.records.survey import BlockRecord, Extrusion, SurveyHead
+from survey.records.survey import BlockRecord, Extrusion, PointMark, SurveyHead
 
 __all__ = ["STONE_WORDS", "StoneReader"]
 
-STONE_WORDS = ("vertex", "point", "photo", "pixel", "station", "extrude", "sigma", "depth", "note", "end")
+STONE_WORDS = (
+    "vertex", "point", "photo", "pixel", "mark", "on", "station", "extrude", "sigma", "depth", "note", "end",
+)  # fmt: skip
 """Words that begin a line of a stone."""
 
 _FEWEST_CORNERS = 3
@@ -53,6 +55,8 @@ class StoneReader:
         self._photograph: str | None = None
         self._station: str | None = None
         self._extrusion: Extrusion | None = None
+        self._marks: list[PointMark] = []
+        self._surface: str | None = None
 
     def take_place(self, line: str) -> bool:
         """Read a line of a vertex or point if it is a plain one: the fast path for most of a file."""
@@ -69,7 +73,7 @@ class StoneReader:
         self._places[word].append((x, y, z))
         return True
 
-    def take(self, word: str, cursor: Cursor) -> None:
+    def take(self, word: str, cursor: Cursor, line: int) -> None:
         """Read one line after its first word, which is one of `STONE_WORDS` other than ``end``."""
         match word:
             case "vertex" | "point":
@@ -85,10 +89,20 @@ class StoneReader:
                 self._take_note(cursor)
             case "photo":
                 cursor.check_first(self._photograph, word)
-                self._photograph = self._known("photo", [one.name for one in self._head.photographs], cursor)
+                known = [one.name for one in self._head.photographs]
+                if self._head.orientation is None:
+                    self._photograph = self._known("photo", known, cursor)
+                else:  # the result of the orientation, which is not read here, names more of them
+                    self._photograph = cursor.name("photo")
+                    cursor.end("write: photo NAME")
             case "pixel":
                 self._pixels.append(cursor.row("pixel", "uv"))
                 cursor.end("write: pixel U V")
+            case "mark":
+                self._take_mark(cursor, line)
+            case "on":
+                cursor.check_first(self._surface, word)
+                self._surface = self._known("surface", [one.name for one in self._head.surfaces], cursor)
             case "station":
                 cursor.check_first(self._station, word)
                 self._station = self._known("station", [one.name for one in self._head.stations], cursor)
@@ -101,6 +115,8 @@ class StoneReader:
         cursor.end("put 'end' on a line of its own")
         self._check_corners(cursor)
         sigma = self._sigma or self._head_sigma
+        if sigma is None and not (self._places["vertex"] or self._places["point"]):
+            sigma = 0.0  # located points bring their own precision
         if sigma is None:
             raise cursor.fail(
                 f"stone {self.code} has no sigma", "write 'sigma 0.003' (metres) before the stones"
@@ -126,6 +142,8 @@ class StoneReader:
             sigmas=sigmas,
             extrusion=self._extrusion,
             spans=(range(self._line, line + 1),),
+            marks=tuple(self._marks),
+            surface=self._surface,
         )
 
     def _take_place(self, word: str, cursor: Cursor) -> None:
@@ -134,6 +152,31 @@ class StoneReader:
         if sigma is not None:
             self._sigmas[word, len(self._places[word])] = sigma
         self._places[word].append(place)
+
+    def _take_mark(self, cursor: Cursor, line: int) -> None:
+        remedy = "write: mark POINT vertex PHOTO X Y [sigma PIXELS], or point instead of vertex"
+        if self._head.orientation is None:
+            raise cursor.fail(
+                "a mark, but the head names no orientation", "write in the head: orientation FILE"
+            )
+        name = cursor.name("point")
+        role = cursor.word()
+        if role not in ("vertex", "point"):
+            raise cursor.fail(f"point {name} is {role!r}", remedy)
+        photograph = cursor.name("photo")
+        image = np.array(cursor.row("mark", "xy"))
+        sigma = cursor.sigma("mark")
+        cursor.end(remedy)
+        for one in self._marks:
+            if one.name == name and one.role != role:
+                raise cursor.fail(
+                    f"point {name} is a {role} here and a {one.role} on line {one.line}", "keep one role"
+                )
+            if one.name == name and one.photograph == photograph:
+                raise cursor.fail(
+                    f"point {name} is marked twice on {photograph}, first on line {one.line}", "keep one"
+                )
+        self._marks.append(PointMark(name, role, photograph, image, sigma, line))
 
     def _take_note(self, cursor: Cursor) -> None:
         key = cursor.key()
@@ -152,6 +195,14 @@ class StoneReader:
 
     def _check_corners(self, cursor: Cursor) -> None:
         corners = len(self._places["vertex"])
+        marked = len({one.name for one in self._marks if one.role == "vertex"})
+        if marked and (corners or self._pixels):
+            raise cursor.fail(
+                f"stone {self.code} has marked vertices and {'pixels' if self._pixels else 'vertices in space'}",
+                "keep one of the two outlines",
+            )
+        if marked:
+            corners = marked
         if self._photograph is None and self._pixels:
             raise cursor.fail(f"stone {self.code} has pixels, but no photo", "write: photo NAME")
         if self._photograph is not None and corners:

@@ -41,7 +41,8 @@ def write_moma(survey: Survey, path: Path) -> None:
         raise SurveyError(
             "the survey has no stones", where=str(path), remedy="write surveys of one stone or more"
         )
-    counts = Counter(block.sigma for block in survey.blocks if block.sigmas is None) or Counter([0.003])
+    own = (block.sigma for block in survey.blocks if block.sigmas is None and block.sigma > 0.0)
+    counts = Counter(own) or Counter([0.003])
     common = max(sorted(counts), key=counts.__getitem__)
     _write(Path(path), _survey_lines(survey, common))
 
@@ -90,6 +91,11 @@ def _head_lines(head: SurveyHead) -> Iterator[str]:
     for one in head.canons:
         size = f"{_number(one.length)} {_number(one.height)} sigma {_number(one.sigma)}"
         yield f"canon {one.kind} {size} source {_text(one.source)}"
+    if head.orientation is not None:
+        yield f"orientation {_text(head.orientation)}"
+    for surface in head.surfaces:
+        scatter = "" if surface.sigma is None else f" sigma {_number(surface.sigma)}"
+        yield f"surface {_name(surface.name)} {surface.kind}{scatter}"
     if head.extrusion.direction is not None or head.extrusion.tail != 1.0:
         yield _extrusion_line(head.extrusion)
 
@@ -123,7 +129,7 @@ def _stone_lines(block: BlockRecord, common_sigma: float) -> list[str]:
     course = "" if block.course is None else f" course {block.course}"
     zone = "" if block.zone is None else f" zone {_name(block.zone)}"
     lines = [f"stone {block.code} {block.kind}{course}{zone}"]
-    if block.sigmas is None and block.sigma != common_sigma:
+    if block.sigmas is None and block.sigma not in (common_sigma, 0.0):
         lines.append(f"  sigma {_number(block.sigma)}")
     if block.station is not None:
         lines.append(f"  station {_name(block.station)}")
@@ -136,6 +142,13 @@ def _stone_lines(block: BlockRecord, common_sigma: float) -> list[str]:
     if block.photograph is not None:
         lines.append(f"  photo {_name(block.photograph)}")
         lines += [f"  pixel {_row(one)}" for one in block.image]
+    if block.surface is not None:
+        lines.append(f"  on {_name(block.surface)}")
+    for mark in block.marks:
+        own = "" if mark.sigma is None else f" sigma {_number(mark.sigma)}"
+        lines.append(
+            f"  mark {_name(mark.name)} {mark.role} {_name(mark.photograph)} {_row(mark.image)}{own}"
+        )
     precisions = [""] * (len(block.points) + len(block.vertices))
     if block.sigmas is not None:
         precisions = [f" sigma {_number(sigma)}" for sigma in block.sigmas]

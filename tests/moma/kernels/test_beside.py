@@ -68,7 +68,7 @@ def test_the_order_begins_at_the_far_end_and_names_every_kernel_once():
     order = beside._order("ingest")
     assert order[0] == f"ingest {ingest - 1}"
     assert order[ingest:] == [f"run {place}" for place in range(run)]
-    assert COMMANDS == ("ingest", "run")
+    assert COMMANDS == ("orient", "ingest", "run")
 
 
 @pytest.mark.slow

@@ -21,7 +21,7 @@ def rings():
     corners = np.array(
         [(half, half), (LENGTH - half, half), (LENGTH - half, HEIGHT - half), (half, HEIGHT - half)]
     )
-    return [corners + (LENGTH * i, HEIGHT * j) for j in range(2) for i in range(3)]
+    return [corners + np.array((LENGTH * i, HEIGHT * j)) for j in range(2) for i in range(3)]
 
 
 def scan(spacing=0.01, noise=0.001, seed=1):

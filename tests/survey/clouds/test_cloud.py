@@ -145,7 +145,7 @@ def test_outlines_of_a_plane_need_a_wall(tmp_path):
 def test_a_cloud_beside_its_outlines_is_told(tmp_path, wall):
     path = scans.geojson(tmp_path / "a.geojson")
     with pytest.raises(SurveyError, match=r"none of its \d+ points lies in an outline: outlines lie about"):
-        measured(tmp_path, scans.scan(0.05) + [0.0, 0.0, 5.0], path, wall=wall)
+        measured(tmp_path, scans.scan(0.05) + np.array([0.0, 0.0, 5.0]), path, wall=wall)
 
 
 def test_the_review_lists_overlaps_odd_sizes_leaks_scores_and_few_points(tmp_path, wall):
@@ -153,7 +153,7 @@ def test_the_review_lists_overlaps_odd_sizes_leaks_scores_and_few_points(tmp_pat
     shapes[1] = shapes[1] - (0.1, 0.0)  # over its neighbour
     a, b = scans.rings()[2][0], scans.rings()[2][2]
     shapes[2] = np.array(
-        [a, (b[0], a[1]), b, b - (0.03, 0), (b[0] - 0.03, a[1] + 0.03), a + (0, 0.03)]
+        [a, (b[0], a[1]), b, b - (0.03, 0), (b[0] - 0.03, a[1] + 0.03), a + np.array((0, 0.03))]
     )  # along joints
     shapes[3] = scans.rings()[3] * (1, 0.5) + (0, 0.16)
     shapes[4] = np.array([(0.7, 0.4), (0.76, 0.4), (0.76, 0.44), (0.7, 0.44)])

@@ -158,7 +158,7 @@ def test_single_precision_far_away_warns(tmp_path):
     (warning,) = open_points(tmp_path / "a.ply").warnings
     assert "rounds by up to 16 mm" in warning
     assert chunks.lost_digits(tmp_path / "a.ply", 1000.0) == ()
-    e57_file(tmp_path / "a.e57", POINTS + [500000.0, 0.0, 0.0], [1.0, 0, 0, 0], np.zeros(3))
+    e57_file(tmp_path / "a.e57", POINTS + np.array([500000.0, 0.0, 0.0]), [1.0, 0, 0, 0], np.zeros(3))
     (warning,) = open_points(tmp_path / "a.e57").warnings
     assert "16 mm" in warning
 

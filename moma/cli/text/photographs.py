@@ -1,0 +1,54 @@
+"""Report of `moma orient` as text."""
+
+from typing import TYPE_CHECKING
+
+from moma.cli.text.formats import shorten
+
+if TYPE_CHECKING:
+    from pipelines.reports.photographs.orient import OrientReport
+
+__all__ = ["orient_lines"]
+
+
+def orient_lines(report: "OrientReport", verbose: bool) -> list[str]:
+    """Describe cameras, photographs, control points and suspected marks."""
+    values = report.values
+    marks = values["marks"]
+    lines = [
+        f"{values['name']}: {len(values['photos'])} photographs, {len(values['points'])} points, "
+        f"{len(marks['x'])} marks",
+        f"  {values['observations']} observations, {values['unknowns']} unknowns, redundancy {values['redundancy']}"
+        + ("" if values["sigma0"] is None else f", σ₀ {values['sigma0']:.6g}"),
+    ]
+    for camera in values["cameras"]:
+        known = [(name, one) for name, one in camera["parameters"].items() if one["sigma"]]
+        if known:
+            lines.append(f"  camera {camera['name']} ({camera['model']} distortion):")
+            lines += [f"    {name} {one['value']:.8g} ± {one['sigma']:.3g}" for name, one in known]
+    photos = [
+        f"    {one['name']}: {one['marks']} marks, rms {one['rms'] or 0.0:.2f} px, station ± "
+        f"{1e3 * max(one['sigma'][axis] for axis in 'xyz'):.1f} mm"
+        for one in values["photos"]
+    ]
+    lines += ["  photographs:", *(photos if verbose else shorten(photos, 12, "    ", ", with -v"))]
+    for use in ("weighted", "check"):
+        ones = [one for one in values["control"] if one["use"] == use]
+        if ones:
+            worst = max(ones, key=lambda one: one["test"])
+            what = "control" if use == "weighted" else "check"
+            lines.append(
+                f"  {len(ones)} {what} points; farthest off is {worst['id']}, by {worst['test']:.1f} σ"
+            )
+    suspected = sorted(
+        (k for k, one in enumerate(marks["verdict"]) if one), key=lambda k: -(marks["test"][k] or 0.0)
+    )
+    if suspected:
+        lines.append(f"  {len(suspected)} marks suspected or left out:")
+        ones = [
+            f"    point {marks['point'][k]} on {marks['photo'][k]}, line {marks['line'][k]}: "
+            f"{marks['test'][k] or 0.0:.1f} σ" + (", left out" if marks["verdict"][k] == "removed" else "")
+            for k in suspected
+        ]
+        lines += ones if verbose else shorten(ones, 5, "    ", ", with -v")
+    lines.append(f"  results in {report.folder}")
+    return lines

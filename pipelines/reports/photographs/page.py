@@ -1,0 +1,148 @@
+"""The page of oriented photographs, by itself and as a part of the survey report."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pipelines.draw.photographs import draw_network, draw_photo_residuals
+from pipelines.reports.html import picture, write_page
+
+__all__ = ["draw_photographs", "photographs_section", "write_photographs_page"]
+
+_MOST = 200  # rows of a table; orientation.json has them all
+
+Row = tuple[str, ...]
+
+
+def draw_photographs(values: Mapping[str, Any], folder: Path, prefix: str = "") -> dict[str, str]:
+    """Draw the pictures into a folder; return captions by file name.
+
+    Parameters
+    ----------
+    values : of `orientation_values`
+    prefix : of the names of the files
+    """
+    network, residuals = f"{prefix}network.png", f"{prefix}photo-residuals.png"
+    larger = draw_network(folder / network, values)
+    count, factor = draw_photo_residuals(folder / residuals, values)
+    which = (
+        "each photograph" if count == len(values["photos"]) else f"the {count} photographs with the largest"
+    )
+    return {
+        network: f"The network from above and from the side: stations, rays, points, ellipses {larger:g} times "
+        "enlarged.",
+        residuals: f"Residuals of the marks on {which}, {factor:g} times enlarged; orange: suspected or left out.",
+    }
+
+
+def write_photographs_page(
+    path: Path, values: Mapping[str, Any], pictures: Mapping[str, str], version: str
+) -> None:
+    """Write the page and embed the pictures of its folder."""
+    redundancy = values["redundancy"]
+    lead = (
+        f"{len(values['photos'])} photographs, {len(values['points'])} points, {len(values['marks']['x'])} marks: "
+        + (
+            f"σ₀ {values['sigma0']:.4g} with redundancy {redundancy}."
+            if redundancy > 0
+            else "nothing checks the marks."
+        )
+    )
+    write_page(
+        path,
+        "photographs.html",
+        name=values["name"],
+        lead=lead,
+        warnings=values["remarks"],
+        photographs=photographs_section(values, pictures, path.parent),
+        version=version,
+    )
+
+
+def photographs_section(
+    values: Mapping[str, Any], pictures: Mapping[str, str], folder: Path
+) -> dict[str, Any]:
+    """Describe the photographs for a template."""
+    marks = values["marks"]
+    suspected = sorted(
+        (k for k, verdict in enumerate(marks["verdict"]) if verdict), key=lambda k: -(marks["test"][k] or 0.0)
+    )
+    return {
+        "pictures": [picture(folder / name, caption) for name, caption in pictures.items()],
+        "adjustment": _adjustment(values),
+        "cameras": [_camera(one) for one in values["cameras"]],
+        "photos": [_photo(one) for one in values["photos"][:_MOST]],
+        "control": [_control(one) for one in values["control"][:_MOST]],
+        "suspected": [_mark(marks, k) for k in suspected[:_MOST]],
+        "suspects": len(suspected),
+        "correlations": [
+            (one["of"], one["a"], one["b"], f"{100.0 * one['value']:.1f} %")
+            for one in values["correlations"][:_MOST]
+        ],
+        "most": _MOST,
+    }
+
+
+def _adjustment(values: Mapping[str, Any]) -> list[Row]:
+    marks = values["marks"]
+    external = [
+        one
+        for one, verdict in zip(marks["external"], marks["verdict"], strict=True)
+        if one is not None and not verdict
+    ]
+    unchecked = sum(one is None for one in marks["external"])
+    return [
+        ("Observations", str(values["observations"])),
+        ("Unknowns", str(values["unknowns"])),
+        ("Redundancy", str(values["redundancy"])),
+        ("σ₀: found over stated", "–" if values["sigma0"] is None else f"{values['sigma0']:.4g}"),
+        ("Datum", values["datum"]),
+        ("Iterations", str(values["iterations"])),
+        (
+            "Movement of a point by a blunder that just escapes",
+            f"up to {max(external) * 1e3:.1f} mm" if external else "–",
+        ),
+        ("Marks that nothing checks", str(unchecked)),
+    ]
+
+
+def _camera(one: Mapping[str, Any]) -> dict[str, Any]:
+    rows = [
+        (name, f"{value['value']:.8g}", f"± {value['sigma']:.3g}" if value["sigma"] else "held")
+        for name, value in one["parameters"].items()
+    ]
+    width, height = one["size"]
+    return {
+        "name": f"{one['name']}: {one['model']} model, {width} × {height} pixels, {one['unit']}",
+        "rows": rows,
+    }
+
+
+def _photo(one: Mapping[str, Any]) -> Row:
+    sigma = one["sigma"]
+    angles = (f"{one[name]:.4f} ± {sigma[name]:.4f}°" for name in ("omega", "phi", "kappa"))
+    places = (f"{one[name]:.4f} ± {sigma[name]:.4f} m" for name in "xyz")
+    return (
+        one["name"],
+        *angles,
+        *places,
+        str(one["marks"]),
+        "–" if one["rms"] is None else f"{one['rms']:.2f} px",
+    )
+
+
+def _control(one: Mapping[str, Any]) -> Row:
+    test = "–" if one["use"] == "fixed" else f"{one['test']:.2f}"
+    return (one["id"], one["use"], *(f"{1e3 * value:z.1f} mm" for value in one["residual"]), test)
+
+
+def _mark(marks: Mapping[str, Any], k: int) -> Row:
+    vx, vy, test = marks["vx"][k], marks["vy"][k], marks["test"][k]
+    return (
+        marks["photo"][k],
+        marks["point"][k],
+        str(marks["line"][k]) if marks["line"][k] > 0 else "–",
+        "–" if vx is None else f"{vx:z.2f}, {vy:z.2f} px",
+        "–" if test is None else f"{test:.1f} σ",
+        "left out" if marks["verdict"][k] == "removed" else "suspected",
+    )

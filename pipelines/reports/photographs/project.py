@@ -1,0 +1,363 @@
+"""Project files of `moma orient`: where marks, control points, cameras and photographs are, and what is estimated."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from moma.errors import SceneError, UsageError
+from pipelines.toml.lines import key_lines, parse_toml, read_text
+from pipelines.toml.schema import Key, TomlDocument, ValueKind, check_table, nearest
+from survey.orientation.formats.colmap import read_colmap
+from survey.orientation.formats.control import read_control, with_control
+from survey.orientation.formats.dbat import read_dbat
+from survey.orientation.formats.marks import network_of, read_marks
+from survey.orientation.formats.metashape import read_metashape
+from survey.orientation.formats.photomodeler import read_photomodeler
+from survey.orientation.network import INTERIOR, Camera, Network, Photo
+from survey.orientation.rotations import from_angles
+
+__all__ = [
+    "CAMERA_KEYS",
+    "PHOTO_KEYS",
+    "PROJECT_KEYS",
+    "WRITTEN",
+    "Project",
+    "calibrated",
+    "read_project",
+]
+
+WRITTEN = ("photomodeler", "colmap", "metashape", "dbat")
+"""Formats in which a result can be written."""
+
+_NUMBERS = ValueKind.NUMBERS
+
+PROJECT_KEYS = (
+    Key("name", ValueKind.TEXT, "Name of the project.", default=None),
+    Key("marks", ValueKind.TEXT, "File of marks: photograph, point, x, y, sigma.", default=None),
+    Key(
+        "photomodeler",
+        ValueKind.TEXT,
+        "Text export of PhotoModeler, instead of marks and cameras.",
+        default=None,
+    ),
+    Key(
+        "colmap",
+        ValueKind.TEXT,
+        "Folder with a text model of COLMAP, instead of marks and cameras.",
+        default=None,
+    ),
+    Key(
+        "metashape",
+        ValueKind.TEXT,
+        "XML of cameras that Metashape exports, instead of cameras.",
+        default=None,
+    ),
+    Key("markers", ValueKind.TEXT, "XML of markers that Metashape exports, with `metashape`.", default=None),
+    Key(
+        "dbat",
+        ValueKind.TEXT,
+        "Script of the Damped Bundle Adjustment Toolbox, instead of all others.",
+        default=None,
+    ),
+    Key(
+        "control", ValueKind.TEXT, "File of control points: number, name, X, Y, Z, deviations.", default=None
+    ),
+    Key(
+        "fixed_control",
+        ValueKind.BOOLEAN,
+        "Control points keep their places, whatever their deviations.",
+        default=False,
+    ),
+    Key("check", ValueKind.TEXTS, "Control points that only check the result.", default=()),
+    Key(
+        "sigma", ValueKind.NUMBER, "Standard deviation of marks without one of their own.", "px", 1.0, above=0
+    ),
+    Key(
+        "blunders",
+        ValueKind.TEXT,
+        "Whether marks that the test finds wrong are left out.",
+        default="report",
+        choices=("report", "remove"),
+    ),
+    Key(
+        "write",
+        ValueKind.TEXTS,
+        "Formats in which the result is written too: photomodeler, colmap, metashape, dbat.",
+        default=(),
+    ),
+    Key(
+        "calibrate",
+        ValueKind.TEXTS,
+        "Parameters of cameras without a list of their own that are estimated.",
+        default=(),
+    ),
+)
+"""Keys at the top of a project file."""
+
+CAMERA_KEYS = (
+    Key("name", ValueKind.TEXT, "Name of the camera."),
+    Key("unit", ValueKind.TEXT, "Unit of its image.", default="mm", choices=("mm", "px")),
+    Key(
+        "model",
+        ValueKind.TEXT,
+        "Model of its distortion.",
+        default="backward",
+        choices=("backward", "forward"),
+    ),
+    Key("size", _NUMBERS, "Width and height of its photographs.", "px"),
+    Key("pixel", ValueKind.NUMBER, "Height of a pixel; 1 in the unit px.", "unit", None, above=0),
+    *(
+        Key(
+            name,
+            ValueKind.NUMBER,
+            f"Interior orientation, {name}.",
+            "unit",
+            None if name in ("c", "xp", "yp") else 0.0,
+        )
+        for name in INTERIOR
+    ),
+    Key("calibrate", ValueKind.TEXTS, "Parameters that are estimated.", default=None),
+)
+"""Keys of `[[cameras]]`."""
+
+PHOTO_KEYS = (
+    Key("name", ValueKind.TEXT, "Name of the photograph, as in the marks."),
+    Key("camera", ValueKind.TEXT, "Its camera; not needed if there is one.", default=None),
+    Key("station", ValueKind.VECTOR, "Place of the projection centre.", "m", None),
+    Key(
+        "station_sigma",
+        ValueKind.VECTOR,
+        "Its standard deviations, which make it an observation.",
+        "m",
+        None,
+        above=0,
+    ),
+    Key("angles", ValueKind.VECTOR, "ω, φ, κ.", "°", None),
+    Key(
+        "angles_sigma",
+        ValueKind.VECTOR,
+        "Their standard deviations, which make them observations.",
+        "°",
+        None,
+        above=0,
+    ),
+    Key("fixed", ValueKind.BOOLEAN, "Station and angles are not estimated.", default=False),
+)
+"""Keys of `[[photos]]`."""
+
+
+@dataclass(frozen=True)
+class Project:
+    """A project that was read.
+
+    Attributes
+    ----------
+    name : of the project
+    network : with its control points
+    blunders : "report" or "remove"
+    write : formats in which the result is written too
+    """
+
+    name: str
+    network: Network
+    blunders: str
+    write: tuple[str, ...] = ()
+
+
+def read_project(path: Path) -> Project:
+    """Read a project file and the files that it names, relative to it.
+
+    Raises
+    ------
+    SceneError
+        at the key that is wrong
+    SurveyError
+        at the line of another file that is wrong
+    """
+    text = read_text(path, SceneError)
+    tables = parse_toml(text, str(path), SceneError, "see docs/howto/photographs.md")
+    document = TomlDocument(str(path), key_lines(text))
+    cameras, photos = tables.pop("cameras", []), tables.pop("photos", [])
+    for name, given in (("cameras", cameras), ("photos", photos)):
+        if not (isinstance(given, list) and all(isinstance(one, dict) for one in given)):
+            document.fail(f"{name} is not a list of tables", name, remedy=f"write [[{name}]] before each")
+    values = check_table(document, (), tables, PROJECT_KEYS, "the project")
+    network = _network(document, values, cameras, photos, path.parent)
+    if (control := values["control"]) is not None:
+        rows = read_control(path.parent / str(control))
+        network = with_control(
+            network, rows, fixed=bool(values["fixed_control"]), check=_texts(values["check"])
+        )
+    elif values["check"] or values["fixed_control"]:
+        key = "check" if values["check"] else "fixed_control"
+        document.fail(f"{key} without control points", key, remedy="give control = FILE")
+    network = calibrated(network, _texts(values["calibrate"]), document.where("calibrate"))
+    write = _texts(values["write"])
+    for one in write:
+        if one not in WRITTEN:
+            document.fail(f"no format {one!r}", "write", remedy=nearest(one, WRITTEN))
+    return Project(str(values["name"] or path.stem), network, str(values["blunders"]), write)
+
+
+def calibrated(network: Network, names: tuple[str, ...], where: str) -> Network:
+    """Let parameters of the cameras be estimated, those of cameras without a choice of their own.
+
+    Raises
+    ------
+    UsageError
+        if there is no such parameter
+    """
+    for name in names:
+        if name not in INTERIOR:
+            raise UsageError(
+                f"no parameter {name!r} of a camera", where=where, remedy=nearest(name, INTERIOR)
+            )
+    if not names:
+        return network
+    return replace(
+        network, cameras=tuple(one if one.free else replace(one, free=names) for one in network.cameras)
+    )
+
+
+_SOURCES = ("marks", "photomodeler", "colmap", "metashape", "dbat")
+
+
+def _network(
+    document: TomlDocument,
+    values: Mapping[str, object],
+    cameras: list[Mapping[str, Any]],
+    photos: list[Mapping[str, Any]],
+    folder: Path,
+) -> Network:
+    given = [name for name in _SOURCES if values[name] is not None]
+    if not given:
+        document.fail("the project has no photographs", remedy=f"give one of {', '.join(_SOURCES)}")
+    main = [name for name in given if name != "marks"]
+    if len(main) > 1 or (main and main != ["metashape"] and "marks" in given):
+        document.fail(f"{given[0]} and {given[1]}", given[1], remedy="give one of them")
+    if main and (cameras or photos):
+        document.fail(f"[[cameras]] or [[photos]] beside {main[0]}", "cameras", remedy="leave them out")
+    if not main:
+        return _marked(document, values, cameras, photos, folder)
+    source, sigma = folder / str(values[main[0]]), float(str(values["sigma"]))
+    if main[0] == "photomodeler":
+        return read_photomodeler(source)
+    if main[0] == "colmap":
+        return read_colmap(source, sigma)
+    if main[0] == "dbat":
+        return read_dbat(source)
+    markers = values["markers"]
+    file = None if markers is None else folder / str(markers)
+    network = read_metashape(source, file, sigma)
+    if values["marks"] is None:
+        return network
+    marks = folder / str(values["marks"])
+    return network_of(str(marks), read_marks(marks), network.cameras, network.photos, sigma)
+
+
+def _marked(
+    document: TomlDocument,
+    values: Mapping[str, object],
+    cameras: list[Mapping[str, Any]],
+    photos: list[Mapping[str, Any]],
+    folder: Path,
+) -> Network:
+    """Make a network of a file of marks and the cameras and photographs of the project file."""
+    if not cameras:
+        document.fail("the project has no cameras", remedy="write [[cameras]] with name, size, pixel, c")
+    made = tuple(_camera(document, k, one) for k, one in enumerate(cameras))
+    names = [one.name for one in made]
+    if len(set(names)) < len(names):
+        document.fail("two cameras have one name", "cameras", remedy="give each a name of its own")
+    marks = folder / str(values["marks"])
+    rows = read_marks(marks)
+    known = tuple(_photo(document, k, one, names) for k, one in enumerate(photos))
+    if not known:
+        if len(made) > 1:
+            document.fail(
+                f"{len(made)} cameras, but no [[photos]]",
+                "cameras",
+                remedy="write [[photos]] with name and camera",
+            )
+        known = tuple(Photo(name, 0, where=f"{marks}") for name in dict.fromkeys(row.photo for row in rows))
+    return network_of(str(marks), rows, made, known, float(values["sigma"]))  # type: ignore[arg-type]
+
+
+def _camera(document: TomlDocument, number: int, given: Mapping[str, Any]) -> Camera:
+    path = ("cameras", str(number))
+    values = check_table(document, path, given, CAMERA_KEYS, "[[cameras]]")
+    size = _texts(values["size"])
+    if len(size) != 2 or not all(float(one) == int(one) > 0 for one in size):
+        document.fail(
+            "size is not a width and a height in pixels", *path, "size", remedy="e.g. size = [6000, 4000]"
+        )
+    width, height = (int(one) for one in size)
+    pixel = values["pixel"]
+    if pixel is None:
+        if values["unit"] != "px":
+            document.fail(
+                "[[cameras]] has no 'pixel'", *path, remedy="give pixel: the height of a pixel in mm"
+            )
+        pixel = 1.0
+    if values["c"] is None:
+        document.fail("[[cameras]] has no 'c'", *path, remedy="give c: the camera constant")
+    middle = {"xp": 0.5 * width * float(pixel), "yp": 0.5 * height * float(pixel)}  # type: ignore[arg-type]
+    inner = [values[name] if values[name] is not None else middle[name] for name in INTERIOR]
+    free = values["calibrate"]
+    for name in _texts(free or ()):
+        if name not in INTERIOR:
+            document.fail(
+                f"no parameter {name!r} of a camera", *path, "calibrate", remedy=nearest(name, INTERIOR)
+            )
+    return Camera(
+        str(values["name"]),
+        np.array(inner, dtype=float),
+        (width, height),
+        float(pixel),  # type: ignore[arg-type]
+        str(values["unit"]),
+        values["model"] == "forward",
+        _texts(free or ()),
+        document.where(*path),
+    )
+
+
+def _photo(document: TomlDocument, number: int, given: Mapping[str, Any], cameras: list[str]) -> Photo:
+    path = ("photos", str(number))
+    values = check_table(document, path, given, PHOTO_KEYS, "[[photos]]")
+    camera = values["camera"]
+    if camera is None and len(cameras) > 1:
+        document.fail("[[photos]] has no 'camera'", *path, remedy=f"give one of {', '.join(cameras)}")
+    if camera is not None and camera not in cameras:
+        document.fail(f"no camera {camera!r}", *path, "camera", remedy=nearest(str(camera), cameras))
+    if values["fixed"] and (values["station"] is None or values["angles"] is None):
+        document.fail("a fixed photograph without station and angles", *path, "fixed", remedy="give both")
+
+    def array(name: str) -> Any:
+        return None if values[name] is None else np.array(values[name], dtype=float)
+
+    angles = array("angles")
+    rotation = None if angles is None else from_angles(*np.radians(angles))
+    sigma, angle_sigma = array("station_sigma"), array("angles_sigma")
+    for name, own in (("station", sigma), ("angles", angle_sigma)):
+        if own is not None and values[name] is None:
+            document.fail(f"{name}_sigma without {name}", *path, f"{name}_sigma", remedy=f"give {name}")
+    return Photo(
+        str(values["name"]),
+        0 if camera is None else cameras.index(str(camera)),
+        rotation,
+        array("station"),
+        None if sigma is None else array("station"),
+        sigma,
+        None if angle_sigma is None else rotation,
+        None if angle_sigma is None else np.radians(angle_sigma),
+        bool(values["fixed"]),
+        document.where(*path),
+    )
+
+
+def _texts(value: object) -> tuple[Any, ...]:
+    assert isinstance(value, tuple | list)
+    return tuple(value)

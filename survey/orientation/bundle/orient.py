@@ -1,0 +1,420 @@
+"""Photographs, from marks to a checked orientation: soundness, start values, adjustment, blunders, statistics."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import ThreadpoolController
+
+from moma.errors import GeometryError, MomaError, SurveyError
+from survey.arrays import Array
+from survey.orientation.bundle.adjustment import Prepared, Solution, adjust, prepare
+from survey.orientation.bundle.resection import similarity_between
+from survey.orientation.bundle.soundness import check_network
+from survey.orientation.bundle.start import aligned, check_mirrored, start_values, swapped, without_start
+from survey.orientation.bundle.statistics import CRITICAL, Statistics, statistics
+from survey.orientation.network import Network, Photo, listed
+from survey.orientation.projection import project
+
+__all__ = ["Blunders", "Orientation", "control_tests", "orient"]
+
+Blunders = Literal["report", "remove"]
+"""Treatment of marks that the test finds wrong."""
+
+_POOR = 3e-3  # median residual over the longer side of a photograph, beyond which an orientation is none
+_GOOD = 5e-4  # the same, below which no other start is tried
+_SEARCHES = 30  # rounds of data snooping
+_MISSES = 2.33  # √(χ²₃ / 3) that a sound point exceeds once in a thousand
+_FAR_OFF = 10.0  # the same from which the hand of the control points is checked
+_STATIONS = 5  # observed stations of which one that is off can be told
+_TRIPLES = 200  # random triples of stations tried
+_NORMAL = 0.6745  # median of the absolute value of a standard normal variable
+_SMALL = 1500  # parameters of the cameras below which one thread of BLAS is faster than several
+
+
+@dataclass(frozen=True)
+class Orientation:
+    """Oriented photographs with their statistics.
+
+    Attributes
+    ----------
+    network : with the start values that were used
+    prepared, solution, statistics : of the adjustment
+    removed : marks left out as blunders, each with its standardised residual before
+    suspected : marks whose standardised residual exceeds the limit, those left out among them
+    remarks : what was changed or left out, in words
+    """
+
+    network: Network
+    prepared: Prepared
+    solution: Solution
+    statistics: Statistics
+    removed: dict[int, float]
+    suspected: tuple[int, ...]
+    remarks: tuple[str, ...]
+
+    @property
+    def scale(self) -> float:
+        """Factor of standard deviations: σ₀, 1 without redundancy."""
+        return self.statistics.sigma0 if self.statistics.redundancy > 0 else 1.0
+
+    @property
+    def adjusted(self) -> Network:
+        """Network with the adjusted values, without the marks that were left out."""
+        values, network = self.solution.unknowns, self.network
+        used = np.asarray(np.isfinite(self.statistics.residuals).all(axis=1))
+        pairs = zip(network.photos, values.rotation, values.station, strict=True)
+        return replace(
+            _only(network, used),
+            cameras=tuple(
+                replace(one, inner=inner) for one, inner in zip(network.cameras, values.inner, strict=True)
+            ),
+            photos=tuple(replace(one, rotation=turn, station=place) for one, turn, place in pairs),
+            start=values.point.copy(),
+        )
+
+    @property
+    def residuals(self) -> Array:
+        """(n, 2) residuals of the marks on the photographs, measured minus computed, right and down [px]."""
+        return self.statistics.residuals * self.network.sigma * (1.0, -1.0)
+
+
+def orient(network: Network, blunders: Blunders = "report") -> Orientation:
+    """Orient the photographs of a network.
+
+    Parameters
+    ----------
+    network : with marks; start values are used as far as it has them
+    blunders : whether marks that the test finds wrong are left out
+
+    Raises
+    ------
+    SurveyError
+        naming file and line, if the network is unsound, or contradicts itself
+    GeometryError
+        if the marks do not determine the orientation
+    """
+    check_network(network)
+    used, remarks = _useful(network)
+    with _few_threads(network):
+        network, prepared, solution = _oriented(network, used)
+        result = statistics(network, prepared, solution)
+        removed = dict[int, float]()
+        if blunders == "remove":
+            used, prepared, solution, result = _snooped(network, used, prepared, solution, result, removed)
+    remarks += _tested_control(network, solution, result)
+    suspected = {*removed, *_suspects(result).tolist()}
+    if removed:
+        remarks.append(f"{len(removed)} marks left out as blunders")
+    return Orientation(
+        network, prepared, solution, result, removed, tuple(sorted(suspected)), (*network.remarks, *remarks)
+    )
+
+
+def _tested_control(network: Network, solution: Solution, result: Statistics) -> list[str]:
+    """Return remarks on control points that miss their places by more than chance; refuse mirrored ones.
+
+    Raises
+    ------
+    SurveyError
+    """
+    tests = control_tests(network, solution, result)
+    wrong = [
+        (test, one)
+        for one, test in zip(network.control, tests, strict=True)
+        if test > _MISSES and not one.check
+    ]
+    if not wrong:
+        return []
+    if max(test for test, _ in wrong) > _FAR_OFF and (alone := _alone(network)) is not None:
+        _check_hand(network, alone)
+    names = [
+        f"{network.names[one.point]} ({test:.1f} σ)" for test, one in sorted(wrong, key=lambda pair: -pair[0])
+    ]
+    return [f"control points that miss their places: {listed(names)}"]
+
+
+def control_tests(network: Network, solution: Solution, result: Statistics) -> Array:
+    """Return by how many standard deviations each control or check point misses its place; 0 where it is fixed.
+
+    The misfit d of a control point has the covariance Σ - C of what was stated and what was adjusted, that of a
+    check point Σ + C; returned is √(dᵀ(…)⁻¹d / 3).
+    """
+    out = np.zeros(len(network.control))
+    for k, one in enumerate(network.control):
+        own = result.points[one.point]
+        if (one.fixed and not one.check) or not np.isfinite(own).all():
+            continue
+        off = one.place - solution.unknowns.point[one.point]
+        spread = one.covariance + (own if one.check else -own)
+        values, axes = np.linalg.eigh(spread)
+        sound = values > 1e-3 * float(np.trace(one.covariance if not one.check else spread)) / 3.0
+        if sound.any():
+            out[k] = np.sqrt((((axes.T @ off)[sound]) ** 2 / values[sound]).sum() / sound.sum())
+    return out
+
+
+@contextmanager
+def _few_threads(network: Network) -> Iterator[None]:
+    """Keep BLAS to one thread where its matrices are small."""
+    limits = 1 if 6 * len(network.photos) < _SMALL else None
+    with ThreadpoolController().limit(limits=limits, user_api="blas"):
+        yield
+
+
+def _useful(network: Network) -> tuple[NDArray[np.bool_], list[str]]:
+    """Return the marks that take part: those of points with two rays, or of control points."""
+    rays = np.bincount(network.point, minlength=len(network.names))
+    control = np.zeros(len(network.names), dtype=bool)
+    control[[one.point for one in network.control if not one.check]] = True
+    lone = (rays == 1) & ~control
+    remarks = []
+    if lone.any():
+        names = [network.names[i] for i in np.flatnonzero(lone)]
+        remarks.append(f"{len(names)} points are marked on one photograph only and left out: {listed(names)}")
+    return ~lone[network.point], remarks
+
+
+def _oriented(network: Network, used: NDArray[np.bool_]) -> tuple[Network, Prepared, Solution]:
+    """Adjust from the start values of the file, and from none if these lead nowhere."""
+    rests: list[tuple[float, Network, Prepared, Solution]] = []
+    failure: MomaError | None = None
+    chosen = aligned(_only(network, used))
+    for given in (True, False):
+        try:
+            for start in start_values(chosen if given else without_start(chosen)):
+                found = replace(
+                    start,
+                    photo=network.photo,
+                    point=network.point,
+                    image=network.image,
+                    sigma=network.sigma,
+                    lines=network.lines,
+                )
+                prepared = prepare(found, keep=used)
+                solution = adjust(found, prepared)
+                rests.append((_misfit(found, prepared, solution), found, prepared, solution))
+                if rests[-1][0] < _GOOD:
+                    break
+        except MomaError as error:
+            failure = error
+        if rests and min(one[0] for one in rests) < _POOR:
+            break
+    if not rests:
+        assert failure is not None
+        _check_control_alone(network)
+        raise failure
+    misfit, found, prepared, solution = min(rests, key=lambda one: one[0])
+    _check_contradictions(network, found, solution, misfit, failure)
+    return found, prepared, solution
+
+
+def _only(network: Network, used: NDArray[np.bool_]) -> Network:
+    return replace(
+        network,
+        photo=network.photo[used],
+        point=network.point[used],
+        image=network.image[used],
+        sigma=network.sigma[used],
+        lines=network.lines[used],
+    )
+
+
+def _misfit(network: Network, prepared: Prepared, solution: Solution) -> float:
+    """Return the median residual over the longer side of the photographs; infinite if they look the other way."""
+    off = np.empty(len(prepared.order))
+    values = solution.unknowns
+    photo = network.photo[prepared.order]
+    for f, one in enumerate(network.photos):
+        mine = photo == f
+        camera = replace(network.cameras[one.camera], inner=values.inner[one.camera])
+        rows = prepared.order[mine]
+        seen = project(camera, values.rotation[f], values.station[f], values.point[network.point[rows]])
+        off[mine] = np.linalg.norm(seen - network.image[rows], axis=1) / max(camera.size)
+    off[~np.isfinite(off)] = np.inf
+    return float(np.median(off)) if len(off) else 0.0
+
+
+def _check_contradictions(
+    network: Network, found: Network, solution: Solution, misfit: float, failure: MomaError | None
+) -> None:
+    """Refuse an orientation that contradicts its marks, its control points or its start values."""
+    values = solution.unknowns
+    photos = tuple(
+        replace(one, rotation=r, station=s)
+        for one, r, s in zip(found.photos, values.rotation, values.station, strict=True)
+    )
+    pair = swapped(network, replace(found, photos=photos))
+    if pair is not None:
+        raise _swapped(network, *pair)
+    _check_stations(network, solution)
+    if misfit < _POOR:
+        return
+    _check_control_alone(network)
+    if failure is not None:
+        raise failure
+    worst = _worst(found, solution)
+    raise GeometryError(
+        f"the marks contradict each other: half miss by over {misfit:.1%} of a photograph, most on {worst.name}",
+        where=worst.where or network.path,
+        remedy="check the marks of this photograph, and the camera",
+    )
+
+
+def _check_control_alone(network: Network) -> None:
+    """Refuse control points that do not fit photographs which agree with each other without them."""
+    given = [one for one in network.control if not one.check]
+    if not given or (alone := _alone(network)) is None:
+        return
+    _check_hand(network, alone)
+    raise SurveyError(
+        "the control points do not fit the photographs, which agree with each other without them",
+        where=given[0].where or network.path,
+        remedy="check the numbers, the order and the unit of their coordinates",
+    )
+
+
+def _check_stations(network: Network, solution: Solution) -> None:
+    """Refuse observed stations that contradict the photographs, naming those that are swapped or one that is off."""
+    seen = [f for f, one in enumerate(network.photos) if one.observed_station is not None]
+    if len(seen) < _STATIONS:
+        return
+    there = np.array([network.photos[f].observed_station for f in seen])
+    sigma = np.array([network.photos[f].station_sigma for f in seen]).max(axis=1)
+    off = np.linalg.norm(solution.unknowns.station[seen] - there, axis=1)
+    if not (off > _FAR_OFF * sigma).any():
+        return
+    free = replace(
+        network,
+        control=(),
+        photos=tuple(replace(one, observed_station=None, observed_rotation=None) for one in network.photos),
+    )
+    if (alone := _alone(free)) is None:
+        return
+    here = _fitted(alone.unknowns.station[seen], there)
+    own = np.linalg.norm(here - there, axis=1)
+    apart = np.linalg.norm(here[:, None] - there[None], axis=2)
+    worst = int(np.argmax(own))
+    photo = network.photos[seen[worst]]
+    for other in range(len(seen)):
+        if other != worst and max(apart[worst, other], apart[other, worst]) < 0.2 * min(
+            own[worst], own[other]
+        ):
+            raise _swapped(network, *sorted((seen[worst], seen[other])))
+    if own[worst] > _FAR_OFF * sigma[worst]:
+        raise SurveyError(
+            f"the observed station of photograph {photo.name} is {own[worst]:.3g} m from where the others put it",
+            where=photo.where or network.path,
+            remedy="check its coordinates, and to which photograph they belong",
+        )
+
+
+def _fitted(source: Array, target: Array) -> Array:
+    """Move places by the similarity that most of them agree with: of all triples, that of the least median misfit."""
+    best, least = source, np.inf
+    rng = np.random.default_rng(0)
+    for _ in range(_TRIPLES):
+        three = rng.choice(len(source), 3, replace=False)
+        rotation, shift, scale = similarity_between(source[three], target[three])
+        moved = scale * source @ rotation.T + shift
+        misfit = float(np.median(np.linalg.norm(moved - target, axis=1)))
+        if misfit < least:
+            best, least = moved, misfit
+    return best
+
+
+def _swapped(network: Network, a: int, b: int) -> SurveyError:
+    first, second = network.photos[a], network.photos[b]
+    return SurveyError(
+        f"photographs {first.name} and {second.name} are swapped: each fits the orientation given for the other",
+        where=first.where or network.path,
+        remedy="give the marks to the photograph that they were made on",
+    )
+
+
+def _alone(network: Network) -> Solution | None:
+    """Adjust the photographs without their control points; None if they do not agree with each other either."""
+    free = without_start(replace(network, control=()))
+    try:
+        start = next(iter(start_values(free)))
+        prepared = prepare(start, keep=_useful(start)[0])
+        alone = adjust(start, prepared)
+    except MomaError:
+        return None
+    return alone if _misfit(start, prepared, alone) < _POOR else None
+
+
+def _check_hand(network: Network, alone: Solution) -> None:
+    """Refuse mirrored control points."""
+    given = [one for one in network.control if not one.check]
+    source = alone.unknowns.point[[one.point for one in given]]
+    fine = np.isfinite(source).all(axis=1)
+    check_mirrored(source[fine], np.array([one.place for one in given])[fine], network)
+
+
+def _worst(network: Network, solution: Solution) -> Photo:
+    values, off = solution.unknowns, list[float]()
+    for f, one in enumerate(network.photos):
+        mine = network.photo == f
+        seen = project(
+            network.cameras[one.camera],
+            values.rotation[f],
+            values.station[f],
+            values.point[network.point[mine]],
+        )
+        miss = np.linalg.norm(seen - network.image[mine], axis=1)
+        off.append(float(np.median(np.where(np.isfinite(miss), miss, np.inf))))
+    return network.photos[int(np.argmax(off))]
+
+
+def _suspects(result: Statistics) -> NDArray[np.intp]:
+    """Return the marks whose standardised residual exceeds the limit.
+
+    Where most residuals are larger than the marks' σ tell, that σ is taken to be too small, by the median of them all.
+    """
+    tests = np.abs(result.standardised)
+    size = np.where(np.isfinite(tests), tests, 0.0).max(axis=1)
+    return np.flatnonzero(size > CRITICAL * _scale(tests))
+
+
+def _scale(tests: Array) -> float:
+    sound = tests[np.isfinite(tests) & (tests > 0.0)]
+    return max(1.0, float(np.median(sound)) / _NORMAL) if len(sound) else 1.0
+
+
+def _snooped(
+    network: Network,
+    used: NDArray[np.bool_],
+    prepared: Prepared,
+    solution: Solution,
+    result: Statistics,
+    removed: dict[int, float],
+) -> tuple[NDArray[np.bool_], Prepared, Solution, Statistics]:
+    """Leave out blunders, the worst of each photograph and point at a time, until none is left."""
+    held = np.zeros(len(network.names), dtype=bool)
+    held[[one.point for one in network.control if not one.check]] = True
+    for _ in range(_SEARCHES):
+        tests = np.nan_to_num(np.abs(result.standardised)).max(axis=1)
+        rays = np.bincount(network.point[used], minlength=len(network.names))
+        photos, points, out = set[int](), set[int](), list[int]()
+        suspects = _suspects(result)
+        for k in suspects[np.argsort(-tests[suspects])]:
+            f, i = int(network.photo[k]), int(network.point[k])
+            if f in photos or i in points or (rays[i] < 3 and not held[i]):
+                continue
+            photos.add(f)
+            points.add(i)
+            out.append(int(k))
+        if not out:
+            break
+        removed |= {k: float(tests[k]) for k in out}
+        used = used.copy()
+        used[out] = False
+        values = solution.unknowns
+        prepared = prepare(network, values._replace(free=prepared.unknowns.free), used)
+        solution = adjust(network, prepared)
+        result = statistics(network, prepared, solution)
+    return used, prepared, solution, result

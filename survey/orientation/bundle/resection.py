@@ -1,0 +1,241 @@
+"""Orientation of single photographs and pairs, from nothing: resection, relative orientation, intersection.
+
+Resection: three points give up to four orientations (Grunert's quartic in the form of Haralick et al. 1994); of random
+triples, the orientation that most other points agree with is taken. Relative orientation: five pairs of rays give
+up to ten
+essential matrices (Stewénius, Engels & Nistér 2006), chosen likewise. The plane of a wall leaves two orientations
+of a pair, of which both are returned.
+"""
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from survey.arrays import Array
+
+__all__ = ["essential_orientations", "intersect_rays", "resect", "similarity_between"]
+
+_TRIPLES = 60  # random triples of points tried
+_FIVES = 80  # random fives of pairs of rays tried
+_ENOUGH = 12  # of these, after which nearly all pairs may end the search
+_AGREES = 0.01  # angle between a ray and the direction of its point [rad]
+_REAL = 1e-6  # imaginary part of a root that is rounding
+
+
+def resect(rays: Array, points: Array) -> tuple[Array, Array, int] | None:
+    """Orient a photograph by known points.
+
+    Parameters
+    ----------
+    rays : (n, 3) in the camera's axes, n ≥ 4
+    points : (n, 3) [m]
+
+    Returns
+    -------
+    rotation (3, 3), station (3,), number of points that agree; None if no triple gives any
+    """
+    rays = rays / np.linalg.norm(rays, axis=1)[:, None]
+    rng = np.random.default_rng(0)
+    best: tuple[int, float, Array, Array] | None = None
+    for _ in range(_TRIPLES):
+        three = rng.choice(len(rays), 3, replace=False)
+        for rotation, station in _three_point(rays[three], points[three]):
+            seen = (points - station) @ rotation
+            length = np.linalg.norm(seen, axis=1)
+            cosine = np.einsum("ij,ij->i", seen, rays) / np.maximum(length, 1e-300)
+            angle = np.arccos(np.clip(cosine, -1.0, 1.0))
+            agree = int((angle < _AGREES).sum())
+            rest = float(np.median(angle))
+            if best is None or (agree, -rest) > (best[0], -best[1]):
+                best = agree, rest, rotation, station
+    return None if best is None else (best[2], best[3], best[0])
+
+
+def _three_point(rays: Array, points: Array) -> Iterator[tuple[Array, Array]]:
+    """Yield the orientations from which three points are seen along three unit rays."""
+    a2 = float(((points[1] - points[2]) ** 2).sum())
+    b2 = float(((points[0] - points[2]) ** 2).sum())
+    c2 = float(((points[0] - points[1]) ** 2).sum())
+    if min(a2, b2, c2) < 1e-18:
+        return
+    alpha, beta, gamma = rays[1] @ rays[2], rays[0] @ rays[2], rays[0] @ rays[1]
+    m, p = (a2 - c2) / b2, (a2 + c2) / b2
+    quartic = [
+        (m - 1.0) ** 2 - 4.0 * c2 / b2 * alpha**2,
+        4.0 * (m * (1.0 - m) * beta - (1.0 - p) * alpha * gamma + 2.0 * c2 / b2 * alpha**2 * beta),
+        2.0
+        * (
+            m**2 - 1.0 + 2.0 * m**2 * beta**2 + 2.0 * (b2 - c2) / b2 * alpha**2
+            - 4.0 * p * alpha * beta * gamma + 2.0 * (b2 - a2) / b2 * gamma**2
+        ),
+        4.0 * (-m * (1.0 + m) * beta + 2.0 * a2 / b2 * gamma**2 * beta - (1.0 - p) * alpha * gamma),
+        (1.0 + m) ** 2 - 4.0 * a2 / b2 * gamma**2,
+    ]  # fmt: skip
+    if not np.isfinite(quartic).all() or abs(quartic[0]) < 1e-14:
+        return
+    for root in np.roots(quartic):
+        v = float(root.real)
+        under = 2.0 * (gamma - v * alpha)
+        if abs(root.imag) > _REAL * max(1.0, abs(v)) + 1e-4 or v <= 0.0 or abs(under) < 1e-12:
+            continue
+        u = ((m - 1.0) * v**2 - 2.0 * m * beta * v + 1.0 + m) / under
+        square = 1.0 + v**2 - 2.0 * v * beta
+        if u <= 0.0 or square <= 0.0:
+            continue
+        first = np.sqrt(b2 / square)
+        rotation, station, _ = similarity_between(
+            rays * (first * np.array([1.0, u, v]))[:, None], points, scaled=False
+        )
+        yield rotation, station
+
+
+def similarity_between(
+    source: Array, target: Array, *, scaled: bool = True, mirrored: bool = False
+) -> tuple[Array, Array, float]:
+    """Fit target = scale · R · source + shift by least squares.
+
+    Parameters
+    ----------
+    source, target : (n, 3)
+    scaled : the scale is estimated, otherwise 1
+    mirrored : R is a reflection
+
+    Returns
+    -------
+    R (3, 3), shift (3,), scale
+    """
+    middle, aim = source.mean(axis=0), target.mean(axis=0)
+    a, b = source - middle, target - aim
+    u, values, vt = np.linalg.svd(b.T @ a)
+    sign = np.array([1.0, 1.0, np.linalg.det(u @ vt) * (-1.0 if mirrored else 1.0)])
+    rotation = u * sign @ vt
+    size = float((a**2).sum())
+    scale = float((values * sign).sum()) / size if scaled and size > 0.0 else 1.0
+    return rotation, aim - scale * rotation @ middle, scale
+
+
+def intersect_rays(stations: Array, rays: Array) -> tuple[Array, float]:
+    """Return the point nearest to rays in space, (3,), and the largest angle between two of them [rad].
+
+    Parameters
+    ----------
+    stations : (n, 3) [m]
+    rays : (n, 3) directions in space, of any length
+    """
+    rays = rays / np.linalg.norm(rays, axis=1)[:, None]
+    across = np.eye(3) - rays[:, :, None] * rays[:, None, :]
+    normal = across.sum(axis=0)
+    cosine = float(np.clip((rays @ rays.T).min(), -1.0, 1.0))
+    if np.linalg.matrix_rank(normal, tol=1e-10) < 3:
+        return np.full(3, np.nan), 0.0
+    return np.linalg.solve(normal, np.einsum("nij,nj->i", across, stations)), float(np.arccos(cosine))
+
+
+def essential_orientations(first: Array, second: Array) -> list[tuple[Array, Array, int]]:
+    """Orient a second photograph in the axes of the first.
+
+    Parameters
+    ----------
+    first, second : (n, 3) rays of the same points in the axes of either camera, n ≥ 5
+
+    Returns
+    -------
+    list of (rotation, station of length 1, number of pairs that agree), the best first, at most four that differ
+    """
+    first = first / np.linalg.norm(first, axis=1)[:, None]
+    second = second / np.linalg.norm(second, axis=1)[:, None]
+    rng = np.random.default_rng(0)
+    found: list[tuple[Array, Array, int, float]] = []
+    for count in range(_FIVES):
+        if count >= _ENOUGH and max((one[2] for one in found), default=0) > 0.9 * len(first):
+            break
+        five = rng.choice(len(first), 5, replace=False)
+        for essential in _essential(first[five], second[five]):
+            for rotation, station in _decomposed(essential):
+                agree, rest = _agreement(first, second, rotation, station)
+                if agree >= 5:
+                    found.append((rotation, station, agree, rest))
+    found.sort(key=lambda one: (-one[2], one[3]))
+    chosen: list[tuple[Array, Array, int]] = []
+    for rotation, station, agree, _ in found[:60]:
+        if agree < 0.8 * found[0][2] or len(chosen) == 4:
+            break
+        if all(np.trace(rotation.T @ one[0]) < 2.999 or station @ one[1] < 0.999 for one in chosen):
+            chosen.append((rotation, station, agree))
+    return chosen
+
+
+def _agreement(first: Array, second: Array, rotation: Array, station: Array) -> tuple[int, float]:
+    """Return how many pairs of rays meet in front of both cameras, and the median angle by which they miss."""
+    turned = second @ rotation.T
+    normal = np.cross(np.broadcast_to(station, first.shape), first)
+    miss = np.abs(np.einsum("ij,ij->i", normal, turned)) / np.maximum(np.linalg.norm(normal, axis=1), 1e-12)
+    # depths along either ray, by the cross products of the law of sines
+    across = np.cross(first, turned)
+    size = np.maximum((across**2).sum(axis=1), 1e-18)
+    near = np.einsum("ij,ij->i", np.cross(station, turned), across) / size
+    far = np.einsum("ij,ij->i", np.cross(station, first), across) / size
+    fine = (miss < _AGREES) & (near > 0.0) & (far > 0.0)
+    return int(fine.sum()), float(np.median(miss))
+
+
+def _decomposed(essential: Array) -> Iterator[tuple[Array, Array]]:
+    """Yield the four orientations of an essential matrix with x₁ᵀ E x₂ = 0, E = [b]× R."""
+    u, _, vt = np.linalg.svd(essential)
+    u, vt = u * np.linalg.det(u), vt * np.linalg.det(vt)
+    w = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    for turn in (w, w.T):
+        for side in (1.0, -1.0):
+            yield u @ turn @ vt, side * u[:, 2]
+
+
+_CUBIC = (
+    (3, 0, 0), (2, 1, 0), (1, 2, 0), (0, 3, 0), (2, 0, 1), (1, 1, 1), (0, 2, 1), (1, 0, 2), (0, 1, 2), (0, 0, 3),
+)  # fmt: skip
+_BASIS = (
+    (2, 0, 0), (1, 1, 0), (0, 2, 0), (1, 0, 1), (0, 1, 1), (0, 0, 2), (1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, 0),
+)  # fmt: skip
+"""Exponents of x, y, z: monomials of the third degree, and those below."""
+
+
+def _times(a: Array, b: Array) -> Array:
+    """Multiply polynomials in x, y, z: arrays (4, 4, 4) of coefficients by exponents."""
+    out = np.zeros((4, 4, 4))
+    for i, j, k in np.argwhere(a):
+        out[i:, j:, k:] += a[i, j, k] * b[: 4 - i, : 4 - j, : 4 - k]
+    return out
+
+
+def _sum(terms: Iterable[Array]) -> Array:
+    return np.asarray(np.sum(list(terms), axis=0))
+
+
+def _essential(first: Array, second: Array) -> Iterator[Array]:
+    """Yield the essential matrices of five pairs of rays."""
+    rows = np.einsum("ni,nj->nij", first, second).reshape(len(first), 9)
+    space = np.linalg.svd(rows)[2][5:].reshape(4, 3, 3)
+    e = np.zeros((3, 3, 4, 4, 4))
+    e[:, :, 1, 0, 0], e[:, :, 0, 1, 0], e[:, :, 0, 0, 1], e[:, :, 0, 0, 0] = space
+    eet = [[_sum(_times(e[i, k], e[j, k]) for k in range(3)) for j in range(3)] for i in range(3)]
+    half = 0.5 * (eet[0][0] + eet[1][1] + eet[2][2])
+    for i in range(3):
+        eet[i][i] = eet[i][i] - half
+    equations = [_sum(_times(eet[i][k], e[k, j]) for k in range(3)) for i in range(3) for j in range(3)]
+    minor = [
+        _times(e[1, (j + 1) % 3], e[2, (j + 2) % 3]) - _times(e[1, (j + 2) % 3], e[2, (j + 1) % 3])
+        for j in range(3)
+    ]
+    equations.append(_sum(_times(e[0, j], minor[j]) for j in range(3)))
+    matrix = np.array([[one[power] for power in (*_CUBIC, *_BASIS)] for one in equations])
+    try:
+        rest = -np.linalg.solve(matrix[:, :10], matrix[:, 10:])
+    except np.linalg.LinAlgError:
+        return
+    action = np.zeros((10, 10))
+    action[:6] = rest[[0, 1, 2, 4, 5, 7]]
+    action[[6, 7, 8, 9], [0, 1, 3, 6]] = 1.0
+    values, vectors = np.linalg.eig(action)
+    for value, vector in zip(values, vectors.T, strict=True):
+        if abs(value.imag) < _REAL and abs(vector[9]) > 1e-12:
+            x, y, z = (vector[6:9] / vector[9]).real
+            yield x * space[0] + y * space[1] + z * space[2] + space[3]

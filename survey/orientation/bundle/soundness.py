@@ -1,0 +1,124 @@
+"""Checks of a network before anything is computed: units, photographs without rays, control that cannot hold it."""
+
+import numpy as np
+
+from moma.errors import SurveyError
+from survey.orientation.network import Camera, Network, listed
+from survey.orientation.projection import corrected
+
+__all__ = ["check_cameras", "check_network"]
+
+_PIXELS_MM = (5e-4, 0.5)  # sizes of pixels, of sensors and of scanned plates [mm]
+_ANGLES = (0.25, 60.0)  # camera constant over the longer side of the photograph: from 127° to telescopes
+_DISTORTED = 0.5  # distortion in the corners over their distance from the principal point
+_OUTSIDE = 0.02  # of the size of the photograph, marks may lie outside it
+_ON_LINE = 1e-3  # extent of control points across a line, over that along it
+
+
+def check_network(network: Network) -> None:
+    """Check a network.
+
+    Raises
+    ------
+    SurveyError
+        at the line of the camera, photograph, mark or control point that is wrong
+    """
+    check_cameras(network)
+    counts = np.bincount(network.photo, minlength=len(network.photos))
+    for photo, count in zip(network.photos, counts, strict=True):
+        if not count:
+            raise SurveyError(
+                f"photograph {photo.name} has no marks",
+                where=photo.where or network.path,
+                remedy="mark points on it, or leave it out",
+            )
+    size = np.array([one.size for one in network.cameras], dtype=float)
+    size = size[[one.camera for one in network.photos]][network.photo]
+    outside = ((network.image < -_OUTSIDE * size) | (network.image > (1.0 + _OUTSIDE) * size)).any(axis=1)
+    for k in np.flatnonzero(outside)[:1]:
+        width, height = network.camera_of(network.photo[k]).size
+        x, y = network.image[k]
+        raise SurveyError(
+            f"point {network.names[network.point[k]]} at ({x:g}, {y:g}) lies outside photograph "
+            f"{network.photos[network.photo[k]].name} of {width} × {height} pixels",
+            where=network.where(int(k)),
+            remedy="marks are in pixels, to the right and down from the upper left corner",
+        )
+    _check_control(network)
+
+
+def check_cameras(network: Network) -> None:
+    """Check the cameras of a network.
+
+    Raises
+    ------
+    SurveyError
+        at the camera whose values are of another unit
+    """
+    for camera in network.cameras:
+        if (fault := _camera_fault(camera)) is not None:
+            raise SurveyError(
+                fault,
+                where=camera.where or network.path,
+                remedy=f"give the camera in one unit, here {camera.unit}",
+            )
+
+
+def _camera_fault(camera: Camera) -> str | None:
+    c, xp, yp = camera.inner[:3].tolist()
+    width, height = (one * camera.pixel for one in camera.size)
+    if not np.isfinite(camera.inner).all():
+        return f"camera {camera.name} has a value that is not finite"
+    if camera.unit == "mm" and not _PIXELS_MM[0] <= camera.pixel <= _PIXELS_MM[1]:
+        return f"camera {camera.name} has pixels of {camera.pixel:g} mm: its format is not in millimetres"
+    ratio = c / max(width, height)
+    if not _ANGLES[0] <= ratio <= _ANGLES[1]:
+        return (
+            f"camera {camera.name} has a camera constant of {c:g} for a format of {width:g} × {height:g} "
+            f"{camera.unit}: they are of different units"
+        )
+    if not (0.0 <= xp <= width and 0.0 <= yp <= height):
+        return (
+            f"camera {camera.name} has its principal point at ({xp:g}, {yp:g}), outside the format of "
+            f"{width:g} × {height:g} {camera.unit}"
+        )
+    if camera.forward:
+        return None
+    corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]) * camera.size
+    plain = corners * camera.pixel * (1.0, -1.0) - (xp, -yp)
+    off = np.linalg.norm(corrected(camera, corners) - plain, axis=1) / np.linalg.norm(plain, axis=1)
+    if off.max() > _DISTORTED:
+        return f"camera {camera.name} distorts its corners by {off.max():.0%}: K and P are of another unit"
+    return None
+
+
+def _check_control(network: Network) -> None:
+    """Check that control points and observed stations hold the network, if there are any."""
+    marked = np.bincount(network.point, minlength=len(network.names))
+    points = [one for one in network.control if not one.check]
+    for one in points:
+        if not marked[one.point]:
+            raise SurveyError(
+                f"control point {network.names[one.point]} is marked on no photograph",
+                where=one.where or network.path,
+                remedy="mark it, or leave it out",
+            )
+    places = [one.place for one in points]
+    places += [one.observed_station for one in network.photos if one.observed_station is not None]
+    if not places or any(one.fixed for one in network.photos):
+        return
+    if len(places) < 3:
+        names = listed([network.names[one.point] for one in points])
+        raise SurveyError(
+            f"{len(points)} control point{'' if len(points) == 1 else 's'} ({names}) cannot hold the photographs",
+            where=(points[0].where if points else network.photos[0].where) or network.path,
+            remedy="give three or more that are not on one line, or none for a network in a frame of its own",
+        )
+    arms = np.array(places) - np.mean(places, axis=0)
+    along, across = np.linalg.svd(arms, compute_uv=False)[:2]
+    if not across > _ON_LINE * along:
+        raise SurveyError(
+            f"the {len(places)} control points {listed([network.names[one.point] for one in points])} lie on one line",
+            where=(points[0].where if points else network.photos[0].where) or network.path,
+            remedy="measure a control point off this line: the photographs could turn about it",
+        )

@@ -1,0 +1,321 @@
+"""Scripts of the Damped Bundle Adjustment Toolbox: XML that names tables of control points, photographs, marks.
+
+    document/input[@base_dir]
+        ctrl_pts/file[@format], check_pts/file, each with filters by id that keep or remove
+        images/file[@format="id,path"]
+        image_pts/file[@format="im,id,x,y,sxy"], the precision also as an attribute sxy [px]
+        cameras/camera: name, unit, sensor, image, focal, cc, pp, K, P, aspect, skew, model
+    document/operations: set_bundle_estimate_params/io names what is calibrated
+
+Tables have commas between their values. The operations themselves are not run: start values are found here.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path, PurePosixPath
+from xml.sax.saxutils import escape
+
+import numpy as np
+
+from moma.errors import SurveyError
+from survey.arrays import Array
+from survey.formats.fields import parse_number, shown
+from survey.formats.text_lines import TextLines
+from survey.orientation.formats.control import ControlRow, with_control, write_control
+from survey.orientation.formats.marks import MarkRow, network_of
+from survey.orientation.formats.xml_lines import Element, read_xml
+from survey.orientation.network import INTERIOR, Camera, Network, Photo
+
+__all__ = ["read_dbat", "write_dbat"]
+
+_PARTS = {
+    "cc": ("c",),
+    "pp": ("xp", "yp"),
+    "aspect": ("as",),
+    "skew": ("sk",),
+    "K": ("K1", "K2", "K3"),
+    "P": ("P1", "P2"),
+}
+_DEFAULT = 1.0  # standard deviation of marks that state none [px]
+
+
+def read_dbat(path: Path) -> Network:
+    """Read a script and its tables.
+
+    Raises
+    ------
+    SurveyError
+        naming file and line
+    """
+    document = read_xml(path, "document")
+    given = document.need("input")
+    base = _base(path, given)
+    free = _estimated(document)
+    cameras = tuple(_camera(one, free) for one in _cameras(given, base))
+    if len(cameras) != 1:
+        raise given.fail(f"{len(cameras)} cameras", "scripts of one camera can be read")
+    images = [row for file in given.all("images", "file") for row in _table(file, base, ("id", "path"))]
+    photos = tuple(Photo(PurePosixPath(str(row["path"])).name, 0, where=str(row["where"])) for row in images)
+    number = {str(row["id"]): photo.name for row, photo in zip(images, photos, strict=True)}
+    if not photos:
+        raise given.fail("the script has no images", "give images/file")
+    marks, source = list[MarkRow](), str(path)
+    for file in given.all("image_pts", "file"):
+        default = file.attributes.get("sxy")
+        for row in _table(file, base, ("im", "id", "x", "y")):
+            where = str(row["where"])
+            if str(row["im"]) not in number:
+                raise SurveyError(
+                    f"no image {row['im']}", where=where, remedy=f"known are {', '.join(number)}"
+                )
+            sigma = row.get("sxy", default)
+            value = None if sigma is None else parse_number(str(sigma), "sxy", where)
+            source, line = where.rpartition(":")[0], int(where.rpartition(":")[2])
+            x, y = (parse_number(str(row[name]), name, where) for name in "xy")
+            marks.append(MarkRow(number[str(row["im"])], str(row["id"]), x, y, value, line))
+    network = network_of(source, tuple(marks), cameras, photos, _DEFAULT)
+    control = [
+        _control(row)
+        for file in given.all("ctrl_pts", "file")
+        for row in _table(file, base, ("id", "x", "y", "z"))
+    ]
+    checks = [
+        _control(row)
+        for file in given.all("check_pts", "file")
+        for row in _table(file, base, ("id", "x", "y", "z"))
+    ]
+    control, checks = _filtered(given.find("ctrl_pts"), control), _filtered(given.find("check_pts"), checks)
+    if not (control or checks):
+        return network
+    rows = {one.number: one for one in (*checks, *control)}
+    only = tuple(
+        one.number
+        for one in checks
+        if one.number not in {row.number for row in control} and one.number in network.names
+    )
+    return with_control(network, tuple(rows.values()), check=only)
+
+
+def _base(path: Path, given: Element) -> Path:
+    text = given.attributes.get("base_dir", "$HERE")
+    return path.parent / text.replace("$HERE", ".", 1) if text.startswith("$HERE") else Path(text)
+
+
+def _table(file: Element, base: Path, needed: tuple[str, ...]) -> list[Mapping[str, object]]:
+    """Read a table by the names of its columns; `where` is added to each row."""
+    columns = [one.strip() for one in file.attribute("format").split(",")]
+    missing = [one for one in needed if one not in columns]
+    if missing:
+        raise file.fail(
+            f"the format {file.attributes['format']!r} has no {missing[0]}", f"it needs {', '.join(needed)}"
+        )
+    lines = TextLines(base / file.text.strip())
+    out = list[Mapping[str, object]]()
+    for line, text in lines.rows():
+        words = [one.strip() for one in text.split(",")]
+        where = f"{lines.path}:{line}"
+        if len(words) != len(columns):
+            raise SurveyError(
+                f"a row of {len(words)} values", where=where, remedy=f"its columns are {', '.join(columns)}"
+            )
+        out.append({**dict(zip(columns, words, strict=True)), "where": where})
+    return out
+
+
+def _control(row: Mapping[str, object]) -> ControlRow:
+    where = str(row["where"])
+    place = [parse_number(str(row[name]), name, where) for name in "xyz"]
+    common = row.get("sxyz", row.get("sxy"))
+    deviations = [row.get(f"s{axis}", common if axis != "z" or "sxyz" in row else None) for axis in "xyz"]
+    sigma = [0.0 if one is None else parse_number(str(one), "a deviation", where) for one in deviations]
+    if any(sigma) and not all(sigma):
+        raise SurveyError("a deviation of 0 beside others", where=where, remedy="give all of them, or none")
+    return ControlRow(
+        str(row["id"]), str(row.get("label", "")), np.array(place), np.diag(np.square(sigma)), where
+    )
+
+
+def _filtered(part: Element | None, rows: list[ControlRow]) -> list[ControlRow]:
+    for one in () if part is None else part.all("filter"):
+        ids = {word.strip() for word in one.attribute("id").split(",")}
+        what = one.text.strip()
+        if what not in ("keep", "remove"):
+            raise one.fail(f"a filter that says {shown(what)}", "write keep or remove")
+        rows = [row for row in rows if (row.number in ids) == (what == "keep")]
+    return rows
+
+
+def _cameras(given: Element, base: Path) -> list[Element]:
+    out = list(given.all("cameras", "camera"))
+    for file in given.all("cameras", "file"):
+        out += read_xml(base / file.text.strip(), "document").all("cameras", "camera")
+    return out
+
+
+def _camera(one: Element, free: tuple[str, ...]) -> Camera:
+    def values(name: str, count: int) -> list[float]:
+        found = one.find(name)
+        return [0.0] * count if found is None or not found.text.strip() else found.numbers()
+
+    image = [int(value) for value in one.need("image").numbers(2)]
+    sensor = one.need("sensor").text.split(",")
+    if len(sensor) != 2:
+        raise one.need("sensor").fail(
+            "a sensor without width and height", "write WIDTH,HEIGHT or auto,HEIGHT"
+        )
+    height = parse_number(sensor[1].strip(), "the sensor", one.need("sensor").where)
+    pixel = height / image[1]
+    cc, pp = values("cc", 1), values("pp", 2)
+    c = cc[0] if len(cc) == 1 and cc[0] else values("focal", 1)[0]
+    aspect = values("aspect", 1)[0] or 1.0
+    width = (
+        image[0] * pixel
+        if sensor[0].strip() == "auto"
+        else parse_number(sensor[0].strip(), "the sensor", one.need("sensor").where)
+    )
+    if sensor[0].strip() != "auto" and abs(width / image[0] / pixel - 1.0) > 0.05:
+        raise one.need("sensor").fail(
+            f"pixels of {width / image[0]:g} × {pixel:g} mm", "check the sensor's size"
+        )
+    xp, yp = (pp[0], -pp[1]) if len(pp) == 2 and any(pp) else (0.5 * width, 0.5 * height)
+    radial, tangential = (values("K", 3) + [0.0] * 3)[:3], (values("P", 2) + [0.0] * 2)[:2]
+    model = one.find("model")
+    number = 1 if model is None else int(model.numbers(1)[0])
+    if number not in (-1, 1, 2, 3, 4, 5):
+        raise one.fail(f"lens distortion model {number}", "models -1 and 1 to 5 are known")
+    name = one.find("name")
+    inner = np.array([c, xp, yp, aspect - 1.0, values("skew", 1)[0], *radial, *tangential])
+    return Camera(
+        "camera1" if name is None else name.text.strip(),
+        inner,
+        (image[0], image[1]),
+        pixel,
+        "mm",
+        number < 0,
+        free,
+        one.where,
+    )
+
+
+def _estimated(document: Element) -> tuple[str, ...]:
+    """Return the parameters of the camera that the script estimates."""
+    found = next(
+        (
+            e
+            for path in (("operations",), ("operations", "operation"))
+            for e in document.all(*path, "set_bundle_estimate_params", "io")
+        ),
+        None,
+    )
+    if found is None:
+        return ()
+    whole = found.find("all")
+    chosen = set(INTERIOR) if whole is not None and whole.text.strip() == "true" else set()
+    for one in found.children:
+        if one.name == "all":
+            continue
+        names = _PARTS.get(one.name) or ((one.name,) if one.name in INTERIOR else None)
+        if names is None or one.text.strip() not in ("true", "false"):
+            raise one.fail(
+                f"<{one.name}> {shown(one.text.strip())}", f"write true or false for {', '.join(_PARTS)}"
+            )
+        chosen = chosen | set(names) if one.text.strip() == "true" else chosen - set(names)
+    return tuple(name for name in INTERIOR if name in chosen)
+
+
+def write_dbat(network: Network, folder: Path) -> Path:
+    """Write a script with its tables into a folder; return its path.
+
+    Raises
+    ------
+    SurveyError
+        if there are several cameras, or one in pixels
+    """
+    if len(network.cameras) != 1 or network.cameras[0].unit != "mm":
+        raise SurveyError(
+            "several cameras, or one in pixels", where=str(folder), remedy="use one camera, in millimetres"
+        )
+    camera = network.cameras[0]
+    folder.mkdir(parents=True, exist_ok=True)
+    rows = [
+        ControlRow(network.names[one.point], network.names[one.point], one.place, one.covariance)
+        for one in network.control
+    ]
+    kinds = {"control": [r for r, one in zip(rows, network.control, strict=True) if not one.check]}
+    kinds["check"] = [r for r, one in zip(rows, network.control, strict=True) if one.check]
+    tables = []
+    for kind, tag in (("control", "ctrl_pts"), ("check", "check_pts")):
+        if kinds[kind]:
+            tables.append(
+                f'<{tag}><file format="{_control_table(kinds[kind], folder / f"{kind}.txt")}">{kind}.txt</file></{tag}>'
+            )
+    _lines(folder / "images.txt", [f"{k}, {one.name}" for k, one in enumerate(network.photos, start=1)])
+    marks = [
+        ", ".join(
+            [
+                str(network.photo[k] + 1),
+                network.names[network.point[k]],
+                *map(repr, network.image[k].tolist()),
+                repr(_rms(network.sigma[k])),
+            ]
+        )
+        for k in range(len(network.photo))
+    ]
+    _lines(folder / "marks.txt", marks)
+    inner = dict(zip(INTERIOR, camera.inner.tolist(), strict=True))
+    width, height = camera.size
+    k, p = (",".join(repr(inner[name]) for name in names) for names in (_PARTS["K"], _PARTS["P"]))
+    estimated = "".join(f"<{name}>true</{name}>" for name in camera.free)
+    script = [
+        '<?xml version="1.0" encoding="UTF-8"?>',
+        '<document dbat_script_version="1.0">',
+        '<input base_dir="$HERE">',
+        *tables,
+        '<images><file format="id,path">images.txt</file></images>',
+        '<image_pts><file format="im,id,x,y,sxy">marks.txt</file></image_pts>',
+        "<cameras><camera>",
+        f"<name>{escape(camera.name)}</name>",
+        "<unit>mm</unit>",
+        f"<sensor>auto,{camera.pixel * height!r}</sensor>",
+        f"<image>{width},{height}</image>",
+        f"<cc>{inner['c']!r}</cc>",
+        f"<pp>{inner['xp']!r},{-inner['yp']!r}</pp>",
+        f"<aspect>{1.0 + inner['as']!r}</aspect>",
+        f"<skew>{inner['sk']!r}</skew>",
+        f"<K>{k}</K>",
+        f"<P>{p}</P>",
+        f"<model>{-1 if camera.forward else 3}</model>",
+        "</camera></cameras>",
+        "</input>",
+        "<operations><set_bundle_estimate_params>",
+        f"<io><all>false</all>{estimated}</io>",
+        "</set_bundle_estimate_params></operations>",
+        "</document>",
+    ]
+    _lines(folder / "project.xml", script)
+    return folder / "project.xml"
+
+
+def _control_table(rows: list[ControlRow], path: Path) -> str:
+    weighted = [bool(row.covariance.any()) for row in rows]
+    if any(weighted) and not all(weighted):
+        raise SurveyError(
+            "fixed control points beside weighted ones", where=str(path), remedy="weight all, or none"
+        )
+    write_control([replace(row, covariance=np.zeros((3, 3))) for row in rows], path)
+    if not any(weighted):
+        return "id,label,x,y,z"
+    text = ["# number, name, X, Y, Z, standard deviations"]
+    for row in rows:
+        values = [*row.place.tolist(), *np.sqrt(np.diag(row.covariance)).tolist()]
+        text.append(", ".join([row.number, row.name, *map(repr, values)]))
+    _lines(path, text)
+    return "id,label,x,y,z,sx,sy,sz"
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt((values**2).mean()))
+
+
+def _lines(path: Path, lines: list[str]) -> None:
+    path.write_text("\n".join([*lines, ""]), encoding="utf-8", newline="\n")

@@ -1,0 +1,305 @@
+"""XML of cameras and markers as Agisoft Metashape exports it, both in one file or in two.
+
+A chunk holds sensors with their calibrations, cameras with their transformation from the camera's axes (x to the
+right, y
+down, z forward) to those of the chunk, the chunk's own transformation to the world, markers with their places by
+survey, and their marks on the photographs. Distortion is forward, of coordinates over the depth:
+
+    u = w/2 + c_x + x' f + x' B₁ + y' B₂,   v = h/2 + c_y + y' f
+"""
+
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from moma.errors import SurveyError
+from survey.arrays import Array
+from survey.formats.fields import parse_number
+from survey.orientation.formats.xml_lines import Element, read_xml
+from survey.orientation.network import Camera, Control, Network, Photo
+
+__all__ = ["read_metashape", "write_metashape"]
+
+_FLIP = np.diag([1.0, -1.0, -1.0])
+
+
+def read_metashape(path: Path, markers: Path | None = None, sigma: float = 1.0) -> Network:
+    """Read cameras and markers.
+
+    Parameters
+    ----------
+    path : the file of the cameras
+    markers : the file of the markers; None: the same
+    sigma : standard deviation of marks, where the file states none [px]
+
+    Raises
+    ------
+    SurveyError
+        naming file and line
+    """
+    chunk = read_xml(path, "document").need("chunk")
+    sensors = {one.attribute("id"): k for k, one in enumerate(chunk.all("sensors", "sensor"))}
+    cameras = tuple(_camera(one) for one in chunk.all("sensors", "sensor"))
+    world = _world(chunk)
+    photos: dict[str, Photo] = {}
+    for one in _grouped(chunk, "cameras", "camera"):
+        if one.attributes.get("enabled", "true").lower() in ("0", "false"):
+            continue
+        if one.attribute("sensor_id") not in sensors:
+            raise one.fail(
+                f"sensor {one.attributes['sensor_id']} is not in the file", "export the cameras again"
+            )
+        photos[one.attribute("id")] = _photo(one, sensors[one.attributes["sensor_id"]], world)
+    if not photos:
+        raise chunk.fail("the chunk has no cameras", "export the cameras")
+    other = chunk if markers is None else read_xml(markers, "document").need("chunk")
+    remarks = []
+    if (
+        (reference := chunk.find("reference")) is not None
+        and "LOCAL_CS" not in reference.text
+        and reference.text.strip()
+    ):
+        remarks.append("the chunk is georeferenced: places are geocentric")
+    return _network(path if markers is None else markers, other, cameras, photos, sigma, tuple(remarks))
+
+
+def _grouped(chunk: Element, outer: str, inner: str) -> list[Element]:
+    return [*chunk.all(outer, inner), *chunk.all(outer, "group", inner)]
+
+
+def _value(calibration: Element, name: str) -> float:
+    found = calibration.find(name)
+    return 0.0 if found is None else found.numbers(1)[0]
+
+
+def _camera(sensor: Element) -> Camera:
+    name = sensor.attributes.get("label") or sensor.attribute("id")
+    kind = sensor.attributes.get("type", "frame")
+    if kind != "frame":
+        raise sensor.fail(f"sensor {name} is {kind!r}", "central projections ('frame') can be read")
+    calibrations = list(sensor.all("calibration"))
+    if not calibrations:
+        raise sensor.fail(f"sensor {name} has no calibration", "align the photographs before exporting")
+    one = next((c for c in calibrations if c.attributes.get("class") == "adjusted"), calibrations[-1])
+    size = one.find("resolution") or sensor.need("resolution")
+    width, height = int(size.number("width")), int(size.number("height"))
+    fx, fy = (_value(one, "f"),) * 2 if one.find("f") is not None else (_value(one, "fx"), _value(one, "fy"))
+    if not (fx > 0.0 and fy > 0.0):
+        raise one.fail(f"sensor {name} has no focal length", "align the photographs before exporting")
+    if _value(one, "k4") or _value(one, "p3") or _value(one, "p4"):
+        raise one.fail(f"sensor {name} has k4, p3 or p4", "calibrate with k1, k2, k3, p1, p2 alone")
+    cx, cy = _value(one, "cx"), _value(one, "cy")
+    if one.find("f") is not None:  # since version 1.4 the principal point counts from the centre
+        cx, cy = cx + 0.5 * width, cy + 0.5 * height
+    stretch = fx + _value(one, "b1")
+    skew = _value(one, "b2") + _value(one, "skew")
+    k1, k2, k3 = (_value(one, name) for name in ("k1", "k2", "k3"))
+    inner = [
+        fy,
+        cx,
+        cy,
+        stretch / fy - 1.0,
+        -skew / fy,
+        k1 / fy**2,
+        k2 / fy**4,
+        k3 / fy**6,
+        _value(one, "p1") / fy,
+        -_value(one, "p2") / fy,
+    ]
+    return Camera(name, np.array(inner), (width, height), 1.0, "px", True, where=one.where)
+
+
+def _world(chunk: Element) -> tuple[Array, Array, float]:
+    """Return rotation, shift and scale from the chunk to the world."""
+    own = chunk.find("transform")
+    if own is None:
+        return np.eye(3), np.zeros(3), 1.0
+    rotation, shift, scale = own.find("rotation"), own.find("translation"), own.find("scale")
+    return (
+        np.eye(3) if rotation is None else np.array(rotation.numbers(9)).reshape(3, 3),
+        np.zeros(3) if shift is None else np.array(shift.numbers(3)),
+        1.0 if scale is None else scale.numbers(1)[0],
+    )
+
+
+def _photo(one: Element, camera: int, world: tuple[Array, Array, float]) -> Photo:
+    name = one.attributes.get("label") or one.attribute("id")
+    rotation, station = None, None
+    if (found := one.find("transform")) is not None:
+        own = np.array(found.numbers(16)).reshape(4, 4)
+        turn, shift, scale = world
+        rotation = turn @ own[:3, :3] @ _FLIP
+        if not np.allclose(rotation.T @ rotation, np.eye(3), atol=1e-6) or np.linalg.det(rotation) < 0.0:
+            raise found.fail(f"the transform of camera {name} is no rotation", "export the cameras again")
+        station = scale * turn @ own[:3, 3] + shift
+    return Photo(name, camera, rotation, station, where=one.where)
+
+
+def _network(
+    path: Path,
+    chunk: Element,
+    cameras: tuple[Camera, ...],
+    photos: dict[str, Photo],
+    sigma: float,
+    remarks: tuple[str, ...],
+) -> Network:
+    places = {one: k for k, one in enumerate(photos)}
+    markers = {one.attribute("id"): one for one in _grouped(chunk, "markers", "marker")}
+    names = [one.attributes.get("label") or number for number, one in markers.items()]
+    index = {number: k for k, number in enumerate(markers)}
+    accuracy = next(
+        (
+            one
+            for one in chunk.all("settings", "property")
+            if one.attributes.get("name") == "accuracy_projections"
+        ),
+        None,
+    )
+    if accuracy is not None:
+        sigma = accuracy.number("value")
+    control = tuple(
+        Control(index[number], place, covariance, where=found.where)
+        for number, one in markers.items()
+        if (found := one.find("reference")) is not None
+        and found.attributes.get("enabled", "true").lower() not in ("0", "false")
+        and "x" in found.attributes
+        for place, covariance in [_reference(found)]
+    )
+    photo, point, image, lines, seen = (
+        list[int](),
+        list[int](),
+        list[list[float]](),
+        list[int](),
+        set[tuple[int, int]](),
+    )
+    for marker in chunk.all("frames", "frame", "markers", "marker"):
+        number = marker.attribute("marker_id")
+        if number not in index:
+            raise marker.fail(f"marker {number} is not in the file", "export the markers again")
+        for location in marker.all("location"):
+            if location.attribute("camera_id") not in places or location.attributes.get(
+                "pinned", "true"
+            ).lower() in ("0", "false"):
+                continue
+            key = places[location.attributes["camera_id"]], index[number]
+            if key in seen:
+                raise location.fail(f"marker {names[key[1]]} is marked twice on one photograph", "keep one")
+            seen.add(key)
+            photo.append(key[0])
+            point.append(key[1])
+            image.append([location.number("x"), location.number("y")])
+            lines.append(int(location.where.rpartition(":")[2]))
+    start = np.full((len(names), 3), np.nan)
+    for one in control:
+        start[one.point] = one.place
+    return Network(
+        str(path),
+        cameras,
+        tuple(photos.values()),
+        tuple(names),
+        start,
+        control,
+        np.array(photo, dtype=np.int64),
+        np.array(point, dtype=np.int64),
+        np.array(image).reshape(-1, 2),
+        np.full((len(photo), 2), sigma),
+        np.array(lines, dtype=np.int64),
+        remarks,
+    )
+
+
+def _reference(one: Element) -> tuple[Array, Array]:
+    """Return the place of a marker by survey, and its covariance."""
+    sigmas = [one.attributes.get(name) or one.attributes.get("sxyz") for name in ("sx", "sy", "sz")]
+    deviations = [0.0 if text is None else parse_number(text, "a deviation", one.where) for text in sigmas]
+    return np.array([one.number(name) for name in "xyz"]), np.diag(np.square(deviations))
+
+
+def write_metashape(network: Network, path: Path) -> None:
+    """Write cameras and markers in one file, with all digits.
+
+    Raises
+    ------
+    SurveyError
+        if a camera has backward distortion, or an orientation is missing
+    """
+    out = [
+        '<?xml version="1.0" encoding="UTF-8"?>',
+        '<document version="1.5.0">',
+        '<chunk label="moma" enabled="true">',
+        "<sensors>",
+    ]
+    for index, camera in enumerate(network.cameras):
+        if not camera.forward:
+            raise SurveyError(
+                f"camera {camera.name} has backward distortion",
+                where=str(path),
+                remedy='Metashape holds forward distortion: calibrate with model = "forward"',
+            )
+        out += _sensor(index, camera)
+    out += ["</sensors>", "<cameras>"]
+    for index, photo in enumerate(network.photos):
+        if photo.rotation is None or photo.station is None:
+            raise SurveyError(
+                f"photograph {photo.name} is not oriented", where=str(path), remedy="orient it first"
+            )
+        pose = np.eye(4)
+        pose[:3, :3], pose[:3, 3] = photo.rotation @ _FLIP, photo.station
+        numbers = " ".join(map(repr, pose.ravel().tolist()))
+        out.append(
+            f'<camera id="{index}" sensor_id="{photo.camera}" label={quoteattr(photo.name)} enabled="true">'
+        )
+        out += [f"<transform>{numbers}</transform>", "</camera>"]
+    out += ["</cameras>", "<markers>"]
+    control = {one.point: one for one in network.control}
+    for number, name in enumerate(network.names):
+        out.append(f'<marker id="{number}" label={quoteattr(name)}>')
+        if number in control:
+            x, y, z = control[number].place.tolist()
+            deviations = np.sqrt(np.diag(control[number].covariance)).tolist()
+            own = (
+                "".join(f' s{axis}="{value!r}"' for axis, value in zip("xyz", deviations, strict=True))
+                if any(deviations)
+                else ""
+            )
+            out.append(f'<reference x="{x!r}" y="{y!r}" z="{z!r}"{own} enabled="true"/>')
+        out.append("</marker>")
+    out += ["</markers>", "<frames>", '<frame id="0">', "<markers>"]
+    for i in range(len(network.names)):
+        out.append(f'<marker marker_id="{i}">')
+        for k in np.flatnonzero(network.point == i).tolist():
+            x, y = network.image[k].tolist()
+            out.append(f'<location camera_id="{network.photo[k]}" pinned="true" x="{x!r}" y="{y!r}"/>')
+        out.append("</marker>")
+    sigma = float(np.sqrt((network.sigma**2).mean())) if len(network.sigma) else 1.0
+    out += ["</markers>", "</frame>", "</frames>", "<settings>"]
+    out += [
+        f'<property name="accuracy_projections" value="{sigma!r}"/>',
+        "</settings>",
+        "</chunk>",
+        "</document>",
+        "",
+    ]
+    path.write_text("\n".join(out), encoding="utf-8", newline="\n")
+
+
+def _sensor(number: int, camera: Camera) -> list[str]:
+    c, xp, yp, a, s, k1, k2, k3, p1, p2 = camera.inner.tolist()
+    width, height = camera.size
+    f = c / camera.pixel
+    values = {
+        "f": f, "b1": a * f, "b2": -s * f,
+        "cx": xp / camera.pixel - 0.5 * width, "cy": yp / camera.pixel - 0.5 * height,
+        "k1": k1 * c**2, "k2": k2 * c**4, "k3": k3 * c**6, "p1": p1 * c, "p2": -p2 * c,
+    }  # fmt: skip
+    size = f'<resolution width="{width}" height="{height}"/>'
+    return [
+        f'<sensor id="{number}" label={quoteattr(camera.name)} type="frame">',
+        size,
+        '<calibration type="frame" class="adjusted">',
+        size,
+        *(f"<{name}>{value!r}</{name}>" for name, value in values.items()),
+        "</calibration>",
+        "</sensor>",
+    ]

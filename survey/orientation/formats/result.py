@@ -1,0 +1,261 @@
+"""orientation.json: the result of an orientation, for programs, reports, and the stones measured on its photographs.
+
+Angles in degrees, places in metres, cameras in their unit, marks in pixels; deviations and covariances have σ₀² in
+them.
+"""
+
+import base64
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from moma.errors import SurveyError
+from survey.arrays import Array
+from survey.formats.fields import unreadable
+from survey.orientation.bundle.orient import Orientation, control_tests
+from survey.orientation.bundle.statistics import photo_precision
+from survey.orientation.network import INTERIOR, Camera, Photo
+from survey.orientation.oriented import Oriented
+from survey.orientation.rotations import angles, from_angles
+
+__all__ = ["orientation_values", "read_orientation", "write_orientation"]
+
+_CORRELATED = 0.95  # correlation from which two parameters are named
+_ANGLES = ("omega", "phi", "kappa", "x", "y", "z")
+
+
+def orientation_values(result: Orientation, *, name: str = "") -> dict[str, Any]:
+    """Describe an orientation in plain values.
+
+    Returns
+    -------
+    dict
+        sigma0, redundancy, observations, unknowns, iterations, camera, cameras, photos, points, control, marks,
+        correlations, remarks, covariance (lower triangle by rows, little-endian float64 in base64) with its columns
+    """
+    network, statistics = result.network, result.statistics
+    values = result.solution.unknowns
+    scaled = result.scale**2
+    deviations = result.scale * np.sqrt(np.maximum(np.diag(statistics.cameras), 0.0))
+    column = {one: k for k, one in enumerate(result.prepared.columns)}
+    cameras = [
+        {
+            "name": one.name,
+            "model": one.model,
+            "unit": one.unit,
+            "size": list(one.size),
+            "pixel": one.pixel,
+            "parameters": {
+                parameter: {
+                    "value": float(values.inner[m, k]),
+                    "sigma": float(deviations[column[one.name, parameter]])
+                    if (one.name, parameter) in column
+                    else 0.0,
+                }
+                for k, parameter in enumerate(INTERIOR)
+            },
+        }
+        for m, one in enumerate(network.cameras)
+    ]
+    return {
+        "name": name or network.path,
+        "sigma0": _finite(statistics.sigma0),
+        "redundancy": statistics.redundancy,
+        "observations": result.prepared.observations,
+        "unknowns": result.prepared.count,
+        "iterations": result.solution.iterations,
+        "datum": "inner constraints of the points" if result.prepared.datum else "control",
+        "camera": cameras[0]["parameters"],
+        "cameras": cameras,
+        "photos": _photos(result),
+        "points": [
+            {
+                "id": network.names[i],
+                "xyz": values.point[i].tolist(),
+                "covariance": (scaled * statistics.points[i]).tolist(),
+            }
+            for i in range(len(network.names))
+            if np.isfinite(statistics.points[i]).all() and np.isfinite(values.point[i]).all()
+        ],
+        "control": _control(result),
+        "marks": _marks(result),
+        "correlations": _correlations(result),
+        "remarks": list(result.remarks),
+        "covariance": {
+            "columns": [list(one) for one in result.prepared.columns],
+            "lower": _packed(scaled * statistics.cameras),
+        },
+        "mark_sigma": float(np.sqrt((network.sigma**2).mean())) * result.scale,
+    }
+
+
+def _photos(result: Orientation) -> list[dict[str, Any]]:
+    network, values = result.network, result.solution.unknowns
+    covariance = photo_precision(network, result.prepared, result.solution, result.statistics)
+    deviations = result.scale * np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0))
+    deviations[:, :3] = np.degrees(deviations[:, :3])
+    residuals, out = result.residuals, []
+    for f, one in enumerate(network.photos):
+        mine = residuals[(network.photo == f) & np.isfinite(residuals).all(axis=1)]
+        place = [*np.degrees(angles(values.rotation[f])).tolist(), *values.station[f].tolist()]
+        out.append(
+            {
+                "name": one.name,
+                "camera": network.cameras[one.camera].name,
+                **dict(zip(_ANGLES, place, strict=True)),
+                "sigma": dict(zip(_ANGLES, deviations[f].tolist(), strict=True)),
+                "marks": len(mine),
+                "rms": float(np.sqrt((mine**2).sum(axis=1).mean())) if len(mine) else None,
+            }
+        )
+    return out
+
+
+def _control(result: Orientation) -> list[dict[str, Any]]:
+    network, values = result.network, result.solution.unknowns
+    tests = control_tests(network, result.solution, result.statistics)
+    return [
+        {
+            "id": network.names[one.point],
+            "use": "check" if one.check else "fixed" if one.fixed else "weighted",
+            "place": one.place.tolist(),
+            "sigma": np.sqrt(np.diag(one.covariance)).tolist(),
+            "residual": (one.place - values.point[one.point]).tolist(),
+            "test": float(test),
+        }
+        for one, test in zip(network.control, tests, strict=True)
+    ]
+
+
+def _marks(result: Orientation) -> dict[str, Any]:
+    """Describe the marks by columns: rows of their own would make the file three times as long."""
+    network, statistics = result.network, result.statistics
+    removed = result.removed
+    taken = [
+        k for k in range(len(network.photo)) if np.isfinite(statistics.residuals[k]).all() or k in removed
+    ]
+    tests, residuals = np.abs(statistics.standardised), result.residuals
+    suspected = set(result.suspected)
+    return {
+        "photo": [network.photos[network.photo[k]].name for k in taken],
+        "point": [network.names[network.point[k]] for k in taken],
+        "line": network.lines[taken].tolist(),
+        "x": network.image[taken, 0].tolist(),
+        "y": network.image[taken, 1].tolist(),
+        "vx": [_finite(one) for one in residuals[taken, 0].round(5).tolist()],
+        "vy": [_finite(one) for one in residuals[taken, 1].round(5).tolist()],
+        "test": [
+            removed.get(k, _finite(one))
+            for k, one in zip(taken, tests[taken].max(axis=1).round(3).tolist(), strict=True)
+        ],
+        "redundancy": [_finite(one) for one in statistics.parts[taken].sum(axis=1).round(4).tolist()],
+        "external": [_finite(one) for one in statistics.external[taken].max(axis=1).round(7).tolist()],
+        "verdict": ["removed" if k in removed else "suspected" if k in suspected else "" for k in taken],
+    }
+
+
+def _correlations(result: Orientation) -> list[dict[str, Any]]:
+    """Name pairs of parameters of one camera or photograph with a correlation over 95 %."""
+    columns = result.prepared.columns
+    size = np.sqrt(np.maximum(np.diag(result.statistics.cameras), 1e-300))
+    labels = {"rx": "omega", "ry": "phi", "rz": "kappa"}
+    precision = photo_precision(result.network, result.prepared, result.solution, result.statistics)
+    out = []
+    for f, photo in enumerate(result.network.photos):
+        own = precision[f]
+        spread = np.sqrt(np.maximum(np.diag(own), 1e-300))
+        for a in range(6):
+            for b in range(a + 1, 6):
+                value = float(own[a, b] / (spread[a] * spread[b]))
+                if abs(value) > _CORRELATED and own.any():
+                    out.append({"of": photo.name, "a": _ANGLES[a], "b": _ANGLES[b], "value": value})
+    inner = [k for k, (_, parameter) in enumerate(columns) if parameter in INTERIOR]
+    for place, a in enumerate(inner):
+        for b in inner[place + 1 :]:
+            value = float(result.statistics.cameras[a, b] / (size[a] * size[b]))
+            if abs(value) > _CORRELATED and columns[a][0] == columns[b][0]:
+                names = [labels.get(columns[k][1], columns[k][1]) for k in (a, b)]
+                out.append({"of": columns[a][0], "a": names[0], "b": names[1], "value": value})
+    return out
+
+
+def _packed(matrix: Array) -> str:
+    lower = matrix[np.tril_indices(len(matrix))]
+    return base64.b64encode(lower.astype("<f8").tobytes()).decode("ascii")
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def write_orientation(path: Path, values: dict[str, Any]) -> None:
+    """Write the file."""
+    path.write_text(json.dumps(values, ensure_ascii=False, allow_nan=False, indent=1), encoding="utf-8")
+
+
+def read_orientation(path: Path) -> Oriented:
+    """Read the photographs of such a file.
+
+    Raises
+    ------
+    SurveyError
+        if it cannot be read, or is not such a file
+    """
+    try:
+        values = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise unreadable(path, error, "write it with moma orient") from error
+    except ValueError as error:
+        raise SurveyError(
+            f"this is not JSON: {error}", where=str(path), remedy="write it with moma orient"
+        ) from error
+    try:
+        return _oriented(path, values)
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        raise SurveyError(
+            f"this is not the result of an orientation: {type(error).__name__} {error}",
+            where=str(path),
+            remedy="write it with moma orient",
+        ) from error
+
+
+def _oriented(path: Path, values: dict[str, Any]) -> Oriented:
+    cameras = tuple(
+        Camera(
+            one["name"],
+            np.array([float(one["parameters"][name]["value"]) for name in INTERIOR]),
+            (int(one["size"][0]), int(one["size"][1])),
+            float(one["pixel"]),
+            str(one["unit"]),
+            one["model"] == "forward",
+        )
+        for one in values["cameras"]
+    )
+    index = {one.name: k for k, one in enumerate(cameras)}
+    photos = tuple(
+        Photo(
+            one["name"],
+            index[one["camera"]],
+            from_angles(*np.radians([one["omega"], one["phi"], one["kappa"]])),
+            np.array([one["x"], one["y"], one["z"]], dtype=float),
+        )
+        for one in values["photos"]
+    )
+    columns = [tuple(one) for one in values["covariance"]["columns"]]
+    lower = np.frombuffer(base64.b64decode(values["covariance"]["lower"]), dtype="<f8")
+    covariance = np.zeros((len(columns), len(columns)))
+    covariance[np.tril_indices(len(columns))] = lower
+    covariance += np.tril(covariance, -1).T
+    place = {one: k for k, one in enumerate(columns)}
+    exterior = ("rx", "ry", "rz", "x", "y", "z")
+    table = np.array(
+        [
+            [place.get((one.name, name), -1) for name in exterior]
+            + [place.get((cameras[one.camera].name, name), -1) for name in INTERIOR]
+            for one in photos
+        ],
+        dtype=np.int64,
+    )
+    return Oriented(str(path), cameras, photos, table, covariance, float(values["mark_sigma"]))

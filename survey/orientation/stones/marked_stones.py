@@ -1,0 +1,239 @@
+"""Stones marked on oriented photographs: from marks to points and corners in space.
+
+A point marked on two or more photographs is intersected. A corner marked on one meets the surface that the stone
+names, or the
+plane of the stone's own points; that outline can also be a polygon drawn on one photograph (`photo`, `pixel`).
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from moma.errors import MomaError, SurveyError
+from survey.arrays import Array
+from survey.orientation.formats.result import read_orientation
+from survey.orientation.oriented import Oriented
+from survey.orientation.stones.intersection import intersect
+from survey.orientation.stones.located import Located, Mark, joint_covariance
+from survey.orientation.stones.plotting import plot
+from survey.orientation.stones.surfaces import Surface, fit_surface
+from survey.records.survey import BlockRecord, PointMark, Reject, SolidRecord, SurfaceRule, SurveyHead
+
+__all__ = ["located_stones"]
+
+_LEAST = 1e-5  # standard deviation along the normal below which a point counts no more [m]
+
+Item = BlockRecord | SolidRecord | Reject
+
+
+def located_stones(items: Iterator[Item], head: SurveyHead) -> Iterator[Item]:
+    """Locate the points of the stones that were marked on photographs; pass on all others.
+
+    Stones with marks come last, because a surface may be defined by the points of several.
+
+    Raises
+    ------
+    SurveyError
+        if the result of the orientation cannot be read
+    """
+    assert head.orientation is not None
+    oriented = read_orientation(Path(head.path).parent / head.orientation)
+    homographies = {one.name for one in head.photographs}
+    marked = list[BlockRecord]()
+    for item in items:
+        if isinstance(item, BlockRecord) and (
+            item.marks or (item.photograph is not None and item.photograph not in homographies)
+        ):
+            marked.append(item)
+        else:
+            yield item
+    yield from _located(marked, head, oriented)
+
+
+def _located(records: Sequence[BlockRecord], head: SurveyHead, oriented: Oriented) -> Iterator[Item]:
+    points: dict[str, dict[str, Located]] = {}
+    errors: dict[str, MomaError] = {}
+    for record in records:
+        try:
+            points[record.code] = _intersected(record, head, oriented)
+        except MomaError as error:
+            errors[record.code] = error
+    surfaces = {rule.name: _surface(rule, records, points, oriented) for rule in head.surfaces}
+    for record in records:
+        try:
+            if record.code in errors:
+                raise errors[record.code]
+            yield _record(record, head, oriented, points[record.code], surfaces)
+        except MomaError as error:
+            place = f"{head.path}:{record.line}"
+            where = (
+                error.where if error.where is not None and error.where.startswith(f"{head.path}:") else place
+            )
+            yield Reject(record.code, error.at(f"{where}: stone {record.code}"), record.spans)
+
+
+def _marks(record: BlockRecord) -> dict[str, list[PointMark]]:
+    """Group the marks of a stone by their points; corners drawn on one photograph are points of their own."""
+    out: dict[str, list[PointMark]] = {}
+    for one in record.marks:
+        out.setdefault(one.name, []).append(one)
+    for number, image in enumerate(record.image, start=1):
+        name = f"corner {number}"
+        out[name] = [PointMark(name, "vertex", record.photograph or "", image, None, record.line)]
+    return out
+
+
+def _mark(one: PointMark, head: SurveyHead, oriented: Oriented) -> Mark:
+    where = f"{head.path}:{one.line}"
+    photo = oriented.index(one.photograph, where)
+    width, height = oriented.camera(photo).size
+    if not (
+        -0.02 * width <= one.image[0] <= 1.02 * width and -0.02 * height <= one.image[1] <= 1.02 * height
+    ):
+        raise SurveyError(
+            f"point {one.name} at ({one.image[0]:g}, {one.image[1]:g}) lies outside photograph {one.photograph} "
+            f"of {width} × {height} pixels",
+            where=where,
+            remedy="marks are in pixels, to the right and down from the upper left corner",
+        )
+    return Mark(photo, one.image, one.sigma or oriented.mark_sigma, one.line)
+
+
+def _intersected(record: BlockRecord, head: SurveyHead, oriented: Oriented) -> dict[str, Located]:
+    """Return the points of a stone that are known in space: two photographs show them, or they were measured."""
+    if len(record.vertices):
+        raise SurveyError("it has marks and vertices in space", remedy="give its outline in one way")
+    out = {}
+    for k, (place, sigma) in enumerate(zip(record.points, record.point_sigmas, strict=True), start=1):
+        name = f"measured {k}"
+        still = np.zeros((3, len(oriented.covariance)))
+        out[name] = Located(
+            name, place, still, {f"{record.code} {name}": sigma * np.eye(3)}, (), "measured in space"
+        )
+    for name, ones in _marks(record).items():
+        marks = [_mark(one, head, oriented) for one in ones]
+        if len(marks) >= 2:
+            try:
+                out[name] = intersect(oriented, name, marks)
+            except MomaError as error:
+                raise error.at(f"{head.path}:{marks[0].line}") from error
+    return out
+
+
+def _surface(
+    rule: SurfaceRule,
+    records: Sequence[BlockRecord],
+    points: Mapping[str, Mapping[str, Located]],
+    oriented: Oriented,
+) -> Surface | MomaError:
+    """Fit a surface to the points of all stones that lie on it."""
+    own: dict[str, Located] = {}
+    for record in records:
+        if record.surface == rule.name:
+            # a corner that stones share is measured once
+            own |= {f"{one.place.round(6).tolist()}": one for one in points.get(record.code, {}).values()}
+    try:
+        return fit_surface(rule.kind, list(own.values()), oriented, _middle(oriented), rule.sigma)
+    except MomaError as error:
+        return error.at(f"surface {rule.name} (line {rule.line})")
+
+
+def _middle(oriented: Oriented) -> Array:
+    return np.asarray(np.mean([oriented.station(f) for f in range(len(oriented.photos))], axis=0))
+
+
+def _record(
+    record: BlockRecord,
+    head: SurveyHead,
+    oriented: Oriented,
+    intersected: Mapping[str, Located],
+    surfaces: Mapping[str, Surface | MomaError],
+) -> BlockRecord:
+    grouped = _marks(record)
+    single = [name for name in grouped if name not in intersected]
+    plotted = {}
+    if single:
+        surface = _own_surface(record, intersected, surfaces, oriented)
+        for name in single:
+            mark = _mark(grouped[name][0], head, oriented)
+            try:
+                plotted[name] = plot(oriented, name, mark, surface)
+            except MomaError as error:
+                raise error.at(f"{head.path}:{mark.line}") from error
+    role = {name: ones[0].role for name, ones in grouped.items()}
+    measured = [one for name, one in intersected.items() if name not in grouped]
+    # points that only one photograph shows define nothing: they were put on the surface
+    located = measured + [
+        intersected[name] for name in grouped if role[name] == "point" and name in intersected
+    ]
+    corners = [plotted.get(name) or intersected[name] for name in grouped if role[name] == "vertex"]
+    return _in_space(record, oriented, located, corners)
+
+
+def _own_surface(
+    record: BlockRecord,
+    intersected: Mapping[str, Located],
+    surfaces: Mapping[str, Surface | MomaError],
+    oriented: Oriented,
+) -> Surface:
+    if record.surface is not None:
+        surface = surfaces[record.surface]
+        if isinstance(surface, MomaError):
+            raise surface
+        return surface
+    return fit_surface("plane", list(intersected.values()), oriented, _middle(oriented))
+
+
+def _in_space(
+    record: BlockRecord, oriented: Oriented, located: Sequence[Located], corners: Sequence[Located]
+) -> BlockRecord:
+    """Return a record with points and corners in space, and the evidence for them."""
+    every = [*located, *corners]
+    places = np.array([one.place for one in every])
+    joint = joint_covariance(every, oriented)
+    own = [joint_covariance([one], oriented, shared=False) for one in every]
+    normal = np.linalg.svd(places - places.mean(axis=0))[2][2]
+    sigmas = np.maximum([np.sqrt(normal @ one @ normal) for one in own], _LEAST)
+    photos = {one.photo for each in every for one in each.sights}
+    stations = [oriented.station(f) for f, one in enumerate(oriented.photos) if one.name in photos]
+    return replace(
+        record,
+        points=np.array([one.place for one in located]).reshape(-1, 3),
+        vertices=np.array([one.place for one in corners]).reshape(-1, 3),
+        sigma=float(np.sqrt((sigmas**2).mean())),
+        sigmas=sigmas,
+        names=tuple(one.name for one in every),
+        photograph=None,
+        image=np.empty((0, 2)),
+        seen_from=np.mean(stations, axis=0),
+        joint=joint.ravel(),
+        evidence=tuple(
+            _evidence(one, k >= len(located), joint[3 * k : 3 * k + 3, 3 * k : 3 * k + 3])
+            for k, one in enumerate(every)
+        ),
+    )
+
+
+def _evidence(one: Located, corner: bool, covariance: Array) -> dict[str, object]:
+    """Describe in plain values how a point was located."""
+    return {
+        "point": one.name,
+        "role": "vertex" if corner else "point",
+        "place": one.place.tolist(),
+        "how": one.text,
+        "sigma": np.sqrt(np.diag(covariance)).tolist(),
+        "covariance": covariance.tolist(),
+        "rays": [
+            {
+                "photo": sight.photo,
+                "x": float(sight.image[0]),
+                "y": float(sight.image[1]),
+                "residual": sight.residual.tolist(),
+                "test": sight.test,
+                "distance": sight.distance,
+            }
+            for sight in one.sights
+        ],
+    }

@@ -1,0 +1,162 @@
+"""Each format gives back what was written, to the last digits."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from moma.errors import SurveyError
+from survey.orientation.bundle.orient import orient
+from survey.orientation.formats.colmap import read_colmap, write_colmap
+from survey.orientation.formats.control import read_control, with_control, write_control
+from survey.orientation.formats.dbat import read_dbat, write_dbat
+from survey.orientation.formats.marks import network_of, read_marks, write_marks
+from survey.orientation.formats.metashape import read_metashape, write_metashape
+from survey.orientation.formats.photomodeler import read_photomodeler, write_photomodeler
+from survey.orientation.formats.result import orientation_values, read_orientation, write_orientation
+from survey.orientation.projection import project
+from tests.survey.orientation.synthetic_block import noisy, spread_points, wall_block, with_points
+
+NEAR = 1e-9  # [m], [px]
+
+
+def written(forward=False, plain=False):
+    truth = wall_block(columns=3, points=40, forward=forward)
+    network = with_points(truth, spread_points(truth, 5))
+    (camera,) = network.cameras
+    inner = camera.inner.copy()
+    if plain:
+        inner[3:5] = 0.0
+    if forward:
+        inner[4] = 0.0
+    return replace(network, cameras=(replace(camera, inner=inner),))
+
+
+def same_pictures(one, other):
+    """Both networks show the same points at the same places, with the same marks, whatever their units."""
+    assert [photo.name for photo in one.photos] == [photo.name for photo in other.photos]
+    assert set(one.names) == set(other.names)
+    order = [one.names.index(name) for name in other.names]
+    np.testing.assert_allclose(other.start, one.start[order], atol=NEAR)
+    for f, (a, b) in enumerate(zip(one.photos, other.photos, strict=True)):
+        np.testing.assert_allclose(b.station, a.station, atol=NEAR)
+        np.testing.assert_allclose(b.rotation, a.rotation, atol=NEAR)
+        first, second = (
+            project(net.cameras[p.camera], p.rotation, p.station, one.start)
+            for net, p in ((one, a), (other, b))
+        )
+        np.testing.assert_allclose(second, first, atol=1e-6)
+        marks = [
+            {
+                net.names[i]: tuple(xy)
+                for i, xy in zip(net.point[net.photo == f], net.image[net.photo == f], strict=True)
+            }
+            for net in (one, other)
+        ]
+        assert marks[0].keys() == marks[1].keys()
+        np.testing.assert_allclose([marks[1][k] for k in marks[0]], list(marks[0].values()), atol=NEAR)
+
+
+def test_photomodeler(tmp_path):
+    network = written(plain=True)
+    write_photomodeler(network, tmp_path / "export.txt")
+    back = read_photomodeler(tmp_path / "export.txt")
+    same_pictures(network, back)
+    np.testing.assert_allclose(back.cameras[0].inner, network.cameras[0].inner, rtol=1e-15)
+    assert {back.names[one.point] for one in back.control} == {
+        network.names[one.point] for one in network.control
+    }
+
+
+def test_colmap(tmp_path):
+    network = written(forward=True)
+    write_colmap(network, tmp_path / "model")
+    same_pictures(network, read_colmap(tmp_path / "model"))
+
+
+def test_metashape(tmp_path):
+    network = written(forward=True)
+    write_metashape(network, tmp_path / "doc.xml")
+    back = read_metashape(tmp_path / "doc.xml")
+    same_pictures(replace(network, start=np.where(np.isfinite(back.start), network.start, np.nan)), back)
+    assert [one.place.tolist() for one in back.control] == [
+        one.place.tolist() for one in sorted(network.control, key=lambda one: one.point)
+    ]
+    np.testing.assert_allclose(back.control[0].covariance, network.control[0].covariance, rtol=1e-12)
+    np.testing.assert_allclose(back.sigma, 0.5)
+
+
+@pytest.mark.parametrize("forward", [False, True])
+def test_dbat(tmp_path, forward):
+    network = written(forward=forward)
+    network = replace(network, cameras=(replace(network.cameras[0], free=("c", "K1", "K2", "K3")),))
+    back = read_dbat(write_dbat(network, tmp_path / "script"))
+    (one,), (other,) = network.cameras, back.cameras
+    np.testing.assert_allclose(other.inner, one.inner, rtol=1e-12)
+    assert (other.size, other.pixel, other.forward, other.free) == (
+        one.size,
+        one.pixel,
+        one.forward,
+        one.free,
+    )
+    found = {back.names[k.point]: k for k in back.control}
+    for control in network.control:
+        np.testing.assert_allclose(found[network.names[control.point]].place, control.place, atol=NEAR)
+    assert sorted(map(tuple, back.image.tolist())) == sorted(map(tuple, network.image.tolist()))
+
+
+def test_control_points_with_full_covariance(tmp_path):
+    network = written()
+    covariance = np.array([[4.0, 1.0, 0.5], [1.0, 3.0, 0.2], [0.5, 0.2, 2.0]]) * 1e-6
+    control = tuple(replace(one, covariance=covariance) for one in network.control)
+    path = tmp_path / "control.txt"
+    from survey.orientation.formats.control import ControlRow
+
+    write_control(
+        [ControlRow(network.names[one.point], "", one.place, one.covariance) for one in control], path
+    )
+    back = with_control(replace(network, control=()), read_control(path))
+    for one, other in zip(control, back.control, strict=True):
+        assert (one.place.tolist(), one.covariance.tolist()) == (
+            other.place.tolist(),
+            other.covariance.tolist(),
+        )
+
+
+def test_marks(tmp_path):
+    network = written()
+    write_marks(network, tmp_path / "marks.txt")
+    rows = read_marks(tmp_path / "marks.txt")
+    start = dict(zip(network.names, network.start, strict=True))
+    back = network_of("marks.txt", rows, network.cameras, network.photos, 1.0, start)
+    same_pictures(network, back)
+    np.testing.assert_array_equal(back.sigma, network.sigma)
+
+
+def test_the_result_of_an_orientation(tmp_path):
+    truth = wall_block(columns=3, points=40, free=("c", "K1"))
+    result = orient(noisy(with_points(truth, spread_points(truth, 5)), np.random.default_rng(1)))
+    write_orientation(tmp_path / "orientation.json", orientation_values(result))
+    back = read_orientation(tmp_path / "orientation.json")
+    values = result.solution.unknowns
+    np.testing.assert_allclose(back.cameras[0].inner, values.inner[0], rtol=1e-15)
+    for f, photo in enumerate(back.photos):
+        np.testing.assert_allclose(photo.rotation, values.rotation[f], atol=1e-14)
+        np.testing.assert_array_equal(photo.station, values.station[f])
+    np.testing.assert_array_equal(back.table, result.prepared.unknowns.column)
+    np.testing.assert_allclose(
+        back.covariance, result.statistics.sigma0**2 * result.statistics.cameras, rtol=1e-14
+    )
+
+
+def test_what_a_format_has_no_place_for_is_refused(tmp_path):
+    with pytest.raises(SurveyError, match="backward distortion"):
+        write_colmap(written(), tmp_path / "a")
+    with pytest.raises(SurveyError, match="backward distortion"):
+        write_metashape(written(), tmp_path / "a.xml")
+    with pytest.raises(SurveyError, match=r"as 0\.0002"):
+        write_photomodeler(written(), tmp_path / "a.txt")
+    named = replace(written(plain=True), names=tuple(f"p{k}" for k in range(len(written().names))))
+    with pytest.raises(SurveyError, match="'p0' is not a number"):
+        write_photomodeler(named, tmp_path / "a.txt")
+    assert not list(tmp_path.iterdir())
