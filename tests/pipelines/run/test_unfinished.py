@@ -19,7 +19,7 @@ from pipelines.run import record as record_module
 from pipelines.run import run as run_module
 from pipelines.run import unfinished
 from pipelines.run.run import run_scene
-from tests.moma.commands import answer, fails, invoke, prints
+from tests.moma.commands import fails, invoke, prints
 from tests.pipelines.scenes import TWO_COURSES
 
 SCENE = (

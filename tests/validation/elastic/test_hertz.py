@@ -11,7 +11,6 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from mechanics.contact.contacts import material_points
-from mechanics.dynamics.outcome import Outcome
 from mechanics.dynamics.simulation import Simulation
 from mechanics.model.balls import ball
 from mechanics.model.model import build_model

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from mechanics.dynamics.outcome import Outcome
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import Fidelity
 from mechanics.stones.materials import Material
