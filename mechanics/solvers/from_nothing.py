@@ -7,7 +7,7 @@ import numpy as np
 
 from mechanics.arrays import Array
 from mechanics.delassus.compliant import CompliantDelassus
-from mechanics.problem.problem import ContactProblem, ContactStart, mean_diagonal
+from mechanics.problem.problem import ContactProblem, ContactStart
 from mechanics.problem.residual import residual
 from mechanics.solvers.chain import Link, follow
 from mechanics.solvers.first_order.body_admm import BodyADMM, Stage
@@ -15,13 +15,15 @@ from mechanics.solvers.second_order.newton import Newton
 
 __all__ = ["rests_from_nothing"]
 
-# compliances of joints over the scale of W, and penalties of ADMM that suit them: from joints so soft that there is one
+# compliances of joints over their W_αα, and penalties of ADMM that suit them: from joints so soft that there is one
 # state only, to two stiff ones a hundred apart [-]
 _JOINTS = (10.0, 10.0), (0.1, 1.0), (1e-3, 0.01), (1e-4, 1e-3), (1e-6, 0.02)
 # velocity over the largest u_free from which stones fall, and need not be released to see it [-]
 _FALLS = 0.1
 # velocity with the harder joints over that with the softer ones below which it vanishes with them [-]
 _VANISHES = 0.1
+# the same from which it stays as it is [-]
+_STAYS = 0.5
 # velocity over the largest u_free that is none: the tolerance of a step [-]
 _STILL = 1e-5
 # tolerances of η and of velocities, and steps or iterations in which they are to be met [-]
@@ -34,24 +36,30 @@ def rests_from_nothing(problem: ContactProblem) -> tuple[bool | None, Array]:
     """Return whether stones rest by forces that arise from nothing, and these (nc, 3); None: they may rest again.
 
     Joints with a small compliance E bring about one set of forces: those of the law at u = (W + E) r + u_free. Where
-    stones rest, W r + u_free is that by which joints yield, and vanishes with E; where it does not, they begin to move,
-    and may come to rest again after next to nothing.
+    stones rest, contacts slip and open by next to nothing, and u vanishes with E; where it does not, stones begin to
+    move, and may come to rest again after next to nothing.
     """
     operator, pace = problem.delassus, float(np.abs(problem.u_free).max(initial=0.0))
     nothing = np.zeros_like(problem.u_free)
     start, speeds, error = ContactStart(nothing, nothing), [], 0.0
+    # each joint in the measure of its own stones: heavy ones hardly answer
+    each = np.repeat(
+        np.einsum("cii->c", operator.diagonal)[:, None] / nothing.shape[1], nothing.shape[1], axis=1
+    )
     for share, penalty in _JOINTS:
         admm = partial(BodyADMM, stages=(Stage(penalty, _ITERATIONS, extrapolated=True),))
         link = Link("body ADMM", admm, _ITERATIONS)
         if len(nothing) < _MANY or operator.rigid is None:
             link = Link("Newton", Newton, _STEPS)
-        yields = np.full_like(nothing, share * mean_diagonal(operator.diagonal))
+        yields = share * each
         yielding = replace(problem, delassus=CompliantDelassus(operator, yields))
         found = follow((link,), yielding, start, _LIMITS, link.iterations)
         start = ContactStart(found.impulse, found.velocity)
         error = pace * residual(yielding, found.impulse).velocity
-        speeds.append(float(np.abs(operator.apply(found.impulse) + problem.u_free).max(initial=0.0)))
+        slips = operator.apply(found.impulse) + yields * found.impulse + problem.u_free
+        speeds.append(float(np.abs(slips).max(initial=0.0)))
     *_, softer, harder = speeds
     if harder + error <= max(_VANISHES * softer, _STILL * pace):
         return True, start.impulse
-    return (False if harder - error > _FALLS * pace else None), start.impulse
+    falls = harder - error > max(_FALLS * pace, _STAYS * softer)
+    return (False if falls else None), start.impulse
