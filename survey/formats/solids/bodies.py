@@ -1,8 +1,8 @@
 """Closed stones with planar faces, from the polygons of a file of solids.
 
-Faces without area are dropped; a surface that is not closed is repaired within a tolerance (`survey.geometry.repair`), and
-what was done is remarked; closed ones stay as they are. Three things are inferred from neighbouring polygons: which of
-them make one body, which side of each is outside, and how a polygon that is not plane is folded.
+Faces without area are dropped; a surface that is not closed is repaired within a tolerance (`survey.geometry.repair`),
+and what was done is remarked; closed ones stay as they are. Three things are inferred from neighbouring polygons: which
+of them make one body, which side of each is outside, and how a polygon that is not plane is folded.
 """
 
 from collections.abc import Iterator, Sequence
