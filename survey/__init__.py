@@ -2,11 +2,12 @@
 
 formats       readers of survey files → records
 records       content of a survey file
+clouds        point clouds with outlines, and masks → records
 registration  survey frames and photographs → site frame
 orientation   photographs → orientation, and points from marks on them
 faces         points → plane → outlined face
 extrusion     face and depth → solid block
-geometry      closed solids: cutting, convex parts, adjacency
+geometry      closed solids: cutting, convex parts, adjacency, repair
 simplify      solid block → hexahedron, wedge or prism
 joints        blocks a joint apart → stones that share contact planes
 quality       report on precision, courses and contradictions

@@ -1,4 +1,4 @@
-"""Closed solids with planar faces: cutting, convex parts, adjacency, folds.
+"""Closed solids with planar faces: cutting, convex parts, adjacency, folds, repair.
 
 Public: `Solid`, `volume_of` (solids); `SolidArrays`, `Touching`, `find_touching` (adjacency); `cut_stones`, `CutStone`
 (cutting); `convex_parts` (convex_parts); `stone_parts` (stone_parts); `is_convex`, `reflex_edges` (convexity);

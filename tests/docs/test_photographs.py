@@ -93,7 +93,7 @@ def test_the_survey_report_names_the_photographs_behind_each_corner(bay):
     page = (report / "report.html").read_text(encoding="utf-8")
     assert "Corners and the rays behind them" in page
     assert "intersection of 3 rays" in page
-    assert page.count("<img") == 5
+    assert page.count("<img") == 6
     values = json.loads((report / "survey.json").read_text(encoding="utf-8"))
     assert {"photographs-1-network.png", "photographs-1-photo-residuals.png"} <= set(values["files"])
     stone = next(one for one in values["stones"] if one["code"] == "V4")

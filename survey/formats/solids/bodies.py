@@ -1,8 +1,8 @@
 """Closed stones with planar faces, from the polygons of a file of solids.
 
-Faces without area are dropped; a surface that is not closed is repaired within a tolerance (`survey.repair`), and what
-was done is remarked; closed ones stay as they are. Three things are inferred from neighbouring polygons: which of them
-make one body, which side of each is outside, and how a polygon that is not plane is folded.
+Faces without area are dropped; a surface that is not closed is repaired within a tolerance (`survey.geometry.repair`),
+and what was done is remarked; closed ones stay as they are. Three things are inferred from neighbouring polygons: which
+of them make one body, which side of each is outside, and how a polygon that is not plane is folded.
 """
 
 from collections.abc import Iterator, Sequence
@@ -17,10 +17,10 @@ from survey.formats.solids.body_groups import body_groups, signed_volume
 from survey.formats.solids.flat_faces import merge_flat, rounding
 from survey.formats.solids.scanned_stone import is_scanned, plane_faces
 from survey.geometry.folds import fold, warp
+from survey.geometry.repair.polygons import is_flat_line, simple_polygons, without_repeats
+from survey.geometry.repair.repair import Repaired, holes_of, open_edges, repair
 from survey.geometry.solids import Solid
 from survey.geometry.watertight import check_watertight
-from survey.repair.polygons import is_flat_line, simple_polygons, without_repeats
-from survey.repair.repair import Repaired, holes_of, open_edges, repair
 
 __all__ = ["ClosedBody", "RawBody", "check_coordinates", "closed_bodies", "compact"]
 

@@ -10,11 +10,11 @@ from moma.errors import GeometryError
 from survey.formats.options import ReadingOptions
 from survey.formats.reading import open_survey
 from survey.formats.solids.bodies import RawBody, closed_bodies
+from survey.geometry.repair.polygons import simple_polygons, without_repeats
+from survey.geometry.repair.repair import open_edges, repair
 from survey.geometry.solids import volume_of
 from survey.geometry.watertight import check_watertight
 from survey.records.survey import Reject, SolidRecord
-from survey.repair.polygons import simple_polygons, without_repeats
-from survey.repair.repair import open_edges, repair
 
 BOX = np.array(list(itertools.product((0.0, 1.0), (0.0, 0.5), (0.0, 0.3))))
 FACES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]

@@ -15,9 +15,9 @@ from scipy.spatial import cKDTree
 
 from survey.arrays import Array
 from survey.geometry.folds import warp
+from survey.geometry.repair.polygons import Polygon, is_flat_line, simple_polygons, without_repeats
 from survey.geometry.solids import Solid, area_vector
 from survey.geometry.watertight import triangulate
-from survey.repair.polygons import Polygon, is_flat_line, simple_polygons, without_repeats
 
 __all__ = ["Hole", "Repaired", "holes_of", "open_edges", "repair"]
 
