@@ -50,7 +50,7 @@ from moma.errors import UsageError
 if TYPE_CHECKING:
     from survey.formats.options import ReadingOptions
 
-__all__ = ["Blunders", "Level", "Moved", "cloud", "ingest", "orient", "sample", "survey_report"]
+__all__ = ["Blunders", "Level", "Moved", "cloud", "ingest", "orient", "outlined", "sample", "survey_report"]
 
 
 class Level(StrEnum):

@@ -48,7 +48,9 @@ def test_the_commands_of_the_page_run(arch):
 
 
 def test_the_reaction_is_the_weight_after_every_stage_and_the_database_keeps_the_stages(arch):
-    scene = written(arch, STAGES.replace('hold = ["kind != springer"]', 'hold = ["kind = voussoir"]'), "free")
+    scene = written(
+        arch, STAGES.replace('hold = ["kind != springer"]', 'hold = ["kind like voussoir"]'), "free"
+    )
     summary = answer("run", scene, "--db", url(arch), "--out", arch / "free")
     assert [one["name"] for one in summary["stages"]] == ["left half", "ring", "centring struck"]
     weights = [one["weight"] for one in summary["stages"]]

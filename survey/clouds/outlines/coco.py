@@ -14,7 +14,7 @@ from survey.clouds.outlines.outline import Attributes, Outline, attributes_of, m
 from survey.clouds.outlines.tracing import few_corners, ring_area
 from survey.clouds.world import PixelPlace, world_of
 
-__all__ = ["is_coco", "read_coco", "run_lengths"]
+__all__ = ["is_coco", "load_json", "read_coco", "run_lengths"]
 
 _REMEDY = "give annotations with a segmentation, as COCO describes them"
 

@@ -14,7 +14,7 @@ from survey.clouds.outlines.outline import Attributes, Outline
 from survey.clouds.outlines.tracing import few_corners, ring_area, trace
 from survey.clouds.world import PixelPlace, world_of
 
-__all__ = ["Labels", "outlines_of", "read_labels"]
+__all__ = ["Labels", "outline_of_mask", "outlines_of", "read_labels"]
 
 _LARGEST = 2**24  # number of a stone: as many as there are colours
 _GREY = 0.02  # share of pixels that are neither black nor white in a picture of two colours: blurred edges

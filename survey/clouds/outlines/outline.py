@@ -12,7 +12,7 @@ from moma.errors import SurveyError, UsageError
 from survey.arrays import Array
 from survey.formats.fields import KIND
 
-__all__ = ["FIELDS", "Attributes", "Outline", "attributes_of", "field_map", "made_code"]
+__all__ = ["FIELDS", "Attributes", "Outline", "attributes_of", "distinct", "field_map", "made_code"]
 
 FIELDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
