@@ -220,6 +220,7 @@ def test_all_that_is_known_of_a_stone(filled: Database) -> None:
     assert known["depth"] == {"value": 0.42, "sigma": 0.03, "source": source, "origin": "stone"}
     assert known["survey"]["file"] == "window.moma"  # type: ignore[index]
     assert known["measured"] == {
+        "evidence": [],
         "vertices": 4,
         "points": 9,
         "rejected": [3, 6],
