@@ -70,7 +70,7 @@ def ring_of(rings: "list[list[list[str]]] | list[list[list[float]]]", where: str
         )
     try:
         corners = np.array([[float(value) for value in one[:3]] for one in ring], dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise SurveyError("a coordinate is not a number", where=where, remedy="give x, y and z") from None
     if not (np.abs(corners) <= FARTHEST).all():
         raise SurveyError(
