@@ -58,10 +58,9 @@ class Simulation(Carrier):
     Attributes
     ----------
     state : at the end of the last step
-    cold : it has known no forces other than its own since it began at rest, and `halt` was not called
     """
 
-    CARRIED = ("_first", "_freed", "_joints", "_memory", "_relax", "_sleepers", "cold", "state")
+    CARRIED = ("_first", "_freed", "_joints", "_memory", "_relax", "_sleepers", "state")
     REBUILT = (
         "_begin", "_compliance", "_detect", "_given", "_may_yield", "_solve", "_step", "_theta", "clock", "model",
         "start",
@@ -92,7 +91,6 @@ class Simulation(Carrier):
         self._sleepers = Sleepers(model, self.start, self._memory)
         self._first = True
         self._freed = False
-        self.cold = begin.memory is None
 
     @property
     def asleep(self) -> Bools:
@@ -101,7 +99,6 @@ class Simulation(Carrier):
 
     def halt(self, time: float) -> None:
         """Bring all bodies to a halt, and set the clock of the scene to `time` [s]."""
-        self.cold = False
         self.state = replace(halted(self.state), time=time)
 
     def take_over(self, other: "Simulation") -> None:
@@ -118,7 +115,6 @@ class Simulation(Carrier):
         self._memory.follows = not self.model.scene.time.relaxation
         # stiffness 1/(ε h²) stays
         self._joints = replace(other._joints, value=other._joints.value / pace**2)
-        self.cold = other.cold and pace == 1.0
         if pace == 1.0 and self.model.rigid_only:
             self._detect.follow(other._detect, self.model)
         self._sleepers = Sleepers(self.model, self.state, self._memory)

@@ -128,11 +128,6 @@ class Watch(Carrier):
         self._sunk, self._moved = float(sunk[self._culprit]), float(moved[self._culprit])
         return Outcome.SETTLED if share[self._culprit] > MOVED else Outcome.EQUILIBRIUM
 
-    @property
-    def yielded(self) -> bool:
-        """Joints have given way in some step."""
-        return self._compliant > 0
-
     def disproved(self) -> Outcome:
         """Take back a rest that did not last once its forces were forgotten."""
         self._quiet, self._clamped = 0, True

@@ -30,6 +30,7 @@ _STILL = 1e-5
 _LIMITS, _STEPS, _ITERATIONS = (1e-6, 1e-5), 60, 300
 # contacts from which iterations with kept factors cost less than Newton's steps
 _MANY = 3000
+_NEWTON = Link("Newton", Newton, _STEPS)
 
 
 def rests_from_nothing(problem: ContactProblem) -> tuple[bool | None, Array]:
@@ -46,11 +47,10 @@ def rests_from_nothing(problem: ContactProblem) -> tuple[bool | None, Array]:
     each = np.repeat(
         np.einsum("cii->c", operator.diagonal)[:, None] / nothing.shape[1], nothing.shape[1], axis=1
     )
+    many = len(nothing) >= _MANY and operator.rigid is not None
     for share, penalty in _JOINTS:
         admm = partial(BodyADMM, stages=(Stage(penalty, _ITERATIONS, extrapolated=True),))
-        link = Link("body ADMM", admm, _ITERATIONS)
-        if len(nothing) < _MANY or operator.rigid is None:
-            link = Link("Newton", Newton, _STEPS)
+        link = Link("body ADMM", admm, _ITERATIONS) if many else _NEWTON
         yields = share * each
         yielding = replace(problem, delassus=CompliantDelassus(operator, yields))
         found = follow((link,), yielding, start, _LIMITS, link.iterations)

@@ -383,8 +383,8 @@ def _dynamics(one: dict[str, Any]) -> str:
     lost = "nothing lost" if found["lost"] is None else f"lost at {found['lost']:.4g}"
     said = ""
     if one["candidate"] is not None:
-        said = "CONFIRMED" if found["agrees"] else "NOT CONFIRMED"
-    text = f"; by the dynamics {said}: {held}, {lost}".replace("  ", " ").replace(" :", ":")
+        said = " CONFIRMED" if found["agrees"] else " NOT CONFIRMED"
+    text = f"; by the dynamics{said}: {held}, {lost}"
     if found["likeness"] is None:
         return text
     cosine = found["likeness"]["cosine"]

@@ -36,7 +36,7 @@ from pipelines.results.summary import as_json
 from pipelines.results.table_csv import inert
 from pipelines.run.assemble import Assembly, assemble_stones
 from pipelines.run.record import store_record, versions
-from pipelines.run.soundness import problems_of, refuse_unsound
+from pipelines.run.soundness import problems_of, refuse_unsound, some
 from pipelines.scene.file import SceneFile, read_scene
 from pipelines.scene.fingerprint import digest, fingerprint
 from pipelines.scene.selection import select_groups, select_stones
@@ -73,7 +73,6 @@ REPORT = "report.html"
 
 _SOUND_FIRST = "limit loads need sound joints: mend the scene until `moma check` finds nothing"
 _LOOSE = 0.5  # share of the stones that may be left out as loose, at most [-]
-_NAMED = 6  # stones that fall which the headline names
 _RUNS = 12  # by which a candidate is confirmed, at most
 
 
@@ -297,11 +296,7 @@ def _summary(
     )
     until = assembled.scene.loads.until
     cautions = [
-        *(
-            [f"left out, as they fall under their own weight: {_some(left_out, len(left_out))}"]
-            if left_out
-            else []
-        ),
+        *([f"left out, as they fall under their own weight: {', '.join(left_out)}"] if left_out else []),
         *([f"under the dead load alone {standing.reason}"] if standing.outcome is Outcome.SETTLED else []),
         *(
             ["loads that change are taken as they are in the end, but where an instant is named"]
@@ -339,9 +334,9 @@ def _summary(
 
 def _headline(loads: Sequence[dict[str, Any]], standing: Standing, left_out: Sequence[str]) -> str:
     """Return the decisive load in a sentence: the least that is known, or what cannot stand at all."""
-    without = f"without {_some(left_out, _NAMED)}, which fall under their own weight, " if left_out else ""
+    without = f"without {some(left_out)}, which fall under their own weight, " if left_out else ""
     if standing.outcome is Outcome.COLLAPSED:
-        loose = f": {_some(standing.moved, _NAMED)}" if standing.moved else ""
+        loose = f": {some(standing.moved)}" if standing.moved else ""
         return f"it {FALLS}{loose}; --leave-out-loose assesses the rest, if that stands"
     if not standing.outcome.rests:
         return f"under its own weight it does not come to rest: {standing.reason}"
@@ -359,11 +354,6 @@ def _limit(one: dict[str, Any]) -> float:
     runs = one.get("confirmation", {})
     known = [one.get("candidate"), one.get("bound"), runs.get("held") or runs.get("lost")]
     return min((value for value in known if value is not None), default=float("inf"))
-
-
-def _some(codes: Sequence[str], most: int) -> str:
-    more = f" and {len(codes) - most} more" if len(codes) > most else ""
-    return ", ".join(codes[:most]) + more
 
 
 def _carried(on: RigidAssembly, found: Answer) -> Resultants | None:

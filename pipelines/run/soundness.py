@@ -16,7 +16,7 @@ from survey.geometry.watertight import check_watertight, doubtful_solids
 from survey.joints.settings import JointMode
 
 __all__ = [
-    "caution_of", "problems_of", "refuse_unsound", "unsound_stones", "unsupported", "unsupported_stages",
+    "caution_of", "problems_of", "refuse_unsound", "some", "unsound_stones", "unsupported", "unsupported_stages",
 ]  # fmt: skip
 
 _DEEP = 0.005  # overlap [m]; less is survey noise, which the contacts absorb
@@ -101,7 +101,7 @@ def _unclosed(assembly: Assembly) -> list[str]:
         return []
     first = min(left)
     return [
-        f"no joint of these could be closed: {_some(sorted(left))}; of {first}, {left[first]}; look at the survey "
+        f"no joint of these could be closed: {some(sorted(left))}; of {first}, {left[first]}; look at the survey "
         "there, or allow more by max_displacement in [joints]"
     ]
 
@@ -119,7 +119,7 @@ def _alone(assembly: Assembly) -> list[str]:
     if not loose:
         return []
     return [
-        f"these face no other stone across a joint: {_some(sorted(loose))}; look at max_width, max_angle and "
+        f"these face no other stone across a joint: {some(sorted(loose))}; look at max_width, max_angle and "
         "min_overlap in [joints], or leave them out"
     ]
 
@@ -147,7 +147,7 @@ def unsupported(scene: Scene, loose: Sequence[str]) -> list[str]:
     falling = [code for code in loose if code not in thrown]
     if not falling:
         return []
-    return [f"no chain of touching stones ties these to a fixed one: {_some(falling)}; they will fall"]
+    return [f"no chain of touching stones ties these to a fixed one: {some(falling)}; they will fall"]
 
 
 def unsupported_stages(scene: SceneFile, assembly: Assembly) -> list[str]:
@@ -163,12 +163,13 @@ def unsupported_stages(scene: SceneFile, assembly: Assembly) -> list[str]:
         if loose:
             remarks.append(
                 f"{scene.document.where(*entry.path)}: in stage {stage.name!r} no chain of touching stones ties these "
-                f"to a fixed or held one: {_some(loose)}; they will fall, unless what has moved lies beneath them"
+                f"to a fixed or held one: {some(loose)}; they will fall, unless what has moved lies beneath them"
             )
     return remarks
 
 
-def _some(codes: Sequence[str]) -> str:
+def some(codes: Sequence[str]) -> str:
+    """Return the first codes, and how many others there are."""
     more = f" and {len(codes) - _NAMED} more" if len(codes) > _NAMED else ""
     return ", ".join(codes[:_NAMED]) + more
 
