@@ -85,7 +85,7 @@ _REST = (
 # from nothing: between joints so soft that contacts hardly know of each other there is one state only, and the way from
 # it leaves out self-stress, as a fall does that is under way when joints would jam
 _FROM_NOTHING = Link(
-    "Newton from soft joints", partial(SofterJoints, factors=(1e5, 1e3, 10.0)), 150, Begin.GIVEN, _FURTHER
+    "Newton from soft joints", partial(SofterJoints, factors=(1e5, 1e3, 10.0)), 150, Begin.GIVEN, EXACT
 )
 _REST_FROM_NOTHING = (_FROM_NOTHING, *_REST)
 _REST_OF_SOME = (replace(_admm, method=_rest, begin=Begin.GIVEN), _newton, _path, _newton)

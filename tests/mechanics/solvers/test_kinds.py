@@ -65,7 +65,7 @@ class Kind:
 # Newton's method goes first between stones that deform, but from near alone; a path may need it at its end
 ENDED = "interior point", "Newton"
 KINDS = {
-    "few rigid": Kind(lambda: wall(4, 4), "Newton", ("Newton",)),
+    "few rigid": Kind(lambda: wall(4, 4), "Newton", ("Newton from soft joints",)),
     "some hundred rigid": Kind(lambda: wall(18, 18), "body ADMM", ("body ADMM",)),
     "few on springs": Kind(lambda: yielding(wall(4, 4), 1e-2), "Newton", ("Newton",)),
     "some hundred on springs": Kind(lambda: yielding(wall(18, 18), 1e-2), "body ADMM", ("body ADMM",)),
@@ -158,4 +158,4 @@ def test_mortar_is_no_kind_of_its_own():
         stack(RIGID, RIGID, below=FORWARD), contact=ContactSettings(MortarJoint(0.4, 200.0, 1000.0))
     )
     problem = posed(one).problem
-    assert Auto()(problem, cold(problem)).why.startswith("Newton:")
+    assert Auto()(problem, cold(problem)).why.startswith("Newton from soft joints:")
