@@ -83,11 +83,17 @@ _REST = (
     _released,
 )
 # from nothing: between joints so soft that contacts hardly know of each other there is one state only, and the way from
-# it leaves out self-stress, as a fall does that is under way when joints would jam
+# it leaves out self-stress, as a fall does that is under way when joints would jam. It ends at 10⁻⁶ of W, as forces of
+# the limit hardly depend on where corners lie
 _FROM_NOTHING = Link(
-    "Newton from soft joints", partial(SofterJoints, factors=(1e5, 1e3, 10.0)), 150, Begin.GIVEN, EXACT
+    "Newton from soft joints",
+    partial(SofterJoints, factors=(1e5, 1e2, 0.01)),
+    60,
+    Begin.GIVEN,
+    EXACT,
 )
-_REST_FROM_NOTHING = (_FROM_NOTHING, *_REST)
+# Newton's method has failed twice where iterations begin: the path goes on
+_REST_FROM_NOTHING = (_FROM_NOTHING, *_REST[:2], *_REST[3:])
 _REST_OF_SOME = (replace(_admm, method=_rest, begin=Begin.GIVEN), _newton, _path, _newton)
 _REST_OF_MANY = (replace(_endless, method=_rest, begin=Begin.GIVEN),)
 _MOTION = (
