@@ -593,6 +593,11 @@ def test_a_run_whose_process_is_killed_has_failed_and_no_process_is_left():
 
 def interrupted(answers):
     """Wait for answers, and be interrupted at once."""
-    threading.Timer(0.2, lambda: signal.raise_signal(signal.SIGINT)).start()
-    next(iter(answers))
-    time.sleep(9.0)
+    # a worker of tests that was begun in the background, or has meshed, has no handler, and would end
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        threading.Timer(0.2, lambda: signal.raise_signal(signal.SIGINT)).start()
+        next(iter(answers))
+        time.sleep(9.0)
+    finally:
+        signal.signal(signal.SIGINT, before)

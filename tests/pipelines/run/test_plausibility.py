@@ -127,8 +127,8 @@ def test_a_corner_25_cm_off_in_its_plane_is_in_every_headline(tmp_path):
 
     path, url = edited(tmp_path, "W03-03", off), f"sqlite:///{tmp_path}/off.db"
     told = prints("survey-report", path, "--out", tmp_path / "report")
-    assert "measure again:\n  W03-03: its angle at" in told
-    assert "measure again:\n  W03-03" not in prints("survey-report", WINDOW, "--out", tmp_path / "sound")
+    assert "measure again, what changes a verdict first:\n  W03-03: its angle at" in told
+    assert "\n  W03-03: its angle" not in prints("survey-report", WINDOW, "--out", tmp_path / "sound")
     ingest([path], url)
     assert any("stone W03-03: its angle at" in one for one in checked(tmp_path, url).warnings)
 

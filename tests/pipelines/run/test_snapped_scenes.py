@@ -63,8 +63,8 @@ def test_a_dome_rounded_to_a_millimetre_stands_and_moves_by_nothing(tmp_path: Pa
 
 
 def test_groin_stones_rest_on_each_other_with_both_arms(tmp_path: Path) -> None:
-    """Beds slant by at most 0.3 rad, so that friction holds the stones; the upper course is 3 of 6."""
-    stones = groin(2, (0.02, 0.3))
+    """Beds slant by at most 0.1 rad: steeper, the outer stones tip, and only self-stress could hold them."""
+    stones = groin(2, (0.0, 0.1))
     url = taken_in(tmp_path, stones, "code like '%0'")
     blocks = assembled(url, SCENE).scene.blocks
     assert {block.code: len(block.parts) for block in blocks} == {
@@ -75,7 +75,7 @@ def test_groin_stones_rest_on_each_other_with_both_arms(tmp_path: Path) -> None:
     assert summary["outcome"] == "equilibrium"
     assert summary["displacement"]["max"] < 1e-6
     weight = 2000.0 * 9.81 * sum(mass_properties(one.vertices, one.faces).volume for one in stones[3:])
-    assert summary["reaction"]["total_vertical"] == pytest.approx(weight, rel=1e-3)
+    assert summary["reaction"]["total_vertical"] == pytest.approx(weight, rel=2e-3)  # corners are rounded to a millimetre
 
 
 def _folded(solids: list[Solid]) -> list[Solid]:

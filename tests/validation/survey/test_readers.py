@@ -368,7 +368,7 @@ def test_objects_of_obj_files_are_stones(tmp_path, style):
 @pytest.mark.parametrize("order", [1, 2])
 def test_volumes_of_gmsh_are_stones(tmp_path, version, binary, order):
     path = tmp_path / "pair.msh"
-    gmsh.initialize()
+    gmsh.initialize(interruptible=False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
         gmsh.option.setNumber("Mesh.MshFileVersion", version)
