@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from tests.costs import is_dear, listed
 from tests.kernel_locks import compile_once
 from tests.postgresql import Server, Unavailable, running_server
 
@@ -50,12 +51,13 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Begin with the files that take longest; count properties among the slow tests where these are asked for."""
+    """Begin with the files that take longest; count dear tests as slow, and properties where slow ones are asked for."""
     items.sort(key=lambda item: [not item.nodeid.startswith(folder) for folder in FIRST])
-    if config.stash[FREE]:
-        for item in items:
-            if getattr(getattr(item, "obj", None), "is_hypothesis_test", False):
-                item.add_marker("slow")
+    dear = listed()
+    for item in items:
+        free = config.stash[FREE] and getattr(getattr(item, "obj", None), "is_hypothesis_test", False)
+        if free or is_dear(item.nodeid, dear):
+            item.add_marker("slow")
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -1,0 +1,114 @@
+"""What each test costs: `python -m tests.costs` measures all of them, which takes an hour, and renews `dear.txt`.
+
+`dear.txt` lists the tests that take more than 0.7 s of processor time; they run with `-m slow`. Never listed are the
+cheapest test of a file, so that each keeps a guard, and the tests of the folders that `KEPT` names.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import pytest
+
+__all__ = ["DEAR", "KEPT", "dear", "is_dear"]
+
+DEAR = Path(__file__).with_name("dear.txt")
+"""List of dear tests: their file, then, indented, their names."""
+
+KEPT = ("tests/validation/wild/", "tests/validation/one_answer/", "tests/docs/")
+"""Scenes that were found to break a verdict, and the documented commands: they run in every suite."""
+
+_LIMIT = 0.7  # processor time [s]
+_FOLDER = "MOMA_COSTS"  # variable that names the folder of the measurements
+
+
+def is_dear(node: str, listed: frozenset[str]) -> bool:
+    """Return True for a test that is listed, by its whole name or by that of its function."""
+    return node in listed or node.split("[")[0] in listed
+
+
+def listed() -> frozenset[str]:
+    """Return the names in `dear.txt`."""
+    found, file = set[str](), ""
+    for line in DEAR.read_text(encoding="utf-8").splitlines():
+        if line.startswith(" "):
+            found.add(f"{file}::{line.strip()}")
+        else:
+            file = line
+    return frozenset(found)
+
+
+def dear(costs: dict[str, float]) -> Iterator[str]:
+    """Yield the tests to list, whole functions where all of their cases are dear.
+
+    >>> list(dear({"f.py::a": 3.0, "f.py::b[1]": 2.0, "f.py::b[2]": 2.0, "f.py::c[1]": 2.0, "f.py::c[2]": 0.1}))
+    ['f.py::a', 'f.py::b', 'f.py::c[1]']
+    """
+    files, functions = defaultdict[str, list[str]](list), defaultdict[str, list[str]](list)
+    for node in sorted(costs, key=lambda one: (costs[one], one)):
+        files[node.split("::")[0]].append(node)
+        functions[node.split("[")[0]].append(node)
+    spared = {nodes[0] for nodes in files.values()}
+    over = {
+        node
+        for node, cost in costs.items()
+        if cost > _LIMIT and node not in spared and not node.startswith(KEPT)
+    }
+    yield from sorted(
+        {
+            function if over.issuperset(nodes) else node
+            for function, nodes in functions.items()
+            for node in over.intersection(nodes)
+        }
+    )
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    """Note, in a worker, the processor time at the end of each phase of a test."""
+    worker = os.environ.get("PYTEST_XDIST_WORKER")
+    if worker is None or _FOLDER not in os.environ:
+        return
+    now = sum(os.times()[:4])
+    with (Path(os.environ[_FOLDER]) / f"{worker}.jsonl").open("a", encoding="utf-8") as file:
+        file.write(json.dumps([report.nodeid, now]) + "\n")
+
+
+def measured(folder: Path) -> dict[str, float]:
+    """Return the processor time [s] of each test that a run noted."""
+    costs = defaultdict[str, float](float)
+    for path in sorted(folder.glob("*.jsonl")):
+        before: float | None = None
+        for line in path.read_text(encoding="utf-8").splitlines():
+            node, now = json.loads(line)
+            costs[node] += 0.0 if before is None else now - before
+            before = now
+    return dict(costs)
+
+
+def text_of(names: Iterable[str]) -> str:
+    """Return the text of `dear.txt`."""
+    lines, file = list[str](), ""
+    for name in names:
+        path, test = name.split("::", 1)
+        if path != file:
+            file = path
+            lines.append(path)
+        lines.append(f"  {test}")
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    """Measure all tests, and renew the list."""
+    with tempfile.TemporaryDirectory() as folder:
+        command = [sys.executable, "-m", "pytest", "-p", "tests.costs", "-m", "slow or not slow"]
+        subprocess.run(command, env=os.environ | {_FOLDER: folder}, check=False)
+        DEAR.write_text(text_of(dear(measured(Path(folder)))), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
