@@ -222,7 +222,7 @@ class RunRecord:
     ----------
     scene : its name
     scene_text : the scene file as it was run
-    outcome : equilibrium, settled, moving, collapsed, undecided, interrupted or assessed
+    outcome : equilibrium, settled, moving, collapsed, undecided, interrupted, assessed or pushed
     summary : the contents of summary.json
     versions : of the programs and libraries, by name; at least of "moma"
     results : one per stone of the scene

@@ -32,10 +32,10 @@ from mechanics.scene.loads.load import Force, Loads
 from mechanics.scene.scene import Scene, TimeSettings
 from moma.errors import SolverError
 
-__all__ = ["Pushover", "pushover"]
+__all__ = ["SPEED", "Pushover", "pushover"]
 
 # speed at which the stone is led, over that of a fall through the way of the whole curve [-]
-_SPEED = 0.01
+SPEED = 0.01
 # steps in one interval of the curve, and of T
 _PER_POINT, _STEPS = 16, 4.0
 # largest change of λ in one step over the limit load, and that where nothing moves yet [-]
@@ -178,7 +178,7 @@ def pushover(
     moving = on.free[found.mechanism.speed[on.free] > 1e-2]
     if reach is None:
         reach = _REACH * float(on.model.surfaces.size[moving].min())
-    speed = _SPEED * float(np.sqrt(2.0 * np.linalg.norm(on.model.gravity(0.0)) * reach))
+    speed = SPEED * float(np.sqrt(2.0 * np.linalg.norm(on.model.gravity(0.0)) * reach))
     return _Run(on, load, led, way, reach / points, speed).curve(found, 2 * points, progress, stop)
 
 

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from moma.cli.assess import assess, compare, diagnose
+from moma.cli.assess import assess, compare, diagnose, pushover
 from moma.cli.console import PlainCommand, PlainGroup
 from moma.cli.database import export, import_, migrate, serve, view
 from moma.cli.entities import query, schema, show
@@ -74,6 +74,7 @@ _COMMANDS = (
     check,
     run,
     assess,
+    pushover,
     compare,
     diagnose,
     trade,

@@ -11,7 +11,7 @@ from moma.cli.console import reporting, say
 from moma.cli.options import DEFAULT_DB, AcceptUnsound, Db, Json, Out, Overwrite, SceneArgument, Verbose
 from moma.cli.progress import progress_bars
 
-__all__ = ["assess", "compare", "diagnose"]
+__all__ = ["assess", "compare", "diagnose", "pushover"]
 
 
 @contextmanager
@@ -96,6 +96,25 @@ def assess(
     for warning in done.warnings:
         say(f"warning: {warning}")
     print(as_json(done.summary) if json else "\n".join(assessment_lines(done, verbose)))
+
+
+@reporting
+def pushover(
+    scene: SceneArgument,
+    out: Out = None,
+    overwrite: Overwrite = False,
+    db: Db = DEFAULT_DB,
+    json: Json = False,
+) -> None:
+    """Push stones in a test rig as the scene's table [pushover] says: force against displacement, with a band."""
+    from moma.cli.text.assessments import pushover_lines
+    from moma.cli.text.formats import as_json
+    from pipelines.assess.pushover.push import push
+
+    folder = out or Path("out") / f"{scene.stem}-pushover"
+    with progress_bars() as listener:
+        done = push(scene, db, folder, listener, overwrite=overwrite)
+    print(as_json(done.summary) if json else "\n".join(pushover_lines(done)))
 
 
 @reporting

@@ -55,6 +55,7 @@ _INDEXES = (
     "comparison.json",
     "diagnosis.json",
     "orientation.json",
+    "pushover.json",
 )  # their "files" list the files that MOMA wrote
 _LEFT = {
     UNFINISHED: (RUN_INDEX, "run"),

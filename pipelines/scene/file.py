@@ -21,6 +21,7 @@ from pipelines.scene.array_tables import ArrayTable, read_entries
 from pipelines.scene.keys import build, typed_values
 from pipelines.scene.laws import BONDS, JointLaw, read_laws
 from pipelines.scene.loads import ASSESS_TYPES, read_loads, read_throws
+from pipelines.scene.pushover import Pushing, read_pushover
 from pipelines.scene.settings import Fidelities, MaterialRule, MeshSettings, Output, Selection
 from pipelines.scene.site import Site
 from pipelines.scene.stages import read_stages
@@ -52,6 +53,7 @@ class SceneFile:
     stages : of building; none: all stones stand from the beginning
     assess : live loads whose limits are sought
     site : seismic action for the check by a code; None: not stated
+    pushover : test rig and displacements of `moma pushover`; None: there is none
     """
 
     document: TomlDocument
@@ -74,6 +76,7 @@ class SceneFile:
     stages: tuple[ArrayTable, ...]
     assess: tuple[ArrayTable, ...]
     site: Site | None
+    pushover: Pushing | None
 
 
 def read_scene(path: str | Path) -> SceneFile:
@@ -128,6 +131,7 @@ def parse_scene(text: str, path: str) -> SceneFile:
         stages=read_stages(document, given, loads, throws),
         assess=read_entries(document, given, "assess", ASSESS_TYPES),
         site=_site(document, given),
+        pushover=read_pushover(document, given),
     )
 
 
@@ -137,7 +141,7 @@ def _fidelities(values: dict[str, Any]) -> Fidelities:
 
 
 def _checked_tables(document: TomlDocument, given: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    known = [*TABLES, "materials", "site", *ARRAYS, *BESIDE]
+    known = [*TABLES, "materials", "site", "pushover", *ARRAYS, *BESIDE]
     for name, content in given.items():
         if name in (*ARRAYS, *BESIDE):
             continue

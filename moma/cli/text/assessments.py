@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pipelines.assess.assess import Assessment
     from pipelines.assess.compare import SurveyComparison
+    from pipelines.assess.pushover.push import Pushed
 
-__all__ = ["assessment_lines", "comparison_lines"]
+__all__ = ["assessment_lines", "comparison_lines", "pushover_lines"]
 
 _FEW = 6  # stones of a mechanism that are named without -v
 _COURSES = 5  # courses with the largest misfits that are listed without -v
@@ -100,3 +101,28 @@ def _shape(one: dict[str, Any]) -> str:
         f"{text}; mid-span {1e3 * one['measured']:+.1f} ± {1e3 * one['sigma']:.1f}, "
         f"simulated {1e3 * one['simulated']:+.1f} mm"
     )
+
+
+def pushover_lines(done: "Pushed") -> list[str]:
+    """Return the lines of a loading test: what the stones bear, how stiff they are, and how sure that is."""
+    summary, errors = done.summary, done.summary["errors"]
+    measured = summary["measured"] or {"ratio": {}}
+    band = summary["band"] or {"by_one_sigma": {}}
+    return [
+        f"{summary['scene']}: {summary['headline']}",
+        *(f"  {caution}" for caution in summary["cautions"]),
+        f"  initial stiffness {1e-6 * summary['stiffness']:.4g} kN/mm, secant at 0.3 of the largest force",
+        f"  {summary['steps']} steps, {errors['unsolved']} not solved; "
+        f"error of the rate {1e-3 * errors['rate']:.2g} kN",
+        *(
+            f"  one standard deviation of {name}: {1e-3 * change:+.3g} kN"
+            for name, change in band["by_one_sigma"].items()
+        ),
+        *(
+            f"  measured {name} {1e-3 * measured['strength'][name]:.4g} kN; predicted over it {ratio:.3f}"
+            for name, ratio in measured["ratio"].items()
+            if ratio is not None
+        ),
+        f"  run {done.run}",
+        *(f"  {done.folder / name}" for name in summary["files"]),
+    ]

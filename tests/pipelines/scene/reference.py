@@ -7,6 +7,7 @@ from pathlib import Path
 
 from pipelines.scene.laws import LAW_KEYS, LAW_TYPES
 from pipelines.scene.loads import ASSESS_TYPES, LOAD_KEYS, LOAD_TYPES, THROW_KEYS
+from pipelines.scene.pushover import PUSHOVER_KEYS, SCATTER_KEYS
 from pipelines.scene.stages import STAGE_KEYS
 from pipelines.scene.tables import MATERIAL_KEYS, MESH_KEYS, ORTHOTROPY_KEYS, SITE_KEYS, TABLES
 from pipelines.toml.schema import REQUIRED, Key
@@ -29,6 +30,8 @@ SECTIONS: Mapping[str, tuple[Key, ...]] = {
     "[[stages]]": STAGE_KEYS,
     **{f"[[assess]] {name}": keys for name, keys in ASSESS_TYPES.items()},
     "[site]": SITE_KEYS,
+    "[pushover]": PUSHOVER_KEYS,
+    "[pushover.scatter]": SCATTER_KEYS,
 }
 """Keys by heading of the page; those of a type follow the heading of its array."""
 

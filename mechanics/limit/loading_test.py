@@ -1,0 +1,273 @@
+"""Loading test: stones in a rig are pushed step by step, forwards and back, and the force on the jaws is the curve.
+
+Each step moves the jaws by a stated way, at a speed that is a hundredth of that of a fall through the largest of them;
+with θ = 1 what the stones gather of it in a step is gone in the next. The force that jaws bear at rest is theirs less
+ΔE/Δu, what the kinetic energy took of their work; that is the error of the rate, and it is measured with the curve.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from mechanics.arrays import Array, Bools, Ints
+from mechanics.dynamics.energy_balance import EnergyBalance
+from mechanics.dynamics.observers.energy import kinetic_energy
+from mechanics.dynamics.progress import Listener, Progress, silent
+from mechanics.dynamics.simulation import Simulation
+from mechanics.dynamics.static_start import static_start
+from mechanics.dynamics.step import Step
+from mechanics.limit.pushover import SPEED
+from mechanics.model.model import Model, build_model
+from mechanics.scene.loads.load import Pose
+from mechanics.scene.rig import BEAM, JAWS, Rig, rigged
+from mechanics.scene.scene import Scene, TimeSettings
+from mechanics.scene.state import State
+from moma.errors import SolverError
+
+__all__ = ["LoadingTest", "loading_test"]
+
+# steps over the largest way, where no other step is asked for
+_STEPS = 200
+# inertia over the largest force up to which a step is calm [-]
+_CALM = 0.01
+# of displacements, over the largest [-]
+_ROUNDING = 1e-9
+# share of the largest force up to which the curve gives the initial stiffness [-]
+_INITIAL = 0.3
+
+
+@dataclass(frozen=True)
+class LoadingTest:
+    """Force and displacement of stones in a rig.
+
+    Attributes
+    ----------
+    displacement : (n,) of the push at the end of each step, from the state of rest under the vertical force [m]
+    force : (n,) on the jaws along the push [N]
+    inertia : (n,) what the kinetic energy took of it, the error of the rate [N]
+    lift : (n,) by which what is pushed has risen [m]
+    rig, model : the rig; the stones with its pieces
+    settled, peak, end : at rest under the vertical force; the steps with the largest force and the last one
+    settling : largest displacement of a stone under the vertical force [m]
+    unsolved : steps that were not solved
+    energy_error : energy that no term explains over the largest in any term [-]
+    stopped : ended before its way
+    """
+
+    displacement: Array
+    force: Array
+    inertia: Array
+    lift: Array
+    rig: Rig
+    model: Model
+    settled: State
+    peak: Step
+    end: Step
+    settling: float
+    unsolved: int
+    energy_error: float
+    stopped: bool
+
+    @property
+    def calm(self) -> Bools:
+        """Steps (n,) in which inertia changes the force by no more than 1 % of the largest."""
+        found: Bools = np.abs(self.inertia) <= _CALM * np.abs(self.force).max()
+        return found
+
+    @property
+    def strength(self) -> tuple[float, float]:
+        """Largest force of calm steps forwards, and backwards as a negative number; 0 where none was pushed [N]."""
+        force = np.append(np.where(self.calm, self.force, 0.0), 0.0)
+        return float(force.max()), float(force.min())
+
+    @property
+    def stiffness(self) -> float:
+        """Secant of the curve's first branch at 0.3 of the largest force [N/m]."""
+        goal = _INITIAL * np.abs(self.force).max()
+        first = int(np.argmax(np.abs(self.force) >= goal))
+        places, forces = np.insert(self.displacement, 0, 0.0), np.insert(self.force, 0, 0.0)
+        one, two = np.abs(forces[first : first + 2])
+        part = (goal - one) / (two - one)
+        place = abs(places[first] + part * (places[first + 1] - places[first]))
+        return float(goal / place)
+
+    @property
+    def first_branch(self) -> int:
+        """Steps before the push turns for the first time, one at least."""
+        back = np.flatnonzero(np.diff(np.abs(self.displacement)) < 0)
+        return int(back[0]) + 1 if len(back) else len(self.displacement)
+
+    def at(self, displacement: Array) -> Array:
+        """Return the force at displacements (m,) on the first branch of the curve, NaN beyond its end [N]."""
+        branch, sign = slice(self.first_branch), np.sign(self.displacement[self.first_branch - 1])
+        places, forces = (
+            np.insert(sign * self.displacement[branch], 0, 0.0),
+            np.insert(self.force[branch], 0, 0.0),
+        )
+        asked = sign * displacement
+        found: Array = np.interp(asked, places, forces, np.nan)
+        return np.where(asked > places[-1] * (1.0 + _ROUNDING), np.nan, found)
+
+    @property
+    def turning(self) -> float:
+        """Share of the displacement that comes from stones that turn: 1 if all rock, 0 if they slide [-]."""
+        model, end = self.model, self.end.after
+        own = ~model.fixed
+        own[[block.code == BEAM for block in model.scene.blocks]] = False
+        spin = Rotation.from_matrix(end.rotation[own] @ self.settled.rotation[own].transpose(0, 2, 1))
+        angle = spin.as_rotvec() @ self.rig.axes[1]
+        mass = model.mass[own]
+        return float(mass @ angle / mass.sum() * self.rig.height / self.displacement[-1])
+
+
+class _Path:
+    """Motion of jaws to given displacements in turn, at a constant speed; they rise with what they push.
+
+    Parameters
+    ----------
+    stones : codes of the jaws
+    direction : (3,) unit vector
+    to : displacements in turn [m]
+    speed : [m/s]
+
+    Attributes
+    ----------
+    rise : of the jaws so far [m]
+    """
+
+    def __init__(self, stones: frozenset[str], direction: Array, to: Sequence[float], speed: float) -> None:
+        self.stones, self._direction = stones, direction
+        self._way = np.concatenate([[0.0], to])
+        self._time = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(self._way)))]) / speed
+        self.rise = 0.0
+
+    @property
+    def until(self) -> float:
+        """Time at which they come to rest [s]."""
+        return float(self._time[-1])
+
+    def at(self, time: float) -> float:
+        """Return the displacement at `time` [m]."""
+        return float(np.interp(time, self._time, self._way))
+
+    def pose(self, time: float) -> Pose:
+        """Return the pose at `time` [s]."""
+        return Pose(self.at(time) * self._direction + [0.0, 0.0, self.rise], np.eye(3), np.zeros(3))
+
+
+class _Pushed:
+    """Points of the stones, or of the beam, that jaws touched first.
+
+    Parameters
+    ----------
+    step, jaws : the first step, and the bodies of the jaws
+    start : state to which rises count
+    """
+
+    def __init__(self, step: Step, jaws: Ints, start: State) -> None:
+        contacts = step.contacts
+        side = np.isin(contacts.bodies, jaws)
+        rows, touching = np.flatnonzero(side.any(axis=1)), side[side.any(axis=1)]
+        other = np.where(touching[:, 0], 1, 0)
+        self._body, self._arm = contacts.bodies[rows, other], contacts.arm[rows, other]
+        self._start = self._height(start)
+
+    def rise(self, state: State) -> float:
+        """Return their mean rise [m]."""
+        return self._height(state) - self._start if len(self._body) else 0.0
+
+    def _height(self, state: State) -> float:
+        place = state.centre[self._body] + np.einsum("nij,nj->ni", state.rotation[self._body], self._arm)
+        return float(place[:, 2].mean()) if len(place) else 0.0
+
+
+def loading_test(
+    scene: Scene,
+    rig: Rig,
+    to: Sequence[float],
+    step: float | None = None,
+    progress: Listener = silent,
+    stop: Callable[[], bool] = lambda: False,
+) -> LoadingTest:
+    """Push stones to displacements in turn, and return the force.
+
+    Parameters
+    ----------
+    scene : the stones and their laws, without loads that change with time; its time settings are not used
+    rig : where it is pushed
+    to : displacements of the push, in turn; their signs are those of the rig's direction [m]
+    step : way of one step; None: 1/200 of the largest displacement [m]
+    progress, stop : called and asked at every step
+
+    Raises
+    ------
+    SceneError, GeometryError : the rig, or the scene, cannot be built
+    SolverError : the stones do not come to rest under the vertical force, or the motion is no longer finite
+    """
+    furthest = float(np.abs(to).max())
+    way = step or furthest / _STEPS
+    speed = SPEED * float(np.sqrt(2.0 * np.linalg.norm(scene.gravity) * furthest))
+    path = _Path(frozenset(JAWS if rig.has_beam else JAWS[:1]), rig.axes[0], to, speed)
+    duration = way / speed
+    scene = replace(scene, time=TimeSettings(duration, theta=1.0, duration=path.until + duration))
+    bare, _ = build_model(scene)
+    weight = float(bare.mass[~bare.fixed].sum() * np.linalg.norm(scene.gravity))
+    model, begin = build_model(rigged(scene, weight, rig, path))
+    told, search = static_start(model, begin, progress)
+    if not told.found:
+        raise SolverError(
+            "the stones do not come to rest under the vertical force",
+            where=scene.name,
+            remedy="look at them with `moma check` and `moma run`, or lower the load",
+        )
+    simulation = Simulation(model, begin)
+    simulation.take_over(search)
+    settled = simulation.state
+    settling = float(np.linalg.norm(settled.centre - begin.centre, axis=1).max())
+    balance = EnergyBalance(model, settled)
+    codes = [block.code for block in model.scene.blocks]
+    jaws = np.array([codes.index(code) for code in sorted(path.stones)])
+    steps = int(np.ceil(path.until / duration - _ROUNDING))
+    rows: list[tuple[float, float, float, float]] = []
+    unsolved, energy, peak = 0, kinetic_energy(model, settled), None
+    pushed: _Pushed | None = None
+    for number in range(1, steps + 1):
+        made = simulation.step()
+        balance(made)
+        unsolved += not made.solution.converged
+        pushed = pushed or _Pushed(made, jaws, settled)
+        path.rise = pushed.rise(made.after)
+        force, place = _reaction(made, jaws, rig.axes[0]), path.at(made.after.time)
+        moved, before, energy = place - path.at(made.before.time), energy, kinetic_energy(model, made.after)
+        if peak is None or abs(force) > max(abs(row[1]) for row in rows):
+            peak = made
+        rows.append((place, force, (energy - before) / moved if moved else 0.0, path.rise))
+        progress(Progress("push", number, steps, f"{force / 1e3:.4g} kN at {1e3 * place:.4g} mm"))
+        if number < steps and stop():
+            break
+    displacement, force_, inertia, lift_ = np.array(rows).T
+    assert peak is not None
+    return LoadingTest(
+        displacement,
+        force_,
+        inertia,
+        lift_,
+        rig,
+        model,
+        settled,
+        peak,
+        made,
+        settling,
+        unsolved,
+        abs(balance.unexplained) / balance.reference,
+        number < steps,
+    )
+
+
+def _reaction(step: Step, jaws: Array, along: Array) -> float:
+    """Return the force of jaws on what they push, along the push [N]."""
+    side = np.isin(step.contacts.bodies, jaws)
+    sign = side[:, 1].astype(float) - side[:, 0]
+    return float(sign @ (step.force @ along))

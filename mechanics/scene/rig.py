@@ -1,0 +1,204 @@
+"""A test rig about some stones: a base, a beam or a hold at their top, and jaws that push at a stated height.
+
+The pieces are bodies of the scene: nothing else in the engine knows of them. Jaws are driven, without friction, and so
+stiff that they yield by 10⁻⁵ of the height. They hold the beam by a thin lug at the height of the push, between edges
+where it may turn, between faces where it may not, and let it rise and sink, so that the vertical force on it stays.
+"""
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Annotated
+
+import numpy as np
+
+from mechanics.arrays import Array
+from mechanics.scene.laws.elastic_joint import ElasticJoint
+from mechanics.scene.loads.forces import StoneForce
+from mechanics.scene.loads.load import Motion
+from mechanics.scene.loads.time_series import History
+from mechanics.scene.scene import Block, Fidelity, LawRule, Part, Scene
+from mechanics.scene.shapes import BOX_FACES, box_corners
+from mechanics.stones.materials import Material
+from mechanics.stones.settings import Setting, check_settings
+from moma.errors import SceneError
+
+__all__ = ["BASE", "BEAM", "HOLD", "JAWS", "Head", "Rig", "rigged"]
+
+BASE, BEAM, HOLD, JAWS = "rig base", "rig beam", "rig hold", ("rig jaw 1", "rig jaw 2")
+"""Codes of the pieces."""
+
+# of the jaws' edges, and of the lug, over the way from the stones' top to the push [-]
+_EDGE, _LUG = 0.01, 0.1
+# what jaws yield under the vertical force over the height of the stones [-]
+_YIELDS = 1e-5
+# weight of the beam over the vertical force [-]
+_BEAM = 0.01
+# of base and hold beyond the stones, over their height [-]
+_BEYOND = 0.2
+_UP = np.array([0.0, 0.0, 1.0])
+
+Box = tuple[tuple[float, float, float], tuple[float, float, float]]
+
+
+class Head(StrEnum):
+    """What is at the top of the stones."""
+
+    TURNS = "turns"
+    GUIDED = "guided"
+    HELD = "held"
+    FREE = "free"
+
+
+@dataclass(frozen=True)
+class Rig:
+    """Where a rig pushes, and what it puts on the stones.
+
+    Attributes
+    ----------
+    direction : (3,) horizontal, of any length
+    """
+
+    direction: tuple[float, float, float]
+    height: Annotated[float, Setting("Height of the push above the stones' lowest point.", "m", above=0)]
+    load: Annotated[
+        float, Setting("Vertical force on the stones' top, the beam's weight included.", "N", at_least=0)
+    ] = 0.0
+    head: Annotated[
+        Head,
+        Setting(
+            "What is on top: turns: a rigid beam that is pushed and may turn; guided: one that may not; held: an edge "
+            "against which the top leans, while the stones are pushed; free: nothing."
+        ),
+    ] = Head.TURNS
+
+    def __post_init__(self) -> None:
+        check_settings("rig", self)
+        if not np.isfinite(self.direction).all() or not any(self.direction[:2]) or self.direction[2]:
+            raise SceneError(
+                f"direction = {list(self.direction)}", where="rig", remedy="give a horizontal direction"
+            )
+        if self.load and not self.has_beam:
+            raise SceneError(
+                f'a load on a top that is "{self.head}"',
+                where="rig",
+                remedy="leave load out, or put a beam on",
+            )
+
+    @property
+    def has_beam(self) -> bool:
+        """True where a beam is on top, which is what is pushed."""
+        return self.head in (Head.TURNS, Head.GUIDED)
+
+    @property
+    def pieces(self) -> tuple[str, ...]:
+        """Codes of the pieces that have joints with stones by the scene's own laws."""
+        return (BASE, BEAM) if self.has_beam else (BASE,)
+
+    @property
+    def axes(self) -> Array:
+        """Rows (3, 3): along the push, across it, and up."""
+        along = np.array(self.direction) / np.linalg.norm(self.direction)
+        return np.array([along, np.cross(_UP, along), _UP])
+
+
+class _Shop:
+    """Maker of pieces from boxes in the axes of a rig.
+
+    Attributes
+    ----------
+    made : so far
+    """
+
+    def __init__(self, axes: Array) -> None:
+        self._axes = axes
+        self.made: list[Block] = []
+
+    def make(self, code: str, *boxes: Box, density: float | None = None) -> None:
+        """Make a piece that fills some boxes; without a density [kg/m³] it is fixed."""
+        parts = [Part(box_corners(*one) @ self._axes, BOX_FACES) for one in boxes]
+        faces = tuple(
+            tuple(k + len(part.vertices) * number for k in face)
+            for number, part in enumerate(parts)
+            for face in part.faces
+        )
+        self.made.append(
+            Block(
+                code,
+                np.vstack([part.vertices for part in parts]),
+                faces,
+                Material("rig", density or 1.0, 1.0, 0.0),
+                Fidelity.RIGID if density else Fidelity.FIXED,
+                parts=tuple(parts) if len(parts) > 1 else (),
+            )
+        )
+
+
+def rigged(scene: Scene, weight: float, rig: Rig, motion: Motion) -> Scene:
+    """Return the scene with the pieces of a rig, whose jaws are driven.
+
+    The scene's rules of laws hold for base and beam where they name their codes (`Rig.pieces`).
+
+    Parameters
+    ----------
+    scene : stones; those that are fixed stay so, and without any they stand on a base
+    weight : of those that are not fixed [N]
+    motion : of `JAWS`
+
+    Raises
+    ------
+    SceneError : the push is not where it can act
+    """
+    shop, corners = _Shop(rig.axes), [block.vertices @ rig.axes.T for block in scene.blocks]
+    a, c, bottom = np.min([one.min(axis=0) for one in corners], axis=0).tolist()
+    b, d, top = np.max([one.max(axis=0) for one in corners], axis=0).tolist()
+    tall, at = top - bottom, bottom + rig.height
+    wide, forces = _BEYOND * tall, scene.loads.forces
+    if not any(block.fidelity is Fidelity.FIXED for block in scene.blocks):
+        shop.make(BASE, ((a - wide, c, bottom - wide), (b + wide, d, bottom)))
+    if rig.has_beam:
+        rise = at - top
+        if rise <= 0:
+            remedy = f'give the height at which the beam is pushed, or head = "{Head.HELD}" or "{Head.FREE}"'
+            raise _misplaced(rig, "below", tall, remedy)
+        middle, half = (a + b) / 2, 0.5 * _LUG * rise
+        beam: Box = (a, c, top), (b, d, top + rise / 2)
+        lug: Box = (middle - half, c, top + rise / 2), (middle + half, d, top + 1.5 * rise)
+        fall = float(np.linalg.norm(scene.gravity))
+        mass = _BEAM * max(rig.load, weight) / fall
+        shop.make(
+            BEAM, beam, lug, density=mass / sum(float(np.prod(np.subtract(*one))) * -1 for one in (beam, lug))
+        )
+        edge = _EDGE * rise if rig.head is Head.TURNS else rise / 2
+        shop.make(JAWS[0], ((a, c, at - edge), (middle - half, d, at + edge)))
+        shop.make(JAWS[1], ((middle + half, c, at - edge), (b, d, at + edge)))
+        down = History.constant((mass * fall - rig.load) * _UP)
+        forces = (*forces, StoneForce(frozenset({BEAM}), down))
+    else:
+        if rig.height > tall:
+            raise _misplaced(rig, "above", tall, "push lower, or put a beam on")
+        edge = _EDGE * _LUG * tall
+        near = [one for one in corners if one[:, 2].min() < at + edge and one[:, 2].max() > at - edge]
+        face = min(float(one[:, 0].min()) for one in near)
+        shop.make(JAWS[0], ((face - wide, c, at - edge), (face, d, at + edge)))
+        if rig.head is Head.HELD:
+            shop.make(HOLD, ((b, c, top - edge), (b + wide, d, top + wide)))
+    stiffness = max(rig.load, weight) / (_YIELDS * tall * 2 * edge * (d - c))
+    own = frozenset(block.code for block in shop.made)
+    driven = own & {*JAWS, HOLD}
+    rule = LawRule(
+        driven,
+        frozenset(block.code for block in scene.blocks) | (own - driven),
+        ElasticJoint(0.0, stiffness, stiffness),
+    )
+    return replace(
+        scene,
+        blocks=(*scene.blocks, *shop.made),
+        contact=replace(scene.contact, rules=(*scene.contact.rules, rule)),
+        loads=replace(scene.loads, forces=forces, motions=(*scene.loads.motions, motion)),
+    )
+
+
+def _misplaced(rig: Rig, where: str, tall: float, remedy: str) -> SceneError:
+    return SceneError(
+        f"the push at {rig.height:g} m is {where} the stones' top, {tall:g} m", where="rig", remedy=remedy
+    )

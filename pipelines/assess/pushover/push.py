@@ -1,0 +1,260 @@
+"""A loading test of a scene from file to files: test, band, pictures, report, and the record in the database."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from archmodel.database.session import open_database
+from archmodel.store.run_record import RunRecord
+from archmodel.tables.entries import latest_entry
+from mechanics.arrays import Array
+from mechanics.dynamics.progress import Listener, Progress, silent
+from mechanics.limit.loading_test import LoadingTest, loading_test
+from mechanics.scene.rig import Rig
+from mechanics.scene.scene import Fidelity, Scene
+from moma.errors import UsageError
+from pipelines.assess.pushover.band import Band, banded, varied
+from pipelines.assess.pushover.measured import read_curve
+from pipelines.draw.loading import draw_curve, draw_pushed
+from pipelines.reports.pushover import write_pushover
+from pipelines.results.folder import check_replaceable, replacing, source_of
+from pipelines.results.summary import as_json
+from pipelines.run.assemble import Assembly, assemble_stones
+from pipelines.run.record import store_record, versions
+from pipelines.run.soundness import problems_of, refuse_unsound
+from pipelines.scene.file import SceneFile, read_scene
+from pipelines.scene.laws import law_rules
+from pipelines.scene.pushover import Pushing
+from pipelines.scene.selection import Groups, select_groups, select_stones
+from pipelines.scene.stages import refuse_stages
+
+__all__ = ["COLUMNS", "INDEX", "REPORT", "Pushed", "push"]
+
+INDEX = "pushover.json"
+"""Index of the results of a loading test."""
+
+REPORT = "report.html"
+"""Page for people."""
+
+COLUMNS = ("displacement", "force", "inertia", "lift")
+"""Columns of curve.csv: of the push [m], on the jaws [N], the error of the rate [N], and rise of the beam [m]."""
+
+_SOUND_FIRST = "mend the scene until `moma check` finds nothing"
+_ROCKS, _SLIDES = 0.5, 0.2  # share of turning from which stones rock, and up to which they slide [-]
+_FEW = 0.02  # share of steps that may be left unsolved, or that inertia may disturb, without a caution [-]
+_BALANCE = 1e-3  # energy that no term explains, up to which there is no caution [-]
+
+
+@dataclass(frozen=True)
+class Pushed:
+    """Result of a loading test.
+
+    Attributes
+    ----------
+    folder : of the files
+    summary : contents of pushover.json
+    run : its number in the database
+    """
+
+    folder: Path
+    summary: dict[str, Any]
+    run: int
+
+
+def push(
+    path: str | Path,
+    url: str,
+    folder: str | Path,
+    progress: Listener = silent,
+    stop: Callable[[], bool] = lambda: False,
+    overwrite: bool = False,
+) -> Pushed:
+    """Push the stones of a scene in a test rig as its table [pushover] says; keep curve and report in a folder.
+
+    Parameters
+    ----------
+    path : scene file
+    url : of the database
+    folder : of the results; earlier ones there are replaced
+    progress, stop : called and asked at every step
+    overwrite : replace the results of another scene in the folder
+
+    Raises
+    ------
+    UsageError : the scene has no [pushover]; the folder holds other files, or results of another scene
+    UnsoundSceneError : the scene has problems that `check_scene` reports
+    SceneError, GeometryError, SolverError : see `assemble_stones` and `loading_test`
+    DatabaseError : the database cannot be read or written
+    """
+    folder, scene = Path(folder), read_scene(path)
+    refuse_stages(scene.stages, scene.document, "moma pushover")
+    check_replaceable(folder, INDEX, () if overwrite else (Path(path),))
+    if scene.pushover is None:
+        raise UsageError(
+            "the scene has no table [pushover]",
+            where=str(path),
+            remedy="say where it is pushed and how far (docs/scene.md)",
+        )
+    asked = scene.pushover
+    measured = None if asked.measured is None else read_curve(Path(path).parent / asked.measured)
+    progress(Progress("blocks", 0, None, "reading the stones"))
+    with open_database(url, create=False) as database, database.session(read_only=True) as session:
+        as_of = latest_entry(session)
+        models = select_stones(scene, session)
+        groups = select_groups(scene, session, models)
+        assembled = assemble_stones(scene, models, groups)
+    refuse_unsound(problems_of(scene, assembled, ()), str(path), _SOUND_FIRST)
+    stones = _in_rig(scene, assembled.scene, groups, asked.rig)
+    number, total = 0, 1 + len(asked.scatter)
+
+    def within(report: Progress) -> None:
+        """Tell how far one of the tests is."""
+        text = f"test {number + 1} of {total}, {report.text}" if total > 1 else report.text
+        progress(replace(report, text=text))
+
+    def tested(name: str, factor: float) -> LoadingTest:
+        """Test with one parameter times a factor."""
+        nonlocal number
+        number += 1
+        return loading_test(*varied(stones, asked.rig, name, factor), asked.to, asked.step, within, stop)
+
+    test = loading_test(stones, asked.rig, asked.to, asked.step, within, stop)
+    progress(Progress("push", 1, total, found=_headline(test, None)))
+    band = banded(test, asked.scatter, asked.level, tested) if asked.scatter and not test.stopped else None
+    summary = _summary(assembled, asked, test, band, measured)
+    with replacing(folder, INDEX) as fresh:
+        title = f"{scene.name}: {summary['headline']}"
+        np.savetxt(
+            fresh / "curve.csv",
+            np.column_stack([test.displacement, test.force, test.inertia, test.lift]),
+            "%.7g",
+            ",",
+            header=",".join(COLUMNS),
+            comments="",
+        )
+        draw_curve(fresh / "curve.png", title, test, None if band is None else band.curve, measured)
+        draw_pushed(fresh / "peak.png", f"{scene.name}, at the largest force", test, test.peak)
+        draw_pushed(fresh / "end.png", f"{scene.name}, at the end", test, test.end)
+        files = [INDEX, REPORT, "scene.toml", "curve.csv", "curve.png", "peak.png", "end.png"]
+        summary |= {"files": files, "source": source_of([path], fresh)}
+        (fresh / "scene.toml").write_text(scene.text, encoding="utf-8")
+        write_pushover(fresh / REPORT, summary)
+        (fresh / INDEX).write_text(as_json(summary), encoding="utf-8")
+    record = RunRecord(
+        scene=scene.name,
+        scene_text=scene.text,
+        outcome="pushed",
+        summary=summary,
+        versions=versions(),
+        results=(),
+        as_of=as_of,
+    )
+    with open_database(url, create=False) as database:
+        return Pushed(folder, summary, store_record(database, folder, record))
+
+
+def _in_rig(scene: SceneFile, stones: Scene, groups: Groups, rig: Rig) -> Scene:
+    """Return stones, all of them rigid or fixed, with laws that also hold for what the rig puts below and above them.
+
+    Its base and beam count as of the material of all other stones.
+    """
+    general = next(
+        (one.material.name for one in scene.materials if not one.stones), scene.materials[0].material.name
+    )
+    materials = {block.code: block.material.name for block in stones.blocks} | dict.fromkeys(
+        rig.pieces, general
+    )
+    rules = law_rules(scene.document, scene.laws, groups, materials)
+    blocks = tuple(
+        replace(block, fidelity=Fidelity.RIGID) if block.fidelity is Fidelity.DEFORMABLE else block
+        for block in stones.blocks
+    )
+    return replace(stones, blocks=blocks, contact=replace(stones.contact, rules=rules))
+
+
+def _headline(test: LoadingTest, band: Band | None) -> str:
+    """Return what the stones bear in a sentence."""
+    forwards, backwards = test.strength
+    told = [f"{1e-3 * value:.4g} kN" for value in (forwards, backwards) if value]
+    text = f"bears {' and '.join(told) or 'nothing'}"
+    if band is not None:
+        text += f" ± {1e-3 * band.strength:.2g} kN ({100 * band.level:g} % band)"
+    share = test.turning
+    way = "rocks" if share > _ROCKS else "slides in its joints" if share < _SLIDES else "rocks and slides"
+    return f"{text}; it {way}"
+
+
+def _summary(
+    assembled: Assembly, asked: Pushing, test: LoadingTest, band: Band | None, measured: Array | None
+) -> dict[str, Any]:
+    """Return the contents of pushover.json, but for its files."""
+    steps, disturbed = len(test.force), int(np.sum(~test.calm))
+    soft = sum(block.fidelity is Fidelity.DEFORMABLE for block in assembled.scene.blocks)
+    cautions = [
+        *(["it was stopped before its end"] if test.stopped else []),
+        *(
+            [f"{test.unsolved} of {steps} steps were not solved to the tolerance"]
+            if test.unsolved > _FEW * steps
+            else []
+        ),
+        *(
+            [f"in {disturbed} of {steps} steps stones gathered speed: their forces are not those of rest"]
+            if disturbed > _FEW * steps
+            else []
+        ),
+        *(
+            [f"energy does not balance by {100 * test.energy_error:.2g} %"]
+            if test.energy_error > _BALANCE
+            else []
+        ),
+        *([f"{soft} deformable stones count as rigid"] if soft else []),
+    ]
+    forwards, backwards = test.strength
+    model = test.model
+    weight = float(model.mass[~model.fixed].sum() * np.linalg.norm(model.scene.gravity))
+    return {
+        "scene": assembled.scene.name,
+        "headline": _headline(test, band),
+        "cautions": [*cautions, *assembled.remarks],
+        "stones": len(assembled.scene.blocks),
+        "weight": weight,
+        "load": asked.rig.load,
+        "height": asked.rig.height,
+        "head": str(asked.rig.head),
+        "strength": {"forwards": forwards, "backwards": backwards},
+        "stiffness": test.stiffness,
+        "turning": test.turning,
+        "settling": test.settling,
+        "steps": steps,
+        "errors": {
+            "unsolved": test.unsolved,
+            "rate": float(np.abs(test.inertia[test.calm]).max(initial=0.0)),
+            "disturbed": disturbed,
+            "energy": test.energy_error,
+        },
+        "band": None
+        if band is None
+        else {
+            "level": band.level,
+            "strength": band.strength,
+            "by_one_sigma": dict(band.parts),
+            "scatter": dict(asked.scatter),
+        },
+        "measured": None if measured is None else _beside(test, measured),
+        "versions": dict(versions()),
+    }
+
+
+def _beside(test: LoadingTest, measured: Array) -> dict[str, Any]:
+    """Return a measured curve (n, 2) beside the predicted one, at the measured displacements of a short curve."""
+    most, least = float(measured[:, 1].max()), float(measured[:, 1].min())
+    strength, other = test.strength
+    found: dict[str, Any] = {"strength": {"forwards": most, "backwards": min(least, 0.0)}}
+    found["ratio"] = {
+        "forwards": strength / most if strength and most > 0 else None,
+        "backwards": other / least if other and least < 0 else None,
+    }
+    return found

@@ -1,0 +1,92 @@
+"""Pictures of a loading test: the capacity curve with its band and a measured one, and the stones at its end."""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.collections import PolyCollection
+
+from mechanics.arrays import Array
+from mechanics.contact.contacts import material_points
+from mechanics.dynamics.step import Step
+from mechanics.limit.loading_test import LoadingTest
+from pipelines.draw.elevations.sheet import new_sheet
+
+__all__ = ["draw_curve", "draw_pushed"]
+
+_WAY = 0.08  # largest displacement in the picture over the extent of the stones [-]
+_OPEN = 0.05  # opening of a joint that is marked, over the displacement of the push [-]
+_SEEN = -0.5  # component of a normal towards the viewer up to which a face is drawn [-]
+
+
+def draw_curve(path: Path, title: str, test: LoadingTest, band: Array | None, measured: Array | None) -> None:
+    """Draw force against displacement.
+
+    Parameters
+    ----------
+    band : (n, 3) displacement, least and largest force of a band about the curve [m, N]; None: there is none
+    measured : (n, 2) displacement and force [m, N]; None: nothing was measured
+    """
+    figure = new_sheet((7.0, 4.4))
+    axes = figure.subplots()
+    if band is not None:
+        places, low, high = band.T
+        axes.fill_between(1e3 * places, 1e-3 * low, 1e-3 * high, color="#1f5f8b", alpha=0.2, label="band")
+    places, forces = np.insert(test.displacement, 0, 0.0), np.insert(test.force, 0, 0.0)
+    axes.plot(1e3 * places, 1e-3 * forces, color="#1f5f8b", label="predicted")
+    if measured is not None:
+        style = "-" if len(measured) > 30 else "o"
+        axes.plot(
+            *(1e3 * measured[:, 0], 1e-3 * measured[:, 1]), style, color="#8a3b12", lw=1.0, label="measured"
+        )
+    axes.axhline(0.0, color="black", lw=0.5)
+    axes.set_xlabel("displacement of the push [mm]")
+    axes.set_ylabel("force [kN]")
+    axes.set_title(title, fontsize=10, parse_math=False)
+    axes.grid(alpha=0.3)
+    axes.legend(frameon=False, loc="best")
+    figure.savefig(path)
+
+
+def draw_pushed(path: Path, title: str, test: LoadingTest, step: Step) -> None:
+    """Draw the stones at the end of a step as seen across the push, displacements exaggerated, open joints marked."""
+    model, after = test.model, step.after
+    along, across, up = test.rig.axes
+    view = np.array([along, up])
+    own = [number for number, fixed in enumerate(model.fixed) if not fixed]
+    extent = max(np.ptp(np.vstack([model.scene.blocks[k].vertices for k in own]) @ view.T, axis=0))
+    moved = after.centre - test.settled.centre
+    factor = _WAY * extent / max(float(np.abs(moved).max()), 1e-9)
+    turn = after.rotation @ test.settled.rotation.transpose(0, 2, 1)
+    shown = list[Array]()
+    for number in own:
+        block = model.scene.blocks[number]
+        first, last = model.outline.first[number : number + 2]
+        start = model.outline.corner[first:last] @ test.settled.rotation[number].T
+        place = start @ turn[number].T - start
+        corners = (test.settled.centre[number] + start + factor * (moved[number] + place)) @ view.T
+        for face in block.faces:
+            ring = block.vertices[list(face)]
+            normal = np.cross(ring[1] - ring[0], ring[2] - ring[0])
+            if normal @ across < _SEEN * np.linalg.norm(normal):
+                shown.append(corners[list(face)])
+    figure = new_sheet((5.0, 5.0))
+    axes = figure.subplots()
+    axes.add_collection(PolyCollection(shown, facecolor="#e6dfd0", edgecolor="#4a4a4a", linewidth=0.6))
+    contacts = step.active.contacts
+    wide = step.active.gap > _OPEN * abs(float(test.displacement[-1]))
+    sides = contacts.bodies[wide]
+    points = np.concatenate([one[wide] for one in material_points(contacts, after)])
+    bodies = np.concatenate([sides[:, 0], sides[:, 1]])
+    kept = ~model.fixed[bodies]
+    points, bodies = points[kept], bodies[kept]
+    arm = np.einsum("nji,nj->ni", turn[bodies], points - after.centre[bodies])
+    start = test.settled.centre[bodies] + arm
+    marks = (start + factor * (points - start)) @ view.T
+    axes.plot(*marks.T, ".", color="#c0392b", markersize=3)
+    axes.autoscale_view()
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+    axes.set_title(
+        f"{title}\ndisplacements × {factor:.3g}; red: joints that are open", fontsize=9, parse_math=False
+    )
+    figure.savefig(path)

@@ -1,0 +1,66 @@
+"""report.html of a loading test: what the stones bear, the curve, how sure it is, and how they moved."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from pipelines.reports.html import picture, write_page
+
+__all__ = ["write_pushover"]
+
+_PICTURES = {
+    "curve.png": "Force on the jaws of the rig against the displacement of the push.",
+    "peak.png": "The stones at the largest force.",
+    "end.png": "The stones at the end of the test.",
+}
+
+
+def write_pushover(path: Path, summary: Mapping[str, Any]) -> None:
+    """Write the page and embed the pictures of its folder.
+
+    Parameters
+    ----------
+    path : report.html
+    summary : as in pushover.json
+    """
+    write_page(
+        path,
+        "pushover.html",
+        name=summary["scene"],
+        lead=f"{summary['headline']}. {summary['stones']} stones, weight {1e-3 * summary['weight']:.2f} kN, vertical "
+        f"force {1e-3 * summary['load']:.4g} kN, pushed at {summary['height']:g} m.",
+        cautions=summary["cautions"],
+        warnings=(),
+        version=summary["versions"]["moma"],
+        versions=summary["versions"],
+        values=list(_values(summary)),
+        band=list(_band(summary)),
+        level=None if summary["band"] is None else f"{100 * summary['band']['level']:g} %",
+        figures=[picture(path.parent / name, words) for name, words in _PICTURES.items()],
+    )
+
+
+def _values(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    for name, value in summary["strength"].items():
+        if value:
+            yield f"Largest force {name}", f"{1e-3 * value:.4g} kN"
+    yield "Initial stiffness, secant at 0.3 of it", f"{1e-6 * summary['stiffness']:.4g} kN/mm"
+    yield "Share of the displacement by stones that turn", f"{summary['turning']:.2f}"
+    yield "Settling under the vertical force", f"{1e3 * summary['settling']:.3g} mm"
+    errors = summary["errors"]
+    yield "Error of the rate, largest of calm steps", f"{1e-3 * errors['rate']:.2g} kN"
+    yield (
+        "Steps, not solved, disturbed by inertia",
+        (f"{summary['steps']}, {errors['unsolved']}, {errors['disturbed']}"),
+    )
+    yield "Energy that no term explains", f"{errors['energy']:.1e}"
+    for name, ratio in ((summary["measured"] or {}).get("ratio") or {}).items():
+        if ratio is not None:
+            measured = summary["measured"]["strength"][name]
+            yield f"Measured {name}; predicted over it", f"{1e-3 * measured:.4g} kN; {ratio:.3f}"
+
+
+def _band(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
+    if summary["band"] is not None:
+        for name, change in summary["band"]["by_one_sigma"].items():
+            yield name, f"{100 * summary['band']['scatter'][name]:.3g} %", f"{1e-3 * change:+.3g} kN"

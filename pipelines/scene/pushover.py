@@ -1,0 +1,109 @@
+"""Table [pushover] of a scene: the rig, the displacements to which it pushes, and the scatter of what decides."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from mechanics.scene.rig import Rig
+from pipelines.scene.keys import keys_of, typed_values
+from pipelines.toml.schema import Key, TomlDocument, ValueKind, check_table
+
+__all__ = ["PUSHOVER_KEYS", "SCATTER", "SCATTER_KEYS", "Pushing", "read_pushover"]
+
+PUSHOVER_KEYS = (
+    Key(
+        "direction",
+        ValueKind.VECTOR,
+        "Horizontal direction of the push; its length does not matter.",
+        "-",
+        (1.0, 0.0, 0.0),
+    ),
+    *keys_of(Rig),
+    Key(
+        "to",
+        ValueKind.NUMBERS,
+        "Displacements of the push, in turn: one, or those of cycles, such as [0.01, -0.01, 0.02, -0.02].",
+        "m",
+    ),
+    Key(
+        "step",
+        ValueKind.NUMBER,
+        "Way of one step; if not given, 1/200 of the largest displacement.",
+        "m",
+        None,
+        above=0,
+    ),
+    Key(
+        "measured",
+        ValueKind.TEXT,
+        "CSV file beside the scene, to be drawn beside the curve: displacement [mm], force [kN].",
+        default=None,
+    ),
+    Key("level", ValueKind.NUMBER, "Level of the band of `[pushover.scatter]`.", "-", 0.9, above=0, below=1),
+)
+"""Keys of [pushover]."""
+
+SCATTER: Mapping[str, str] = {
+    "friction": "friction of all joints",
+    "stiffness": "stiffness of all elastic joints, or the modulus of their mortar",
+    "tension": "tensile strength of the joints, with its energy",
+    "shear": "shear strength of the joints, with its energy",
+    "compressive_strength": "pressure at which joints crush",
+    "load": "vertical force",
+    "density": "density of the stones",
+}
+"""What may scatter."""
+
+SCATTER_KEYS = tuple(
+    Key(name, ValueKind.NUMBER, f"Coefficient of variation of the {what}.", "-", None, above=0, below=1)
+    for name, what in SCATTER.items()
+)
+"""Keys of [pushover.scatter]."""
+
+
+@dataclass(frozen=True)
+class Pushing:
+    """What [pushover] asks.
+
+    Attributes
+    ----------
+    rig : where it pushes
+    to : displacements in turn [m]
+    step : way of one step; None: the usual one [m]
+    measured : file of a measured curve, relative to the scene; None: there is none
+    level : of the band [-]
+    scatter : coefficients of variation by the names of `SCATTER`, of those that are given [-]
+    """
+
+    rig: Rig
+    to: tuple[float, ...]
+    step: float | None
+    measured: str | None
+    level: float
+    scatter: Mapping[str, float]
+
+
+def read_pushover(document: TomlDocument, given: Mapping[str, Any]) -> Pushing | None:
+    """Check the table; None where a scene has none."""
+    if "pushover" not in given:
+        return None
+    content = given["pushover"]
+    if not isinstance(content, dict):
+        document.fail("'pushover' is not a table", "pushover", remedy="write [pushover] on a line of its own")
+    plain = {key: value for key, value in content.items() if key != "scatter"}
+    values: dict[str, Any] = check_table(document, ("pushover",), plain, PUSHOVER_KEYS)
+    scatter: dict[str, Any] = check_table(
+        document, ("pushover", "scatter"), content.get("scatter", {}), SCATTER_KEYS
+    )
+    with document.at("pushover"):
+        rig = Rig(direction=values["direction"], **typed_values(Rig, values))
+    if not values["to"] or not any(values["to"]):
+        document.fail("no displacement", "pushover", "to", remedy="give at least one, such as [0.03]")
+    return Pushing(
+        rig,
+        tuple(values["to"]),
+        values["step"],
+        values["measured"],
+        values["level"],
+        {name: value for name, value in scatter.items() if value is not None},
+    )
