@@ -1,6 +1,8 @@
 """Scene: all input of a simulation, constant during a run."""
 
+import math
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Annotated
@@ -147,6 +149,8 @@ class ContactSettings:
         from its corner, with two or more cells each way, and stays with that face as stones slide and rock
     spacing : the number of cells along a face is its length over `spacing`, rounded up; a joint of two faces has two
         or more each way, of an area of its own
+    thickness : of the mortar between two blocks, by their codes, for laws whose stiffness depends on it; pairs of which
+        one is not in the scene are left alone [m]
     """
 
     law: Law = field(default_factory=DryJoint)
@@ -180,8 +184,17 @@ class ContactSettings:
         Setting("Largest distance between points where placement is area, which needs it.", "m", above=0),
     ] = None
 
+    thickness: Mapping[frozenset[str], float] = field(default_factory=dict)
+
     def __post_init__(self) -> None:
         check_settings("contact", self)
+        for pair, thickness in self.thickness.items():
+            if len(pair) != 2 or not 0.0 < thickness < math.inf:
+                raise SceneError(
+                    f"thickness {thickness!r} of the joint between {' and '.join(sorted(pair))}",
+                    where="contact",
+                    remedy="give two codes, and a thickness greater than 0 [m]",
+                )
         if self.placement is Placement.AREA and self.spacing is None:
             raise SceneError(
                 'placement = "area" without spacing',
