@@ -32,6 +32,7 @@ from mechanics.contact.surfaces import Placed, Surfaces, middles
 from mechanics.scene.scene import Placement
 from mechanics.scene.state import State
 from mechanics.scene.threads import at_once
+from moma.errors import SceneError
 
 __all__ = ["FLAT", "THIN", "Detector"]
 
@@ -82,6 +83,7 @@ class Detector:
     fixed : (nb,) fixed bodies; pairs of them are left out
     alert : gap below which a contact is watched, relative to the smaller stone [-]
     points, placement : minimum number of contact points of two rigid faces, and where they lie
+    spacing : of points over the area of the faces [m]
     distance : gap up to which some law acts, whatever the size of the stones [m]
     threads : maximum number of concurrent threads; the result is the same to the last bit
     """
@@ -93,6 +95,7 @@ class Detector:
     placement: Placement = Placement.CORNERS
     distance: float = 0.0
     threads: int = 1
+    spacing: float | None = None
     _hints: _Hints = field(default_factory=_Hints, repr=False)
     _cells: list[FaceCells] = field(default_factory=list, repr=False)
 
@@ -184,12 +187,27 @@ class Detector:
         return take(Contacts(body, key, frame, area, arm, weights), np.flatnonzero(outside))
 
     def _interfaces(self, pairs: Pairs, placed: Placed) -> tuple[Any, ...]:
-        """Return the contact points of all pairs, as `_of_bodies` does of single points."""
+        """Return the contact points of all pairs, as `_of_bodies` does of single points.
+
+        Raises
+        ------
+        SceneError : the points over the area of a face are too many to be named
+        """
         inner, middle = self.placement == Placement.INERTIA, self.placement == Placement.CENTROID
+        spacing = self.spacing if self.spacing and self.placement == Placement.AREA else 0.0
 
         def part(a: int, b: int) -> tuple[Any, ...]:
             some = Pairs._make(one[a:b] for one in pairs)
-            found, *points = interface_points(some, self.points, inner, middle, FLAT, THIN, placed.shapes)
+            try:
+                found, *points = interface_points(
+                    some, self.points, inner, middle, spacing, FLAT, THIN, placed.shapes
+                )
+            except ValueError as error:
+                raise SceneError(
+                    f"spacing = {spacing:g} m makes more points on one face than can be told apart",
+                    where="contact",
+                    remedy="give a larger spacing",
+                ) from error
             found[:, 0] += a
             return self._of_bodies(pairs, _Singles(found, *points), placed)
 

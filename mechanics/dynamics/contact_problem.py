@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechanics.arrays import Array
+from mechanics.arrays import Array, Bools
 from mechanics.contact.contacts import PAIR_BIT, Contacts, gaps
 from mechanics.delassus.assembly import local_velocity
 from mechanics.delassus.compliant import CompliantDelassus
@@ -30,6 +30,7 @@ from mechanics.scene.laws.law import REST, SPRING, Approach, Springs, Terms
 from mechanics.scene.scene import Method
 from mechanics.scene.state import State
 from mechanics.stones.validation import SMALLEST
+from moma.errors import SceneError
 
 __all__ = [
     "SOFTNESS",
@@ -132,6 +133,7 @@ def contact_problem(
     begin: Beginning | None,
     joints: JointCompliance = _RIGID,
     last: Array | None = None,
+    crushing: Bools | None = None,
 ) -> tuple[ContactProblem, Approach]:
     """State the problem u = W r̃ + (u_free - W s n), (u, r̃) in the shift and cone of its law, for r̃ = r + s n.
 
@@ -148,6 +150,7 @@ def contact_problem(
     begin : how the run begins, in its first step; None in later ones
     joints : their compliance; the joints of this step are compliant where rigid ones are not to be tried
     last : (nc, 3) r of the last step, zero for new contacts, from which compliant joints go on; None: zero [N s]
+    crushing : (nc,) contacts whose joints crush in this step; None: those that are at their strength and close
 
     Returns
     -------
@@ -186,10 +189,14 @@ def contact_problem(
         else np.zeros_like(contacts.key),
         first=meets,
         state=internal,
+        thickness=_thickness(model, found),
     )
     before = np.zeros((len(gap), 3)) if last is None else last
     if model.laws.sprung:
         approach = replace(approach, state=turned_springs(approach.state, spring_axes(contacts, predicted)))
+    if model.laws.crushes:
+        guess = model.laws.crushing(found.law, approach) if crushing is None else crushing
+        approach = replace(approach, crushing=guess)
     if not joints.rigid:
         approach = _explained(approach, joints.value, before)
     terms = model.laws.terms(found.law, approach)
@@ -209,6 +216,29 @@ def contact_problem(
     if terms.springs is not None:
         problem = _sprung(problem, terms.springs)
     return problem if joints.rigid else _compliant(problem, joints.value, before), approach
+
+
+def _thickness(model: Model, found: Detection) -> Array | None:
+    """Return the thickness of mortar (nc,) of contacts, zero where no law needs it [m].
+
+    Raises
+    ------
+    SceneError : two stones whose joint has no thickness, although its law needs it
+    """
+    contacts = found.contacts
+    thickness = model.laws.thickness(found.law, contacts.bodies)
+    if thickness is None:
+        return None
+    lacks = np.flatnonzero(np.isnan(thickness) & (contacts.area > 0))
+    if len(lacks):
+        one, other = sorted(model.scene.blocks[b].code for b in contacts.bodies[lacks[0]])
+        raise SceneError(
+            f"no thickness of the mortar between {one} and {other}",
+            where=model.scene.name,
+            remedy="give thickness beside mortar_young in the law of this joint, for pairs of which none is known",
+        )
+    known: Array = np.where(np.isnan(thickness), 0.0, thickness)
+    return known
 
 
 def spring_axes(contacts: Contacts, state: State) -> Array:

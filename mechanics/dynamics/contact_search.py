@@ -65,6 +65,7 @@ def detector(model: Model, bed: float = 0.0) -> Detector:
         settings.placement,
         max(bed, *(law.reach for law in model.laws.laws)),
         model.scene.solver.threads,
+        settings.spacing,
     )
 
 

@@ -39,6 +39,7 @@ __all__ = ["Simulation"]
 
 # bias of a gap over the largest u_free up to which it is one of an inexact step, and counts as closed [-]
 _CLOSED = 1e-3
+_CRUSHING = 10  # most solutions of a step in search of the joints that crush
 # predicted state, contacts, free motion, internal variables, and how the run begins
 _Given = tuple[State, Detection, Kick, Array, Beginning | None]
 _Solved = tuple[ContactProblem, Approach, ContactSolution]
@@ -262,11 +263,23 @@ class Simulation(Carrier):
     def _try(
         self, given: _Given, joints: JointCompliance, warm: ContactStart, begin: ContactStart
     ) -> _Solved:
-        """State the problem after a step with the impulses of `warm`, and solve it from `begin`."""
-        with self.clock("assemble"):
-            problem, approach = contact_problem(self.model, *given, joints, warm.impulse)
-        with self.clock("solve"):
-            return problem, approach, self._solve(problem, shifted(problem, begin))
+        """State the problem after a step with the impulses of `warm`, and solve it from `begin`.
+
+        Which joints crush is known once it is solved; then it is solved again with these, until they stay the same.
+        """
+        found, laws, crushing = given[1], self.model.laws, None
+        for _ in range(_CRUSHING):
+            with self.clock("assemble"):
+                problem, approach = contact_problem(self.model, *given, joints, warm.impulse, crushing)
+            with self.clock("solve"):
+                solution = self._solve(problem, shifted(problem, begin))
+            if approach.crushing is None:
+                break
+            crushing = laws.crushing(found.law, approach, solution.impulse)
+            if np.array_equal(crushing, approach.crushing):
+                break
+            begin = ContactStart(unshifted(problem, solution.impulse), solution.velocity)
+        return problem, approach, solution
 
     def _conclude(self, step: Step) -> Step:
         """Remember a step for the next one, and halt the bodies that relaxation or sleep halts after it."""

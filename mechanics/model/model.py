@@ -263,7 +263,13 @@ def laws_between(scene: Scene) -> LawTable:
     SceneError : a law names a block that is not there
     """
     rules = [(*_groups(scene, rule), rule.law) for rule in scene.contact.rules]
-    return law_table(scene.contact.law, rules, len(scene.blocks))
+    number = {block.code: b for b, block in enumerate(scene.blocks)}
+    beds = {
+        (min(ends), max(ends)): thickness
+        for pair, thickness in scene.contact.thickness.items()
+        if len(ends := [number[code] for code in pair if code in number]) == 2
+    }
+    return law_table(scene.contact.law, rules, len(scene.blocks), beds)
 
 
 def _groups(scene: Scene, rule: LawRule) -> tuple[Bools, Bools]:

@@ -28,7 +28,7 @@ class ContactResult:
     pressure : (nc,) normal force over area; NaN between edges [Pa]
     opening : (nc,) growth of its gap since the start [m]
     slide : (nc,) displacement of its two material points along each other since the start [m]
-    status : (nc,) "open", "stick", "slip", "bonded" or "broken"
+    status : (nc,) "open", "stick", "slip", "bonded", "broken" or "crush"
     joint : (nc,) its joint; -1 without one, as between edges
     """
 

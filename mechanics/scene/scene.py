@@ -1,6 +1,8 @@
 """Scene: all input of a simulation, constant during a run."""
 
+import math
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Annotated
@@ -119,6 +121,7 @@ class Placement(StrEnum):
     CORNERS = "corners"
     INERTIA = "inertia"
     CENTROID = "centroid"
+    AREA = "area"
 
 
 @dataclass(frozen=True)
@@ -141,7 +144,13 @@ class ContactSettings:
     placement : *corners*: on the edge of the common face, so that a stone rocks about its true edge; *inertia*: inside
         it, where they reproduce its area and second moments exactly, as a uniform pressure does; *centroid*: corners,
         and a further point at the centroid, which take shares of the area that carry its second moments, so that
-        elastic joints bend like the area and stones still rock about its edge
+        elastic joints bend like the area and stones still rock about its edge; *area*: one in each cell of a grid, so
+        that elastic joints also gap and crush like the area. The grid lies along the longest edge of the smaller face,
+        from its corner, with two or more cells each way, and stays with that face as stones slide and rock
+    spacing : the number of cells along a face is its length over `spacing`, rounded up; a joint of two faces has two
+        or more each way, of an area of its own
+    thickness : of the mortar between two blocks, by their codes, for laws whose stiffness depends on it; pairs of which
+        one is not in the scene are left alone [m]
     """
 
     law: Law = field(default_factory=DryJoint)
@@ -166,12 +175,32 @@ class ContactSettings:
         Placement,
         Setting(
             "corners: at the true edge of the common face; inertia: inside it, where they carry its second moments; "
-            "centroid: corners and centroid, which together bend like the face where joints are elastic."
+            "centroid: corners and centroid, which together bend like the face where joints are elastic; "
+            "area: in cells all over it, `spacing` wide, so that elastic joints open and crush like the face."
         ),
     ] = Placement.CORNERS
+    spacing: Annotated[
+        float | None,
+        Setting("Largest distance between points where placement is area, which needs it.", "m", above=0),
+    ] = None
+
+    thickness: Mapping[frozenset[str], float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         check_settings("contact", self)
+        for pair, thickness in self.thickness.items():
+            if len(pair) != 2 or not 0.0 < thickness < math.inf:
+                raise SceneError(
+                    f"thickness {thickness!r} of the joint between {' and '.join(sorted(pair))}",
+                    where="contact",
+                    remedy="give two codes, and a thickness greater than 0 [m]",
+                )
+        if self.placement is Placement.AREA and self.spacing is None:
+            raise SceneError(
+                'placement = "area" without spacing',
+                where="contact",
+                remedy="give the largest distance between points, such as a quarter of a stone's length [m]",
+            )
 
 
 class Start(StrEnum):

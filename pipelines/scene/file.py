@@ -220,7 +220,8 @@ def _joints(document: TomlDocument, laws: Sequence[JointLaw], values: Mapping[st
 def _contact(document: TomlDocument, values: Mapping[str, Any]) -> ContactSettings:
     with document.at("contact", "dynamic_friction"):
         law = build(DryJoint, values)
-    return replace(build(ContactSettings, values), law=law)
+    with document.at("contact", "placement"):
+        return replace(build(ContactSettings, values), law=law)
 
 
 def _gravity(

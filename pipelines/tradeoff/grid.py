@@ -188,7 +188,8 @@ def _of_points(scene: SceneFile, model: Variant) -> Iterator[Variant]:
         if points != scene.contact.points:
             yield _variant(model, replace(model.overlay, points=points), points / scene.contact.points)
     for placement in Placement:
-        if placement is not scene.contact.placement:
+        spaced = placement is not Placement.AREA or scene.contact.spacing is not None
+        if placement is not scene.contact.placement and spaced:
             yield _variant(model, replace(model.overlay, placement=placement), 1.0)
 
 

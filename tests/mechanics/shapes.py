@@ -84,10 +84,12 @@ def opening(**time):
     return scene(ground(), *stones, duration=1.0, **time)
 
 
-def detected(one, points=4, placement=Placement.CORNERS):
+def detected(one, points=4, placement=Placement.CORNERS, spacing=None):
     """Model, state at the start and the contacts in it."""
     model, state = build_model(one)
-    find = Detector(model.surfaces, model.fixed, one.contact.alert_distance, points, placement)
+    find = Detector(
+        model.surfaces, model.fixed, one.contact.alert_distance, points, placement, spacing=spacing
+    )
     return model, state, find(state, np.zeros(len(one.blocks)))
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 
 from mechanics.arrays import Array, Bools, Ints
+from mechanics.contact._kernels.cells import cell_points, face_grid
 from mechanics.contact._kernels.vectors import (
     along,
     cross,
@@ -48,6 +49,7 @@ _PARALLEL = 0.999999  # cosine of the angle below which edges need no test
 # distance from a side, relative to the size of the smaller shape, within which a corner is on it, so that faces that
 # end together clip cleanly
 _ON_SIDE = 1e-7
+_EQUAL = 1.0 - 1e-6  # of faces of equal area but for rounding, the first counts [-]
 _LEAST_SHARE = 0.1  # smallest area of a contact point, relative to an even share of the overlap
 # distance by which the edge of an overlap may recede where a corner is left out, relative to twice its smaller radius
 # of gyration, which is the radius of a disk and 1.15 of half the width of a rectangle: stones then tip within 1 % of
@@ -504,8 +506,15 @@ def _polygon_of(size):
 
 
 @njit(cache=True)
-def _room_needed(kind, feature, cptr, points):
-    """Return the most corners of an overlap, and of all overlaps and pairs of edges together."""
+def _grid_face(first, second, face_area):
+    """Return which of two faces, of the first and of the second shape, carries the cells: the smaller one."""
+    return second if face_area[second] < _EQUAL * face_area[first] else first
+
+
+@njit(cache=True)
+def _room_needed(pairs, points, spacing, flat, shapes):
+    """Return the most corners of an overlap, and of all overlaps and pairs of edges together; -1 for too many cells."""
+    kind, feature, cptr = pairs.kind, pairs.feature, shapes.cptr
     largest, total = max(points, 1), 0
     for p in range(kind.shape[0]):
         if kind[p] == EDGES:
@@ -515,12 +524,28 @@ def _room_needed(kind, feature, cptr, points):
             corners = max(points, 1) + 1
             for f in feature[p]:
                 corners += cptr[f + 1] - cptr[f]
+            one, other = feature[p, 0], feature[p, 1]
+            if spacing > 0.0 and -dot(row(shapes.normal, one), row(shapes.normal, other)) > flat:
+                if kind[p] != FACE_FIRST:
+                    one, other = other, one
+                face = _grid_face(one, other, shapes.face_area)
+                _, _, _, n1, n2, _, _ = face_grid(
+                    face, spacing, shapes.vertex, cptr, shapes.corner, shapes.normal
+                )
+                faces = 0
+                for s in pairs.shapes[p]:
+                    faces = max(faces, shapes.fptr[s + 1] - shapes.fptr[s])
+                if 9.0 * n1 * n2 * faces >= 1 << _WHAT_BIT:
+                    return -1, -1
+                corners = max(corners, n1 * n2)
             largest, total = max(largest, corners), total + corners
     return largest, total
 
 
 @njit(cache=True, nogil=True)
-def interface_points(pairs, points, inner, middle, flat, thin, shapes):  # pragma: no cover - compiled
+def interface_points(
+    pairs, points, inner, middle, spacing, flat, thin, shapes
+):  # pragma: no cover - compiled
     """Find the contact points of each pair in touch: corners of the overlap of two faces, or the feet of two edges.
 
     Inputs
@@ -530,6 +555,8 @@ def interface_points(pairs, points, inner, middle, flat, thin, shapes):  # pragm
         the overlap
     inner : bool, points of flat faces lie inside, where they carry the area's second moments
     middle : bool, flat faces have a further point at the centroid, so that springs in all points bend like the area
+    spacing : float64, flat faces have a point in each cell, of this width or less, of a grid on the smaller one; zero:
+        at corners or inside [m]
     flat : float64, cosine of the angle within which faces lie flat on one another [-]
     thin : float64, flat faces that overlap by less than this part of the smaller one do not touch [-]
     shapes : Polyhedra
@@ -540,13 +567,20 @@ def interface_points(pairs, points, inner, middle, flat, thin, shapes):  # pragm
     frame : (nc, 3, 3) float64, rows n, t1, t2 [-]
     nearest : (nc, 2, 3) float64, points on candidate and antagonist [m]
     area : (nc,) float64 [m²]
+
+    Raises
+    ------
+    ValueError : cells of a face that are too many to be named
     """
-    largest, most = _room_needed(pairs.kind, pairs.feature, shapes.cptr, points)
+    largest, most = _room_needed(pairs, points, spacing, flat, shapes)
+    if most < 0:
+        raise ValueError("too many cells")
     place = np.empty((most, 3), dtype=np.int64)
     frame, nearest, area = np.empty((most, 3, 3)), np.empty((2 * most, 3)), np.empty(most)
     polygon, kept = _polygon_of(largest), _polygon_of(largest)
     x, y, z, label = polygon
     share, chosen = np.empty(largest), np.empty(largest, dtype=np.int64)
+    rings = np.empty((5, largest + 4 if spacing > 0.0 else 0, 4))
     # unpacked once: in the loop the compiler would count references
     pair, limit, _, kind, feature, axis = pairs
     _, vertex, fptr, cptr, corner, normal, eptr, edge_a, edge_b, _, _, size, face_area = shapes
@@ -597,7 +631,25 @@ def interface_points(pairs, points, inner, middle, flat, thin, shapes):  # pragm
         for q in range(k):
             if z[q] <= limit[p]:
                 near += 1
-        if (inner or points == 1) and lies_flat and near == k:
+        if spacing > 0.0 and lies_flat and near > 0:
+            gx, gy = _slope(f, g)
+            height = z[0] - gx * x[0] - gy * y[0]
+            first, second = (reference, incident) if owner == i else (incident, reference)
+            face = _grid_face(first, second, face_area)
+            origin, e1, e2, n1, n2, p1, p2 = face_grid(face, spacing, vertex, cptr, corner, normal)
+            away = minus(o, origin)
+            for q in range(k):
+                arm = along(along(along(away, x[q], t1), y[q], t2), z[q], n)
+                rings[0, q, 0], rings[0, q, 1], rings[0, q, 2], rings[0, q, 3] = (
+                    dot(e1, arm),
+                    dot(e2, arm),
+                    x[q],
+                    y[q],
+                )
+            k, inside = cell_points(rings[0], k, (n1, n2, p1, p2), rings[1:], x, y, label, share), True
+            for q in range(k):
+                z[q] = height + gx * x[q] + gy * y[q]
+        elif (inner or points == 1) and lies_flat and near == k:
             gx, gy = _slope(f, g)
             height = z[0] - gx * x[0] - gy * y[0]
             _inner_points(points, m, x, y)

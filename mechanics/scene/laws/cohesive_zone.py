@@ -43,17 +43,18 @@ class CohesiveZone:
     @property
     def reach(self) -> float:
         """Opening at which the bond is broken, δ_f,N [m]."""
-        return 2.0 * self.energy_tension / self._tension
+        return 2.0 * self.energy_tension / self.held
 
     @property
-    def _tension(self) -> float:
+    def held(self) -> float:
+        """Tension that a whole bond holds [Pa]."""
         return held_tension(self.friction, self.tension, self.shear)
 
     @property
     def _dry(self) -> DryJoint:
         return DryJoint(self.friction)
 
-    def _intact(self, opening: Array, slip: Array) -> Array:
+    def intact(self, opening: Array, slip: Array) -> Array:
         """Return β (n,) after a largest opening and a path of sliding [m], for contacts that were bonded."""
         intact: Array = np.maximum(
             1.0 - opening / self.reach - slip * self.shear / (2.0 * self.energy_shear), 0.0
@@ -67,8 +68,8 @@ class CohesiveZone:
         step, theta = contacts.step, contacts.theta
         opening = np.maximum(contacts.gap - state[:, REST] + step * (theta - 0.5) * contacts.speed, 0.0)
         largest = np.maximum(state[:, OPENING], opening)
-        area = step * contacts.area * self._intact(largest, state[:, SLIP]) * bonded(contacts)
-        full = area * self._tension
+        area = step * contacts.area * self.intact(largest, state[:, SLIP]) * bonded(contacts)
+        full = area * self.held
         unresolved = step * theta * contacts.compliance * full
         opened = largest > 0
         part = np.where(opened, (opening + unresolved) / np.where(opened, largest, 1.0), 1.0)
@@ -87,6 +88,6 @@ class CohesiveZone:
         free = holds & ((impulse[:, 0] <= 0) | at_limit(terms, impulse))
         state[:, SLIP] += np.where(free, step * np.linalg.norm(velocity[:, 1:], axis=1), 0.0)
         state[:, SLIDING] = slid(contacts, terms, impulse, velocity)
-        intact = self._intact(state[:, OPENING], state[:, SLIP])
+        intact = self.intact(state[:, OPENING], state[:, SLIP])
         state[holds, BOND] = np.where(intact > 0, intact, BROKEN)[holds]
         return state

@@ -14,6 +14,7 @@ from mechanics.arrays import Array, Bools, Ints
 
 __all__ = [
     "BOND",
+    "CRUSHED",
     "ENERGY",
     "OPENING",
     "REST",
@@ -32,7 +33,8 @@ __all__ = [
 BOND, SLIDING, OPENING, SLIP, REST = range(5)
 SPRING = slice(5, 8)
 ENERGY = 8
-STATE = 9
+CRUSHED = 9
+STATE = 10
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,10 @@ class Approach:
         step, OPENING largest opening so far [m], SLIP path of sliding so far [m], REST gap that counts as closed, where
         stones overlapped or mortar filled a joint as they met [m], SPRING three columns of springs, local frame: what
         their stretch exceeds the gap across the joint, and their stretch along it, which is what the candidate has
-        moved over the antagonist in them [m], ENERGY what they hold [J]
+        moved over the antagonist in them [m], ENERGY what they hold [J], CRUSHED closure by crushing so far, by which
+        REST is lower [m]
+    thickness : (n,) of the mortar in the joints, zero where it is not known; None: nowhere [m]
+    crushing : (n,) contacts whose pressure exceeds the strength of their joint in this step; None: not known yet
     """
 
     gap: Array
@@ -71,6 +76,8 @@ class Approach:
     pair: Ints
     first: Bools
     state: Array
+    thickness: Array | None = None
+    crushing: Bools | None = None
 
 
 @dataclass(frozen=True)

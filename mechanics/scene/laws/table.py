@@ -1,7 +1,7 @@
 """Table of the laws between bodies, and all laws of a step as one shift and cone."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from mechanics.scene.laws.mortar import MortarJoint
 __all__ = ["LawTable", "law_table"]
 
 _PER_CONTACT = ("gap", "speed", "slide", "area", "size", "compliance", "state", "pair", "first")
+_IF_KNOWN = ("thickness", "crushing")
 _NUMBERS = ("bias", "friction", "cohesion", "adhesion")
 
 
@@ -25,15 +26,52 @@ class LawTable:
     ----------
     laws : the general law, then that of each rule
     groups : (rules, 2, nb) the bodies of the two groups of each rule
+    beds : thickness of mortar between two bodies, by their numbers, the lower first [m]
     """
 
     laws: tuple[Law, ...]
     groups: Bools
+    beds: Mapping[tuple[int, int], float] = field(default_factory=dict)
 
     @property
     def sprung(self) -> bool:
         """True where a law has springs, so that joints yield."""
         return any(isinstance(law, ElasticJoint) for law in self.laws)
+
+    @property
+    def crushes(self) -> bool:
+        """True where joints have a compressive strength."""
+        return any(isinstance(law, ElasticJoint) and law.compressive_strength for law in self.laws)
+
+    def thickness(self, law: Ints, bodies: Ints) -> Array | None:
+        """Return the thickness of mortar (nc,) between bodies (nc, 2), zero where no law needs it; None: anywhere [m].
+
+        Not a number where it is needed, but not known.
+        """
+        own = [one if isinstance(one, ElasticJoint) and one.by_thickness else None for one in self.laws]
+        if not any(own):
+            return None
+        otherwise = np.array([0.0 if one is None else one.thickness or np.nan for one in own])[law]
+        needed = np.array([one is not None for one in own])[law]
+        if not self.beds:
+            return otherwise
+        pairs = np.array(sorted(self.beds), dtype=np.int64)
+        wide = np.array([self.beds[one, other] for one, other in pairs.tolist()])
+        count = int(max(bodies.max(initial=0), pairs.max())) + 1
+        known, asked = pairs @ [count, 1], np.sort(bodies, axis=1) @ [count, 1]
+        at = np.minimum(np.searchsorted(known, asked), len(known) - 1)
+        return np.where(needed & (known[at] == asked), wide[at], otherwise)
+
+    def crushing(self, law: Ints, contacts: Approach, impulse: Array | None = None) -> Bools:
+        """Return the contacts (nc,) whose joints crush in a step with r̃, as `ElasticJoint.crushing` does."""
+        crushing = np.zeros(len(law), dtype=bool)
+        for index, rows in _groups(law):
+            one = self.laws[index]
+            if isinstance(one, ElasticJoint):
+                crushing[rows] = one.crushing(
+                    _some(contacts, rows), None if impulse is None else impulse[rows]
+                )
+        return crushing
 
     def makes_bonds(self, law: Ints) -> Bools:
         """Return the contacts (n,) whose law bonds stones that meet at the start."""
@@ -75,14 +113,19 @@ class LawTable:
         return state
 
 
-def law_table(general: Law, rules: Sequence[tuple[Bools, Bools, Law]], bodies: int) -> LawTable:
-    """Return the table of a general law and of rules, each with the bodies (nb,) of its two groups.
+def law_table(
+    general: Law,
+    rules: Sequence[tuple[Bools, Bools, Law]],
+    bodies: int,
+    beds: Mapping[tuple[int, int], float] | None = None,
+) -> LawTable:
+    """Return the table of a general law and of rules, each with the bodies (nb,) of its two groups, and of beds.
 
     Rules that say what the general law says anyway are left out where all do.
     """
     rules = () if all(law == general for _, _, law in rules) else rules
     groups = np.array([[first, second] for first, second, _ in rules], dtype=bool).reshape(-1, 2, bodies)
-    return LawTable((general, *(law for _, _, law in rules)), groups)
+    return LawTable((general, *(law for _, _, law in rules)), groups, dict(beds or {}))
 
 
 def _groups(law: Ints) -> Iterator[tuple[int, Ints]]:
@@ -93,6 +136,8 @@ def _groups(law: Ints) -> Iterator[tuple[int, Ints]]:
 
 def _some(contacts: Approach, rows: Ints) -> Approach:
     parts = {name: getattr(contacts, name)[rows] for name in _PER_CONTACT}
+    known = {name: getattr(contacts, name) for name in _IF_KNOWN}
+    parts |= {name: None if value is None else value[rows] for name, value in known.items()}
     return Approach(
         **parts,
         step=contacts.step,

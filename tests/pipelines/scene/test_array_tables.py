@@ -40,6 +40,8 @@ def test_every_law_is_made_of_its_keys():
         + '[[laws]]\ntype = "cohesive_zone"\nfriction = 0.5\ntension = 3e5\nshear = 4e5\n'
         + "energy_tension = 50\nenergy_shear = 80\n"
         + SPRINGS
+        + '[[laws]]\ntype = "elastic_joint"\nfriction = 0.7\nmortar_young = 1e9\nthickness = 0.01\n'
+        + "tension = 1e5\nshear = 2e5\nenergy_tension = 5\nenergy_shear = 50\ncompressive_strength = 3e6\n"
         + '[[laws]]\ntype = "lennard_jones"\nfriction = 0.2\nforce = 5\ndistance = 1e-3\n'
     )
     assert [one.law for one in scene.laws] == [
@@ -47,6 +49,7 @@ def test_every_law_is_made_of_its_keys():
         DryJoint(0.3, None, 0.1),
         CohesiveZone(0.5, 3e5, 4e5, 50.0, 80.0),
         ElasticJoint(0.5, 1e9, 4e8),
+        ElasticJoint(0.7, None, None, 0.0, 1e5, 2e5, None, 5.0, 50.0, 3e6, mortar_young=1e9, thickness=0.01),
         LennardJones(0.2, 5.0, 1e-3),
     ]
 

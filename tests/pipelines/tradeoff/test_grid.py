@@ -114,8 +114,10 @@ def test_names_distinguish_settings_and_records_read_back(overlay):
 
 @given(overlays, st.floats(0.01, 10.0))
 def test_lines_that_are_pasted_make_the_scene_that_was_run(overlay, width):
-    pasted = parse_scene(PLAIN + "\n" + scene_lines(overlay, width), "scene.toml")
-    meant = overlaid(parse_scene(PLAIN, "scene.toml"), overlay, width)
+    lines, spacing = scene_lines(overlay, width), "[contact]\nspacing = 0.1\n"
+    own = lines.replace("[contact]\n", spacing) if "[contact]" in lines else spacing + lines
+    pasted = parse_scene(PLAIN + "\n" + own, "scene.toml")
+    meant = overlaid(parse_scene(PLAIN + "\n" + spacing, "scene.toml"), overlay, width)
     assert pasted.bodies == meant.bodies
     assert pasted.mesh.element == meant.mesh.element
     assert pasted.mesh.size == pytest.approx(meant.mesh.size, rel=1e-5)

@@ -13,11 +13,15 @@ from mechanics.dynamics.static_start import static_start
 from mechanics.model.model import build_model
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.elastic_joint import ElasticJoint
-from mechanics.scene.laws.law import ENERGY
+from mechanics.scene.laws.law import CRUSHED, ENERGY
+from mechanics.scene.loads.forces import StoneForce
 from mechanics.scene.loads.load import Loads
+from mechanics.scene.loads.motions import ImposedMotion
+from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import (
     ContactSettings,
     Fidelity,
+    LawRule,
     Method,
     Placement,
     Scene,
@@ -28,7 +32,7 @@ from mechanics.scene.scene import (
 from mechanics.scene.shapes import prism, voussoir_arch
 from mechanics.simulate import simulate
 from mechanics.stones.materials import Material
-from moma.errors import SolverError
+from moma.errors import SceneError, SolverError
 from tests.validation.masonry import rectangle
 from tests.validation.scenes import STONE, G, box, ground, tilted_gravity
 
@@ -118,15 +122,21 @@ def test_a_spring_that_slid_pulls_no_further_than_its_limit():
 
 
 @pytest.mark.parametrize(
-    ("placement", "times"), [(Placement.CORNERS, 3.0), (Placement.CENTROID, 1.0), (Placement.INERTIA, 1.0)]
+    ("placement", "times"),
+    [
+        (Placement.CORNERS, 3.0),
+        (Placement.CENTROID, 1.0),
+        (Placement.INERTIA, 1.0),
+        (Placement.AREA, 1 - 1 / 16),
+    ],
 )
 def test_a_joint_bends_like_its_area_or_like_its_corners(placement, times):
-    """Rotation M/(k I), I = b d³/12; springs at the corners alone are three times as stiff."""
+    """Rotation M/(k I), I = b d³/12; springs at corners are three times as stiff, those of n cells 1 - 1/n² as."""
     law = ElasticJoint(0.6, STIFF, STIFF, tension=1e8, shear=1e8)
     height, push = 0.5, 100.0
     gravity = (push / (STONE.density * height), 0.0, 0.0)
     block = box("block", [-0.5, -0.5, 0.0], [0.5, 0.5, height])
-    simulation = started(law, block, gravity=gravity, theta=1.0, step=0.05, placement=placement)
+    simulation = started(law, block, gravity=gravity, theta=1.0, step=0.05, placement=placement, spacing=0.25)
     track(simulation, 60)
     turn = np.arcsin(simulation.state.rotation[1] @ [0, 0, 1.0] @ np.array([1.0, 0, 0]))
     moment = push * (height / 2)
@@ -179,11 +189,11 @@ def test_a_block_that_slides_over_an_edge_gains_no_energy_from_its_springs():
     assert kept(on_plinth([0, -0.5, 0], [1, 0.5, 0.2], (0.8, 0, 0, 0, 0, 0), 0.0), 600) < 1e-9
 
 
-@pytest.mark.parametrize("placement", [Placement.CORNERS, Placement.CENTROID])
+@pytest.mark.parametrize("placement", [Placement.CORNERS, Placement.CENTROID, Placement.AREA])
 def test_a_block_that_rocks_gains_no_energy_from_its_springs(placement):
     """Corners that lift leave their area to the others, the point in the middle comes and goes: 11 mJ of each J."""
     velocity = (0.3, 0, 0, 0, 1.0, 0)
-    rocks = on_plinth([-0.15, -0.15, 0], [0.15, 0.15, 0.6], velocity, 0.8, placement=placement)
+    rocks = on_plinth([-0.15, -0.15, 0], [0.15, 0.15, 0.6], velocity, 0.8, placement=placement, spacing=0.1)
     assert kept(rocks, 700) < 1e-9
 
 
@@ -293,3 +303,110 @@ def test_other_methods_agree(method):
         for one in (Method.AUTO, method)
     ]
     np.testing.assert_allclose(paths[1], paths[0], atol=1e-6 * np.abs(paths[0]).max())
+
+
+# --- joints that crush, soften, and are of mortar ---
+
+
+def driven(law, velocity, step=1e-3):
+    """A slab of 1 m² on the ground, glued below a plate that moves: forces on the slab from below, balance and run.
+
+    `velocity` is a history of the plate's.
+    """
+    plate = box("plate", [-0.5, -0.5, SLAB], [0.5, 0.5, 2 * SLAB], fidelity=Fidelity.FIXED)
+    glue = LawRule(
+        frozenset({"plate"}), frozenset({"slab"}), ElasticJoint(0.6, 1e12, 1e12, tension=1e9, shear=1e9)
+    )
+    contact = ContactSettings(law, (glue,), placement=Placement.AREA, spacing=0.3)
+    loads = Loads(motions=(ImposedMotion(frozenset({"plate"}), velocity),))
+    scene = Scene(
+        "driven", (ground(), slab(), plate), (0, 0, 0), contact, TimeSettings(step, 1.0, 1.0), loads=loads
+    )
+    simulation = Simulation(*build_model(scene))
+    balance, force, step = EnergyBalance(simulation.model, simulation.start), [], None
+    for _ in range(round(velocity.time[-1] / scene.time.step)):
+        step = simulation.step()
+        balance(step)
+        below = (step.contacts.bodies == 0).any(axis=1)
+        up = np.where(step.contacts.bodies[below, 0] == 1, 1.0, -1.0)
+        force.append(up @ step.force[below])
+    return np.array(force), balance, step
+
+
+def test_a_block_that_is_pressed_down_crushes_its_joint_at_its_strength():
+    """k = 1 GPa/m, 2 MPa: 2 mm to the strength, 3 mm beyond; back by 1 mm the force has halved, and 3 mm remain."""
+    law = ElasticJoint(0.6, 1e9, 5e8, compressive_strength=2e6)
+    times, way = [0.0, 0.05, 0.2501, 0.2502, 0.29], [0.0, -0.02, -0.02, 0.02, 0.02]
+    force, balance, step = driven(law, History(times, np.outer(way, [0, 0, 1.0])))
+    np.testing.assert_allclose(force[155:249, 2], 2e6, rtol=0.01)
+    moved = -0.02 * (0.025 + 0.2) + 0.02 * 0.04
+    crushed = step.internal[:, CRUSHED].max()
+    assert crushed == pytest.approx(0.0045 - 0.002, rel=0.02)
+    assert force[-1, 2] == pytest.approx(1e9 * (-moved - crushed), rel=0.01)
+    assert balance.error < 1e-9
+    assert balance.contact + step.internal[:, ENERGY].sum() == pytest.approx(-2e6 * crushed, rel=0.02)
+
+
+def test_a_bond_that_is_pulled_off_costs_its_energy_of_fracture():
+    """50 J/m², in 300 steps of 2 µm, with the energy balance closed."""
+    law = ElasticJoint(0.6, 1e10, 5e9, tension=3e5, shear=3e5, energy_tension=50.0, energy_shear=80.0)
+    force, balance, step = driven(law, History([0.0, 0.3], np.outer([2e-3, 2e-3], [0, 0, 1.0])))
+    assert -force[:, 2].min() == pytest.approx(3e5, rel=0.02)
+    assert force[-1, 2] == 0.0
+    assert -balance.contact - step.internal[:, ENERGY].sum() == pytest.approx(50.0, rel=0.02)
+    assert balance.error < 1e-9
+
+
+def test_a_block_pressed_off_its_middle_crushes_and_gaps_like_a_winkler_bed():
+    """N = 0.4 f b L a quarter of L from the edge: crushed to L_c, then linear over a, then open; φ = f/(k a).
+
+    N = f b (a/2 + L_c) and N L/4 = f b (L_c²/2 + a (L_c + a/3)/2) give a = √(24 n (1/4 - n/2)) L for n = 0.4.
+    """
+    strength, stiffness, share = 2e6, 1e9, 0.4
+    press = share * 0.1 * strength
+    law = ElasticJoint(0.6, stiffness, stiffness / 2, compressive_strength=strength)
+    force = StoneForce(
+        frozenset({"block"}), History([0.0, 1.0], np.outer([0, press], [0, 0, -1.0])), (0.25, 0.0, 0.1)
+    )
+    scene = Scene(
+        "bed",
+        (ground(), box("block", [-0.5, -0.05, 0.0], [0.5, 0.05, 0.2])),
+        (0, 0, 0),
+        ContactSettings(law, placement=Placement.AREA, spacing=0.025),
+        TimeSettings(2e-2, 1.0, 2.0),
+        loads=Loads(forces=(force,)),
+    )
+    simulation = Simulation(*build_model(scene))
+    for _ in range(100):
+        step = simulation.step()
+        assert step.solution.converged
+    elastic = np.sqrt(24 * share * (0.25 - share / 2))
+    crushed = share - elastic / 2
+    turn = np.arcsin(simulation.state.rotation[1, 0, 2])
+    assert turn == pytest.approx(strength / (stiffness * elastic), rel=0.01)
+    place, pressed = step.active.place[:, 0], step.impulse[:, 0] > 0
+    assert place[pressed].min() == pytest.approx(0.5 - elastic - crushed, abs=0.025)
+    assert place[step.internal[:, CRUSHED] > 0].min() == pytest.approx(0.5 - crushed, abs=0.025)
+    pressure = step.force[:, 2] / step.contacts.area
+    assert np.abs(pressure).max() == pytest.approx(strength, rel=1e-3)
+
+
+def test_mortar_yields_by_its_local_thickness():
+    """Slabs on 10 and 20 mm of E = 100 MPa sink by m g t/E; a pair without thickness is named."""
+    stones = (slab(), box("other", [1.0, -0.5, 0.0], [2.0, 0.5, SLAB]))
+    beds = {frozenset({"ground", "slab"}): 0.01, frozenset({"other", "ground"}): 0.02}
+    law = ElasticJoint(0.6, mortar_young=1e8)
+    simulation = started(law, *stones, theta=1.0, step=5e-3, thickness=beds)
+    track(simulation, 60)
+    sunk = simulation.start.centre[:, 2] - simulation.state.centre[:, 2]
+    np.testing.assert_allclose(sunk[1:], MASS * G * np.array([0.01, 0.02]) / 1e8, rtol=1e-3)
+    del beds[frozenset({"other", "ground"})]
+    with pytest.raises(SceneError, match="no thickness of the mortar between ground and other"):
+        track(started(law, *stones, thickness=beds), 1)
+    with pytest.raises(SceneError, match="two codes"):
+        ContactSettings(law, thickness={frozenset({"ground"}): 0.01})
+
+
+def test_points_over_the_area_need_their_spacing():
+    with pytest.raises(SceneError, match="without spacing"):
+        ContactSettings(placement=Placement.AREA)

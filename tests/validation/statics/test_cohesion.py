@@ -59,7 +59,7 @@ def test_a_block_on_mortar_is_pulled_off_and_sheared_off_at_its_strength(
     force = History([0.0, 0.5, 0.501, 1.5], np.outer(parts, direction))
     simulation = started(
         [ground(), box("block", [0, 0, 0], [1, 1, 1], stone)],
-        ContactSettings(MortarJoint(0.5, 1e4, 5e3), placement=placement),
+        ContactSettings(MortarJoint(0.5, 1e4, 5e3), placement=placement, spacing=0.3),
         Loads(forces=(StoneForce(frozenset({"block"}), force, arm),)),
         theta=theta,
         step=2e-3,

@@ -86,12 +86,12 @@ def test_points_are_named_after_the_edge_that_begins_in_them():
 # --- the points of two faces ---
 
 
-def points_of(first, second, kind, feature, axis=UP, points=4, inner=False, limit=0.1):
+def points_of(first, second, kind, feature, axis=UP, points=4, inner=False, limit=0.1, spacing=0.0):
     """Contact points of one pair with a given feature: place, frame, nearest, area."""
     pair = kernel.Pairs(
         *map(np.array, ([[0, 1]], [limit], [False], [kind], [feature], [np.asarray(axis, dtype=float)]))
     )
-    return kernel.interface_points(pair, points, inner, False, FLAT, THIN, packed(first, second))
+    return kernel.interface_points(pair, points, inner, False, spacing, FLAT, THIN, packed(first, second))
 
 
 def packed(*stones):
@@ -404,3 +404,97 @@ def test_shares_do_not_jump_where_one_would_vanish():
         kernel.point_areas(*x.T.copy(), 3, 2.0, 0.5 + nudge, 1.0, share)
         # exact would be 1, 0, 1; a tenth of an even share for the second, the rest as even as before
         np.testing.assert_allclose(share, np.array([29, 2, 29]) / 30, atol=1e-10)
+
+
+# --- points over the area ---
+
+
+def cells_twin(stack, spacing, swap):
+    """Areas and centroids of the cells of a grid on the smaller face, by clipping."""
+    common = stack.common[:, :2]
+    lower, upper = stack.top[:, :2], stack.bottom[:, :2]
+    first, second = ((upper, -1.0), (lower, 1.0)) if swap else ((lower, 1.0), (upper, -1.0))
+    ring, up = second if moments(second[0])[0] < moments(first[0])[0] * (1 - 1e-6) else first
+    sides = np.roll(ring, -1, axis=0) - ring
+    lengths = np.linalg.norm(sides, axis=1)
+    e1 = sides[np.flatnonzero(lengths > lengths.max() * (1 - 1e-6))[0]]
+    e1 = e1 / np.linalg.norm(e1)
+    axes = np.array([e1, [-up * e1[1], up * e1[0]]])
+    grid = ring @ axes.T
+    low, length = grid.min(axis=0), np.ptp(grid, axis=0)
+    count = np.maximum(2, np.ceil(length / spacing - 1e-6)).astype(int)
+    pitch = length / count
+    lines = []
+    for axis in range(2):
+        across = common @ axes[axis] - low[axis]
+        inner = np.arange(1, count[axis]) * pitch[axis]
+        reach = 0.25 * pitch[axis]
+        inner = inner[(inner - across.min() >= reach) & (across.max() - inner >= reach)]
+        if not len(inner):
+            inner = np.array([(across.min() + across.max()) / 2])
+        lines.append([-np.inf, *inner, np.inf])
+    flat = np.column_stack([common, np.zeros(len(common))])
+    found, pending = [], np.zeros(3)
+    for a in range(len(lines[0]) - 1):
+        for b in range(len(lines[1]) - 1):
+            cell = flat
+            for axis, n in ((0, a), (1, b)):
+                normal = np.array([*axes[axis], 0.0])
+                for sign, bound in ((1.0, lines[axis][n + 1]), (-1.0, lines[axis][n])):
+                    if np.isfinite(bound) and len(cell):
+                        cell = clip(cell, (bound + low[axis]) * normal, sign * normal)
+            area, first_moment, _ = moments(cell[:, :2]) if len(cell) > 2 else (0.0, np.zeros(2), 0)
+            pending = pending + np.array([area, *first_moment])
+            if pending[0] >= 1e-3 * pitch.prod():
+                found.append(pending)
+                pending = np.zeros(3)
+    if found:
+        found[-1] = found[-1] + pending
+    else:
+        found = [pending]
+    return np.array(found)
+
+
+@settings(max_examples=60, deadline=None)
+@given(seeds, st.sampled_from([0.07, 0.3, 2.0]), st.sampled_from([0.0, 3.0]), st.booleans())
+def test_points_over_the_area_are_centroids_of_cells(seed, spacing, degrees, swap):
+    stack = Stack(seed, degrees, swap)
+    large_enough(stack)
+    assume(stack.common[:, 2].min() <= 0.1)
+    whole, first, _ = moments(stack.common[:, :2])
+    place, _, nearest, area = stack.points(spacing=spacing)
+    x = nearest[:, 1, :2]
+    assert len(set(place[:, 2].tolist())) == len(place) >= 3
+    assert area.sum() == pytest.approx(whole, rel=1e-12)
+    np.testing.assert_allclose(area @ x, first, atol=1e-12 * whole)
+    if degrees == 0.0:
+        twin = cells_twin(stack, spacing, swap)
+        np.testing.assert_allclose(area, twin[:, 0], atol=1e-11)
+        np.testing.assert_allclose(area[:, None] * x, twin[:, 1:], atol=1e-11)
+    n = np.cross(*(stack.bottom[1:3] - stack.bottom[0]))
+    np.testing.assert_allclose((nearest[:, 0] - stack.bottom[0]) @ n, 0.0, atol=1e-12)
+
+
+def test_cells_stay_with_the_smaller_face_as_it_slides_over_a_larger_one_and_over_its_edge():
+    """A stone 0.4 × 0.2 m slides over the edge of a plate: points on it keep names and places."""
+    plate = prism(np.array([(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0)]), -1.0, 0.0)
+    ring = np.array([(0.0, 0.0), (0.4, 0.0), (0.4, 0.2), (0.0, 0.2)])
+    seen = []
+    for way in (0.5, 0.513, 1.6, 1.63, 1.75):
+        stone = prism(ring + np.array([way, 0.3]), 0.0, 0.3)
+        feature = [1, len(plate[1])]
+        place, _, nearest, area = points_of(plate, stone, kernel.FACE_FIRST, feature, spacing=0.1)
+        assert area.sum() == pytest.approx(0.2 * min(0.4, 2.0 - way), rel=1e-12)
+        seen.append(dict(zip(place[:, 2].tolist(), nearest[:, 0, :2] - [way, 0.3], strict=True)))
+    assert [len(one) for one in seen] == [8, 8, 8, 8, 6]
+    for one in seen[1:3]:
+        assert one.keys() == seen[0].keys()
+        np.testing.assert_allclose([one[name] for name in seen[0]], list(seen[0].values()), atol=1e-12)
+    # over 0.37 m the last cells are 0.07 m long, over 0.25 m they are halves
+    assert seen[3].keys() == seen[0].keys() > seen[4].keys()
+
+
+def test_too_many_cells_are_refused():
+    ring = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
+    with pytest.raises(ValueError, match="too many cells"):
+        points_of(prism(ring, -1.0, 0.0), prism(ring, 0.0, 1.0), kernel.FACE_FIRST, [1, 6], spacing=1e-3)

@@ -3,20 +3,31 @@
 import numpy as np
 
 from mechanics.scene.laws.bonds import BROKEN
-from mechanics.scene.laws.law import BOND, STATE, Terms
+from mechanics.scene.laws.law import BOND, CRUSHED, STATE, Terms
 from mechanics.scene.laws.status import STATUSES, contact_status
 
 
 def test_each_contact_has_the_status_of_its_bond_and_its_impulse():
-    bond = [0, 0, 0, 1.0, 0.3, BROKEN, BROKEN, BROKEN]
+    bond = [0, 0, 0, 1.0, 0.3, BROKEN, BROKEN, BROKEN, 0]
     impulse = np.array(
-        [[0, 0, 0], [2, 0.9, 0], [2, 0.6, 0.8], [0, 0, 0], [2, 1, 0], [0, 0, 0], [2, 0, 0], [2, 0, 1]]
+        [
+            [0, 0, 0],
+            [2, 0.9, 0],
+            [2, 0.6, 0.8],
+            [0, 0, 0],
+            [2, 1, 0],
+            [0, 0, 0],
+            [2, 0, 0],
+            [2, 0, 1],
+            [2, 0, 1],
+        ]
     )
-    state = np.zeros((8, STATE))
+    state = np.zeros((9, STATE))
     state[:, BOND] = bond
-    terms = Terms(np.zeros(8), np.full(8, 0.5), np.zeros(8), np.zeros(8))
+    state[[0, 8], CRUSHED] = 1e-3
+    terms = Terms(np.zeros(9), np.full(9, 0.5), np.zeros(9), np.zeros(9))
     found = contact_status(state, terms, impulse.astype(float))
-    assert found.tolist() == ["open", "stick", "slip", "bonded", "bonded", "broken", "stick", "slip"]
+    assert found.tolist() == ["open", "stick", "slip", "bonded", "bonded", "broken", "stick", "slip", "crush"]
     assert set(found.tolist()) == set(STATUSES)
 
 
