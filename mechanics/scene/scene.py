@@ -1,6 +1,7 @@
 """Scene: all input of a simulation, constant during a run."""
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Annotated
@@ -142,10 +143,13 @@ class ContactSettings:
         it, where they reproduce its area and second moments exactly, as a uniform pressure does; *centroid*: corners,
         and a further point at the centroid, which take shares of the area that carry its second moments, so that
         elastic joints bend like the area and stones still rock about its edge
+    thickness : mean thickness of the mortar between two stones, by their codes; by the code of a stone alone, towards
+        blocks that have no outline, such as a base or a beam [m]
     """
 
     law: Law = field(default_factory=DryJoint)
     rules: tuple[LawRule, ...] = ()
+    thickness: Mapping[frozenset[str], float] = field(default_factory=dict)
     alert_distance: Annotated[
         float,
         Setting(
