@@ -23,6 +23,7 @@ LEFT_BELOW_RIGHT_ABOVE = (-1, -2, -3, -4)
 """Numbers that stand for the sides of the frame where a line runs along it instead of between two stones."""
 
 _FINEST = 1.0 / 16.0  # of the sampling distance: finest samples, where outlines come close to each other
+_INSET = 1.0 / 16.0  # of the sampling distance: samples lie within outlines by this, so that those that touch differ
 _TOUCHING = 1.0 / 64.0  # of the sampling distance: samples of two stones nearer than this belong to neither
 _NEAR = 2.0  # sampling distances within which another outline calls for finer samples
 _NEIGHBOURS = 16  # samples that are looked at for one of another stone
@@ -66,7 +67,7 @@ def medial_lines(outlines: Sequence[Array], frame: Array, step: float) -> Medial
 
     Parameters
     ----------
-    outlines : (n, 2) corners of each stone, in order [m]
+    outlines : (n, 2) corners of each stone, counter-clockwise [m]
     frame : (2, 2) lower left and upper right corner of the rectangle [m]
     step : distance of the samples along outlines [m]; finer where outlines are near to each other
 
@@ -105,7 +106,7 @@ def _samples(
     outlines: Sequence[Array], frame: Array, step: float
 ) -> tuple[Array, Ints, tuple[tuple[int, int], ...]]:
     """Return samples (n, 2) of the outlines, the stones that they are of, and the pairs of stones that touch."""
-    places, owner = _sampled(outlines, [np.full(len(one), step) for one in outlines])
+    places, owner = _sampled(outlines, [np.full(len(one), step) for one in outlines], _INSET * step)
     near = _apart(places, owner, _NEAR * step)
     # each side of an outline is sampled as finely as its nearest neighbour asks for
     finest, at = [], 0
@@ -115,7 +116,7 @@ def _samples(
         closest = np.minimum.reduceat(near, starts)
         finest.append(np.clip(0.5 * closest, _FINEST * step, step))
         at += int(counts.sum())
-    places, owner = _sampled(outlines, finest)
+    places, owner = _sampled(outlines, finest, _INSET * step)
     crossing = set[tuple[int, int]]()
     free = np.ones(len(places), np.bool_)
     low = np.array([one.min(axis=0) for one in outlines])
@@ -131,10 +132,11 @@ def _samples(
                 free[own] &= ~within
                 crossing.add((min(i, j), max(i, j)))
     tree = cKDTree(places)
-    touching = tree.query_pairs(_TOUCHING * step, output_type="ndarray")
+    touching = tree.query_pairs(2.0 * (_INSET + _TOUCHING) * step, output_type="ndarray")
     touching = touching[owner[touching[:, 0]] != owner[touching[:, 1]]]
-    free[touching.ravel()] = False
     crossing |= {(min(a, b), max(a, b)) for a, b in owner[touching].tolist()}
+    gaps = np.linalg.norm(places[touching[:, 0]] - places[touching[:, 1]], axis=1)
+    free[touching[gaps < _TOUCHING * step].ravel()] = False
     low_end, high_end = frame + _TOUCHING * step * np.array([[1.0], [-1.0]])
     # two samples at one place, as where sides return, would be one site
     clear: Array = np.clip(places[free], low_end, high_end)
@@ -143,20 +145,25 @@ def _samples(
     return clear[single], owner[free][single], tuple(sorted(crossing))
 
 
-def _sampled(outlines: Sequence[Array], steps: Sequence[Array]) -> tuple[Array, Ints]:
+def _sampled(outlines: Sequence[Array], steps: Sequence[Array], inset: float) -> tuple[Array, Ints]:
+    """Return samples (n, 2) a little to the left of the sides of outlines, so far apart at most, and their stones."""
     places = []
     for ring, step in zip(outlines, steps, strict=True):
         counts = _counts(ring, step)
-        along = np.concatenate([np.arange(count) / count for count in counts.tolist()])
-        way = np.repeat(np.roll(ring, -1, axis=0) - ring, counts, axis=0)
-        places.append(np.repeat(ring, counts, axis=0) + along[:, None] * way)
+        along = np.concatenate([np.linspace(0.0, 1.0, count) for count in counts.tolist()])
+        sides = np.roll(ring, -1, axis=0) - ring
+        inward = inset * np.column_stack([-sides[:, 1], sides[:, 0]])
+        inward /= np.maximum(np.hypot(*sides.T), 1e-12)[:, None]
+        starts = np.repeat(ring + inward, counts, axis=0)
+        places.append(starts + along[:, None] * np.repeat(sides, counts, axis=0))
     owner = np.repeat(np.arange(len(outlines)), [len(one) for one in places])
     return np.concatenate(places), owner
 
 
 def _counts(ring: Array, step: Array) -> Ints:
+    """Return the number of samples (n,) of each side, those at both of its ends included."""
     sides = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1)
-    out: Ints = np.maximum(1, np.ceil(sides / step)).astype(np.int64)
+    out: Ints = np.maximum(1, np.ceil(sides / step)).astype(np.int64) + 1
     return out
 
 
