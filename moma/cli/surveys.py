@@ -79,7 +79,8 @@ class Blunders(StrEnum):
 @reporting
 def sample(
     kind: Annotated[
-        str, typer.Argument(help="arch, corner, facings, ribvault, tower, vault, wall or window.")
+        str,
+        typer.Argument(help="arch, corner, facings, ribvault, rubble-wall, tower, vault, wall or window."),
     ],
     moved: Annotated[
         Moved | None,
