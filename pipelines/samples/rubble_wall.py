@@ -31,6 +31,7 @@ _JITTER = 0.22  # of a cell's size: largest shift of its place
 _JOINTS = (0.010, 0.025)  # least and largest thickness of the mortar between two stones [m]
 _EDGES = (0.004, 0.010)  # and between a stone and the edge of the wall [m]
 _PIXEL = 0.001  # [m]
+_FINER = 8  # pixels along the side of one
 _SEED = 1790
 
 
@@ -117,16 +118,18 @@ def mask_png(wall: RubbleWall) -> bytes:
     from PIL import Image, ImageDraw
     from PIL.PngImagePlugin import PngInfo
 
-    columns, rows = (round(one / _PIXEL) for one in SIZE)
+    # finer first: Pillow paints every pixel that a side touches
+    columns, rows = (round(_FINER * one / _PIXEL) for one in SIZE)
     picture = Image.new("L", (columns, rows), 0)
     draw = ImageDraw.Draw(picture)
     for ring in wall.stones:
-        pixels = np.column_stack([ring[:, 0] / _PIXEL - 0.5, rows - ring[:, 1] / _PIXEL - 0.5])
+        pixels = np.array([0.0, rows]) + ring * np.array([_FINER, -_FINER]) / _PIXEL - 0.5
         draw.polygon([(x, y) for x, y in pixels.tolist()], fill=255)
+    shares = np.asarray(picture).reshape(rows // _FINER, _FINER, columns // _FINER, _FINER).mean(axis=(1, 3))
     about = PngInfo()
     about.add_text("Title", "Rubble wall (synthetic): no such wall exists")
     out = io.BytesIO()
-    picture.save(out, "PNG", pnginfo=about)
+    Image.fromarray(np.where(shares > 127.5, 255, 0).astype(np.uint8)).save(out, "PNG", pnginfo=about)
     return out.getvalue()
 
 

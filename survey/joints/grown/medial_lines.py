@@ -23,7 +23,9 @@ LEFT_BELOW_RIGHT_ABOVE = (-1, -2, -3, -4)
 """Numbers that stand for the sides of the frame where a line runs along it instead of between two stones."""
 
 _FINEST = 1.0 / 16.0  # of the sampling distance: finest samples, where outlines come close to each other
-_INSET = 1.0 / 16.0  # of the sampling distance: samples lie within outlines by this, so that those that touch differ
+_INSET = (
+    1.0 / 16.0
+)  # of the sampling distance: samples lie within outlines by this, so that those that touch differ
 _TOUCHING = 1.0 / 64.0  # of the sampling distance: samples of two stones nearer than this belong to neither
 _NEAR = 2.0  # sampling distances within which another outline calls for finer samples
 _NEIGHBOURS = 16  # samples that are looked at for one of another stone
