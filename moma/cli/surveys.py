@@ -80,7 +80,7 @@ class Blunders(StrEnum):
 def sample(
     kind: Annotated[
         str,
-        typer.Argument(help="arch, corner, facings, ribvault, rubble-wall, tower, vault, wall or window."),
+        typer.Argument(help="arch, corner, facings, ribvault, tower, vault, wall, window or rubble-wall."),
     ],
     moved: Annotated[
         Moved | None,
