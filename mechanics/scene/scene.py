@@ -149,12 +149,13 @@ class ContactSettings:
         from its corner, with two or more cells each way, and stays with that face as stones slide and rock
     spacing : the number of cells along a face is its length over `spacing`, rounded up; a joint of two faces has two
         or more each way, of an area of its own
-    thickness : of the mortar between two blocks, by their codes, for laws whose stiffness depends on it; pairs of which
-        one is not in the scene are left alone [m]
+    thickness : of the mortar between two blocks, by their codes, for laws whose stiffness depends on it; by the code of
+        one alone, towards blocks that have no outline, such as a base or a beam [m]
     """
 
     law: Law = field(default_factory=DryJoint)
     rules: tuple[LawRule, ...] = ()
+    thickness: Mapping[frozenset[str], float] = field(default_factory=dict)
     alert_distance: Annotated[
         float,
         Setting(

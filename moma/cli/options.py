@@ -265,7 +265,8 @@ Outlines = Annotated[
     typer.Option(
         "--outlines",
         metavar="FILE",
-        help="Outlines of its stones: GeoPackage, GeoJSON, Shapefile, DXF, label PNG or TIFF, COCO JSON.",
+        help="Outlines of its stones: GeoPackage, GeoJSON, Shapefile, DXF, CSV, label PNG or TIFF, COCO or plain "
+        "JSON; with --depth, without a cloud.",
         rich_help_panel=_PANEL,
     ),
 ]
@@ -301,7 +302,7 @@ OutlineSigma = Annotated[
     typer.Option(
         "--outline-sigma",
         metavar="S",
-        help="Standard deviation of a drawn corner in metres; default: 0.005.",
+        help="Standard deviation of a drawn corner in metres; default: 0.005, or 0.001 without a cloud.",
         rich_help_panel=_PANEL,
     ),
 ]
@@ -337,13 +338,13 @@ Size = Annotated[
     typer.Option(
         "--size",
         metavar="WxH",
-        help="Width and height of the picture in metres, e.g. 1.0x1.2.",
+        help="Width and height in metres, e.g. 1.0x1.2: of the picture, or of the wall from the origin of outlines.",
         rich_help_panel=_PANEL,
     ),
 ]
 Depth = Annotated[
     float | None,
     typer.Option(
-        "--depth", metavar="D", help="Depth of all masked stones in metres.", rich_help_panel=_PANEL
+        "--depth", metavar="D", help="Depth in metres of all stones without a cloud.", rich_help_panel=_PANEL
     ),
 ]

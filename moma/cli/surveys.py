@@ -79,7 +79,8 @@ class Blunders(StrEnum):
 @reporting
 def sample(
     kind: Annotated[
-        str, typer.Argument(help="arch, corner, facings, ribvault, tower, vault, wall or window.")
+        str,
+        typer.Argument(help="arch, corner, facings, ribvault, tower, vault, wall, window or rubble-wall."),
     ],
     moved: Annotated[
         Moved | None,
@@ -482,7 +483,9 @@ def outlined(
     format: SurveyFormat | None,
     **given: object,
 ) -> "tuple[str, list[Path], ReadingOptions] | None":
-    """Return format, files and options of a cloud with outlines or of masks; None if neither is given.
+    """Return format, files and options of a cloud with outlines, or of masks or outlines alone; None without any.
+
+    Outlines without a cloud are known by the size or depth that goes with them.
 
     Raises
     ------
@@ -490,34 +493,37 @@ def outlined(
         if options contradict each other, or are of another format
     """
     named = {f"--{name.replace('_', '-')}": value for name, value in given.items() if value is not None}
-    if clouds is None and masks is None:
+    alone = masks
+    if clouds is None and masks is None and ("--depth" in named or "--size" in named):
+        alone = given["outlines"]  # type: ignore[assignment]
+    if clouds is None and alone is None:
         for name in named:
             what = f"{name} without --cloud" + (" or --masks" if name in ("--wall", "--fields") else "")
             remedy = (
-                "give --masks too"
+                "give --masks or --outlines too"
                 if name in ("--size", "--depth")
                 else "give --cloud FILE and --outlines FILE"
+                + ("; or --depth, for outlines alone" if name == "--outlines" else "")
             )
             raise UsageError(
                 what if name not in ("--size", "--depth") else f"{name} without --masks", remedy=remedy
             )
         return None
+    main = "--cloud" if clouds else "--masks" if masks else "--outlines"
     if files or (clouds and masks):
         other = "--masks" if clouds and masks else "survey files"
-        raise UsageError(
-            f"{other} beside --{'cloud' if clouds else 'masks'}", remedy="ingest one after the other"
-        )
+        raise UsageError(f"{other} beside {main}", remedy="ingest one after the other")
     if format is not None:
-        raise UsageError(f"--format beside --{'cloud' if clouds else 'masks'}", remedy="leave it out")
+        raise UsageError(f"--format beside {main}", remedy="leave it out")
     from pipelines.ingest.outlined import cloud_options, mask_options
 
-    fitting = ("size", "depth", "wall", "fields") if masks else _OF_CLOUDS
+    fitting = _OF_CLOUDS if clouds else _OF_MASKS if masks else _OF_OUTLINES
     for name in named:
-        if name.strip("-").replace("-", "_") not in fitting:
-            raise UsageError(f"{name} with --{'masks' if masks else 'cloud'}", remedy="leave it out")
-    if masks is not None:
+        if name.strip("-").replace("-", "_") not in fitting and name != main:
+            raise UsageError(f"{name} with {main}", remedy="leave it out")
+    if alone is not None:
         chosen = {"chosen" if name == "fields" else name: given[name] for name in fitting}
-        return "masks", [masks], mask_options(base, **chosen)  # type: ignore[arg-type]
+        return "masks", [alone], mask_options(base, **chosen)  # type: ignore[arg-type]
     if given["outlines"] is None:
         raise UsageError(
             "--cloud without --outlines", remedy="name the outlines of its stones: --outlines FILE"
@@ -543,4 +549,6 @@ def _check_fitting(
         raise UsageError(f"--unit with format {name}", remedy="its lengths are metres")
 
 
+_OF_MASKS = ("size", "depth", "wall", "fields")
+_OF_OUTLINES = (*_OF_MASKS, "layer", "outline_sigma")
 _OF_CLOUDS = ("outlines", "wall", "layer", "fields", "outline_sigma", "margin", "slab")

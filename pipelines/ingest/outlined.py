@@ -1,4 +1,4 @@
-"""Surveys that consist of outlines: over a point cloud, or of masks alone at a stated scale."""
+"""Surveys that consist of outlines: over a point cloud, or alone at a stated scale."""
 
 import csv
 import re
@@ -32,6 +32,7 @@ __all__ = [
 _MARK = b"outlines rejected by moma"
 _SIZE = re.compile(r"(\d+(?:[.,]\d+)?)\s*[x×]\s*(\d+(?:[.,]\d+)?)")
 _LARGEST = 1000.0  # size of a wall [m]
+_SIGMAS = (1e-5, 0.2)  # bounds of the standard deviation of a drawn corner [m]
 
 
 def open_source(
@@ -42,7 +43,7 @@ def open_source(
     Parameters
     ----------
     source : its files
-    format : its name; "cloud" with `CloudOptions`, "masks" with `MaskOptions`
+    format : its name; "cloud" with `CloudOptions`; "masks", which may be outlines, with `MaskOptions`
     options : defaults for what the files leave out
     progress : told of the points of a cloud that are read
 
@@ -105,7 +106,7 @@ def outline_rejects(source: Path, options: ReadingOptions | None, rejects: Seque
         path, layer, chosen = options.outlines, options.layer, options.chosen
         return rejected_outlines(path, layer, chosen, options.outline_sigma, options.smooth, rejects)
     masks = options if isinstance(options, MaskOptions) else MaskOptions()
-    return rejected_outlines(source, None, masks.chosen, masks.sigma, masks.smooth, rejects)
+    return rejected_outlines(source, masks.layer, masks.chosen, masks.outline_sigma, masks.smooth, rejects)
 
 
 def write_review(path: Path, review: Sequence[Doubtful]) -> None:
@@ -152,14 +153,11 @@ def cloud_options(
     UsageError, SurveyError
         if a value is out of its range, or the frame cannot be read
     """
-    for name, value, least, most in (
-        ("--outline-sigma", outline_sigma, 1e-5, 0.2),
+    _check_lengths(
+        ("--outline-sigma", outline_sigma, *_SIGMAS),
         ("--margin", margin, 0.0, 0.5),
         ("--slab", slab, 0.005, 5.0),
-    ):
-        if value is not None and not least <= value <= most:
-            what, remedy = f"is {value:g} m", f"give it in metres, from {least:g} to {most:g}"
-            raise UsageError(what, where=name, remedy=remedy)
+    )
     default = CloudOptions()
     return CloudOptions(
         **_shared(base),
@@ -179,16 +177,20 @@ def mask_options(
     depth: float | None = None,
     wall: str | None = None,
     chosen: str | None = None,
+    layer: str | None = None,
+    outline_sigma: float | None = None,
 ) -> MaskOptions:
-    """Gather the settings of masks without a cloud; None keeps the default.
+    """Gather the settings of masks or outlines without a cloud; None keeps the default.
 
     Parameters
     ----------
     base : options of all formats
-    size : of the picture [m], e.g. "1.0x1.2"
+    size : of the picture, or of the wall from the origin of outlines in metres [m], e.g. "1.0x1.2"
     depth : of all stones [m]
     wall : file of a frame, or two points on the foot of a wall
     chosen : attributes by meaning
+    layer : of a file of outlines with several
+    outline_sigma : as in `MaskOptions`
 
     Raises
     ------
@@ -197,13 +199,24 @@ def mask_options(
     """
     if depth is not None and not 0.0 < depth < 10.0:
         raise UsageError(f"is {depth:g} m", where="--depth", remedy="give it in metres, e.g. 0.2")
+    _check_lengths(("--outline-sigma", outline_sigma, *_SIGMAS))
+    default = MaskOptions()
     return MaskOptions(
         **_shared(base),
         size=None if size is None else _size(size),
         depth=depth,
         wall=None if wall is None else read_wall(wall),
+        layer=layer,
         chosen=field_map(chosen),
+        outline_sigma=outline_sigma or default.outline_sigma,
     )
+
+
+def _check_lengths(*given: tuple[str, float | None, float, float]) -> None:
+    for name, value, least, most in given:
+        if value is not None and not least <= value <= most:
+            what, remedy = f"is {value:g} m", f"give it in metres, from {least:g} to {most:g}"
+            raise UsageError(what, where=name, remedy=remedy)
 
 
 def _size(text: str) -> tuple[float, float]:
@@ -212,7 +225,7 @@ def _size(text: str) -> tuple[float, float]:
         width, height = (float(one.replace(",", ".")) for one in found.groups())
         if 0.0 < width < _LARGEST and 0.0 < height < _LARGEST:
             return width, height
-    remedy = "give width and height of the picture in metres, e.g. 1.0x1.2"
+    remedy = "give width and height of the picture or wall in metres, e.g. 1.0x1.2"
     raise UsageError(f"is {text!r}", where="--size", remedy=remedy)
 
 

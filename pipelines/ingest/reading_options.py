@@ -17,7 +17,7 @@ _ENDINGS: Mapping[str, tuple[str, ...]] = {
     "pnezd": (".txt", ".csv"),
     "penzd": (".txt", ".csv"),
     "cloud": (".las", ".laz", ".e57", ".ply", ".xyz", ".pts"),
-    "masks": (".png", ".tif", ".tiff", ".json"),
+    "masks": (".png", ".tif", ".tiff", ".json", ".csv", ".geojson", ".gpkg", ".shp", ".fgb", ".dxf"),
 }
 """Endings of the files that are read of a folder, by format."""
 

@@ -1,6 +1,6 @@
 """From the database to a scene: selected stones → simplified solids → closed joints → blocks."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -91,9 +91,9 @@ def assemble_stones(scene: SceneFile, models: tuple[StoneModel, ...], groups: Gr
     meshes = _meshes(scene, groups)
     blocks = tuple(
         _block(model, chosen[solid.code], solid, meshes.get(solid.code, scene.mesh))
-        for model, solid in zip(models, closed.solids, strict=True)
+        for model, solid in zip(_with_mortar(models, scene, closed.report), closed.solids, strict=True)
     )
-    whole = _scene(scene, blocks, groups, origin)
+    whole = _scene(scene, blocks, groups, origin, closed.report)
     return Assembly(
         scene=whole,
         models=models,
@@ -125,12 +125,30 @@ def wishes_of(scene: SceneFile, models: Sequence[StoneModel], groups: Groups) ->
     )
 
 
-def _scene(scene: SceneFile, blocks: Sequence[Block], groups: Groups, origin: Array) -> Scene:
+def _with_mortar(
+    models: Sequence[StoneModel], scene: SceneFile, closing: ClosingReport
+) -> Iterator[StoneModel]:
+    """Yield the stones with the density of stone and mortar together, where they grew into their mortar."""
+    shares = {code: share for leaf in closing.leaves for code, share in leaf.stone_share.items()}
+    for model in models:
+        share, mortar = shares.get(model.record.code, 1.0), scene.joints.mortar_density
+        if mortar is None or share == 1.0:
+            yield model
+            continue
+        density = share * model.material.density + (1.0 - share) * mortar
+        yield replace(model, material=replace(model.material, density=density))
+
+
+def _scene(
+    scene: SceneFile, blocks: Sequence[Block], groups: Groups, origin: Array, closing: ClosingReport
+) -> Scene:
     """Return the scene of the blocks, with the laws and loads of the file; loads of a building in stages are theirs."""
     document, by_code = scene.document, {block.code: block for block in blocks}
     materials = {block.code: block.material.name for block in blocks}
     loads = [_entry_about(entry, origin) for entry in scene.loads if not scene.stages]
     velocity = thrown(document, scene.throws, groups, by_code)
+    rules = law_rules(document, scene.laws, groups, materials)
+    thickness = {stones: own for leaf in closing.leaves for stones, own in leaf.thickness.items()}
     return Scene(
         name=scene.name,
         blocks=tuple(
@@ -138,7 +156,7 @@ def _scene(scene: SceneFile, blocks: Sequence[Block], groups: Groups, origin: Ar
             for block in blocks
         ),
         gravity=scene.gravity,
-        contact=replace(scene.contact, rules=law_rules(document, scene.laws, groups, materials)),
+        contact=replace(scene.contact, rules=rules, thickness=thickness),
         time=scene.time,
         solver=scene.solver,
         loads=build_loads(document, loads, groups, by_code),

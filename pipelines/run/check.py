@@ -40,6 +40,7 @@ from pipelines.scene.file import SceneFile, read_scene
 from pipelines.scene.selection import Groups, StoneModel, select_groups, select_stones
 from pipelines.tuning.profiles import with_profile
 from survey.geometry.solids import Solid
+from survey.simplify.simplify import BlockyStone
 
 __all__ = ["check_scene"]
 
@@ -119,6 +120,12 @@ def _with_pictures(report: CheckReport, assembly: Assembly, folder: Path, scene:
     return report
 
 
+def _simplified(assembly: Assembly) -> list[BlockyStone]:
+    """Return the simplified stones; those that grew from their outlines are as surveyed."""
+    grown = {code for leaf in assembly.closing.leaves for code in leaf.grown}
+    return [one for one in assembly.simplified if one.code not in grown]
+
+
 def _hypotheses(assembly: Assembly) -> frozenset[str]:
     return frozenset(model.record.code for model in assembly.models if model.record.hypothesis)
 
@@ -169,7 +176,7 @@ def _report(
         ),
         meshes=() if assembly is None else _meshes(assembly.scene),
         mesh_quality=None if needs is None else _mesh_quality(needs.meshes),
-        simplification=None if assembly is None else simplification_report(assembly.simplified),
+        simplification=None if assembly is None else simplification_report(_simplified(assembly)),
         joints=None
         if assembly is None
         else joints_report(assembly.closing, assembly.origin, _hypotheses(assembly)),

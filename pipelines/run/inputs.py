@@ -81,6 +81,7 @@ def closing_lines(report: JointsReport) -> tuple[str, ...]:
             f"corners moved by {1e3 * report.max_displacement:.1f} mm at most (stone {report.worst_stone}), volumes "
             f"changed by {100 * report.max_volume_change:.1f} % at most"
         )
+    lines += [line for leaf in report.leaves for line in leaf.in_words()]
     lines += [f"{number} left open: {reason}" for reason, number in report.left_open.items()]
     for name, places in (("gaps", report.gaps), ("overlaps", report.overlaps)):
         if places:

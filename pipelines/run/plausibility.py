@@ -10,6 +10,7 @@ from pipelines.scene.file import SceneFile
 from pipelines.scene.selection import StoneModel
 from survey.quality.corners import SeenFace, misplaced_corners
 from survey.quality.plausible import DENSITY, FRICTION, LENGTH, POISSON, YOUNG, Doubt, doubt_of
+from survey.records.survey import OUTLINE_NOTE
 
 __all__ = ["corner_warnings", "impossible_values", "unusual_values"]
 
@@ -36,8 +37,9 @@ def unusual_values(scene: SceneFile, models: Sequence[StoneModel]) -> list[str]:
 
 
 def corner_warnings(models: Sequence[StoneModel]) -> list[str]:
-    """List the measured stones of which a corner seems out of place."""
-    found = misplaced_corners([_seen(one) for one in models if one.record.provenance == "points"])
+    """List the measured stones of which a corner seems out of place; outlines have as many as they like."""
+    measured = (one for one in models if one.record.provenance == "points")
+    found = misplaced_corners([_seen(one) for one in measured if OUTLINE_NOTE not in one.record.notes])
     texts = [f"stone {one.code}: {one.text}; measure its corners again" for one in found]
     left = len(texts) - _SHOWN
     return [*texts[:_SHOWN], *([f"{left} more signs of corners out of place"] if left > 0 else [])]

@@ -170,7 +170,11 @@ def settings_of(scene: SceneFile, built: Scene) -> dict[str, Any]:
         "joints": _values(scene.joints),
         "contact": {
             "law": {"type": type(contact.law).__name__, **_values(contact.law)},
-            **{name: value for name, value in _values(contact).items() if name not in ("law", "rules")},
+            **{
+                name: value
+                for name, value in _values(contact).items()
+                if name not in ("law", "rules", "thickness")
+            },
         },
         "time": _values(built.time),
         "solver": _values(built.solver),

@@ -9,6 +9,14 @@ from mechanics.dynamics.progress import Listener, silent
 from moma.errors import UsageError, storing
 from pipelines.samples.causes import PULSE, Cause
 from pipelines.samples.photographs import PHOTOGRAPHED, write_photographs
+from pipelines.samples.rubble_wall import (
+    DEPTH,
+    RUBBLE_WALL,
+    SIZE,
+    make_rubble_wall,
+    mask_png,
+    rubble_truth,
+)
 from pipelines.samples.samples import Recipe, recipe_of
 from pipelines.samples.scan import Scan, outlines_text, write_masks, write_scan
 from survey.arrays import Array
@@ -47,6 +55,49 @@ theta = 1.0
 duration = {duration}     # s
 {relaxation}
 {loads}
+[output]
+pictures = ["displacement", "pressure"]
+"""
+
+_RUBBLE = """\
+# Rubble wall: synthetic, no such wall exists. Every key is explained in docs/scene.md.
+{commands}
+[scene]
+name = "Rubble wall (synthetic)"
+
+# Granite in lime mortar; synthetic values, like the wall.
+[materials.granite]
+density = 2600.0   # kg/m³
+young = 20e9       # Pa
+poisson = 0.2
+
+[bodies]
+default = "rigid"
+fixed = ["z < 0.12"]  # the lowest course
+
+[joints]
+mode = "mortar"          # stones grow to the middle of the mortar between their outlines
+mortar_density = 1800.0  # kg/m³
+
+[contact]
+placement = "centroid"  # joints bend on their springs like the whole face
+
+[[laws]]
+type = "elastic_joint"
+materials = ["granite", "granite"]
+friction = 0.7
+normal_stiffness = 6e10   # Pa/m: of a mortar of 1 GPa, 17 mm thick
+shear_stiffness = 2.5e10  # Pa/m
+tension = 0.1e6           # Pa
+shear = 0.1e6             # Pa
+
+[time]
+start = "equilibrium"  # found at once; the steps then show that it lasts
+step = 0.005       # s
+theta = 1.0
+duration = 1.0     # s
+relaxation = true  # only where it comes to rest is asked for
+
 [output]
 pictures = ["displacement", "pressure"]
 """
@@ -162,7 +213,7 @@ def write_sample(
     courses: int | None = None,
     photographs: bool = False,
 ) -> WrittenSample:
-    """Write KIND.moma, truth.json and KIND.toml into a folder, created if necessary.
+    """Write KIND.moma, truth.json and KIND.toml into a folder, created if necessary; of rubble, a mask, not a survey.
 
     Some come with knowledge.toml, with solids.obj and its head.moma, with diagnosis.toml, or with scan.laz, the
     outlines stones.geojson, the frame wall.toml and head.moma.
@@ -181,6 +232,10 @@ def write_sample(
     StorageError
         if the disk is full, for example; none of the files is left then
     """
+    if kind == RUBBLE_WALL:
+        if moved or small or phases or scan or courses is not None or photographs:
+            raise UsageError(f"an option with the sample {kind!r}", remedy="it has none")
+        return _write_rubble_wall(folder)
     if photographs and kind != "window":
         raise UsageError(f"--photographs with the sample {kind!r}", remedy="it is for the window")
     recipe = recipe_of(kind, moved=moved, small=small, phases=phases, scan=scan, courses=courses)
@@ -224,6 +279,29 @@ def write_sample(
     files = tuple(map(str, paths))
     stones = len(sample.survey.blocks) + len(sample.modelled)
     return WrittenSample(kind, recipe.title, stones, files, commands)
+
+
+def _write_rubble_wall(folder: Path) -> WrittenSample:
+    """Write the mask of a wall of rubble, its truth and its scene."""
+    wall = make_rubble_wall()
+    mask, scene, truth = folder / "wall.png", folder / f"{RUBBLE_WALL}.toml", folder / "truth.json"
+    _must_be_new(mask, scene, truth)
+    database = f"--db sqlite:///{scene.with_suffix('.db')}"
+    width, height = SIZE
+    commands = (
+        f"moma ingest --masks {mask} --size {width:g}x{height:g} --depth {DEPTH:g} --kind rubble {database}",
+        f"moma check {scene} {database}",
+        f"moma run {scene} {database} --out {folder / 'results'}",
+    )
+    with storing(str(folder)):
+        folder.mkdir(parents=True, exist_ok=True)
+        with _all_or_none((mask, scene, truth)):
+            mask.write_bytes(mask_png(wall))
+            texts = {scene: _RUBBLE.format(commands=_listed(commands)), truth: rubble_truth(wall)}
+            for path, text in texts.items():
+                path.write_text(text, encoding="utf-8", newline="\n")
+    files = (str(mask), str(truth), str(scene))
+    return WrittenSample(RUBBLE_WALL, "Rubble wall", len(wall.stones), files, commands)
 
 
 @contextmanager

@@ -1,6 +1,6 @@
-"""From masks alone to the records of faces: one plane face for each stone of a picture, at a stated scale."""
+"""From masks or outlines alone to the records of faces: one plane face for each stone, at a stated scale."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,22 +16,30 @@ from survey.clouds.settings import MaskOptions
 from survey.clouds.wall import Wall
 from survey.clouds.world import PixelPlace
 from survey.records.review import Doubtful
-from survey.records.survey import BlockRecord, DepthRule, Reject, SurveyHead, SurveyStream
+from survey.records.survey import (
+    FRAME_NOTE,
+    OUTLINE_NOTE,
+    BlockRecord,
+    DepthRule,
+    Reject,
+    SurveyStream,
+)
 
 __all__ = ["open_masks"]
 
 _STRETCHED = 0.02  # by which the two sides of a pixel may differ before it is doubtful [-]
+_OVER = 0.005  # metres by which an outline may reach beyond the stated size before it is doubtful
 _UPRIGHT = Wall(np.zeros(3), np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]))
-_SOURCE = "stated for all masks"
+_SOURCE = "stated for all outlines"
 
 
 def open_masks(path: Path, options: MaskOptions) -> SurveyStream:
-    """Make faces of the masks of a picture.
+    """Make faces of the masks of a picture, or of outlines drawn in metres.
 
     Parameters
     ----------
-    path : picture of labels, or COCO's JSON
-    options : its size, and the depth of the stones
+    path : picture of labels, COCO's JSON, or any file of outlines
+    options : size of the picture or wall, and the depth of the stones
 
     Returns
     -------
@@ -42,7 +50,10 @@ def open_masks(path: Path, options: MaskOptions) -> SurveyStream:
     UsageError, SurveyError
         if the picture cannot be read, or its scale is not known
     """
-    drawing = read_outlines(path, chosen=options.chosen, smooth=options.smooth)
+    drawing = read_outlines(
+        path, layer=options.layer, chosen=options.chosen, sigma=options.outline_sigma, smooth=options.smooth
+    )
+    _check_flat(drawing)
     places, stretched = _places(drawing, options)
     outlines = drawing.outlines
     if places is not None:
@@ -54,10 +65,43 @@ def open_masks(path: Path, options: MaskOptions) -> SurveyStream:
         head = replace(head, depth_rules=(*head.depth_rules, DepthRule(None, options.depth, None, _SOURCE)))
     middle = wall.origin + np.mean([one.corners.mean(axis=0) for one in outlines], axis=0) @ wall.axes[:2]
     head = viewed(head, wall, middle)
-    review = [*stretched, *flat_doubts(outlines, [one.corners for one in outlines], drawing)]
+    review = [
+        *stretched,
+        *flat_doubts(outlines, [one.corners for one in outlines], replace(drawing, pixel=pixel)),
+    ]
+    if pixel is None:
+        pixel, how = options.outline_sigma, f"outline drawn to {options.outline_sigma * 1e3:.1f} mm"
+    else:
+        how = f"outline of a picture with pixels of {pixel * 1e3:.1f} mm"
+    frame = None if options.size is None else np.array([(0.0, 0.0), options.size])
+    review += _beyond(outlines, frame)
     return SurveyStream(
-        head, iter(list(_stones(outlines, wall, pixel or options.sigma, options, head))), review=tuple(review)
+        head, iter(list(_stones(outlines, wall, pixel, how, frame, options))), review=tuple(review)
     )
+
+
+def _check_flat(drawing: Drawing) -> None:
+    """Refuse outlines in space, which have no depth to be given by a wall."""
+    for one in drawing.outlines:
+        if one.corners.shape[1] != 2:
+            remedy = (
+                "give the cloud that it was drawn over, with --cloud; or draw it in the plane of the wall"
+            )
+            raise SurveyError("the outline lies in space", where=one.where, remedy=remedy)
+
+
+def _beyond(outlines: Sequence[Outline], frame: Array | None) -> list[Doubtful]:
+    """List the outlines that reach beyond the stated size of the wall."""
+    if frame is None:
+        return []
+    out = []
+    for one in outlines:
+        low, high = one.corners.min(axis=0), one.corners.max(axis=0)
+        over = float(max((frame[0] - low).max(), (high - frame[1]).max()))
+        if over > _OVER:
+            text = f"it reaches {over * 1e3:.0f} mm beyond the stated size of {frame[1][0]:g} × {frame[1][1]:g} m"
+            out.append(Doubtful(one.code, "beyond the size", text, one.where))
+    return out
 
 
 def _places(drawing: Drawing, options: MaskOptions) -> tuple[PixelPlace | None, list[Doubtful]]:
@@ -67,15 +111,14 @@ def _places(drawing: Drawing, options: MaskOptions) -> tuple[PixelPlace | None, 
             what, remedy = "the size of the picture is not known", "give it in metres, e.g. --size 1.0x1.2"
             raise UsageError(what, where=str(drawing.path), remedy=remedy)
         return None, []
-    if not drawing.pixels or drawing.size is None:
-        what = (
-            "--size with outlines in metres"
-            if not drawing.pixels
-            else "the file does not say how large its picture is"
-        )
-        remedy = (
-            "leave --size out" if not drawing.pixels else "give width and height of the image in the JSON"
-        )
+    if not drawing.pixels:
+        if drawing.size is not None:
+            what = "--size with a picture whose world file says where it lies"
+            raise UsageError(what, where=str(drawing.path), remedy="leave --size out")
+        return None, []
+    if drawing.size is None:
+        what = "the file does not say how large its picture is"
+        remedy = "give width and height of the image in the JSON"
         raise UsageError(what, where=str(drawing.path), remedy=remedy)
     (columns, rows), (width, height) = drawing.size, options.size
     across, up = width / columns, height / rows
@@ -87,7 +130,12 @@ def _places(drawing: Drawing, options: MaskOptions) -> tuple[PixelPlace | None, 
 
 
 def _stones(
-    outlines: tuple[Outline, ...], wall: Wall, pixel: float, options: MaskOptions, head: SurveyHead
+    outlines: tuple[Outline, ...],
+    wall: Wall,
+    sigma: float,
+    how: str,
+    frame: Array | None,
+    options: MaskOptions,
 ) -> Iterator[BlockRecord | Reject]:
     first = first_codes([one.code for one in outlines])
     for k, one in enumerate(outlines):
@@ -98,7 +146,10 @@ def _stones(
             yield Reject(one.code, error, span)
             continue
         said = one.said
-        notes = dict(said.notes) | {"mask": f"outline of a picture with pixels of {pixel * 1e3:.1f} mm"}
+        notes = dict(said.notes) | {OUTLINE_NOTE: how}
+        if frame is not None:
+            beyond = np.concatenate([one.corners.min(axis=0) - frame[0], frame[1] - one.corners.max(axis=0)])
+            notes[FRAME_NOTE] = " ".join(f"{value:.9f}" for value in beyond.tolist())
         if said.score is not None:
             notes["score"] = f"{said.score:g}"
         yield BlockRecord(
@@ -107,7 +158,7 @@ def _stones(
             course=said.course,
             vertices=_in_space(one.corners, wall),
             points=np.empty((0, 3)),
-            sigma=max(pixel, said.sigma or 0.0),
+            sigma=max(sigma, said.sigma or 0.0),
             depth=said.depth,
             depth_sigma=said.depth_sigma,
             depth_source=None if said.depth is None else f"attribute of {one.where}",

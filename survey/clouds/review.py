@@ -45,7 +45,8 @@ def drawn_doubts(placed: Sequence[PlacedOutline], drawing: Drawing) -> list[Doub
 def flat_doubts(outlines: Sequence[Outline], rings: Sequence[Array], drawing: Drawing) -> Iterator[Doubtful]:
     """Yield what is odd about the shape and size of outlines, whose rings (n, 2) are given in metres."""
     if drawing.specks:
-        text = f"{drawing.specks} pieces are too small for a stone and are left out"
+        area = "" if drawing.pixel is None else f", {1e4 * drawing.smallest * drawing.pixel**2:.2g} cm²"
+        text = f"{drawing.specks} pieces are too small for a stone (under {drawing.smallest} pixels{area}) and left out"
         yield Doubtful("", "specks", text, str(drawing.path))
     areas = np.array([_area(ring) for ring in rings])
     logs = np.log(np.maximum(areas, 1e-12))

@@ -38,19 +38,24 @@ class CloudOptions(ReadingOptions):
 
 @dataclass(frozen=True)
 class MaskOptions(ReadingOptions):
-    """Settings of masks without a cloud.
+    """Settings of masks, or of outlines, without a cloud.
 
     Attributes
     ----------
-    size : width and height of the picture [m]; None: its world file says where its pixels lie
+    size : width and height of the picture, or of the wall from the origin of outlines in metres [m]; None: a world file
+        says where the pixels of a picture lie, and the wall is as large as the outlines
     depth : of all stones [m]; None: by the rules of the header file
     wall : frame of the picture in space; None: it stands on the x axis, seen along y
-    chosen : names of attributes of masks, by meaning
+    layer : of a file of outlines with several
+    chosen : names of attributes of outlines, by meaning
+    outline_sigma : standard deviation of a drawn corner, where the outline states none [m]
     smooth : largest distance of the boundary of a mask from the sides of its outline [px]
     """
 
     size: tuple[float, float] | None = None
     depth: float | None = None
     wall: Wall | None = None
+    layer: str | None = None
     chosen: Mapping[str, str] = field(default_factory=dict)
+    outline_sigma: float = 0.001
     smooth: float = 1.5

@@ -8,11 +8,13 @@ without sharing a joint, for instance at the foot of an arch, are separated (`su
 would move a corner farther than the bound stay open and are listed.
 """
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from moma.errors import GeometryError
 from survey.arrays import Array, Ints
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.adjacency import SolidArrays
@@ -21,16 +23,19 @@ from survey.geometry.stone_parts import stone_parts
 from survey.joints.bounded_closing import Cut, LocalStones, as_building, close_within_bounds
 from survey.joints.contact_planes import ContactPlanes
 from survey.joints.facing import FacingFaces, find_facing, planes_of
+from survey.joints.grown.grow import GrownStones, grow
+from survey.joints.grown.leaf import Leaf, find_leaves
 from survey.joints.overlaps import find_overlaps, part_stones
-from survey.joints.report import ClosingReport, closing_report
+from survey.joints.report import ClosingReport, StoneJoint, closing_report
 from survey.joints.settings import JointMode, JointSettings
-from survey.simplify.simplify import BlockyStone, simplify
+from survey.simplify.simplify import BlockShape, BlockyStone, simplify
 
 __all__ = ["ClosedStones", "close_joints", "newly_facing"]
 
 _ROUNDS = 4  # rounds in which closing joints reveals further ones, beside worn corners
 _MEETS = 1e-6  # metres: distance within which faces share a plane
 _AS_SURVEYED = "joints are left as surveyed"
+_GROWN = "grows from its outline as surveyed"
 
 
 @dataclass(frozen=True)
@@ -61,7 +66,8 @@ def close_joints(
 
     Returns
     -------
-    ClosedStones; convex stones with joints are cut, others stay as they are
+    ClosedStones; convex stones with joints are cut, others stay as they are. With `JointMode.MORTAR`, stones of one
+    leaf that are known by their outlines grow to the medial lines between these (`survey.joints.grown`)
 
     Raises
     ------
@@ -80,6 +86,9 @@ def close_joints(
     15.2
     """
     settings = settings or JointSettings()
+    leaves = find_leaves(stones, settings)
+    if leaves:
+        return _with_leaves(stones, leaves, settings)
     blocky = tuple(stone if isinstance(stone, BlockyStone) else simplify(stone) for stone in stones)
     if not blocky:
         return ClosedStones((), (), ClosingReport(settings.mode, (), {}, {}, (), (), ()))
@@ -108,6 +117,87 @@ def close_joints(
         for stone, old, solid, new in zip(blocky, building.solids, cut.solids, placed, strict=True)
     )
     return ClosedStones(changed, blocky, report)
+
+
+def _with_leaves(
+    stones: Sequence[SurveyedBlock | BlockyStone], leaves: Sequence[Leaf], settings: JointSettings
+) -> ClosedStones:
+    """Let the stones of leaves grow, and close the joints of the others among themselves."""
+    codes = [one.code for one in stones]
+    _check_distinct(codes)
+    grown = [grow(leaf, [codes[k] for k in leaf.members], settings) for leaf in leaves]
+    members = {k: one for leaf, one in zip(leaves, grown, strict=True) for k in leaf.members}
+    rest = close_joints(
+        [stone for k, stone in enumerate(stones) if k not in members], replace(settings, grow=False)
+    )
+    blocky = {one.code: one for one in rest.simplified}
+    blocky |= {codes[k]: _unsimplified(stones[k]) for k in members}
+    solids = {one.code: one for one in rest.solids}
+    solids |= {solid.code: solid for one in grown for solid in one.solids}
+    ordered = [solids[code] for code in codes]
+    joints = (*(joint for one in grown for joint in one.joints), *rest.report.joints)
+    joints += tuple(_met(ordered, members, grown, settings))
+    joined = {code for joint in joints for code in joint.stones}
+    displacement, volume_change = dict(rest.report.displacement), dict(rest.report.volume_change)
+    for leaf, one in zip(leaves, grown, strict=True):
+        own = [codes[k] for k in leaf.members]
+        displacement |= dict(zip(own, one.displacement, strict=True))
+        volume_change |= dict(zip(own, one.volume_change, strict=True))
+    report = replace(
+        rest.report,
+        mode=settings.mode,
+        joints=joints,
+        displacement={code: displacement[code] for code in codes},
+        volume_change={code: volume_change[code] for code in codes},
+        alone=tuple(code for code in codes if code not in joined),
+        leaves=tuple(one.report for one in grown),
+    )
+    return ClosedStones(tuple(ordered), tuple(blocky[code] for code in codes), report)
+
+
+def _check_distinct(codes: Sequence[str]) -> None:
+    twice = next((code for code, count in Counter(codes).items() if count > 1), None)
+    if twice is not None:
+        raise GeometryError("two stones have this code", where=f"stone {twice}", remedy="rename one of them")
+
+
+def _unsimplified(stone: SurveyedBlock | BlockyStone) -> BlockyStone:
+    """Return a stone as surveyed, with what simplifying it would make of it as a measure of its shape."""
+    simple = stone if isinstance(stone, BlockyStone) else simplify(stone)
+    if isinstance(stone, BlockyStone):
+        return simple
+    report = replace(
+        simple.report,
+        displacement=np.zeros(len(stone.solid.vertices)),
+        volume_change=0.0,
+        within=True,
+        reason=_GROWN,
+    )
+    sound = np.ones(len(stone.face.outline), np.bool_)
+    return replace(simple, solid=stone.solid, sound=sound, shape=BlockShape.POLYHEDRON, report=report)
+
+
+def _met(
+    solids: Sequence[Solid],
+    members: Mapping[int, GrownStones],
+    grown: Sequence[GrownStones],
+    settings: JointSettings,
+) -> Iterator[StoneJoint]:
+    """Yield the joints between stones of a leaf and stones that are none of it, where they meet."""
+    arrays = SolidArrays.gather((solid.vertices, solid.faces) for solid in solids)
+    planes = planes_of(arrays)
+    close = replace(settings, max_width=_MEETS, max_angle=0.01, min_overlap=0.0)
+    found = find_facing(arrays, planes, close)
+    number = sum(len(one.joints) for one in grown)
+    for k, (i, j) in enumerate(planes.owner[found.faces].tolist()):
+        own = [members[one] for one in (i, j) if one in members]
+        if not own or (len(own) == 2 and own[0] is own[1]):
+            continue
+        codes = (solids[i].code, solids[j].code)
+        width = sum(leaf.report.thickness.get(frozenset({code}), 0.0) for leaf in own for code in codes)
+        yield StoneJoint(
+            codes, number + k, width, 0.0, float(found.area[k]), found.centroid[k], found.normal[k], ""
+        )
 
 
 def _closed(building: LocalStones, facing: FacingFaces, settings: JointSettings) -> tuple[Cut, FacingFaces]:

@@ -22,8 +22,9 @@ class JointMode(StrEnum):
     """Treatment of the open joints of a survey.
 
     CLOSE: both stones are extended to the middle of the joint and share its plane (dry joints). MORTAR: likewise, and
-    the open width is kept as the thickness of the mortar, which the plane then represents. AS_SURVEYED: stones keep
-    their measured sides and gaps.
+    the open width is kept as the thickness of the mortar, which the plane then represents; stones of one leaf that are
+    known by their outlines grow to the medial lines between these. AS_SURVEYED: stones keep their measured sides and
+    gaps.
     """
 
     CLOSE = "close"
@@ -38,8 +39,8 @@ class JointSettings:
     mode: Annotated[
         JointMode,
         Setting(
-            "close: neighbours share contact planes; mortar: so too, with the width kept as the mortar's thickness; "
-            "as-surveyed: stones keep their measured sides."
+            "close: neighbours share contact planes; mortar: so too, with the width kept as the mortar's thickness, "
+            "and outlines of one leaf grow to meet in its middle; as-surveyed: stones keep their measured sides."
         ),
     ] = JointMode.CLOSE
     max_width: Annotated[float, Setting("Faces farther apart do not make a joint.", "m", above=0)] = 0.05
@@ -62,3 +63,26 @@ class JointSettings:
     max_displacement: Annotated[
         float, Setting("Largest distance by which closing may move a corner.", "m", above=0)
     ] = 0.08
+    grow: Annotated[
+        bool | None,
+        Setting(
+            "With mortar, stones of one leaf grow to the medial lines between their outlines, however irregular these "
+            "are; if not given, those that came in as outlines without a cloud."
+        ),
+    ] = None
+    margin: Annotated[
+        float,
+        Setting(
+            "Width of the mortar around the outlines of a leaf whose size was not stated when it was taken in.",
+            "m",
+            at_least=0,
+        ),
+    ] = 0.0
+    mortar_density: Annotated[
+        float | None,
+        Setting(
+            "Density of the mortar that grown stones take in; if not given, that of the stone.",
+            "kg/m³",
+            above=0,
+        ),
+    ] = None

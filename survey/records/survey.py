@@ -11,7 +11,9 @@ from survey.records.review import Doubtful
 from survey.records.snapping import Snapping
 
 __all__ = [
+    "FRAME_NOTE",
     "OBSERVER",
+    "OUTLINE_NOTE",
     "BlockRecord",
     "Canon",
     "ControlPoint",
@@ -32,6 +34,13 @@ __all__ = [
 
 OBSERVER = "observer"
 """Name of the station from which stones without a station of their own were seen."""
+
+OUTLINE_NOTE = "mask"
+"""Note of stones that came in as outlines alone: how precise these are."""
+
+FRAME_NOTE = "frame"
+"""Note of stones from a picture or drawing of stated size: how far it reaches beyond the outline of the stone to the
+left, downwards, to the right and upwards, as four numbers [m]."""
 
 
 @dataclass(frozen=True)

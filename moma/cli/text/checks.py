@@ -140,6 +140,7 @@ def _joint_lines(report: "JointsReport", verbose: bool) -> list[str]:
             f"  closing moved corners by {_mm(report.max_displacement)} at most (stone {report.worst_stone}), "
             f"and changed volumes by {100 * report.max_volume_change:.1f} % at most"
         )
+    lines += [f"  {line}" for leaf in report.leaves for line in leaf.in_words()]
     into = [
         f"    {' and '.join(one.stones)} were measured {_mm(-one.width)} into each other at {_place(one.place)}"
         for one in report.measured_overlaps

@@ -23,6 +23,7 @@ __all__ = [
 
 _FACING = np.cos(np.radians(45.0))  # faces turned farther from the joint are not sides of it
 _NOTHING = 1e-10  # smaller areas are rounding [m²]
+_IN_PLANE = 1e-6  # metres: distance from the plane of a joint within which a corner lies in it
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,7 @@ class DrawnStone:
     area : of its visible face [m²]
     hypothesis : whether it is hypothetical
     core : whether it lies behind the stones of a facing
+    grown : whether it grew from its outline to the middle of its mortar
     """
 
     surveyed: Solid
@@ -51,6 +53,7 @@ class DrawnStone:
     area: float
     hypothesis: bool
     core: bool = False
+    grown: bool = False
 
     @property
     def code(self) -> str:
@@ -136,6 +139,7 @@ def closing_shapes(
     hypotheses : codes of hypothetical stones
     core : codes of those that lie behind the stones of a facing
     """
+    grown = {code for leaf in closing.leaves for code in leaf.grown}
     stones = tuple(
         DrawnStone(
             surveyed=before,
@@ -148,6 +152,7 @@ def closing_shapes(
             area=float(np.linalg.norm(area_vector(face))),
             hypothesis=after.code in hypotheses,
             core=after.code in core,
+            grown=after.code in grown,
         )
         for before, between, after, face in zip(*solids, faces, strict=True)
     )
@@ -223,15 +228,19 @@ def joint_polygon(first: Solid, second: Solid, normal: Array, centroid: Array) -
 
 
 def _sides(solid: Solid, towards: Array, axes: Array, centroid: Array) -> list[Array]:
-    """Project the faces of a stone that look in a direction onto the joint: (k, 2) each, counter-clockwise."""
-    found = []
+    """Project the faces of a stone that look in a direction onto the joint: (k, 2) each, counter-clockwise.
+
+    Where faces lie in the plane of the joint, others do not count.
+    """
+    found, within = [], []
     for face in solid.faces:
         polygon = solid.vertices[list(face)]
         area = area_vector(polygon)
         if area @ towards > _FACING * float(np.linalg.norm(area)):
             flat = (polygon - centroid) @ axes.T
             found.append(flat if _area(flat) > 0.0 else flat[::-1])
-    return found
+            within.append(bool((np.abs((polygon - centroid) @ towards) < _IN_PLANE).all()))
+    return [one for one, own in zip(found, within, strict=True) if own] if any(within) else found
 
 
 def _clipped(subject: Array, window: Array) -> Array:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 __all__ = ["draw_joints"]
 
 
-_STONE, _OVERLAP, _NEGATIVE = "#efede9", "#000000", "#cc79a7"
+_STONE, _OUTLINE, _OVERLAP, _NEGATIVE = "#efede9", "#d8d4cc", "#000000", "#cc79a7"
 _EDGE_ON = np.sin(np.radians(50.0))  # joints turned farther to the viewer lie behind the faces
 _FINEST = 0.1  # shortest colour scale [mm]
 _NUMBERED = 12  # gaps and overlaps
@@ -61,6 +61,8 @@ def draw_joints(path: Path, shapes: ClosingShapes, facade: Facade) -> None:
     figure = new_sheet((width, height + _LINE * len(keys)))
     axes = figure.subplots()
     axes.add_collection(PolyCollection(flat, facecolors=_STONE, edgecolors=PALE, linewidths=0.6))
+    outlines = [corners for one in own if one.grown for corners, _ in visible_faces(one.simple, facade)]
+    axes.add_collection(PolyCollection(outlines, facecolors=_OUTLINE, edgecolors=PALE, linewidths=0.6))
     hatch(axes, own, faces)
     name_stones(axes, own, faces, [float("nan")] * len(own))
     closed = [one for one in shown if not one.joint.left_open]

@@ -34,6 +34,7 @@ class Labels:
     numbers : (h, w) number of the stone of each pixel; 0: mortar
     values : number of each stone in the picture, by its number here; None if stones were numbered here
     specks : number of pieces that were too small for a stone
+    smallest : pieces of fewer pixels are specks
     places : from pixels to metres of the wall; None if the file does not say
     """
 
@@ -41,6 +42,7 @@ class Labels:
     numbers: NDArray[np.int32]
     values: NDArray[np.int64] | None
     specks: int
+    smallest: int
     places: PixelPlace | None
 
 
@@ -59,16 +61,16 @@ def read_labels(path: Path) -> Labels:
     places = world_of(path, tags)
     two = _two_colours(pixels)
     if two is not None:
-        numbers, specks = _pieces(two)
+        numbers, specks, smallest = _pieces(two)
         if not numbers.any():
             raise SurveyError("no white piece is large enough for a stone", where=str(path), remedy=_REMEDY)
-        return Labels(path, numbers, None, specks, places)
+        return Labels(path, numbers, None, specks, smallest, places)
     colours = pixels.ndim == 3
     flat = _colour_numbers(pixels) if colours else pixels
     values, numbers = _ranked(flat, path)
     if len(values) < 2 or values[0] != 0:
         raise SurveyError(f"{len(values)} numbers and no 0 among them", where=str(path), remedy=_REMEDY)
-    return Labels(path, numbers, None if colours else values, 0, places)
+    return Labels(path, numbers, None if colours else values, 0, _SMALLEST, places)
 
 
 _REMEDY = "a picture of labels has stones in white and mortar in black, or one number for each stone and 0 for mortar"
@@ -160,23 +162,29 @@ def _two_colours(pixels: NDArray[Any]) -> NDArray[np.bool_] | None:
     return None
 
 
-def _pieces(white: NDArray[np.bool_]) -> tuple[NDArray[np.int32], int]:
-    """Number the pieces of white from the ground up, row by row, and leave specks out."""
+def _pieces(white: NDArray[np.bool_]) -> tuple[NDArray[np.int32], int, int]:
+    """Number the pieces of white from the ground up, row by row, and leave specks out.
+
+    Returns
+    -------
+    numbers of the pixels, the number of specks, and the pixels of the smallest piece that is none
+    """
     from scipy.ndimage import find_objects, label
 
     numbers, count = label(white)
     sizes = np.bincount(numbers.ravel(), minlength=count + 1)
     sizes[0] = 0
-    fine = sizes >= _SMALLEST
+    fine, smallest = sizes >= _SMALLEST, _SMALLEST
     if fine.any():
-        fine &= sizes >= max(_SMALLEST, _SPECK * float(np.median(sizes[fine])))
+        smallest = max(_SMALLEST, int(np.ceil(_SPECK * float(np.median(sizes[fine])))))
+        fine &= sizes >= smallest
     boxes = find_objects(numbers)
     good = np.flatnonzero(fine)
     middles = np.array([[0.5 * (boxes[k - 1][a].start + boxes[k - 1][a].stop) for a in (0, 1)] for k in good])
     order = _rows_from_below(middles, np.array([boxes[k - 1][0].stop - boxes[k - 1][0].start for k in good]))
     renumbered = np.zeros(count + 1, dtype=np.int32)
     renumbered[good[order]] = np.arange(1, len(good) + 1)
-    return renumbered[numbers], int(np.count_nonzero(sizes)) - len(good)
+    return renumbered[numbers], int(np.count_nonzero(sizes)) - len(good), smallest
 
 
 def _rows_from_below(middles: Array, heights: Array) -> NDArray[np.intp]:

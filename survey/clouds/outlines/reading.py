@@ -12,6 +12,7 @@ from survey.clouds.outlines.coco import is_coco, load_json, read_coco
 from survey.clouds.outlines.dxf import read_dxf
 from survey.clouds.outlines.labels import outlines_of, read_labels
 from survey.clouds.outlines.outline import Outline
+from survey.clouds.outlines.plain import is_plain, read_plain_json, read_table
 from survey.clouds.outlines.tracing import few_corners
 from survey.clouds.outlines.vector import read_vector
 from survey.clouds.world import PixelPlace
@@ -39,6 +40,7 @@ class Drawing:
     pixel : side of a pixel [m]; None if they were not traced from a picture or its place is not known
     size : columns and rows of the picture; None without one
     specks : pieces of a picture that were too small for a stone
+    smallest : pieces of fewer pixels are specks
     """
 
     path: Path
@@ -47,6 +49,7 @@ class Drawing:
     pixel: float | None = None
     size: tuple[int, int] | None = None
     specks: int = 0
+    smallest: int = 0
 
 
 def read_outlines(
@@ -61,7 +64,7 @@ def read_outlines(
 
     Parameters
     ----------
-    path : GeoPackage, GeoJSON, Shapefile, DXF, a picture of labels, or COCO's JSON
+    path : GeoPackage, GeoJSON, Shapefile, DXF, a picture of labels, COCO's JSON, plain JSON or CSV
     layer : of a file with several
     chosen : names of attributes that the user has given, by meaning
     sigma : standard deviation of a drawn corner [m], to which curves are described by straight sides
@@ -93,12 +96,17 @@ def _read(path: Path, layer: str | None, chosen: Mapping[str, str], smooth: floa
     if ending in PICTURES:
         labels = read_labels(path)
         size = labels.numbers.shape[1], labels.numbers.shape[0]
-        return _placed(path, tuple(outlines_of(labels, smooth)), labels.places, size, labels.specks)
+        placed = _placed(path, tuple(outlines_of(labels, smooth)), labels.places, size)
+        return replace(placed, specks=labels.specks, smallest=labels.smallest)
     if ending == ".json" and is_coco(content := load_json(path)):
         return _placed(path, *read_coco(path, content, smooth, chosen))
+    if ending == ".json" and is_plain(content):
+        return Drawing(path, read_plain_json(path, content, chosen))
+    if ending == ".csv":
+        return Drawing(path, read_table(path, chosen))
     if ending in _VECTORS:
         return Drawing(path, read_vector(path, layer, chosen))
-    known = ", ".join((*_VECTORS, ".dxf", *PICTURES))
+    known = ", ".join((*_VECTORS, ".dxf", ".csv", *PICTURES))
     raise UsageError(
         f"unknown ending {ending!r}",
         where=str(path),
@@ -111,13 +119,12 @@ def _placed(
     outlines: tuple[Outline, ...],
     places: PixelPlace | None,
     size: tuple[int, int] | None,
-    specks: int = 0,
 ) -> Drawing:
     """Move outlines from pixels to metres, if it is known where the picture lies."""
     if places is None:
-        return Drawing(path, outlines, True, None, size, specks)
+        return Drawing(path, outlines, True, None, size)
     moved = tuple(replace(one, corners=places.place(one.corners)) for one in outlines)
-    return Drawing(path, moved, False, places.pixel, size, specks)
+    return Drawing(path, moved, False, places.pixel, size)
 
 
 def _sparse(outline: Outline, tolerance: float) -> Outline:

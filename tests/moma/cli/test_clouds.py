@@ -103,7 +103,9 @@ def test_masks_alone_are_ingested(place):
     [
         ("--cloud scan.laz", "--cloud without --outlines; name the outlines of its stones"),
         ("--outlines stones.geojson", "--outlines without --cloud; give --cloud FILE and --outlines FILE"),
-        ("--size 1x1 head.moma", "--size without --masks; give --masks too"),
+        ("--outlines stones.geojson --depth 0.2 --slab 0.1", "--slab with --outlines; leave it out"),
+        ("--outlines stones.geojson --depth 0.2 head.moma", "survey files beside --outlines"),
+        ("--size 1x1 head.moma", "--size without --masks; give --masks or --outlines too"),
         ("head.moma --cloud scan.laz --outlines stones.geojson", "survey files beside --cloud"),
         ("--cloud scan.laz --masks wall.png", "--masks beside --cloud"),
         ("--masks wall.png --slab 0.1", "--slab with --masks; leave it out"),

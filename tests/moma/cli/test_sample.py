@@ -7,6 +7,7 @@ import shlex
 import pytest
 
 from moma.cli.surveys import Moved
+from pipelines.samples.rubble_wall import RUBBLE_WALL
 from pipelines.samples.samples import SAMPLES
 from tests.moma.commands import answer, fails, invoke, prints
 
@@ -30,7 +31,7 @@ LARGE = {name for name, recipe in SAMPLES.items() if recipe.cause is not None or
 
 def test_the_help_names_the_samples_and_the_causes_of_movement():
     said = " ".join(invoke("sample", "--help").stdout.replace("│", " ").split())
-    names = [name for name in SAMPLES if " " not in name]
+    names = [*(name for name in SAMPLES if " " not in name), RUBBLE_WALL]
     assert f"{', '.join(names[:-1])} or {names[-1]}." in said
     causes = {name.split()[name.split().index("--moved") + 1] for name in SAMPLES if "--moved" in name}
     assert causes == {one.value for one in Moved}
@@ -38,8 +39,9 @@ def test_the_help_names_the_samples_and_the_causes_of_movement():
 
 def test_samples_and_options_that_there_are_not_are_refused(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert "the samples are arch, corner, facings, ribvault, tower, vault, wall, window" in fails(
-        2, "sample", "castle"
+    assert (
+        "the samples are arch, corner, facings, ribvault, tower, vault, wall, window, rubble-wall"
+        in fails(2, "sample", "castle")
     )
     said = fails(2, "sample", "facings", "--moved", "thrust")
     assert "no sample 'facings --moved thrust'; there is 'facings', 'facings --moved settlement'" in said

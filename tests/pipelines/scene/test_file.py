@@ -169,8 +169,7 @@ def test_no_text_makes_the_reader_fail_in_another_way(text):
 def test_every_setting_has_a_key_with_its_default(table, owners):
     keys = {key.name: key.default for key in TABLES[table]}
     settings = {one.name: one.default for owner in owners for one in fields(owner)}
-    # laws and rules are tables of their own, thickness comes from the joints; "auto" leaves the model of a stone to the
-    # outputs
+    # laws and rules are tables of their own, thickness comes from joints; "auto" leaves the model to the outputs
     others = ("law", "rules", "thickness")
     assert keys == {name: value for name, value in settings.items() if name not in others} | (
         {"default": "auto"} if table == "bodies" else {}

@@ -1,0 +1,305 @@
+"""Partition of a rectangle among stones by few straight edges along the medial lines between their outlines."""
+
+from collections import Counter, defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from moma.errors import GeometryError
+from survey.arrays import Array
+from survey.joints.grown.medial_lines import Line, MedialLines, inside
+
+__all__ = ["Edge", "Partition", "apart", "partition"]
+
+_CHORD = 0.5  # of the mean thickness of a joint: largest distance of an edge from the medial line, within the mortar
+_ROUNDS = 10  # in each of which edges that cross others follow their lines twice as closely
+_FEWEST = 3  # lines about a stone
+_PIECES = 24  # places of an edge at which its thickness is taken
+
+
+@dataclass(frozen=True)
+class Edge:
+    """A straight edge between two stones, or between a stone and the frame.
+
+    Attributes
+    ----------
+    ends : numbers of the corners at its ends
+    left, right : numbers of the stones on its sides; negative for a side of the frame
+    thickness : of the mortar: mean along it of the distances from the outlines of its stones [m]
+    opening : angle by which the joint widens along it [degrees]
+    """
+
+    ends: tuple[int, int]
+    left: int
+    right: int
+    thickness: float
+    opening: float
+
+
+@dataclass(frozen=True)
+class Partition:
+    """Division of a rectangle among stones.
+
+    Attributes
+    ----------
+    corners : (n, 2) [m]
+    rings : of each stone, the numbers of its corners, counter-clockwise
+    edges : between them
+    collapsed : number of edges that were too short and became a corner
+    """
+
+    corners: Array
+    rings: tuple[tuple[int, ...], ...]
+    edges: tuple[Edge, ...]
+    collapsed: int
+
+
+def partition(
+    lines: MedialLines, outlines: Sequence[Array], straightness: float, shortest: float
+) -> Partition:
+    """Replace medial lines by few straight edges.
+
+    Parameters
+    ----------
+    lines : medial lines
+    outlines : (n, 2) of the stones [m]
+    straightness : largest distance of an edge from its line; half the mean thickness of the joint where less [m]
+    shortest : edges shorter than this become a corner [m]
+
+    Returns
+    -------
+    Partition, whose polygons are simple and fill the rectangle
+
+    Raises
+    ------
+    GeometryError
+        if the lines cannot be straightened without crossing each other
+    """
+    bound = [min(straightness, _CHORD * _mean_thickness(one, outlines)) for one in lines.lines]
+    for least in (shortest, 0.5 * shortest, 0.25 * shortest, 0.0):
+        network = _Network(lines)
+        network.collapse(least)
+        found = _straightened(network, list(bound), least, len(outlines))
+        if found is not None:
+            corners, chains, rings = found
+            edges = tuple(
+                _edge(corners, (a, b), line, outlines) for line, chain in chains for a, b in pairwise(chain)
+            )
+            return Partition(corners, rings, edges, network.collapsed)
+    what = "the lines between the outlines cross each other when straightened"
+    raise GeometryError(
+        what, where="joints", remedy="look at outlines that touch or cross, and draw them apart"
+    )
+
+
+class _Network:
+    """Lines between nodes, short ones of which become a node."""
+
+    def __init__(self, lines: MedialLines) -> None:
+        self.nodes = lines.nodes.copy()
+        self.lines: dict[int, Line] = dict(enumerate(lines.lines))
+        self.collapsed = 0
+        self.about: dict[int, set[int]] = defaultdict(set)
+        for one in lines.lines:
+            for node in one.ends:
+                self.about[node] |= {one.left, one.right}
+        self.at: dict[int, set[int]] = defaultdict(set)
+        self.sides = Counter(stone for one in lines.lines for stone in (one.left, one.right))
+        for number, one in self.lines.items():
+            for node in one.ends:
+                self.at[node].add(number)
+
+    def collapse(self, shortest: float) -> None:
+        """Make nodes of lines whose ends are nearer than this, the shortest first."""
+        merged = True
+        while merged:
+            merged = False
+            for number in sorted(self.lines, key=self._length):
+                if self._length(number) >= shortest:
+                    break
+                merged |= self._merge(number)
+
+    def _length(self, number: int) -> float:
+        a, b = self.lines[number].ends
+        return float(np.hypot(*(self.nodes[b] - self.nodes[a]))) if a != b else np.inf
+
+    def _merge(self, number: int) -> bool:
+        """Make a node of a line; False if that would pinch a stone, cut off a corner of the frame, or lose a stone."""
+        line = self.lines[number]
+        a, b = line.ends
+        if self.about[a] & self.about[b] != {line.left, line.right}:
+            return False
+        if len(self.at[a] & self.at[b]) != 1:
+            return False
+        sides_a, sides_b = ({one for one in self.about[node] if one < 0} for node in (a, b))
+        if not (sides_a <= sides_b or sides_b <= sides_a):
+            return False
+        if any(stone >= 0 and self.sides[stone] <= _FEWEST for stone in (line.left, line.right)):
+            return False
+        if sides_a == sides_b:
+            self.nodes[a] = 0.5 * (self.nodes[a] + self.nodes[b])
+        elif len(sides_b) > len(sides_a):
+            self.nodes[a] = self.nodes[b]
+        self.about[a] |= self.about[b]
+        del self.lines[number]
+        self.sides.subtract((line.left, line.right))
+        self.at[a].discard(number)
+        for other in self.at.pop(b) - {number}:
+            one = self.lines[other]
+            start, stop = (a if node == b else node for node in one.ends)
+            self.lines[other] = Line((start, stop), one.path, one.left, one.right)
+            self.at[a].add(other)
+        self.collapsed += 1
+        return True
+
+
+Chains = list[tuple[Line, tuple[int, ...]]]
+
+
+def _straightened(
+    network: _Network, bound: list[float], shortest: float, count: int
+) -> tuple[Array, Chains, tuple[tuple[int, ...], ...]] | None:
+    """Return corners, the corners of each line, and the rings of the stones; None if they cross to the last."""
+    closely = dict.fromkeys(network.lines, 1.0)
+    for _ in range(_ROUNDS):
+        corners = list(network.nodes)
+        chains: Chains = []
+        of_stone: dict[int, list[int]] = defaultdict(list)
+        for number, line in network.lines.items():
+            path = line.path.copy()
+            path[0], path[-1] = network.nodes[line.ends[0]], network.nodes[line.ends[1]]
+            few = _few(path, bound[number] * closely[number], shortest * closely[number], line.ends)
+            chain = (line.ends[0], *range(len(corners), len(corners) + len(few)), line.ends[1])
+            corners += list(path[few])
+            for stone in (line.left, line.right):
+                if stone >= 0:
+                    of_stone[stone].append(len(chains))
+            chains.append((line, chain))
+        places = np.array(corners)
+        rings = [_ring(stone, [chains[k] for k in of_stone[stone]]) for stone in range(count)]
+        wrong = [k for k, ring in enumerate(rings) if ring is None or not is_simple(places[list(ring)])]
+        if not wrong:
+            return places, chains, tuple(ring for ring in rings if ring is not None)
+        for number, line in network.lines.items():
+            if line.left in wrong or line.right in wrong:
+                closely[number] *= 0.5
+    return None
+
+
+def _few(path: Array, tolerance: float, shortest: float, ends: tuple[int, int]) -> list[int]:
+    """Return the places along a path, its ends left out, that a chain of straight edges needs (Douglas & Peucker)."""
+    kept, stack = set[int](), [(0, len(path) - 1)]
+    if ends[0] == ends[1]:  # about a single stone: three corners at least
+        third = len(path) // 3
+        kept = {third, 2 * third}
+        stack = [(0, third), (third, 2 * third), (2 * third, len(path) - 1)]
+    while stack:
+        start, stop = stack.pop()
+        if stop - start < 2:
+            continue
+        off = apart(path[start + 1 : stop], path[[start, stop]], closed=False)
+        worst = int(np.argmax(off))
+        if off[worst] > tolerance:
+            middle = start + 1 + worst
+            kept.add(middle)
+            stack += [(start, middle), (middle, stop)]
+    chosen = [0, *sorted(kept), len(path) - 1]
+    least = 4 if ends[0] == ends[1] else 2
+    while len(chosen) > least:
+        sides = np.linalg.norm(np.diff(path[chosen], axis=0), axis=1)
+        short = int(np.argmin(sides))
+        if sides[short] >= shortest:
+            break
+        # of the two ends of the shortest edge, the one that can be left out, and that is nearer to its neighbours
+        ends_of = [k for k in (short, short + 1) if 0 < k < len(chosen) - 1]
+        near = [
+            apart(path[[chosen[k]]], path[[chosen[k - 1], chosen[k + 1]]], closed=False)[0] for k in ends_of
+        ]
+        del chosen[ends_of[int(np.argmin(near))]]
+    return chosen[1:-1]
+
+
+def _ring(stone: int, chains: Chains) -> tuple[int, ...] | None:
+    """Return the corners around a stone, counter-clockwise; None unless its lines form one ring."""
+    after: dict[int, tuple[int, ...]] = {}
+    for line, chain in chains:
+        own = chain if line.left == stone else chain[::-1]
+        if own[0] in after:
+            return None
+        after[own[0]] = own
+    if not after:
+        return None
+    start = here = next(iter(after))
+    ring: list[int] = []
+    for _ in range(len(after)):
+        if here not in after:
+            return None
+        chain = after[here]
+        ring += chain[:-1]
+        here = chain[-1]
+        if here == start:
+            break
+    return tuple(ring) if here == start and len(ring) == sum(len(one) - 1 for one in after.values()) else None
+
+
+def is_simple(ring: Array) -> bool:
+    """Return whether a polygon (n, 2) runs counter-clockwise and no two of its sides meet but at their corner."""
+    count = len(ring)
+    x, y = (ring - ring[0]).T
+    if count < 3 or not float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) > 0.0:
+        return False
+    start, way = ring, np.roll(ring, -1, axis=0) - ring
+    offset = start[None] - start[:, None]
+    turn = way[:, None, 0] * way[None, :, 1] - way[:, None, 1] * way[None, :, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along = (offset[..., 0] * way[None, :, 1] - offset[..., 1] * way[None, :, 0]) / turn
+    met = (along >= 0.0) & (along <= 1.0)
+    met = met & met.T
+    k = np.arange(count)
+    met[k, k] = met[k, (k + 1) % count] = met[(k + 1) % count, k] = False
+    if met.any():
+        return False
+    back = np.roll(way, 1, axis=0)
+    folded = np.abs(back[:, 0] * way[:, 1] - back[:, 1] * way[:, 0]) < 1e-12
+    return not bool((folded & ((back * way).sum(axis=1) < 0.0)).any())
+
+
+def apart(places: Array, ring: Array, closed: bool = True) -> Array:
+    """Return the distances (n,) of places (n, 2) from the sides of a polygon, or of an open chain [m]."""
+    start, stop = (ring, np.roll(ring, -1, axis=0)) if closed else (ring[:-1], ring[1:])
+    way = stop - start
+    size = np.maximum((way**2).sum(axis=1), 1e-300)
+    off = places[:, None] - start[None]
+    along = np.clip((off * way).sum(axis=2) / size, 0.0, 1.0)
+    out: Array = np.linalg.norm(off - along[..., None] * way, axis=2).min(axis=1)
+    return out
+
+
+def _thickness(places: Array, line: Line, outlines: Sequence[Array]) -> Array:
+    """Return the thickness (n,) of the mortar at places along a line: the distances from the outlines beside it [m]."""
+    total = np.zeros(len(places))
+    for stone in (line.left, line.right):
+        if stone >= 0:
+            ring = outlines[stone]
+            total += np.where(inside(places, ring), 0.0, apart(places, ring))
+    return total
+
+
+def _mean_thickness(line: Line, outlines: Sequence[Array]) -> float:
+    places, lengths = _middles(line.path)
+    return float(np.average(_thickness(places, line, outlines), weights=lengths)) if lengths.any() else 0.0
+
+
+def _middles(path: Array) -> tuple[Array, Array]:
+    ways = np.diff(path, axis=0)
+    return path[:-1] + 0.5 * ways, np.linalg.norm(ways, axis=1)
+
+
+def _edge(corners: Array, ends: tuple[int, int], line: Line, outlines: Sequence[Array]) -> Edge:
+    start, stop = corners[list(ends)]
+    along = (np.arange(_PIECES) + 0.5) / _PIECES
+    thickness = _thickness(start + along[:, None] * (stop - start), line, outlines)
+    widening = abs(float(np.polyfit(along, thickness, 1)[0])) / max(float(np.hypot(*(stop - start))), 1e-12)
+    return Edge(ends, line.left, line.right, float(thickness.mean()), float(np.degrees(np.arctan(widening))))
