@@ -263,13 +263,26 @@ def laws_between(scene: Scene) -> LawTable:
     SceneError : a law names a block that is not there
     """
     rules = [(*_groups(scene, rule), rule.law) for rule in scene.contact.rules]
+    return law_table(scene.contact.law, rules, len(scene.blocks), _beds(scene))
+
+
+def _beds(scene: Scene) -> dict[tuple[int, int], float]:
+    """Return the thickness of mortar between two bodies, the lower number first [m].
+
+    What is stated of one block alone holds towards all of which nothing is stated.
+    """
+    stated = scene.contact.thickness
+    outlined = frozenset[str]().union(*stated)
     number = {block.code: b for b, block in enumerate(scene.blocks)}
-    beds = {
-        (min(ends), max(ends)): thickness
-        for pair, thickness in scene.contact.thickness.items()
-        if len(ends := [number[code] for code in pair if code in number]) == 2
-    }
-    return law_table(scene.contact.law, rules, len(scene.blocks), beds)
+    others = [b for code, b in number.items() if code not in outlined] if stated else []
+    beds = dict[tuple[int, int], float]()
+    for pair, thickness in stated.items():
+        ends = [number[code] for code in pair if code in number]
+        if len(ends) == 2:
+            beds[min(ends), max(ends)] = thickness
+        elif len(pair) == 1:
+            beds |= {(min(end, other), max(end, other)): thickness for end in ends for other in others}
+    return beds
 
 
 def _groups(scene: Scene, rule: LawRule) -> tuple[Bools, Bools]:

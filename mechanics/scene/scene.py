@@ -185,16 +185,14 @@ class ContactSettings:
         Setting("Largest distance between points where placement is area, which needs it.", "m", above=0),
     ] = None
 
-    thickness: Mapping[frozenset[str], float] = field(default_factory=dict)
-
     def __post_init__(self) -> None:
         check_settings("contact", self)
         for pair, thickness in self.thickness.items():
-            if len(pair) != 2 or not 0.0 < thickness < math.inf:
+            if len(pair) not in (1, 2) or not 0.0 < thickness < math.inf:
                 raise SceneError(
                     f"thickness {thickness!r} of the joint between {' and '.join(sorted(pair))}",
                     where="contact",
-                    remedy="give two codes, and a thickness greater than 0 [m]",
+                    remedy="give one code or two, and a thickness greater than 0 [m]",
                 )
         if self.placement is Placement.AREA and self.spacing is None:
             raise SceneError(
