@@ -22,7 +22,7 @@ from mechanics.limit.pushover import SPEED
 from mechanics.model.model import Model, build_model
 from mechanics.scene.loads.load import Pose
 from mechanics.scene.rig import BEAM, JAWS, Rig, rigged
-from mechanics.scene.scene import Scene, TimeSettings
+from mechanics.scene.scene import ContactSettings, Scene, TimeSettings
 from mechanics.scene.state import State
 from moma.errors import SolverError
 
@@ -212,7 +212,7 @@ def loading_test(
     path = _Path(frozenset(JAWS if rig.has_beam else JAWS[:1]), rig.axes[0], to, speed)
     duration = way / speed
     scene = replace(scene, time=TimeSettings(duration, theta=1.0, duration=path.until + duration))
-    bare, _ = build_model(scene)
+    bare, _ = build_model(replace(scene, contact=ContactSettings()))
     weight = float(bare.mass[~bare.fixed].sum() * np.linalg.norm(scene.gravity))
     model, begin = build_model(rigged(scene, weight, rig, path))
     told, search = static_start(model, begin, progress)

@@ -75,8 +75,7 @@ def draw_pushed(path: Path, title: str, test: LoadingTest, step: Step) -> None:
     contacts = step.active.contacts
     wide = step.active.gap > _OPEN * abs(float(test.displacement[-1]))
     sides = contacts.bodies[wide]
-    points = np.concatenate([one[wide] for one in material_points(contacts, after)])
-    bodies = np.concatenate([sides[:, 0], sides[:, 1]])
+    points, bodies = material_points(contacts, after)[wide].reshape(-1, 3), sides.ravel()
     kept = ~model.fixed[bodies]
     points, bodies = points[kept], bodies[kept]
     arm = np.einsum("nji,nj->ni", turn[bodies], points - after.centre[bodies])

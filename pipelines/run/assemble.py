@@ -147,8 +147,8 @@ def _scene(
     materials = {block.code: block.material.name for block in blocks}
     loads = [_entry_about(entry, origin) for entry in scene.loads if not scene.stages]
     velocity = thrown(document, scene.throws, groups, by_code)
-    rules = law_rules(document, scene.laws, groups, materials)
     thickness = {stones: own for leaf in closing.leaves for stones, own in leaf.thickness.items()}
+    rules = law_rules(document, scene.laws, groups, materials, thickness)
     return Scene(
         name=scene.name,
         blocks=tuple(

@@ -34,7 +34,7 @@ from pipelines.run.fidelity import Modelled, modelled
 from pipelines.run.inputs import stage_lines
 from pipelines.run.plausibility import corner_warnings, impossible_values, unusual_values
 from pipelines.run.run import USUAL
-from pipelines.run.soundness import unsound_stones, unsupported, unsupported_stages
+from pipelines.run.soundness import stands_alone, unsound_stones, unsupported, unsupported_stages
 from pipelines.scene.array_tables import describe
 from pipelines.scene.file import SceneFile, read_scene
 from pipelines.scene.selection import Groups, StoneModel, select_groups, select_stones
@@ -51,6 +51,9 @@ _STONE = 3e-3  # a stone is read, its joints are closed, its results are written
 _PICTURE = 5.0  # a picture is drawn by a program of its own [s]
 _SPREAD = 2.0  # factor within which these lie [-]
 _LIBRARIES = 280_000_000  # memory of the libraries that read, draw and store [bytes]
+
+
+_IN_RIG = "no stone is fixed: only `moma pushover` can use the scene, whose rig has a base"
 
 
 def check_scene(
@@ -96,7 +99,8 @@ def check_scene(
         problems += unsound_stones(assembly)
         progress(Progress("check", 0, None, "meshes, and contacts at the start"))
         needs = plan(assembly.scene)
-        problems += unsupported(assembly.scene, needs.loose)
+        if scene.pushover is None or not stands_alone(assembly.scene):
+            problems += unsupported(assembly.scene, needs.loose)
     except (GeometryError, MeshError) as error:
         problems.append(str(error))
     report = _report(scene, models, groups, assembly, needs, tuple(problems))
@@ -194,6 +198,7 @@ def _report(
             *corner_warnings(models),
             *(() if assembly is None else assembly.remarks),
             *(() if assembly is None else unsupported_stages(scene, assembly)),
+            *(() if assembly is None or not stands_alone(assembly.scene) else (_IN_RIG,)),
         ),
     )
 

@@ -16,7 +16,8 @@ from survey.geometry.watertight import check_watertight, doubtful_solids
 from survey.joints.settings import JointMode
 
 __all__ = [
-    "caution_of", "problems_of", "refuse_unsound", "some", "unsound_stones", "unsupported", "unsupported_stages",
+    "caution_of", "problems_of", "refuse_unsound", "some", "stands_alone", "unsound_stones", "unsupported",
+    "unsupported_stages",
 ]  # fmt: skip
 
 _DEEP = 0.005  # overlap [m]; less is survey noise, which the contacts absorb
@@ -141,13 +142,18 @@ def unsupported(scene: Scene, loose: Sequence[str]) -> list[str]:
     scene : the scene
     loose : codes of the stones that no chain of touching stones ties to a fixed one
     """
-    if all(block.fidelity is not Fidelity.FIXED for block in scene.blocks):
+    if stands_alone(scene):
         return ['no stone is fixed, so nothing holds the others; give [bodies] fixed, e.g. ["course = 1"]']
     thrown = {block.code for block in scene.blocks if any(block.velocity)}
     falling = [code for code in loose if code not in thrown]
     if not falling:
         return []
     return [f"no chain of touching stones ties these to a fixed one: {some(falling)}; they will fall"]
+
+
+def stands_alone(scene: Scene) -> bool:
+    """Return True where no stone is fixed, so that only a test rig could hold the stones."""
+    return all(block.fidelity is not Fidelity.FIXED for block in scene.blocks)
 
 
 def unsupported_stages(scene: SceneFile, assembly: Assembly) -> list[str]:

@@ -1,8 +1,10 @@
 """Laws of particular joints: from [[laws]] of a scene file to rules between groups of stones."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
+
+import numpy as np
 
 from mechanics.scene.laws.cohesive_zone import CohesiveZone
 from mechanics.scene.laws.dry_joint import DryJoint
@@ -89,8 +91,17 @@ def law_rules(
     laws: Iterable[JointLaw],
     groups: Mapping[tuple[str, ...], Sequence[frozenset[str]]],
     materials: Mapping[str, str],
+    beds: Mapping[frozenset[str], float],
 ) -> tuple[LawRule, ...]:
-    """Return the rules between groups of codes; `materials` maps the code of each stone to its material."""
+    """Return the rules between groups of codes.
+
+    Parameters
+    ----------
+    groups : the stones that the tables of the laws name
+    materials : by code the material of each stone
+    beds : thickness of the mortar between stones; where they touch elsewhere, at a corner, it is the mean of these [m]
+    """
+    mean = float(np.mean(list(beds.values()))) if beds else None
     rules = []
     for one in laws:
         path, named = one.entry.path, one.entry.values["materials"]
@@ -102,5 +113,8 @@ def law_rules(
                 document.fail(what, *path, "materials", remedy="leave the law out, or select its stones")
             sides.append(side)
         first, second = sides or [frozenset(materials)] * 2
-        rules.append(LawRule(first, second, one.law))
+        law = one.law
+        if isinstance(law, ElasticJoint) and law.by_thickness and law.thickness is None:
+            law = replace(law, thickness=mean)
+        rules.append(LawRule(first, second, law))
     return tuple(rules)

@@ -23,8 +23,9 @@ from pipelines.reports.pushover import write_pushover
 from pipelines.results.folder import check_replaceable, replacing, source_of
 from pipelines.results.summary import as_json
 from pipelines.run.assemble import Assembly, assemble_stones
+from pipelines.run.plausibility import impossible_values
 from pipelines.run.record import store_record, versions
-from pipelines.run.soundness import problems_of, refuse_unsound
+from pipelines.run.soundness import refuse_unsound, unsound_stones
 from pipelines.scene.file import SceneFile, read_scene
 from pipelines.scene.laws import law_rules
 from pipelines.scene.pushover import Pushing
@@ -106,7 +107,8 @@ def push(
         models = select_stones(scene, session)
         groups = select_groups(scene, session, models)
         assembled = assemble_stones(scene, models, groups)
-    refuse_unsound(problems_of(scene, assembled, ()), str(path), _SOUND_FIRST)
+    problems = (*impossible_values(scene, assembled.models), *unsound_stones(assembled))
+    refuse_unsound(problems, str(path), _SOUND_FIRST)
     stones = _in_rig(scene, assembled.scene, groups, asked.rig)
     number, total = 0, 1 + len(asked.scatter)
 
@@ -167,7 +169,7 @@ def _in_rig(scene: SceneFile, stones: Scene, groups: Groups, rig: Rig) -> Scene:
     materials = {block.code: block.material.name for block in stones.blocks} | dict.fromkeys(
         rig.pieces, general
     )
-    rules = law_rules(scene.document, scene.laws, groups, materials)
+    rules = law_rules(scene.document, scene.laws, groups, materials, stones.contact.thickness)
     blocks = tuple(
         replace(block, fidelity=Fidelity.RIGID) if block.fidelity is Fidelity.DEFORMABLE else block
         for block in stones.blocks

@@ -74,14 +74,14 @@ def test_laws_hold_between_materials_or_groups_or_everywhere():
         ("laws", "1"): (frozenset({"A1", "A2"}), frozenset({"B1"})),
         ("laws", "2"): (),
     }
-    rules = law_rules(scene.document, scene.laws, groups, materials)
+    rules = law_rules(scene.document, scene.laws, groups, materials, {})
     assert [(set(rule.first), set(rule.second)) for rule in rules] == [
         ({"A1", "A2"}, {"B1"}),
         ({"A1", "A2"}, {"B1"}),
         (set(materials), set(materials)),
     ]
     with pytest.raises(SceneError, match=r"scene.toml:6: no selected stone is of 'brick'"):
-        law_rules(scene.document, scene.laws, groups, {"A1": "stone"})
+        law_rules(scene.document, scene.laws, groups, {"A1": "stone"}, {})
 
 
 def test_the_general_law_and_the_contact_points_are_those_of_the_contact_table():
