@@ -28,6 +28,8 @@ from survey.records.survey import (
 __all__ = ["open_masks"]
 
 _STRETCHED = 0.02  # by which the two sides of a pixel may differ before it is doubtful [-]
+_TWICE = 1.5  # standard deviations between two corners that are one
+_NEAREST = 0.001  # and metres
 _OVER = 0.005  # metres by which an outline may reach beyond the stated size before it is doubtful
 _UPRIGHT = Wall(np.zeros(3), np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]))
 _SOURCE = "stated for all outlines"
@@ -146,9 +148,10 @@ def _stones(
             yield Reject(one.code, error, span)
             continue
         said = one.said
+        corners = _distinct(one.corners, max(_TWICE * sigma, _NEAREST))
         notes = dict(said.notes) | {OUTLINE_NOTE: how}
         if frame is not None:
-            beyond = np.concatenate([one.corners.min(axis=0) - frame[0], frame[1] - one.corners.max(axis=0)])
+            beyond = np.concatenate([corners.min(axis=0) - frame[0], frame[1] - corners.max(axis=0)])
             notes[FRAME_NOTE] = " ".join(f"{value:.9f}" for value in beyond.tolist())
         if said.score is not None:
             notes["score"] = f"{said.score:g}"
@@ -156,7 +159,7 @@ def _stones(
             code=one.code,
             kind=said.kind or options.kind,
             course=said.course,
-            vertices=_in_space(one.corners, wall),
+            vertices=_in_space(corners, wall),
             points=np.empty((0, 3)),
             sigma=max(sigma, said.sigma or 0.0),
             depth=said.depth,
@@ -167,6 +170,12 @@ def _stones(
             zone=said.zone,
             spans=span,
         )
+
+
+def _distinct(corners: Array, nearest: float) -> Array:
+    """Return corners (n, 2) without those that are as good as the one before them: a worn corner has two."""
+    kept = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1) >= nearest
+    return corners[kept] if np.count_nonzero(kept) >= 3 else corners
 
 
 def _in_space(corners: Array, wall: Wall) -> Array:
