@@ -9,13 +9,15 @@ from moma.errors import UsageError
 
 __all__ = ["read_curve"]
 
+_MISSING = ("", "nan", "na")
 _FORM = "give lines with a displacement in mm and a force in kN, separated by a comma"
 
 
 def read_curve(path: Path) -> Array:
     """Return a measured curve (n, 2): displacement and force [m], [N].
 
-    Lines before the first with two numbers are headings; columns after the second are left out.
+    Lines before the first with two numbers are headings; columns after the second are left out, and so are lines where
+    one of the two is missing, as instruments write them.
 
     Raises
     ------
@@ -27,16 +29,15 @@ def read_curve(path: Path) -> Array:
         raise UsageError(f"the measured curve cannot be read: {error}", where=str(path)) from error
     rows: list[tuple[float, float]] = []
     for number, line in enumerate(lines, start=1):
-        if not line.strip():
+        cells = [cell.strip() for cell in line.split(",")[:2]]
+        if len(cells) < 2 or any(cell.lower() in _MISSING for cell in cells):
             continue
         try:
-            one, two, *_ = (float(cell) for cell in line.split(",")[:2])
+            one, two = map(float, cells)
         except ValueError as error:
             if rows:
                 raise UsageError("no two numbers", where=f"{path}:{number}", remedy=_FORM) from error
             continue
-        if not np.isfinite([one, two]).all():
-            raise UsageError("a number that is not finite", where=f"{path}:{number}", remedy=_FORM)
         rows.append((one, two))
     if not rows:
         raise UsageError("no measured points", where=str(path), remedy=_FORM)

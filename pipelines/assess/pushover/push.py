@@ -58,11 +58,13 @@ class Pushed:
     folder : of the files
     summary : contents of pushover.json
     run : its number in the database
+    test : the curve, and the stones
     """
 
     folder: Path
     summary: dict[str, Any]
     run: int
+    test: LoadingTest
 
 
 def push(
@@ -155,7 +157,7 @@ def push(
         as_of=as_of,
     )
     with open_database(url, create=False) as database:
-        return Pushed(folder, summary, store_record(database, folder, record))
+        return Pushed(folder, summary, store_record(database, folder, record), test)
 
 
 def _in_rig(scene: SceneFile, stones: Scene, groups: Groups, rig: Rig) -> Scene:
