@@ -20,6 +20,7 @@ from mechanics.contact._kernels.broad_phase import boxes, close_pairs, grid_of, 
 from mechanics.contact._kernels.narrow_phase import (
     EDGES,
     FACE_FIRST,
+    SAME_PLANE,
     SEPARATED,
     Pairs,
     interface_points,
@@ -146,8 +147,13 @@ class Detector:
         hint = self._hints.of(key)
         near = np.where(balls, -np.inf, limit)
 
+        # points over the area are kept where the two faces are equally deep, so that they keep their names
+        plane = FLAT if self.placement == Placement.AREA else SAME_PLANE
+
         def part(a: int, b: int) -> tuple[Ints, Ints, Array]:
-            axes: tuple[Ints, Ints, Array] = separating_axes(shapes[a:b], near[a:b], hint[a:b], placed.shapes)
+            axes: tuple[Ints, Ints, Array] = separating_axes(
+                shapes[a:b], near[a:b], hint[a:b], plane, placed.shapes
+            )
             return axes
 
         kind, feature, axis = self._in_parts(len(shapes), part)

@@ -22,6 +22,7 @@ from mechanics.contact._kernels.vectors import (
 __all__ = [
     "MAX_CORNERS",
     "NAME_BITS",
+    "SAME_PLANE",
     "Pairs",
     "Polygon",
     "Polyhedra",
@@ -44,7 +45,7 @@ SEPARATED, FACE_FIRST, FACE_SECOND, EDGES = 0, 1, 2, 3
 # margin, relative to the size of the smaller shape, by which the second shape's face or two edges must separate better
 # than the first shape's face to be preferred, so that the choice between equally good features does not flicker
 _PREFERENCE = 1e-3
-_SAME_PLANE = 1.0 - 5e-13  # cosine of 10⁻⁶ rad: two faces at a smaller angle are one plane
+SAME_PLANE = 1.0 - 5e-13  # cosine of 10⁻⁶ rad: two faces at a smaller angle are one plane
 _PARALLEL = 0.999999  # cosine of the angle below which edges need no test
 # distance from a side, relative to the size of the smaller shape, within which a corner is on it, so that faces that
 # end together clip cleanly
@@ -212,7 +213,7 @@ def _deepest_edges(i, j, floor, shapes):
 
 
 @njit(cache=True, nogil=True)
-def separating_axes(pair, limit, hint, shapes):  # pragma: no cover - compiled
+def separating_axes(pair, limit, hint, plane, shapes):  # pragma: no cover - compiled
     """Find the best separating axis of each pair of convex polyhedra (separating-axis theorem).
 
     Inputs
@@ -220,6 +221,7 @@ def separating_axes(pair, limit, hint, shapes):  # pragma: no cover - compiled
     pair : (np, 2) int64, shapes
     limit : (np,) float64, gap beyond which a pair is apart [m]
     hint : (np,) int64, the face that separated the pair before, or -1; it is tried first, and updated
+    plane : float64, cosine of the angle within which two faces count as one plane [-]
     shapes : Polyhedra
 
     Outputs
@@ -250,7 +252,7 @@ def separating_axes(pair, limit, hint, shapes):  # pragma: no cover - compiled
         alike = -dot(row(shapes.normal, face_i), row(shapes.normal, face_j))
         # where the choice makes no difference the first face, so that it does not flicker; otherwise the better one, so
         # that nothing depends on the order of the stones
-        use_i = gap_i >= gap_j - (_PREFERENCE * small if alike > _SAME_PLANE else 0.0)
+        use_i = gap_i >= gap_j - (_PREFERENCE * small if alike > plane else 0.0)
         face, other = (face_i, j) if use_i else (face_j, i)
         n = row(shapes.normal, face)
         incident = _opposite_face(other, n, shapes)

@@ -163,6 +163,23 @@ def test_points_over_the_area_keep_their_names_when_the_scene_is_turned_moved_an
     np.testing.assert_allclose((there[4] - np.ones(3)) @ turn / scale, place, atol=1e-8)
 
 
+def test_points_over_the_area_keep_their_names_as_equal_faces_tilt_either_way():
+    """Of two equal stones each face is the deeper one in turn, by a part of a millimetre."""
+    one = scene(brick("a", (0, 0, 0), (0.4, 0.2, 0.2)), brick("b", (0, 0, 0.2), (0.4, 0.2, 0.4)))
+    model, state = build_model(one)
+    find = Detector(model.surfaces, model.fixed, 0.05, placement=Placement.AREA, spacing=0.05)
+    keys, faces = [], []
+    for tilt in (0.0, 1e-4, -1e-4, 3e-4, -3e-4):
+        turned = state.rotation.copy()
+        turned[1] = Rotation.from_rotvec([0.0, tilt, 0.0]).as_matrix() @ turned[1]
+        contacts = find(replace(state, rotation=turned), np.zeros(2))
+        keys.append(np.sort(contacts.key))
+        faces.append(set(contacts.bodies[:, 0].tolist()))
+    for key, face in zip(keys, faces, strict=True):
+        np.testing.assert_array_equal(key, keys[0])
+        assert face == {1}
+
+
 @pytest.mark.parametrize(("spacing", "count"), [(1.0, 4), (0.2, 12), (0.05, 160)])
 def test_a_joint_has_a_point_in_each_cell_two_each_way_at_least(spacing, count):
     one = scene(ground(), brick("a", (0, 0, 0), (0.8, 0.5, 0.6)))

@@ -13,7 +13,7 @@ from mechanics.dynamics.static_start import static_start
 from mechanics.model.model import build_model
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.elastic_joint import ElasticJoint
-from mechanics.scene.laws.law import CRUSHED, ENERGY
+from mechanics.scene.laws.law import BOND, CRUSHED, ENERGY
 from mechanics.scene.loads.forces import StoneForce
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.motions import ImposedMotion
@@ -195,6 +195,25 @@ def test_a_block_that_rocks_gains_no_energy_from_its_springs(placement):
     velocity = (0.3, 0, 0, 0, 1.0, 0)
     rocks = on_plinth([-0.15, -0.15, 0], [0.15, 0.15, 0.6], velocity, 0.8, placement=placement, spacing=0.1)
     assert kept(rocks, 700) < 1e-9
+
+
+def test_a_block_that_rocks_crushes_and_cracks_gains_no_energy_from_its_joint():
+    """Mortar that stiffens, softens and crushes; it is torn off and crushed at its edges within the first swing."""
+    law = ElasticJoint(
+        0.8, 1e9, 1e9, 0.0, 1e4, 2e4, None, 1.0, 4.0, 4e4, stiffening=0.5, reference_pressure=1e6
+    )
+    blocks = (
+        box("plinth", [-1, -1, -1], [1, 1, 0], fidelity=Fidelity.FIXED),
+        box("b", [-0.15, -0.15, 0], [0.15, 0.15, 0.6], velocity=(0.12, 0, 0, 0, 0.4, 0)),
+    )
+    contact = ContactSettings(law, placement=Placement.AREA, spacing=0.15)
+    simulation = Simulation(
+        *build_model(Scene("mortar", blocks, contact=contact, time=TimeSettings(1e-3, 0.5, 1.0)))
+    )
+    assert kept(simulation, 200) < 1e-9
+    internal = simulation.step().internal
+    assert internal[:, CRUSHED].max() > 0
+    assert internal[:, BOND].min() == -1.0
 
 
 @pytest.mark.slow

@@ -29,7 +29,9 @@ def pack(first, second):
 def separating(first, second, alert=0.1, hint=-1):
     """Kind, feature and axis of one pair, and the hint that is left behind."""
     packed, hints = pack(first, second), np.array([hint])
-    kind, feature, axis = kernel.separating_axes(np.array([[0, 1]]), np.array([alert]), hints, packed)
+    kind, feature, axis = kernel.separating_axes(
+        np.array([[0, 1]]), np.array([alert]), hints, kernel.SAME_PLANE, packed
+    )
     return int(kind[0]), feature[0].tolist(), axis[0], int(hints[0])
 
 
