@@ -29,8 +29,10 @@ BASE, BEAM, HOLD, JAWS = "rig base", "rig beam", "rig hold", ("rig jaw 1", "rig 
 
 # of the jaws' edges, and of the lug, over the way from the stones' top to the push [-]
 _EDGE, _LUG = 0.01, 0.1
-# what jaws yield under the vertical force over the height of the stones [-]
-_YIELDS = 1e-5
+# lug that may not turn, and where its jaws begin, above the beam over the height of the stones [-]
+_GUIDE, _CLEAR = 0.5, 0.05
+# what jaws yield under the vertical force over the height of the stones, and share of it where they guide [-]
+_YIELDS, _STIFFER = 1e-5, 0.1
 # weight of the beam over the vertical force [-]
 _BEAM = 0.01
 # of base and hold beyond the stones, over their height [-]
@@ -160,29 +162,32 @@ def rigged(scene: Scene, weight: float, rig: Rig, motion: Motion) -> Scene:
         if rise <= 0:
             remedy = f'give the height at which the beam is pushed, or head = "{Head.HELD}" or "{Head.FREE}"'
             raise _misplaced(rig, "below", tall, remedy)
-        middle, half = (a + b) / 2, 0.5 * _LUG * rise
-        beam: Box = (a, c, top), (b, d, top + rise / 2)
-        lug: Box = (middle - half, c, top + rise / 2), (middle + half, d, top + 1.5 * rise)
+        middle, half, under = (a + b) / 2, 0.5 * _LUG * rise, top + rise / 2
+        turns = rig.head is Head.TURNS
+        beam: Box = (a, c, top), (b, d, under)
+        lug: Box = (middle - half, c, under), (middle + half, d, under + (rise if turns else tall * _GUIDE))
+        # between edges at the height of the push, or faces that the beam's moment hardly turns
+        jaw = (at - _EDGE * rise, at + _EDGE * rise) if turns else (under + tall * _CLEAR, lug[1][2])
         fall = float(np.linalg.norm(scene.gravity))
         mass = _BEAM * max(rig.load, weight) / fall
-        shop.make(
-            BEAM, beam, lug, density=mass / sum(float(np.prod(np.subtract(*one))) * -1 for one in (beam, lug))
-        )
-        edge = _EDGE * rise if rig.head is Head.TURNS else rise / 2
-        shop.make(JAWS[0], ((a, c, at - edge), (middle - half, d, at + edge)))
-        shop.make(JAWS[1], ((middle + half, c, at - edge), (b, d, at + edge)))
+        volume = sum(float(np.prod(np.subtract(one[1], one[0]))) for one in (beam, lug))
+        shop.make(BEAM, beam, lug, density=mass / volume)
+        shop.make(JAWS[0], ((a, c, jaw[0]), (middle - half, d, jaw[1])))
+        shop.make(JAWS[1], ((middle + half, c, jaw[0]), (b, d, jaw[1])))
+        width, yields = jaw[1] - jaw[0], _YIELDS * (1.0 if turns else _STIFFER)
         down = History.constant((mass * fall - rig.load) * _UP)
         forces = (*forces, StoneForce(frozenset({BEAM}), down))
     else:
         if rig.height > tall:
             raise _misplaced(rig, "above", tall, "push lower, or put a beam on")
-        edge = _EDGE * _LUG * tall
+        edge, yields = _EDGE * _LUG * tall, _YIELDS
         near = [one for one in corners if one[:, 2].min() < at + edge and one[:, 2].max() > at - edge]
         face = min(float(one[:, 0].min()) for one in near)
         shop.make(JAWS[0], ((face - wide, c, at - edge), (face, d, at + edge)))
+        width = 2 * edge
         if rig.head is Head.HELD:
             shop.make(HOLD, ((b, c, top - edge), (b + wide, d, top + wide)))
-    stiffness = max(rig.load, weight) / (_YIELDS * tall * 2 * edge * (d - c))
+    stiffness = max(rig.load, weight) / (yields * tall * width * (d - c))
     own = frozenset(block.code for block in shop.made)
     driven = own & {*JAWS, HOLD}
     rule = LawRule(

@@ -80,7 +80,9 @@ class Blunders(StrEnum):
 def sample(
     kind: Annotated[
         str,
-        typer.Argument(help="arch, corner, facings, ribvault, tower, vault, wall, window or rubble-wall."),
+        typer.Argument(
+            help="arch, corner, facings, ribvault, tower, vault, wall, window, rubble-wall or granite-wall."
+        ),
     ],
     moved: Annotated[
         Moved | None,
@@ -109,7 +111,7 @@ def sample(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Write a synthetic survey with its truth and a scene that runs, to start from."""
+    """Write a survey with its truth and a scene that runs, to start from: synthetic, but of granite-wall."""
     from moma.cli.text.formats import as_json
     from pipelines.samples.write import write_sample
 
@@ -126,7 +128,7 @@ def sample(
             photographs=photographs,
         )
     lines = [
-        f"{written.title}: a synthetic survey of {written.stones} stones",
+        f"{written.title}: {'a synthetic survey of ' if written.synthetic else ''}{written.stones} stones",
         *(f"  {path}" for path in written.files),
         "run it with",
         *(f"  {command}" for command in written.commands),

@@ -14,7 +14,57 @@ from scipy.spatial import Voronoi
 
 from survey.arrays import Array
 
-__all__ = ["DEPTH", "RUBBLE_WALL", "SIZE", "RubbleWall", "make_rubble_wall", "mask_png", "rubble_truth"]
+__all__ = [
+    "DEPTH",
+    "RUBBLE_SCENE",
+    "RUBBLE_WALL",
+    "SIZE",
+    "RubbleWall",
+    "make_rubble_wall",
+    "mask_png",
+    "rubble_truth",
+]
+
+RUBBLE_SCENE = """\
+# Rubble wall: synthetic, no such wall exists. Every key is explained in docs/scene.md.
+{commands}
+[scene]
+name = "Rubble wall (synthetic)"
+
+# Granite in lime mortar; synthetic values, like the wall.
+[materials.granite]
+density = 2600.0   # kg/m³
+young = 20e9       # Pa
+poisson = 0.2
+
+[joints]
+mode = "mortar"          # stones grow to the middle of the mortar between their outlines
+mortar_density = 1800.0  # kg/m³
+
+[contact]
+placement = "area"  # joints open and crush like their area
+spacing = 0.05      # m
+
+[[laws]]
+type = "elastic_joint"
+friction = 0.7
+mortar_young = 0.5e9        # Pa; over the thickness of each joint it is its stiffness
+mortar_poisson = 0.2
+tension = 0.1e6             # Pa
+shear = 0.1e6               # Pa
+energy_tension = 5.0        # J/m²
+energy_shear = 20.0         # J/m²
+compressive_strength = 5e6  # Pa
+
+# The wall stands on the base of a rig, under a beam that is pushed and may turn.
+[pushover]
+height = 1.325  # m
+load = 100e3    # N
+head = "turns"
+to = [0.01]     # m
+step = 1e-4     # m
+"""
+"""Scene of the sample."""
 
 RUBBLE_WALL = "rubble-wall"
 """Name of the sample."""

@@ -29,6 +29,7 @@ from pipelines.samples.causes import (
     Cause,
     tower_settled,
 )
+from pipelines.samples.granite_wall import GRANITE_WALL
 from pipelines.samples.rubble_wall import RUBBLE_WALL
 from pipelines.samples.scan import Scan, scan_window
 from pipelines.samples.true_movement import true_movement
@@ -114,7 +115,7 @@ def recipe_of(
     if kind in _RENAMED:
         raise UsageError(f"no sample {kind!r} any more", remedy=f"it is now: moma sample {_RENAMED[kind]}")
     if kind not in SAMPLES:
-        kinds = [*(one for one in SAMPLES if " " not in one), RUBBLE_WALL]
+        kinds = [*(one for one in SAMPLES if " " not in one), RUBBLE_WALL, GRANITE_WALL]
         raise UsageError(f"no sample {kind!r}", remedy=f"the samples are {', '.join(kinds)}")
     if name not in SAMPLES:
         known = [f"'{one}'" for one in SAMPLES if one.split()[0] == kind]

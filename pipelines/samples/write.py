@@ -8,9 +8,11 @@ from pathlib import Path
 from mechanics.dynamics.progress import Listener, silent
 from moma.errors import UsageError, storing
 from pipelines.samples.causes import PULSE, Cause
+from pipelines.samples.granite_wall import GRANITE_SCENE, GRANITE_WALL, MEASURED, units, units_text
 from pipelines.samples.photographs import PHOTOGRAPHED, write_photographs
 from pipelines.samples.rubble_wall import (
     DEPTH,
+    RUBBLE_SCENE,
     RUBBLE_WALL,
     SIZE,
     make_rubble_wall,
@@ -59,48 +61,8 @@ duration = {duration}     # s
 pictures = ["displacement", "pressure"]
 """
 
-_RUBBLE = """\
-# Rubble wall: synthetic, no such wall exists. Every key is explained in docs/scene.md.
-{commands}
-[scene]
-name = "Rubble wall (synthetic)"
-
-# Granite in lime mortar; synthetic values, like the wall.
-[materials.granite]
-density = 2600.0   # kg/m³
-young = 20e9       # Pa
-poisson = 0.2
-
-[bodies]
-default = "rigid"
-fixed = ["z < 0.12"]  # the lowest course
-
-[joints]
-mode = "mortar"          # stones grow to the middle of the mortar between their outlines
-mortar_density = 1800.0  # kg/m³
-
-[contact]
-placement = "centroid"  # joints bend on their springs like the whole face
-
-[[laws]]
-type = "elastic_joint"
-materials = ["granite", "granite"]
-friction = 0.7
-normal_stiffness = 6e10   # Pa/m: of a mortar of 1 GPa, 17 mm thick
-shear_stiffness = 2.5e10  # Pa/m
-tension = 0.1e6           # Pa
-shear = 0.1e6             # Pa
-
-[time]
-start = "equilibrium"  # found at once; the steps then show that it lasts
-step = 0.005       # s
-theta = 1.0
-duration = 1.0     # s
-relaxation = true  # only where it comes to rest is asked for
-
-[output]
-pictures = ["displacement", "pressure"]
-"""
+_PUSHED = (RUBBLE_WALL, GRANITE_WALL)
+"""Walls for a test rig, known by outlines."""
 
 _SETTLEMENT = """
 [[loads]]
@@ -192,6 +154,7 @@ class WrittenSample:
     stones : their number in the survey
     files : paths of the survey, its truth, the scene, what is known besides, and stones that are closed solids
     commands : that take the survey to the results of the scene, in order
+    synthetic : there is no such wall
     """
 
     kind: str
@@ -199,6 +162,7 @@ class WrittenSample:
     stones: int
     files: tuple[str, ...]
     commands: tuple[str, ...]
+    synthetic: bool = True
 
 
 def write_sample(
@@ -213,7 +177,7 @@ def write_sample(
     courses: int | None = None,
     photographs: bool = False,
 ) -> WrittenSample:
-    """Write KIND.moma, truth.json and KIND.toml into a folder, created if necessary; of rubble, a mask, not a survey.
+    """Write KIND.moma, truth.json and KIND.toml into a folder, created if necessary; of walls for a rig, outlines.
 
     Some come with knowledge.toml, with solids.obj and its head.moma, with diagnosis.toml, or with scan.laz, the
     outlines stones.geojson, the frame wall.toml and head.moma.
@@ -232,10 +196,10 @@ def write_sample(
     StorageError
         if the disk is full, for example; none of the files is left then
     """
-    if kind == RUBBLE_WALL:
+    if kind in _PUSHED:
         if moved or small or phases or scan or courses is not None or photographs:
             raise UsageError(f"an option with the sample {kind!r}", remedy="it has none")
-        return _write_rubble_wall(folder)
+        return _write_rubble_wall(folder) if kind == RUBBLE_WALL else _write_granite_wall(folder)
     if photographs and kind != "window":
         raise UsageError(f"--photographs with the sample {kind!r}", remedy="it is for the window")
     recipe = recipe_of(kind, moved=moved, small=small, phases=phases, scan=scan, courses=courses)
@@ -283,25 +247,53 @@ def write_sample(
 
 def _write_rubble_wall(folder: Path) -> WrittenSample:
     """Write the mask of a wall of rubble, its truth and its scene."""
-    wall = make_rubble_wall()
-    mask, scene, truth = folder / "wall.png", folder / f"{RUBBLE_WALL}.toml", folder / "truth.json"
-    _must_be_new(mask, scene, truth)
-    database = f"--db sqlite:///{scene.with_suffix('.db')}"
+    wall, mask, scene = make_rubble_wall(), folder / "wall.png", folder / f"{RUBBLE_WALL}.toml"
     width, height = SIZE
-    commands = (
-        f"moma ingest --masks {mask} --size {width:g}x{height:g} --depth {DEPTH:g} --kind rubble {database}",
-        f"moma check {scene} {database}",
-        f"moma run {scene} {database} --out {folder / 'results'}",
+    taken = f"--masks {mask} --size {width:g}x{height:g} --depth {DEPTH:g} --kind rubble"
+    commands = _pushed(taken, scene)
+    files: dict[Path, bytes | str] = {
+        mask: mask_png(wall),
+        folder / "truth.json": rubble_truth(wall),
+        scene: RUBBLE_SCENE.format(commands=_listed(commands)),
+    }
+    _write_all(folder, files)
+    return WrittenSample(RUBBLE_WALL, "Rubble wall", len(wall.stones), tuple(map(str, files)), commands)
+
+
+def _write_granite_wall(folder: Path) -> WrittenSample:
+    """Write the units of a wall that a laboratory broke, points of its measured curve and its scene."""
+    outlines, scene = folder / "units.csv", folder / f"{GRANITE_WALL}.toml"
+    commands = _pushed(f"--outlines {outlines} --size 1x1.2 --depth 0.2 --kind ashlar", scene)
+    points = "".join(f"{place:g},{force:g}\n" for place, force in MEASURED)
+    files: dict[Path, bytes | str] = {
+        outlines: units_text(),
+        folder / "measured.csv": f"displacement [mm],force [kN]\n{points}",
+        scene: GRANITE_SCENE.format(commands=_listed(commands)),
+    }
+    _write_all(folder, files)
+    return WrittenSample(
+        GRANITE_WALL, "Granite wall WS.100", len(units()), tuple(map(str, files)), commands, synthetic=False
     )
+
+
+def _pushed(taken: str, scene: Path) -> tuple[str, ...]:
+    """Return the commands from stones that are taken in to a loading test."""
+    database = f"--db sqlite:///{scene.with_suffix('.db')}"
+    return (
+        f"moma ingest {taken} {database}",
+        f"moma check {scene} {database}",
+        f"moma pushover {scene} {database} --out {scene.parent / 'results'}",
+    )
+
+
+def _write_all(folder: Path, files: Mapping[Path, bytes | str]) -> None:
+    """Write new files; none is left where one cannot be written."""
+    _must_be_new(*files)
     with storing(str(folder)):
         folder.mkdir(parents=True, exist_ok=True)
-        with _all_or_none((mask, scene, truth)):
-            mask.write_bytes(mask_png(wall))
-            texts = {scene: _RUBBLE.format(commands=_listed(commands)), truth: rubble_truth(wall)}
-            for path, text in texts.items():
-                path.write_text(text, encoding="utf-8", newline="\n")
-    files = (str(mask), str(truth), str(scene))
-    return WrittenSample(RUBBLE_WALL, "Rubble wall", len(wall.stones), files, commands)
+        with _all_or_none(tuple(files)):
+            for path, content in files.items():
+                path.write_bytes(content if isinstance(content, bytes) else content.encode())
 
 
 @contextmanager

@@ -1,0 +1,71 @@
+"""A wall that a laboratory broke: dry granite ashlar under 100 kN, from its stated dimensions (WS.100).
+
+Vasconcelos, G. (2005): Experimental investigations on the mechanics of stone masonry. Thesis, Universidade do Minho.
+"""
+
+from itertools import pairwise
+
+__all__ = ["GRANITE_SCENE", "GRANITE_WALL", "MEASURED", "units", "units_text"]
+
+GRANITE_WALL = "granite-wall"
+"""Name of the sample."""
+
+_LENGTH, _HEIGHT, _COURSES = 0.2, 0.15, 8  # of a unit [m], and courses
+
+MEASURED = ((2.0, 20.8), (5.0, 29.8), (10.0, 33.1), (20.0, 36.5), (30.0, 36.8))
+"""Points of the measured curve: displacement [mm] and force [kN]; the largest force was 37.0 kN."""
+
+GRANITE_SCENE = """\
+# Granite wall WS.100: dry ashlar of 1.0 × 1.2 × 0.2 m under 100 kN, pushed at the top (Vasconcelos 2005).
+{commands}
+[scene]
+name = "Granite wall WS.100"
+
+[materials.granite]
+density = 2600.0   # kg/m³, assumed
+young = 20.2e9     # Pa
+poisson = 0.2
+
+[joints]
+mode = "as-surveyed"
+
+[contact]
+placement = "area"  # joints open and crush like their area
+spacing = 0.05      # m
+
+[[laws]]
+type = "elastic_joint"
+friction = 0.65              # assumed: 0.55 to 0.70 changes the force by less than 2 %
+normal_stiffness = 26.2e9    # Pa/m: moduli of masonry and granite, by difference
+shear_stiffness = 10.5e9     # Pa/m: times 0.4, assumed
+compressive_strength = 73e6  # Pa: of the dry masonry
+
+[pushover]
+height = 1.325       # m above the base, where the beam was pushed
+load = 100e3         # N
+head = "turns"       # the beam was free to turn
+to = [0.03]          # m
+measured = "measured.csv"
+"""
+"""Scene of the sample."""
+
+
+def units() -> dict[str, tuple[float, float, float, float]]:
+    """Return left, bottom, right and top of each unit by its code [m]: half-unit bond, odd courses of whole units."""
+    found = {}
+    for course in range(_COURSES):
+        ends = [0.0, *(_LENGTH * (k + (0.5 if course % 2 else 1.0)) for k in range(5))]
+        ends = [*ends, 5 * _LENGTH] if course % 2 else ends
+        for number, (left, right) in enumerate(pairwise(ends), start=1):
+            found[f"{course + 1}-{number}"] = (left, _HEIGHT * course, right, _HEIGHT * (course + 1))
+    return found
+
+
+def units_text() -> str:
+    """Return the outlines of all units as CSV: code, x and y [m]."""
+    lines = ["code,x,y"]
+    for code, (left, bottom, right, top) in units().items():
+        lines += [
+            f"{code},{x:.4f},{y:.4f}" for x, y in ((left, bottom), (right, bottom), (right, top), (left, top))
+        ]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,104 @@
+"""Loading tests of blocks whose force is a formula: rocking, sliding, with a guided head, crushing, out of plane."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mechanics.limit.loading_test import loading_test
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.laws.elastic_joint import ElasticJoint
+from mechanics.scene.rig import BASE, BEAM, Head, Rig
+from mechanics.scene.scene import ContactSettings, Placement, Scene
+from mechanics.scene.shapes import box
+from mechanics.stones.materials import Material
+from moma.errors import SceneError
+
+WIDTH, DEEP, TALL, PUSH, LOAD = 0.6, 0.2, 1.0, 1.1, 40e3
+STONE = Material("stone", 2000.0, 10e9, 0.2)
+WEIGHT = 2000.0 * 9.81 * WIDTH * DEEP * TALL
+
+
+def scene(law, turn=0.0, **contact):
+    """A block, turned about the vertical."""
+    block = box("block", (0.0, 0.0, 0.0), (WIDTH, DEEP, TALL), STONE)
+    c, s = np.cos(turn), np.sin(turn)
+    turned = block.vertices @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    return Scene("block", (replace(block, vertices=turned),), contact=ContactSettings(law, **contact))
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.7])
+def test_a_block_under_a_beam_rocks_about_its_toe_both_ways(turn):
+    rig = Rig((np.cos(turn), np.sin(turn), 0.0), PUSH, LOAD)
+    test = loading_test(scene(DryJoint(1.0), turn), rig, (0.01, -0.01), 5e-4)
+    # the toe's lever shrinks with the displacement of the beam and of the block's centre
+    place, force = test.displacement[19], test.force[19]
+    expected = (LOAD * (WIDTH / 2 - place) + WEIGHT * (WIDTH / 2 - place * TALL / 2 / PUSH)) / PUSH
+    assert place == pytest.approx(0.01)
+    assert force == pytest.approx(expected, rel=0.01)
+    assert test.force[-1] == pytest.approx(-expected, rel=0.01)
+    forwards, backwards = test.strength
+    assert forwards == pytest.approx((LOAD + WEIGHT) * WIDTH / 2 / PUSH, rel=0.02)
+    assert backwards == pytest.approx(-forwards, rel=0.02)
+    assert test.turning == pytest.approx(1.0, abs=0.02)
+    assert test.lift[19] == pytest.approx(WIDTH / 2 * place / PUSH, rel=0.03)
+    assert test.unsolved == 0
+    assert test.energy_error < 1e-6
+
+
+def test_a_slippery_block_slides():
+    test = loading_test(scene(DryJoint(0.1)), Rig((1.0, 0.0, 0.0), PUSH, LOAD), (0.005,), 5e-4)
+    assert test.force[-1] == pytest.approx(0.1 * LOAD, rel=0.02)  # below the beam
+    assert test.turning == pytest.approx(0.0, abs=1e-3)
+
+
+def test_a_beam_that_may_not_turn_doubles_the_lever():
+    test = loading_test(scene(DryJoint(1.5)), Rig((1.0, 0.0, 0.0), PUSH, LOAD, Head.GUIDED), (0.002,), 2e-4)
+    place = test.displacement[-1]
+    assert test.force[-1] == pytest.approx(
+        (LOAD * (WIDTH - place) + WEIGHT * (WIDTH - place) / 2) / TALL, rel=0.02
+    )
+
+
+def test_a_toe_that_crushes_shortens_the_lever():
+    strength = 2e6
+    law = ElasticJoint(1.0, 1e11, 4e10, compressive_strength=strength)
+    test = loading_test(
+        scene(law, placement=Placement.AREA, spacing=0.02), Rig((1.0, 0.0, 0.0), PUSH, LOAD), (0.02,), 4e-4
+    )
+    toe = (LOAD + WEIGHT) / (strength * DEEP)
+    place = test.displacement[-1]
+    expected = (LOAD * (WIDTH / 2 - toe / 2 - place) + WEIGHT * (WIDTH / 2 - toe / 2 - place / 2)) / PUSH
+    assert toe > 0.1
+    assert test.force[-1] == pytest.approx(expected, rel=0.03)
+
+
+def test_two_blocks_held_at_the_top_follow_the_line_of_rigid_ones():
+    """F = W 2t/h (1 - d/t) of a wall on two edges that is pushed at mid-height."""
+    high, thick = 1.5, 0.11
+    halves = tuple(
+        box(f"half {k}", (0.0, 0.0, k * high / 2), (1.0, thick, (k + 1) * high / 2), STONE) for k in (0, 1)
+    )
+    wall = Scene("wall", halves, contact=ContactSettings(DryJoint(0.7)))
+    test = loading_test(wall, Rig((0.0, 1.0, 0.0), high / 2, 0.0, Head.HELD), (0.03,), 3e-4)
+    weight = 2000.0 * 9.81 * high * thick
+    d = test.displacement[9:]
+    np.testing.assert_allclose(test.force[9:], weight * 2 * thick / high * (1 - d / thick), rtol=0.015)
+
+
+def test_the_rig_refuses_what_it_cannot_push():
+    block = scene(DryJoint(0.6))
+    for rig, words in (
+        (Rig((1.0, 0.0, 0.0), 0.9, LOAD), "below the stones' top"),
+        (Rig((1.0, 0.0, 0.0), 1.2, 0.0, Head.FREE), "above the stones' top"),
+    ):
+        with pytest.raises(SceneError, match=words):
+            loading_test(block, rig, (0.01,))
+    for wrong, words in (
+        ({"direction": (0.0, 0.0, 1.0), "height": 1.1}, "horizontal"),
+        ({"direction": (1.0, 0.0, 0.0), "height": -1.0}, "height"),
+        ({"direction": (1.0, 0.0, 0.0), "height": 1.0, "load": 1.0, "head": Head.FREE}, "a load on a top"),
+    ):
+        with pytest.raises(SceneError, match=words):
+            Rig(**wrong)
+    assert Rig((1.0, 0.0, 0.0), 1.1).pieces == (BASE, BEAM)
