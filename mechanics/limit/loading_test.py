@@ -112,14 +112,16 @@ class LoadingTest:
 
     @property
     def turning(self) -> float:
-        """Share of the displacement that comes from stones that turn: 1 if all rock, 0 if they slide [-]."""
+        """Share of the displacement that comes of turning, of the median stone by mass: rocking 1, sliding 0 [-]."""
         model, end = self.model, self.end.after
         own = ~model.fixed
         own[[block.code == BEAM for block in model.scene.blocks]] = False
         spin = Rotation.from_matrix(end.rotation[own] @ self.settled.rotation[own].transpose(0, 2, 1))
         angle = spin.as_rotvec() @ self.rig.axes[1]
-        mass = model.mass[own]
-        return float(mass @ angle / mass.sum() * self.rig.height / self.displacement[-1])
+        order = np.argsort(angle)
+        half = np.cumsum(model.mass[own][order])
+        middle = angle[order][np.searchsorted(half, half[-1] / 2)]
+        return float(middle * self.rig.height / self.displacement[-1])
 
 
 class _Path:

@@ -13,7 +13,7 @@ from pipelines.draw.elevations.sheet import new_sheet
 
 __all__ = ["draw_curve", "draw_pushed"]
 
-_WAY = 0.08  # largest displacement in the picture over the extent of the stones [-]
+_WAY = 0.08  # way of the push in the picture over the extent of the stones [-]
 _OPEN = 0.05  # opening of a joint that is marked, over the displacement of the push [-]
 _SEEN = -0.5  # component of a normal towards the viewer up to which a face is drawn [-]
 
@@ -53,9 +53,13 @@ def draw_pushed(path: Path, title: str, test: LoadingTest, step: Step) -> None:
     along, across, up = test.rig.axes
     view = np.array([along, up])
     own = [number for number, fixed in enumerate(model.fixed) if not fixed]
-    extent = max(np.ptp(np.vstack([model.scene.blocks[k].vertices for k in own]) @ view.T, axis=0))
+    corners = np.vstack([model.scene.blocks[k].vertices for k in own]) @ view.T
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    extent = float((high - low).max())
     moved = after.centre - test.settled.centre
-    factor = _WAY * extent / max(float(np.abs(moved).max()), 1e-9)
+    # by the way of the push: a stone that has fallen out would leave none for the others
+    way = abs(float(test.displacement[np.abs(test.force).argmax() if step is test.peak else -1]))
+    factor = _WAY * extent / max(way, 1e-9)
     turn = after.rotation @ test.settled.rotation.transpose(0, 2, 1)
     shown = list[Array]()
     for number in own:
@@ -63,17 +67,17 @@ def draw_pushed(path: Path, title: str, test: LoadingTest, step: Step) -> None:
         first, last = model.outline.first[number : number + 2]
         start = model.outline.corner[first:last] @ test.settled.rotation[number].T
         place = start @ turn[number].T - start
-        corners = (test.settled.centre[number] + start + factor * (moved[number] + place)) @ view.T
+        shape = (test.settled.centre[number] + start + factor * (moved[number] + place)) @ view.T
         for face in block.faces:
             ring = block.vertices[list(face)]
             normal = np.cross(ring[1] - ring[0], ring[2] - ring[0])
             if normal @ across < _SEEN * np.linalg.norm(normal):
-                shown.append(corners[list(face)])
+                shown.append(shape[list(face)])
     figure = new_sheet((5.0, 5.0))
     axes = figure.subplots()
     axes.add_collection(PolyCollection(shown, facecolor="#e6dfd0", edgecolor="#4a4a4a", linewidth=0.6))
     contacts = step.active.contacts
-    wide = step.active.gap > _OPEN * abs(float(test.displacement[-1]))
+    wide = step.active.gap > _OPEN * way
     sides = contacts.bodies[wide]
     points, bodies = material_points(contacts, after)[wide].reshape(-1, 3), sides.ravel()
     kept = ~model.fixed[bodies]
@@ -82,7 +86,9 @@ def draw_pushed(path: Path, title: str, test: LoadingTest, step: Step) -> None:
     start = test.settled.centre[bodies] + arm
     marks = (start + factor * (points - start)) @ view.T
     axes.plot(*marks.T, ".", color="#c0392b", markersize=3)
-    axes.autoscale_view()
+    margin = 2 * _WAY * extent
+    axes.set_xlim(low[0] - margin, high[0] + margin)
+    axes.set_ylim(low[1] - margin, high[1] + margin)
     axes.set_aspect("equal")
     axes.set_axis_off()
     axes.set_title(
