@@ -7,6 +7,7 @@ import shlex
 import pytest
 
 from moma.cli.surveys import Moved
+from pipelines.samples.granite_wall import GRANITE_WALL
 from pipelines.samples.rubble_wall import RUBBLE_WALL
 from pipelines.samples.samples import SAMPLES
 from tests.moma.commands import answer, fails, invoke, prints
@@ -31,7 +32,7 @@ LARGE = {name for name, recipe in SAMPLES.items() if recipe.cause is not None or
 
 def test_the_help_names_the_samples_and_the_causes_of_movement():
     said = " ".join(invoke("sample", "--help").stdout.replace("│", " ").split())
-    names = [*(name for name in SAMPLES if " " not in name), RUBBLE_WALL]
+    names = [*(name for name in SAMPLES if " " not in name), RUBBLE_WALL, GRANITE_WALL]
     assert f"{', '.join(names[:-1])} or {names[-1]}." in said
     causes = {name.split()[name.split().index("--moved") + 1] for name in SAMPLES if "--moved" in name}
     assert causes == {one.value for one in Moved}

@@ -269,7 +269,7 @@ def test_records_are_read_filtered_and_corrected_as_asked(tmp_path):
 def test_the_examples_of_the_documentation_are_valid():
     documented = (ROOT / "docs/scene.md").read_text(encoding="utf-8")
     examples = re.findall(r"^```toml\n(.*?)^```$", documented, re.MULTILINE | re.DOTALL)
-    assert len(examples) == 8
+    assert len(examples) == 9
     assert "[materials.sandstone.orthotropy]" in examples[1]
     material = (
         "[materials.sandstone]\ndensity = 2200\nyoung = 1e10\npoisson = 0.2\nstones = ['kind = sill']\n"
