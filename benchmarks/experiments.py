@@ -86,7 +86,6 @@ class Experiment:
     curve: str = ""
 
 
-_CYCLES = (0.1, 0.25, 0.5, 1.0)  # amplitudes of cycles over the largest
 _POINTS = {"placement": Placement.AREA, "spacing": ASSUMED["distance of contact points"]}
 
 
@@ -146,7 +145,7 @@ compressive_strength = {crushing}
 height = {height}
 load = {load}
 head = "{head}"
-to = {to}
+to = [{to}]
 step = {step}
 """
 
