@@ -24,7 +24,7 @@ from mechanics.scene.loads.load import Pose
 from mechanics.scene.rig import BEAM, JAWS, Rig, rigged
 from mechanics.scene.scene import ContactSettings, Scene, TimeSettings
 from mechanics.scene.state import State
-from moma.errors import SolverError
+from moma.errors import SceneError, SolverError
 
 __all__ = ["LoadingTest", "loading_test"]
 
@@ -205,9 +205,22 @@ def loading_test(
 
     Raises
     ------
-    SceneError, GeometryError : the rig, or the scene, cannot be built
+    SceneError, GeometryError : the rig, or the scene, cannot be built; a load changes with time; stones without a beam
+        are pushed backwards
     SolverError : the stones do not come to rest under the vertical force, or the motion is no longer finite
     """
+    if scene.loads.until > 0:
+        raise SceneError(
+            "a load that changes with time",
+            where=scene.name,
+            remedy="leave it out: the test is at rest but for its push",
+        )
+    if not rig.has_beam and min(to) < 0:
+        raise SceneError(
+            "a push backwards without a beam",
+            where="rig",
+            remedy="give displacements of one sign, or turn the direction",
+        )
     furthest = float(np.abs(to).max())
     way = step or furthest / _STEPS
     speed = SPEED * float(np.sqrt(2.0 * np.linalg.norm(scene.gravity) * furthest))

@@ -11,7 +11,7 @@ from moma.errors import GeometryError
 from survey.arrays import Array
 from survey.joints.grown.medial_lines import Line, MedialLines, inside
 
-__all__ = ["Edge", "Partition", "apart", "partition"]
+__all__ = ["Edge", "Partition", "apart", "is_simple", "partition"]
 
 _CHORD = 0.5  # of the mean thickness of a joint: largest distance of an edge from the medial line, within the mortar
 _ROUNDS = 10  # in each of which edges that cross others follow their lines twice as closely
@@ -251,7 +251,7 @@ def _straightened(
             chains.append((line, chain))
         places = np.array(corners)
         rings = [_ring(stone, [chains[k] for k in of_stone[stone]]) for stone in range(count)]
-        wrong = [k for k, ring in enumerate(rings) if ring is None or not _is_simple(places[list(ring)])]
+        wrong = [k for k, ring in enumerate(rings) if ring is None or not is_simple(places[list(ring)])]
         if not wrong:
             return places, chains, tuple(ring for ring in rings if ring is not None)
         for number, line in network.lines.items():
@@ -316,7 +316,7 @@ def _ring(stone: int, chains: Chains) -> tuple[int, ...] | None:
     return tuple(ring) if here == start and len(ring) == sum(len(one) - 1 for one in after.values()) else None
 
 
-def _is_simple(ring: Array) -> bool:
+def is_simple(ring: Array) -> bool:
     """Return whether a polygon (n, 2) runs counter-clockwise and no two of its sides meet but at their corner."""
     count = len(ring)
     x, y = (ring - ring[0]).T

@@ -8,6 +8,9 @@ import pytest
 from mechanics.limit.loading_test import loading_test
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.elastic_joint import ElasticJoint
+from mechanics.scene.loads.forces import StoneForce
+from mechanics.scene.loads.load import Loads
+from mechanics.scene.loads.time_series import History
 from mechanics.scene.rig import BASE, BEAM, Head, Rig
 from mechanics.scene.scene import ContactSettings, Placement, Scene
 from mechanics.scene.shapes import box
@@ -102,3 +105,8 @@ def test_the_rig_refuses_what_it_cannot_push():
         with pytest.raises(SceneError, match=words):
             Rig(**wrong)
     assert Rig((1.0, 0.0, 0.0), 1.1).pieces == (BASE, BEAM)
+    with pytest.raises(SceneError, match="backwards without a beam"):
+        loading_test(block, Rig((1.0, 0.0, 0.0), 0.5, 0.0, Head.FREE), (0.01, -0.01))
+    grows = StoneForce(frozenset({"block"}), History.trapezoid(0.0, 1.0, [0.0, 0.0, -1.0]))
+    with pytest.raises(SceneError, match="changes with time"):
+        loading_test(replace(block, loads=Loads(forces=(grows,))), Rig((1.0, 0.0, 0.0), 1.1, LOAD), (0.01,))
