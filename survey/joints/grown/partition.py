@@ -15,6 +15,9 @@ __all__ = ["Edge", "Partition", "apart", "partition"]
 
 _CHORD = 0.5  # of the mean thickness of a joint: largest distance of an edge from the medial line, within the mortar
 _ROUNDS = 10  # in each of which edges that cross others follow their lines twice as closely
+_STEPS = 3  # of Newton's rule
+_FLATTEST = 0.05  # square of the growth of a difference of distances below which it tells no place
+_SHIFT = 0.5  # of its distance from the stones: farthest that a place moves
 _FEWEST = 3  # lines about a stone
 _PIECES = 24  # places of an edge at which its thickness is taken
 
@@ -77,21 +80,90 @@ def partition(
     GeometryError
         if the lines cannot be straightened without crossing each other
     """
-    bound = [min(straightness, _CHORD * _mean_thickness(one, outlines)) for one in lines.lines]
-    for least in (shortest, 0.5 * shortest, 0.25 * shortest, 0.0):
-        network = _Network(lines)
-        network.collapse(least)
-        found = _straightened(network, list(bound), least, len(outlines))
-        if found is not None:
-            corners, chains, rings = found
-            edges = tuple(
-                _edge(corners, (a, b), line, outlines) for line, chain in chains for a, b in pairwise(chain)
-            )
-            return Partition(corners, rings, edges, network.collapsed)
+    for drawn in (_exact(lines, outlines), lines):  # those of the samples hold where outlines cross
+        bound = [min(straightness, _CHORD * _mean_thickness(one, outlines)) for one in drawn.lines]
+        for least in (shortest, 0.5 * shortest, 0.25 * shortest, 0.0):
+            network = _Network(drawn)
+            network.collapse(least)
+            found = _straightened(network, bound, least, len(outlines))
+            if found is not None:
+                corners, chains, rings = found
+                edges = tuple(
+                    _edge(corners, (a, b), line, outlines)
+                    for line, chain in chains
+                    for a, b in pairwise(chain)
+                )
+                return Partition(corners, rings, edges, network.collapsed)
     what = "the lines between the outlines cross each other when straightened"
     raise GeometryError(
         what, where="joints", remedy="look at outlines that touch or cross, and draw them apart"
     )
+
+
+def _exact(lines: MedialLines, outlines: Sequence[Array]) -> MedialLines:
+    """Return the lines moved to where the distances from the outlines beside them are equal, and not from samples.
+
+    So edges hardly depend on where samples lie. Places move by Newton's rule; those on the frame stay on it.
+    """
+    about: dict[int, set[int]] = defaultdict(set)
+    for one in lines.lines:
+        for node in one.ends:
+            about[node] |= {one.left, one.right}
+    nodes = np.array([_met(place, about[k], outlines) for k, place in enumerate(lines.nodes)])
+    moved = []
+    for one in lines.lines:
+        path = one.path.copy()
+        path[[0, -1]] = nodes[list(one.ends)]
+        if min(one.left, one.right) >= 0:
+            path[1:-1] = _halfway(path[1:-1], outlines[one.left], outlines[one.right])
+        moved.append(Line(one.ends, path, one.left, one.right))
+    return MedialLines(nodes, tuple(moved), lines.crossing)
+
+
+def _halfway(places: Array, first: Array, second: Array) -> Array:
+    """Return places (n, 2) moved to where they are as far from one polygon as from the other."""
+    moved = places
+    for _ in range(_STEPS):
+        (near, out), (far, back) = _signed(moved, first), _signed(moved, second)
+        rise = out - back
+        steep = (rise**2).sum(axis=1)
+        safe = np.where(steep > _FLATTEST, steep, np.inf)
+        moved = moved - ((near - far) / safe)[:, None] * rise
+    good = np.linalg.norm(moved - places, axis=1) < _SHIFT * np.abs(_signed(places, first)[0])
+    halfway: Array = np.where(good[:, None], moved, places)
+    return halfway
+
+
+def _met(place: Array, about: set[int], outlines: Sequence[Array]) -> Array:
+    """Return a node (2,) moved to where it is equally far from all stones about it, if these tell where that is."""
+    stones, sides = [one for one in about if one >= 0], {-one - 1 for one in about if one < 0}
+    free = [axis for axis in (0, 1) if not sides & {axis, axis + 2}]
+    if len(stones) <= len(free) or not free:
+        return place
+    moved = place.copy()
+    for _ in range(_STEPS):
+        found = [_signed(moved[None], outlines[one]) for one in stones]
+        apart_by = np.array([found[0][0][0] - near[0] for near, _ in found[1:]])
+        rise = np.array([(found[0][1][0] - out[0])[free] for _, out in found[1:]])
+        if np.linalg.svd(rise, compute_uv=False).min() ** 2 < _FLATTEST:
+            return place
+        moved[free] -= np.linalg.lstsq(rise, apart_by, rcond=None)[0]
+    return moved if float(np.hypot(*(moved - place))) < _SHIFT * float(abs(found[0][0][0])) else place
+
+
+def _signed(places: Array, ring: Array) -> tuple[Array, Array]:
+    """Return the distances (n,) of places from a polygon, negative inside, and in what direction (n, 2) they grow."""
+    way = np.roll(ring, -1, axis=0) - ring
+    size = np.maximum((way**2).sum(axis=1), 1e-300)
+    off = places[:, None] - ring[None]
+    along = np.clip((off * way).sum(axis=2) / size, 0.0, 1.0)
+    gap = off - along[..., None] * way
+    lengths = np.linalg.norm(gap, axis=2)
+    nearest = lengths.argmin(axis=1)
+    rows = np.arange(len(places))
+    distance = np.where(inside(places, ring), -1.0, 1.0) * lengths[rows, nearest]
+    out: Array = gap[rows, nearest] / np.where(distance == 0.0, np.inf, distance)[:, None]
+    return distance, out
 
 
 class _Network:
