@@ -1,6 +1,7 @@
 """Criteria by which a run ends, and the words in which its outcome is given."""
 
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
@@ -19,7 +20,9 @@ from mechanics.dynamics.simulation import Simulation
 from mechanics.dynamics.step import Step
 from mechanics.model.model import Model
 from mechanics.problem.residual import residual
+from mechanics.scene.laws.elastic_joint import ElasticJoint
 from mechanics.scene.laws.law import BOND
+from mechanics.scene.scene import Fidelity
 from mechanics.scene.state import State
 
 __all__ = ["LASTING", "MOVED", "Verdict", "Watch", "balance_of", "disproof", "rests"]
@@ -51,14 +54,14 @@ class Watch(Carrier):
     """Outcome of a run, judged after each step.
 
     *Equilibrium*: for five steps in a row, solved, and after all loads have ceased to change, every body that is not
-    fixed is in balance (unbalanced force and moment below the scene's tolerance), slower than 10⁻⁴ √(g · its width),
-    and within 1 % of its width from where it began. *Settled*: the same, but farther away. *Collapsed*: a body has
-    sunk, along the load that acts on it, by more than the scene's fraction of its width, and is faster than
-    0.05 √(g · width); or it has come to rest after such a fall, or after toppling. A body that rocks lifts its centre,
-    one that slides slowly keeps its support: both move, and may still come to rest.
-    *Undecided*: steps that were not solved may have added as much velocity as the motion has. Without gravity g
-    counts as 1 m/s². Displacements and speeds are relative to the supports where these are driven. Steps with compliant
-    joints count as solved, and are told.
+    fixed is in balance (unbalanced force and moment below the scene's tolerance), slower than 10⁻⁴ √(g · its width) and
+    than a thousandth of its width in the time of the dashpots, and within 1 % of its width from where it began.
+    *Settled*: the same, but farther away. *Collapsed*: a body has sunk, along the load that acts on it, by more than
+    the scene's fraction of its width, and is faster than 0.05 √(g · width); or it has come to rest after such a fall,
+    or after toppling. A body that rocks lifts its centre, one that slides slowly keeps its support: both move, and may
+    still come to rest. *Undecided*: steps that were not solved may have added as much velocity as the motion has.
+    Without gravity g counts as 1 m/s². Displacements and speeds are relative to the supports where these are driven.
+    Steps with compliant joints count as solved, and are told.
 
     Parameters
     ----------
@@ -101,7 +104,7 @@ class Watch(Carrier):
         speeds = np.where(model.fixed, 0.0, speed(model, seen))
         pace = speeds / _fall(model, state)
         self._fastest = max(self._fastest, float(speeds.max()))
-        still = state.time >= model.scene.loads.until and _rests(model, balance, pace)
+        still = state.time >= model.scene.loads.until and _rests(model, state, balance, speeds)
         self._still = still and not solution.converged
         self._quiet = self._quiet + 1 if still and solution.converged else 0
         if self._quiet == 1:
@@ -249,8 +252,8 @@ def _lasts(simulation: Simulation) -> bool:
         seen = seen_from_supports(model, begin, step.after)
         if (displacement(model, begin, seen) > _STAYS * model.surfaces.size)[~model.fixed].any():
             return False
-        pace = np.where(model.fixed, 0.0, speed(model, seen)) / _fall(model, step.after)
-        calm = step.solution.converged and _rests(model, balance_of(model, step), pace)
+        speeds = np.where(model.fixed, 0.0, speed(model, seen))
+        calm = step.solution.converged and _rests(model, step.after, balance_of(model, step), speeds)
         quiet = quiet + 1 if calm else 0
         if quiet >= LASTING:
             return True
@@ -259,7 +262,7 @@ def _lasts(simulation: Simulation) -> bool:
 
 def rests(model: Model, state: State, balance: Array) -> bool:
     """Return whether all bodies are in balance (nb,) and slow, where no support is driven."""
-    return _rests(model, balance, np.where(model.fixed, 0.0, speed(model, state)) / _fall(model, state))
+    return _rests(model, state, balance, np.where(model.fixed, 0.0, speed(model, state)))
 
 
 def _unbonded(model: Model, step: Step) -> tuple[str, ...]:
@@ -278,9 +281,26 @@ def _unbonded(model: Model, step: Step) -> tuple[str, ...]:
     )
 
 
-def _rests(model: Model, balance: Array, pace: Array) -> bool:
-    """Return whether all bodies are in balance and slow: `pace` (nb,) is their speed over that of a fall."""
-    return bool(balance.max() <= model.scene.time.balance_tolerance and pace.max() <= _REST_SPEED)
+def _rests(model: Model, state: State, balance: Array, speeds: Array) -> bool:
+    """Return whether all bodies are in balance (nb,) and slow (nb,).
+
+    A dashpot over a spring, c = τ k, may balance what the spring has yet to bear; a body then has the way v τ to go.
+    """
+    slow = _REST_SPEED * _fall(model, state)
+    if (lag := _lag(model)) > 0.0:
+        slow = np.minimum(slow, _STAYS * model.surfaces.size / lag)
+    return bool(balance.max() <= model.scene.time.balance_tolerance and (speeds <= slow).all())
+
+
+def _lag(model: Model) -> float:
+    """Return the longest time τ in which dashpots of joints and of deformable stones let springs take over [s]."""
+    joints = (law.damping_time for law in model.laws.laws if isinstance(law, ElasticJoint))
+    stones = (
+        block.material.stiffness_damping
+        for block in model.scene.blocks
+        if block.fidelity is Fidelity.DEFORMABLE
+    )
+    return max(chain(joints, stones), default=0.0)
 
 
 def _fall(model: Model, state: State) -> Array:

@@ -7,6 +7,7 @@ import pytest
 
 from mechanics.dynamics.outcome import Outcome
 from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.laws.elastic_joint import ElasticJoint
 from mechanics.scene.laws.mortar import MortarJoint
 from mechanics.scene.scene import ContactSettings, Method, SolverSettings, Start
 from mechanics.scene.shapes import bond, box, wall
@@ -186,3 +187,21 @@ def test_mortar_that_is_too_wide_to_hold_is_told(gap, held):
     expected = "mortar does not hold 50 % of the area of its joints, where gaps or overlaps exceed a hundredth of the "
     told = [caution for caution in simulate(one).cautions if "mortar" in caution]
     assert told == ([] if held else [f"{expected}smaller stone's width (A and B: 6 mm)"])
+
+
+@pytest.mark.parametrize("relaxation", [False, True])
+@pytest.mark.parametrize("step", [1e-9, 1e-13])
+def test_a_time_too_short_to_see_anything_move_decides_nothing(step, relaxation):
+    """Nothing holds the stone; in 200 steps of a nanosecond it falls by 0.2 pm, at 2 µm/s."""
+    stone = brick("a", (0, 0, 1), (0.5, 0.5, 1.5))
+    result = simulate(scene(ground(), stone, step=step, duration=200 * step, relaxation=relaxation))
+    assert result.outcome is Outcome.MOVING
+    assert result.cautions[0].startswith("whether it stands is not decided")
+
+
+@pytest.mark.parametrize(("damping_time", "outcome"), [(100.0, Outcome.MOVING), (0.07, Outcome.SETTLED)])
+def test_what_dashpots_hold_for_a_while_does_not_rest(damping_time, outcome):
+    """On springs of 1 MPa/m a cube of 0.5 m sinks by 13 mm: at 0.13 mm/s at first, where τ is 100 s."""
+    law = ElasticJoint(0.6, normal_stiffness=1e6, shear_stiffness=1e6, damping_time=damping_time)
+    one = scene(ground(), brick("a", (0, 0, 0), (0.5, 0.5, 0.5)), step=5e-3, duration=1.0, theta=1.0)
+    assert simulate(replace(one, contact=ContactSettings(law))).outcome is outcome
