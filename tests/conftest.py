@@ -51,7 +51,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Begin with the files that take longest; count dear tests as slow, and properties where slow ones are asked for."""
+    """Begin with the files that take longest; count dear tests as slow, with slow ones also properties."""
     items.sort(key=lambda item: [not item.nodeid.startswith(folder) for folder in FIRST])
     dear = listed()
     for item in items:

@@ -19,7 +19,8 @@ class Run(Base):
     Attributes
     ----------
     scene, scene_text : the scene's name, and its file as it was run: all settings
-    outcome : equilibrium, settled, moving, collapsed, undecided or interrupted; assessed: limit loads, pushed: a loading test, both without steps
+    outcome : equilibrium, settled, moving, collapsed, undecided or interrupted; assessed: limit loads, pushed: a
+        loading test, both without steps
     steps, contacts : how many
     simulated, wall : simulated time and time of work [s]
     natural_map, penetration, balance, reaction, energy : the error measures of docs/theory.md §4 [-]

@@ -75,7 +75,8 @@ def test_groin_stones_rest_on_each_other_with_both_arms(tmp_path: Path) -> None:
     assert summary["outcome"] == "equilibrium"
     assert summary["displacement"]["max"] < 1e-6
     weight = 2000.0 * 9.81 * sum(mass_properties(one.vertices, one.faces).volume for one in stones[3:])
-    assert summary["reaction"]["total_vertical"] == pytest.approx(weight, rel=2e-3)  # corners are rounded to a millimetre
+    # corners are rounded to a millimetre
+    assert summary["reaction"]["total_vertical"] == pytest.approx(weight, rel=2e-3)
 
 
 def _folded(solids: list[Solid]) -> list[Solid]:
