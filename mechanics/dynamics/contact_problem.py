@@ -21,7 +21,7 @@ from mechanics.arrays import Array, Bools
 from mechanics.contact.contacts import PAIR_BIT, Contacts, gaps
 from mechanics.delassus.assembly import local_velocity
 from mechanics.delassus.compliant import CompliantDelassus
-from mechanics.dynamics.contact_search import Detection, slits
+from mechanics.dynamics.contact_search import Detection
 from mechanics.dynamics.handover import Beginning
 from mechanics.dynamics.stepping import Kick
 from mechanics.model.model import Model
@@ -138,9 +138,8 @@ def contact_problem(
     """State the problem u = W r̃ + (u_free - W s n), (u, r̃) in the shift and cone of its law, for r̃ = r + s n.
 
     Stones that overlap as they meet, when the run or a stage of building begins, touch: survey and rounding leave such
-    joints, and nothing moves because of them. So do joints with a gap of no more than a thousandth of the smaller
-    stone's width. The gap of that instant counts as closed from then on, so that only what comes closer later is
-    corrected. So do the beds of stones that are laid on others which have moved.
+    joints, and nothing moves because of them. The gap of that instant counts as closed from then on, so that only what
+    overlaps deeper later is corrected. So do the beds of stones that are laid on others which have moved.
 
     Parameters
     ----------
@@ -164,7 +163,7 @@ def contact_problem(
     size = np.minimum(*model.surfaces.size[contacts.bodies.T])
     if begin is not None:
         initial, meets = gaps(contacts, begin.state), begin.meets(contacts.bodies)
-        closed = begin.closed(initial, gaps(contacts, begin.drawn), slits(model, contacts))
+        closed = begin.closed(initial, gaps(contacts, begin.drawn))
         elastic = model.elastic[contacts.bodies].any(axis=1)
         # a ball dents a meshed face by what the mesh does not see of it
         round_ = model.surfaces.radius[model.surfaces.sptr[:-1]][contacts.bodies].any(axis=1)

@@ -18,10 +18,8 @@ from mechanics.model.deformable import Compliance
 from mechanics.model.model import Model
 from mechanics.scene.state import State
 
-__all__ = ["CLOSED", "ContactSearch", "Detection", "detection", "detector", "slits"]
+__all__ = ["ContactSearch", "Detection", "detection", "detector"]
 
-CLOSED = 1e-3
-"""Gap at the start up to which a joint counts as closed, over the smaller stone's width: the error of a survey [-]."""
 
 # displacements since the last detection, over the smallest width, from which contacts are detected again [-]:
 _MOVED_RIGID = 1e-6  # rigid stones: at rest nothing changes, in motion W is that of the very instant
@@ -31,7 +29,6 @@ _PER_SPEED, _MOVED_LOOSE = 2.5e-4, 4e-5
 _PER_SQUARE, _MOVED_ROUGH = 1e-3, 2e-3
 _MOVED = 1e-3  # deformable stones, whose Delassus operator is expensive
 _MOVED_SETTLED = 1e-6  # deformable stones that come to rest, so that the last detection does not lag behind
-_TOUCH = 1e-9  # gap over a body's size that comes from rounding [-]
 _SLOWED = 1e-2  # they come to rest where one step moves them by less than this part of that displacement [-]
 
 
@@ -93,17 +90,6 @@ def detection(
     side = contacts.bodies.argmin(axis=1)
     place = contacts.arm[np.arange(len(side)), side]
     return Detection(model, state, contacts, place, model.laws.of(contacts.bodies), operator)
-
-
-def slits(model: Model, contacts: Contacts) -> Array:
-    """Return the gap (nc,) up to which each contact counts as closed at the start [m].
-
-    Balls have no joints, and stones that begin in motion are not laid; their gaps are what they are.
-    """
-    laid = np.array([block.radius is None and not any(block.velocity) for block in model.scene.blocks])
-    share = np.where(laid[contacts.bodies].all(axis=1), CLOSED, _TOUCH)
-    closed: Array = share * np.minimum(*model.surfaces.size[contacts.bodies.T])
-    return closed
 
 
 class ContactSearch:

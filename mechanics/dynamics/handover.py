@@ -42,15 +42,14 @@ class Beginning:
         met: Bools = ~knew
         return met
 
-    def closed(self, initial: Array, drawn: Array, slit: Array) -> Array:
+    def closed(self, initial: Array, drawn: Array) -> Array:
         """Return the part of each gap (nc,) that counts as closed, from those at the beginning and as drawn [m].
 
-        Overlaps of survey and rounding are properties of a joint, and so are gaps up to a `slit` (nc,) [m]. A stone
-        that is laid on others which have moved is laid where it was drawn: mortar fills what they have left open, and
-        what they have taken of its place is cut off it. What the drawing itself leaves open beyond a slit stays open.
+        Overlaps of survey and rounding are properties of a joint. A stone that is laid on others which have moved is
+        laid where it was drawn: mortar fills what they have left open, and what they have taken of its place is cut off
+        it. What the drawing itself leaves open stays open.
         """
-        left = np.where(drawn > slit, drawn, 0.0)
-        return np.where(initial < 0.0, initial, np.maximum(initial - left, 0.0))
+        return np.where(initial < 0.0, initial, np.maximum(initial - np.maximum(drawn, 0.0), 0.0))
 
     def bed(self, model: Model) -> float:
         """Return the largest gap that mortar may have to fill: how far standing stones have moved [m]."""

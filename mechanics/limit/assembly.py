@@ -18,7 +18,7 @@ from scipy.sparse import csc_array, csr_array
 
 from mechanics.arrays import Array, Ints
 from mechanics.contact.contacts import Contacts, gaps, take
-from mechanics.dynamics.contact_search import CLOSED, Detection, detection, detector, slits
+from mechanics.dynamics.contact_search import Detection, detection, detector
 from mechanics.limit.joints import Joints, StressBlocks, find_joints, stress_blocks
 from mechanics.model.model import Model, build_model
 from mechanics.problem.forms import SparseForm
@@ -28,6 +28,10 @@ from mechanics.scene.state import State
 from moma.errors import SceneError
 
 __all__ = ["RigidAssembly", "Strength", "assembly"]
+
+
+# gap up to which a joint counts as closed, over the width of the smaller stone: a thousandth is a survey's error [-]
+_CLOSED = 1e-3
 
 
 @dataclass(frozen=True)
@@ -64,7 +68,7 @@ class RigidAssembly:
     strength : of the contact points
     joints : in which the contact points act together
     crushing : limits of crushing; None where no stone states its compressive strength
-    gaping : contact points that are watched but open
+    widest : largest gap that counts as closed [m]
     """
 
     model: Model
@@ -76,7 +80,7 @@ class RigidAssembly:
     strength: Strength
     joints: Joints
     crushing: StressBlocks | None
-    gaping: int
+    widest: float
 
     @property
     def weight(self) -> float:
@@ -128,12 +132,13 @@ def assembly(scene: Scene) -> RigidAssembly:
         raise SceneError("no stone may move", where=scene.name, remedy="fix the supports only")
     contacts = detector(model)(state, np.zeros(len(model.mass)))
     gap = gaps(contacts, state)
-    closed = np.flatnonzero(gap <= slits(model, contacts))
+    size = np.minimum(*model.surfaces.size[contacts.bodies.T])
+    closed = np.flatnonzero(gap <= _CLOSED * size)
     if not len(closed):
         raise SceneError(
             "no joint is closed",
             where=scene.name,
-            remedy=f"close the joints: gaps up to {CLOSED:g} of a stone's width count as closed",
+            remedy=f"close the joints: gaps up to {_CLOSED:g} of a stone's width count as closed",
         )
     found = detection(model, state, take(contacts, closed), ())
     form = found.operator.form
@@ -150,7 +155,7 @@ def assembly(scene: Scene) -> RigidAssembly:
         strength=_strength(found),
         joints=joints,
         crushing=stress_blocks(joints, np.array([np.inf if one is None else one for one in crushes])),
-        gaping=len(gap) - len(closed),
+        widest=float(gap[closed].max()),
     )
 
 

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from mechanics.arrays import Array
 from mechanics.dynamics.outcome import Outcome
@@ -13,7 +12,7 @@ from mechanics.dynamics.stopping import MOVED
 from mechanics.limit.assembly import RigidAssembly, assembly
 from mechanics.limit.programme import Ending, Programme
 from mechanics.scene.loads.load import Force, Loads
-from mechanics.scene.scene import Block, Scene, Start
+from mechanics.scene.scene import Scene, Start
 from mechanics.simulate import simulate
 from moma.errors import SceneError
 
@@ -80,14 +79,12 @@ class Standing:
     reason : its reason, in words
     moved : codes of the stones that do not stand as surveyed, the farthest first
     displacement : (nb, 3) of the centres of all stones' corners [m]
-    blocks : the stones where the run has left them
     """
 
     outcome: Outcome
     reason: str
     moved: tuple[str, ...]
     displacement: Array
-    blocks: tuple[Block, ...]
 
 
 def admits_rest(scene: Scene) -> bool:
@@ -115,15 +112,4 @@ def stands(
     share = np.where(on.model.fixed, 0.0, farthest / on.model.surfaces.size)
     order = np.argsort(-share, kind="stable")
     moved = tuple(scene.blocks[body].code for body in order if share[body] > MOVED)
-    blocks = tuple(
-        _placed(block, body.position) for block, body in zip(scene.blocks, result.bodies, strict=True)
-    )
-    return Standing(result.outcome, result.reason, moved, displacement, blocks)
-
-
-def _placed(block: Block, corners: Array) -> Block:
-    """Return a rigid stone where its corners (nv, 3) are, with its parts."""
-    middle, there = block.vertices.mean(axis=0), corners.mean(axis=0)
-    turn, _ = Rotation.align_vectors(corners - there, block.vertices - middle)
-    parts = tuple(replace(part, vertices=there + turn.apply(part.vertices - middle)) for part in block.parts)
-    return replace(block, vertices=corners, parts=parts)
+    return Standing(result.outcome, result.reason, moved, displacement)

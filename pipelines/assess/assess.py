@@ -35,7 +35,6 @@ from pipelines.results.folder import UNFINISHED_ASSESSMENT, check_replaceable, r
 from pipelines.results.summary import as_json
 from pipelines.results.table_csv import inert
 from pipelines.run.assemble import Assembly, assemble_stones
-from pipelines.run.open_joints import OpenJoints, open_joints
 from pipelines.run.record import store_record, versions
 from pipelines.run.soundness import problems_of, refuse_unsound, some
 from pipelines.scene.file import SceneFile, read_scene
@@ -159,7 +158,6 @@ def assess(
     for question in questions:
         refuse_unanswerable(on, question)
     progress(Progress("assess", 0, len(questions), "do the stones stand by themselves?"))
-    gaping = open_joints(on.model, on.state)
     on, standing, left_out = _standing(on, dead, leave_out_loose, progress)
     questions = questions or [_asked(one, confirm, code) for one in facade_pushes(on.model.scene.blocks)]
     if weakest and standing.outcome.rests:
@@ -175,7 +173,7 @@ def assess(
         else:
             answers = [fallen(on, question, standing) for question in questions]
     unchecked = [one.name for one in questions if code and isinstance(one, LoadQuestion) and one.code is None]
-    summary = _summary(assembled, on, answers, unchecked, standing, left_out, gaping)
+    summary = _summary(assembled, on, answers, unchecked, standing, left_out)
     progress(Progress("write", 0, 1, "pictures"))
     warnings: list[str] = []
     with replacing(folder, INDEX) as fresh:
@@ -229,14 +227,7 @@ def _standing(
         left_out = tuple(sorted(loose))
         on = assembly(replace(dead, blocks=kept))
         standing = stands(on, progress)
-    if standing.outcome.rests and _elsewhere(on, standing):
-        on = assembly(replace(on.model.scene, blocks=standing.blocks))
     return on, standing, left_out
-
-
-def _elsewhere(on: RigidAssembly, standing: Standing) -> bool:
-    """Return whether stones rest on other joints than those of the survey: they moved, or may have closed open ones."""
-    return on.gaping > 0 or standing.outcome is Outcome.SETTLED
 
 
 def _answered(
@@ -297,7 +288,6 @@ def _summary(
     unchecked: Sequence[str],
     standing: Standing,
     left_out: Sequence[str],
-    gaping: OpenJoints,
 ) -> dict[str, Any]:
     """Return all answers; `unchecked` are the loads that the code of the option --code does not take."""
     soft = sum(block.fidelity is Fidelity.DEFORMABLE for block in assembled.scene.blocks)
@@ -305,7 +295,6 @@ def _summary(
         "stones are rigid and do not crush" if on.crushing is None else "stones crush at their strength"
     )
     until = assembled.scene.loads.until
-    moved = not gaping.closed.all() or standing.outcome is Outcome.SETTLED
     cautions = [
         *([f"left out, as they fall under their own weight: {', '.join(left_out)}"] if left_out else []),
         *([f"under the dead load alone {standing.reason}"] if standing.outcome is Outcome.SETTLED else []),
@@ -316,12 +305,7 @@ def _summary(
         ),
         f"{crushing}; joints keep their geometry until the mechanism moves",
         *([f"{soft} deformable stones count as rigid"] if soft else []),
-        *gaping.in_words(),
-        *(
-            ["limit loads are those of the stones where they rest under their dead load"]
-            if standing.outcome.rests and moved
-            else []
-        ),
+        *([f"gaps of up to {1e3 * on.widest:.2g} mm count as closed"] if on.widest > 1e-6 else []),
         *(
             [f"not checked by the code, which takes pushes on all stones: {', '.join(unchecked)}"]
             if unchecked

@@ -32,7 +32,6 @@ from pipelines.run.closing_check import (
 )
 from pipelines.run.fidelity import Modelled, modelled
 from pipelines.run.inputs import stage_lines
-from pipelines.run.open_joints import OpenJoints, open_joints, rigid_model
 from pipelines.run.plausibility import corner_warnings, impossible_values, unusual_values
 from pipelines.run.run import USUAL
 from pipelines.run.soundness import stands_alone, unsound_stones, unsupported, unsupported_stages
@@ -93,19 +92,18 @@ def check_scene(
         scene = with_profile(scene, profile, models)
         groups = select_groups(scene, session, models)
     problems = impossible_values(scene, models)
-    assembly, needs, gaping = None, None, None
+    assembly, needs = None, None
     progress(Progress("blocks", 0, None, f"closing the joints of {len(models)} stones"))
     try:
         assembly = assemble_stones(scene, models, groups)
         problems += unsound_stones(assembly)
         progress(Progress("check", 0, None, "meshes, and contacts at the start"))
         needs = plan(assembly.scene)
-        gaping = open_joints(*rigid_model(assembly.scene))
         if scene.pushover is None or not stands_alone(assembly.scene):
             problems += unsupported(assembly.scene, needs.loose)
     except (GeometryError, MeshError) as error:
         problems.append(str(error))
-    report = _report(scene, models, groups, assembly, needs, gaping, tuple(problems))
+    report = _report(scene, models, groups, assembly, needs, tuple(problems))
     if pictures is None or assembly is None:
         return report
     progress(Progress("write", 0, None, "pictures"))
@@ -162,7 +160,6 @@ def _report(
     groups: Groups,
     assembly: Assembly | None,
     needs: Plan | None,
-    gaping: OpenJoints | None,
     problems: tuple[str, ...],
 ) -> CheckReport:
     """Return the report; it says less where stones could not be assembled, or the scene not be meshed."""
@@ -188,12 +185,9 @@ def _report(
         if assembly is None
         else joints_report(assembly.closing, assembly.origin, _hypotheses(assembly)),
         cost=None
-        if assembly is None or needs is None or gaping is None
+        if assembly is None or needs is None
         else _cost(
-            needs,
-            int(gaping.closed.sum()),
-            assembly.scene,
-            len(USUAL if scene.output.pictures is None else scene.output.pictures),
+            needs, assembly.scene, len(USUAL if scene.output.pictures is None else scene.output.pictures)
         ),
         laws=tuple(describe(one.entry, groups) for one in scene.laws),
         loads=tuple(describe(entry, groups) for entry in (*scene.loads, *scene.throws)),
@@ -203,7 +197,6 @@ def _report(
             *unusual_values(scene, models),
             *corner_warnings(models),
             *(() if assembly is None else assembly.remarks),
-            *(() if gaping is None else gaping.in_words()),
             *(() if assembly is None else unsupported_stages(scene, assembly)),
             *(() if assembly is None or not stands_alone(assembly.scene) else (_IN_RIG,)),
         ),
@@ -246,15 +239,15 @@ def _pictures(scene: SceneFile, needs: Plan) -> int:
     return sum(soft or PICTURES[name].shows != "stress" for name in names)
 
 
-def _cost(needs: Plan, closed: int, scene: Scene, pictures: int) -> Cost:
-    """Return the expected cost of the whole command, with so many closed joints and pictures."""
+def _cost(needs: Plan, scene: Scene, pictures: int) -> Cost:
+    """Return the expected cost of the whole command, with so many pictures."""
     slowness = machine_slowness()
     expected = expected_cost(needs, scene, slowness)
     beside = slowness * (_PROGRAM + _STONE * needs.amounts.stones + _PICTURE * pictures)
     least, usual, most = expected.seconds
     low, likely, high = beside / _SPREAD + least, beside + usual, _SPREAD * beside + most
     return Cost(
-        pairs=closed,
+        pairs=len(needs.pairs),
         contacts=needs.contacts,
         unknowns=needs.unknowns,
         memory=needs.memory,

@@ -76,8 +76,8 @@ class Cost:
 
     Attributes
     ----------
-    pairs : touching pairs of stones: their joint counts as closed (`open_joints`)
-    contacts : contact points that are watched at the start
+    pairs : touching pairs of stones
+    contacts : contact points at the start
     unknowns : velocities
     memory : of the largest arrays [bytes], estimated
     steps : at most

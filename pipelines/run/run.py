@@ -39,7 +39,6 @@ from pipelines.results.vtk import write_frames, write_joint_grid
 from pipelines.results.vtkhdf import RESULTS, write_vtkhdf
 from pipelines.run.assemble import Assembly, assemble_stones
 from pipelines.run.inputs import run_inputs
-from pipelines.run.open_joints import open_joints, rigid_model
 from pipelines.run.plausibility import corner_warnings, unusual_values
 from pipelines.run.record import run_record, store_record, versions
 from pipelines.run.soundness import caution_of, problems_of, refuse_unsound, unsupported_stages
@@ -135,7 +134,6 @@ def run_scene(
                     *unusual_values(scene, models),
                     *corner_warnings(models),
                     *unsupported_stages(scene, assembly),
-                    *open_joints(*rigid_model(assembly.scene)).in_words(),
                 ),
                 inputs=run_inputs(scene, assembly, groups, session),
             )

@@ -1,12 +1,14 @@
 """Problems of a scene that make its result worthless; `moma check` lists them, and `moma run` refuses them."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
+from mechanics.model.model import build_model
 from mechanics.results.forecast.plan import loose_blocks
+from mechanics.scene.loads.load import Loads
 from mechanics.scene.scene import Fidelity, Scene
 from moma.errors import GeometryError, UnsoundSceneError
 from pipelines.run.assemble import Assembly
-from pipelines.run.open_joints import rigid_model
 from pipelines.run.plausibility import impossible_values
 from pipelines.scene.file import SceneFile
 from survey.geometry.solids import Solid
@@ -158,7 +160,12 @@ def unsupported_stages(scene: SceneFile, assembly: Assembly) -> list[str]:
     """Return a remark for each stage of building in which nothing ties stones to a fixed or held one, with its line."""
     remarks = []
     for entry, stage in zip(scene.stages, assembly.stages, strict=True):
-        loose = loose_blocks(*rigid_model(stage.scene))
+        # what touches does not depend on meshes
+        blocks = tuple(
+            replace(one, fidelity=Fidelity.RIGID) if one.fidelity is Fidelity.DEFORMABLE else one
+            for one in stage.scene.blocks
+        )
+        loose = loose_blocks(*build_model(replace(stage.scene, blocks=blocks, loads=Loads())))
         if loose:
             remarks.append(
                 f"{scene.document.where(*entry.path)}: in stage {stage.name!r} no chain of touching stones ties these "
