@@ -1,5 +1,5 @@
 # make demo   from a survey file to a picture of the stresses, in out/window
-# make test   the tests, but those of over 10 s
+# make test   the tests, but those of over 0.7 s
 # make tower  a synthetic storey of 2,508 stones with a core, from its survey to a report, in out/tower
 # make clean  remove .venv and out
 #
