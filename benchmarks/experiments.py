@@ -9,7 +9,7 @@ in `curves`. `--write` puts the table into docs/accuracy.md.
 import json
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -26,6 +26,7 @@ from benchmarks.report import (
     options_of,
     print_table,
     progress,
+    show,
     table_lines,
     write_between,
 )
@@ -86,23 +87,23 @@ class Experiment:
     curve: str = ""
 
 
-_POINTS = {"placement": Placement.AREA, "spacing": ASSUMED["distance of contact points"]}
-
-
-def _granite(load: float, stiffness: float, to: float = 0.03, **changes: Any) -> LoadingTest:
+def _granite(
+    load: float,
+    stiffness: float,
+    *,
+    friction: float = ASSUMED["friction of dry granite"],
+    spacing: float = ASSUMED["distance of contact points"],
+    step: float | None = None,
+) -> LoadingTest:
     """Predict the dry ashlar walls of Vasconcelos: 8 courses of 0.20 × 0.15 × 0.20 m in half-unit bond."""
     granite = Material("granite", ASSUMED["density of granite"], 20.2e9, 0.2)
     units = wall(bond(5, 8), 0.2, 0.15, 0.2, granite, slab=False)
     blocks = tuple(replace(unit, fidelity=Fidelity.RIGID) for unit in units)
-    law = ElasticJoint(
-        friction=changes.pop("friction", ASSUMED["friction of dry granite"]),
-        normal_stiffness=stiffness,
-        shear_stiffness=ASSUMED["shear over normal stiffness"] * stiffness,
-        compressive_strength=73e6,
-    )
-    contact = ContactSettings(law, **(_POINTS | changes.pop("points", {})))
+    shear = ASSUMED["shear over normal stiffness"] * stiffness
+    law = ElasticJoint(friction, stiffness, shear, compressive_strength=73e6)
+    contact = ContactSettings(law, placement=Placement.AREA, spacing=spacing)
     rig = Rig((1.0, 0.0, 0.0), 1.325, load, Head.TURNS)
-    return loading_test(Scene("granite wall", blocks, contact=contact), rig, (to,), **changes)
+    return loading_test(Scene("granite wall", blocks, contact=contact), rig, (0.03,), step)
 
 
 def _bricks(placement: Mapping[str, Any]) -> LoadingTest:
@@ -120,7 +121,7 @@ def _bricks(placement: Mapping[str, Any]) -> LoadingTest:
 
 _RUBBLE = """
 [scene]
-name = "{name}"
+name = "rubble wall"
 [materials.stone]
 density = 2600.0
 young = 20.2e9
@@ -150,48 +151,50 @@ step = {step}
 """
 
 
-def _rubble(
-    name: str,
-    file: str,
-    size: str,
-    friction: float,
-    young: float,
-    tension: float,
-    cohesion: float,
-    crushing: float,
-    height: float,
-    load: float,
-    head: Head,
-    to: float,
-) -> Callable[[Path, Path], tuple[LoadingTest, ...]]:
-    """Return what predicts a rubble wall from its mask, or its outlines: stones grow to the middle of the mortar."""
+@dataclass(frozen=True)
+class Rubble:
+    """A rubble wall that is known by a mask or by outlines; called, it is predicted: its stones grow into their mortar.
 
-    def pushed(url: str, folder: Path, way: float) -> LoadingTest:
-        text = _RUBBLE.format(
-            name=name,
-            spacing=ASSUMED["distance of contact points"],
-            friction=friction,
-            young=young,
-            tension=tension,
-            cohesion=cohesion,
-            energy_tension=0.5 * tension * ASSUMED["opening at which tension is lost"],
-            energy_shear=0.5 * cohesion * ASSUMED["slip at which cohesion is lost"],
-            crushing=crushing,
-            height=height,
-            load=load,
-            head=head,
-            to=way,
-            step=to / 150,
-        )
-        (folder / "wall.toml").write_text(text, encoding="utf-8")
-        return push(folder / "wall.toml", url, folder / "out").test
+    Attributes
+    ----------
+    file : of the mask or outlines
+    size : of the wall, as `moma ingest` takes it
+    friction, tension, cohesion : of the joints [-], [Pa]
+    young : modulus of the mortar [Pa]
+    crushing : pressure at which joints crush [Pa]
+    height, load, head : of the rig [m], [N]
+    to : displacement, forwards and backwards [m]
+    """
 
-    def predict(data: Path, folder: Path) -> tuple[LoadingTest, ...]:
+    file: str
+    size: str
+    friction: float
+    young: float
+    tension: float
+    cohesion: float
+    crushing: float
+    height: float
+    load: float
+    head: Head
+    to: float
+
+    def __call__(self, data: Path, folder: Path) -> tuple[LoadingTest, ...]:
+        """Return the tests forwards and backwards."""
         url = f"sqlite:///{folder / 'wall.db'}"
-        ingest([data / file], url, "masks", options=mask_options(ReadingOptions(), size=size, depth=0.2))
-        return pushed(url, folder, to), pushed(url, folder, -to)
+        options = mask_options(ReadingOptions(), size=self.size, depth=0.2)
+        ingest([data / self.file], url, "masks", options=options)
+        return self._pushed(url, folder, self.to), self._pushed(url, folder, -self.to)
 
-    return predict
+    def _pushed(self, url: str, folder: Path, to: float) -> LoadingTest:
+        values = asdict(self) | {
+            "to": to,
+            "step": self.to / 150,
+            "spacing": ASSUMED["distance of contact points"],
+            "energy_tension": 0.5 * self.tension * ASSUMED["opening at which tension is lost"],
+            "energy_shear": 0.5 * self.cohesion * ASSUMED["slip at which cohesion is lost"],
+        }
+        (folder / "wall.toml").write_text(_RUBBLE.format(**values), encoding="utf-8")
+        return push(folder / "wall.toml", url, folder / "out").test
 
 
 _THESIS = "Vasconcelos 2005, Experimental investigations on the mechanics of stone masonry"
@@ -200,6 +203,24 @@ _ALIKE = "pushed once each way, without cycles; crushing at the strength of the 
 _ROCKS = "rocks about the toe, one stepped crack"
 # modulus of the mortar by difference, from those of masonry and stone, with two thirds of stone [Pa]
 _MORTAR = 0.33 / (1 / 1.25e9 - 0.67 / 20.2e9)
+
+
+def _rubble_granite(file: str, load: float) -> Rubble:
+    """Return a wall of the second kind of Vasconcelos & Lourenço: granite rubble in weak mortar."""
+    return Rubble(
+        file,
+        size="1.0x1.2",
+        friction=0.7,
+        young=_MORTAR,
+        tension=0.1e6,
+        cohesion=0.1e6,
+        crushing=5.0e6,
+        height=1.325,
+        load=load,
+        head=Head.TURNS,
+        to=0.015,
+    )
+
 
 EXPERIMENTS = {
     "WS.40": Experiment(
@@ -257,19 +278,18 @@ EXPERIMENTS = {
         "SC1",
         "Godio et al. 2019, 10.1016/j.engstruct.2019.04.041",
         (74.0, -77.0),
-        _rubble(
-            "SC1",
-            "sc1_outlines.json",
-            "0.9x0.9",
-            0.5,
-            0.97e9,
-            0.57e6,
-            0.29e6,
-            10.3e6,
-            0.95,
-            139e3,
-            Head.GUIDED,
-            0.008,
+        Rubble(
+            file="sc1_outlines.json",
+            size="0.9x0.9",
+            friction=0.5,
+            young=0.97e9,
+            tension=0.57e6,
+            cohesion=0.29e6,
+            crushing=10.3e6,
+            height=0.95,
+            load=139e3,
+            head=Head.GUIDED,
+            to=0.008,
         ),
         "two crossing diagonal cracks",
         184.0,
@@ -296,20 +316,7 @@ EXPERIMENTS = {
         "WR1.100",
         _CYCLIC,
         (36.3, -40.4),
-        _rubble(
-            "WR1.100",
-            "masks/WR1_100.png",
-            "1.0x1.2",
-            0.7,
-            _MORTAR,
-            0.1e6,
-            0.1e6,
-            5.0e6,
-            1.325,
-            100e3,
-            Head.TURNS,
-            0.015,
-        ),
+        _rubble_granite("masks/WR1_100.png", 100e3),
         "flexure and rocking",
         assumed=_ALIKE + "; modulus of mortar by difference",
         curve="WR1100_Vasconcelos2009.csv",
@@ -318,20 +325,7 @@ EXPERIMENTS = {
         "WR2.250",
         _CYCLIC,
         (69.8, -80.4),
-        _rubble(
-            "WR2.250",
-            "masks/WR2_250.png",
-            "1.0x1.2",
-            0.7,
-            _MORTAR,
-            0.1e6,
-            0.1e6,
-            5.0e6,
-            1.325,
-            250e3,
-            Head.TURNS,
-            0.015,
-        ),
+        _rubble_granite("masks/WR2_250.png", 250e3),
         "shear",
         assumed=_ALIKE + "; modulus of mortar by difference",
         curve="WR2250_Vasconcelos2009.csv",
@@ -369,7 +363,7 @@ def _row(name: str, one: Experiment, data: Path, figures: Path | None) -> Row:
         if one.forces
         else None,
         "displacements": [1e3 * place for place in _PLACES],
-        "forces_predicted": found.tolist(),
+        "forces_predicted": [None if np.isnan(force) else float(force) for force in found],
         "forces_measured": list(one.forces),
         "observed": one.mechanism,
         "mechanism": f"{100 * test.turning:.0f} % by turning",
@@ -390,13 +384,36 @@ def _row(name: str, one: Experiment, data: Path, figures: Path | None) -> Row:
     return row
 
 
+METHOD: Mapping[str, Mapping[str, float]] = {
+    "as predicted": {},
+    "half the step": {"step": 0.075e-3},
+    "twice the step": {"step": 0.3e-3},
+    "half the distance of points": {"spacing": 0.025},
+    "twice the distance of points": {"spacing": 0.1},
+    "friction 0.55": {"friction": 0.55},
+    "friction 0.70": {"friction": 0.70},
+}
+"""What is changed in WS.100 by --method."""
+
+_EFFECTS = columns("changed changed | strength strength, kN :.2f | effect change, % :+.2f")
+
+
+def _effects() -> Iterator[Row]:
+    first: float | None = None
+    for name, changes in METHOD.items():
+        progress(name)
+        strength = 1e-3 * _granite(100e3, 26.2e9, **changes).strength[0]
+        first = first or strength
+        yield {"changed": name, "strength": strength, "effect": 100.0 * (strength / first - 1.0)}
+
+
 def _signs(forces: Iterable[float]) -> list[float]:
     return [float(np.sign(force)) for force in forces]
 
 
 def _rows(names: Mapping[str, Experiment], data: Path, figures: Path | None) -> Iterator[Row]:
     for name, one in names.items():
-        if "rubble" in one.predict.__qualname__ and not data.exists():
+        if isinstance(one.predict, Rubble) and not (data / one.predict.file).exists():
             continue
         progress(name)
         yield _row(name, one, data, figures)
@@ -408,14 +425,24 @@ def main() -> None:
     options.add_argument("--data", type=Path, default=_DATA, help="folder of masks, outlines and curves")
     options.add_argument("--only", nargs="+", choices=sorted(EXPERIMENTS), help="these walls")
     options.add_argument("--figures", type=Path, help="folder for a figure of each wall")
+    options.add_argument(
+        "--method", action="store_true", help="effects of step, points and friction on WS.100 alone"
+    )
     options.add_argument("--write", action="store_true", help="put the table into docs/accuracy.md")
     given = options.parse_args()
+    if given.method:
+        show(list(_effects()), _EFFECTS, as_json=given.json)
+        return
     chosen = {name: one for name, one in EXPERIMENTS.items() if not given.only or name in given.only}
     if given.figures is not None:
         given.figures.mkdir(parents=True, exist_ok=True)
     rows = list(_rows(chosen, given.data, given.figures))
     if given.json:
-        print(json.dumps({"walls": rows, "machine": machine(), "commit": commit()}, indent=1))
+        print(
+            json.dumps(
+                {"walls": rows, "assumed": ASSUMED, "machine": machine(), "commit": commit()}, indent=1
+            )
+        )
         return
     print(f"{commit()}; {machine()}")
     print_table(rows, _TABLE)

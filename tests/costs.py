@@ -15,13 +15,13 @@ from pathlib import Path
 
 import pytest
 
-__all__ = ["DEAR", "KEPT", "dear", "is_dear"]
+__all__ = ["DEAR", "KEPT", "dear", "is_dear", "listed"]
 
 DEAR = Path(__file__).with_name("dear.txt")
 """List of dear tests: their file, then, indented, their names."""
 
-KEPT = ("tests/validation/wild/", "tests/validation/one_answer/", "tests/docs/")
-"""Scenes that were found to break a verdict, and the documented commands: they run in every suite."""
+KEPT = ("tests/test_", "tests/validation/wild/", "tests/validation/one_answer/", "tests/docs/")
+"""Rules of the source, scenes that were found to break a verdict, and documented commands: they run in every suite."""
 
 _LIMIT = 0.7  # processor time [s]
 _FOLDER = "MOMA_COSTS"  # variable that names the folder of the measurements

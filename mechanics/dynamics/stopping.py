@@ -1,7 +1,6 @@
 """Criteria by which a run ends, and the words in which its outcome is given."""
 
 from dataclasses import dataclass
-from itertools import chain
 
 import numpy as np
 
@@ -20,9 +19,7 @@ from mechanics.dynamics.simulation import Simulation
 from mechanics.dynamics.step import Step
 from mechanics.model.model import Model
 from mechanics.problem.residual import residual
-from mechanics.scene.laws.elastic_joint import ElasticJoint
 from mechanics.scene.laws.law import BOND
-from mechanics.scene.scene import Fidelity
 from mechanics.scene.state import State
 
 __all__ = ["LASTING", "MOVED", "Verdict", "Watch", "balance_of", "disproof", "rests"]
@@ -287,20 +284,9 @@ def _rests(model: Model, state: State, balance: Array, speeds: Array) -> bool:
     A dashpot over a spring, c = τ k, may balance what the spring has yet to bear; a body then has the way v τ to go.
     """
     slow = _REST_SPEED * _fall(model, state)
-    if (lag := _lag(model)) > 0.0:
-        slow = np.minimum(slow, _STAYS * model.surfaces.size / lag)
+    if model.lag > 0.0:
+        slow = np.minimum(slow, _STAYS * model.surfaces.size / model.lag)
     return bool(balance.max() <= model.scene.time.balance_tolerance and (speeds <= slow).all())
-
-
-def _lag(model: Model) -> float:
-    """Return the longest time τ in which dashpots of joints and of deformable stones let springs take over [s]."""
-    joints = (law.damping_time for law in model.laws.laws if isinstance(law, ElasticJoint))
-    stones = (
-        block.material.stiffness_damping
-        for block in model.scene.blocks
-        if block.fidelity is Fidelity.DEFORMABLE
-    )
-    return max(chain(joints, stones), default=0.0)
 
 
 def _fall(model: Model, state: State) -> Array:

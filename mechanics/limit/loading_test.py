@@ -22,7 +22,7 @@ from mechanics.limit.pushover import SPEED
 from mechanics.model.model import Model, build_model
 from mechanics.scene.loads.load import Pose
 from mechanics.scene.rig import BEAM, JAWS, Rig, rigged
-from mechanics.scene.scene import ContactSettings, Scene, TimeSettings
+from mechanics.scene.scene import Scene, TimeSettings
 from mechanics.scene.state import State
 from moma.errors import SceneError, SolverError
 
@@ -71,6 +71,12 @@ class LoadingTest:
     stopped: bool
 
     @property
+    def free(self) -> Bools:
+        """Bodies (nb,) that are stones and not fixed."""
+        found: Bools = ~self.model.fixed & [block.code != BEAM for block in self.model.scene.blocks]
+        return found
+
+    @property
     def calm(self) -> Bools:
         """Steps (n,) in which inertia changes the force by no more than 1 % of the largest."""
         found: Bools = np.abs(self.inertia) <= _CALM * np.abs(self.force).max()
@@ -113,9 +119,7 @@ class LoadingTest:
     @property
     def turning(self) -> float:
         """Share of the displacement that comes of turning, of the median stone by mass: rocking 1, sliding 0 [-]."""
-        model, end = self.model, self.end.after
-        own = ~model.fixed
-        own[[block.code == BEAM for block in model.scene.blocks]] = False
+        model, end, own = self.model, self.end.after, self.free
         spin = Rotation.from_matrix(end.rotation[own] @ self.settled.rotation[own].transpose(0, 2, 1))
         angle = spin.as_rotvec() @ self.rig.axes[1]
         order = np.argsort(angle)
@@ -227,9 +231,7 @@ def loading_test(
     path = _Path(frozenset(JAWS if rig.has_beam else JAWS[:1]), rig.axes[0], to, speed)
     duration = way / speed
     scene = replace(scene, time=TimeSettings(duration, theta=1.0, duration=path.until + duration))
-    bare, _ = build_model(replace(scene, contact=ContactSettings()))
-    weight = float(bare.mass[~bare.fixed].sum() * np.linalg.norm(scene.gravity))
-    model, begin = build_model(rigged(scene, weight, rig, path))
+    model, begin = build_model(rigged(scene, rig, path))
     told, search = static_start(model, begin, progress)
     if not told.found:
         raise SolverError(

@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import chain
 
 import numpy as np
 
@@ -15,6 +17,7 @@ from mechanics.model.deformable import Deformable
 from mechanics.model.rigid import RigidInertia
 from mechanics.model.stone_groups import ElasticStones, elastic_stones
 from mechanics.model.stone_meshes import StoneWorkshop
+from mechanics.scene.laws.elastic_joint import ElasticJoint
 from mechanics.scene.laws.table import LawTable, law_table
 from mechanics.scene.loads.load import Force, Motion
 from mechanics.scene.scene import Block, Fidelity, LawRule, Part, Scene
@@ -95,6 +98,17 @@ class Model:
     def rigid_only(self) -> bool:
         """True if no body is deformable."""
         return not bool(self.elastic.any())
+
+    @cached_property
+    def lag(self) -> float:
+        """Longest time τ in which dashpots of joints and of deformable stones let springs take over [s]."""
+        joints = (law.damping_time for law in self.laws.laws if isinstance(law, ElasticJoint))
+        stones = (
+            block.material.stiffness_damping
+            for block in self.scene.blocks
+            if block.fidelity is Fidelity.DEFORMABLE
+        )
+        return max(chain(joints, stones), default=0.0)
 
     @property
     def mostly_rigid(self) -> bool:

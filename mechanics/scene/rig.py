@@ -19,6 +19,7 @@ from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import Block, Fidelity, LawRule, Part, Scene
 from mechanics.scene.shapes import BOX_FACES, box_corners
 from mechanics.stones.materials import Material
+from mechanics.stones.polyhedra import mass_properties
 from mechanics.stones.settings import Setting, check_settings
 from moma.errors import SceneError
 
@@ -43,7 +44,7 @@ Box = tuple[tuple[float, float, float], tuple[float, float, float]]
 
 
 class Head(StrEnum):
-    """What is at the top of the stones."""
+    """Top of the stones."""
 
     TURNS = "turns"
     GUIDED = "guided"
@@ -53,7 +54,7 @@ class Head(StrEnum):
 
 @dataclass(frozen=True)
 class Rig:
-    """Where a rig pushes, and what it puts on the stones.
+    """Push of a rig, and what it puts on the stones.
 
     Attributes
     ----------
@@ -135,7 +136,7 @@ class _Shop:
         )
 
 
-def rigged(scene: Scene, weight: float, rig: Rig, motion: Motion) -> Scene:
+def rigged(scene: Scene, rig: Rig, motion: Motion) -> Scene:
     """Return the scene with the pieces of a rig, whose jaws are driven.
 
     The scene's rules of laws hold for base and beam where they name their codes (`Rig.pieces`).
@@ -143,7 +144,6 @@ def rigged(scene: Scene, weight: float, rig: Rig, motion: Motion) -> Scene:
     Parameters
     ----------
     scene : stones; those that are fixed stay so, and without any they stand on a base
-    weight : of those that are not fixed [N]
     motion : of `JAWS`
 
     Raises
@@ -155,6 +155,12 @@ def rigged(scene: Scene, weight: float, rig: Rig, motion: Motion) -> Scene:
     b, d, top = np.max([one.max(axis=0) for one in corners], axis=0).tolist()
     tall, at = top - bottom, bottom + rig.height
     wide, forces = _BEYOND * tall, scene.loads.forces
+    fall = float(np.linalg.norm(scene.gravity))
+    weight = fall * sum(
+        block.material.density * mass_properties(block.vertices, block.faces, block.code).volume
+        for block in scene.blocks
+        if block.fidelity is not Fidelity.FIXED
+    )
     if not any(block.fidelity is Fidelity.FIXED for block in scene.blocks):
         shop.make(BASE, ((a - wide, c, bottom - wide), (b + wide, d, bottom)))
     if rig.has_beam:
@@ -168,7 +174,6 @@ def rigged(scene: Scene, weight: float, rig: Rig, motion: Motion) -> Scene:
         lug: Box = (middle - half, c, under), (middle + half, d, under + (rise if turns else tall * _GUIDE))
         # between edges at the height of the push, or faces that the beam's moment hardly turns
         jaw = (at - _EDGE * rise, at + _EDGE * rise) if turns else (under + tall * _CLEAR, lug[1][2])
-        fall = float(np.linalg.norm(scene.gravity))
         mass = _BEAM * max(rig.load, weight) / fall
         volume = sum(float(np.prod(np.subtract(one[1], one[0]))) for one in (beam, lug))
         shop.make(BEAM, beam, lug, density=mass / volume)

@@ -9,6 +9,7 @@ from mechanics.arrays import Array
 from mechanics.contact.contacts import material_points
 from mechanics.dynamics.step import Step
 from mechanics.limit.loading_test import LoadingTest
+from mechanics.results.postprocess import positions
 from pipelines.draw.elevations.sheet import new_sheet
 
 __all__ = ["draw_curve", "draw_pushed"]
@@ -35,9 +36,8 @@ def draw_curve(path: Path, title: str, test: LoadingTest, band: Array | None, me
     axes.plot(1e3 * places, 1e-3 * forces, color="#1f5f8b", label="predicted")
     if measured is not None:
         style = "-" if len(measured) > 30 else "o"
-        axes.plot(
-            *(1e3 * measured[:, 0], 1e-3 * measured[:, 1]), style, color="#8a3b12", lw=1.0, label="measured"
-        )
+        places, forces = measured.T
+        axes.plot(1e3 * places, 1e-3 * forces, style, color="#8a3b12", lw=1.0, label="measured")
     axes.axhline(0.0, color="black", lw=0.5)
     axes.set_xlabel("displacement of the push [mm]")
     axes.set_ylabel("force [kN]")
@@ -49,43 +49,36 @@ def draw_curve(path: Path, title: str, test: LoadingTest, band: Array | None, me
 
 def draw_pushed(path: Path, title: str, test: LoadingTest, step: Step) -> None:
     """Draw the stones at the end of a step as seen across the push, displacements exaggerated, open joints marked."""
-    model, after = test.model, step.after
-    along, across, up = test.rig.axes
-    view = np.array([along, up])
-    own = [number for number, fixed in enumerate(model.fixed) if not fixed]
-    corners = np.vstack([model.scene.blocks[k].vertices for k in own]) @ view.T
+    model, (along, across, up) = test.model, test.rig.axes
+    view, own = np.array([along, up]), np.flatnonzero(~model.fixed).tolist()
+    before, now = positions(model, test.settled), positions(model, step.after)
+    corners = np.vstack([before[k] for k in own]) @ view.T
     low, high = corners.min(axis=0), corners.max(axis=0)
     extent = float((high - low).max())
-    moved = after.centre - test.settled.centre
     # by the way of the push: a stone that has fallen out would leave none for the others
     way = abs(float(test.displacement[np.abs(test.force).argmax() if step is test.peak else -1]))
     factor = _WAY * extent / max(way, 1e-9)
-    turn = after.rotation @ test.settled.rotation.transpose(0, 2, 1)
+
+    def drawn(start: Array, end: Array) -> Array:
+        """Project places (n, 3) at the end of the step, their displacements exaggerated."""
+        seen: Array = (start + factor * (end - start)) @ view.T
+        return seen
+
     shown = list[Array]()
     for number in own:
-        block = model.scene.blocks[number]
-        first, last = model.outline.first[number : number + 2]
-        start = model.outline.corner[first:last] @ test.settled.rotation[number].T
-        place = start @ turn[number].T - start
-        shape = (test.settled.centre[number] + start + factor * (moved[number] + place)) @ view.T
-        for face in block.faces:
-            ring = block.vertices[list(face)]
+        block, shape = model.scene.blocks[number], drawn(before[number], now[number])
+        for face in map(list, block.faces):
+            ring = block.vertices[face]
             normal = np.cross(ring[1] - ring[0], ring[2] - ring[0])
             if normal @ across < _SEEN * np.linalg.norm(normal):
-                shown.append(shape[list(face)])
+                shown.append(shape[face])
     figure = new_sheet((5.0, 5.0))
     axes = figure.subplots()
     axes.add_collection(PolyCollection(shown, facecolor="#e6dfd0", edgecolor="#4a4a4a", linewidth=0.6))
-    contacts = step.active.contacts
-    wide = step.active.gap > _OPEN * way
-    sides = contacts.bodies[wide]
-    points, bodies = material_points(contacts, after)[wide].reshape(-1, 3), sides.ravel()
-    kept = ~model.fixed[bodies]
-    points, bodies = points[kept], bodies[kept]
-    arm = np.einsum("nji,nj->ni", turn[bodies], points - after.centre[bodies])
-    start = test.settled.centre[bodies] + arm
-    marks = (start + factor * (points - start)) @ view.T
-    axes.plot(*marks.T, ".", color="#c0392b", markersize=3)
+    contacts, wide = step.active.contacts, step.active.gap > _OPEN * way
+    kept = ~model.fixed[contacts.bodies[wide]]
+    ends = (material_points(contacts, one)[wide][kept] for one in (test.settled, step.after))
+    axes.plot(*drawn(*ends).T, ".", color="#c0392b", markersize=3)
     margin = 2 * _WAY * extent
     axes.set_xlim(low[0] - margin, high[0] + margin)
     axes.set_ylim(low[1] - margin, high[1] + margin)

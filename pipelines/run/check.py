@@ -99,7 +99,7 @@ def check_scene(
         problems += unsound_stones(assembly)
         progress(Progress("check", 0, None, "meshes, and contacts at the start"))
         needs = plan(assembly.scene)
-        if scene.pushover is None or not stands_alone(assembly.scene):
+        if not _in_rig(scene, assembly):
             problems += unsupported(assembly.scene, needs.loose)
     except (GeometryError, MeshError) as error:
         problems.append(str(error))
@@ -122,6 +122,11 @@ def _with_pictures(report: CheckReport, assembly: Assembly, folder: Path, scene:
         )
         (fresh / _INDEX).write_text(as_json(asdict(report)), encoding="utf-8")
     return report
+
+
+def _in_rig(scene: SceneFile, assembly: Assembly) -> bool:
+    """Return True where the stones stand on the base of a test rig alone."""
+    return scene.pushover is not None and stands_alone(assembly.scene)
 
 
 def _simplified(assembly: Assembly) -> list[BlockyStone]:
@@ -198,7 +203,7 @@ def _report(
             *corner_warnings(models),
             *(() if assembly is None else assembly.remarks),
             *(() if assembly is None else unsupported_stages(scene, assembly)),
-            *(() if assembly is None or not stands_alone(assembly.scene) else (_IN_RIG,)),
+            *(() if assembly is None or not _in_rig(scene, assembly) else (_IN_RIG,)),
         ),
     )
 

@@ -5,12 +5,17 @@ Vasconcelos, G. (2005): Experimental investigations on the mechanics of stone ma
 
 from itertools import pairwise
 
+import numpy as np
+
+from mechanics.scene.shapes import bond
+
 __all__ = ["GRANITE_SCENE", "GRANITE_WALL", "MEASURED", "units", "units_text"]
 
 GRANITE_WALL = "granite-wall"
 """Name of the sample."""
 
-_LENGTH, _HEIGHT, _COURSES = 0.2, 0.15, 8  # of a unit [m], and courses
+_LENGTH, _HEIGHT = 0.2, 0.15  # of a unit [m]
+_UNITS, _COURSES = 5, 8  # in a course, and courses
 
 MEASURED = ((2.0, 20.8), (5.0, 29.8), (10.0, 33.1), (20.0, 36.5), (30.0, 36.8))
 """Points of the measured curve: displacement [mm] and force [kN]; the largest force was 37.0 kN."""
@@ -53,10 +58,9 @@ measured = "measured.csv"
 def units() -> dict[str, tuple[float, float, float, float]]:
     """Return left, bottom, right and top of each unit by its code [m]: half-unit bond, odd courses of whole units."""
     found = {}
-    for course in range(_COURSES):
-        ends = [0.0, *(_LENGTH * (k + (0.5 if course % 2 else 1.0)) for k in range(5))]
-        ends = [*ends, 5 * _LENGTH] if course % 2 else ends
-        for number, (left, right) in enumerate(pairwise(ends), start=1):
+    for course, lengths in enumerate(bond(_UNITS, _COURSES)):
+        ends = _LENGTH * np.concatenate([[0.0], np.cumsum(lengths)])
+        for number, (left, right) in enumerate(pairwise(ends.tolist()), start=1):
             found[f"{course + 1}-{number}"] = (left, _HEIGHT * course, right, _HEIGHT * (course + 1))
     return found
 

@@ -63,7 +63,7 @@ SCATTER_KEYS = tuple(
 
 @dataclass(frozen=True)
 class Pushing:
-    """What [pushover] asks.
+    """Test that [pushover] asks for.
 
     Attributes
     ----------

@@ -8,8 +8,8 @@ import numpy as np
 from moma.errors import SurveyError, UsageError
 from survey.arrays import Array
 from survey.clouds.outlines.outline import Outline
-from survey.clouds.outlines.tracing import ring_area
 from survey.clouds.wall import Wall
+from survey.geometry.polygons import ring_area
 from survey.geometry.solids import area_vector
 from survey.records.survey import Station
 

@@ -10,6 +10,7 @@ from survey.clouds.extras import optional
 from survey.clouds.outlines.outline import Outline
 from survey.clouds.outlines.reading import PICTURES, Drawing
 from survey.clouds.placing import PlacedOutline
+from survey.geometry.polygons import ring_area
 from survey.records.review import Doubtful
 
 __all__ = ["drawn_doubts", "flat_doubts", "measured_doubts"]
@@ -48,7 +49,7 @@ def flat_doubts(outlines: Sequence[Outline], rings: Sequence[Array], drawing: Dr
         area = "" if drawing.pixel is None else f", {1e4 * drawing.smallest * drawing.pixel**2:.2g} cm²"
         text = f"{drawing.specks} pieces are too small for a stone (under {drawing.smallest} pixels{area}) and left out"
         yield Doubtful("", "specks", text, str(drawing.path))
-    areas = np.array([_area(ring) for ring in rings])
+    areas = np.array([abs(ring_area(ring)) for ring in rings])
     logs = np.log(np.maximum(areas, 1e-12))
     middle = float(np.median(logs))
     spread = max(1.4826 * float(np.median(np.abs(logs - middle))), _SPREAD)
@@ -127,11 +128,6 @@ def _polygons(shapely: Any, rings: Sequence[Array]) -> Any:
     return shapely.make_valid(shapely.polygons(shapely.linearrings(np.concatenate(rings), indices=which)))
 
 
-def _area(ring: Array) -> float:
-    x, y = (ring - ring[0]).T
-    return 0.5 * abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1)))
-
-
 def _hull_area(ring: Array) -> float:
     """Return the area of the convex hull of a polygon by Andrew's chain."""
     points = ring[np.lexsort((ring[:, 1], ring[:, 0]))].tolist()
@@ -146,4 +142,4 @@ def _hull_area(ring: Array) -> float:
                 chain.pop()
             chain.append([x, y])
         hull += chain[:-1]
-    return _area(np.array(hull)) if len(hull) >= 3 else 0.0
+    return abs(ring_area(np.array(hull))) if len(hull) >= 3 else 0.0

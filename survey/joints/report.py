@@ -9,6 +9,7 @@ import numpy as np
 from survey.arrays import Array
 from survey.geometry.adjacency import SolidArrays
 from survey.geometry.cutting import moves
+from survey.geometry.polygons import ring_area
 from survey.joints.bounded_closing import Cut, LocalStones
 from survey.joints.facing import FacePlanes, FacingFaces, find_facing, planes_of
 from survey.joints.overlaps import Overlapping
@@ -115,12 +116,7 @@ class GrownLeaf:
     @property
     def stones_over_all(self) -> float:
         """Area of the outlines over that of the frame [-]."""
-        return sum(_area(one) for one in self.outlines.values()) / (self.size[0] * self.size[1])
-
-
-def _area(ring: Array) -> float:
-    x, y = (ring - ring[0]).T
-    return 0.5 * abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1)))
+        return sum(abs(ring_area(one)) for one in self.outlines.values()) / (self.size[0] * self.size[1])
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from enum import StrEnum
 import numpy as np
 
 from survey.arrays import Array, Bools
+from survey.geometry.polygons import ring_area
 from survey.quality.canon import ENOUGH
 from survey.quality.facades import find_facades
 
@@ -120,7 +121,7 @@ def _overlaps(members: Sequence[SeenFace], flat: Sequence[Array], away: Array) -
         depth = _thickness(common)
         if depth > _DEEP:
             for one, other in ((members[i], members[j]), (members[j], members[i])):
-                text = f"its face overlaps that of {other.code} by {_area(common) * 1e4:.0f} cm²"
+                text = f"its face overlaps that of {other.code} by {ring_area(common) * 1e4:.0f} cm²"
                 yield Misplaced(one.code, one.line, Sign.OVERLAP, depth, text)
 
 
@@ -157,12 +158,7 @@ def _common(one: Array, other: Array) -> Array:
 def _thickness(polygon: Array) -> float:
     """Return twice the area over the perimeter [m]: of a strip its width, of a triangle the radius of its circle."""
     around = float(np.linalg.norm(np.roll(polygon, -1, axis=0) - polygon, axis=1).sum())
-    return 2.0 * _area(polygon) / around if around > 0.0 else 0.0
-
-
-def _area(polygon: Array) -> float:
-    following = np.roll(polygon, -1, axis=0)
-    return 0.5 * float((polygon[:, 0] * following[:, 1] - following[:, 0] * polygon[:, 1]).sum())
+    return 2.0 * ring_area(polygon) / around if around > 0.0 else 0.0
 
 
 def _distances(points: Array, starts: Array, ends: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -55,12 +56,17 @@ class LawTable:
         needed = np.array([one is not None for one in own])[law]
         if not self.beds:
             return otherwise
-        pairs = np.array(sorted(self.beds), dtype=np.int64)
-        wide = np.array([self.beds[one, other] for one, other in pairs.tolist()])
+        pairs, wide = self._wide
         count = int(max(bodies.max(initial=0), pairs.max())) + 1
         known, asked = pairs @ [count, 1], np.sort(bodies, axis=1) @ [count, 1]
         at = np.minimum(np.searchsorted(known, asked), len(known) - 1)
         return np.where(needed & (known[at] == asked), wide[at], otherwise)
+
+    @cached_property
+    def _wide(self) -> tuple[Ints, Array]:
+        """Pairs of bodies (n, 2) in order, and the thickness of the mortar between them (n,) [m]."""
+        pairs = np.array(sorted(self.beds), dtype=np.int64)
+        return pairs, np.array([self.beds[one, other] for one, other in pairs.tolist()])
 
     def crushing(self, law: Ints, contacts: Approach, impulse: Array | None = None) -> Bools:
         """Return the contacts (nc,) whose joints crush in a step with r̃, as `ElasticJoint.crushing` does."""

@@ -218,7 +218,7 @@ def _summary(
     ]
     forwards, backwards = test.strength
     model = test.model
-    weight = float(model.mass[~model.fixed].sum() * np.linalg.norm(model.scene.gravity))
+    weight = float(model.mass[test.free].sum() * np.linalg.norm(model.scene.gravity))
     return {
         "scene": assembled.scene.name,
         "headline": _headline(test, band),
@@ -253,12 +253,13 @@ def _summary(
 
 
 def _beside(test: LoadingTest, measured: Array) -> dict[str, Any]:
-    """Return a measured curve (n, 2) beside the predicted one, at the measured displacements of a short curve."""
+    """Return the largest forces of a measured curve (n, 2), and those predicted over them."""
     most, least = float(measured[:, 1].max()), float(measured[:, 1].min())
     strength, other = test.strength
-    found: dict[str, Any] = {"strength": {"forwards": most, "backwards": min(least, 0.0)}}
-    found["ratio"] = {
-        "forwards": strength / most if strength and most > 0 else None,
-        "backwards": other / least if other and least < 0 else None,
+    return {
+        "strength": {"forwards": most, "backwards": min(least, 0.0)},
+        "ratio": {
+            "forwards": strength / most if strength and most > 0 else None,
+            "backwards": other / least if other and least < 0 else None,
+        },
     }
-    return found

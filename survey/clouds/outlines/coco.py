@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from moma.errors import SurveyError, UsageError
 from survey.clouds.outlines.labels import outline_of_mask
 from survey.clouds.outlines.outline import Attributes, Outline, attributes_of, made_code
-from survey.clouds.outlines.tracing import few_corners, ring_area
+from survey.clouds.outlines.tracing import few_corners
 from survey.clouds.world import PixelPlace, world_of
+from survey.geometry.polygons import ring_area
 
 __all__ = ["is_coco", "load_json", "read_coco", "run_lengths"]
 

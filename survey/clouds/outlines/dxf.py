@@ -11,6 +11,7 @@ from moma.errors import SurveyError
 from survey.arrays import Array
 from survey.clouds.extras import optional
 from survey.clouds.outlines.outline import Attributes, Outline, made_code
+from survey.geometry.polygons import inside
 from survey.geometry.solids import area_vector
 
 __all__ = ["read_dxf"]
@@ -101,11 +102,11 @@ def _coded(
     layers = [layer for _, layer, _ in rings]
     by_layer = chosen == "layer" or (chosen is None and not texts and len(set(layers)) == len(layers) > 1)
     for number, (ring, layer, handle) in enumerate(rings, start=1):
-        inside = [text for place, text in texts if _is_inside(place, ring)]
+        within = [text for place, text in texts if _is_inside(place, ring)]
         said, doubts = Attributes(notes={"layer": layer} if layer != "0" else {}), []
-        name = layer if by_layer else inside[0] if inside else f"S{number}"
-        if not by_layer and len(inside) > 1:
-            doubts.append(("texts", f"{len(inside)} texts inside: {', '.join(inside[:4])}"))
+        name = layer if by_layer else within[0] if within else f"S{number}"
+        if not by_layer and len(within) > 1:
+            doubts.append(("texts", f"{len(within)} texts inside: {', '.join(within[:4])}"))
         where = f"{path}, polyline {handle} on layer {layer}"
         code = made_code(name) or f"S{number}"
         yield Outline(number, code, ring, replace(said, code=code), where, tuple(doubts))
@@ -116,9 +117,4 @@ def _is_inside(place: Array, ring: Array) -> bool:
     axes = [0, 1]
     if ring.shape[1] == 3:
         axes = [k for k in range(3) if k != int(np.argmax(np.abs(area_vector(ring))))]
-    x, y = place[axes]
-    (ax, ay), (bx, by) = ring[:, axes].T, np.roll(ring[:, axes], -1, axis=0).T
-    spans = (ay > y) != (by > y)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        crossing = ax + (y - ay) / (by - ay) * (bx - ax)
-    return bool(np.count_nonzero(spans & (x < crossing)) % 2)
+    return bool(inside(place[None, axes], ring[:, axes])[0])

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from moma.errors import SurveyError
 from survey.arrays import Array
 from survey.clouds.outlines.outline import Attributes, Outline
-from survey.clouds.outlines.tracing import few_corners, ring_area, trace
+from survey.clouds.outlines.tracing import few_corners, trace
 from survey.clouds.world import PixelPlace, world_of
+from survey.geometry.polygons import ring_area
 
 __all__ = ["Labels", "outline_of_mask", "outlines_of", "read_labels"]
 

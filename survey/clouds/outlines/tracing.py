@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from survey.arrays import Array, Bools
+from survey.geometry.polygons import ring_area
 
-__all__ = ["few_corners", "ring_area", "trace"]
+__all__ = ["few_corners", "trace"]
 
 _SHARP = math.sin(
     math.radians(12.0)
@@ -49,12 +50,6 @@ def _is_outer(ring: Array, mask: NDArray[np.bool_]) -> bool:
     column, row = ring[np.argmin(ring[:, 1])]
     inside = math.floor(row) + 1, round(column)
     return inside[0] < mask.shape[0] and 0 <= inside[1] < mask.shape[1] and bool(mask[inside])
-
-
-def ring_area(ring: Array) -> float:
-    """Return the signed area of a polygon (n, 2), positive if it runs from the first axis to the second."""
-    x, y = (ring - ring[0]).T
-    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
 
 
 def few_corners(ring: Array, tolerance: float) -> Array:

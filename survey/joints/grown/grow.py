@@ -8,6 +8,7 @@ import numpy as np
 
 from survey.arrays import Array
 from survey.extrusion.extrusion import prism
+from survey.geometry.polygons import ring_area
 from survey.geometry.solids import Solid
 from survey.joints.grown.leaf import Leaf
 from survey.joints.grown.medial_lines import LEFT_BELOW_RIGHT_ABOVE, medial_lines
@@ -58,7 +59,7 @@ def grow(leaf: Leaf, codes: Sequence[str], settings: JointSettings, fineness: fl
     GeometryError
         if an outline lies within another, or outlines cross so much that they cannot be told apart
     """
-    areas = np.array([_area(one) for one in leaf.outlines])
+    areas = np.array([abs(ring_area(one)) for one in leaf.outlines])
     step = float(np.sqrt(np.median(areas))) / (_SAMPLES * fineness)
     lines = medial_lines(leaf.outlines, leaf.frame, step)
     found = partition(lines, leaf.outlines, settings.straightness, settings.min_overlap)
@@ -69,7 +70,7 @@ def grow(leaf: Leaf, codes: Sequence[str], settings: JointSettings, fineness: fl
     ]
     moved = [apart(outline, ring) for outline, ring in zip(leaf.outlines, rings, strict=True)]
     growth = [float(apart(ring, outline).max()) for outline, ring in zip(leaf.outlines, rings, strict=True)]
-    new = np.array([_area(one) for one in rings])
+    new = np.array([abs(ring_area(one)) for one in rings])
     low = leaf.frame[0]
     width, height = (leaf.frame[1] - low).tolist()
     farthest = int(np.argmax(growth))
@@ -92,11 +93,6 @@ def grow(leaf: Leaf, codes: Sequence[str], settings: JointSettings, fineness: fl
         joints=_joints(leaf, found, codes),
         report=report,
     )
-
-
-def _area(ring: Array) -> float:
-    x, y = (ring - ring[0]).T
-    return 0.5 * abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1)))
 
 
 def _thickness(found: Partition, codes: Sequence[str]) -> dict[frozenset[str], float]:

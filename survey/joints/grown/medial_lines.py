@@ -16,8 +16,9 @@ from scipy.spatial import Voronoi, cKDTree
 
 from moma.errors import GeometryError
 from survey.arrays import Array, Bools, Ints
+from survey.geometry.polygons import inside
 
-__all__ = ["LEFT_BELOW_RIGHT_ABOVE", "Line", "MedialLines", "inside", "medial_lines"]
+__all__ = ["LEFT_BELOW_RIGHT_ABOVE", "Line", "MedialLines", "medial_lines"]
 
 LEFT_BELOW_RIGHT_ABOVE = (-1, -2, -3, -4)
 """Numbers that stand for the sides of the frame where a line runs along it instead of between two stones."""
@@ -175,18 +176,6 @@ def _apart(places: Array, owner: Ints, most: float) -> Array:
     other = np.append(owner, -1)[found]
     foreign = (other >= 0) & (other != owner[:, None])
     out: Array = np.where(foreign, apart, most).min(axis=1)
-    return out
-
-
-def inside(places: Array, ring: Array) -> Bools:
-    """Return which places (n, 2) lie within a polygon (m, 2), by the number of sides that a ray crosses."""
-    start, stop = ring, np.roll(ring, -1, axis=0)
-    y = places[:, 1, None]
-    spans = (start[:, 1] > y) != (stop[:, 1] > y)
-    rise = stop[:, 1] - start[:, 1]
-    safe = np.where(rise == 0.0, 1.0, rise)
-    crossing = start[:, 0] + (y - start[:, 1]) / safe * (stop[:, 0] - start[:, 0])
-    out: Bools = (np.count_nonzero(spans & (places[:, 0, None] < crossing), axis=1) % 2).astype(np.bool_)
     return out
 
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from moma.errors import GeometryError
 from survey.arrays import Array
-from survey.joints.grown.medial_lines import Line, MedialLines, inside
+from survey.geometry.polygons import inside, ring_area
+from survey.joints.grown.medial_lines import Line, MedialLines
 
 __all__ = ["Edge", "Partition", "apart", "is_simple", "partition"]
 
@@ -319,8 +320,7 @@ def _ring(stone: int, chains: Chains) -> tuple[int, ...] | None:
 def is_simple(ring: Array) -> bool:
     """Return whether a polygon (n, 2) runs counter-clockwise and no two of its sides meet but at their corner."""
     count = len(ring)
-    x, y = (ring - ring[0]).T
-    if count < 3 or not float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) > 0.0:
+    if count < 3 or not ring_area(ring) > 0.0:
         return False
     start, way = ring, np.roll(ring, -1, axis=0) - ring
     offset = start[None] - start[:, None]

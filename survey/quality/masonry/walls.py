@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from survey.arrays import Array
+from survey.geometry.polygons import ring_area
 from survey.quality.courses import lower_corners
 from survey.quality.facades import Facade
 from survey.quality.masonry.index import (
@@ -260,9 +261,7 @@ def _shape(own: Sequence[WallStone], facade: Facade) -> Grade:
 def _is_cut(flat: Array) -> bool:
     if len(flat) > _CORNERS:
         return False
-    x, y = flat.T
-    area = 0.5 * float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())
-    return area >= _CUT * float(ConvexHull(flat, qhull_options="QJ").volume)
+    return ring_area(flat) >= _CUT * float(ConvexHull(flat, qhull_options="QJ").volume)
 
 
 def _level(own: Sequence[WallStone], facade: Facade) -> Grade:

@@ -11,7 +11,8 @@ from survey.clouds.outlines.coco import run_lengths
 from survey.clouds.outlines.labels import read_labels
 from survey.clouds.outlines.outline import attributes_of, field_map, made_code
 from survey.clouds.outlines.reading import read_outlines
-from survey.clouds.outlines.tracing import few_corners, ring_area, trace
+from survey.clouds.outlines.tracing import few_corners, trace
+from survey.geometry.polygons import ring_area
 from tests.survey.clouds import scans
 
 PIXEL = 0.004
