@@ -98,6 +98,17 @@ def test_forces_of_a_rest_are_exact_where_they_are_kept_for_long():
     assert left.within(1e-8, 1e-7)
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_gaps_below_the_tolerance_do_not_set_stones_in_motion(seed):
+    """Errors of earlier steps leave gaps and overlaps of a billionth; contacts rest as if there were none."""
+    problem = rest()[10].problem
+    ajar = np.random.default_rng(seed).uniform(-5e-6, 5e-6, len(problem.bias)) * FREE
+    gaping = replace(problem, bias=ajar)
+    found = Auto()(gaping, cold(gaping))
+    assert found.converged
+    assert np.abs(velocity_of(gaping, found)).max() <= 1e-8 * FREE
+
+
 def pinched(count):
     """Stones that each overlap two fixed ones by a millimetre, one from each side."""
     stones = []
