@@ -39,6 +39,8 @@ __all__ = ["Simulation"]
 
 # bias of a gap over the largest u_free up to which it is one of an inexact step, and counts as closed [-]
 _CLOSED = 1e-3
+# velocity tolerance over that of the balance: contacts that break their laws by more leave stones unbalanced [-]
+_BALANCED = 0.1
 _CRUSHING = 10  # most solutions of a step in search of the joints that crush
 # predicted state, contacts, free motion, internal variables, and how the run begins
 _Given = tuple[State, Detection, Kick, Array, Beginning | None]
@@ -302,5 +304,9 @@ class Simulation(Carrier):
 
 
 def _solver_of(model: Model, settings: SolverSettings) -> Solver:
-    deforms, sprung = bool(model.elastic.any()), model.laws.sprung
-    return choose_solver(settings, deforms, sprung, model.scene.time.duration)
+    """Return the solver of a model; where only the rest of rigid stones is asked for, it suits their balance."""
+    deforms, sprung, time = bool(model.elastic.any()), model.laws.sprung, model.scene.time
+    if time.relaxation and not deforms:
+        exact = min(settings.velocity_tolerance, _BALANCED * time.balance_tolerance)
+        settings = replace(settings, velocity_tolerance=exact)
+    return choose_solver(settings, deforms, sprung, time.duration)

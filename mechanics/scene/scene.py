@@ -309,7 +309,8 @@ class SolverSettings:
     velocity_tolerance: Annotated[
         float,
         Setting(
-            "Largest velocity by which a contact may break its law, over the largest that contacts have to stop.",
+            "Largest velocity by which a contact may break its law, over the largest that contacts have to stop; "
+            "between rigid stones of a relaxation at most a tenth of `balance_tolerance`.",
             "-",
             above=0,
             infinite=True,

@@ -116,7 +116,7 @@ def rigid_motion(
     soft : (n,) deformable stones
     """
     starts = np.concatenate([[0], np.cumsum([len(points) for points in references])]).astype(np.int64)
-    chosen = starts[:-1, None] + np.array([_three(points) for points in references]).reshape(-1, 3)
+    chosen = starts[:-1, None] + _three(references)
     centres = np.array([points.mean(axis=0) for points in references]).reshape(-1, 3)
     start = np.concatenate([np.zeros((0, 3)), *references])
     then = _axes(start[chosen])
@@ -132,11 +132,18 @@ def rigid_motion(
     return centres, shift, turn
 
 
-def _three(points: Array) -> list[int]:
-    """Return three points of a stone that span a wide triangle."""
-    far = int(np.argmax(np.sum((points - points[0]) ** 2, axis=1)))
-    away = np.cross(points - points[0], points[far] - points[0])
-    return [0, far, int(np.argmax(np.sum(away**2, axis=1)))]
+def _three(stones: Sequence[Array]) -> Ints:
+    """Return three points (n, 3) of each stone that span a wide triangle."""
+    chosen = np.zeros((len(stones), 3), dtype=np.int64)
+    counts = np.array([len(points) for points in stones])
+    for count in np.unique(counts).tolist():
+        rows = np.flatnonzero(counts == count)
+        arms = np.array([stones[row] for row in rows])
+        arms -= arms[:, :1]
+        far = np.argmax(np.sum(arms**2, axis=2), axis=1)
+        away = np.cross(arms, arms[np.arange(len(rows)), far][:, None])
+        chosen[rows, 1], chosen[rows, 2] = far, np.argmax(np.sum(away**2, axis=2), axis=1)
+    return chosen
 
 
 def _axes(three: Array) -> Array:
@@ -160,4 +167,20 @@ def _rotation_vectors(matrices: Array) -> Array:
     """Return the rotation vectors (n, 3) of rotation matrices."""
     from scipy.spatial.transform import Rotation
 
-    return np.asarray(Rotation.from_matrix(matrices).as_rotvec())
+    sine = 0.5 * np.stack(
+        [
+            matrices[:, 2, 1] - matrices[:, 1, 2],
+            matrices[:, 0, 2] - matrices[:, 2, 0],
+            matrices[:, 1, 0] - matrices[:, 0, 1],
+        ],
+        axis=1,
+    )
+    size, cosine = np.linalg.norm(sine, axis=1), 0.5 * (np.trace(matrices, axis1=1, axis2=2) - 1.0)
+    # sin φ over φ is 1 to the last digit where sin φ is this small
+    turn: Array = (
+        np.where(size > 1e-9, np.arctan2(size, cosine) / np.maximum(size, 1e-9), 1.0)[:, None] * sine
+    )
+    # half a turn has no sine that gives its axis
+    if (half := cosine < -0.5).any():
+        turn[half] = Rotation.from_matrix(matrices[half]).as_rotvec()
+    return turn
