@@ -81,7 +81,14 @@ def simulate(
         if built is None:
             with clock("mesh"):
                 built = build_model(scene, lambda done, total: progress(Progress("mesh", done, total)))
-        return _simulate(built[0], of_run(built[1]), clock, progress, stop, archive)[0]
+        result, _ = _simulate(built[0], of_run(built[1]), clock, progress, stop, archive)
+        if result.outcome.rests and _keeps_strain(built[0]):
+            with clock("confirm"):
+                clamped = _falls_without_strain(scene, progress, stop)
+            if clamped:
+                result = replace(result, outcome=Outcome.UNDECIDED, reason=_CLAMPED)
+            result = replace(result, wall_time=dict(clock.seconds))
+        return result
 
 
 def simulate_stages(
@@ -125,6 +132,35 @@ def simulate_stages(
         if whole is None and any(one.fidelity is Fidelity.DEFORMABLE for one in scene.blocks):
             whole = build_model(scene, lambda done, total: progress(Progress("mesh", done, total)))
         return _Building(stages, whole, archive).built(progress, stop)
+
+
+_CLAMPED = (
+    "its stones came to rest, but ones that do not deform would fall in their place: what holds them is "
+    "self-stress, which no load applies"
+)
+
+
+def _keeps_strain(model: Model) -> bool:
+    """Return whether stones deform between rigid joints under loads that last, so that strain may hold what falls."""
+    scene = model.scene
+    moves = scene.loads.until > 0 or any(any(block.velocity) for block in scene.blocks)
+    return bool(model.elastic.any()) and not model.laws.sprung and not moves
+
+
+def _falls_without_strain(scene: Scene, progress: Listener, stop: Callable[[], bool]) -> bool:
+    """Return whether the stones of a scene fall once none deforms.
+
+    Strain cannot be forgotten as contact forces can (`mechanics.dynamics.stopping.disproof`): what stones press against
+    each other on the way to a rest stays. Rigid ones have no other forces than those that their loads bring about.
+    """
+    blocks = tuple(
+        replace(block, fidelity=Fidelity.RIGID) if block.fidelity is Fidelity.DEFORMABLE else block
+        for block in scene.blocks
+    )
+    time = replace(scene.time, start=Start.REST, stop_at_equilibrium=True)
+    rigid = replace(scene, blocks=blocks, time=time)
+    told = simulate(rigid, lambda one: progress(replace(one, stage="confirm", total=None)), stop)
+    return told.outcome is Outcome.COLLAPSED
 
 
 def _simulate(

@@ -10,11 +10,12 @@ from sqlalchemy.orm import Session
 
 __all__ = ["Deadline", "deadline"]
 
+_CANCELLED = "57014"  # SQLSTATE of a statement that PostgreSQL gave up, in any language
 _INSTRUCTIONS = 2_000  # of SQLite's machine between two looks at the clock: tens of microseconds
 
 
 class Deadline:
-    """Longest time of a statement; `passed` tells whether one was stopped by it.
+    """Longest time of a statement; `stopped` tells whether an error is that of one which was stopped by it.
 
     Parameters
     ----------
@@ -24,7 +25,7 @@ class Deadline:
     def __init__(self, seconds: float) -> None:
         self._seconds = seconds
         self._end = time.monotonic() + seconds
-        self.passed = False
+        self._passed = False
 
     def begin(self, *_: Any) -> None:
         """Give a new statement its time."""
@@ -32,8 +33,17 @@ class Deadline:
 
     def __call__(self) -> int:
         """Return 1 once the time is over, which stops SQLite."""
-        self.passed = self.passed or time.monotonic() > self._end
-        return int(self.passed)
+        self._passed = self._passed or time.monotonic() > self._end
+        return int(self._passed)
+
+    def stopped(self, error: BaseException) -> bool:
+        """Return whether the database gave up a statement, whose error or its cause this is, as its time was over."""
+        told: BaseException | None = error
+        while told is not None:
+            if getattr(getattr(told, "orig", told), "sqlstate", None) == _CANCELLED:
+                return True
+            told = told.__cause__
+        return self._passed
 
 
 @contextmanager

@@ -11,7 +11,8 @@ class Outcome(StrEnum):
 
     *Equilibrium*: the stones stand as they are drawn, by forces that arise from nothing. *Settled*: they have come to
     rest elsewhere. *Moving*: they have done neither, nor fallen. *Undecided*: the steps that would decide were not
-    solved. *Interrupted*: ended by its user before its time.
+    solved, or deformable stones rest where rigid ones in their place fall. *Interrupted*: ended by its user before its
+    time.
     """
 
     EQUILIBRIUM = "equilibrium"

@@ -280,7 +280,7 @@ class Result:
     weight : total weight of the blocks that are not fixed [N]
     frames : the motion, at least its first and last instant
     history : one value per step
-    wall_time : wall seconds by stage: mesh, start, assemble, detect, solve, advance, stress
+    wall_time : wall seconds by stage: mesh, start, assemble, detect, solve, advance, stress, confirm
     static : search for the equilibrium in which the run began; None if it began at rest
     solvers : number of steps by chosen method and reason, most frequent first
     peaks : largest values of the whole run

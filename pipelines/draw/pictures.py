@@ -55,7 +55,7 @@ _ENDINGS = {
     Outcome.SETTLED: "SETTLED elsewhere",
     Outcome.MOVING: "still moving",
     Outcome.COLLAPSED: "collapsed",
-    Outcome.UNDECIDED: "UNDECIDED: not solved",
+    Outcome.UNDECIDED: "UNDECIDED",
     Outcome.INTERRUPTED: "INTERRUPTED",
 }
 

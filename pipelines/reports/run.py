@@ -32,7 +32,7 @@ _OUTCOMES = {
     "settled": "It does not stand as surveyed: every stone came to rest, in balance, but not all in their places.",
     "moving": "It was still moving at the end of the simulated time: neither at rest nor collapsed.",
     "collapsed": "It falls: at least one stone moved too far to come back, and was still moving.",
-    "undecided": "Nothing can be said: the steps that would decide were not solved.",
+    "undecided": "Nothing can be said: the steps that would decide were not solved, or self-stress holds what rests.",
     "interrupted": "It was interrupted before its time: what it would have come to is not known.",
 }
 

@@ -77,7 +77,7 @@ def application(database: Database, settings: ServeSettings) -> FastAPI:
                 try:
                     yield session
                 except Exception as error:
-                    if limit.passed or "statement timeout" in str(error):
+                    if limit.stopped(error):
                         told = f"The query took longer than {settings.seconds:g} s and was stopped."
                         raise HTTPException(503, told) from error
                     raise

@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mechanics.limit.assembly import assembly
+from mechanics.limit.assembly import Strength, assembly
 from mechanics.limit.dead_load import admits_rest, at_instant, stands
+from mechanics.limit.live_loads import levers
 from mechanics.scene.loads.forces import StoneForce
+from mechanics.scene.loads.gravity import TiltingTable
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.motions import settlement
 from mechanics.scene.loads.time_series import History
@@ -86,3 +88,28 @@ def test_stones_that_hang_loose_are_named():
     )
     assert not found.outcome.rests
     assert found.moved == ("loose",)
+
+
+def test_gravity_is_taken_at_the_instant_and_loads_have_their_moments():
+    table = TiltingTable((0.0, 1.0, 0.0), History(np.array([0.0, 1.0]), np.array([0.0, 0.2])))
+    pull = StoneForce(frozenset({"a"}), History.constant((100.0, 0, 0)), (0.0, 0.0, 0.3))
+    one = replace(
+        scene(ground(), brick("a", (0, 0, 0), (1, 0.5, 1))), loads=Loads(gravity=(table,), forces=(pull,))
+    )
+    there = at_instant(one)
+    assert np.linalg.norm(there.gravity) == pytest.approx(np.linalg.norm(one.gravity))
+    assert abs(there.gravity[0] / there.gravity[2]) == pytest.approx(np.tan(0.2), rel=1e-6)
+    assert assembly(there).dead[3:] == pytest.approx([0.0, 30.0, 0.0], abs=1e-9)
+
+
+def test_the_shear_strength_is_cohesion_and_friction_of_compression_and_tension():
+    strength = Strength(np.array([0.5]), np.array([3.0]), np.array([2.0]))
+    assert strength.shear(np.array([[10.0, 0.0, 0.0]])) == pytest.approx([9.0])
+
+
+def test_a_lever_is_where_a_force_has_its_moment():
+    """A force along x at (0, 0.2, 0.3): r × F = (0, 0.3 F, -0.2 F)."""
+    rows, force, place = levers(np.array([[0.0] * 6, [5.0, 0.0, 0.0, 0.0, 1.5, -1.0]]))
+    assert rows.tolist() == [1]
+    assert force.tolist() == [[5.0, 0.0, 0.0]]
+    assert place == pytest.approx(np.array([[0.0, 0.2, 0.3]]))

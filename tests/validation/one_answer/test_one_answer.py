@@ -10,7 +10,7 @@ from mechanics.dynamics.outcome import Outcome
 from mechanics.limit.assembly import assembly
 from mechanics.limit.dead_load import stands
 from mechanics.simulate import simulate
-from tests.validation.one_answer.matrix import SETTINGS, Mark, answer, rotating
+from tests.validation.one_answer.matrix import SETTINGS, Mark, Setting, answer, at, rotating
 from tests.validation.one_answer.scenes import SCENES, WEDGE, wedge_on_two_planes
 from tests.validation.wild.scene_list import Truth
 
@@ -58,6 +58,14 @@ def test_the_wedge_slides_where_statics_says(tetrahedron):
         rests = simulate(one).outcome is Outcome.EQUILIBRIUM
         low, high = (low, middle) if rests else (middle, high)
     assert np.isclose(WEDGE * (1 + 0.5 * (low + high)), 33.357, rtol=0.01)
+
+
+@pytest.mark.parametrize(("name", "held"), [("lintel of 2, 3×0.3, μ 0.7", True), ("hook, μ 0.6", False)])
+def test_a_rest_of_deformable_stones_that_rigid_ones_would_not_find_is_none(name, held):
+    """A lintel of upright joints comes to rest: its stones keep the strain with which they were pressed together."""
+    result = simulate(at(SCENES[name], Setting("accurate", "auto", relaxation=True, static=False, step=1e-2)))
+    assert result.outcome is (Outcome.UNDECIDED if held else Outcome.EQUILIBRIUM)
+    assert ("self-stress" in result.reason) is held
 
 
 def test_nine_in_ten_are_decided(marks):
