@@ -142,8 +142,8 @@ def on_a_slope(share, slides=True):
     return scene([ground(), stone], friction, gravity=tuple(gravity), duration=1.0)
 
 
-def _rod(code, foot, head, thickness=0.04):
-    """A rhombic rod from corner to corner in the plane y = 0."""
+def _rod(code, foot, head, thickness=0.12):
+    """A rhombic rod from corner to corner in the plane y = 0, so thick that it sags by less than 1 % of its width."""
     foot, head = np.asarray(foot, dtype=float), np.asarray(head, dtype=float)
     along = head - foot
     across = thickness * np.array([-along[1], along[0]]) / np.linalg.norm(along)
