@@ -8,7 +8,9 @@ from typing import Any
 
 import pytest
 from sqlalchemy import select, text
+from sqlalchemy.exc import DBAPIError
 
+from archmodel.database.limits import deadline
 from archmodel.database.postgresql import WRITE_LOCK
 from archmodel.database.session import open_database
 from archmodel.store.stones import store_survey
@@ -42,6 +44,17 @@ def test_a_database_that_is_not_there_is_to_be_made_on_the_server(postgresql: Se
         DatabaseError, match=r'database "castle" does not exist.*; make it .*: createdb castle'
     ):
         open_database(postgresql.url("castle"))
+
+
+def test_a_statement_that_takes_too_long_is_stopped_and_known_by_its_code(url: str) -> None:
+    with open_database(url) as database:
+        with database.session(read_only=True) as session, deadline(session, 0.05) as limit:
+            with pytest.raises(DBAPIError) as stopped:
+                session.execute(text("SELECT pg_sleep(20)"))
+            assert limit.stopped(stopped.value)
+            assert not limit.stopped(ValueError("statement timeout"))
+        with database.session(read_only=True) as session:
+            assert session.execute(text("SELECT 1")).scalar() == 1
 
 
 def test_a_server_that_does_not_run_is_said_not_to_answer() -> None:

@@ -211,7 +211,7 @@ export class Panel {
     const { relations } = this.viewer.model, found = new Map();
     if (!relations) return [];
     for (let i = 0; i < relations.kind.length; i++) {
-      const [subject, object] = relations.pairs.subarray(2 * i, 2 * i + 2);
+      const subject = relations.pairs[2 * i], object = relations.pairs[2 * i + 1];
       if (subject !== stone && object !== stone) continue;
       const name = say((subject === stone ? relations.names : relations.inverse)[relations.kind[i]]);
       found.set(name, [...(found.get(name) ?? []), this.link(subject === stone ? object : subject)]);
@@ -223,7 +223,7 @@ export class Panel {
     const joints = this.viewer.stage.joints(this.viewer.state), rows = [];
     if (!joints) return rows;
     for (let j = 0; j < joints.counts.length; j++) {
-      const [first, second] = joints.bodies.subarray(2 * j, 2 * j + 2);
+      const first = joints.bodies[2 * j], second = joints.bodies[2 * j + 1];
       if (first !== stone && second !== stone) continue;
       const force = Math.hypot(...joints.force.subarray(3 * j, 3 * j + 3));
       const told = joints.columns.filter((one) => !Number.isNaN(one.values[j]) && one.values[j] !== 0).map((one) => `${say(one.label)} ${quantity(one.values[j], one.unit)}`);
