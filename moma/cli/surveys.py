@@ -106,6 +106,9 @@ def sample(
     photographs: Annotated[
         bool, typer.Option("--photographs", help="Twelve photographs of the window too, to orient.")
     ] = False,
+    pictures: Annotated[
+        bool, typer.Option("--pictures", help="With --photographs: render the pictures themselves.")
+    ] = False,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="DIR", help="Folder for the files; default: KIND.")
     ] = None,
@@ -126,6 +129,7 @@ def sample(
             scan=scan,
             courses=courses,
             photographs=photographs,
+            pictures=pictures,
         )
     lines = [
         f"{written.title}: {'a synthetic survey of ' if written.synthetic else ''}{written.stones} stones",

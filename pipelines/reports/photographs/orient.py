@@ -1,5 +1,6 @@
 """`moma orient`: photographs from a project file, or from an export, to orientation.json and a report."""
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from importlib.metadata import version
@@ -94,11 +95,22 @@ def orient_photographs(project: Path | Project, folder: Path) -> OrientReport:
     read = project if isinstance(project, Project) else read_project(project)
     result = orient(read.network, "remove" if read.blunders == "remove" else "report")
     values = orientation_values(result, name=read.name)
+    for one in values["photos"]:
+        if one["name"] in read.pictures:
+            one["picture"] = _beside(read.pictures[one["name"]], folder)
     with replacing(folder, INDEX) as fresh:
-        pictures = draw_photographs(values, fresh)
+        pictures = draw_photographs(values, fresh, read.pictures)
         for one in read.write:
             _WRITERS[one](result.adjusted, fresh)
         values["files"] = sorted([INDEX, "report.html", *(entry.name for entry in fresh.iterdir())])
         write_photographs_page(fresh / "report.html", values, pictures, version("moma-masonry"))
         write_orientation(fresh / INDEX, values)
     return OrientReport(folder, result, values)
+
+
+def _beside(picture: Path, folder: Path) -> str:
+    """Return the path of a picture from a folder; the whole path where there is none, as from another drive."""
+    try:
+        return Path(os.path.relpath(picture.resolve(), folder.resolve())).as_posix()
+    except ValueError:
+        return picture.resolve().as_posix()

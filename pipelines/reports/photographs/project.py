@@ -1,7 +1,7 @@
 """Project files of `moma orient`: where marks, control points, cameras and photographs are, and what is estimated."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -89,6 +89,12 @@ PROJECT_KEYS = (
         default=(),
     ),
     Key(
+        "pictures",
+        ValueKind.TEXT,
+        "Folder of the photographs themselves, on which results are drawn.",
+        default=None,
+    ),
+    Key(
         "calibrate",
         ValueKind.TEXTS,
         "Parameters of cameras without a list of their own that are estimated.",
@@ -159,12 +165,14 @@ class Project:
     network : with its control points
     blunders : "report" or "remove"
     write : formats in which the result is written too
+    pictures : file of each photograph by its name; empty: not given
     """
 
     name: str
     network: Network
     blunders: str
     write: tuple[str, ...] = ()
+    pictures: Mapping[str, Path] = field(default_factory=dict)
 
 
 def read_project(path: Path) -> Project:
@@ -199,7 +207,61 @@ def read_project(path: Path) -> Project:
     for one in write:
         if one not in WRITTEN:
             document.fail(f"no format {one!r}", "write", remedy=nearest(one, WRITTEN))
-    return Project(str(values["name"] or path.stem), network, str(values["blunders"]), write)
+    pictures = (
+        {}
+        if values["pictures"] is None
+        else _pictures(document, path.parent / str(values["pictures"]), network)
+    )
+    return Project(str(values["name"] or path.stem), network, str(values["blunders"]), write, pictures)
+
+
+_ENDINGS = (".jpg", ".jpeg", ".png", ".tif", ".tiff")
+_ASPECT = 0.01  # difference of width over height between a camera and its picture, relative
+
+
+def _pictures(document: TomlDocument, folder: Path, network: Network) -> dict[str, Path]:
+    """Return the file of each photograph: of its name, or of its name with the ending of a picture.
+
+    Raises
+    ------
+    SceneError
+        if there is none, or it has other proportions than the camera
+    """
+    from PIL import Image
+
+    try:
+        files = sorted(one for one in folder.iterdir() if one.suffix.lower() in _ENDINGS)
+    except OSError:
+        document.fail(
+            f"no folder {folder}", "pictures", remedy="give the folder of the photographs, or leave it out"
+        )
+    by_name = {one.stem.lower(): one for one in files} | {one.name.lower(): one for one in files}
+    out = {}
+    for f, photo in enumerate(network.photos):
+        found = by_name.get(photo.name.lower()) or by_name.get(Path(photo.name).stem.lower())
+        if found is None:
+            document.fail(
+                f"no picture of photograph {photo.name} in {folder}",
+                "pictures",
+                remedy=f"name it {photo.name}.jpg, or leave pictures out",
+            )
+        try:
+            with Image.open(found) as picture:
+                width, height = picture.size
+        except OSError as error:
+            document.fail(f"{found} cannot be read: {error}", "pictures", remedy="give JPEG, PNG or TIFF")
+        size = network.camera_of(f).size
+        if abs(width * size[1] / (height * size[0]) - 1.0) > _ASPECT:
+            turned = abs(height * size[1] / (width * size[0]) - 1.0) <= _ASPECT
+            document.fail(
+                f"{found} has {width} × {height} pixels, its camera {size[0]} × {size[1]}",
+                "pictures",
+                remedy="turn it back as the camera took it: marks refer to that"
+                if turned
+                else "give the whole picture, of any resolution",
+            )
+        out[photo.name] = found
+    return out
 
 
 def calibrated(network: Network, names: tuple[str, ...], where: str) -> Network:
