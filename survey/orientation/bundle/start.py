@@ -102,7 +102,8 @@ def check_mirrored(source: Array, target: Array, network: Network) -> None:
         raise SurveyError(
             f"the control points are mirrored: they fit to {wrong:.3g} m as a reflection, to {right:.3g} m otherwise",
             where=one.where or network.path,
-            remedy="check the order and the signs of their coordinates: they must form a right-handed system",
+            remedy="check the order and the signs of their coordinates, which must form a right-handed system, and "
+            "that y of the marks counts downwards",
         )
 
 

@@ -14,7 +14,8 @@ import numpy as np
 from moma.errors import SurveyError
 from survey.arrays import Array
 from survey.formats.fields import unreadable
-from survey.orientation.bundle.orient import Orientation, control_tests
+from survey.orientation.bundle.control import control_tests
+from survey.orientation.bundle.orient import Orientation
 from survey.orientation.bundle.statistics import photo_precision
 from survey.orientation.network import INTERIOR, Camera, Photo
 from survey.orientation.oriented import Oriented

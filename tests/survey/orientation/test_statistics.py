@@ -7,7 +7,8 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from survey.orientation.bundle.adjustment import adjust, prepare, similarity
-from survey.orientation.bundle.orient import control_tests, orient
+from survey.orientation.bundle.control import control_tests
+from survey.orientation.bundle.orient import orient
 from survey.orientation.bundle.statistics import photo_precision, statistics
 from survey.orientation.network import INTERIOR
 from survey.orientation.rotations import angles
