@@ -56,6 +56,7 @@ def photomodeler_project(
     fixed_control: bool = False,
     check: tuple[str, ...] = (),
     blunders: str = "report",
+    size: tuple[int, int] | None = None,
 ) -> Project:
     """Make a project of an export of PhotoModeler and a file of control points, without a project file.
 
@@ -64,7 +65,7 @@ def photomodeler_project(
     UsageError, SurveyError
         as of `read_project`
     """
-    network = read_photomodeler(export)
+    network = read_photomodeler(export, size)
     if control is not None:
         network = with_control(network, read_control(control), fixed=fixed_control, check=check)
     elif fixed_control or check:

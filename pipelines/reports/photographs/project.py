@@ -44,6 +44,13 @@ PROJECT_KEYS = (
         default=None,
     ),
     Key(
+        "size",
+        _NUMBERS,
+        "Width and height of the photographs, with an export of PhotoModeler that does not state them.",
+        "px",
+        None,
+    ),
+    Key(
         "colmap",
         ValueKind.TEXT,
         "Folder with a text model of COLMAP, instead of marks and cameras.",
@@ -303,10 +310,16 @@ def _network(
     if main and (cameras or photos):
         document.fail(f"[[cameras]] or [[photos]] beside {main[0]}", "cameras", remedy="leave them out")
     if not main:
+        if values["size"] is not None:
+            document.fail("size beside marks", "size", remedy="write it into [[cameras]]")
         return _marked(document, values, cameras, photos, folder)
+    if values["size"] is not None and main[0] != "photomodeler":
+        document.fail(f"size with {main[0]}", "size", remedy="leave it out")
     source, sigma = folder / str(values[main[0]]), float(str(values["sigma"]))
     if main[0] == "photomodeler":
-        return read_photomodeler(source)
+        return read_photomodeler(
+            source, None if values["size"] is None else _size(document, values["size"], "size")
+        )
     if main[0] == "colmap":
         return read_colmap(source, sigma)
     if main[0] == "dbat":
@@ -351,12 +364,7 @@ def _marked(
 def _camera(document: TomlDocument, number: int, given: Mapping[str, Any]) -> Camera:
     path = ("cameras", str(number))
     values = check_table(document, path, given, CAMERA_KEYS, "[[cameras]]")
-    size = _texts(values["size"])
-    if len(size) != 2 or not all(float(one) == int(one) > 0 for one in size):
-        document.fail(
-            "size is not a width and a height in pixels", *path, "size", remedy="e.g. size = [6000, 4000]"
-        )
-    width, height = (int(one) for one in size)
+    width, height = _size(document, values["size"], *path, "size")
     pixel = values["pixel"]
     if pixel is None:
         if values["unit"] != "px":
@@ -384,6 +392,14 @@ def _camera(document: TomlDocument, number: int, given: Mapping[str, Any]) -> Ca
         _texts(free or ()),
         document.where(*path),
     )
+
+
+def _size(document: TomlDocument, given: object, *path: str) -> tuple[int, int]:
+    """Return width and height in pixels."""
+    size = _texts(given)
+    if len(size) != 2 or not all(float(one) == int(one) > 0 for one in size):
+        document.fail("size is not a width and a height in pixels", *path, remedy="e.g. size = [6000, 4000]")
+    return int(size[0]), int(size[1])
 
 
 def _photo(document: TomlDocument, number: int, given: Mapping[str, Any], cameras: list[str]) -> Photo:

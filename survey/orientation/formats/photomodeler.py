@@ -2,7 +2,7 @@
 
 Lines, all of numbers separated by blanks, after the title in the first:
 
-    tolerance, iterations, and width and height of the photographs [px]
+    tolerance, iterations, and in most exports width and height of the photographs [px]
     standard deviations by default: image point, control, points, stations (3), angles (3)
     c x_p y_p width height K₁ K₂ K₃ P₁ P₂ [mm], and their standard deviations in the next line
     of each photograph, counted from 0, with that number first: its file; X Y Z κ φ ω [°]; their standard deviations;
@@ -90,8 +90,12 @@ class _Lines:
         return number, file.strip() or number
 
 
-def read_photomodeler(path: Path) -> Network:
+def read_photomodeler(path: Path, size: tuple[int, int] | None = None) -> Network:
     """Read an export.
+
+    Parameters
+    ----------
+    size : width and height of the photographs [px], where the export does not state them
 
     Raises
     ------
@@ -100,7 +104,21 @@ def read_photomodeler(path: Path) -> Network:
     """
     lines = _Lines(path)
     lines.line("the title")
-    settings = lines.numbers("the line of tolerance, iterations, width and height", (4,))
+    settings = lines.numbers("the line of tolerance, iterations, width and height", (2, 4))
+    if len(settings) == 4:
+        stated = (int(settings[2]), int(settings[3]))
+        if size is not None and size != stated:
+            raise lines.fail(
+                f"photographs of {stated[0]} × {stated[1]} pixels, but {size[0]} × {size[1]} are given",
+                "leave the size out",
+            )
+    elif size is not None:
+        settings = np.array([*settings, *size], dtype=float)
+    else:
+        raise lines.fail(
+            "the line of tolerance, iterations, width and height has 2 numbers",
+            "give the size of the photographs: size = [6000, 4000] in the project, or --size 6000x4000",
+        )
     if not (settings[2:] >= 1.0).all():
         width, height = settings[2:].astype(int)
         raise lines.fail(f"the photographs have {width} × {height} pixels", "line 2 gives their size")
