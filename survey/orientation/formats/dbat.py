@@ -60,7 +60,10 @@ def read_dbat(path: Path) -> Network:
     if len(cameras) != 1:
         raise given.fail(f"{len(cameras)} cameras", "scripts of one camera can be read")
     images = [row for file in given.all("images", "file") for row in _table(file, base, ("id", "path"))]
-    photos = tuple(Photo(PurePosixPath(str(row["path"])).name, 0, where=str(row["where"])) for row in images)
+    photos = tuple(
+        Photo(PurePosixPath(str(row["path"]).replace("\\", "/")).name, 0, where=str(row["where"]))
+        for row in images
+    )
     photos = _prior(given, base, images, photos)
     number = {str(row["id"]): photo.name for row, photo in zip(images, photos, strict=True)}
     if not photos:
