@@ -7,7 +7,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from moma.errors import UsageError
+from moma.errors import SurveyError, UsageError
 from pipelines.reports.photographs.project import Project, calibrated, read_project
 from pipelines.results.folder import check_replaceable, replacing
 from survey.orientation.bundle.orient import Orientation, orient
@@ -102,7 +102,10 @@ def orient_photographs(project: Path | Project, folder: Path) -> OrientReport:
     with replacing(folder, INDEX) as fresh:
         pictures = draw_photographs(values, fresh, read.pictures)
         for one in read.write:
-            _WRITERS[one](result.adjusted, fresh)
+            try:
+                _WRITERS[one](result.adjusted, fresh)
+            except SurveyError as error:
+                raise error.at(f'write = ["{one}"]') from error
         values["files"] = sorted([INDEX, "report.html", *(entry.name for entry in fresh.iterdir())])
         write_photographs_page(fresh / "report.html", values, pictures, version("moma-masonry"))
         write_orientation(fresh / INDEX, values)

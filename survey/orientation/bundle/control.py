@@ -1,12 +1,14 @@
 """Control points: whether they fit what the photographs show, and what they cannot tell."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from moma.errors import SurveyError
 from survey.arrays import Array
 from survey.orientation.bundle.adjustment import Solution
 from survey.orientation.bundle.statistics import Statistics
-from survey.orientation.network import Network
+from survey.orientation.network import Network, Photo
 
 __all__ = ["FAR_OFF", "MISSES", "control_remarks", "control_tests"]
 
@@ -19,6 +21,7 @@ FAR_OFF = 10.0
 _FLAT = (
     5e-3  # extent of control points off their plane over that in it, below which a mirrored set fits as well
 )
+_NEAR = 0.3  # distance of a station from where it was given, over that from the control points, up to which they agree
 _FOOTPRINT = 0.5  # of a pixel on the object, beyond which coordinates are hardly in metres [m]
 _FINE = 3e-3  # standard deviation of coordinates over that, below which they are not
 
@@ -43,12 +46,12 @@ def control_tests(network: Network, solution: Solution, result: Statistics) -> A
     return out
 
 
-def control_remarks(network: Network, solution: Solution, placed: bool) -> list[str]:
+def control_remarks(network: Network, solution: Solution, photos: Sequence[Photo]) -> list[str]:
     """Return remarks on what control points leave open: their unit, and the side of their plane.
 
     Parameters
     ----------
-    placed : stations of photographs were given, so that a mirrored plane shows
+    photos : as they were given: where their stations agree with what was found, a plane is not mirrored
 
     Raises
     ------
@@ -73,6 +76,10 @@ def control_remarks(network: Network, solution: Solution, placed: bool) -> list[
             )
         out.append(f"{told}: are their coordinates in metres?")
     _, sizes, axes = np.linalg.svd(places - places.mean(axis=0), full_matrices=False)
+    found = zip((one.station for one in photos), solution.unknowns.station, strict=True)
+    off = [float(np.linalg.norm(here - there)) for there, here in found if there is not None]
+    placed = bool(off) and np.median(off) < _NEAR * np.linalg.norm(towards)
+    placed = placed or any(one.observed_station is not None or one.fixed for one in photos)
     if sizes[2] < _FLAT * sizes[0] and not placed:
         normal = axes[2] * np.sign(axes[2] @ towards)
         x, y, z = normal.round(2) + 0.0

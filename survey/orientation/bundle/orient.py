@@ -1,6 +1,6 @@
 """Photographs, from marks to a checked orientation: soundness, start values, adjustment, blunders, statistics."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -17,7 +17,7 @@ from survey.orientation.bundle.resection import similarity_between
 from survey.orientation.bundle.soundness import check_network
 from survey.orientation.bundle.start import aligned, check_mirrored, start_values, swapped, without_start
 from survey.orientation.bundle.statistics import CRITICAL, Statistics, statistics
-from survey.orientation.network import Network, Photo, listed
+from survey.orientation.network import Control, Network, Photo, listed
 from survey.orientation.projection import project
 
 __all__ = ["Blunders", "Orientation", "orient"]
@@ -102,7 +102,7 @@ def orient(network: Network, blunders: Blunders = "report") -> Orientation:
     """
     check_network(network)
     used, remarks = _useful(network)
-    placed = any(one.station is not None or one.observed_station is not None for one in network.photos)
+    given = network.photos
     with _few_threads(network):
         network, prepared, solution = _oriented(network, used)
         try:
@@ -111,14 +111,14 @@ def orient(network: Network, blunders: Blunders = "report") -> Orientation:
             _check_control_alone(network)
             raise
         _check_control(network, solution, result)
-        removed, given = dict[int, float](), network
+        removed, control = dict[int, float](), network.control
         if blunders == "remove":
             network, used, prepared, solution, result = _snooped(
                 network, used, prepared, solution, result, removed
             )
-    remarks += _left_out(given, network, solution, result)
+    remarks += _left_out(control, network, solution, result)
     remarks += _tested_control(network, solution, result)
-    remarks += control_remarks(network, solution, placed)
+    remarks += control_remarks(network, solution, given)
     suspected = {*removed, *_suspects(result).tolist()}
     if removed:
         remarks.append(
@@ -137,10 +137,12 @@ def orient(network: Network, blunders: Blunders = "report") -> Orientation:
     )
 
 
-def _left_out(given: Network, network: Network, solution: Solution, result: Statistics) -> list[str]:
+def _left_out(
+    given: Sequence[Control], network: Network, solution: Solution, result: Statistics
+) -> list[str]:
     """Return a remark on control points that were left out, by how much the others contradict them."""
     tests = control_tests(network, solution, result)
-    pairs = zip(given.control, network.control, tests, strict=True)
+    pairs = zip(given, network.control, tests, strict=True)
     names = [
         f"{network.names[new.point]} ({test:.1f} σ, {1e3 * off:.3g} mm)"
         for old, new, test in pairs

@@ -116,6 +116,13 @@ def _check_control(network: Network) -> None:
             )
     places = [one.place for one in points]
     places += [one.observed_station for one in network.photos if one.observed_station is not None]
+    held = any(one.fixed or one.observed_station is not None for one in network.photos)
+    if network.control and not points and not held:
+        raise SurveyError(
+            f"all {len(network.control)} control points only check the result: none holds the photographs",
+            where=network.control[0].where or network.path,
+            remedy="take three or more out of the list of those that check",
+        )
     if not places or any(one.fixed for one in network.photos):
         return
     if len(places) < 3:

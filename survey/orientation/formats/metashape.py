@@ -16,6 +16,7 @@ import numpy as np
 from moma.errors import SurveyError
 from survey.arrays import Array
 from survey.formats.fields import parse_number
+from survey.orientation.formats.marks import marks_of_points
 from survey.orientation.formats.xml_lines import Element, read_xml
 from survey.orientation.network import Camera, Control, Network, Photo
 
@@ -266,9 +267,10 @@ def write_metashape(network: Network, path: Path) -> None:
             out.append(f'<reference x="{x!r}" y="{y!r}" z="{z!r}"{own} enabled="true"/>')
         out.append("</marker>")
     out += ["</markers>", "<frames>", '<frame id="0">', "<markers>"]
+    of_point = marks_of_points(network)
     for i in range(len(network.names)):
         out.append(f'<marker marker_id="{i}">')
-        for k in np.flatnonzero(network.point == i).tolist():
+        for k in of_point[i]:
             x, y = network.image[k].tolist()
             out.append(f'<location camera_id="{network.photo[k]}" pinned="true" x="{x!r}" y="{y!r}"/>')
         out.append("</marker>")

@@ -24,6 +24,7 @@ from moma.errors import SurveyError
 from survey.arrays import Array
 from survey.formats.fields import parse_number, shown
 from survey.formats.text_lines import TextLines
+from survey.orientation.formats.marks import numbered
 from survey.orientation.network import Camera, Control, Network, Photo
 from survey.orientation.rotations import angles, from_angles
 
@@ -240,12 +241,15 @@ def _smart_points(numbers: list[int], marks: list[tuple[int, Array]]) -> tuple[i
 
 
 def write_photomodeler(network: Network, path: Path, title: str = "moma") -> None:
-    """Write a network in this format, with all digits; the names of points must be whole numbers.
+    """Write a network in this format, with all digits.
+
+    Points are numbers in this format. Where one has another name, all are numbered, and NAME-points.txt beside the file
+    has number and name of each.
 
     Raises
     ------
     SurveyError
-        if a point has another name, or a camera another model or unit, affinity or skew: the format has no place
+        if a camera has another model or unit, affinity or skew: the format has no place
     """
     camera = network.cameras[0]
     for one in network.cameras:
@@ -255,11 +259,7 @@ def write_photomodeler(network: Network, path: Path, title: str = "moma") -> Non
                 where=str(path),
                 remedy="this format holds backward distortion in millimetres, without affinity and skew",
             )
-    for name in network.names:
-        if not name.isdigit():
-            raise SurveyError(
-                f"point {shown(name)} is not a number", where=str(path), remedy="number the points"
-            )
+    names = numbered(network, path.with_name(f"{path.stem}-points.txt"))
 
     def row(values: Sequence[float] | Array) -> str:
         return " ".join(repr(float(one)) for one in values)
@@ -285,13 +285,13 @@ def write_photomodeler(network: Network, path: Path, title: str = "moma") -> Non
         ]
     sigmas = row(np.zeros(3))
     text.append("")
-    text += [f"{network.names[one.point]} {row(one.place)} {sigmas}" for one in network.control]
+    text += [f"{names[one.point]} {row(one.place)} {sigmas}" for one in network.control]
     text.append("")
     known = np.isfinite(network.start).all(axis=1)
-    text += [f"{network.names[i]} {row(network.start[i])} {sigmas}" for i in np.flatnonzero(known)]
+    text += [f"{names[i]} {row(network.start[i])} {sigmas}" for i in np.flatnonzero(known)]
     text.append("")
     for k in range(len(network.photo)):
         text.append(
-            f"{network.photo[k]} {network.names[network.point[k]]} {row(network.image[k])} {row(network.sigma[k])}"
+            f"{network.photo[k]} {names[network.point[k]]} {row(network.image[k])} {row(network.sigma[k])}"
         )
     path.write_text("\n".join([*text, ""]), encoding="utf-8", newline="\n")

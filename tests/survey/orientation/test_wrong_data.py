@@ -121,6 +121,22 @@ def test_mirrored_control_points_of_one_plane_without_start_values_are_told_as_a
         assert side in remark.replace("-0,", "0,")
 
 
+def test_mirrored_control_points_of_one_plane_are_told_where_stations_are_given():
+    """Stations that are found elsewhere than they were given leave the question open; those that agree do not."""
+    one = network(relief=0.0)
+    flat = replace(one, control=tuple(replace(c, place=c.place * (1, 0, 1)) for c in one.control))
+    start = np.full_like(one.start, np.nan)
+    assert not [text for text in orient(replace(flat, start=start)).remarks if "mirrored" in text]
+    result = orient(replace(placed(flat, MIRRORS["x"]), start=start))
+    assert [text for text in result.remarks if "mirrored" in text]
+
+
+def test_control_points_that_all_check_hold_nothing():
+    one = network()
+    checks = tuple(replace(c, check=True) for c in one.control)
+    refused(replace(one, control=checks), "all 8 control points only check the result", "control.txt:1")
+
+
 def test_marks_that_count_upwards_are_mirrored():
     one = without_start(network())
     height = one.cameras[0].size[1]

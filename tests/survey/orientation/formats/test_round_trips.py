@@ -159,10 +159,21 @@ def test_what_a_format_has_no_place_for_is_refused(tmp_path):
         write_metashape(written(), tmp_path / "a.xml")
     with pytest.raises(SurveyError, match=r"as 0\.0002"):
         write_photomodeler(written(), tmp_path / "a.txt")
-    named = replace(written(plain=True), names=tuple(f"p{k}" for k in range(len(written().names))))
-    with pytest.raises(SurveyError, match="'p0' is not a number"):
-        write_photomodeler(named, tmp_path / "a.txt")
     assert not list(tmp_path.iterdir())
+
+
+def test_points_with_names_are_numbered_and_the_table_says_how(tmp_path):
+    names = tuple(f"p{k}" for k in range(len(written().names)))
+    plain, forward = (replace(one, names=names) for one in (written(plain=True), written(forward=True)))
+    write_photomodeler(plain, tmp_path / "export.txt")
+    write_colmap(forward, tmp_path / "model")
+    for back, network, table in (
+        (read_photomodeler(tmp_path / "export.txt"), plain, tmp_path / "export-points.txt"),
+        (read_colmap(tmp_path / "model"), forward, tmp_path / "model/points-names.txt"),
+    ):
+        rows = table.read_text(encoding="utf-8").splitlines()[1:]
+        name = dict(row.split(", ") for row in rows)
+        same_pictures(network, replace(back, names=tuple(name[one] for one in back.names)))
 
 
 def test_dbat_writes_distortion_as_the_toolbox_does(tmp_path):
