@@ -23,7 +23,7 @@ _QUALITY = 88  # of JPEG
 
 @dataclass(frozen=True)
 class PhotographedScene:
-    """What is photographed.
+    """Coloured and textured quadrilaterals before the camera.
 
     Attributes
     ----------
