@@ -201,7 +201,8 @@ def _useful(network: Network) -> tuple[NDArray[np.bool_], list[str]]:
     remarks = []
     if lone.any():
         names = [network.names[i] for i in np.flatnonzero(lone)]
-        remarks.append(f"{len(names)} points are marked on one photograph only and left out: {listed(names)}")
+        what = "1 point is" if len(names) == 1 else f"{len(names)} points are"
+        remarks.append(f"{what} marked on one photograph only and left out: {listed(names)}")
     return ~lone[network.point], remarks
 
 

@@ -125,13 +125,14 @@ def with_control(
     SurveyError
         if none of the points is marked on a photograph, or a point to check is unknown
     """
-    index = {name: k for k, name in enumerate(network.names)}
+    marked = set(network.point.tolist())
+    index = {name: k for k, name in enumerate(network.names) if k in marked}
     known = [row for row in rows if row.number in index]
     if not known:
         raise SurveyError(
             f"none of the {len(rows)} control points is marked on a photograph: {listed([row.number for row in rows])}",
             where=rows[0].where.rpartition(":")[0] if rows else network.path,
-            remedy=f"marked points: {listed(network.names)}",
+            remedy=f"marked points: {listed(list(index))}",
         )
     names = {row.number for row in known} | {row.name for row in known if row.name}
     for wanted in check:
