@@ -2,13 +2,13 @@
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from moma.errors import SurveyError, UsageError
-from pipelines.reports.photographs.project import Project, calibrated, read_project
+from pipelines.reports.photographs.project import Project, calibrated, exported_control, read_project
 from pipelines.results.folder import check_replaceable, replacing
 from survey.orientation.bundle.orient import Orientation, orient
 from survey.orientation.formats.colmap import write_colmap
@@ -68,11 +68,10 @@ def photomodeler_project(
     network = read_photomodeler(export, size)
     if control is not None:
         network = with_control(network, read_control(control), fixed=fixed_control, check=check)
+    elif network.control and not check:
+        network = exported_control(network, fixed_control)
     elif fixed_control or check:
         raise UsageError("--fixed-control or --check without --control", remedy="give --control FILE")
-    elif network.control:
-        # their places are results of an adjustment, and no observations
-        network = replace(network, control=())
     network = calibrated(network, calibrate, "--calibrate")
     return Project(export.stem, network, blunders)
 

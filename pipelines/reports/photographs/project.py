@@ -26,6 +26,7 @@ __all__ = [
     "WRITTEN",
     "Project",
     "calibrated",
+    "exported_control",
     "read_project",
 ]
 
@@ -206,6 +207,8 @@ def read_project(path: Path) -> Project:
         network = with_control(
             network, rows, fixed=bool(values["fixed_control"]), check=_texts(values["check"])
         )
+    elif values["photomodeler"] is not None and network.control:
+        network = exported_control(network, bool(values["fixed_control"]))
     elif values["check"] or values["fixed_control"]:
         key = "check" if values["check"] else "fixed_control"
         document.fail(f"{key} without control points", key, remedy="give control = FILE")
@@ -220,6 +223,20 @@ def read_project(path: Path) -> Project:
         else _pictures(document, path.parent / str(values["pictures"]), network)
     )
     return Project(str(values["name"] or path.stem), network, str(values["blunders"]), write, pictures)
+
+
+def exported_control(network: Network, fixed: bool) -> Network:
+    """Keep the control points of an export of PhotoModeler as fixed points, or leave them out with a remark.
+
+    The export has their adjusted places, which are no observations unless they were fixed.
+    """
+    if fixed:
+        return network
+    remark = (
+        f"{len(network.control)} control points of the export are left out, as it has their adjusted places: give "
+        "their file, or fix them"
+    )
+    return replace(network, control=(), remarks=(*network.remarks, remark))
 
 
 _ENDINGS = (".jpg", ".jpeg", ".png", ".tif", ".tiff")

@@ -187,7 +187,9 @@ def test_an_export_that_does_not_state_the_size_of_its_photographs(tmp_path):
     lines[1] = "0.0005 20"
     (tmp_path / "export.txt").write_text("\n".join(lines), encoding="utf-8")
     given = ("orient", "--photomodeler", tmp_path / "export.txt", "--out", tmp_path / "out")
-    assert "export.txt:2: the line of tolerance, iterations, width and height has 2 numbers" in fails(1, *given)
+    assert "export.txt:2: the line of tolerance, iterations, width and height has 2 numbers" in fails(
+        1, *given
+    )
     assert "write width and height" in fails(2, *given, "--size", "6000")
     assert "6 photographs" in prints(*given, "--size", "6000x4000")
     project = tmp_path / "project.toml"
@@ -224,3 +226,15 @@ def test_results_are_drawn_on_pictures_of_any_resolution(tmp_path):
     assert values["photos"][0]["picture"] == "../pictures/p01.PNG"
     (tmp_path / "pictures/p02.PNG").unlink()
     assert "no picture of photograph P02" in fails(2, "orient", path, "--out", tmp_path / "out")
+
+
+def test_control_points_of_an_export_are_results_unless_they_are_fixed(tmp_path):
+    write_photomodeler(network(plain=True), tmp_path / "export.txt")
+    path = tmp_path / "project.toml"
+    for more, points in (("", 0), ("fixed_control = true\n", 6)):
+        path.write_text(f'photomodeler = "export.txt"\n{more}', encoding="utf-8")
+        told = answer("orient", path, "--out", tmp_path / "out")
+        assert len(told["control"]) == points
+        assert any("are left out, as it has their adjusted places" in one for one in told["remarks"]) == (
+            not points
+        )

@@ -208,3 +208,11 @@ def test_dbat_stations_known_beforehand(tmp_path):
     np.testing.assert_array_equal(photo.station_sigma, [0.05] * 3)
     np.testing.assert_allclose(angles(photo.rotation), [0.1, 0.2, 0.3])
     assert photo.observed_rotation is None
+
+
+def test_check_points_of_metashape_remain_check_points(tmp_path):
+    network = written(forward=True)
+    checks = tuple(replace(one, check=k == 1) for k, one in enumerate(network.control))
+    write_metashape(replace(network, control=checks), tmp_path / "doc.xml")
+    back = read_metashape(tmp_path / "doc.xml")
+    assert {back.names[one.point] for one in back.control if one.check} == {network.names[checks[1].point]}
