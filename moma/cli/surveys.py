@@ -106,6 +106,9 @@ def sample(
     photographs: Annotated[
         bool, typer.Option("--photographs", help="Twelve photographs of the window too, to orient.")
     ] = False,
+    pictures: Annotated[
+        bool, typer.Option("--pictures", help="With --photographs: render the pictures themselves.")
+    ] = False,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="DIR", help="Folder for the files; default: KIND.")
     ] = None,
@@ -126,6 +129,7 @@ def sample(
             scan=scan,
             courses=courses,
             photographs=photographs,
+            pictures=pictures,
         )
     lines = [
         f"{written.title}: {'a synthetic survey of ' if written.synthetic else ''}{written.stones} stones",
@@ -167,6 +171,14 @@ def orient(
     check: Annotated[
         str | None, typer.Option("--check", metavar="LIST", help="Control points that only check the result.")
     ] = None,
+    size: Annotated[
+        str | None,
+        typer.Option(
+            "--size",
+            metavar="WIDTHxHEIGHT",
+            help="Size of the photographs in pixels, where the export does not state it.",
+        ),
+    ] = None,
     blunders: Annotated[
         Blunders | None,
         typer.Option(help="Whether marks that the test finds wrong are left out; default: report."),
@@ -190,7 +202,7 @@ def orient(
     if project is not None:
         for name, given in (
             ("--control", control), ("--calibrate", calibrate), ("--fixed-control", fixed_control or None),
-            ("--check", check), ("--blunders", blunders),
+            ("--check", check), ("--size", size), ("--blunders", blunders),
         ):  # fmt: skip
             if given is not None:
                 raise UsageError(f"{name} with a project file", remedy="write it into the project file")
@@ -204,6 +216,7 @@ def orient(
             fixed_control,
             _names(check),
             (blunders or Blunders.REPORT).value,
+            None if size is None else _pixels(size),
         )
     folder = out or Path("out") / (project or photomodeler or Path("photographs")).stem
     with compiling_beside("orient"):
@@ -213,6 +226,13 @@ def orient(
     left = ("covariance", "marks")
     shown = {name: value for name, value in report.values.items() if name not in left}
     print(as_json({**shown, "folder": str(folder)}) if json else "\n".join(orient_lines(report, verbose)))
+
+
+def _pixels(text: str) -> tuple[int, int]:
+    width, _, height = text.lower().partition("x")
+    if not (width.strip().isdigit() and height.strip().isdigit()):
+        raise UsageError(f"--size {text!r}", remedy="write width and height in pixels, e.g. --size 6000x4000")
+    return int(width), int(height)
 
 
 def _names(text: str | None) -> tuple[str, ...]:

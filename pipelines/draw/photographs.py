@@ -1,6 +1,7 @@
-"""Pictures of oriented photographs: a plan of the network with rays and ellipses, and residuals on each photograph."""
+"""Pictures of oriented photographs: a plan of the network with rays and ellipses, residuals and outlines on them."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -8,17 +9,24 @@ import numpy as np
 
 from mechanics.arrays import Array
 from pipelines.draw.elevations.sheet import FLAG, INK, PALE, PLAIN, new_sheet, save_sheet
+from survey.orientation.oriented import Oriented
+from survey.orientation.projection import project
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["draw_network", "draw_photo_residuals"]
+__all__ = ["DrawnOutline", "draw_network", "draw_outlines", "draw_photo_residuals"]
 
 _RAYS = 4000  # rays drawn in the plan
 _ELLIPSES = 400  # ellipses drawn in the plan
 _NAMED = 40  # photographs named in the plan
 _PHOTOS = 24  # photographs whose residuals are drawn: those with the largest first
 _READABLE = 0.04  # length of a typical residual over the width of its photograph
+_DRAWN = 6  # photographs on which outlines are drawn: those with most marks of stones
+_PARTS = 8  # pieces of a side of an outline, which the lens bends
+_MARGIN = 0.01  # of the width of a photograph, shown around outlines
+_LONG = 1500  # pixels of the longer side of a picture that is laid under a drawing
+_FAINT = 0.75  # opacity of such a picture
 _VISIBLE = 0.02  # semi-axis of a typical ellipse over the extent of the network
 
 
@@ -93,13 +101,16 @@ def _ellipses(covariances: Array) -> tuple[Array, Array, Array]:
     return sizes[:, 1], sizes[:, 0], np.degrees(np.arctan2(axes[:, 1, 1], axes[:, 0, 1]))
 
 
-def draw_photo_residuals(path: Path, values: Mapping[str, Any]) -> tuple[int, float]:
+def draw_photo_residuals(
+    path: Path, values: Mapping[str, Any], pictures: Mapping[str, Path]
+) -> tuple[int, float]:
     """Draw the residuals of marks as vectors on each photograph; return how many photographs, and how much is enlarged.
 
     Parameters
     ----------
     path : PNG
     values : of `orientation_values`
+    pictures : files of the photographs themselves, by their names
     """
     marks = values["marks"]
     size = {one["name"]: one["size"] for one in values["cameras"]}
@@ -122,6 +133,8 @@ def draw_photo_residuals(path: Path, values: Mapping[str, Any]) -> tuple[int, fl
     grid = np.atleast_1d(figure.subplots(rows, columns, squeeze=False)).ravel()
     for axes, one in zip(grid, photos, strict=False):
         mine = of == one["name"]
+        if one["name"] in pictures:
+            _lay_under(axes, pictures[one["name"]], size[one["camera"]])
         _vectors(axes, at[mine], factor * off[mine], verdict[mine] != "")
         w, h = size[one["camera"]]
         axes.set_xlim(0, w)
@@ -146,3 +159,99 @@ def _vectors(axes: "Axes", at: Array, off: Array, wrong: Sequence[bool] | Array)
     colours = [FLAG if one else PLAIN for one in wrong]
     axes.add_collection(LineCollection(list(lines), colors=colours, linewidths=0.7))
     axes.plot(*at.T, ".", color=INK, markersize=1.0)
+
+
+def _lay_under(axes: "Axes", picture: Path, size: Sequence[int]) -> None:
+    """Lay a photograph under a drawing in the pixels of its camera."""
+    from PIL import Image
+
+    with Image.open(picture) as opened:
+        opened.draft("RGB", (_LONG, _LONG))
+        shown = opened.convert("RGB")
+    shown.thumbnail((_LONG, _LONG))
+    axes.imshow(np.asarray(shown), extent=(0, size[0], size[1], 0), alpha=_FAINT, zorder=0)
+
+
+@dataclass(frozen=True)
+class DrawnOutline:
+    """A stone whose face is drawn on photographs.
+
+    Attributes
+    ----------
+    code : of the stone
+    corners : (nv, 3) of its face [m]
+    normal : (3,) outward
+    marks : places on photographs behind its corners and points [px], by the name of the photograph
+    drawn : name of the photograph on which the whole outline was drawn; None if it was not
+    """
+
+    code: str
+    corners: Array
+    normal: Array
+    marks: Mapping[str, Array]
+    drawn: str | None
+
+
+def draw_outlines(
+    path: Path, oriented: Oriented, stones: Sequence[DrawnOutline], pictures: Mapping[str, Path]
+) -> tuple[str, ...]:
+    """Draw the outlines of stones on the photographs with most of their marks; return the names of these.
+
+    Parameters
+    ----------
+    path : PNG
+    oriented : the photographs
+    stones : in the frame of the photographs
+    pictures : files of the photographs themselves, by their names
+    """
+    count = {one.name: sum(len(stone.marks.get(one.name, ())) for stone in stones) for one in oriented.photos}
+    drawn_on = {stone.drawn for stone in stones}
+    best = sorted(count, key=lambda name: (name not in drawn_on, -count[name]))
+    chosen = sorted(name for name in best[:_DRAWN] if count[name])
+    columns = min(2, len(chosen))
+    rows = -(-len(chosen) // columns)
+    figure = new_sheet((11.0, 3.9 * rows))
+    grid = np.atleast_1d(figure.subplots(rows, columns, squeeze=False)).ravel()
+    for axes, name in zip(grid, chosen, strict=False):
+        f = oriented.index(name, str(path))
+        if name in pictures:
+            _lay_under(axes, pictures[name], oriented.camera(f).size)
+        _outlines(axes, oriented, f, stones)
+        axes.set_title(name, fontsize=7, color=INK)
+    for axes in grid:
+        axes.set_aspect("equal")
+        axes.set_xticks([])
+        axes.set_yticks([])
+    for axes in grid[len(chosen) :]:
+        axes.set_visible(False)
+    save_sheet(figure, path)
+    return tuple(chosen)
+
+
+def _outlines(axes: "Axes", oriented: Oriented, f: int, stones: Sequence[DrawnOutline]) -> None:
+    from matplotlib.collections import LineCollection
+
+    photo, camera = oriented.photos[f], oriented.camera(f)
+    width, height = camera.size
+    lines, colours, marks = list[Array](), list[str](), list[Array]()
+    part = np.arange(_PARTS)[:, None] / _PARTS
+    for stone in stones:
+        if stone.normal @ (oriented.station(f) - stone.corners.mean(axis=0)) <= 0.0:
+            continue
+        sides = zip(stone.corners, np.roll(stone.corners, -1, axis=0), strict=True)
+        along = np.concatenate([a + part * (b - a) for a, b in sides])
+        seen = project(camera, oriented.rotation(f), oriented.station(f), along)
+        if np.isfinite(seen).all() and ((seen > 0.0) & (seen < (width, height))).all(axis=1).any():
+            lines.append(np.concatenate([seen, seen[:1]]))
+            colours.append(FLAG if stone.drawn == photo.name else PLAIN)
+        if photo.name in stone.marks:
+            marks.append(stone.marks[photo.name])
+    axes.add_collection(LineCollection(lines, colors=colours, linewidths=0.8))
+    if marks:
+        axes.plot(*np.concatenate(marks).T, ".", color=INK, markersize=1.5)
+    shown = np.concatenate([*lines, *marks])
+    margin = _MARGIN * width
+    low = np.maximum(shown.min(axis=0) - margin, 0.0)
+    high = np.minimum(shown.max(axis=0) + margin, (width, height))
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(high[1], low[1])

@@ -1,7 +1,8 @@
 """Twelve synthetic photographs of the window bay: a project to orient them, and its stones marked on them.
 
-Nothing is rendered: points of the true stones are projected by known cameras with lens distortion, with noise, as
-if they had been marked. Joints are open as in the survey; corners are sound.
+Marks are points of the true stones, projected by known cameras with lens distortion, with noise, as if somebody had
+marked them. The photographs themselves are rendered of the same scene by the same cameras. Joints are open as in the
+survey; corners are sound.
 """
 
 from collections.abc import Iterator
@@ -10,8 +11,11 @@ from pathlib import Path
 from random import Random
 
 import numpy as np
+from numpy.typing import NDArray
 
 from moma.errors import UsageError
+from pipelines.draw.offscreen.photographs import PhotographedScene
+from pipelines.draw.pictures import draw_apart
 from pipelines.samples.buildings.window import WindowBay, make_window
 from pipelines.samples.measure import inset, margin_points
 from survey.arrays import Array
@@ -19,12 +23,24 @@ from survey.orientation.network import Camera, Photo
 from survey.orientation.projection import project
 from survey.orientation.rotations import from_angles
 
-__all__ = ["PHOTOGRAPHED", "PHOTOGRAPHS", "TrueCamera", "true_cameras", "write_photographs"]
+__all__ = [
+    "PHOTOGRAPHED",
+    "PICTURES",
+    "TrueCamera",
+    "render_photographs",
+    "true_cameras",
+    "write_photographs",
+]
 
 PHOTOGRAPHED = ("photographs.toml", "marks.txt", "control.txt", "marked.moma")
 """Names of the files that are written."""
 
-PHOTOGRAPHS = 12
+_PHOTOGRAPHS = 12
+
+PICTURES = tuple(f"P{k + 1:02d}.jpg" for k in range(_PHOTOGRAPHS))
+"""Names of the rendered photographs."""
+
+_REDUCED = 4  # pixels of the camera along a pixel of a rendered photograph
 _SEED = 12
 _SIGMA = 0.5  # standard deviation of a mark [px]
 _CONTROL_SIGMA = 0.001  # of each coordinate of a control point [m]
@@ -35,6 +51,16 @@ _SHOWN = 3  # photographs on which a corner or point is marked
 _DISTANCE = 6.5  # of the stations from the wall [m]
 _DRAWN = 9  # every so many stones, the outline is drawn on one photograph
 _SINGLE = 7  # every so many stones, one corner is marked on one photograph only
+_MORTAR = 0.012  # distance of the mortar behind the wall's plane [m]
+_BEHIND = 0.35  # distance of what is seen through the window behind the wall [m]
+_ROOM = 0.3  # seen beyond the edges of the panel [m]
+_TEXTURE = 0.003  # side of a pixel of the wall's texture [m]
+_GREY = 9.0  # standard deviation of the texture of stones and mortar [of 255]
+_PLATE, _DISC, _DOT = (
+    0.04,
+    0.015,
+    0.008,
+)  # half the side of a target's plate, radii of its disc and of a tie point [m]
 
 _CAMERA = Camera(
     "camera",
@@ -63,7 +89,7 @@ name = "window bay, photographs (synthetic)"
 marks = "marks.txt"
 control = "control.txt"
 check = ["T07", "T14"]
-sigma = {sigma}          # px, of a mark
+{pictures}sigma = {sigma}          # px, of a mark
 blunders = "remove"
 
 # As the maker states it; calibrated from the marks.
@@ -74,10 +100,15 @@ pixel = 0.006        # mm
 c = 24.0             # mm
 calibrate = ["c", "xp", "yp", "K1", "K2", "P1", "P2"]
 """
+_PICTURES = 'pictures = "pictures"   # P01.jpg …, a quarter of the size that the camera states\n'
 
 
-def write_photographs(folder: Path) -> tuple[str, ...]:
+def write_photographs(folder: Path, pictures: bool = False) -> tuple[str, ...]:
     """Write photographs.toml, marks.txt, control.txt and marked.moma into a folder; return their paths.
+
+    Parameters
+    ----------
+    pictures : the project names the folder `pictures` of the photographs themselves
 
     Raises
     ------
@@ -93,7 +124,7 @@ def write_photographs(folder: Path) -> tuple[str, ...]:
     names, points = _targets(bay, rng)
     folder.mkdir(parents=True, exist_ok=True)
     texts = (
-        _PROJECT.format(sigma=_SIGMA),
+        _PROJECT.format(sigma=_SIGMA, pictures=_PICTURES if pictures else ""),
         _marks(names, points, cameras, rng),
         _control(names, points, rng),
         _stones(bay, cameras, rng),
@@ -106,8 +137,8 @@ def write_photographs(folder: Path) -> tuple[str, ...]:
 def true_cameras(bay: WindowBay) -> Iterator[TrueCamera]:
     """Yield the photographs: two rows of six, convergent, every third turned by a right angle."""
     frame = bay.frame
-    for k in range(PHOTOGRAPHS):
-        row, column = divmod(k, PHOTOGRAPHS // 2)
+    for k in range(_PHOTOGRAPHS):
+        row, column = divmod(k, _PHOTOGRAPHS // 2)
         along, up = -2.6 + 5.3 * column / 5, 0.7 + 2.4 * row
         station = frame.origin + np.array([along, up, _DISTANCE + 0.4 * (column % 2)]) @ frame.axes
         target = frame.origin + np.array([0.35 * along, 1.95, 0.0]) @ frame.axes
@@ -119,6 +150,96 @@ def true_cameras(bay: WindowBay) -> Iterator[TrueCamera]:
         yield TrueCamera(Photo(f"P{k + 1:02d}", 0, turned, np.round(station, 4)))
 
 
+def render_photographs(folder: Path) -> None:
+    """Render the photographs into a folder, a quarter of their size along either side.
+
+    Raises
+    ------
+    MissingLibraryError
+        if nothing can be drawn on this machine
+    """
+    bay = make_window()
+    names, points = _targets(bay, Random(_SEED))
+    jobs = [
+        {
+            "path": str((folder / f"{one.photo.name}.jpg").absolute()),
+            "inner": _CAMERA.inner.tolist(),
+            "size": list(_CAMERA.size),
+            "pixel": _CAMERA.pixel,
+            "forward": _CAMERA.forward,
+            "rotation": np.asarray(one.photo.rotation).tolist(),
+            "station": np.asarray(one.photo.station).tolist(),
+            "reduced": _REDUCED,
+        }
+        for one in true_cameras(bay)
+    ]
+    draw_apart("pipelines.draw.offscreen.photographs", _scene(bay, names, points), jobs)
+
+
+def _scene(bay: WindowBay, names: list[str], points: Array) -> PhotographedScene:
+    """Return stones before their mortar, the room behind the window, targets on plates, and tie points."""
+    frame, rng = bay.frame, np.random.default_rng(_SEED)
+    plans = np.array([stone.plan.corners for stone in bay.stones])
+    low, high = plans.reshape(-1, 2).min(axis=0) - _ROOM, plans.reshape(-1, 2).max(axis=0) + _ROOM
+    textured, plain, colours = list[Array](), list[Array](), list[tuple[int, int, int]]()
+    for stone, measured in zip(bay.stones, bay.measured, strict=True):
+        front = stone.on_face(frame, inset(stone.plan.corners, measured.half_joints))
+        back = front - 2.0 * _MORTAR * frame.axes[2]
+        textured += [front, frame.place(stone.plan.corners, -_MORTAR)]
+        for a, b in ((0, 1), (1, 2), (2, 3), (3, 0)):
+            plain.append(np.array([front[b], front[a], back[a], back[b]]))
+            colours.append((96, 90, 82))
+    plain.append(frame.place(np.array([low, (high[0], low[1]), high, (low[0], high[1])]), -_BEHIND))
+    colours.append((58, 60, 66))
+    for name, place in zip(names, points, strict=True):
+        target = name.startswith("T")
+        if target:
+            square = _PLATE * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+            plain.append(place - 0.001 * frame.axes[2] + square @ frame.axes[:2])
+            colours.append((20, 20, 20))
+        for quad in _disc(_DISC if target else _DOT):
+            plain.append(place + quad @ frame.axes[:2])
+            colours.append((245, 245, 245) if target else (150, 30, 30))
+    corners = np.concatenate([*textured, *plain])
+    flat = (corners - frame.origin) @ frame.axes[:2].T
+    index = np.arange(len(corners)).reshape(-1, 4)
+    return PhotographedScene(
+        corners,
+        index[len(textured) :],
+        np.array(colours, dtype=np.uint8),
+        index[: len(textured)],
+        np.clip((flat - low) / (high - low), 0.0, 1.0),
+        _texture(bay, low, high, rng),
+    )
+
+
+def _disc(radius: float) -> Iterator[Array]:
+    """Yield quadrilaterals (4, 2) that form a regular polygon of 24 corners about the origin."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 25)
+    ring = radius * np.column_stack([np.cos(turn), np.sin(turn)])
+    for k in range(0, 24, 2):
+        yield np.array([[0.0, 0.0], *ring[k : k + 3]])
+
+
+def _texture(bay: WindowBay, low: Array, high: Array, rng: np.random.Generator) -> NDArray[np.uint8]:
+    """Paint mortar and stones in the plane of the wall, the first row at its top."""
+    from PIL import Image, ImageDraw
+
+    width, height = np.ceil((high - low) / _TEXTURE).astype(int).tolist()
+    picture = Image.new("RGB", (width, height), (168, 160, 146))
+    pen = ImageDraw.Draw(picture)
+    for stone, measured in zip(bay.stones, bay.measured, strict=True):
+        flat = (inset(stone.plan.corners, measured.half_joints) - low) / (high - low)
+        tone = 150.0 + 22.0 * rng.normal()
+        colour = (int(tone * 1.02), int(tone * 0.96), int(tone * 0.85))
+        pen.polygon([(x * width, (1.0 - y) * height) for x, y in flat.tolist()], fill=colour)
+    grain = np.zeros((height, width))
+    for coarse in (1, 4, 16):
+        small = rng.normal(size=(height // coarse + 1, width // coarse + 1))
+        grain += np.kron(small, np.ones((coarse, coarse)))[:height, :width] / np.sqrt(3.0)
+    return np.asarray(np.clip(np.asarray(picture) + _GREY * grain[..., None], 0, 255), dtype=np.uint8)
+
+
 def _targets(bay: WindowBay, rng: Random) -> tuple[list[str], Array]:
     """Return control targets and tie points on and before the wall."""
     columns, rows = _CONTROL
@@ -127,9 +248,7 @@ def _targets(bay: WindowBay, rng: Random) -> tuple[list[str], Array]:
         for r in range(rows)
         for c in range(columns)
     ]
-    flat += [
-        (rng.uniform(-2.3, 2.4), rng.uniform(0.05, 3.85), rng.uniform(-0.02, 0.05)) for _ in range(_TIES)
-    ]
+    flat += [(rng.uniform(-2.3, 2.4), rng.uniform(0.05, 3.85), rng.uniform(0.01, 0.05)) for _ in range(_TIES)]
     names = [f"T{k + 1:02d}" for k in range(columns * rows)] + [f"{k + 1}" for k in range(_TIES)]
     return names, bay.frame.origin + np.array(flat) @ bay.frame.axes
 

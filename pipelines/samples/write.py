@@ -9,7 +9,7 @@ from mechanics.dynamics.progress import Listener, silent
 from moma.errors import UsageError, storing
 from pipelines.samples.causes import PULSE, Cause
 from pipelines.samples.granite_wall import GRANITE_SCENE, GRANITE_WALL, MEASURED, units, units_text
-from pipelines.samples.photographs import PHOTOGRAPHED, write_photographs
+from pipelines.samples.photographs import PHOTOGRAPHED, PICTURES, render_photographs, write_photographs
 from pipelines.samples.rubble_wall import (
     DEPTH,
     RUBBLE_SCENE,
@@ -176,6 +176,7 @@ def write_sample(
     scan: bool = False,
     courses: int | None = None,
     photographs: bool = False,
+    pictures: bool = False,
 ) -> WrittenSample:
     """Write KIND.moma, truth.json and KIND.toml into a folder, created if necessary; of walls for a rig, outlines.
 
@@ -188,20 +189,25 @@ def write_sample(
     folder : in which none of these files exists; created if necessary
     progress : called at every step of the simulation that moves the stones of some
     photographs : photographs.toml, marks.txt, control.txt and marked.moma too: of the window
+    pictures : the photographs themselves too, rendered into the folder `pictures`
 
     Raises
     ------
     UsageError
         if there is no such sample, or a file would be overwritten
+    MissingLibraryError
+        if no picture can be rendered on this machine
     StorageError
         if the disk is full, for example; none of the files is left then
     """
     if kind in _PUSHED:
-        if moved or small or phases or scan or courses is not None or photographs:
+        if moved or small or phases or scan or courses is not None or photographs or pictures:
             raise UsageError(f"an option with the sample {kind!r}", remedy="it has none")
         return _write_rubble_wall(folder) if kind == RUBBLE_WALL else _write_granite_wall(folder)
     if photographs and kind != "window":
         raise UsageError(f"--photographs with the sample {kind!r}", remedy="it is for the window")
+    if pictures and not photographs:
+        raise UsageError("--pictures without --photographs", remedy="give --photographs too")
     recipe = recipe_of(kind, moved=moved, small=small, phases=phases, scan=scan, courses=courses)
     cause = recipe.cause
     survey, scene, truth = folder / f"{kind}.moma", folder / f"{kind}.toml", folder / "truth.json"
@@ -222,6 +228,7 @@ def write_sample(
         extra = tuple(folder / name for name in _SCANNED)
     if photographs:
         extra += tuple(folder / name for name in PHOTOGRAPHED)
+        extra += tuple(folder / "pictures" / name for name in PICTURES) if pictures else ()
         project, result = folder / "photographs.toml", folder / "photographs"
         commands = (f"moma orient {project} --out {result}", *commands)
     _must_be_new(*texts, *extra)
@@ -239,7 +246,10 @@ def write_sample(
             if sample.scan is not None:
                 _write_scan(sample.scan, folder)
             if photographs:
-                write_photographs(folder)
+                write_photographs(folder, pictures)
+            if pictures:
+                (folder / "pictures").mkdir(exist_ok=True)
+                render_photographs(folder / "pictures")
     files = tuple(map(str, paths))
     stones = len(sample.survey.blocks) + len(sample.modelled)
     return WrittenSample(kind, recipe.title, stones, files, commands)

@@ -5,14 +5,21 @@ import tomllib
 
 import numpy as np
 import pytest
+from PIL import Image
 
+from pipelines.reports.photographs.project import read_project
 from pipelines.samples.buildings.window import make_window
 from pipelines.samples.measure import inset
+from pipelines.samples.photographs import true_cameras
 from survey.formats.reading import open_survey
+from survey.orientation.bundle.orient import orient
+from survey.orientation.formats.control import read_control
 from survey.stones import survey_stones
 from tests.docs.pages import blocks, ran
 
 PAGE = "docs/howto/photographs.md"
+
+pytestmark = pytest.mark.draws
 
 
 @pytest.fixture(scope="module")
@@ -20,6 +27,45 @@ def bay(tmp_path_factory):
     folder = tmp_path_factory.mktemp("photographs")
     said = ran(folder, "".join(blocks(PAGE, "bash")))
     return folder, said
+
+
+def discs(folder, photo, near):
+    """Centres of the white discs of targets on a rendered photograph, near places on it [px of the camera]."""
+    with Image.open(folder / f"out/bay/pictures/{photo}.jpg") as picture:
+        grey = np.asarray(picture.convert("L"), dtype=float)
+    down, across = np.mgrid[-5:6, -5:6]
+    found = []
+    for u, v in near / 4.0:
+        rows, columns = int(v) + down, int(u) + across
+        weight = np.clip(grey[rows, columns] - 80.0, 0.0, None)
+        weight *= np.hypot(columns + 0.5 - u, rows + 0.5 - v) < 4.5  # the wall about the plate is bright too
+        found.append([(weight * (columns + 0.5)).sum(), (weight * (rows + 0.5)).sum()] / weight.sum())
+    return 4.0 * np.array(found)
+
+
+def test_the_rendered_photographs_show_what_the_camera_does(bay):
+    """The centres of targets, measured in the pixels, orient the photographs and calibrate the lens."""
+    window = make_window()
+    points = {
+        row.number: row.place
+        for row in read_control(bay[0] / "out/bay/control.txt")
+        if row.number not in ("T05", "T10", "T15", "T20")  # some are cut off by the edge of the wall
+    }
+    lines = []
+    for camera in true_cameras(window):
+        seen = camera.see(np.array(list(points.values())))
+        measured = discs(bay[0], camera.photo.name, seen)
+        lines += [f"{camera.photo.name}, {p}, {x}, {y}" for p, (x, y) in zip(points, measured, strict=True)]
+    project = bay[0] / "out/bay/pixels.toml"
+    (bay[0] / "out/bay/pixels.txt").write_text("\n".join(lines), encoding="utf-8")
+    text = (bay[0] / "out/bay/photographs.toml").read_text(encoding="utf-8")
+    text = text.replace("marks.txt", "pixels.txt").replace('"T14"', '"T13"')
+    project.write_text(text.replace("sigma = 0.5", "sigma = 0.2"), encoding="utf-8")
+    found = orient(read_project(project).network)
+    assert found.statistics.sigma0 == pytest.approx(1.0, abs=0.3)
+    inner, sigma = found.solution.unknowns.inner[0], np.sqrt(np.diag(found.statistics.cameras))[-7:]
+    true = [24.0, 18.06, 11.95, 1.1e-4, -1.4e-7, 1.2e-5, -0.8e-5]
+    assert (np.abs(inner[[0, 1, 2, 5, 6, 8, 9]] - true) < 4.0 * sigma).all()
 
 
 def told(bay, beginning):
@@ -45,6 +91,8 @@ def test_the_photographs_are_oriented_and_their_camera_is_found(bay):
     assert "12 photographs, 100 points" in told(bay, "moma orient")
     page = (bay[0] / "out/bay/photographs/report.html").read_text(encoding="utf-8")
     assert page.count("<img") == 2
+    folder = bay[0] / "out/bay/photographs"
+    assert all((folder / one["picture"]).is_file() for one in values["photos"])
     assert "Suspected marks" in page
 
 
@@ -93,8 +141,9 @@ def test_the_survey_report_names_the_photographs_behind_each_corner(bay):
     page = (report / "report.html").read_text(encoding="utf-8")
     assert "Corners and the rays behind them" in page
     assert "intersection of 3 rays" in page
-    assert page.count("<img") == 6
+    assert page.count("<img") == 7
     values = json.loads((report / "survey.json").read_text(encoding="utf-8"))
-    assert {"photographs-1-network.png", "photographs-1-photo-residuals.png"} <= set(values["files"])
+    names = {f"photographs-1-{name}.png" for name in ("network", "outlines", "photo-residuals")}
+    assert names <= set(values["files"])
     stone = next(one for one in values["stones"] if one["code"] == "V4")
     assert [one["role"] for one in stone["evidence"]] == ["point"] * 6 + ["vertex"] * 4

@@ -1,13 +1,14 @@
 """`moma orient`: photographs from a project file, or from an export, to orientation.json and a report."""
 
+import os
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from moma.errors import UsageError
-from pipelines.reports.photographs.project import Project, calibrated, read_project
+from moma.errors import SurveyError, UsageError
+from pipelines.reports.photographs.project import Project, calibrated, exported_control, read_project
 from pipelines.results.folder import check_replaceable, replacing
 from survey.orientation.bundle.orient import Orientation, orient
 from survey.orientation.formats.colmap import write_colmap
@@ -55,6 +56,7 @@ def photomodeler_project(
     fixed_control: bool = False,
     check: tuple[str, ...] = (),
     blunders: str = "report",
+    size: tuple[int, int] | None = None,
 ) -> Project:
     """Make a project of an export of PhotoModeler and a file of control points, without a project file.
 
@@ -63,14 +65,13 @@ def photomodeler_project(
     UsageError, SurveyError
         as of `read_project`
     """
-    network = read_photomodeler(export)
+    network = read_photomodeler(export, size)
     if control is not None:
         network = with_control(network, read_control(control), fixed=fixed_control, check=check)
+    elif network.control and not check:
+        network = exported_control(network, fixed_control)
     elif fixed_control or check:
         raise UsageError("--fixed-control or --check without --control", remedy="give --control FILE")
-    elif network.control:
-        # their places are results of an adjustment, and no observations
-        network = replace(network, control=())
     network = calibrated(network, calibrate, "--calibrate")
     return Project(export.stem, network, blunders)
 
@@ -94,11 +95,25 @@ def orient_photographs(project: Path | Project, folder: Path) -> OrientReport:
     read = project if isinstance(project, Project) else read_project(project)
     result = orient(read.network, "remove" if read.blunders == "remove" else "report")
     values = orientation_values(result, name=read.name)
+    for one in values["photos"]:
+        if one["name"] in read.pictures:
+            one["picture"] = _beside(read.pictures[one["name"]], folder)
     with replacing(folder, INDEX) as fresh:
-        pictures = draw_photographs(values, fresh)
+        pictures = draw_photographs(values, fresh, read.pictures)
         for one in read.write:
-            _WRITERS[one](result.adjusted, fresh)
+            try:
+                _WRITERS[one](result.adjusted, fresh)
+            except SurveyError as error:
+                raise error.at(f'write = ["{one}"]') from error
         values["files"] = sorted([INDEX, "report.html", *(entry.name for entry in fresh.iterdir())])
         write_photographs_page(fresh / "report.html", values, pictures, version("moma-masonry"))
         write_orientation(fresh / INDEX, values)
     return OrientReport(folder, result, values)
+
+
+def _beside(picture: Path, folder: Path) -> str:
+    """Return the path of a picture from a folder; the whole path where there is none, as from another drive."""
+    try:
+        return Path(os.path.relpath(picture.resolve(), folder.resolve())).as_posix()
+    except ValueError:
+        return picture.resolve().as_posix()

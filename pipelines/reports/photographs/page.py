@@ -14,17 +14,20 @@ _MOST = 200  # rows of a table; orientation.json has them all
 Row = tuple[str, ...]
 
 
-def draw_photographs(values: Mapping[str, Any], folder: Path, prefix: str = "") -> dict[str, str]:
+def draw_photographs(
+    values: Mapping[str, Any], folder: Path, pictures: Mapping[str, Path], prefix: str = ""
+) -> dict[str, str]:
     """Draw the pictures into a folder; return captions by file name.
 
     Parameters
     ----------
     values : of `orientation_values`
+    pictures : files of the photographs themselves, by their names
     prefix : of the names of the files
     """
     network, residuals = f"{prefix}network.png", f"{prefix}photo-residuals.png"
     larger = draw_network(folder / network, values)
-    count, factor = draw_photo_residuals(folder / residuals, values)
+    count, factor = draw_photo_residuals(folder / residuals, values, pictures)
     which = (
         "each photograph" if count == len(values["photos"]) else f"the {count} photographs with the largest"
     )

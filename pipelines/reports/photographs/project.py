@@ -1,7 +1,7 @@
 """Project files of `moma orient`: where marks, control points, cameras and photographs are, and what is estimated."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,7 @@ __all__ = [
     "WRITTEN",
     "Project",
     "calibrated",
+    "exported_control",
     "read_project",
 ]
 
@@ -42,6 +43,13 @@ PROJECT_KEYS = (
         ValueKind.TEXT,
         "Text export of PhotoModeler, instead of marks and cameras.",
         default=None,
+    ),
+    Key(
+        "size",
+        _NUMBERS,
+        "Width and height of the photographs, with an export of PhotoModeler that does not state them.",
+        "px",
+        None,
     ),
     Key(
         "colmap",
@@ -87,6 +95,12 @@ PROJECT_KEYS = (
         ValueKind.TEXTS,
         "Formats in which the result is written too: photomodeler, colmap, metashape, dbat.",
         default=(),
+    ),
+    Key(
+        "pictures",
+        ValueKind.TEXT,
+        "Folder of the photographs themselves, on which results are drawn.",
+        default=None,
     ),
     Key(
         "calibrate",
@@ -159,12 +173,14 @@ class Project:
     network : with its control points
     blunders : "report" or "remove"
     write : formats in which the result is written too
+    pictures : file of each photograph by its name; empty: not given
     """
 
     name: str
     network: Network
     blunders: str
     write: tuple[str, ...] = ()
+    pictures: Mapping[str, Path] = field(default_factory=dict)
 
 
 def read_project(path: Path) -> Project:
@@ -191,6 +207,8 @@ def read_project(path: Path) -> Project:
         network = with_control(
             network, rows, fixed=bool(values["fixed_control"]), check=_texts(values["check"])
         )
+    elif values["photomodeler"] is not None and network.control:
+        network = exported_control(network, bool(values["fixed_control"]))
     elif values["check"] or values["fixed_control"]:
         key = "check" if values["check"] else "fixed_control"
         document.fail(f"{key} without control points", key, remedy="give control = FILE")
@@ -199,7 +217,75 @@ def read_project(path: Path) -> Project:
     for one in write:
         if one not in WRITTEN:
             document.fail(f"no format {one!r}", "write", remedy=nearest(one, WRITTEN))
-    return Project(str(values["name"] or path.stem), network, str(values["blunders"]), write)
+    pictures = (
+        {}
+        if values["pictures"] is None
+        else _pictures(document, path.parent / str(values["pictures"]), network)
+    )
+    return Project(str(values["name"] or path.stem), network, str(values["blunders"]), write, pictures)
+
+
+def exported_control(network: Network, fixed: bool) -> Network:
+    """Keep the control points of an export of PhotoModeler as fixed points, or leave them out with a remark.
+
+    The export has their adjusted places, which are no observations unless they were fixed.
+    """
+    if fixed:
+        return network
+    remark = (
+        f"{len(network.control)} control points of the export are left out, as it has their adjusted places: give "
+        "their file, or fix them"
+    )
+    return replace(network, control=(), remarks=(*network.remarks, remark))
+
+
+_ENDINGS = (".jpg", ".jpeg", ".png", ".tif", ".tiff")
+_ASPECT = 0.01  # difference of width over height between a camera and its picture, relative
+
+
+def _pictures(document: TomlDocument, folder: Path, network: Network) -> dict[str, Path]:
+    """Return the file of each photograph: of its name, or of its name with the ending of a picture.
+
+    Raises
+    ------
+    SceneError
+        if there is none, or it has other proportions than the camera
+    """
+    from PIL import Image
+
+    try:
+        files = sorted(one for one in folder.iterdir() if one.suffix.lower() in _ENDINGS)
+    except OSError:
+        document.fail(
+            f"no folder {folder}", "pictures", remedy="give the folder of the photographs, or leave it out"
+        )
+    by_name = {one.stem.lower(): one for one in files} | {one.name.lower(): one for one in files}
+    out = {}
+    for f, photo in enumerate(network.photos):
+        found = by_name.get(photo.name.lower()) or by_name.get(Path(photo.name).stem.lower())
+        if found is None:
+            document.fail(
+                f"no picture of photograph {photo.name} in {folder}",
+                "pictures",
+                remedy=f"name it {photo.name}.jpg, or leave pictures out",
+            )
+        try:
+            with Image.open(found) as picture:
+                width, height = picture.size
+        except OSError as error:
+            document.fail(f"{found} cannot be read: {error}", "pictures", remedy="give JPEG, PNG or TIFF")
+        size = network.camera_of(f).size
+        if abs(width * size[1] / (height * size[0]) - 1.0) > _ASPECT:
+            turned = abs(height * size[1] / (width * size[0]) - 1.0) <= _ASPECT
+            document.fail(
+                f"{found} has {width} × {height} pixels, its camera {size[0]} × {size[1]}",
+                "pictures",
+                remedy="turn it back as the camera took it: marks refer to that"
+                if turned
+                else "give the whole picture, of any resolution",
+            )
+        out[photo.name] = found
+    return out
 
 
 def calibrated(network: Network, names: tuple[str, ...], where: str) -> Network:
@@ -241,10 +327,16 @@ def _network(
     if main and (cameras or photos):
         document.fail(f"[[cameras]] or [[photos]] beside {main[0]}", "cameras", remedy="leave them out")
     if not main:
+        if values["size"] is not None:
+            document.fail("size beside marks", "size", remedy="write it into [[cameras]]")
         return _marked(document, values, cameras, photos, folder)
+    if values["size"] is not None and main[0] != "photomodeler":
+        document.fail(f"size with {main[0]}", "size", remedy="leave it out")
     source, sigma = folder / str(values[main[0]]), float(str(values["sigma"]))
     if main[0] == "photomodeler":
-        return read_photomodeler(source)
+        return read_photomodeler(
+            source, None if values["size"] is None else _size(document, values["size"], "size")
+        )
     if main[0] == "colmap":
         return read_colmap(source, sigma)
     if main[0] == "dbat":
@@ -289,12 +381,7 @@ def _marked(
 def _camera(document: TomlDocument, number: int, given: Mapping[str, Any]) -> Camera:
     path = ("cameras", str(number))
     values = check_table(document, path, given, CAMERA_KEYS, "[[cameras]]")
-    size = _texts(values["size"])
-    if len(size) != 2 or not all(float(one) == int(one) > 0 for one in size):
-        document.fail(
-            "size is not a width and a height in pixels", *path, "size", remedy="e.g. size = [6000, 4000]"
-        )
-    width, height = (int(one) for one in size)
+    width, height = _size(document, values["size"], *path, "size")
     pixel = values["pixel"]
     if pixel is None:
         if values["unit"] != "px":
@@ -322,6 +409,14 @@ def _camera(document: TomlDocument, number: int, given: Mapping[str, Any]) -> Ca
         _texts(free or ()),
         document.where(*path),
     )
+
+
+def _size(document: TomlDocument, given: object, *path: str) -> tuple[int, int]:
+    """Return width and height in pixels."""
+    size = _texts(given)
+    if len(size) != 2 or not all(float(one) == int(one) > 0 for one in size):
+        document.fail("size is not a width and a height in pixels", *path, remedy="e.g. size = [6000, 4000]")
+    return int(size[0]), int(size[1])
 
 
 def _photo(document: TomlDocument, number: int, given: Mapping[str, Any], cameras: list[str]) -> Photo:

@@ -7,10 +7,13 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from mechanics.dynamics.progress import Listener, Progress, silent
 from pipelines.draw.elevations.beds import draw_courses
 from pipelines.draw.elevations.orthophoto import Orthophoto, read_orthophoto
 from pipelines.draw.elevations.survey import draw_departure, draw_elevation, draw_residuals
+from pipelines.draw.photographs import DrawnOutline, draw_outlines
 from pipelines.reports.photographs.page import draw_photographs, photographs_section
 from pipelines.reports.survey.document import survey_json, write_survey_json
 from pipelines.reports.survey.page import write_survey_page
@@ -18,6 +21,8 @@ from pipelines.reports.survey.study import SurveyStudy, study_surveys
 from pipelines.results.folder import check_replaceable, replacing, source_of
 from survey.clouds.settings import CloudOptions
 from survey.formats.options import ReadingOptions
+from survey.orientation.formats.result import read_orientation
+from survey.orientation.network import listed
 from survey.quality.masonry.index import Grade
 
 __all__ = ["INDEX", "SurveyReport", "report_surveys", "write_survey_report"]
@@ -113,8 +118,37 @@ def _photographs(study: SurveyStudy, folder: Path) -> Iterator[dict[str, Any]]:
     paths = [Path(one.head.path).parent / one.head.orientation for one in study.files if one.head.orientation]
     for number, path in enumerate(dict.fromkeys(paths), start=1):
         values = json.loads(path.read_text(encoding="utf-8"))
-        pictures = draw_photographs(values, folder, f"photographs-{number}-")
+        files = {one["name"]: path.parent / one["picture"] for one in values["photos"] if "picture" in one}
+        gone = [name for name, file in files.items() if not file.is_file()]
+        there = {name: file for name, file in files.items() if name not in gone}
+        pictures = draw_photographs(values, folder, there, f"photographs-{number}-")
+        oriented = read_orientation(path)
+        if stones := list(_outlines(study, {one.name for one in oriented.photos})):
+            name = f"photographs-{number}-outlines.png"
+            draw_outlines(folder / name, oriented, stones, there)
+            pictures[name] = (
+                "Outlines of the stones on the photographs with most of their marks; orange: drawn on this photograph"
+                f"{f'; the files of {listed(gone)} are not there any more' if gone else ''}."
+            )
         yield photographs_section(values, pictures, folder)
+
+
+def _outlines(study: SurveyStudy, photos: set[str]) -> Iterator[DrawnOutline]:
+    """Yield the stones that were marked on some photographs, unless control points moved them to another frame."""
+    if any(one.head.control for one in study.files):
+        return
+    for stone in study.stones:
+        marks: dict[str, list[tuple[float, float]]] = {}
+        drawn = set[str]()
+        for one in stone.evidence:
+            rays: Any = one["rays"]
+            for ray in rays:
+                marks.setdefault(ray["photo"], []).append((ray["x"], ray["y"]))
+                if str(one["point"]).startswith("corner "):
+                    drawn.add(ray["photo"])
+        if marks.keys() & photos:
+            places = {name: np.array(ones) for name, ones in marks.items()}
+            yield DrawnOutline(stone.code, stone.outline, stone.normal, places, next(iter(drawn), None))
 
 
 def _draw(study: SurveyStudy, folder: Path, photo: Orthophoto | None) -> dict[str, str]:

@@ -20,6 +20,7 @@ __all__ = [
     "Prepared",
     "Solution",
     "adjust",
+    "cholesky",
     "inner_constraints",
     "normals",
     "prepare",
@@ -336,11 +337,28 @@ def _step(
     scale = 1.0 / np.sqrt(scale)
     held = normal if damping else with_datum(normal, prepared, unknowns)
     try:
-        factor = cho_factor(held * scale[:, None] * scale, lower=True, check_finite=False)
+        factor = cholesky(held, scale)
     except np.linalg.LinAlgError:
         return None
-    step: Array = scale * cho_solve(factor, scale * right, check_finite=False)
+    step: Array = scale * cho_solve((factor, False), scale * right, check_finite=False)
     return step
+
+
+def cholesky(normal: Array, scale: Array) -> Array:
+    """Factorise S N S with S = diag(scale), N given by its lower triangle; return the upper triangular factor.
+
+    Nothing is copied besides the scaled matrix: the lower triangle by rows is the upper one by columns, as LAPACK
+    takes it. The other triangle of what is returned is not defined.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        if the matrix is not positive definite
+    """
+    scaled = normal * scale
+    scaled *= scale[:, None]
+    factor: Array = cho_factor(scaled.T, lower=False, overwrite_a=True, check_finite=False)[0]
+    return factor
 
 
 def _corrections(prepared: Prepared, unknowns: Unknowns, damping: float, step: Array) -> tuple[Array, Array]:

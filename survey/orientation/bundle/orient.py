@@ -1,6 +1,6 @@
 """Photographs, from marks to a checked orientation: soundness, start values, adjustment, blunders, statistics."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -12,23 +12,26 @@ from threadpoolctl import ThreadpoolController
 from moma.errors import GeometryError, MomaError, SurveyError
 from survey.arrays import Array
 from survey.orientation.bundle.adjustment import Prepared, Solution, adjust, prepare
+from survey.orientation.bundle.control import FAR_OFF, MISSES, control_remarks, control_tests
 from survey.orientation.bundle.resection import similarity_between
 from survey.orientation.bundle.soundness import check_network
 from survey.orientation.bundle.start import aligned, check_mirrored, start_values, swapped, without_start
 from survey.orientation.bundle.statistics import CRITICAL, Statistics, statistics
-from survey.orientation.network import Network, Photo, listed
+from survey.orientation.network import Control, Network, Photo, listed
 from survey.orientation.projection import project
 
-__all__ = ["Blunders", "Orientation", "control_tests", "orient"]
+__all__ = ["Blunders", "Orientation", "orient"]
 
 Blunders = Literal["report", "remove"]
 """Treatment of marks that the test finds wrong."""
 
 _POOR = 3e-3  # median residual over the longer side of a photograph, beyond which an orientation is none
 _GOOD = 5e-4  # the same, below which no other start is tried
-_SEARCHES = 30  # rounds of data snooping
-_MISSES = 2.33  # √(χ²₃ / 3) that a sound point exceeds once in a thousand
-_FAR_OFF = 10.0  # the same from which the hand of the control points is checked
+_SEARCHES = 60  # rounds of data snooping
+_ENOUGH = 4  # control points that must be left where one is left out
+_LARGE = 3.0  # σ₀ from which the model is doubted rather than the marks
+_MANY = 0.1  # part of the marks left out, from which it is
+_AGREE = 3.0  # σ₀ up to which photographs agree with each other without control points
 _STATIONS = 5  # observed stations of which one that is off can be told
 _TRIPLES = 200  # random triples of stations tried
 _NORMAL = 0.6745  # median of the absolute value of a standard normal variable
@@ -99,62 +102,86 @@ def orient(network: Network, blunders: Blunders = "report") -> Orientation:
     """
     check_network(network)
     used, remarks = _useful(network)
+    given = network.photos
     with _few_threads(network):
         network, prepared, solution = _oriented(network, used)
-        result = statistics(network, prepared, solution)
-        removed = dict[int, float]()
+        try:
+            result = statistics(network, prepared, solution)
+        except GeometryError:
+            _check_control_alone(network)
+            raise
+        _check_control(network, solution, result)
+        removed, control = dict[int, float](), network.control
         if blunders == "remove":
-            used, prepared, solution, result = _snooped(network, used, prepared, solution, result, removed)
+            network, used, prepared, solution, result = _snooped(
+                network, used, prepared, solution, result, removed
+            )
+    remarks += _left_out(control, network, solution, result)
     remarks += _tested_control(network, solution, result)
+    remarks += control_remarks(network, solution, given)
     suspected = {*removed, *_suspects(result).tolist()}
     if removed:
-        remarks.append(f"{len(removed)} marks left out as blunders")
+        remarks.append(
+            "1 mark left out as a blunder"
+            if len(removed) == 1
+            else f"{len(removed)} marks left out as blunders"
+        )
+    if result.redundancy > 0 and (result.sigma0 > _LARGE or len(removed) > _MANY * len(network.photo)):
+        remarks.append(
+            f"the marks fit {result.sigma0:.1f} times worse than stated"
+            + (f", and {len(removed) / len(network.photo):.0%} of them are left out" if removed else "")
+            + ": check the camera (calibrate c, K1), the control points, and sigma"
+        )
     return Orientation(
         network, prepared, solution, result, removed, tuple(sorted(suspected)), (*network.remarks, *remarks)
     )
 
 
-def _tested_control(network: Network, solution: Solution, result: Statistics) -> list[str]:
-    """Return remarks on control points that miss their places by more than chance; refuse mirrored ones.
+def _left_out(
+    given: Sequence[Control], network: Network, solution: Solution, result: Statistics
+) -> list[str]:
+    """Return a remark on control points that were left out, by how much the others contradict them."""
+    tests = control_tests(network, solution, result)
+    pairs = zip(given, network.control, tests, strict=True)
+    names = [
+        f"{network.names[new.point]} ({test:.1f} σ, {1e3 * off:.3g} mm)"
+        for old, new, test in pairs
+        if new.check and not old.check
+        for off in [float(np.linalg.norm(new.place - solution.unknowns.point[new.point]))]
+    ]
+    return [f"control points left out, which the others contradict: {listed(names)}"] if names else []
 
-    Raises
-    ------
-    SurveyError
-    """
+
+def _tested_control(network: Network, solution: Solution, result: Statistics) -> list[str]:
+    """Return remarks on control points that miss their places by more than chance."""
     tests = control_tests(network, solution, result)
     wrong = [
         (test, one)
         for one, test in zip(network.control, tests, strict=True)
-        if test > _MISSES and not one.check
+        if test > MISSES and not one.check
     ]
     if not wrong:
         return []
-    if max(test for test, _ in wrong) > _FAR_OFF and (alone := _alone(network)) is not None:
-        _check_hand(network, alone)
     names = [
         f"{network.names[one.point]} ({test:.1f} σ)" for test, one in sorted(wrong, key=lambda pair: -pair[0])
     ]
     return [f"control points that miss their places: {listed(names)}"]
 
 
-def control_tests(network: Network, solution: Solution, result: Statistics) -> Array:
-    """Return by how many standard deviations each control or check point misses its place; 0 where it is fixed.
+def _check_control(network: Network, solution: Solution, result: Statistics) -> None:
+    """Refuse control points of which most are far off, where the photographs agree with each other without them.
 
-    The misfit d of a control point has the covariance Σ - C of what was stated and what was adjusted, that of a
-    check point Σ + C; returned is √(dᵀ(…)⁻¹d / 3).
+    Raises
+    ------
+    SurveyError
     """
-    out = np.zeros(len(network.control))
-    for k, one in enumerate(network.control):
-        own = result.points[one.point]
-        if (one.fixed and not one.check) or not np.isfinite(own).all():
-            continue
-        off = one.place - solution.unknowns.point[one.point]
-        spread = one.covariance + (own if one.check else -own)
-        values, axes = np.linalg.eigh(spread)
-        sound = values > 1e-3 * float(np.trace(one.covariance if not one.check else spread)) / 3.0
-        if sound.any():
-            out[k] = np.sqrt((((axes.T @ off)[sound]) ** 2 / values[sound]).sum() / sound.sum())
-    return out
+    tests = control_tests(network, solution, result)
+    held = np.array([test for one, test in zip(network.control, tests, strict=True) if not one.check])
+    if not (held > FAR_OFF).any() or (alone := _alone(network)) is None:
+        return
+    _check_hand(network, alone[0])
+    if np.median(held) > FAR_OFF and alone[1] < _AGREE:
+        raise _control_misfit(network)
 
 
 @contextmanager
@@ -174,7 +201,8 @@ def _useful(network: Network) -> tuple[NDArray[np.bool_], list[str]]:
     remarks = []
     if lone.any():
         names = [network.names[i] for i in np.flatnonzero(lone)]
-        remarks.append(f"{len(names)} points are marked on one photograph only and left out: {listed(names)}")
+        what = "1 point is" if len(names) == 1 else f"{len(names)} points are"
+        remarks.append(f"{what} marked on one photograph only and left out: {listed(names)}")
     return ~lone[network.point], remarks
 
 
@@ -269,10 +297,15 @@ def _check_control_alone(network: Network) -> None:
     given = [one for one in network.control if not one.check]
     if not given or (alone := _alone(network)) is None:
         return
-    _check_hand(network, alone)
-    raise SurveyError(
+    _check_hand(network, alone[0])
+    raise _control_misfit(network)
+
+
+def _control_misfit(network: Network) -> SurveyError:
+    first = next(one for one in network.control if not one.check)
+    return SurveyError(
         "the control points do not fit the photographs, which agree with each other without them",
-        where=given[0].where or network.path,
+        where=first.where or network.path,
         remedy="check the numbers, the order and the unit of their coordinates",
     )
 
@@ -285,7 +318,7 @@ def _check_stations(network: Network, solution: Solution) -> None:
     there = np.array([network.photos[f].observed_station for f in seen])
     sigma = np.array([network.photos[f].station_sigma for f in seen]).max(axis=1)
     off = np.linalg.norm(solution.unknowns.station[seen] - there, axis=1)
-    if not (off > _FAR_OFF * sigma).any():
+    if not (off > FAR_OFF * sigma).any():
         return
     free = replace(
         network,
@@ -294,7 +327,7 @@ def _check_stations(network: Network, solution: Solution) -> None:
     )
     if (alone := _alone(free)) is None:
         return
-    here = _fitted(alone.unknowns.station[seen], there)
+    here = _fitted(alone[0].unknowns.station[seen], there)
     own = np.linalg.norm(here - there, axis=1)
     apart = np.linalg.norm(here[:, None] - there[None], axis=2)
     worst = int(np.argmax(own))
@@ -304,7 +337,7 @@ def _check_stations(network: Network, solution: Solution) -> None:
             own[worst], own[other]
         ):
             raise _swapped(network, *sorted((seen[worst], seen[other])))
-    if own[worst] > _FAR_OFF * sigma[worst]:
+    if own[worst] > FAR_OFF * sigma[worst]:
         raise SurveyError(
             f"the observed station of photograph {photo.name} is {own[worst]:.3g} m from where the others put it",
             where=photo.where or network.path,
@@ -335,8 +368,13 @@ def _swapped(network: Network, a: int, b: int) -> SurveyError:
     )
 
 
-def _alone(network: Network) -> Solution | None:
-    """Adjust the photographs without their control points; None if they do not agree with each other either."""
+def _alone(network: Network) -> tuple[Solution, float] | None:
+    """Adjust the photographs without their control points; None if they do not agree with each other either.
+
+    Returns
+    -------
+    the solution and its σ₀
+    """
     free = without_start(replace(network, control=()))
     try:
         start = next(iter(start_values(free)))
@@ -344,7 +382,10 @@ def _alone(network: Network) -> Solution | None:
         alone = adjust(start, prepared)
     except MomaError:
         return None
-    return alone if _misfit(start, prepared, alone) < _POOR else None
+    if _misfit(start, prepared, alone) >= _POOR:
+        return None
+    redundancy = prepared.observations - prepared.count + prepared.datum
+    return alone, float(np.sqrt(alone.square / max(redundancy, 1)))
 
 
 def _check_hand(network: Network, alone: Solution) -> None:
@@ -392,29 +433,59 @@ def _snooped(
     solution: Solution,
     result: Statistics,
     removed: dict[int, float],
-) -> tuple[NDArray[np.bool_], Prepared, Solution, Statistics]:
-    """Leave out blunders, the worst of each photograph and point at a time, until none is left."""
-    held = np.zeros(len(network.names), dtype=bool)
-    held[[one.point for one in network.control if not one.check]] = True
+) -> tuple[Network, NDArray[np.bool_], Prepared, Solution, Statistics]:
+    """Leave out blunders, the worst of each photograph and point at a time, until none is left.
+
+    A control point that misses its place by more than any mark does is left out first: otherwise its marks would be
+    blamed. It then checks only.
+    """
     for _ in range(_SEARCHES):
         tests = np.nan_to_num(np.abs(result.standardised)).max(axis=1)
-        rays = np.bincount(network.point[used], minlength=len(network.names))
-        photos, points, out = set[int](), set[int](), list[int]()
         suspects = _suspects(result)
-        for k in suspects[np.argsort(-tests[suspects])]:
-            f, i = int(network.photo[k]), int(network.point[k])
-            if f in photos or i in points or (rays[i] < 3 and not held[i]):
-                continue
-            photos.add(f)
-            points.add(i)
-            out.append(int(k))
-        if not out:
-            break
-        removed |= {k: float(tests[k]) for k in out}
-        used = used.copy()
-        used[out] = False
-        values = solution.unknowns
-        prepared = prepare(network, values._replace(free=prepared.unknowns.free), used)
+        wrong = _wrong_control(network, solution, result, float(tests.max(initial=0.0)))
+        if wrong is not None:
+            control = tuple(
+                replace(one, check=one.check or k == wrong) for k, one in enumerate(network.control)
+            )
+            network = replace(network, control=control)
+            free = prepared.unknowns.free.copy()
+            free[network.control[wrong].point] = True
+        else:
+            out = _worst_marks(network, used, suspects[np.argsort(-tests[suspects])])
+            if not out:
+                break
+            removed |= {k: float(tests[k]) for k in out}
+            used = used.copy()
+            used[out] = False
+            free = prepared.unknowns.free
+        prepared = prepare(network, solution.unknowns._replace(free=free), used)
         solution = adjust(network, prepared)
         result = statistics(network, prepared, solution)
-    return used, prepared, solution, result
+    return network, used, prepared, solution, result
+
+
+def _wrong_control(network: Network, solution: Solution, result: Statistics, most: float) -> int | None:
+    """Return the control point that is farthest off, if it is farther off than any mark, and enough others are left."""
+    tests = control_tests(network, solution, result)
+    tests[[one.check for one in network.control]] = 0.0
+    if not len(tests) or tests.max() <= MISSES or np.sqrt(3.0) * tests.max() <= most:
+        return None
+    worst = int(np.argmax(tests))
+    left = [one.place for k, one in enumerate(network.control) if not one.check and k != worst]
+    return worst if len(left) >= _ENOUGH else None
+
+
+def _worst_marks(network: Network, used: NDArray[np.bool_], suspects: NDArray[np.intp]) -> list[int]:
+    """Choose marks to leave out, the worst first: one of a photograph and of a point."""
+    held = np.zeros(len(network.names), dtype=bool)
+    held[[one.point for one in network.control if not one.check]] = True
+    rays = np.bincount(network.point[used], minlength=len(network.names))
+    photos, points, out = set[int](), set[int](), list[int]()
+    for k in suspects:
+        f, i = int(network.photo[k]), int(network.point[k])
+        if f in photos or i in points or (rays[i] < 3 and not held[i]):
+            continue
+        photos.add(f)
+        points.add(i)
+        out.append(int(k))
+    return out

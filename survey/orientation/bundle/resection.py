@@ -10,15 +10,19 @@ of a pair, of which both are returned.
 from collections.abc import Iterable, Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from survey.arrays import Array
 
-__all__ = ["essential_orientations", "intersect_rays", "resect", "similarity_between"]
+__all__ = ["essential_orientations", "intersect_many", "intersect_rays", "resect", "similarity_between"]
 
 _TRIPLES = 60  # random triples of points tried
 _FIVES = 80  # random fives of pairs of rays tried
 _ENOUGH = 12  # of these, after which nearly all pairs may end the search
 _AGREES = 0.01  # angle between a ray and the direction of its point [rad]
+_PARALLEL = (
+    1e-10  # smallest eigenvalue of the sum of the projections across rays, below which they are parallel
+)
 _REAL = 1e-6  # imaginary part of a root that is rounding
 
 
@@ -126,9 +130,42 @@ def intersect_rays(stations: Array, rays: Array) -> tuple[Array, float]:
     across = np.eye(3) - rays[:, :, None] * rays[:, None, :]
     normal = across.sum(axis=0)
     cosine = float(np.clip((rays @ rays.T).min(), -1.0, 1.0))
-    if np.linalg.matrix_rank(normal, tol=1e-10) < 3:
+    if np.linalg.matrix_rank(normal, tol=_PARALLEL) < 3:
         return np.full(3, np.nan), 0.0
     return np.linalg.solve(normal, np.einsum("nij,nj->i", across, stations)), float(np.arccos(cosine))
+
+
+def intersect_many(
+    points: NDArray[np.int64], stations: Array, rays: Array
+) -> tuple[NDArray[np.int64], Array, Array]:
+    """Return what `intersect_rays` does for many points at once.
+
+    Parameters
+    ----------
+    points : (n,) index of the point of each ray, ascending
+    stations, rays : (n, 3) as in `intersect_rays`
+
+    Returns
+    -------
+    the points (np,), their places (np, 3), and the largest angle between two rays of each (np,) [rad]; where the rays
+    do not define a place it is nan, and the angle 0
+    """
+    rays = rays / np.linalg.norm(rays, axis=1)[:, None]
+    across = np.eye(3) - rays[:, :, None] * rays[:, None, :]
+    numbers, start, group = np.unique(points, return_index=True, return_inverse=True)
+    normal = np.add.reduceat(across, start)
+    right = np.add.reduceat(np.einsum("nij,nj->ni", across, stations), start)
+    cosine = np.ones(len(numbers))
+    for apart in range(1, len(points)):
+        pairs = np.flatnonzero(points[apart:] == points[:-apart])
+        if not len(pairs):
+            break
+        np.minimum.at(cosine, group[pairs], np.einsum("ni,ni->n", rays[pairs], rays[pairs + apart]))
+    sound = np.linalg.eigvalsh(normal)[:, 0] > _PARALLEL
+    places, angles = np.full((len(numbers), 3), np.nan), np.zeros(len(numbers))
+    places[sound] = np.linalg.solve(normal[sound], right[sound][:, :, None])[:, :, 0]
+    angles[sound] = np.arccos(np.clip(cosine[sound], -1.0, 1.0))
+    return numbers, places, angles
 
 
 def essential_orientations(first: Array, second: Array) -> list[tuple[Array, Array, int]]:

@@ -11,6 +11,7 @@ __all__ = ["check_cameras", "check_network"]
 _PIXELS_MM = (5e-4, 0.5)  # sizes of pixels, of sensors and of scanned plates [mm]
 _ANGLES = (0.25, 60.0)  # camera constant over the longer side of the photograph: from 127° to telescopes
 _DISTORTED = 0.5  # distortion in the corners over their distance from the principal point
+_TINY = 0.03  # extent of all marks over that of the photographs, below which they are not in pixels
 _OUTSIDE = 0.02  # of the size of the photograph, marks may lie outside it
 _ON_LINE = 1e-3  # extent of control points across a line, over that along it
 
@@ -44,6 +45,16 @@ def check_network(network: Network) -> None:
             where=network.where(int(k)),
             remedy="marks are in pixels, to the right and down from the upper left corner",
         )
+    for m, camera in enumerate(network.cameras):
+        mine = np.array([one.camera == m for one in network.photos])[network.photo]
+        if mine.any() and (np.ptp(network.image[mine], axis=0) < _TINY * np.array(camera.size)).all():
+            span = np.ptp(network.image[mine], axis=0)
+            raise SurveyError(
+                f"all marks lie within {span[0]:.3g} × {span[1]:.3g} of {camera.size[0]} × {camera.size[1]} pixels: "
+                "they are of another unit",
+                where=network.where(int(np.flatnonzero(mine)[0])),
+                remedy="give marks in pixels, to the right and down from the upper left corner",
+            )
     _check_control(network)
 
 
@@ -105,6 +116,13 @@ def _check_control(network: Network) -> None:
             )
     places = [one.place for one in points]
     places += [one.observed_station for one in network.photos if one.observed_station is not None]
+    held = any(one.fixed or one.observed_station is not None for one in network.photos)
+    if network.control and not points and not held:
+        raise SurveyError(
+            f"all {len(network.control)} control points only check the result: none holds the photographs",
+            where=network.control[0].where or network.path,
+            remedy="take three or more out of the list of those that check",
+        )
     if not places or any(one.fixed for one in network.photos):
         return
     if len(places) < 3:

@@ -9,13 +9,12 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from moma.errors import GeometryError, SurveyError
 from survey.arrays import Array
 from survey.orientation.bundle.resection import (
     essential_orientations,
-    intersect_rays,
+    intersect_many,
     resect,
     similarity_between,
 )
@@ -102,7 +101,8 @@ def check_mirrored(source: Array, target: Array, network: Network) -> None:
         raise SurveyError(
             f"the control points are mirrored: they fit to {wrong:.3g} m as a reflection, to {right:.3g} m otherwise",
             where=one.where or network.path,
-            remedy="check the order and the signs of their coordinates: they must form a right-handed system",
+            remedy="check the order and the signs of their coordinates, which must form a right-handed system, and "
+            "that y of the marks counts downwards",
         )
 
 
@@ -184,11 +184,9 @@ def _filled(
 ) -> Network:
     """Orient the remaining photographs and intersect the remaining points, in turn."""
     of_photo = [np.flatnonzero(network.photo == f) for f in range(len(network.photos))]
-    order = np.argsort(network.point, kind="stable")
-    bounds = np.searchsorted(network.point[order], np.arange(len(network.names) + 1))
     firm, misfits = set(places), set[int]()
     while True:
-        _intersect(network, rays, oriented, places, firm, (order, bounds))
+        _intersect(network, rays, oriented, places, firm)
         waiting = [f for f in range(len(network.photos)) if f not in oriented]
         known = {f: [k for k in of_photo[f] if network.point[k] in firm] for f in waiting}
         ready = sorted((f for f in waiting if len(known[f]) >= _FEWEST), key=lambda f: -len(known[f]))
@@ -238,20 +236,24 @@ def _intersect(
     oriented: dict[int, tuple[Array, Array]],
     places: dict[int, Array],
     firm: set[int],
-    sorted_marks: tuple[NDArray[np.intp], NDArray[np.intp]],
 ) -> None:
     """Intersect the points that two oriented photographs show; `firm` collects those good for a resection."""
-    order, bounds = sorted_marks
-    for i in range(len(network.names)):
-        if i in firm:
-            continue
-        marks = [k for k in order[bounds[i] : bounds[i + 1]] if network.photo[k] in oriented]
-        if len(marks) < 2:
-            continue
-        stations = np.array([oriented[network.photo[k]][1] for k in marks])
-        turned = np.array([oriented[network.photo[k]][0] @ rays[k] for k in marks])
-        place, angle = intersect_rays(stations, turned)
-        if np.isfinite(place).all() and angle > 0.0:
+    known = np.zeros(len(network.photos), dtype=bool)
+    known[list(oriented)] = True
+    wanted = np.ones(len(network.names), dtype=bool)
+    wanted[list(firm)] = False
+    marks = np.flatnonzero(known[network.photo] & wanted[network.point])
+    marks = marks[np.argsort(network.point[marks], kind="stable")]
+    if not len(marks):
+        return
+    rotations, stations = np.zeros((len(known), 3, 3)), np.zeros((len(known), 3))
+    for f, (rotation, station) in oriented.items():
+        rotations[f], stations[f] = rotation, station
+    photo = network.photo[marks]
+    turned = np.einsum("kij,kj->ki", rotations[photo], rays[marks])
+    points, found, angles = intersect_many(network.point[marks], stations[photo], turned)
+    for i, place, angle in zip(points.tolist(), found, angles.tolist(), strict=True):
+        if angle > 0.0:
             places[i] = place
             if angle > _NARROW:
                 firm.add(i)

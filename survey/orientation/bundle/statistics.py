@@ -9,7 +9,7 @@ of the result. Where there is no control, it refers to the datum in which the po
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg.lapack import dpotri
 
 from moma.errors import GeometryError
 from survey.arrays import Array
@@ -17,6 +17,7 @@ from survey.orientation._kernels.adjustment import datum_sums, point_statistics
 from survey.orientation.bundle.adjustment import (
     Prepared,
     Solution,
+    cholesky,
     inner_constraints,
     normals,
     prior,
@@ -128,17 +129,21 @@ def _inverse(normal: Array, network: Network, prepared: Prepared) -> Array:
     if (size > 0.0).all():
         scale = 1.0 / np.sqrt(size)
         try:
-            factor = cho_factor(normal * scale[:, None] * scale, lower=True, check_finite=False)
+            factor = cholesky(normal, scale)
         except np.linalg.LinAlgError:
             full = np.tril(normal) + np.tril(normal, -1).T
             _, vectors = np.linalg.eigh(full * scale[:, None] * scale)
             worst = int(np.argmax(np.abs(vectors[:, 0])))
         else:
-            pivots = np.abs(np.diag(factor[0])) ** 2
+            pivots = np.diag(factor) ** 2
             worst, smallest = int(np.argmin(pivots)), float(pivots.min())
             if smallest > _ROUNDING:
-                out: Array = cho_solve(factor, np.diag(scale), check_finite=False) * scale[:, None]
-                return 0.5 * (out + out.T)
+                upper = dpotri(factor, lower=0, overwrite_c=1)[0]
+                out: Array = np.tril(upper.T)
+                out += np.tril(out, -1).T
+                out *= scale
+                out *= scale[:, None]
+                return out
     owner, parameter = names[worst]
     places = {one.name: one.where for one in network.cameras} | {
         one.name: one.where for one in network.photos

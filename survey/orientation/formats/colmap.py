@@ -18,6 +18,7 @@ from moma.errors import SurveyError
 from survey.arrays import Array
 from survey.formats.fields import parse_number, shown
 from survey.formats.text_lines import TextLines
+from survey.orientation.formats.marks import marks_of_points, numbered
 from survey.orientation.network import Camera, Network, Photo
 
 __all__ = ["read_colmap", "write_colmap"]
@@ -226,40 +227,42 @@ def _points(path: Path) -> dict[int, Array]:
 
 
 def write_colmap(network: Network, folder: Path) -> None:
-    """Write a model with all digits; points must have whole numbers for names, cameras forward distortion.
+    """Write a model with all digits; cameras must have forward distortion.
+
+    Points are numbers in this format. Where one has another name, all are numbered, and points-names.txt has number and
+    name of each.
 
     Raises
     ------
     SurveyError
         if the format has no place for something
     """
-    for name in network.names:
-        if not name.isdigit():
-            raise SurveyError(
-                f"point {shown(name)} is not a number", where=str(folder), remedy="number the points"
-            )
     cameras = [_camera_line(k, one, folder) for k, one in enumerate(network.cameras, start=1)]
+    for one in network.photos:
+        if one.rotation is None or one.station is None:
+            raise SurveyError(
+                f"photograph {one.name} is not oriented", where=str(folder), remedy="orient it first"
+            )
+    folder.mkdir(parents=True, exist_ok=True)
+    names = numbered(network, folder / "points-names.txt")
     images, place_of = list[str](), np.zeros(len(network.photo), dtype=int)
     for k, photo in enumerate(network.photos):
-        if photo.rotation is None or photo.station is None:
-            raise SurveyError(
-                f"photograph {photo.name} is not oriented", where=str(folder), remedy="orient it first"
-            )
+        assert photo.rotation is not None
+        assert photo.station is not None
         turn = (photo.rotation @ _FLIP).T
         pose = [*_quaternion(turn), *(-turn @ photo.station).tolist()]
         mine = np.flatnonzero(network.photo == k)
         place_of[mine] = np.arange(len(mine))
         images.append(" ".join([str(k + 1), *map(repr, pose), str(photo.camera + 1), photo.name]))
         marks = [
-            f"{x!r} {y!r} {network.names[i]}"
+            f"{x!r} {y!r} {names[i]}"
             for (x, y), i in zip(network.image[mine].tolist(), network.point[mine], strict=True)
         ]
         images.append(" ".join(marks))
-    points = []
+    points, of_point = [], marks_of_points(network)
     for i in np.flatnonzero(np.isfinite(network.start).all(axis=1)):
-        track = [f"{network.photo[k] + 1} {place_of[k]}" for k in np.flatnonzero(network.point == i)]
-        points.append(" ".join([network.names[i], *map(repr, network.start[i].tolist()), "0 0 0 0", *track]))
-    folder.mkdir(parents=True, exist_ok=True)
+        track = [f"{network.photo[k] + 1} {place_of[k]}" for k in of_point[i]]
+        points.append(" ".join([names[i], *map(repr, network.start[i].tolist()), "0 0 0 0", *track]))
     for name, lines in (("cameras", cameras), ("images", images), ("points3D", points)):
         _write(folder / f"{name}.txt", lines)
 

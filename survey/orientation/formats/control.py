@@ -1,9 +1,11 @@
 """Files of control points as the Damped Bundle Adjustment Toolbox reads them, and their place in a network.
 
-One point per line, separated by commas: number, name, X, Y, Z and, if the place is not fixed, its standard deviations
-(one, or three) or its covariance (nine, row by row). The name may be left out. Lines that begin with # are comments.
+One point per line, its values separated by commas, semicolons or tabs: number, name, X, Y, Z and, if the place is not
+fixed, its standard deviations (one, or three) or its covariance (nine, row by row). The name may be left out. Lines
+that begin with # are comments.
 """
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,6 +20,7 @@ from survey.orientation.network import Control, Network, listed
 
 __all__ = ["ControlRow", "read_control", "with_control", "write_control"]
 
+_BETWEEN = re.compile(r"[,;\t]")
 _FAR = 10.0  # mean offset between two lists of the same points over its spread, from which it is a shift of the origin
 
 
@@ -53,7 +56,7 @@ def read_control(path: Path) -> tuple[ControlRow, ...]:
     rows: dict[str, ControlRow] = {}
     for number, line in lines.rows():
         where = f"{lines.path}:{number}"
-        row = _row([one.strip() for one in line.split(",")], where)
+        row = _row([one.strip() for one in _BETWEEN.split(line)], where)
         if row.number in rows:
             raise SurveyError(
                 f"point {row.number} is there twice, first at {rows[row.number].where}",
@@ -74,7 +77,7 @@ def _row(words: list[str], where: str) -> ControlRow:
         raise SurveyError(
             f"a control point of {len(words)} values",
             where=where,
-            remedy="write: number, name, X, Y, Z, and deviations: none, one, three, or nine covariances",
+            remedy="write: number, name, X, Y, Z, and deviations: none, one, three, or nine covariances, with commas",
         )
     if not words[0]:
         raise SurveyError("a control point without a number", where=where, remedy="write its number first")
@@ -122,13 +125,14 @@ def with_control(
     SurveyError
         if none of the points is marked on a photograph, or a point to check is unknown
     """
-    index = {name: k for k, name in enumerate(network.names)}
+    marked = set(network.point.tolist())
+    index = {name: k for k, name in enumerate(network.names) if k in marked}
     known = [row for row in rows if row.number in index]
     if not known:
         raise SurveyError(
             f"none of the {len(rows)} control points is marked on a photograph: {listed([row.number for row in rows])}",
             where=rows[0].where.rpartition(":")[0] if rows else network.path,
-            remedy=f"marked points: {listed(network.names)}",
+            remedy=f"marked points: {listed(list(index))}",
         )
     names = {row.number for row in known} | {row.name for row in known if row.name}
     for wanted in check:

@@ -3,11 +3,15 @@
     document/input[@base_dir]
         ctrl_pts/file[@format], check_pts/file, each with filters by id that keep or remove
         images/file[@format="id,path"]
+        prior_eo/file[@format="id,x,y,z,omega,phi,kappa"]: start values; with deviations sx, sy, sz or sxyz, so, sp, sk
+            observations; angles in the unit @units, radians or degrees
         image_pts/file[@format="im,id,x,y,sxy"], the precision also as an attribute sxy [px]
         cameras/camera: name, unit, sensor, image, focal, cc, pp, K, P, aspect, skew, model
     document/operations: set_bundle_estimate_params/io names what is calibrated
 
-Tables have commas between their values. The operations themselves are not run: start values are found here.
+Tables have commas between their values. K, P and the aspect are written as what the lens does, not as its correction:
+of the backward models with the opposite sign of the values in result files, and 1 - as. The operations themselves are
+not run: start values that are not given are found here.
 """
 
 from collections.abc import Mapping
@@ -24,7 +28,8 @@ from survey.formats.text_lines import TextLines
 from survey.orientation.formats.control import ControlRow, with_control, write_control
 from survey.orientation.formats.marks import MarkRow, network_of
 from survey.orientation.formats.xml_lines import Element, read_xml
-from survey.orientation.network import INTERIOR, Camera, Network, Photo
+from survey.orientation.network import INTERIOR, Camera, Network, Photo, listed
+from survey.orientation.rotations import angles, from_angles
 
 __all__ = ["read_dbat", "write_dbat"]
 
@@ -55,7 +60,11 @@ def read_dbat(path: Path) -> Network:
     if len(cameras) != 1:
         raise given.fail(f"{len(cameras)} cameras", "scripts of one camera can be read")
     images = [row for file in given.all("images", "file") for row in _table(file, base, ("id", "path"))]
-    photos = tuple(Photo(PurePosixPath(str(row["path"])).name, 0, where=str(row["where"])) for row in images)
+    photos = tuple(
+        Photo(PurePosixPath(str(row["path"]).replace("\\", "/")).name, 0, where=str(row["where"]))
+        for row in images
+    )
+    photos = _prior(given, base, images, photos)
     number = {str(row["id"]): photo.name for row, photo in zip(images, photos, strict=True)}
     if not photos:
         raise given.fail("the script has no images", "give images/file")
@@ -98,7 +107,64 @@ def read_dbat(path: Path) -> Network:
 
 def _base(path: Path, given: Element) -> Path:
     text = given.attributes.get("base_dir", "$HERE")
-    return path.parent / text.replace("$HERE", ".", 1) if text.startswith("$HERE") else Path(text)
+    if text.startswith("$DBAT"):
+        raise given.fail(
+            "the folder of the toolbox, $DBAT, is not known here", 'write base_dir="$HERE", or a path'
+        )
+    if text.startswith("$HERE"):
+        return path.parent / text.replace("$HERE", ".", 1)
+    return Path(text.replace("$HOME", str(Path.home()), 1))
+
+
+def _prior(
+    given: Element, base: Path, images: list[Mapping[str, object]], photos: tuple[Photo, ...]
+) -> tuple[Photo, ...]:
+    """Return the photographs with the stations and angles that are known beforehand."""
+    places = {str(row["id"]): k for k, row in enumerate(images)}
+    out = list(photos)
+    for file in given.all("prior_eo", "file"):
+        unit = file.attributes.get("units", "radians").strip().lower()
+        if unit not in ("degrees", "radians"):
+            raise file.fail(f"angles in {shown(unit)}", 'write units="degrees" or "radians"')
+        for row in _table(file, base, ("id",)):
+            where = str(row["where"])
+            if str(row["id"]) not in places:
+                raise SurveyError(
+                    f"no image {row['id']}", where=where, remedy=f"known are {listed(list(places))}"
+                )
+            k = places[str(row["id"])]
+            out[k] = _placed(out[k], row, where, np.pi / 180.0 if unit == "degrees" else 1.0)
+    return tuple(out)
+
+
+def _placed(photo: Photo, row: Mapping[str, object], where: str, radian: float) -> Photo:
+    """Return a photograph with one row of a table of stations and angles."""
+
+    def three(names: tuple[str, str, str], *common: str) -> Array | None:
+        texts = [row.get(name, next((row[one] for one in common if one in row), None)) for name in names]
+        if any(one is None for one in texts):
+            return None
+        return np.array([parse_number(str(one), name, where) for one, name in zip(texts, names, strict=True)])
+
+    station, station_sigma = three(("x", "y", "z")), three(("sx", "sy", "sz"), "sxyz")
+    angles, angle_sigma = three(("omega", "phi", "kappa")), three(("so", "sp", "sk"))
+    for sigma in (station_sigma, angle_sigma):
+        if sigma is not None and (sigma < 0.0).any():
+            raise SurveyError(
+                f"a deviation of {sigma.min():g}", where=where, remedy="it must not be negative"
+            )
+    rotation = None if angles is None else from_angles(*(radian * angles))
+    observed = station is not None and station_sigma is not None and bool(station_sigma.all())
+    turned = rotation is not None and angle_sigma is not None and bool(angle_sigma.all())
+    return replace(
+        photo,
+        station=station,
+        rotation=rotation,
+        observed_station=station if observed else None,
+        station_sigma=station_sigma if observed else None,
+        observed_rotation=rotation if turned else None,
+        angle_sigma=radian * angle_sigma if turned and angle_sigma is not None else None,
+    )
 
 
 def _table(file: Element, base: Path, needed: tuple[str, ...]) -> list[Mapping[str, object]]:
@@ -184,7 +250,17 @@ def _camera(one: Element, free: tuple[str, ...]) -> Camera:
     if number not in (-1, 1, 2, 3, 4, 5):
         raise one.fail(f"lens distortion model {number}", "models -1 and 1 to 5 are known")
     name = one.find("name")
-    inner = np.array([c, xp, yp, aspect - 1.0, values("skew", 1)[0], *radial, *tangential])
+    side = 1.0 if number < 0 else -1.0  # a correction has the opposite sign
+    inner = np.array(
+        [
+            c,
+            xp,
+            yp,
+            side * (aspect - 1.0),
+            values("skew", 1)[0],
+            *(side * one for one in (*radial, *tangential)),
+        ]
+    )
     return Camera(
         "camera1" if name is None else name.text.strip(),
         inner,
@@ -250,6 +326,7 @@ def write_dbat(network: Network, folder: Path) -> Path:
                 f'<{tag}><file format="{_control_table(kinds[kind], folder / f"{kind}.txt")}">{kind}.txt</file></{tag}>'
             )
     _lines(folder / "images.txt", [f"{k}, {one.name}" for k, one in enumerate(network.photos, start=1)])
+    prior = _prior_table(network, folder / "stations.txt")
     marks = [
         ", ".join(
             [
@@ -264,7 +341,8 @@ def write_dbat(network: Network, folder: Path) -> Path:
     _lines(folder / "marks.txt", marks)
     inner = dict(zip(INTERIOR, camera.inner.tolist(), strict=True))
     width, height = camera.size
-    k, p = (",".join(repr(inner[name]) for name in names) for names in (_PARTS["K"], _PARTS["P"]))
+    side = 1.0 if camera.forward else -1.0
+    k, p = (",".join(repr(side * inner[name]) for name in names) for names in (_PARTS["K"], _PARTS["P"]))
     estimated = "".join(f"<{name}>true</{name}>" for name in camera.free)
     script = [
         '<?xml version="1.0" encoding="UTF-8"?>',
@@ -272,6 +350,7 @@ def write_dbat(network: Network, folder: Path) -> Path:
         '<input base_dir="$HERE">',
         *tables,
         '<images><file format="id,path">images.txt</file></images>',
+        *prior,
         '<image_pts><file format="im,id,x,y,sxy">marks.txt</file></image_pts>',
         "<cameras><camera>",
         f"<name>{escape(camera.name)}</name>",
@@ -280,7 +359,7 @@ def write_dbat(network: Network, folder: Path) -> Path:
         f"<image>{width},{height}</image>",
         f"<cc>{inner['c']!r}</cc>",
         f"<pp>{inner['xp']!r},{-inner['yp']!r}</pp>",
-        f"<aspect>{1.0 + inner['as']!r}</aspect>",
+        f"<aspect>{1.0 + side * inner['as']!r}</aspect>",
         f"<skew>{inner['sk']!r}</skew>",
         f"<K>{k}</K>",
         f"<P>{p}</P>",
@@ -294,6 +373,30 @@ def write_dbat(network: Network, folder: Path) -> Path:
     ]
     _lines(folder / "project.xml", script)
     return folder / "project.xml"
+
+
+def _prior_table(network: Network, path: Path) -> tuple[str, ...]:
+    """Write the observed stations, or all stations to start from; return the line of the script."""
+    observed = [one for one in network.photos if one.observed_station is not None]
+    rows = []
+    for k, one in enumerate(network.photos, start=1):
+        station, rotation = (
+            (one.observed_station, one.observed_rotation) if observed else (one.station, one.rotation)
+        )
+        if station is None or (rotation is None and not observed):
+            continue
+        turn = np.degrees(angles(rotation)).tolist() if rotation is not None else []
+        sigma = [] if one.station_sigma is None else one.station_sigma.tolist()
+        if observed and (rotation is not None or not sigma):
+            raise SurveyError(
+                f"photograph {one.name} has observed angles", where=str(path), remedy="observe stations alone"
+            )
+        rows.append(", ".join([str(k), *map(repr, [*station.tolist(), *turn, *sigma])]))
+    if not rows:
+        return ()
+    _lines(path, rows)
+    columns = "id,x,y,z,sx,sy,sz" if observed else "id,x,y,z,omega,phi,kappa"
+    return (f'<prior_eo><file format="{columns}" units="degrees">{path.name}</file></prior_eo>',)
 
 
 def _control_table(rows: list[ControlRow], path: Path) -> str:

@@ -17,7 +17,7 @@ from survey.formats.fields import parse_length, parse_number
 from survey.formats.text_lines import TextLines
 from survey.orientation.network import Camera, Network, Photo, listed
 
-__all__ = ["MarkRow", "network_of", "read_marks", "write_marks"]
+__all__ = ["MarkRow", "marks_of_points", "network_of", "numbered", "read_marks", "write_marks"]
 
 _BETWEEN = re.compile(r"\s*[,;\t]\s*|\s+")
 
@@ -139,3 +139,24 @@ def write_marks(network: Network, path: Path) -> None:
             f"{network.photos[network.photo[k]].name}, {network.names[network.point[k]]}, {x!r}, {y!r}, {sigma!r}"
         )
     path.write_text("\n".join([*text, ""]), encoding="utf-8", newline="\n")
+
+
+def numbered(network: Network, table: Path) -> tuple[str, ...]:
+    """Return numbers for the points of a network, for formats in which they have no names.
+
+    Names that are all numbers are kept; otherwise points are counted from 1, and `table` gets number and name of each.
+    """
+    if all(name.isdigit() for name in network.names):
+        return network.names
+    numbers = tuple(str(k) for k in range(1, len(network.names) + 1))
+    pairs = zip(numbers, network.names, strict=True)
+    text = ["# number, name", *(f"{number}, {name}" for number, name in pairs), ""]
+    table.write_text("\n".join(text), encoding="utf-8", newline="\n")
+    return numbers
+
+
+def marks_of_points(network: Network) -> list[list[int]]:
+    """Return the indices of the marks of each point."""
+    order = np.argsort(network.point, kind="stable")
+    bounds = np.searchsorted(network.point[order], np.arange(1, len(network.names)))
+    return [one.tolist() for one in np.split(order, bounds)]

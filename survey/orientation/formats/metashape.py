@@ -16,6 +16,7 @@ import numpy as np
 from moma.errors import SurveyError
 from survey.arrays import Array
 from survey.formats.fields import parse_number
+from survey.orientation.formats.marks import marks_of_points
 from survey.orientation.formats.xml_lines import Element, read_xml
 from survey.orientation.network import Camera, Control, Network, Photo
 
@@ -159,11 +160,15 @@ def _network(
     if accuracy is not None:
         sigma = accuracy.number("value")
     control = tuple(
-        Control(index[number], place, covariance, where=found.where)
+        Control(
+            index[number],
+            place,
+            covariance,
+            check=found.attributes.get("enabled", "true").lower() in ("0", "false"),
+            where=found.where,
+        )
         for number, one in markers.items()
-        if (found := one.find("reference")) is not None
-        and found.attributes.get("enabled", "true").lower() not in ("0", "false")
-        and "x" in found.attributes
+        if (found := one.find("reference")) is not None and "x" in found.attributes
         for place, covariance in [_reference(found)]
     )
     photo, point, image, lines, seen = (
@@ -263,12 +268,14 @@ def write_metashape(network: Network, path: Path) -> None:
                 if any(deviations)
                 else ""
             )
-            out.append(f'<reference x="{x!r}" y="{y!r}" z="{z!r}"{own} enabled="true"/>')
+            used = "false" if control[number].check else "true"
+            out.append(f'<reference x="{x!r}" y="{y!r}" z="{z!r}"{own} enabled="{used}"/>')
         out.append("</marker>")
     out += ["</markers>", "<frames>", '<frame id="0">', "<markers>"]
+    of_point = marks_of_points(network)
     for i in range(len(network.names)):
         out.append(f'<marker marker_id="{i}">')
-        for k in np.flatnonzero(network.point == i).tolist():
+        for k in of_point[i]:
             x, y = network.image[k].tolist()
             out.append(f'<location camera_id="{network.photo[k]}" pinned="true" x="{x!r}" y="{y!r}"/>')
         out.append("</marker>")

@@ -2,7 +2,7 @@
 
 Lines, all of numbers separated by blanks, after the title in the first:
 
-    tolerance, iterations, and width and height of the photographs [px]
+    tolerance, iterations, and in most exports width and height of the photographs [px]
     standard deviations by default: image point, control, points, stations (3), angles (3)
     c x_p y_p width height K₁ K₂ K₃ P₁ P₂ [mm], and their standard deviations in the next line
     of each photograph, counted from 0, with that number first: its file; X Y Z κ φ ω [°]; their standard deviations;
@@ -24,6 +24,7 @@ from moma.errors import SurveyError
 from survey.arrays import Array
 from survey.formats.fields import parse_number, shown
 from survey.formats.text_lines import TextLines
+from survey.orientation.formats.marks import numbered
 from survey.orientation.network import Camera, Control, Network, Photo
 from survey.orientation.rotations import angles, from_angles
 
@@ -90,8 +91,12 @@ class _Lines:
         return number, file.strip() or number
 
 
-def read_photomodeler(path: Path) -> Network:
+def read_photomodeler(path: Path, size: tuple[int, int] | None = None) -> Network:
     """Read an export.
+
+    Parameters
+    ----------
+    size : width and height of the photographs [px], where the export does not state them
 
     Raises
     ------
@@ -100,7 +105,21 @@ def read_photomodeler(path: Path) -> Network:
     """
     lines = _Lines(path)
     lines.line("the title")
-    settings = lines.numbers("the line of tolerance, iterations, width and height", (4,))
+    settings = lines.numbers("the line of tolerance, iterations, width and height", (2, 4))
+    if len(settings) == 4:
+        stated = (int(settings[2]), int(settings[3]))
+        if size is not None and size != stated:
+            raise lines.fail(
+                f"photographs of {stated[0]} × {stated[1]} pixels, but {size[0]} × {size[1]} are given",
+                "leave the size out",
+            )
+    elif size is not None:
+        settings = np.array([*settings, *size], dtype=float)
+    else:
+        raise lines.fail(
+            "the line of tolerance, iterations, width and height has 2 numbers",
+            "give the size of the photographs: size = [6000, 4000] in the project, or --size 6000x4000",
+        )
     if not (settings[2:] >= 1.0).all():
         width, height = settings[2:].astype(int)
         raise lines.fail(f"the photographs have {width} × {height} pixels", "line 2 gives their size")
@@ -222,12 +241,15 @@ def _smart_points(numbers: list[int], marks: list[tuple[int, Array]]) -> tuple[i
 
 
 def write_photomodeler(network: Network, path: Path, title: str = "moma") -> None:
-    """Write a network in this format, with all digits; the names of points must be whole numbers.
+    """Write a network in this format, with all digits.
+
+    Points are numbers in this format. Where one has another name, all are numbered, and NAME-points.txt beside the file
+    has number and name of each.
 
     Raises
     ------
     SurveyError
-        if a point has another name, or a camera another model or unit, affinity or skew: the format has no place
+        if a camera has another model or unit, affinity or skew: the format has no place
     """
     camera = network.cameras[0]
     for one in network.cameras:
@@ -237,11 +259,7 @@ def write_photomodeler(network: Network, path: Path, title: str = "moma") -> Non
                 where=str(path),
                 remedy="this format holds backward distortion in millimetres, without affinity and skew",
             )
-    for name in network.names:
-        if not name.isdigit():
-            raise SurveyError(
-                f"point {shown(name)} is not a number", where=str(path), remedy="number the points"
-            )
+    names = numbered(network, path.with_name(f"{path.stem}-points.txt"))
 
     def row(values: Sequence[float] | Array) -> str:
         return " ".join(repr(float(one)) for one in values)
@@ -267,13 +285,13 @@ def write_photomodeler(network: Network, path: Path, title: str = "moma") -> Non
         ]
     sigmas = row(np.zeros(3))
     text.append("")
-    text += [f"{network.names[one.point]} {row(one.place)} {sigmas}" for one in network.control]
+    text += [f"{names[one.point]} {row(one.place)} {sigmas}" for one in network.control]
     text.append("")
     known = np.isfinite(network.start).all(axis=1)
-    text += [f"{network.names[i]} {row(network.start[i])} {sigmas}" for i in np.flatnonzero(known)]
+    text += [f"{names[i]} {row(network.start[i])} {sigmas}" for i in np.flatnonzero(known)]
     text.append("")
     for k in range(len(network.photo)):
         text.append(
-            f"{network.photo[k]} {network.names[network.point[k]]} {row(network.image[k])} {row(network.sigma[k])}"
+            f"{network.photo[k]} {names[network.point[k]]} {row(network.image[k])} {row(network.sigma[k])}"
         )
     path.write_text("\n".join([*text, ""]), encoding="utf-8", newline="\n")

@@ -14,7 +14,8 @@ import numpy as np
 from moma.errors import SurveyError
 from survey.arrays import Array
 from survey.formats.fields import unreadable
-from survey.orientation.bundle.orient import Orientation, control_tests
+from survey.orientation.bundle.control import control_tests
+from survey.orientation.bundle.orient import Orientation
 from survey.orientation.bundle.statistics import photo_precision
 from survey.orientation.network import INTERIOR, Camera, Photo
 from survey.orientation.oriented import Oriented
@@ -191,8 +192,28 @@ def _finite(value: float) -> float | None:
 
 
 def write_orientation(path: Path, values: dict[str, Any]) -> None:
-    """Write the file."""
-    path.write_text(json.dumps(values, ensure_ascii=False, allow_nan=False, indent=1), encoding="utf-8")
+    """Write the file: a line for each value, each item of a list, and each column of the marks."""
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        file.write("{")
+        for number, (name, value) in enumerate(values.items()):
+            file.write(f"{',' if number else ''}\n{_json(name)}: ")
+            if isinstance(value, dict):
+                file.write("{")
+                for k, (key, one) in enumerate(value.items()):
+                    file.write(f"{',' if k else ''}\n {_json(key)}: {_json(one)}")
+                file.write("\n}" if value else "}")
+            elif isinstance(value, list):
+                file.write("[")
+                for k, one in enumerate(value):
+                    file.write(f"{',' if k else ''}\n {_json(one)}")
+                file.write("\n]" if value else "]")
+            else:
+                file.write(_json(value))
+        file.write("\n}\n")
+
+
+def _json(value: object) -> str:
+    return json.dumps(value, ensure_ascii=False, allow_nan=False)
 
 
 def read_orientation(path: Path) -> Oriented:

@@ -132,6 +132,7 @@ def test_points_plotted_on_one_photograph_agree_with_intersections(kind):
 @pytest.mark.parametrize("kind", ["cylinder", "plane"])
 def test_coverage_of_points_plotted_on_one_photograph(kind):
     covered, agree = check_coverage(kind, 1000)
+    print(f"{kind}: {covered:.1%} covered, {agree:.1%} within 2 sigma of the intersection in x, y and z")
     assert covered == pytest.approx(0.95, abs=0.03)
     assert agree > 0.86  # three coordinates within 2 σ
 

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from survey.orientation._kernels.camera import PARAMETERS, ray
+from survey.orientation.bundle.resection import intersect_many, intersect_rays
 from survey.orientation.network import Camera
 from survey.orientation.projection import corrected, directions, project
 from survey.orientation.rotations import angle_slopes, angles, from_angles, turned
@@ -94,3 +95,18 @@ def test_angles_follow_small_rotations():
         np.testing.assert_allclose(
             angle_slopes(rotation)[:, k], (angles(moved) - angles(rotation)) / step, atol=1e-5
         )
+
+
+def test_many_points_are_intersected_as_each_alone():
+    rng = np.random.default_rng(4)
+    points = np.sort(rng.integers(0, 20, 60))
+    stations = rng.normal(size=(60, 3)) * 3.0
+    rays = rng.normal(size=(60, 3))
+    rays[points == 3] = [0.0, 1.0, 0.0]  # parallel
+    numbers, places, angles = intersect_many(points, stations, rays)
+    assert numbers.tolist() == sorted(set(points.tolist()))
+    for i, place, angle in zip(numbers, places, angles, strict=True):
+        alone, between = intersect_rays(stations[points == i], rays[points == i])
+        np.testing.assert_allclose(place, alone, rtol=1e-9, atol=1e-9)
+        assert angle == pytest.approx(between, abs=1e-9)
+    assert np.isnan(places[numbers.tolist().index(3)]).all()

@@ -130,6 +130,60 @@ def test_weighted_control_points_of_aerial_photographs_agree_in_every_digit():
     )
 
 
+def test_the_forward_model_agrees_in_every_digit():
+    """Of the same calibration by the forward model 1: the toolbox prints K and P with the opposite sign."""
+    one = project("camcal", ("c", "xp", "yp", "K1", "K2", "K3", "P1", "P2"))
+    inner = one.cameras[0].inner * np.r_[np.ones(5), -np.ones(5)]
+    one = replace(one, cameras=(replace(one.cameras[0], forward=True, inner=inner),))
+    values = orientation_values(orient(one))
+    assert (f"{values['sigma0']:.5f}", values["redundancy"]) == ("1.62168", 3726)
+    camera = values["camera"]
+    expected = {
+        "c": ("7.45748", "0.00107"),
+        "xp": ("3.61634", "0.000866"),
+        "yp": ("2.60757", "0.000986"),
+        "K1": ("-0.00453336", "1.84e-05"),
+        "K2": ("9.80889e-05", "2.03e-06"),
+        "K3": ("-1.82929e-07", "7.00e-08"),
+        "P1": ("5.69267e-05", "3.13e-06"),
+        "P2": ("2.75179e-05", "3.50e-06"),
+    }
+    for name, (value, sigma) in expected.items():
+        assert same(value, camera[name]["value"]), name
+        assert same(sigma, camera[name]["sigma"]), name
+    first = values["photos"][0]
+    assert [f"{first[name]:.6f}" for name in ("omega", "x", "y", "z")] == [
+        "-39.431706", "0.454874", "1.793834", "1.469413",
+    ]  # fmt: skip
+
+
+def test_fixed_control_points_of_aerial_photographs_agree():
+    """Without the points that are no control points, all of which keep their places."""
+    one = project("sxb")
+    mine = np.isin(one.point, [control.point for control in one.control])
+    one = replace(
+        one, photo=one.photo[mine], point=one.point[mine], image=one.image[mine], sigma=one.sigma[mine],
+        lines=one.lines[mine], control=tuple(replace(c, covariance=np.zeros((3, 3))) for c in one.control),
+    )  # fmt: skip
+    values = orientation_values(orient(one))
+    assert (f"{values['sigma0']:.4f}", values["redundancy"]) == ("1.0419", 64)
+    first = values["photos"][0]
+    found = {name: (first[name], first["sigma"][name]) for name in ("omega", "phi", "kappa", "x", "y", "z")}
+    expected = {
+        "omega": ("0.783992", "0.045"),
+        "phi": ("-0.419915", "0.031"),
+        "kappa": ("-89.916837", "0.00511"),
+        "x": ("-118.672965", "0.991"),
+        "y": ("109.358761", "1.41"),
+        "z": ("1776.759605", "0.178"),
+    }
+    for name, (value, sigma) in expected.items():
+        assert same(value, *found[name][:1], sigma=50.0 * found[name][1]), (
+            name
+        )  # their iteration ends earlier
+        assert same(sigma, found[name][1]), name
+
+
 @pytest.mark.parametrize(("name", "sigma0"), [("camcal", 1.6148), ("sxb", 0.965375)])
 def test_the_result_does_not_depend_on_start_values(name, sigma0):
     calibrate = ("c", "xp", "yp", "as", "K1", "K2", "K3", "P1", "P2") if name == "camcal" else ()

@@ -7,7 +7,8 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from survey.orientation.bundle.adjustment import adjust, prepare, similarity
-from survey.orientation.bundle.orient import control_tests, orient
+from survey.orientation.bundle.control import control_tests
+from survey.orientation.bundle.orient import orient
 from survey.orientation.bundle.statistics import photo_precision, statistics
 from survey.orientation.network import INTERIOR
 from survey.orientation.rotations import angles
@@ -136,6 +137,13 @@ def normalised(draws):
 
 def check_honest(draws, tolerance):
     points, cameras, inner, sigma0 = normalised(draws)
+    names = ("points", "cameras", "calibration", "sigma0")
+    print(
+        {
+            n: round(float(np.mean(one**2)), 4)
+            for n, one in zip(names, (points, cameras, inner, sigma0), strict=True)
+        }
+    )
     for one in (points, cameras):
         assert np.mean(one**2) == pytest.approx(1.0, abs=tolerance)
         assert abs(np.mean(one)) < tolerance
@@ -152,11 +160,11 @@ def test_predicted_covariances_are_honest_in_a_thousand_draws():
     check_honest(1000, 0.1)
 
 
-def test_blunders_of_ten_sigma_are_found():
+def check_blunders(draws):
     truth = wall_block(points=60)
     exact = with_points(truth, spread_points(truth, 6))
     found = wrong = total = 0
-    for draw in range(20):
+    for draw in range(draws):
         rng = np.random.default_rng(draw)
         network = noisy(exact, rng)
         spoilt = rng.choice(len(network.photo), 5, replace=False)
@@ -167,8 +175,18 @@ def test_blunders_of_ten_sigma_are_found():
         found += len(set(result.removed) & set(spoilt.tolist()))
         wrong += len(set(result.removed) - set(spoilt.tolist()))
         total += 5
+    print(f"{found} of {total} blunders found, {wrong} of {draws * len(exact.photo)} sound marks left out")
     assert found >= 0.95 * total
-    assert wrong <= 0.01 * len(exact.photo) * 20
+    assert wrong <= 0.01 * len(exact.photo) * draws
+
+
+def test_blunders_of_ten_sigma_are_found():
+    check_blunders(20)
+
+
+@pytest.mark.slow
+def test_a_thousand_blunders_of_ten_sigma():
+    check_blunders(200)
 
 
 def test_control_points_and_check_points_are_tested_by_their_own_precision():

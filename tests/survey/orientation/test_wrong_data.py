@@ -105,6 +105,75 @@ def test_mirrored_control_points_of_one_plane(change):
     refused(placed(flat, change), "they are mirrored", "control.txt:1")
 
 
+def without(one, axis):
+    """The network with the control points of the plane in front, without start values."""
+    flat = replace(one, control=tuple(replace(c, place=c.place * (1, 0, 1)) for c in one.control))
+    return without_start(placed(flat, axis))
+
+
+def test_mirrored_control_points_of_one_plane_without_start_values_are_told_as_an_open_question():
+    """A plane seen from behind is its mirror image: residuals cannot tell, the side of the stations can."""
+    one = network(relief=0.0)
+    for change, side in ((lambda p: p, "(0, -1, 0)"), (MIRRORS["x"], "(0, 1, 0)")):
+        result = orient(without(one, change))
+        assert result.statistics.sigma0 == pytest.approx(1.0, abs=0.15)
+        (remark,) = [text for text in result.remarks if "mirrored" in text]
+        assert side in remark.replace("-0,", "0,")
+
+
+def test_mirrored_control_points_of_one_plane_are_told_where_stations_are_given():
+    """Stations that are found elsewhere than they were given leave the question open; those that agree do not."""
+    one = network(relief=0.0)
+    flat = replace(one, control=tuple(replace(c, place=c.place * (1, 0, 1)) for c in one.control))
+    start = np.full_like(one.start, np.nan)
+    assert not [text for text in orient(replace(flat, start=start)).remarks if "mirrored" in text]
+    result = orient(replace(placed(flat, MIRRORS["x"]), start=start))
+    assert [text for text in result.remarks if "mirrored" in text]
+
+
+def test_control_points_that_all_check_hold_nothing():
+    one = network()
+    checks = tuple(replace(c, check=True) for c in one.control)
+    refused(replace(one, control=checks), "all 8 control points only check the result", "control.txt:1")
+
+
+def test_marks_that_count_upwards_are_mirrored():
+    one = without_start(network())
+    height = one.cameras[0].size[1]
+    up = replace(one, image=one.image * (1, -1) + (0, height))
+    refused(up, "control points are mirrored", "control.txt:1")
+
+
+def test_control_points_in_millimetres():
+    one = without_start(network())
+    refused(placed(one, lambda place: 1e3 * place), "are of another unit", "control.txt:1")
+
+
+def test_marks_in_millimetres():
+    one = network()
+    refused(replace(one, image=one.image * 0.006), "all marks lie within", one.where(0))
+
+
+def test_a_control_point_that_is_off_is_left_out_and_its_marks_are_not_blamed():
+    one = network()
+    off = tuple(
+        replace(c, place=c.place + (k == 3) * np.array([0.1, 0, 0])) for k, c in enumerate(one.control)
+    )
+    result = orient(replace(one, control=off), "remove")
+    assert [c.check for c in result.network.control].index(True) == 3
+    assert not set(result.removed) & set(np.flatnonzero(one.point == one.control[3].point).tolist())
+    name = one.names[one.control[3].point]
+    assert any(f"left out, which the others contradict: {name} (" in text for text in result.remarks)
+    assert result.statistics.sigma0 == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_wrong_camera_is_doubted_rather_than_the_marks():
+    one = network()
+    camera = replace(one.cameras[0], inner=one.cameras[0].inner * np.r_[1.3, np.ones(9)])
+    result = orient(replace(one, cameras=(camera,)), "remove")
+    assert any("check the camera (calibrate c, K1)" in text for text in result.remarks)
+
+
 def test_start_values_in_another_frame_are_no_mistake():
     one = network()
     turn = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from survey.orientation.formats.colmap import read_colmap
 from survey.orientation.formats.control import ControlRow, write_control
@@ -177,3 +178,63 @@ def test_wrong_data_leave_nothing_behind(tmp_path):
 def _export(folder):
     write_photomodeler(network(plain=True), folder / "export.txt")
     return folder / "export.txt"
+
+
+def test_an_export_that_does_not_state_the_size_of_its_photographs(tmp_path):
+    made = network(plain=True)
+    write_photomodeler(made, tmp_path / "export.txt")
+    lines = (tmp_path / "export.txt").read_text(encoding="utf-8").splitlines()
+    lines[1] = "0.0005 20"
+    (tmp_path / "export.txt").write_text("\n".join(lines), encoding="utf-8")
+    given = ("orient", "--photomodeler", tmp_path / "export.txt", "--out", tmp_path / "out")
+    assert "export.txt:2: the line of tolerance, iterations, width and height has 2 numbers" in fails(
+        1, *given
+    )
+    assert "write width and height" in fails(2, *given, "--size", "6000")
+    assert "6 photographs" in prints(*given, "--size", "6000x4000")
+    project = tmp_path / "project.toml"
+    project.write_text('photomodeler = "export.txt"\nsize = [6000, 4000]\n', encoding="utf-8")
+    assert "6 photographs" in prints("orient", project, "--out", tmp_path / "other")
+
+
+def pictures(folder, made, size):
+    folder.mkdir()
+    for photo in made.photos:
+        Image.new("L", size).save(folder / f"{photo.name.lower()}.PNG")
+
+
+@pytest.mark.parametrize(
+    ("size", "message"),
+    [
+        ((400, 600), "turn it back as the camera took it"),
+        ((600, 300), "has 600 × 300 pixels, its camera 6000 × 4000"),
+    ],
+)
+def test_pictures_of_other_proportions_are_refused(tmp_path, size, message):
+    path = project(tmp_path, 'pictures = "pictures"')
+    assert "project.toml:4: no folder" in fails(2, "orient", path, "--out", tmp_path / "out")
+    pictures(tmp_path / "pictures", network(), size)
+    assert message in fails(2, "orient", path, "--out", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_results_are_drawn_on_pictures_of_any_resolution(tmp_path):
+    path = project(tmp_path, 'pictures = "pictures"')
+    pictures(tmp_path / "pictures", network(), (600, 400))
+    prints("orient", path, "--out", tmp_path / "out")
+    values = json.loads((tmp_path / "out/orientation.json").read_text(encoding="utf-8"))
+    assert values["photos"][0]["picture"] == "../pictures/p01.PNG"
+    (tmp_path / "pictures/p02.PNG").unlink()
+    assert "no picture of photograph P02" in fails(2, "orient", path, "--out", tmp_path / "out")
+
+
+def test_control_points_of_an_export_are_results_unless_they_are_fixed(tmp_path):
+    write_photomodeler(network(plain=True), tmp_path / "export.txt")
+    path = tmp_path / "project.toml"
+    for more, points in (("", 0), ("fixed_control = true\n", 6)):
+        path.write_text(f'photomodeler = "export.txt"\n{more}', encoding="utf-8")
+        told = answer("orient", path, "--out", tmp_path / "out")
+        assert len(told["control"]) == points
+        assert any("are left out, as it has their adjusted places" in one for one in told["remarks"]) == (
+            not points
+        )

@@ -1,10 +1,12 @@
 """Mistakes in files of photographs are named by file and line."""
 
+from dataclasses import replace
+
 import pytest
 
 from moma.errors import SurveyError
 from survey.orientation.formats.colmap import read_colmap, write_colmap
-from survey.orientation.formats.control import read_control, with_control
+from survey.orientation.formats.control import ControlRow, read_control, with_control
 from survey.orientation.formats.dbat import read_dbat, write_dbat
 from survey.orientation.formats.marks import read_marks
 from survey.orientation.formats.metashape import read_metashape, write_metashape
@@ -192,3 +194,16 @@ def test_orientation(tmp_path, text, message):
     path.write_text(text, encoding="utf-8")
     with pytest.raises(SurveyError, match=message):
         read_orientation(path)
+
+
+def test_control_points_that_are_marked_nowhere_are_named_and_left_out():
+    network = written()
+    kept = network.point != network.control[0].point
+    less = replace(
+        network, photo=network.photo[kept], point=network.point[kept], image=network.image[kept],
+        sigma=network.sigma[kept], lines=network.lines[kept], control=(),
+    )  # fmt: skip
+    rows = [ControlRow(network.names[one.point], "", one.place, one.covariance) for one in network.control]
+    found = with_control(less, rows)
+    assert len(found.control) == len(rows) - 1
+    assert found.remarks == (f"control points that are marked nowhere: {rows[0].number}",)

@@ -1,5 +1,6 @@
 """Each format gives back what was written, to the last digits."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +15,9 @@ from survey.orientation.formats.marks import network_of, read_marks, write_marks
 from survey.orientation.formats.metashape import read_metashape, write_metashape
 from survey.orientation.formats.photomodeler import read_photomodeler, write_photomodeler
 from survey.orientation.formats.result import orientation_values, read_orientation, write_orientation
+from survey.orientation.network import INTERIOR
 from survey.orientation.projection import project
+from survey.orientation.rotations import angles
 from tests.survey.orientation.synthetic_block import noisy, spread_points, wall_block, with_points
 
 NEAR = 1e-9  # [m], [px]
@@ -156,7 +159,60 @@ def test_what_a_format_has_no_place_for_is_refused(tmp_path):
         write_metashape(written(), tmp_path / "a.xml")
     with pytest.raises(SurveyError, match=r"as 0\.0002"):
         write_photomodeler(written(), tmp_path / "a.txt")
-    named = replace(written(plain=True), names=tuple(f"p{k}" for k in range(len(written().names))))
-    with pytest.raises(SurveyError, match="'p0' is not a number"):
-        write_photomodeler(named, tmp_path / "a.txt")
     assert not list(tmp_path.iterdir())
+
+
+def test_points_with_names_are_numbered_and_the_table_says_how(tmp_path):
+    names = tuple(f"p{k}" for k in range(len(written().names)))
+    plain, forward = (replace(one, names=names) for one in (written(plain=True), written(forward=True)))
+    write_photomodeler(plain, tmp_path / "export.txt")
+    write_colmap(forward, tmp_path / "model")
+    for back, network, table in (
+        (read_photomodeler(tmp_path / "export.txt"), plain, tmp_path / "export-points.txt"),
+        (read_colmap(tmp_path / "model"), forward, tmp_path / "model/points-names.txt"),
+    ):
+        rows = table.read_text(encoding="utf-8").splitlines()[1:]
+        name = dict(row.split(", ") for row in rows)
+        same_pictures(network, replace(back, names=tuple(name[one] for one in back.names)))
+
+
+def test_dbat_writes_distortion_as_the_toolbox_does(tmp_path):
+    """Its calibration has K1 0.00458861 and as 0.000389598 in the report, and in the script of the camera this."""
+    script = write_dbat(written(), tmp_path)
+    text = script.read_text(encoding="utf-8")
+    text = re.sub(r"<aspect>.*</aspect>", "<aspect>0.999610402</aspect>", text)
+    text = re.sub(r"<K>.*</K>", "<K>-0.00458860,4.51351e-05,2.05253e-06</K>", text)
+    text = re.sub(r"<P>.*</P>", "<P>6.12803e-05,4.41171e-05</P>", text)
+    text = re.sub(r"<cc>.*</cc>", "<cc>7.45699</cc>", text)
+    script.write_text(text, encoding="utf-8")
+    inner = dict(zip(INTERIOR, read_dbat(script).cameras[0].inner, strict=True))
+    expected = {"as": 3.89598e-4, "K1": 4.5886e-3, "K2": -4.51351e-5, "K3": -2.05253e-6, "P1": -6.12803e-5}
+    assert {name: inner[name] for name in expected} == pytest.approx(expected, rel=1e-6)
+
+
+def test_dbat_stations_known_beforehand(tmp_path):
+    made = written()
+    script = write_dbat(made, tmp_path)
+    back = read_dbat(script)
+    for one, other in zip(made.photos, back.photos, strict=True):
+        assert np.abs(one.station - other.station).max() < 1e-9
+        assert np.abs(one.rotation - other.rotation).max() < 1e-9
+        assert other.observed_station is None
+    rows = [f"{k}, 1.0, 2.0, 3.0, 0.05, 0.1, 0.2, 0.3" for k in range(1, len(made.photos) + 1)]
+    (tmp_path / "stations.txt").write_text("\n".join(rows), encoding="utf-8")
+    text = script.read_text(encoding="utf-8")
+    text = text.replace("id,x,y,z,omega,phi,kappa", "id,x,y,z,sxyz,omega,phi,kappa")
+    script.write_text(text.replace('units="degrees"', 'units="radians"'), encoding="utf-8")
+    photo = read_dbat(script).photos[1]
+    np.testing.assert_array_equal(photo.observed_station, [1.0, 2.0, 3.0])
+    np.testing.assert_array_equal(photo.station_sigma, [0.05] * 3)
+    np.testing.assert_allclose(angles(photo.rotation), [0.1, 0.2, 0.3])
+    assert photo.observed_rotation is None
+
+
+def test_check_points_of_metashape_remain_check_points(tmp_path):
+    network = written(forward=True)
+    checks = tuple(replace(one, check=k == 1) for k, one in enumerate(network.control))
+    write_metashape(replace(network, control=checks), tmp_path / "doc.xml")
+    back = read_metashape(tmp_path / "doc.xml")
+    assert {back.names[one.point] for one in back.control if one.check} == {network.names[checks[1].point]}

@@ -1,0 +1,90 @@
+"""Control points: whether they fit what the photographs show, and what they cannot tell."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from moma.errors import SurveyError
+from survey.arrays import Array
+from survey.orientation.bundle.adjustment import Solution
+from survey.orientation.bundle.statistics import Statistics
+from survey.orientation.network import Network, Photo
+
+__all__ = ["FAR_OFF", "MISSES", "control_remarks", "control_tests"]
+
+MISSES = 2.33
+"""√(χ²₃ / 3) that a sound point exceeds once in a thousand cases."""
+
+FAR_OFF = 10.0
+"""The same, beyond which it is a mistake, not chance."""
+
+_FLAT = (
+    5e-3  # extent of control points off their plane over that in it, below which a mirrored set fits as well
+)
+_NEAR = 0.3  # distance of a station from where it was given, over that from the control points, up to which they agree
+_FOOTPRINT = 0.5  # of a pixel on the object, beyond which coordinates are hardly in metres [m]
+_FINE = 3e-3  # standard deviation of coordinates over that, below which they are not
+
+
+def control_tests(network: Network, solution: Solution, result: Statistics) -> Array:
+    """Return by how many standard deviations each control or check point misses its place; 0 where it is fixed.
+
+    The misfit d of a control point has the covariance Σ - C of what was stated and what was adjusted, that of a
+    check point Σ + C; returned is √(dᵀ(…)⁻¹d / 3).
+    """
+    out = np.zeros(len(network.control))
+    for k, one in enumerate(network.control):
+        own = result.points[one.point]
+        if (one.fixed and not one.check) or not np.isfinite(own).all():
+            continue
+        off = one.place - solution.unknowns.point[one.point]
+        spread = one.covariance + (own if one.check else -own)
+        values, axes = np.linalg.eigh(spread)
+        sound = values > 1e-3 * float(np.trace(one.covariance if not one.check else spread)) / 3.0
+        if sound.any():
+            out[k] = np.sqrt((((axes.T @ off)[sound]) ** 2 / values[sound]).sum() / sound.sum())
+    return out
+
+
+def control_remarks(network: Network, solution: Solution, photos: Sequence[Photo]) -> list[str]:
+    """Return remarks on what control points leave open: their unit, and the side of their plane.
+
+    Parameters
+    ----------
+    photos : as they were given: where their stations agree with what was found, a plane is not mirrored
+
+    Raises
+    ------
+    SurveyError
+        if coordinates are stated far finer than a pixel: they are of another unit
+    """
+    given = [one for one in network.control if not one.check]
+    if len(given) < 3:
+        return []
+    places, out = np.array([one.place for one in given]), list[str]()
+    towards = solution.unknowns.station.mean(axis=0) - places.mean(axis=0)
+    lengths = [network.camera_of(f).inner[0] / network.camera_of(f).pixel for f in range(len(network.photos))]
+    footprint = float(np.linalg.norm(towards) / np.median(lengths))
+    sigma = float(np.sqrt(np.median([np.trace(one.covariance) / 3.0 for one in given])))
+    if footprint > _FOOTPRINT:
+        told = f"a pixel covers about {footprint:.2g} m where the control points are"
+        if 0.0 < sigma < _FINE * footprint:
+            raise SurveyError(
+                f"{told}, which are stated to {sigma:.2g} m: their coordinates are of another unit",
+                where=given[0].where or network.path,
+                remedy="give coordinates and deviations in metres",
+            )
+        out.append(f"{told}: are their coordinates in metres?")
+    _, sizes, axes = np.linalg.svd(places - places.mean(axis=0), full_matrices=False)
+    found = zip((one.station for one in photos), solution.unknowns.station, strict=True)
+    off = [float(np.linalg.norm(here - there)) for there, here in found if there is not None]
+    placed = bool(off) and np.median(off) < _NEAR * np.linalg.norm(towards)
+    placed = placed or any(one.observed_station is not None or one.fixed for one in photos)
+    if sizes[2] < _FLAT * sizes[0] and not placed:
+        normal = axes[2] * np.sign(axes[2] @ towards)
+        x, y, z = normal.round(2) + 0.0
+        out.append(
+            "the control points lie in a plane, and mirrored ones would fit as well: check that the photographs stand "
+            f"{normal @ towards:.3g} m from it on the side of its normal ({x:g}, {y:g}, {z:g})"
+        )
+    return out
