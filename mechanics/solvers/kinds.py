@@ -11,10 +11,11 @@ import numpy as np
 
 from mechanics.problem.problem import ContactProblem
 from mechanics.solvers.chain import Begin, Link, Solver
-from mechanics.solvers.first_order.body_admm import BodyADMM, Stage
+from mechanics.solvers.first_order.body_admm import STAGES, BodyADMM, Stage
 from mechanics.solvers.first_order.disk_admm import DiskADMM
 from mechanics.solvers.first_order.nsgs import NSGS
 from mechanics.solvers.first_order.stones_as_rigid import StonesAsRigid
+from mechanics.solvers.scales import HELD, JOINTS, LOOK, MANY
 from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.second_order.newton import Newton
 from mechanics.solvers.second_order.softer_joints import SofterJoints
@@ -22,12 +23,10 @@ from mechanics.solvers.second_order.softer_joints import SofterJoints
 __all__ = ["ENDED_PATH", "EXACT", "POLISH", "chain_of"]
 
 # budgets: iterations of ADMM and sweeps over disks, steps of Newton's method, factorisations of a path
-_ADMM, _NEWTON, _PATH = 500, 20, 60
+_ADMM, _NEWTON, _PATH, _ENDLESS = 500, 20, 60, 1_000_000
 # moving rigid bodies from which a factorisation in each step of Newton's method takes longer than iterations with kept
-# factors: in each step of a motion, at rest, and at all
-_HANDFUL, _SOME, _MANY = 32, 300, 1000
-# contacts of disks up to which Newton's method takes less than the iterations that it spares
-_FEW = 1000
+# factors: in each step of a motion, and at rest; of `MANY` it takes too long at all
+_HANDFUL, _SOME = 32, 300
 EXACT = 1e-3
 """Tolerances over those asked for, of forces that a rest keeps for hundreds of steps: what they lack would be a creep.
 """
@@ -37,12 +36,12 @@ _FURTHER = 0.03
 # velocity tolerance of a motion from which it is solved loosely [-]
 _LOOSE = 1e-3
 # η up to which forces of the last step lead a path, and Newton's method between deformable stones [-]
-_NEAR, _NEARER = 1e-2, 1e-3
+_NEAR = 1e-3
 
 # joints of a rest hold as a rule: with a small penalty their forces arrive at once
-_HOLD = Stage(1e-3, 50, extrapolated=True, longer=100)
+_HOLD = Stage(1e-3, 50, extrapolated=True)
 # so do those of a motion that is predicted, with a larger one, and of one that need not be exact
-_FOLLOW = (Stage(0.02, 150, extrapolated=False), Stage(0.05, 150, extrapolated=True))
+_FOLLOW = STAGES[:2]
 _SHAKE = Stage(0.1, 80, extrapolated=True)
 # penalties in turn: with the large one contacts sort themselves into open, sliding and sticking; with the small one of
 # those that stick, their forces, which grow steadily until one slips, arrive 200 times as soon
@@ -53,27 +52,28 @@ _TURNS = (replace(_SORT, iterations=10), replace(_GROW, penalty=(1.0, 0.05, 0.01
 _Method = Callable[[float, float, int], Solver]
 _turns: _Method = partial(BodyADMM, stages=_TURNS)
 _rest: _Method = partial(BodyADMM, stages=(_HOLD, *_TURNS), further=EXACT)
-_motion: _Method = partial(BodyADMM, stages=(*_FOLLOW, *_TURNS), further=0.1)
+_motion: _Method = partial(BodyADMM, stages=(*_FOLLOW, *_TURNS), further=_FURTHER)
 _loosely: _Method = partial(BodyADMM, stages=(_SHAKE, *_TURNS))
 _as_rigid: _Method = partial(StonesAsRigid, stages=_TURNS)
 # a look costs two sweeps over disks, an extrapolation ten
-_sweeps: _Method = partial(NSGS, check_every=20, depth=0)
+_sweeps: _Method = partial(NSGS, check_every=LOOK, depth=0)
 
 _newton = Link("Newton", Newton, _NEWTON, further=_FURTHER)
-_path = Link("interior point", InteriorPoint, _PATH, Begin.NOTHING)
+_path = Link("interior point", InteriorPoint, _PATH, Begin.NOTHING, _FURTHER)
 _from_best = replace(_path, begin=Begin.BEST)
 _admm = Link("body ADMM", _turns, _ADMM)
-_endless = replace(_admm, iterations=10**6)
+_endless = replace(_admm, iterations=_ENDLESS)
 
 _exact = replace(_newton, further=EXACT)
 
-POLISH = Link("body ADMM", partial(BodyADMM, stages=(_HOLD,)), 50)
+POLISH = Link("body ADMM", partial(BodyADMM, stages=(_HOLD,)), _HOLD.iterations)
 """Link that makes forces exact which a rest keeps."""
 
 ENDED_PATH = (_path, _newton)
 """Chain of the interior point alone, which Newton's method ends: it stalls where contacts are between two states."""
 
-_released = replace(_newton, iterations=60, begin=Begin.RELEASED)
+_long = replace(_newton, iterations=_PATH)
+_released = replace(_long, begin=Begin.RELEASED)
 _REST = (
     replace(_exact, begin=Begin.GIVEN),
     replace(_admm, begin=Begin.GIVEN),
@@ -87,8 +87,8 @@ _REST = (
 # the limit hardly depend on where corners lie
 _FROM_NOTHING = Link(
     "Newton from soft joints",
-    partial(SofterJoints, factors=(1e5, 1e2, 0.01)),
-    60,
+    partial(SofterJoints, factors=tuple(share / HELD for share in JOINTS)),
+    _PATH,
     Begin.GIVEN,
     EXACT,
 )
@@ -98,7 +98,7 @@ _REST_OF_SOME = (replace(_admm, method=_rest, begin=Begin.GIVEN), _newton, _path
 _REST_OF_MANY = (replace(_endless, method=_rest, begin=Begin.GIVEN),)
 _MOTION = (
     replace(_admm, method=_motion, begin=Begin.AHEAD),
-    *(2 * (replace(_newton, iterations=100), _admm)),
+    *(_long, _admm, _long, _admm),
     _path,
 )
 # of few stones Newton's method goes first: ADMM presses stones against what they only touch, and
@@ -107,27 +107,27 @@ _MOTION_OF_FEW = (replace(_newton, begin=Begin.AHEAD), *_MOTION)
 # errors that are allowed would be extrapolated with the rest
 _LOOSE_MOTION = (replace(_endless, method=_loosely, begin=Begin.GIVEN),)
 _MOTION_OF_MANY = (replace(_endless, begin=Begin.AHEAD),)
-_SOFTER = Link("Newton from softer joints", SofterJoints, 150, Begin.GIVEN, EXACT)
+_SOFTER = Link("Newton from softer joints", SofterJoints, _PATH, Begin.GIVEN, EXACT)
 _SPRINGS = (replace(_exact, begin=Begin.GIVEN), _SOFTER, _path)
 _SPRINGS_OF_SOME = (replace(_admm, begin=Begin.GIVEN), _exact, _SOFTER, _path)
 _DEFORMABLE = (
-    replace(_newton, method=partial(Newton, hopeless=0.3), begin=Begin.GIVEN, further=1.0),
+    replace(_newton, method=partial(Newton, near=True), begin=Begin.GIVEN, further=1.0),
     *(_path, _newton),
     *(_from_best, _newton),
     replace(_SOFTER, further=1.0),
-    Link("sweeps", NSGS, 1000),
+    Link("sweeps", NSGS, _ADMM),
 )
 # between rigid stones Newton's method wanders, so the path is followed until the laws hold, again from where it stalled
 _AMONG_RIGID = (replace(_from_best, near=_NEAR), _path, _from_best, _from_best)
 _STONES_AS_RIGID = Link("stones as rigid ones", _as_rigid, _ADMM, Begin.BEST, 100.0)
-_SPRINGS_AMONG_RIGID = (replace(_exact, near=_NEARER), *(2 * (_STONES_AS_RIGID, _exact)))
+_SPRINGS_AMONG_RIGID = (replace(_exact, near=_NEAR), _STONES_AS_RIGID, _exact, _STONES_AS_RIGID, _exact)
 _DISKS = (
     Link("sweeps", _sweeps, _ADMM, Begin.GIVEN),
-    Link("ADMM of disks", partial(DiskADMM, penalty=0.05), _ADMM, Begin.GIVEN),
-    Link("ADMM of disks", DiskADMM, 10**6),
+    Link("ADMM of disks", DiskADMM, _ADMM, Begin.GIVEN),
+    Link("ADMM of disks", DiskADMM, _ENDLESS),
 )
-_FEW_DISKS = (*_DISKS[:2], replace(_newton, iterations=100, begin=Begin.GIVEN), _DISKS[2])
-_SWEEPS = (Link("sweeps", NSGS, 10**6, Begin.GIVEN),)
+_FEW_DISKS = (*_DISKS[:2], replace(_long, begin=Begin.GIVEN), _DISKS[2])
+_SWEEPS = (Link("sweeps", NSGS, _ENDLESS, Begin.GIVEN),)
 
 
 def chain_of(
@@ -144,7 +144,7 @@ def chain_of(
     operator, bodies = problem.delassus, _moving_bodies(problem)
     yields = operator.joint_compliance is not None
     if operator.plane is not None:
-        return _FEW_DISKS if len(problem.friction) <= _FEW else _DISKS
+        return _FEW_DISKS if len(problem.friction) <= MANY else _DISKS
     if operator.rigid is None:
         if operator.form is None:
             return _SWEEPS
@@ -156,7 +156,7 @@ def chain_of(
         return (*_AMONG_RIGID, *_DEFORMABLE) if bodies < _SOME else ()
     if yields:
         return _SPRINGS if bodies < _SOME else _SPRINGS_OF_SOME
-    if follows and bodies >= _MANY:
+    if follows and bodies >= MANY:
         return _MOTION_OF_MANY if moving else _REST_OF_MANY
     if moving and velocity_tolerance < _LOOSE:
         return _MOTION if bodies >= _HANDFUL else _MOTION_OF_FEW

@@ -5,13 +5,13 @@ import numpy as np
 from mechanics.arrays import Array
 from mechanics.problem.problem import ContactProblem
 from mechanics.problem.residual import project_on_cone
+from mechanics.solvers.scales import ROUNDING
 from mechanics.solvers.second_order.scaling import equilibrated
 
 __all__ = ["without_self_stress"]
 
-# α over the scale of W by which self-stress is told from forces that bodies feel, and corrections: of masses that
-# differ by 10⁶, forces are then exact to 10⁻⁵ and self-stress to 10⁻⁶
-_SMALL, _CORRECTIONS = 1e-9, 4
+# corrections: of masses that differ by 10⁶, forces are then exact to 10⁻⁵ and self-stress to 10⁻⁶
+_CORRECTIONS = 4
 
 
 def without_self_stress(problem: ContactProblem, impulse: Array) -> Array:
@@ -27,7 +27,7 @@ def without_self_stress(problem: ContactProblem, impulse: Array) -> Array:
     """
     even, each = equilibrated(problem)
     unit, size = each[:, None], impulse.shape[1]
-    theta = np.tile(_SMALL * even.delassus.scale * np.eye(size), (len(impulse), 1, 1))
+    theta = np.tile(ROUNDING * even.delassus.scale * np.eye(size), (len(impulse), 1, 1))
     system, wanted = even.form("forces without self-stress").shifted(theta), impulse / unit
     least = np.zeros_like(wanted)
     for _ in range(_CORRECTIONS):

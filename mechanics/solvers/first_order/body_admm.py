@@ -22,42 +22,26 @@ from mechanics.solvers._kernels import body_admm as kernel
 from mechanics.solvers._kernels import body_cholesky as cholesky
 from mechanics.solvers._kernels.body_parts import Parts, parts_of
 from mechanics.solvers.first_order.body_factors import factorise
+from mechanics.solvers.scales import MANY, OVERSHOOT, ROUNDING, SPARE
 from moma.errors import SolverError
 
 __all__ = ["STAGES", "BodyADMM", "Stage"]
 
 
-# overshoot of the impulses [-]
-_OVER = 1.6
 # velocities of a body
 _VELOCITIES = 6
-# zeros that a panel of the factors may hold, over its other blocks [-]
-_SPARE = 0.2
-# bodies below which the order of elimination depends on their pairs alone, and is kept while these stay, and factors
-# are of double precision: they stay in the fastest memory, and tolerances may be very small
-_FEW = 1000
 # numbers in factors that are kept until contacts are detected again, at most: 32 MB
 _KEPT = 4_000_000
 # work of a block of contacts in an iteration, over that of a number in the factors [-]
 _CONTACT = 3000
-# difference of the offsets between the centres of two bodies at contacts of one run: rounding [-]
-_SAME = 1e-12
 # σ over E of joints that yield, beyond that of rigid ones: of small contacts E is 10⁴ times W_αα [-]
 _GIVING = 10.0
-# iterations before the first look at the residual
-_FIRST_LOOK = 10
-# fewest iterations between two looks
+# fewest iterations before a look at the residual
 _LEAST_LOOK = 5
 # and most, over the iterations so far: changes of velocities foretell the residual for so long alone [-]
 _LATE_LOOK = 0.2
-# part of the change at which the residual is expected to be small enough, at which it is looked at [-]
-_EARLY = 0.8
-# errors over their tolerances up to which a first stage has come near [-]
-_NEAR = 1e3
 # iterates from which is extrapolated
 _DEPTH = 6
-# distance of x from its cone, over the impulse, beyond which a contact slides: less is rounding [-]
-_BESIDE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -71,16 +55,16 @@ class Stage:
         slide and stick as the stage begins, which cost a factorisation of their own [-]
     iterations : their number
     extrapolated : from the iterates before (Anderson 1965)
-    longer : iterations more of a first stage that has come near at its end
     """
 
     penalty: float | tuple[float, float, float]
     iterations: int
     extrapolated: bool
-    longer: int = 0
 
 
-STAGES = (Stage(0.02, 150, False), Stage(0.05, 150, True), Stage(0.2, 250, True))
+# iterations of each
+_STAGE = 150
+STAGES = (Stage(0.02, _STAGE, False), Stage(0.05, _STAGE, True), Stage(0.2, _STAGE, True))
 
 
 @dataclass(frozen=True)
@@ -167,7 +151,7 @@ class _Run:
         self._stages = list(settings.stages)
         self._factors: kernel.Factors | None = None
         self._memory = _acceleration(0, 0)
-        self._until, self._first, self._longer = 0, settings.stages[0].iterations, settings.stages[0].longer
+        self._until, self._first = 0, settings.stages[0].iterations
         self.iterations, self.excess, self._change, self._limit = 0, np.inf, np.inf, 0.0
 
     @property
@@ -181,7 +165,7 @@ class _Run:
             self._begin(self._stages.pop(0))
         most = min(self._settings.max_iterations, self._until) - self.iterations
         if self.iterations == 0:
-            self._advance(min(_FIRST_LOOK, most), 0.0)
+            self._advance(min(_LEAST_LOOK, most), 0.0)
             return
         least = min(_LEAST_LOOK, most)
         self._advance(least, 0.0)
@@ -197,7 +181,7 @@ class _Run:
             self._iterate,
             count,
             limit,
-            _OVER,
+            OVERSHOOT,
             self._bodies.length,
             self._touching,
             self._factors,
@@ -220,7 +204,7 @@ class _Run:
         for _ in range(count):
             each(kernel.down, step, factors)
             change = kernel.between(iterate, step, length, factors)
-            self._change = max(change, *each(kernel.up, step, (_OVER, length), touching, factors))
+            self._change = max(change, *each(kernel.up, step, (OVERSHOOT, length), touching, factors))
             self.iterations += 1
             if not self._change > limit:
                 return
@@ -265,13 +249,10 @@ class _Run:
         eta = whole / max(size, 1e-300)
         excess = max(eta / settings.tolerance, largest * scale / self._pace / settings.velocity_tolerance)
         if np.isfinite(self._change) and excess > 0:
-            self._limit = self._change * _EARLY * self.goal / excess
+            self._limit = self._change * self.goal / excess
         if self.iterations == 0 or excess < self.excess:
             found = self._iterate.x.copy(), self._z.copy(), self._soft
             self.excess, self._best = float(excess), found
-        if self.iterations == self._first and excess <= _NEAR:
-            self._first = self._until = self._first + self._longer
-            self._longer = 0
 
     def end(self) -> None:
         """Let go of factors that are too large to be kept."""
@@ -304,7 +285,7 @@ class _Bodies:
     def __init__(self, delassus: Delassus, contacts: RigidContacts) -> None:
         moving = np.flatnonzero(contacts.inertia[:, 0] > 0)
         order, side, self._panels = _eliminated(contacts, moving)
-        self._parts = parts_of(self._panels, len(moving) >= _FEW)
+        self._parts = parts_of(self._panels, len(moving) >= MANY)
         self._place, self.runs = _runs(side, contacts.geometry, self._parts, len(moving))
         self._blocks = len(self.runs.block) - 1
         self.geometry = np.ascontiguousarray(contacts.geometry)
@@ -381,7 +362,7 @@ class _Bodies:
         """
         if penalty in self._factors:
             return self._factors[penalty]
-        precision = np.float32 if len(self.inertia) >= _FEW else np.float64
+        precision = np.float32 if len(self.inertia) >= MANY else np.float64
         value = np.zeros(self._panels.start[-1], dtype=precision)
         kernel.assemble(touching, self._mass, self._panels, value)
         if not factorise(self._panels, value, self._parts, len(self.groups)):
@@ -417,7 +398,7 @@ def _runs(side: Ints, geometry: Array, parts: Parts, count: int) -> tuple[Ints, 
     offset = geometry[:, 9:12] - geometry[:, 12:]
     new = np.ones(len(side), dtype=bool)
     new[1:] = (side[1:] != side[:-1]).any(axis=1)
-    new[1:] |= (np.abs(offset[1:] - offset[:-1]) > _SAME * np.abs(offset[1:]).max(axis=1)[:, None]).any(
+    new[1:] |= (np.abs(offset[1:] - offset[:-1]) > ROUNDING * np.abs(offset[1:]).max(axis=1)[:, None]).any(
         axis=1
     )
     number = np.arange(len(side))
@@ -461,7 +442,7 @@ def _groups(panels: cholesky.Panels, parts: Parts, runs: kernel.Runs, threads: i
 def _kinds(x: Array, z: Array) -> Ints:
     """Return whether contacts are open (0), slide (1) or stick (2), from x and z = P_K(x) (n, 3, BLOCK)."""
     force, beyond = np.abs(z).max(axis=1), np.abs(x - z).max(axis=1)
-    kinds: Ints = np.where(force == 0.0, 0, np.where(beyond > _BESIDE * force, 1, 2))
+    kinds: Ints = np.where(force == 0.0, 0, np.where(beyond > ROUNDING * force, 1, 2))
     return kinds
 
 
@@ -486,7 +467,7 @@ def _eliminated(contacts: RigidContacts, moving: Ints) -> tuple[Ints, Ints, chol
     inner = side[new]
     inner = inner[(inner[:, 0] >= 0) & (inner[:, 1] >= 0)]
     pairs = np.unique(np.minimum(*inner.T) * len(moving) + np.maximum(*inner.T))
-    if len(moving) < _FEW:
+    if len(moving) < MANY:
         rank, panels = _pattern_of_few(pairs.tobytes(), len(moving))
     else:
         rank, panels = _pattern(pairs, moving, contacts.centre)
@@ -501,7 +482,7 @@ def _pattern(pairs: Ints, moving: Ints, centre: Array) -> tuple[Ints, cholesky.P
     both = np.column_stack([pairs // count, pairs % count])
     rank = elimination(both, moving, centre)
     rank = cholesky.postorder(np.ascontiguousarray(rank[both]), count)[rank]
-    return rank, cholesky.panels_of(np.ascontiguousarray(rank[both]), count, _SPARE, _VELOCITIES)
+    return rank, cholesky.panels_of(np.ascontiguousarray(rank[both]), count, SPARE, _VELOCITIES)
 
 
 @lru_cache(maxsize=1)

@@ -20,6 +20,7 @@ from mechanics.delassus.elimination import elimination
 from mechanics.problem.forms import Form
 from mechanics.problem.problem import ContactProblem, Delassus, RigidContacts
 from mechanics.solvers._kernels import body_newton as bodies
+from mechanics.solvers.scales import ROUNDING
 from mechanics.solvers.second_order.sparse_blocks import SparseBlocks
 from moma.errors import SolverError
 
@@ -29,11 +30,8 @@ __all__ = ["Equations", "equations_of"]
 # error to which the equations of bodies that deform are solved, over their right side [-], and most products with W
 _INEXACT, _PRODUCTS = 1e-2, 30
 # change of a contact's derivatives that makes it unlike before [-], contacts that may be so while the factors of an
-# earlier step lead, most products with W that those took when they were new, and then, which take as long as a
-# factorisation and the products after it
-_UNLIKE, _TURNED, _NEW, _AGAIN = 0.3, 3, 6, 12
-# part of ρ added to B, which keeps it invertible where a contact is open [-]
-_SOFT = 1e-7
+# earlier step lead, and most products with W meanwhile, which take as long as a factorisation and the products after it
+_UNLIKE, _TURNED, _AGAIN = 0.3, 3, 12
 
 
 class Equations(Protocol):
@@ -70,7 +68,8 @@ class _FormEquations:
     def step(self, first: Array, second: Array, error: Array, alpha: float) -> Array | None:
         """Return Δr (nc, 3); None if the equations are singular."""
         unit = np.eye(error.shape[1])
-        inverse = np.linalg.inv(second + _SOFT * self._rho[:, [0, 1, 1]][:, : len(unit), None] * unit)
+        # B is singular where a contact is open
+        inverse = np.linalg.inv(second + ROUNDING * self._rho[:, [0, 1, 1]][:, : len(unit), None] * unit)
         theta, right = inverse @ first + alpha * unit, -np.einsum("cij,cj->ci", inverse, error)
         try:
             return self._form.shifted(theta)(right.ravel()).reshape(error.shape)
@@ -146,7 +145,7 @@ class _YieldingEquations(_BodyEquations):
         if self._factorise(first, second, alpha):
             self._led = first.copy(), second.copy()
             found, products = self._found(first, second, error, alpha, _PRODUCTS)
-            self._lasts &= products <= _NEW
+            self._lasts &= products <= _AGAIN
             # the matrix may be too badly conditioned for single precision, as where joints hardly yield
             self._single &= products <= _PRODUCTS
             return found

@@ -7,12 +7,11 @@ import numpy as np
 
 from mechanics.delassus.compliant import CompliantDelassus
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, Delassus
+from mechanics.solvers.scales import HELD
 from mechanics.solvers.second_order.newton import Newton
 
 __all__ = ["SofterJoints"]
 
-# that of rigid joints for this purpose, over the scale of W [-]
-_RIGID = 1e-4
 # steps of Newton's method with each
 _STEPS = 30
 
@@ -31,7 +30,7 @@ class SofterJoints:
     tolerance: float = 1e-6
     velocity_tolerance: float = 1e-5
     max_iterations: int = 150
-    factors: tuple[float, ...] = (100.0, 30.0, 10.0, 3.0)
+    factors: tuple[float, ...] = (100.0, 10.0)
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from `start`; return the last iterate of the joints asked for, or of the hardest that were solved."""
@@ -53,7 +52,7 @@ class SofterJoints:
 
 def _softened(operator: Delassus, factors: tuple[float, ...]) -> Iterator[Delassus]:
     """Yield the operator with softer joints, ever harder, and as it is; rigid joints yield next to nothing at first."""
-    inner, compliance = operator, np.full(operator.diagonal.shape[:2], _RIGID * operator.scale)
+    inner, compliance = operator, np.full(operator.diagonal.shape[:2], HELD * operator.scale)
     if isinstance(operator, CompliantDelassus):
         inner, compliance = operator.inner, operator.joint_compliance
     for factor in factors:

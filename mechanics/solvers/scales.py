@@ -1,0 +1,25 @@
+"""Numbers that several methods share."""
+
+__all__ = ["HELD", "JOINTS", "LOOK", "MANY", "OVERSHOOT", "ROUNDING", "SPARE"]
+
+ROUNDING = 1e-9
+"""Part of a quantity that counts as nothing: below it, rounding and the methods' own errors decide [-]."""
+
+HELD = 1e-4
+"""Compliance of a rigid joint in the first step of Newton's method, over the scale of W [-]."""
+
+JOINTS = 10.0, 1e-2, 1e-4, 1e-6
+"""Compliances of joints over W_αα, in turn: from joints so soft that there is one state only, to two a hundred apart
+that are next to rigid [-]."""
+
+MANY = 1000
+"""Bodies, and contacts of disks, from which factors no longer stay in the fastest memory."""
+
+LOOK = 20
+"""Plain sweeps or iterations over disks between two measurements of η: a measurement costs two sweeps."""
+
+OVERSHOOT = 1.6
+"""Over-relaxation of ADMM (Boyd et al. 2011, section 3.4.3, recommend 1.5 to 1.8) [-]."""
+
+SPARE = 0.2
+"""Zeros that a panel of factors of bodies may hold, over its other blocks [-]."""
