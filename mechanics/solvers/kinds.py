@@ -23,7 +23,7 @@ from mechanics.solvers.second_order.softer_joints import SofterJoints
 __all__ = ["ENDED_PATH", "EXACT", "POLISH", "chain_of"]
 
 # budgets: iterations of ADMM and sweeps over disks, steps of Newton's method, factorisations of a path
-_ADMM, _NEWTON, _PATH, _ENDLESS = 500, 20, 60, 1_000_000
+_ADMM, _NEWTON, _PATH = 500, 20, 60
 # moving rigid bodies from which a factorisation in each step of Newton's method takes longer than iterations with kept
 # factors: in each step of a motion, and at rest; of `MANY` it takes too long at all
 _HANDFUL, _SOME = 32, 300
@@ -33,9 +33,8 @@ EXACT = 1e-3
 
 # the same of forces that the next step begins with [-]
 _FURTHER = 0.03
-# velocity tolerance of a motion from which it is solved loosely [-]
-_LOOSE = 1e-3
-# η up to which forces of the last step lead a path, and Newton's method between deformable stones [-]
+# error up to which forces are near a solution: velocity tolerance below which a motion is solved by methods that need
+# such a start, and η up to which forces of the last step lead them between deformable and rigid stones [-]
 _NEAR = 1e-3
 
 # joints of a rest hold as a rule: with a small penalty their forces arrive at once
@@ -47,14 +46,15 @@ _SHAKE = Stage(0.1, 80, extrapolated=True)
 # those that stick, their forces, which grow steadily until one slips, arrive 200 times as soon
 _SORT = Stage(1.0, 40, extrapolated=False)
 _GROW = Stage((1.0, 0.05, 0.005), 60, extrapolated=False)
-_TURNS = (replace(_SORT, iterations=10), replace(_GROW, penalty=(1.0, 0.05, 0.01)), *(50 * (_SORT, _GROW)))
+_FIRST = (replace(_SORT, iterations=10), replace(_GROW, penalty=(1.0, 0.05, 0.01)))
 
 _Method = Callable[[float, float, int], Solver]
-_turns: _Method = partial(BodyADMM, stages=_TURNS)
-_rest: _Method = partial(BodyADMM, stages=(_HOLD, *_TURNS), further=EXACT)
-_motion: _Method = partial(BodyADMM, stages=(*_FOLLOW, *_TURNS), further=_FURTHER)
-_loosely: _Method = partial(BodyADMM, stages=(_SHAKE, *_TURNS))
-_as_rigid: _Method = partial(StonesAsRigid, stages=_TURNS)
+_in_turns = partial(BodyADMM, turns=(_SORT, _GROW))
+_turns = partial(_in_turns, stages=_FIRST)
+_rest: _Method = partial(_in_turns, stages=(_HOLD, *_FIRST), further=EXACT)
+_motion: _Method = partial(_in_turns, stages=(*_FOLLOW, *_FIRST), further=_FURTHER)
+_loosely: _Method = partial(_in_turns, stages=(_SHAKE, *_FIRST))
+_as_rigid: _Method = partial(StonesAsRigid, rigid=_turns)
 # a look costs two sweeps over disks, an extrapolation ten
 _sweeps: _Method = partial(NSGS, check_every=LOOK, depth=0)
 
@@ -62,7 +62,7 @@ _newton = Link("Newton", Newton, _NEWTON, further=_FURTHER)
 _path = Link("interior point", InteriorPoint, _PATH, Begin.NOTHING, _FURTHER)
 _from_best = replace(_path, begin=Begin.BEST)
 _admm = Link("body ADMM", _turns, _ADMM)
-_endless = replace(_admm, iterations=_ENDLESS)
+_endless = Link("body ADMM", _turns)
 
 _exact = replace(_newton, further=EXACT)
 
@@ -124,10 +124,10 @@ _SPRINGS_AMONG_RIGID = (replace(_exact, near=_NEAR), _STONES_AS_RIGID, _exact, _
 _DISKS = (
     Link("sweeps", _sweeps, _ADMM, Begin.GIVEN),
     Link("ADMM of disks", DiskADMM, _ADMM, Begin.GIVEN),
-    Link("ADMM of disks", DiskADMM, _ENDLESS),
+    Link("ADMM of disks", DiskADMM),
 )
 _FEW_DISKS = (*_DISKS[:2], replace(_long, begin=Begin.GIVEN), _DISKS[2])
-_SWEEPS = (Link("sweeps", NSGS, _ENDLESS, Begin.GIVEN),)
+_SWEEPS = (Link("sweeps", NSGS, begin=Begin.GIVEN),)
 
 
 def chain_of(
@@ -158,7 +158,7 @@ def chain_of(
         return _SPRINGS if bodies < _SOME else _SPRINGS_OF_SOME
     if follows and bodies >= MANY:
         return _MOTION_OF_MANY if moving else _REST_OF_MANY
-    if moving and velocity_tolerance < _LOOSE:
+    if moving and velocity_tolerance < _NEAR:
         return _MOTION if bodies >= _HANDFUL else _MOTION_OF_FEW
     if moving:
         return _LOOSE_MOTION

@@ -1,9 +1,12 @@
 """Numbers that several methods share."""
 
-__all__ = ["HELD", "JOINTS", "LOOK", "MANY", "OVERSHOOT", "ROUNDING", "SPARE"]
+__all__ = ["CORRECTIONS", "HELD", "JOINTS", "LOOK", "MANY", "OVERSHOOT", "PLAIN_LOOK", "ROUNDING", "SPARE"]
 
 ROUNDING = 1e-9
 """Part of a quantity that counts as nothing: below it, rounding and the methods' own errors decide [-]."""
+
+CORRECTIONS = 5
+"""Corrections with the same factors, at most: each costs a substitution, a twentieth of a factorisation."""
 
 HELD = 1e-4
 """Compliance of a rigid joint in the first step of Newton's method, over the scale of W [-]."""
@@ -15,7 +18,10 @@ that are next to rigid [-]."""
 MANY = 1000
 """Bodies, and contacts of disks, from which factors no longer stay in the fastest memory."""
 
-LOOK = 20
+LOOK = 5
+"""Iterations or sweeps between two measurements of η, at least; ADMM waits for as large a part of those so far."""
+
+PLAIN_LOOK = 20
 """Plain sweeps or iterations over disks between two measurements of η: a measurement costs two sweeps."""
 
 OVERSHOOT = 1.6

@@ -7,9 +7,10 @@ contacts and one solution with the factors of M + H Σ⁻¹ Hᵀ, less than that
 (mechanics/solvers/_kernels/body_admm.py).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import chain, cycle
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from mechanics.solvers._kernels import body_admm as kernel
 from mechanics.solvers._kernels import body_cholesky as cholesky
 from mechanics.solvers._kernels.body_parts import Parts, parts_of
 from mechanics.solvers.first_order.body_factors import factorise
-from mechanics.solvers.scales import MANY, OVERSHOOT, ROUNDING, SPARE
+from mechanics.solvers.scales import LOOK, MANY, OVERSHOOT, ROUNDING, SPARE
 from moma.errors import SolverError
 
 __all__ = ["STAGES", "BodyADMM", "Stage"]
@@ -30,16 +31,8 @@ __all__ = ["STAGES", "BodyADMM", "Stage"]
 
 # velocities of a body
 _VELOCITIES = 6
-# numbers in factors that are kept until contacts are detected again, at most: 32 MB
-_KEPT = 4_000_000
-# work of a block of contacts in an iteration, over that of a number in the factors [-]
-_CONTACT = 3000
 # σ over E of joints that yield, beyond that of rigid ones: of small contacts E is 10⁴ times W_αα [-]
 _GIVING = 10.0
-# fewest iterations before a look at the residual
-_LEAST_LOOK = 5
-# and most, over the iterations so far: changes of velocities foretell the residual for so long alone [-]
-_LATE_LOOK = 0.2
 # iterates from which is extrapolated
 _DEPTH = 6
 
@@ -77,6 +70,7 @@ class BodyADMM:
     ----------
     tolerance, velocity_tolerance, max_iterations : as in `NSGS`, iterations for sweeps
     stages : in turn, as long as it is not solved
+    turns : stages that follow these, again and again
     further : tolerances of the first stage over those asked for: the next steps begin where the last ones lead, and
         gain from what these go further [-]
     """
@@ -86,6 +80,7 @@ class BodyADMM:
     max_iterations: int = 1000
     stages: tuple[Stage, ...] = STAGES
     further: float = 1.0
+    turns: tuple[Stage, ...] = ()
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from `start`; return the best of all looks.
@@ -102,15 +97,12 @@ class BodyADMM:
         if len(start.impulse) == 0:
             return ContactSolution(start.impulse, start.velocity, 0, 0.0, True)
         run = _Run(problem, contacts, start, self)
-        most = min(self.max_iterations, sum(stage.iterations for stage in self.stages))
-        try:
+        run.look()
+        while run.excess > run.goal and run.iterations < self.max_iterations:
+            if not run.iterate():
+                break
             run.look()
-            while run.excess > run.goal and run.iterations < most:
-                run.iterate()
-                run.look()
-            impulse, velocity = run.best()
-        finally:
-            run.end()
+        impulse, velocity = run.best()
         left = residual(problem, impulse)
         within = left.within(self.tolerance, self.velocity_tolerance)
         return ContactSolution(impulse, velocity, run.iterations, left.natural_map, within)
@@ -133,9 +125,9 @@ class _Run:
             settings,
             _bodies_of(problem.delassus, contacts),
         )
-        bodies, scale = self._bodies, settings.stages[0].penalty
+        bodies, first = self._bodies, settings.stages[0]
         self._compliance = bodies.compliance(problem.delassus.joint_compliance)
-        self._soft = bodies.soft(np.max(scale), self._compliance)
+        self._soft = bodies.soft(np.max(first.penalty), self._compliance)
         free = kernel.to_world(bodies.geometry, problem.u_free)
         self._free = bodies.spread(free)
         rows = [free + problem.bias[:, None] * bodies.geometry[:, :3], problem.friction, problem.cohesion]
@@ -148,10 +140,10 @@ class _Run:
         x = bodies.spread(kernel.to_world(bodies.geometry, x))
         self._iterate = kernel.Iterate(x, np.zeros_like(x), np.zeros(6 * len(bodies.inertia)), bodies.load())
         self._z = np.empty_like(x)
-        self._stages = list(settings.stages)
+        self._stages: Iterator[Stage] = chain(settings.stages, cycle(settings.turns))
         self._factors: kernel.Factors | None = None
         self._memory = _acceleration(0, 0)
-        self._until, self._first = 0, settings.stages[0].iterations
+        self._until, self._first = 0, first.iterations
         self.iterations, self.excess, self._change, self._limit = 0, np.inf, np.inf, 0.0
 
     @property
@@ -159,19 +151,21 @@ class _Run:
         """Errors over their tolerances at which the iteration ends [-]."""
         return self._settings.further if self.iterations < self._first else 1.0
 
-    def iterate(self) -> None:
-        """Make iterations until the next look."""
+    def iterate(self) -> bool:
+        """Make iterations until the next look; return whether there was a stage for them."""
         if self.iterations == self._until:
-            self._begin(self._stages.pop(0))
-        most = min(self._settings.max_iterations, self._until) - self.iterations
-        if self.iterations == 0:
-            self._advance(min(_LEAST_LOOK, most), 0.0)
-            return
-        least = min(_LEAST_LOOK, most)
+            stage = next(self._stages, None)
+            if stage is None:
+                return False
+            self._begin(stage)
+        first, most = self.iterations == 0, min(self._settings.max_iterations, self._until) - self.iterations
+        least = min(LOOK, most)
         self._advance(least, 0.0)
-        if self._change > self._limit:
-            later = max(int(_LATE_LOOK * self.iterations), _LEAST_LOOK)
+        if not first and self._change > self._limit:
+            # changes of velocities foretell the residual for a part of the iterations so far alone
+            later = max(self.iterations // LOOK, LOOK)
             self._advance(min(most - least, later), self._limit)
+        return True
 
     def _advance(self, count: int, limit: float) -> None:
         if len(self._bodies.groups) > 1 and not self._memory.image.size:
@@ -253,11 +247,6 @@ class _Run:
         if self.iterations == 0 or excess < self.excess:
             found = self._iterate.x.copy(), self._z.copy(), self._soft
             self.excess, self._best = float(excess), found
-
-    def end(self) -> None:
-        """Let go of factors that are too large to be kept."""
-        self._factors = None
-        self._bodies.forget()
 
     def best(self) -> tuple[Array, Array]:
         """Return the impulses and the velocities û (nc, 3) of the best look, local frames."""
@@ -362,7 +351,12 @@ class _Bodies:
         """
         if penalty in self._factors:
             return self._factors[penalty]
-        precision = np.float32 if len(self.inertia) >= MANY else np.float64
+        precision = np.float64
+        if len(self.inertia) >= MANY:
+            precision = np.float32
+            if penalty is not None:
+                # room for one
+                self._factors.clear()
         value = np.zeros(self._panels.start[-1], dtype=precision)
         kernel.assemble(touching, self._mass, self._panels, value)
         if not factorise(self._panels, value, self._parts, len(self.groups)):
@@ -371,10 +365,6 @@ class _Bodies:
         if penalty is not None:
             self._factors[penalty] = factors
         return factors
-
-    def forget(self) -> None:
-        """Let go of factors that are too large to be kept from step to step."""
-        self._factors = {key: one for key, one in self._factors.items() if len(one.value) <= _KEPT}
 
 
 def _bodies_of(delassus: Delassus, contacts: RigidContacts) -> _Bodies:
@@ -432,7 +422,8 @@ def _vectors(values: Array) -> Array:
 def _groups(panels: cholesky.Panels, parts: Parts, runs: kernel.Runs, threads: int) -> list[Ints]:
     """Return the parts that each thread takes, so that all have about the same to do."""
     numbers = np.append(np.diff(panels.start[parts.panel], axis=1)[:, 0], 0)
-    work = numbers + _CONTACT * np.diff(runs.block[runs.part])
+    # a block of contacts costs as much as the numbers that it reads and writes
+    work = numbers + kernel.ROWS * kernel.BLOCK * np.diff(runs.block[runs.part])
     given: list[list[int]] = [[] for _ in range(threads)]
     for part in np.argsort(-work, kind="stable"):
         min(given, key=lambda one: work[one].sum()).append(int(part))

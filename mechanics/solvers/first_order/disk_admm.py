@@ -15,7 +15,7 @@ from mechanics.problem.residual import Residual, project_on_cone, residual
 from mechanics.solvers._kernels import body_cholesky as cholesky
 from mechanics.solvers._kernels import disk_admm as kernel
 from mechanics.solvers.first_order.body_factors import factorise
-from mechanics.solvers.scales import LOOK, OVERSHOOT, SPARE
+from mechanics.solvers.scales import OVERSHOOT, PLAIN_LOOK, SPARE
 from moma.errors import SolverError
 
 __all__ = ["DiskADMM"]
@@ -41,7 +41,7 @@ class DiskADMM:
     velocity_tolerance: float = 1e-5
     max_iterations: int = 2000
     penalty: float = 0.1
-    check_every: int = LOOK
+    check_every: int = PLAIN_LOOK
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from `start`, whose velocity û lets the iteration continue where it stopped; return the best look.

@@ -19,7 +19,7 @@ import numpy as np
 
 from mechanics.arrays import Array, Ints
 from mechanics.problem.problem import ContactProblem
-from mechanics.solvers.scales import ROUNDING
+from mechanics.solvers.scales import CORRECTIONS, ROUNDING
 from mechanics.solvers.second_order.second_order_cones import (
     Scaling,
     central,
@@ -41,8 +41,6 @@ NAME = "interior point"
 _BACK_OFF = 0.98
 # part of a step below which it counts as short [-]
 _SHORT = 0.1
-# most corrections of pairs far from the others in a step; each costs a substitution, a twentieth of the factors
-_CORRECTIONS = 5
 # how much farther than the step before a corrected one aims [-]
 _AIM = 0.3
 # factor within which pairs are well centred: of their complementarities on the one wanted, and of the first ones on
@@ -181,7 +179,7 @@ class CentralPath:
         level = centring * self._gap
         step = newton.direction(newton.corrected(step, level), 1.0 - centring)
         length = min(1.0, _BACK_OFF * self._reach(step))
-        for _ in range(_CORRECTIONS):
+        for _ in range(CORRECTIONS):
             if length >= _BACK_OFF:
                 break
             right = newton.recentred(step, min(1.0, length + _AIM), level)

@@ -27,11 +27,9 @@ __all__ = ["Newton"]
 _SHARE = 0.1
 # η from which a start is far from a solution, and the contacts that bear are held first [-]
 _FAR = 0.3
-# smallest α over the scale of W; below it rounding keeps η at 10⁻⁹ [-]
-_LEAST = 1e-8
-# part of a step below which α counts as too small [-]
-_SHORT = 0.2
-# factor by which α then grows, and falls again after whole steps
+# smallest α over the scale of W: rounding in self-stress is ε/α of it, and α itself as large [-]
+_LEAST = float(np.sqrt(np.finfo(float).eps))
+# factor by which α grows after steps shortened by more than that, and falls after whole ones [-]
 _ADAPT = 4.0
 # iterates to which the line search looks back
 _MEMORY = 5
@@ -166,8 +164,8 @@ class _Run:
             merit = self._look(self.r + length * step, self._u + length * change, error)
         if not np.isfinite(merit):
             return False
-        if length < _SHORT:
-            self._share = self._share * _ADAPT
+        if length < 1.0 / _ADAPT:
+            self._share *= _ADAPT
         elif length == 1.0:
             self._share = max(self._share / _ADAPT, _SHARE)
         self._take(self.r + length * step)

@@ -4,7 +4,7 @@ import pytest
 
 from tests.mechanics.solvers.numbers import changed, numbers
 
-MOST = 92
+MOST = 75
 
 
 def test_there_are_no_more_numbers_than_today():
