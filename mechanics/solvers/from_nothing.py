@@ -10,6 +10,7 @@ from mechanics.problem.problem import ContactProblem, ContactStart
 from mechanics.problem.residual import residual
 from mechanics.solvers.chain import Link, follow
 from mechanics.solvers.first_order.body_admm import BodyADMM
+from mechanics.solvers.kinds import SOME, moving_bodies
 from mechanics.solvers.scales import JOINTS
 from mechanics.solvers.second_order.newton import Newton
 
@@ -22,8 +23,6 @@ _SMALL = 0.1
 _STAYS = 0.5
 # tolerances of η and of velocities [-]
 _LIMITS = Newton.tolerance, Newton.velocity_tolerance
-# contacts from which iterations with kept factors cost less than Newton's steps
-_MANY = 3000
 _NEWTON = Link("Newton", Newton, Newton.max_iterations)
 _ADMM = Link("body ADMM", BodyADMM, BodyADMM.max_iterations)
 
@@ -42,7 +41,7 @@ def rests_from_nothing(problem: ContactProblem) -> tuple[bool | None, Array]:
     each = np.repeat(
         np.einsum("cii->c", operator.diagonal)[:, None] / nothing.shape[1], nothing.shape[1], axis=1
     )
-    link = _ADMM if len(nothing) >= _MANY and operator.rigid is not None else _NEWTON
+    link = _ADMM if operator.rigid is not None and moving_bodies(problem) >= SOME else _NEWTON
     for share in JOINTS:
         yields = share * each
         yielding = replace(problem, delassus=CompliantDelassus(operator, yields))

@@ -11,22 +11,27 @@ import numpy as np
 
 from mechanics.problem.problem import ContactProblem
 from mechanics.solvers.chain import Begin, Link, Solver
-from mechanics.solvers.first_order.body_admm import STAGES, BodyADMM, Stage
+from mechanics.solvers.first_order.body_admm import SLIDING, SORTED, BodyADMM, Stage
 from mechanics.solvers.first_order.disk_admm import DiskADMM
 from mechanics.solvers.first_order.nsgs import NSGS
 from mechanics.solvers.first_order.stones_as_rigid import StonesAsRigid
-from mechanics.solvers.scales import HELD, JOINTS, LOOK, MANY
+from mechanics.solvers.scales import HELD, JOINTS, MANY, PLAIN_LOOK
 from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.second_order.newton import Newton
 from mechanics.solvers.second_order.softer_joints import SofterJoints
 
-__all__ = ["ENDED_PATH", "EXACT", "POLISH", "chain_of"]
+__all__ = ["ENDED_PATH", "EXACT", "POLISH", "SOME", "chain_of", "moving_bodies"]
 
-# budgets: iterations of ADMM and sweeps over disks, steps of Newton's method, factorisations of a path
-_ADMM, _NEWTON, _PATH = 500, 20, 60
+# budgets of links that others follow; what needs more is mostly solved by none of them
+_ADMM = 500  # iterations of ADMM, and sweeps over disks
+_NEWTON = 20  # steps of Newton's method
+_PATH = 60  # factorisations of a path, and steps of Newton's method where nothing else is left
 # moving rigid bodies from which a factorisation in each step of Newton's method takes longer than iterations with kept
-# factors: in each step of a motion, and at rest; of `MANY` it takes too long at all
-_HANDFUL, _SOME = 32, 300
+# factors, in the steps of a motion
+_HANDFUL = 32
+SOME = 300
+"""The same at rest; of `MANY` a factorisation takes too long at all."""
+
 EXACT = 1e-3
 """Tolerances over those asked for, of forces that a rest keeps for hundreds of steps: what they lack would be a creep.
 """
@@ -38,31 +43,22 @@ _FURTHER = 0.03
 _NEAR = 1e-3
 
 # joints of a rest hold as a rule: with a small penalty their forces arrive at once
-_HOLD = Stage(1e-3, 50, extrapolated=True)
-# so do those of a motion that is predicted, with a larger one, and of one that need not be exact
-_FOLLOW = STAGES[:2]
-_SHAKE = Stage(0.1, 80, extrapolated=True)
-# penalties in turn: with the large one contacts sort themselves into open, sliding and sticking; with the small one of
-# those that stick, their forces, which grow steadily until one slips, arrive 200 times as soon
-_SORT = Stage(1.0, 40, extrapolated=False)
-_GROW = Stage((1.0, 0.05, 0.005), 60, extrapolated=False)
-_FIRST = (replace(_SORT, iterations=10), replace(_GROW, penalty=(1.0, 0.05, 0.01)))
+_HOLD = Stage(1e-3)
+# so do those of a motion, with a larger one
+_FOLLOW = Stage(SLIDING)
 
 _Method = Callable[[float, float, int], Solver]
-_in_turns = partial(BodyADMM, turns=(_SORT, _GROW))
-_turns = partial(_in_turns, stages=_FIRST)
-_rest: _Method = partial(_in_turns, stages=(_HOLD, *_FIRST), further=EXACT)
-_motion: _Method = partial(_in_turns, stages=(*_FOLLOW, *_FIRST), further=_FURTHER)
-_loosely: _Method = partial(_in_turns, stages=(_SHAKE, *_FIRST))
-_as_rigid: _Method = partial(StonesAsRigid, rigid=_turns)
+_rest: _Method = partial(BodyADMM, stages=(_HOLD, *SORTED), further=EXACT)
+_motion: _Method = partial(BodyADMM, stages=(_FOLLOW, *SORTED), further=_FURTHER)
+_loosely: _Method = partial(BodyADMM, stages=(_FOLLOW, *SORTED))
 # a look costs two sweeps over disks, an extrapolation ten
-_sweeps: _Method = partial(NSGS, check_every=LOOK, depth=0)
+_sweeps: _Method = partial(NSGS, check_every=PLAIN_LOOK, depth=0)
 
 _newton = Link("Newton", Newton, _NEWTON, further=_FURTHER)
 _path = Link("interior point", InteriorPoint, _PATH, Begin.NOTHING, _FURTHER)
 _from_best = replace(_path, begin=Begin.BEST)
-_admm = Link("body ADMM", _turns, _ADMM)
-_endless = Link("body ADMM", _turns)
+_endless = Link("body ADMM", BodyADMM)
+_admm = replace(_endless, iterations=_ADMM)
 
 _exact = replace(_newton, further=EXACT)
 
@@ -111,7 +107,7 @@ _SOFTER = Link("Newton from softer joints", SofterJoints, _PATH, Begin.GIVEN, EX
 _SPRINGS = (replace(_exact, begin=Begin.GIVEN), _SOFTER, _path)
 _SPRINGS_OF_SOME = (replace(_admm, begin=Begin.GIVEN), _exact, _SOFTER, _path)
 _DEFORMABLE = (
-    replace(_newton, method=partial(Newton, near=True), begin=Begin.GIVEN, further=1.0),
+    replace(_newton, begin=Begin.GIVEN, further=1.0),
     *(_path, _newton),
     *(_from_best, _newton),
     replace(_SOFTER, further=1.0),
@@ -119,7 +115,7 @@ _DEFORMABLE = (
 )
 # between rigid stones Newton's method wanders, so the path is followed until the laws hold, again from where it stalled
 _AMONG_RIGID = (replace(_from_best, near=_NEAR), _path, _from_best, _from_best)
-_STONES_AS_RIGID = Link("stones as rigid ones", _as_rigid, _ADMM, Begin.BEST, 100.0)
+_STONES_AS_RIGID = Link("stones as rigid ones", StonesAsRigid, _ADMM, Begin.BEST, 100.0)
 _SPRINGS_AMONG_RIGID = (replace(_exact, near=_NEAR), _STONES_AS_RIGID, _exact, _STONES_AS_RIGID, _exact)
 _DISKS = (
     Link("sweeps", _sweeps, _ADMM, Begin.GIVEN),
@@ -141,7 +137,7 @@ def chain_of(
     velocity_tolerance : asked of this step [-]
     warm : forces are known to begin with
     """
-    operator, bodies = problem.delassus, _moving_bodies(problem)
+    operator, bodies = problem.delassus, moving_bodies(problem)
     yields = operator.joint_compliance is not None
     if operator.plane is not None:
         return _FEW_DISKS if len(problem.friction) <= MANY else _DISKS
@@ -153,21 +149,21 @@ def chain_of(
         if yields:
             return (*_SPRINGS_AMONG_RIGID, *_DEFORMABLE)
         # the path of hundreds of stones between rigid joints takes too long to fail
-        return (*_AMONG_RIGID, *_DEFORMABLE) if bodies < _SOME else ()
+        return (*_AMONG_RIGID, *_DEFORMABLE) if bodies < SOME else ()
     if yields:
-        return _SPRINGS if bodies < _SOME else _SPRINGS_OF_SOME
+        return _SPRINGS if bodies < SOME else _SPRINGS_OF_SOME
     if follows and bodies >= MANY:
         return _MOTION_OF_MANY if moving else _REST_OF_MANY
     if moving and velocity_tolerance < _NEAR:
         return _MOTION if bodies >= _HANDFUL else _MOTION_OF_FEW
     if moving:
         return _LOOSE_MOTION
-    if bodies < _SOME:
+    if bodies < SOME:
         return _REST if warm else _REST_FROM_NOTHING
     return _REST_OF_SOME
 
 
-def _moving_bodies(problem: ContactProblem) -> int:
+def moving_bodies(problem: ContactProblem) -> int:
     """Return the number of bodies that move, those that deform among rigid ones included."""
     operator = problem.delassus
     contacts = (operator if operator.as_rigid is None else operator.as_rigid).rigid

@@ -1,6 +1,17 @@
 """Numbers that several methods share."""
 
-__all__ = ["CORRECTIONS", "HELD", "JOINTS", "LOOK", "MANY", "OVERSHOOT", "PLAIN_LOOK", "ROUNDING", "SPARE"]
+__all__ = [
+    "CORRECTIONS",
+    "DEPTH",
+    "HELD",
+    "JOINTS",
+    "LOOK",
+    "MANY",
+    "OVERSHOOT",
+    "PLAIN_LOOK",
+    "ROUNDING",
+    "SPARE",
+]
 
 ROUNDING = 1e-9
 """Part of a quantity that counts as nothing: below it, rounding and the methods' own errors decide [-]."""
@@ -8,12 +19,15 @@ ROUNDING = 1e-9
 CORRECTIONS = 5
 """Corrections with the same factors, at most: each costs a substitution, a twentieth of a factorisation."""
 
+DEPTH = 6
+"""Iterates from which Anderson's method extrapolates, at most."""
+
 HELD = 1e-4
 """Compliance of a rigid joint in the first step of Newton's method, over the scale of W [-]."""
 
-JOINTS = 10.0, 1e-2, 1e-4, 1e-6
-"""Compliances of joints over W_αα, in turn: from joints so soft that there is one state only, to two a hundred apart
-that are next to rigid [-]."""
+JOINTS = 1.0, 1e-2, 1e-4, 1e-6
+"""Compliances of joints over W_αα, in turn, each a hundredth of the one before: from joints so soft that there is one
+state only, to two that are next to rigid [-]."""
 
 MANY = 1000
 """Bodies, and contacts of disks, from which factors no longer stay in the fastest memory."""

@@ -23,18 +23,14 @@ from mechanics.solvers._kernels import body_admm as kernel
 from mechanics.solvers._kernels import body_cholesky as cholesky
 from mechanics.solvers._kernels.body_parts import Parts, parts_of
 from mechanics.solvers.first_order.body_factors import factorise
-from mechanics.solvers.scales import LOOK, MANY, OVERSHOOT, ROUNDING, SPARE
+from mechanics.solvers.scales import DEPTH, LOOK, MANY, OVERSHOOT, ROUNDING, SPARE
 from moma.errors import SolverError
 
-__all__ = ["STAGES", "BodyADMM", "Stage"]
+__all__ = ["SLIDING", "SORTED", "BodyADMM", "Stage"]
 
 
 # velocities of a body
 _VELOCITIES = 6
-# σ over E of joints that yield, beyond that of rigid ones: of small contacts E is 10⁴ times W_αα [-]
-_GIVING = 10.0
-# iterates from which is extrapolated
-_DEPTH = 6
 
 
 @dataclass(frozen=True)
@@ -51,13 +47,20 @@ class Stage:
     """
 
     penalty: float | tuple[float, float, float]
-    iterations: int
-    extrapolated: bool
+    iterations: int = 50
+    extrapolated: bool = True
 
 
-# iterations of each
-_STAGE = 150
-STAGES = (Stage(0.02, _STAGE, False), Stage(0.05, _STAGE, True), Stage(0.2, _STAGE, True))
+SLIDING = 0.05
+"""Penalty that suits contacts of which some slide [-]."""
+
+# penalty of those that stick: their forces, which grow steadily until one slips, arrive 200 times as soon as with that
+# of open contacts [-]
+_STICKING = 0.005
+# in turn, contacts sort themselves into open, sliding and sticking, and their forces arrive
+_TURNS = (Stage(1.0, extrapolated=False), Stage((1.0, SLIDING, _STICKING), extrapolated=False))
+SORTED = (Stage(1.0, LOOK, extrapolated=False), _TURNS[1])
+"""The first turn: few iterations tell most contacts apart."""
 
 
 @dataclass(frozen=True)
@@ -69,8 +72,8 @@ class BodyADMM:
     Attributes
     ----------
     tolerance, velocity_tolerance, max_iterations : as in `NSGS`, iterations for sweeps
-    stages : in turn, as long as it is not solved
-    turns : stages that follow these, again and again
+    stages : first, one after the other, as long as it is not solved
+    turns : stages that follow, again and again
     further : tolerances of the first stage over those asked for: the next steps begin where the last ones lead, and
         gain from what these go further [-]
     """
@@ -78,9 +81,9 @@ class BodyADMM:
     tolerance: float = 1e-6
     velocity_tolerance: float = 1e-5
     max_iterations: int = 1000
-    stages: tuple[Stage, ...] = STAGES
+    stages: tuple[Stage, ...] = SORTED
+    turns: tuple[Stage, ...] = _TURNS
     further: float = 1.0
-    turns: tuple[Stage, ...] = ()
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from `start`; return the best of all looks.
@@ -125,7 +128,7 @@ class _Run:
             settings,
             _bodies_of(problem.delassus, contacts),
         )
-        bodies, first = self._bodies, settings.stages[0]
+        bodies, first = self._bodies, (*settings.stages, *settings.turns)[0]
         self._compliance = bodies.compliance(problem.delassus.joint_compliance)
         self._soft = bodies.soft(np.max(first.penalty), self._compliance)
         free = kernel.to_world(bodies.geometry, problem.u_free)
@@ -206,7 +209,7 @@ class _Run:
     def _begin(self, stage: Stage) -> None:
         """Go on with the penalty of a stage; y keeps its velocities."""
         self._until += stage.iterations
-        self._memory = _acceleration(_DEPTH if stage.extrapolated else 0, self._iterate.x.size)
+        self._memory = _acceleration(DEPTH if stage.extrapolated else 0, self._iterate.x.size)
         self._broken()
         x, z = _vectors(self._iterate.x), _vectors(self._z)
         common = stage.penalty if isinstance(stage.penalty, float) else None
@@ -334,11 +337,11 @@ class _Bodies:
     def soft(self, penalty: float | Array, compliance: Array | None) -> Array:
         """Return 1/σ of each place for a penalty, or one of each, over the mean diagonals of W_αα; else 0 [kg].
 
-        Where joints yield by E, `compliance`, σ is larger by some E.
+        Where joints yield by E, `compliance`, σ is larger by E: of small contacts that is 10⁴ times W_αα.
         """
         sigma = penalty * self._compliance
         if compliance is not None:
-            sigma += _GIVING * compliance[:, 0].ravel()
+            sigma += compliance[:, 0].ravel()
         soft: Array = 1.0 / sigma
         return soft
 

@@ -41,8 +41,6 @@ NAME = "interior point"
 _BACK_OFF = 0.98
 # part of a step below which it counts as short [-]
 _SHORT = 0.1
-# how much farther than the step before a corrected one aims [-]
-_AIM = 0.3
 # factor within which pairs are well centred: of their complementarities on the one wanted, and of the first ones on
 # typical impulses and their velocities: a start nearer to the cones takes 19 iterations instead of 13 [-]
 _CENTRAL = 10.0
@@ -182,7 +180,7 @@ class CentralPath:
         for _ in range(CORRECTIONS):
             if length >= _BACK_OFF:
                 break
-            right = newton.recentred(step, min(1.0, length + _AIM), level)
+            right = newton.recentred(step, level)
             other = tuple(a + b for a, b in zip(step, newton.direction(right, 0.0), strict=True))
             farther = min(1.0, _BACK_OFF * self._reach(other))
             if farther <= length:
@@ -256,14 +254,14 @@ class _Newton:
         own = level - side.slack * side.dual - slack_n * dual_n
         return divide(self._lambda, square), own / side.dual
 
-    def recentred(self, step: tuple[Array, ...], length: float, level: float) -> tuple[Array, Array]:
-        """Return the right side of a correction: of the pairs that a part of a step leaves far from the level."""
+    def recentred(self, step: tuple[Array, ...], level: float) -> tuple[Array, Array]:
+        """Return the right side of a correction: of the pairs that a whole step would leave far from the level."""
         _, slack, dual, slack_n, dual_n = step
         cone, side = self._cone, self._side
         low, high = level / _CENTRAL, _CENTRAL * level
-        primal = self._scaling.inverse(cone.slack + length * slack)
-        pairs = product(primal, self._scaling(cone.dual + length * dual))
-        own = (side.slack + length * slack_n) * (side.dual + length * dual_n)
+        primal = self._scaling.inverse(cone.slack + slack)
+        pairs = product(primal, self._scaling(cone.dual + dual))
+        own = (side.slack + slack_n) * (side.dual + dual_n)
         change = np.maximum(np.clip(own, low, high) - own, -high)
         return divide(self._lambda, to_bounds(pairs, low, high)), change / side.dual
 

@@ -35,8 +35,6 @@ _ADAPT = 4.0
 _MEMORY = 5
 # shortest part of a step [-]
 _SHORTEST = 1e-3
-# steps after which one that is far will not come near
-_TRIED = 3
 # steps with the least α that may gain nothing
 _IDLE = 1
 _SPACE = 3  # components of an impulse in space
@@ -50,13 +48,11 @@ class Newton:
     ----------
     tolerance, velocity_tolerance : as in `NSGS`
     max_iterations : limit of the steps, with a factorisation each as a rule
-    near : give up after three steps that have not come near a solution: the others would wander
     """
 
     tolerance: float = 1e-6
     velocity_tolerance: float = 1e-5
     max_iterations: int = 100
-    near: bool = False
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from the impulses of `start`; return the best of all iterates.
@@ -72,7 +68,7 @@ class Newton:
         best, idle = (run.left, run.r), 0
         if run.left.natural_map > _FAR:
             run.hold()
-        while not self.near or run.iterations <= _TRIED or run.left.natural_map <= _FAR:
+        while True:
             gains = run.left.natural_map < best[0].natural_map
             best = (run.left, run.r) if gains else best
             # where α is least each step gains until rounding wins

@@ -6,7 +6,7 @@ Between rigid bodies they are those of the bodies' velocities, however many cont
 (mechanics/solvers/_kernels/body_newton.py). Where bodies deform, W is that of rigid ones and what they yield, of which
 the diagonal alone is a compliance of the joints: the equations with that lead a Krylov method (GMRES, Saad & Schultz
 1986) to the step within some five products with W. Factors that only lead may be of single precision, and those of an
-earlier step as long as next to no contact has changed since. Where most bodies deform, W + B⁻¹ A + α is factorised.
+earlier step as long as no contact has changed since. Where most bodies deform, W + B⁻¹ A + α is factorised.
 """
 
 from typing import Protocol
@@ -29,9 +29,10 @@ __all__ = ["Equations", "equations_of"]
 
 # error to which the equations of bodies that deform are solved, over their right side [-], and most products with W
 _INEXACT, _PRODUCTS = 1e-2, 30
-# change of a contact's derivatives that makes it unlike before [-], contacts that may be so while the factors of an
-# earlier step lead, and most products with W meanwhile, which take as long as a factorisation and the products after it
-_UNLIKE, _TURNED, _AGAIN = 0.3, 3, 12
+# change of a contact's derivatives from which it opens, slides or sticks unlike before [-]
+_UNLIKE = 0.3
+# most products with W while the factors of an earlier step lead: as long as a factorisation and the products after it
+_AGAIN = 12
 
 
 class Equations(Protocol):
@@ -130,13 +131,14 @@ class _YieldingEquations(_BodyEquations):
         assert simple.rigid is not None
         super().__init__(simple.rigid, simple.joint_compliance)
         self._operator = operator
+        # derivatives for impulses and velocities (nc, 3, 3) at which the factors were made
         self._led: tuple[Array, Array] | None = None
         self._lasts = True
         self._single = True
 
     def step(self, first: Array, second: Array, error: Array, alpha: float) -> Array | None:
         """Return Δr (nc, 3); None if the equations are singular."""
-        if self._lasts and self._led is not None and _turned(self._led[0], first) <= _TURNED:
+        if self._lasts and self._led is not None and np.abs(first - self._led[0]).max() <= _UNLIKE:
             found, products = self._found(first, second, error, alpha, _AGAIN)
             if products <= _AGAIN:
                 return found
@@ -174,11 +176,6 @@ class _YieldingEquations(_BodyEquations):
         y, unsolved = gmres(equations, -error.ravel(), rtol=_INEXACT, restart=most, maxiter=1)
         # the last product checks what the others found
         return before(y), min(made, most) if unsolved == 0 else most + 1
-
-
-def _turned(old: Array, new: Array) -> int:
-    """Return the number of contacts that open, slide or stick unlike before, by derivatives (nc, 3, 3) for impulses."""
-    return int(np.count_nonzero(np.abs(new - old).max(axis=(1, 2)) > _UNLIKE))
 
 
 def _pattern(side: Ints, count: int) -> tuple[Ints, Ints, Ints, Ints]:

@@ -12,9 +12,6 @@ from mechanics.solvers.second_order.newton import Newton
 
 __all__ = ["SofterJoints"]
 
-# steps of Newton's method with each
-_STEPS = 30
-
 
 @dataclass(frozen=True)
 class SofterJoints:
@@ -23,20 +20,20 @@ class SofterJoints:
     Attributes
     ----------
     tolerance, velocity_tolerance : as in `NSGS`
-    max_iterations : steps of Newton's method in all
+    max_iterations : steps of Newton's method in all, of which each takes its share of what is left
     factors : on the compliance of joints, in turn [-]
     """
 
     tolerance: float = 1e-6
     velocity_tolerance: float = 1e-5
     max_iterations: int = 150
-    factors: tuple[float, ...] = (100.0, 10.0)
+    factors: tuple[float, ...] = (100.0,)
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from `start`; return the last iterate of the joints asked for, or of the hardest that were solved."""
-        count = 0
-        for operator in _softened(problem.delassus, self.factors):
-            most = min(_STEPS, self.max_iterations - count)
+        count, others = 0, len(self.factors)
+        for k, operator in enumerate(_softened(problem.delassus, self.factors)):
+            most = int(np.ceil((self.max_iterations - count) / (others + 1 - k)))
             newton = Newton(self.tolerance, self.velocity_tolerance, most)
             found = newton(replace(problem, delassus=operator), start)
             count += found.iterations

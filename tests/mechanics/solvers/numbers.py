@@ -1,26 +1,31 @@
-"""The numbers of mechanics/solvers, and how half and twice of one change a fixed set of problems and scenes.
+"""The numbers of mechanics/solvers, and what a third and three times each do to a fixed set of problems and scenes.
 
 A number is a literal in an assignment of a module, or in a default of a field or an argument. Not counted are 0 and 1,
-subscripts, the defaults of tolerances and iterations that all methods repeat, and sizes of arrays. Run it as
-`python -m tests.mechanics.solvers.numbers`: it lists them; with names after it, it changes those.
+subscripts, the defaults of tolerances and iterations that all methods repeat, and sizes of arrays. Run as
+`python -m tests.mechanics.solvers.numbers` it lists them; with names after it, or `all`, it changes those, each in a
+process of its own, and prints a row of the table in docs/design/solvers.md.
 """
 
 import ast
 import json
-import os
+import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from importlib import import_module
+from importlib.abc import MetaPathFinder
+from importlib.machinery import ModuleSpec, SourceFileLoader
+from importlib.util import spec_from_file_location
 from pathlib import Path
+from types import CodeType
+from typing import TYPE_CHECKING
 
-from benchmarks.stored import read_problem
-from mechanics.problem.problem import ContactProblem, ContactSolution
-from mechanics.problem.residual import residual
-from mechanics.scene.scene import Method, SolverSettings
-from tests.mechanics.solvers.problems import cold
 from tests.paths import ROOT
+
+if TYPE_CHECKING:
+    from mechanics.problem.problem import ContactProblem, ContactSolution
+    from mechanics.scene.scene import Method
 
 PACKAGE = "mechanics.solvers"
 STORED = ROOT.parent / "shared/data/fc3d"
@@ -38,13 +43,8 @@ WILD = {
 """Scenes of the wild matrix and their settings: rest and fall, with a static start and without."""
 
 
-DEAR = "few deformable among rigid"
-"""Kind of problem that takes longer than all others together."""
-
-
-SINGLE = (Method.NSGS, Method.ADMM, Method.NEWTON)
-"""Methods without a chain, which counts iterations."""
 COUNTED: list[int] = []
+"""Iterations of all methods, of chains and of single ones."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,9 @@ def changed(value: float, factor: float) -> float:
 
 
 class _Change(ast.NodeTransformer):
-    def __init__(self, place: tuple[int, int], value: float) -> None:
+    """Put a value in a place, and let nothing compiled be read from or written to the cache."""
+
+    def __init__(self, place: tuple[int, int] | None, value: float) -> None:
         self._place, self._value = place, value
 
     def visit_Constant(self, node: ast.Constant) -> ast.AST:
@@ -113,41 +115,57 @@ class _Change(ast.NodeTransformer):
             return node
         return ast.copy_location(ast.Constant(self._value), node)
 
+    def visit_keyword(self, node: ast.keyword) -> ast.AST:
+        self.generic_visit(node)
+        if node.arg == "cache":
+            node.value = ast.copy_location(ast.Constant(False), node.value)
+        return node
 
-def change(number: Number, value: float) -> None:
-    """Run with another value from now on: every module that knows of it is executed again."""
-    pure = [name for name in sys.modules if name.startswith(PACKAGE + ".") and "_kernels" not in name]
-    source = {name: Path(sys.modules[name].__file__).read_text(encoding="utf-8") for name in pure}
-    needs = {name: {other for other in pure if f"from {other} import" in source[name]} for name in pure}
-    stale, before = {number.module}, {}
-    while more := {name for name in pure if needs[name] & stale} - stale:
-        stale |= more
-    ordered: list[str] = []
-    while len(ordered) < len(stale):
-        ordered += sorted(name for name in stale - set(ordered) if not (needs[name] & stale) - set(ordered))
-    for name in ordered:
-        tree = ast.parse(source[name])
-        if name == number.module:
-            tree = ast.fix_missing_locations(_Change(number.place, value).visit(tree))
-        space = vars(sys.modules[name])
-        old = dict(space)
-        exec(compile(tree, space["__file__"], "exec"), space)
-        before |= {id(old[key]): space[key] for key in space["__all__"] if key in old}
-    for name, module in list(sys.modules.items()):
-        if name.split(".")[0] in ("mechanics", "pipelines", "benchmarks") and name not in ordered:
-            for key, known in list(vars(module).items()):
-                if id(known) in before:
-                    setattr(module, key, before[id(known)])
+
+class _Changed(SourceFileLoader):
+    """Loader of a module with another number in it."""
+
+    def __init__(self, name: str, path: str, change: _Change) -> None:
+        super().__init__(name, path)
+        self._change = change
+
+    def get_code(self, fullname: str) -> CodeType:
+        tree = self._change.visit(ast.parse(Path(self.path).read_text(encoding="utf-8")))
+        return compile(ast.fix_missing_locations(tree), self.path, "exec")
+
+
+@dataclass(frozen=True)
+class Finder(MetaPathFinder):
+    """Finder of the module of a number, with another value; put first on `sys.meta_path` before it is imported.
+
+    Compiled functions hold numbers of each other: where the number is one of theirs, none is read from the cache.
+    """
+
+    number: Number
+    value: float
+
+    def find_spec(self, fullname: str, path: object, target: object = None) -> ModuleSpec | None:
+        compiled = "_kernels." in self.number.module and fullname.startswith(f"{PACKAGE}._kernels.")
+        if fullname != self.number.module and not compiled:
+            return None
+        file = str(ROOT / (fullname.replace(".", "/") + ".py"))
+        place = self.number.place if fullname == self.number.module else None
+        return spec_from_file_location(
+            fullname, file, loader=_Changed(fullname, file, _Change(place, self.value))
+        )
 
 
 def entries() -> dict[str, Callable[[], str]]:
-    """Return the set: one problem of every kind, stored ones, one by every method, and scenes; each gives a verdict."""
+    """Return the set: one problem of every kind, stored ones, one by every method, and scenes; each gives a verdict.
+
+    Nothing of the solvers is imported before: a number may be another one.
+    """
+    from benchmarks.stored import read_problem
+    from mechanics.scene.scene import Method
     from tests.mechanics.solvers.test_kinds import KINDS
 
     found: dict[str, Callable[[], str]] = {}
     for name, kind in KINDS.items():
-        if name == DEAR:
-            continue
         found[name] = partial(_of_problem, kind.problem(), Method.AUTO, 1e-6)
     for path in sorted(STORED.glob("*.npz")):
         found[path.stem] = partial(_of_problem, read_problem(path), Method.AUTO, 1e-8)
@@ -160,10 +178,15 @@ def entries() -> dict[str, Callable[[], str]]:
     return found
 
 
-def _of_problem(problem: ContactProblem, method: Method, eta: float) -> str:
+def _of_problem(problem: "ContactProblem", method: "Method", eta: float) -> str:
+    from mechanics.problem.residual import residual
+    from mechanics.scene.scene import SolverSettings
+    from mechanics.solvers.choice import choose_solver
+    from tests.mechanics.solvers.problems import cold
+
     settings = SolverSettings(method, eta, 10 * eta, 20_000)
-    solution = import_module(f"{PACKAGE}.choice").choose_solver(settings)(problem, cold(problem))
-    if method in SINGLE:
+    solution = choose_solver(settings)(problem, cold(problem))
+    if not COUNTED:
         COUNTED.append(solution.iterations)
     return "solved" if residual(problem, solution.impulse).within(eta, 10 * eta) else "not solved"
 
@@ -184,66 +207,82 @@ def _of_scene(name: str, setting: str) -> str:
     return str(run(name, next(one for one in SETTINGS if str(one) == setting)).outcome)
 
 
-def measure(known: dict[str, Callable[[], str]]) -> dict[str, tuple[str, int]]:
-    """Return the verdict on each entry, and the iterations of all methods: processor times differ by half at random."""
-    chain = import_module(f"{PACKAGE}.chain")
-    follow = getattr(chain.follow, "args", [chain.follow])[0]
-    for name in ("chain", "auto", "from_nothing"):
-        vars(import_module(f"{PACKAGE}.{name}"))["follow"] = partial(_counted, follow)
+def measure() -> dict[str, tuple[str, int, float]]:
+    """Return the verdict on each entry, the iterations of all methods, and processor time [s]."""
+    from mechanics.solvers import auto, chain, from_nothing
+
+    known = entries()
+    follow = chain.follow
+    for module in (chain, auto, from_nothing):
+        module.follow = partial(_counted, follow)  # type: ignore[attr-defined]
     found = {}
     for name, entry in known.items():
         COUNTED.clear()
+        began = time.process_time()
         try:
             verdict = entry()
         except Exception as error:
             verdict = type(error).__name__
-        found[name] = verdict, sum(COUNTED)
+        found[name] = verdict, sum(COUNTED), time.process_time() - began
     return found
 
 
-def _counted(follow: Callable[..., ContactSolution], *given: object) -> ContactSolution:
+def _counted(follow: "Callable[..., ContactSolution]", *given: object) -> "ContactSolution":
     found = follow(*given)
     COUNTED.append(found.iterations)
     return found
 
 
-def apart(known: dict[str, Callable[[], str]], number: Number, value: float) -> dict[str, tuple[str, int]]:
-    """Return the same with another value, measured in a process of its own."""
-    read, write = os.pipe()
-    if (child := os.fork()) == 0:
-        os.close(read)
-        change(number, value)
-        with os.fdopen(write, "w") as said:
-            json.dump(measure(known), said)
-        os._exit(0)
-    os.close(write)
-    with os.fdopen(read) as said:
-        found = said.read()
-    os.waitpid(child, 0)
-    return {name: tuple(one) for name, one in json.loads(found).items()} if found else {}
+def apart(number: Number | None = None, value: float = 0.0) -> dict[str, tuple[str, int, float]]:
+    """Return what a process of its own measures, of the set with another value; empty where it fails."""
+    asked = (
+        []
+        if number is None
+        else [json.dumps([number.module, number.name, number.value, number.place, value])]
+    )
+    found = subprocess.run(
+        [sys.executable, "-m", __spec__.name, "measure", *asked],
+        stdout=subprocess.PIPE,
+        cwd=ROOT,
+        check=False,
+    )
+    return json.loads(found.stdout) if found.returncode == 0 else {}
+
+
+def row(number: Number, usual: dict[str, tuple[str, int, float]]) -> str:
+    """Return the row of a number: its value, and of a third and three times it, what differs."""
+    told = []
+    for factor in (1 / 3, 3.0):
+        value = changed(number.value, factor)
+        found = apart(number, value)
+        work, seconds = (
+            sum(one[k] for one in found.values()) / sum(one[k] for one in usual.values()) for k in (1, 2)
+        )
+        differ = [f"{name}: {one[0]}" for name, one in found.items() if one[0] != usual[name][0]]
+        said = "; ".join(differ) or "same verdicts"
+        told.append(f"{value:.3g}: {work:.2f}, {seconds:.2f}, {said}" if found else f"{value:.3g}: fails")
+    return f"| {number.module.removeprefix(PACKAGE + '.')} `{number.name}` | {number.value:g} | {told[0]} | {told[1]} |"
 
 
 def main() -> None:
-    """List the numbers; change those of the names given, and print the iterations and verdicts that differ."""
-    asked, every = sys.argv[1:], numbers()
-    for one in every:
-        print(f"{one.module.removeprefix(PACKAGE + '.'):32s} {one.name:24s} {one.value:g}")
-    print(f"{len(every)} numbers")
-    # numbers of kernels are compiled
-    chosen = [one for one in every if one.name in asked and "_kernels" not in one.module]
-    if not chosen:
+    """List the numbers, or measure the set, or change numbers."""
+    asked = sys.argv[1:]
+    if asked[:1] == ["measure"]:
+        if asked[1:]:
+            module, name, value, place, other = json.loads(asked[1])
+            sys.meta_path.insert(0, Finder(Number(module, name, value, tuple(place)), other))
+        print(json.dumps(measure()))
         return
-    known = entries()
-    usual = measure(known)
-    for one in chosen:
-        for factor in (0.5, 2.0):
-            found = apart(known, one, changed(one.value, factor))
-            work = sum(count for _, count in found.values()) / sum(count for _, count in usual.values())
-            others = {name: found.get(name, ("failed", 0))[0] for name in usual}
-            differ = {name: verdict for name, verdict in others.items() if verdict != usual[name][0]}
-            print(
-                f"{one.name} {one.value:g} × {factor:g}: {work:.2f} times the iterations; {differ or 'same verdicts'}"
-            )
+    every = numbers()
+    if not asked:
+        for one in every:
+            print(f"{one.module.removeprefix(PACKAGE + '.'):32s} {one.name:24s} {one.value:g}")
+        print(f"{len(every)} numbers")
+        return
+    usual = apart()
+    for one in every:
+        if one.name in asked or asked == ["all"]:
+            print(row(one, usual), flush=True)
 
 
 if __name__ == "__main__":

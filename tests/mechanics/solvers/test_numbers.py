@@ -4,7 +4,7 @@ import pytest
 
 from tests.mechanics.solvers.numbers import changed, numbers
 
-MOST = 75
+MOST = 54
 
 
 def test_there_are_no_more_numbers_than_today():
@@ -13,7 +13,7 @@ def test_there_are_no_more_numbers_than_today():
 
 def test_numbers_of_tuples_stages_and_defaults_are_found():
     found = {(one.name, one.value) for one in numbers()}
-    assert {("_LOOSEST", 0.025), ("STAGES", 0.2), ("NSGS.depth", 20), ("ROUNDING", 1e-9)} <= found
+    assert {("_LOOSEST", 0.025), ("JOINTS", 1e-4), ("Stage.iterations", 50), ("ROUNDING", 1e-9)} <= found
 
 
 @pytest.mark.parametrize(
