@@ -2,7 +2,6 @@
 
 __all__ = [
     "CORRECTIONS",
-    "DEPTH",
     "HELD",
     "JOINTS",
     "LOOK",
@@ -18,9 +17,6 @@ ROUNDING = 1e-9
 
 CORRECTIONS = 5
 """Corrections with the same factors, at most: each costs a substitution, a twentieth of a factorisation."""
-
-DEPTH = 6
-"""Iterates from which Anderson's method extrapolates, at most."""
 
 HELD = 1e-4
 """Compliance of a rigid joint in the first step of Newton's method, over the scale of W [-]."""

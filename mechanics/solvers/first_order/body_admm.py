@@ -23,7 +23,7 @@ from mechanics.solvers._kernels import body_admm as kernel
 from mechanics.solvers._kernels import body_cholesky as cholesky
 from mechanics.solvers._kernels.body_parts import Parts, parts_of
 from mechanics.solvers.first_order.body_factors import factorise
-from mechanics.solvers.scales import DEPTH, LOOK, MANY, OVERSHOOT, ROUNDING, SPARE
+from mechanics.solvers.scales import LOOK, MANY, OVERSHOOT, ROUNDING, SPARE
 from moma.errors import SolverError
 
 __all__ = ["SLIDING", "SORTED", "BodyADMM", "Stage"]
@@ -31,6 +31,8 @@ __all__ = ["SLIDING", "SORTED", "BodyADMM", "Stage"]
 
 # velocities of a body
 _VELOCITIES = 6
+# iterates from which is extrapolated, at most
+_DEPTH = 6
 
 
 @dataclass(frozen=True)
@@ -209,7 +211,7 @@ class _Run:
     def _begin(self, stage: Stage) -> None:
         """Go on with the penalty of a stage; y keeps its velocities."""
         self._until += stage.iterations
-        self._memory = _acceleration(DEPTH if stage.extrapolated else 0, self._iterate.x.size)
+        self._memory = _acceleration(_DEPTH if stage.extrapolated else 0, self._iterate.x.size)
         self._broken()
         x, z = _vectors(self._iterate.x), _vectors(self._z)
         common = stage.penalty if isinstance(stage.penalty, float) else None

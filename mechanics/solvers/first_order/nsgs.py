@@ -6,7 +6,7 @@ from mechanics.arrays import Array
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, GaussSeidel
 from mechanics.problem.residual import Residual, project_on_cone, residual
 from mechanics.solvers.first_order.anderson import Anderson
-from mechanics.solvers.scales import DEPTH, LOOK
+from mechanics.solvers.scales import LOOK
 
 __all__ = ["NSGS"]
 
@@ -47,7 +47,7 @@ class NSGS:
     velocity_tolerance: float = 1e-5
     max_iterations: int = 2000
     check_every: int = LOOK
-    depth: int = DEPTH
+    depth: int = 20
     min_iterations: int = 0
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
