@@ -66,7 +66,7 @@ def follow(
     problem: ContactProblem,
     start: ContactStart,
     limits: tuple[float, float],
-    most: int,
+    most: float,
 ) -> ContactSolution:
     """Try the links in order until one solves the problem; return the best iterate of all.
 

@@ -356,13 +356,11 @@ class _Bodies:
         """
         if penalty in self._factors:
             return self._factors[penalty]
-        precision = np.float64
-        if len(self.inertia) >= MANY:
-            precision = np.float32
-            if penalty is not None:
-                # room for one
-                self._factors.clear()
-        value = np.zeros(self._panels.start[-1], dtype=precision)
+        many = len(self.inertia) >= MANY
+        if many and penalty is not None:
+            # room for one
+            self._factors.clear()
+        value = np.zeros(self._panels.start[-1], dtype=np.float32 if many else np.float64)
         kernel.assemble(touching, self._mass, self._panels, value)
         if not factorise(self._panels, value, self._parts, len(self.groups)):
             raise SolverError("W is not a number", where="ADMM of bodies", remedy="use another method")
