@@ -11,12 +11,12 @@ from mechanics.solvers.kinds import EXACT, POLISH, chain_of
 
 __all__ = ["Auto"]
 
-# steps without any slip after which chains of rest are tried again; where they fail, they cost as much as one step
+# steps without slip after which chains of rest are tried again; where they fail, they cost as much as one step
 _MOTION = 40
-# loosest tolerance of a motion, of velocities and of η, and largest velocity of a contact at rest over the fastest
-# u_free: beyond, contacts no longer obey their laws [-]
+# loosest tolerance of η and of velocities in a motion, and largest velocity of a contact at rest over the largest
+# u_free; beyond it contacts no longer obey their laws [-]
 _LOOSEST = 0.025
-# velocity of a contact that moves, over the velocity tolerance [-]
+# velocity from which a contact moves, over the velocity tolerance: below it are errors of one step that add up [-]
 _MOVES = 10.0
 
 

@@ -19,7 +19,7 @@ from moma.errors import SolverError
 __all__ = ["choose_planar_solver", "choose_solver"]
 
 
-# largest error of a motion over the largest errors of velocity in its steps, added up [-]
+# largest error of a motion over the sum of the largest velocity errors of its steps: contacts may all err one way [-]
 _ADDS_UP = 8.0
 
 # methods by tolerance, velocity tolerance and iterations

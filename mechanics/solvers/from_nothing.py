@@ -16,10 +16,10 @@ from mechanics.solvers.second_order.newton import Newton
 
 __all__ = ["rests_from_nothing"]
 
-# velocity over the largest u_free from which stones fall, and need not be released to see it; and velocity with the
-# harder joints over that with the softer ones below which it vanishes with them [-]
+# velocity with the harder joints over that with the softer ones, a hundredth of the compliance apart, below which it
+# vanishes with them; and velocity over the largest u_free above which stones fall [-]
 _SMALL = 0.1
-# the latter from which it stays as it is [-]
+# ratio of the same two velocities above which compliance does not cause them [-]
 _STAYS = 0.5
 # tolerances of η and of velocities [-]
 _LIMITS = Newton.tolerance, Newton.velocity_tolerance

@@ -11,7 +11,8 @@ from mechanics.solvers.scales import LOOK
 __all__ = ["NSGS"]
 
 
-# η of an extrapolation over that of the sweeps from which it is dropped, with the old iterates [-]
+# η of an extrapolation over that of the sweeps above which it is dropped, with the old iterates: one that looks worse
+# at first mostly leads on [-]
 _BAD = 10.0
 
 

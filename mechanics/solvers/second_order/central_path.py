@@ -37,10 +37,10 @@ __all__ = ["NAME", "CentralPath"]
 NAME = "interior point"
 """Method in the messages of errors."""
 
-# part of the way to the boundary that a step goes [-]
+# part of the way to the boundary of the cones that a step goes; on it Newton's matrix is singular [-]
 _BACK_OFF = 0.98
-# part of a step below which it counts as short [-]
-_SHORT = 0.1
+# length of a step, over Newton's, below which one towards the middle of the path is tried [-]
+_SHORT = 0.2
 # factor within which pairs are well centred: of their complementarities on the one wanted, and of the first ones on
 # typical impulses and their velocities: a start nearer to the cones takes 19 iterations instead of 13 [-]
 _CENTRAL = 10.0
@@ -186,7 +186,7 @@ class CentralPath:
             if farther <= length:
                 break
             step, length = other, farther
-        if length < 2.0 * _SHORT:
+        if length < _SHORT:
             other = newton.direction(newton.centred(0.5 * self._gap), 0.5)
             farther = min(1.0, _BACK_OFF * self._reach(other))
             if farther > length:

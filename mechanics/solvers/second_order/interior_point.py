@@ -17,8 +17,10 @@ __all__ = ["InteriorPoint"]
 # complementarity, relative to typical impulses, at which a path begins near the impulses of a start: those of the step
 # before cost 10 iterations at 1e-4, 13 at 1e-2 and 15 at 1e-6 [-]
 _NEAR = 1e-4
-# fall of η that is progress, and iterations without any after which the path has stalled [-]
-_PROGRESS, _STALLED = 0.9, 8
+# η over the least so far below which an iteration is progress [-]
+_PROGRESS = 0.9
+# iterations without progress after which the path has stalled: masses 10⁶ apart take a few short steps on the way
+_STALLED = 8
 
 
 @dataclass(frozen=True)

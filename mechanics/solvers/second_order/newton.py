@@ -23,17 +23,17 @@ from mechanics.solvers.second_order.scaling import equilibrated
 __all__ = ["Newton"]
 
 
-# α over η and the scale of W, at first and at least [-]
+# α over η and the scale of W, at first and at least: α falls with η, so convergence stays fast (Fan & Yuan 2005) [-]
 _SHARE = 0.1
-# η from which a start is far from a solution, and the contacts that bear are held first [-]
+# η above which a start is far from a solution, and the contacts that bear are held first [-]
 _FAR = 0.3
 # smallest α over the scale of W: rounding in self-stress is ε/α of it, and α itself as large [-]
 _LEAST = float(np.sqrt(np.finfo(float).eps))
 # factor by which α grows after steps shortened by more than that, and falls after whole ones [-]
 _ADAPT = 4.0
-# iterates to which the line search looks back
+# iterates whose worst merit a step must improve on (Grippo, Lampariello & Lucidi 1986)
 _MEMORY = 5
-# shortest part of a step [-]
+# shortest part of a step, taken even where it gains nothing: it leads away from a kink [-]
 _SHORTEST = 1e-3
 # steps with the least α that may gain nothing
 _IDLE = 1

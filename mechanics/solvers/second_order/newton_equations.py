@@ -27,8 +27,10 @@ from moma.errors import SolverError
 __all__ = ["Equations", "equations_of"]
 
 
-# error to which the equations of bodies that deform are solved, over their right side [-], and most products with W
-_INEXACT, _PRODUCTS = 1e-2, 30
+# error of the equations of bodies that deform over their right side: Newton's steps correct it [-]
+_INEXACT = 1e-2
+# most products with W for them
+_PRODUCTS = 30
 # change of a contact's derivatives from which it opens, slides or sticks unlike before [-]
 _UNLIKE = 0.3
 # most products with W while the factors of an earlier step lead: as long as a factorisation and the products after it
