@@ -11,11 +11,11 @@ import numpy as np
 
 from mechanics.problem.problem import ContactProblem
 from mechanics.solvers.chain import Begin, Link, Solver
-from mechanics.solvers.first_order.body_admm import SLIDING, SORTED, BodyADMM, Stage
+from mechanics.solvers.first_order.body_admm import SORTED, BodyADMM, Stage
 from mechanics.solvers.first_order.disk_admm import DiskADMM
 from mechanics.solvers.first_order.nsgs import NSGS
 from mechanics.solvers.first_order.stones_as_rigid import StonesAsRigid
-from mechanics.solvers.scales import HELD, JOINTS, MANY, PLAIN_LOOK
+from mechanics.solvers.scales import FOLLOWING, HELD, JOINTS, MANY, PLAIN_LOOK
 from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.second_order.newton import Newton
 from mechanics.solvers.second_order.softer_joints import SofterJoints
@@ -45,7 +45,7 @@ _NEAR = 1e-3
 # joints of a rest hold as a rule: with a small penalty their forces arrive at once
 _HOLD = Stage(1e-3)
 # so do those of a motion, with a larger one
-_FOLLOW = Stage(SLIDING)
+_FOLLOW = Stage(FOLLOWING)
 
 _Method = Callable[[float, float, int], Solver]
 _rest: _Method = partial(BodyADMM, stages=(_HOLD, *SORTED), further=EXACT)

@@ -2,6 +2,7 @@
 
 __all__ = [
     "CORRECTIONS",
+    "FOLLOWING",
     "HELD",
     "JOINTS",
     "LOOK",
@@ -33,6 +34,9 @@ LOOK = 5
 
 PLAIN_LOOK = 20
 """Plain sweeps or iterations over disks between two measurements of η: a measurement costs two sweeps."""
+
+FOLLOWING = 0.1
+"""Penalty of ADMM for forces that follow those of the step before, over the mean diagonal of W_αα [-]."""
 
 OVERSHOOT = 1.6
 """Over-relaxation of ADMM (Boyd et al. 2011, section 3.4.3, recommend 1.5 to 1.8) [-]."""

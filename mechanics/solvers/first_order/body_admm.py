@@ -26,7 +26,7 @@ from mechanics.solvers.first_order.body_factors import factorise
 from mechanics.solvers.scales import LOOK, MANY, OVERSHOOT, ROUNDING, SPARE
 from moma.errors import SolverError
 
-__all__ = ["SLIDING", "SORTED", "BodyADMM", "Stage"]
+__all__ = ["SORTED", "BodyADMM", "Stage"]
 
 
 # velocities of a body
@@ -53,14 +53,13 @@ class Stage:
     extrapolated: bool = True
 
 
-SLIDING = 0.05
-"""Penalty that suits contacts of which some slide [-]."""
-
+# penalty of contacts that slide [-]
+_SLIDING = 0.05
 # penalty of those that stick: their forces, which grow steadily until one slips, arrive 200 times as soon as with that
 # of open contacts [-]
 _STICKING = 0.005
 # in turn, contacts sort themselves into open, sliding and sticking, and their forces arrive
-_TURNS = (Stage(1.0, extrapolated=False), Stage((1.0, SLIDING, _STICKING), extrapolated=False))
+_TURNS = (Stage(1.0, extrapolated=False), Stage((1.0, _SLIDING, _STICKING), extrapolated=False))
 SORTED = (Stage(1.0, LOOK, extrapolated=False), _TURNS[1])
 """The first turn: few iterations tell most contacts apart."""
 

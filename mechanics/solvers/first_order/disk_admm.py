@@ -15,7 +15,7 @@ from mechanics.problem.residual import Residual, project_on_cone, residual
 from mechanics.solvers._kernels import body_cholesky as cholesky
 from mechanics.solvers._kernels import disk_admm as kernel
 from mechanics.solvers.first_order.body_factors import factorise
-from mechanics.solvers.scales import OVERSHOOT, PLAIN_LOOK, SPARE
+from mechanics.solvers.scales import FOLLOWING, OVERSHOOT, PLAIN_LOOK, SPARE
 from moma.errors import SolverError
 
 __all__ = ["DiskADMM"]
@@ -40,7 +40,7 @@ class DiskADMM:
     tolerance: float = 1e-6
     velocity_tolerance: float = 1e-5
     max_iterations: int = 2000
-    penalty: float = 0.1
+    penalty: float = FOLLOWING
     check_every: int = PLAIN_LOOK
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
