@@ -1,6 +1,7 @@
 """Rest by forces that arise from nothing, or by self-stress alone (docs/theory.md §3)."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -9,9 +10,9 @@ from mechanics.delassus.compliant import CompliantDelassus
 from mechanics.problem.problem import ContactProblem, ContactStart
 from mechanics.problem.residual import residual
 from mechanics.solvers.chain import Link, follow
-from mechanics.solvers.first_order.body_admm import BodyADMM
+from mechanics.solvers.first_order.body_admm import BodyADMM, Stage
 from mechanics.solvers.kinds import SOME, moving_bodies
-from mechanics.solvers.scales import JOINTS
+from mechanics.solvers.scales import FOLLOWING, JOINTS
 from mechanics.solvers.second_order.newton import Newton
 
 __all__ = ["rests_from_nothing"]
@@ -24,7 +25,8 @@ _STAYS = 0.5
 # tolerances of η and of velocities [-]
 _LIMITS = Newton.tolerance, Newton.velocity_tolerance
 _NEWTON = Link("Newton", Newton, Newton.max_iterations)
-_ADMM = Link("body ADMM", BodyADMM, BodyADMM.max_iterations)
+# forces follow those of the softer joints
+_ADMM = Link("body ADMM", partial(BodyADMM, stages=(Stage(FOLLOWING),)), BodyADMM.max_iterations)
 
 
 def rests_from_nothing(problem: ContactProblem) -> tuple[bool | None, Array]:
