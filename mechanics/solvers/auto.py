@@ -11,14 +11,13 @@ from mechanics.solvers.kinds import EXACT, POLISH, chain_of
 
 __all__ = ["Auto"]
 
-# steps without any slip after which chains of rest are tried again; where they fail, they cost as much as one step
+# steps without slip after which chains of rest are tried again; where they fail, they cost as much as one step
 _MOTION = 40
-# loosest tolerances of a motion, of velocities and of η: beyond, contacts no longer obey their laws [-]
-_LOOSEST, _LOOSEST_MAP = 0.025, 1e-2
-# velocity of a contact that moves, over the velocity tolerance, and over the fastest u_free, at most [-]
-_MOVES, _MOST = 10.0, 1e-2
-# velocity tolerance up to which the bias of a gap counts as closed in a rest: by less than an ångström, as a rule [-]
-_CLOSED = 0.9
+# loosest tolerance of η and of velocities in a motion, and largest velocity of a contact at rest over the largest
+# u_free; beyond it contacts no longer obey their laws [-]
+_LOOSEST = 0.025
+# velocity from which a contact moves, over the velocity tolerance: below it are errors of one step that add up [-]
+_MOVES = 10.0
 
 
 @dataclass(frozen=True)
@@ -75,7 +74,8 @@ class Auto:
         """
         if problem.delassus.rigid is None or problem.delassus.joint_compliance is not None:
             return problem
-        small = _CLOSED * self.velocity_tolerance * float(np.abs(problem.u_free).max())
+        # what a closed gap takes of the tolerance leaves enough for the forces: less than an ångström, as a rule
+        small = (1.0 - EXACT) * self.velocity_tolerance * float(np.abs(problem.u_free).max())
         ajar = (problem.bias != 0.0) & (np.abs(problem.bias) <= small)
         return replace(problem, bias=np.where(ajar, 0.0, problem.bias)) if ajar.any() else problem
 
@@ -99,12 +99,12 @@ class Auto:
             return self.tolerance, self.velocity_tolerance
         velocity = min(max(self.motion_speed / pace, self.velocity_tolerance), _LOOSEST)
         # η says next to nothing of a motion: the forces of the step before have one of 10⁻⁴
-        return max(self.tolerance, min(velocity, _LOOSEST_MAP)), velocity
+        return max(self.tolerance, velocity), velocity
 
     def _rests(self, problem: ContactProblem, found: ContactSolution) -> bool:
         """Return whether no contact moves, neither one that carries a force nor one that opens."""
         u = problem.delassus.apply(found.impulse) + problem.u_free
-        pace = min(_MOVES * self.velocity_tolerance, _MOST) * float(np.abs(problem.u_free).max())
+        pace = min(_MOVES * self.velocity_tolerance, _LOOSEST) * float(np.abs(problem.u_free).max())
         return bool(np.abs(u).max() <= pace)
 
 

@@ -47,7 +47,7 @@ class Link:
     ----------
     name : of the method, as the solution states it
     method : solver from a tolerance of η, of velocities, and a number of iterations
-    iterations : at most
+    iterations : at most; as many as are left where none are given
     begin : where it starts
     further : tolerances over those asked for; going further costs little and spares later steps their work [-]
     near : η of the best iterate from which it is too far for the method [-]
@@ -55,7 +55,7 @@ class Link:
 
     name: str
     method: Callable[[float, float, int], Solver]
-    iterations: int
+    iterations: float = np.inf
     begin: Begin = Begin.BEST
     further: float = 1.0
     near: float = np.inf
@@ -66,7 +66,7 @@ def follow(
     problem: ContactProblem,
     start: ContactStart,
     limits: tuple[float, float],
-    most: int,
+    most: float,
 ) -> ContactSolution:
     """Try the links in order until one solves the problem; return the best iterate of all.
 
@@ -84,7 +84,7 @@ def follow(
         if best.natural_map > link.near:
             continue
         tight = link.further * limits[0], link.further * limits[1]
-        solver = link.method(*tight, min(link.iterations, most - count))
+        solver = link.method(*tight, int(min(link.iterations, most - count)))
         try:
             found = solver(problem, _begun(link.begin, problem, start, best))
         except SolverError as error:

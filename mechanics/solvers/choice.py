@@ -12,15 +12,14 @@ from mechanics.solvers.first_order.body_admm import BodyADMM
 from mechanics.solvers.first_order.disk_admm import DiskADMM
 from mechanics.solvers.first_order.nsgs import NSGS
 from mechanics.solvers.kinds import ENDED_PATH
+from mechanics.solvers.scales import PLAIN_LOOK
 from mechanics.solvers.second_order.newton import Newton
 from moma.errors import SolverError
 
 __all__ = ["choose_planar_solver", "choose_solver"]
 
 
-# plain sweeps over disks between two looks at η
-_LOOK = 20
-# largest error of a motion over the largest errors of velocity in its steps, added up [-]
+# largest error of a motion over the sum of the largest velocity errors of its steps: contacts may all err one way [-]
 _ADDS_UP = 8.0
 
 # methods by tolerance, velocity tolerance and iterations
@@ -73,7 +72,7 @@ def choose_planar_solver(settings: SolverSettings, min_sweeps: int = 0) -> Solve
         return DiskADMM(*limits)
     if settings.method is Method.NSGS:
         # a look costs two sweeps: none is needed before the sweeps that are made anyway
-        return NSGS(*limits, check_every=max(_LOOK, min_sweeps), depth=0, min_iterations=min_sweeps)
+        return NSGS(*limits, check_every=max(PLAIN_LOOK, min_sweeps), depth=0, min_iterations=min_sweeps)
     return choose_solver(settings)
 
 

@@ -11,26 +11,22 @@ from mechanics.problem.problem import ContactProblem, ContactStart
 from mechanics.problem.residual import residual
 from mechanics.solvers.chain import Link, follow
 from mechanics.solvers.first_order.body_admm import BodyADMM, Stage
+from mechanics.solvers.kinds import SOME, moving_bodies
+from mechanics.solvers.scales import FOLLOWING, JOINTS
 from mechanics.solvers.second_order.newton import Newton
 
 __all__ = ["rests_from_nothing"]
 
-# compliances of joints over their W_αα, and penalties of ADMM that suit them: from joints so soft that there is one
-# state only, to two stiff ones a hundred apart [-]
-_JOINTS = (10.0, 10.0), (0.1, 1.0), (1e-3, 0.01), (1e-4, 1e-3), (1e-6, 0.02)
-# velocity over the largest u_free from which stones fall, and need not be released to see it [-]
-_FALLS = 0.1
-# velocity with the harder joints over that with the softer ones below which it vanishes with them [-]
-_VANISHES = 0.1
-# the same from which it stays as it is [-]
+# velocity with the harder joints over that with the softer ones, a hundredth of the compliance apart, below which it
+# vanishes with them; and velocity over the largest u_free above which stones fall [-]
+_SMALL = 0.1
+# ratio of the same two velocities above which compliance does not cause them [-]
 _STAYS = 0.5
-# velocity over the largest u_free that is none: the tolerance of a step [-]
-_STILL = 1e-5
-# tolerances of η and of velocities, and steps or iterations in which they are to be met [-]
-_LIMITS, _STEPS, _ITERATIONS = (1e-6, 1e-5), 60, 300
-# contacts from which iterations with kept factors cost less than Newton's steps
-_MANY = 3000
-_NEWTON = Link("Newton", Newton, _STEPS)
+# tolerances of η and of velocities [-]
+_LIMITS = Newton.tolerance, Newton.velocity_tolerance
+_NEWTON = Link("Newton", Newton, Newton.max_iterations)
+# forces follow those of the softer joints
+_ADMM = Link("body ADMM", partial(BodyADMM, stages=(Stage(FOLLOWING),)), BodyADMM.max_iterations)
 
 
 def rests_from_nothing(problem: ContactProblem) -> tuple[bool | None, Array]:
@@ -47,10 +43,8 @@ def rests_from_nothing(problem: ContactProblem) -> tuple[bool | None, Array]:
     each = np.repeat(
         np.einsum("cii->c", operator.diagonal)[:, None] / nothing.shape[1], nothing.shape[1], axis=1
     )
-    many = len(nothing) >= _MANY and operator.rigid is not None
-    for share, penalty in _JOINTS:
-        admm = partial(BodyADMM, stages=(Stage(penalty, _ITERATIONS, extrapolated=True),))
-        link = Link("body ADMM", admm, _ITERATIONS) if many else _NEWTON
+    link = _ADMM if operator.rigid is not None and moving_bodies(problem) >= SOME else _NEWTON
+    for share in JOINTS:
         yields = share * each
         yielding = replace(problem, delassus=CompliantDelassus(operator, yields))
         found = follow((link,), yielding, start, _LIMITS, link.iterations)
@@ -59,7 +53,7 @@ def rests_from_nothing(problem: ContactProblem) -> tuple[bool | None, Array]:
         slips = operator.apply(found.impulse) + yields * found.impulse + problem.u_free
         speeds.append(float(np.abs(slips).max(initial=0.0)))
     *_, softer, harder = speeds
-    if harder + error <= max(_VANISHES * softer, _STILL * pace):
+    if harder + error <= max(_SMALL * softer, _LIMITS[1] * pace):
         return True, start.impulse
-    falls = harder - error > max(_FALLS * pace, _STAYS * softer)
+    falls = harder - error > max(_SMALL * pace, _STAYS * softer)
     return (False if falls else None), start.impulse

@@ -11,69 +11,65 @@ import numpy as np
 
 from mechanics.problem.problem import ContactProblem
 from mechanics.solvers.chain import Begin, Link, Solver
-from mechanics.solvers.first_order.body_admm import BodyADMM, Stage
+from mechanics.solvers.first_order.body_admm import SORTED, BodyADMM, Stage
 from mechanics.solvers.first_order.disk_admm import DiskADMM
 from mechanics.solvers.first_order.nsgs import NSGS
 from mechanics.solvers.first_order.stones_as_rigid import StonesAsRigid
+from mechanics.solvers.scales import FOLLOWING, HELD, JOINTS, MANY, PLAIN_LOOK
 from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.second_order.newton import Newton
 from mechanics.solvers.second_order.softer_joints import SofterJoints
 
-__all__ = ["ENDED_PATH", "EXACT", "POLISH", "chain_of"]
+__all__ = ["ENDED_PATH", "EXACT", "POLISH", "SOME", "chain_of", "moving_bodies"]
 
-# budgets: iterations of ADMM and sweeps over disks, steps of Newton's method, factorisations of a path
-_ADMM, _NEWTON, _PATH = 500, 20, 60
+# budgets of links that others follow; what needs more is mostly solved by none of them
+_ADMM = 500  # iterations of ADMM, and sweeps over disks
+_NEWTON = 20  # steps of Newton's method
+_PATH = 60  # factorisations of a path, and steps of Newton's method where nothing else is left
 # moving rigid bodies from which a factorisation in each step of Newton's method takes longer than iterations with kept
-# factors: in each step of a motion, at rest, and at all
-_HANDFUL, _SOME, _MANY = 32, 300, 1000
-# contacts of disks up to which Newton's method takes less than the iterations that it spares
-_FEW = 1000
+# factors, in the steps of a motion
+_HANDFUL = 32
+SOME = 300
+"""The same at rest; of `MANY` a factorisation takes too long at all."""
+
 EXACT = 1e-3
 """Tolerances over those asked for, of forces that a rest keeps for hundreds of steps: what they lack would be a creep.
 """
 
 # the same of forces that the next step begins with [-]
 _FURTHER = 0.03
-# velocity tolerance of a motion from which it is solved loosely [-]
-_LOOSE = 1e-3
-# η up to which forces of the last step lead a path, and Newton's method between deformable stones [-]
-_NEAR, _NEARER = 1e-2, 1e-3
+# error up to which forces are near a solution: velocity tolerance below which a motion is solved by methods that need
+# such a start, and η up to which forces of the last step lead them between deformable and rigid stones [-]
+_NEAR = 1e-3
 
 # joints of a rest hold as a rule: with a small penalty their forces arrive at once
-_HOLD = Stage(1e-3, 50, extrapolated=True, longer=100)
-# so do those of a motion that is predicted, with a larger one, and of one that need not be exact
-_FOLLOW = (Stage(0.02, 150, extrapolated=False), Stage(0.05, 150, extrapolated=True))
-_SHAKE = Stage(0.1, 80, extrapolated=True)
-# penalties in turn: with the large one contacts sort themselves into open, sliding and sticking; with the small one of
-# those that stick, their forces, which grow steadily until one slips, arrive 200 times as soon
-_SORT = Stage(1.0, 40, extrapolated=False)
-_GROW = Stage((1.0, 0.05, 0.005), 60, extrapolated=False)
-_TURNS = (replace(_SORT, iterations=10), replace(_GROW, penalty=(1.0, 0.05, 0.01)), *(50 * (_SORT, _GROW)))
+_HOLD = Stage(1e-3)
+# so do those of a motion, with a larger one
+_FOLLOW = Stage(FOLLOWING)
 
 _Method = Callable[[float, float, int], Solver]
-_turns: _Method = partial(BodyADMM, stages=_TURNS)
-_rest: _Method = partial(BodyADMM, stages=(_HOLD, *_TURNS), further=EXACT)
-_motion: _Method = partial(BodyADMM, stages=(*_FOLLOW, *_TURNS), further=0.1)
-_loosely: _Method = partial(BodyADMM, stages=(_SHAKE, *_TURNS))
-_as_rigid: _Method = partial(StonesAsRigid, stages=_TURNS)
+_rest: _Method = partial(BodyADMM, stages=(_HOLD, *SORTED), further=EXACT)
+_motion: _Method = partial(BodyADMM, stages=(_FOLLOW, *SORTED), further=_FURTHER)
+_loosely: _Method = partial(BodyADMM, stages=(_FOLLOW, *SORTED))
 # a look costs two sweeps over disks, an extrapolation ten
-_sweeps: _Method = partial(NSGS, check_every=20, depth=0)
+_sweeps: _Method = partial(NSGS, check_every=PLAIN_LOOK, depth=0)
 
 _newton = Link("Newton", Newton, _NEWTON, further=_FURTHER)
-_path = Link("interior point", InteriorPoint, _PATH, Begin.NOTHING)
+_path = Link("interior point", InteriorPoint, _PATH, Begin.NOTHING, _FURTHER)
 _from_best = replace(_path, begin=Begin.BEST)
-_admm = Link("body ADMM", _turns, _ADMM)
-_endless = replace(_admm, iterations=10**6)
+_endless = Link("body ADMM", BodyADMM)
+_admm = replace(_endless, iterations=_ADMM)
 
 _exact = replace(_newton, further=EXACT)
 
-POLISH = Link("body ADMM", partial(BodyADMM, stages=(_HOLD,)), 50)
+POLISH = Link("body ADMM", partial(BodyADMM, stages=(_HOLD,)), _HOLD.iterations)
 """Link that makes forces exact which a rest keeps."""
 
 ENDED_PATH = (_path, _newton)
 """Chain of the interior point alone, which Newton's method ends: it stalls where contacts are between two states."""
 
-_released = replace(_newton, iterations=60, begin=Begin.RELEASED)
+_long = replace(_newton, iterations=_PATH)
+_released = replace(_long, begin=Begin.RELEASED)
 _REST = (
     replace(_exact, begin=Begin.GIVEN),
     replace(_admm, begin=Begin.GIVEN),
@@ -87,8 +83,8 @@ _REST = (
 # the limit hardly depend on where corners lie
 _FROM_NOTHING = Link(
     "Newton from soft joints",
-    partial(SofterJoints, factors=(1e5, 1e2, 0.01)),
-    60,
+    partial(SofterJoints, factors=tuple(share / HELD for share in JOINTS)),
+    _PATH,
     Begin.GIVEN,
     EXACT,
 )
@@ -98,7 +94,7 @@ _REST_OF_SOME = (replace(_admm, method=_rest, begin=Begin.GIVEN), _newton, _path
 _REST_OF_MANY = (replace(_endless, method=_rest, begin=Begin.GIVEN),)
 _MOTION = (
     replace(_admm, method=_motion, begin=Begin.AHEAD),
-    *(2 * (replace(_newton, iterations=100), _admm)),
+    *(_long, _admm, _long, _admm),
     _path,
 )
 # of few stones Newton's method goes first: ADMM presses stones against what they only touch, and
@@ -107,27 +103,27 @@ _MOTION_OF_FEW = (replace(_newton, begin=Begin.AHEAD), *_MOTION)
 # errors that are allowed would be extrapolated with the rest
 _LOOSE_MOTION = (replace(_endless, method=_loosely, begin=Begin.GIVEN),)
 _MOTION_OF_MANY = (replace(_endless, begin=Begin.AHEAD),)
-_SOFTER = Link("Newton from softer joints", SofterJoints, 150, Begin.GIVEN, EXACT)
+_SOFTER = Link("Newton from softer joints", SofterJoints, _PATH, Begin.GIVEN, EXACT)
 _SPRINGS = (replace(_exact, begin=Begin.GIVEN), _SOFTER, _path)
 _SPRINGS_OF_SOME = (replace(_admm, begin=Begin.GIVEN), _exact, _SOFTER, _path)
 _DEFORMABLE = (
-    replace(_newton, method=partial(Newton, hopeless=0.3), begin=Begin.GIVEN, further=1.0),
+    replace(_newton, begin=Begin.GIVEN, further=1.0),
     *(_path, _newton),
     *(_from_best, _newton),
     replace(_SOFTER, further=1.0),
-    Link("sweeps", NSGS, 1000),
+    Link("sweeps", NSGS, _ADMM),
 )
 # between rigid stones Newton's method wanders, so the path is followed until the laws hold, again from where it stalled
 _AMONG_RIGID = (replace(_from_best, near=_NEAR), _path, _from_best, _from_best)
-_STONES_AS_RIGID = Link("stones as rigid ones", _as_rigid, _ADMM, Begin.BEST, 100.0)
-_SPRINGS_AMONG_RIGID = (replace(_exact, near=_NEARER), *(2 * (_STONES_AS_RIGID, _exact)))
+_STONES_AS_RIGID = Link("stones as rigid ones", StonesAsRigid, _ADMM, Begin.BEST, 100.0)
+_SPRINGS_AMONG_RIGID = (replace(_exact, near=_NEAR), _STONES_AS_RIGID, _exact, _STONES_AS_RIGID, _exact)
 _DISKS = (
     Link("sweeps", _sweeps, _ADMM, Begin.GIVEN),
-    Link("ADMM of disks", partial(DiskADMM, penalty=0.05), _ADMM, Begin.GIVEN),
-    Link("ADMM of disks", DiskADMM, 10**6),
+    Link("ADMM of disks", DiskADMM, _ADMM, Begin.GIVEN),
+    Link("ADMM of disks", DiskADMM),
 )
-_FEW_DISKS = (*_DISKS[:2], replace(_newton, iterations=100, begin=Begin.GIVEN), _DISKS[2])
-_SWEEPS = (Link("sweeps", NSGS, 10**6, Begin.GIVEN),)
+_FEW_DISKS = (*_DISKS[:2], replace(_long, begin=Begin.GIVEN), _DISKS[2])
+_SWEEPS = (Link("sweeps", NSGS, begin=Begin.GIVEN),)
 
 
 def chain_of(
@@ -141,10 +137,10 @@ def chain_of(
     velocity_tolerance : asked of this step [-]
     warm : forces are known to begin with
     """
-    operator, bodies = problem.delassus, _moving_bodies(problem)
+    operator, bodies = problem.delassus, moving_bodies(problem)
     yields = operator.joint_compliance is not None
     if operator.plane is not None:
-        return _FEW_DISKS if len(problem.friction) <= _FEW else _DISKS
+        return _FEW_DISKS if len(problem.friction) <= MANY else _DISKS
     if operator.rigid is None:
         if operator.form is None:
             return _SWEEPS
@@ -153,21 +149,21 @@ def chain_of(
         if yields:
             return (*_SPRINGS_AMONG_RIGID, *_DEFORMABLE)
         # the path of hundreds of stones between rigid joints takes too long to fail
-        return (*_AMONG_RIGID, *_DEFORMABLE) if bodies < _SOME else ()
+        return (*_AMONG_RIGID, *_DEFORMABLE) if bodies < SOME else ()
     if yields:
-        return _SPRINGS if bodies < _SOME else _SPRINGS_OF_SOME
-    if follows and bodies >= _MANY:
+        return _SPRINGS if bodies < SOME else _SPRINGS_OF_SOME
+    if follows and bodies >= MANY:
         return _MOTION_OF_MANY if moving else _REST_OF_MANY
-    if moving and velocity_tolerance < _LOOSE:
+    if moving and velocity_tolerance < _NEAR:
         return _MOTION if bodies >= _HANDFUL else _MOTION_OF_FEW
     if moving:
         return _LOOSE_MOTION
-    if bodies < _SOME:
+    if bodies < SOME:
         return _REST if warm else _REST_FROM_NOTHING
     return _REST_OF_SOME
 
 
-def _moving_bodies(problem: ContactProblem) -> int:
+def moving_bodies(problem: ContactProblem) -> int:
     """Return the number of bodies that move, those that deform among rigid ones included."""
     operator = problem.delassus
     contacts = (operator if operator.as_rigid is None else operator.as_rigid).rigid

@@ -28,6 +28,7 @@ from mechanics.delassus._kernels.sides import inverse_columns
 from mechanics.problem._kernels import onto_cone
 from mechanics.solvers._kernels.body_cholesky import Panels, backward, forward
 from mechanics.solvers._kernels.body_parts import Parts
+from mechanics.solvers.scales import ROUNDING
 
 __all__ = [
     "ADHESION",
@@ -59,17 +60,11 @@ __all__ = [
     "up",
 ]
 
-# regularisation of the extrapolation's normal equations over their trace [-]
-_REGULAR = 1e-10
-# numbers of a vector that are combined at once
-_PIECE = 1024
 # places of a block: a multiple of what a processor multiplies at once, so few that a block stays in the fastest memory
 BLOCK = 64
 # rows of a block of a field, and where the vectors and numbers of contacts begin
 ROWS = 17
 ARM, SHIFT, FRICTION, COHESION, ADHESION, SOFT, SHARE, YIELD = 3, 6, 9, 10, 11, 12, 13, 15
-# growth of the change of an iteration from which earlier ones mislead [-]
-_WORSE = 2.0
 
 
 class Runs(NamedTuple):
@@ -649,7 +644,8 @@ def _extrapolate(x, image, memory):
         kept[i] = image[i]
         step[i] = image[i] - x[i]
         size += step[i] ** 2
-    if memory.tally[0] > 0 and not size <= _WORSE * _WORSE * memory.size[0]:
+    if memory.tally[0] > 0 and not size <= memory.size[0]:
+        # where steps grow, earlier ones mislead
         memory.tally[0] = 0
     memory.size[0] = size
     memory.tally[1] = last
@@ -673,20 +669,21 @@ def _extrapolate(x, image, memory):
             trace += a[k, k]
         if trace > 0.0:
             for k in range(n):
-                a[k, k] += _REGULAR * trace
+                a[k, k] += ROUNDING * trace
             found = np.linalg.solve(a, b)
             for k in range(n):
                 weight[k] = found[k]
     total = 0.0
     for k in range(known - 1):
         total += weight[k]
-    # by pieces that stay in the fastest memory
-    for start in range(0, x.shape[0], _PIECE):
-        piece, own = x[start : start + _PIECE], kept[start : start + _PIECE]
+    # by blocks, which stay in the fastest memory
+    for start in range(0, x.shape[0], 3 * BLOCK):
+        end = start + 3 * BLOCK
+        piece, own = x[start:end], kept[start:end]
         for i in range(piece.shape[0]):
             piece[i] = (1.0 - total) * own[i]
         for k in range(known - 1):
-            other, part = memory.image[(last - 1 - k) % depth][start : start + _PIECE], weight[k]
+            other, part = memory.image[(last - 1 - k) % depth][start:end], weight[k]
             for i in range(piece.shape[0]):
                 piece[i] += part * other[i]
 

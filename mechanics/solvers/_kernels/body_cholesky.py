@@ -24,6 +24,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 __all__ = [
+    "AT_ONCE",
     "Panels",
     "backward",
     "divide",
@@ -36,8 +37,8 @@ __all__ = [
     "solve",
 ]
 
-# rows of a panel that are finished before they are taken from the others by one product
-_ROWS = 48
+# rows of a panel that are finished, while other threads wait, before they are taken from the others by one product
+AT_ONCE = 48
 # bodies above which a product is faster than line by line
 _FEW = 1
 # columns of a tile: a multiple of what a processor multiplies at once
@@ -293,8 +294,8 @@ def _finish(panel, space):
     Rows are finished some at a time; what they take from all others is one product.
     """
     w, n = panel.shape
-    for k in range(0, w, _ROWS):
-        end = min(k + _ROWS, w)
+    for k in range(0, w, AT_ONCE):
+        end = min(k + AT_ONCE, w)
         if not _finish_rows(panel, k, end):
             return False
         if end < w:

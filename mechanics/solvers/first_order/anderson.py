@@ -3,12 +3,9 @@
 import numpy as np
 
 from mechanics.arrays import Array
+from mechanics.solvers.scales import ROUNDING
 
 __all__ = ["Anderson"]
-
-
-# regularisation of the small least-squares problem over the trace of its Gram matrix [-]
-_REGULAR = 1e-12
 
 
 class Anderson:
@@ -36,7 +33,8 @@ class Anderson:
         size = float(np.trace(gram))
         if size == 0.0:
             return None
-        gram += _REGULAR * size * np.eye(len(gram))
+        # regularised, as late differences are nearly parallel
+        gram += ROUNDING * size * np.eye(len(gram))
         weights = np.linalg.solve(gram, steps @ self._steps[-1])
         extrapolated: Array = (self._images[-1] - weights @ images).reshape(x.shape)
         return extrapolated

@@ -7,9 +7,10 @@ contacts and one solution with the factors of M + H Σ⁻¹ Hᵀ, less than that
 (mechanics/solvers/_kernels/body_admm.py).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import chain, cycle
 
 import numpy as np
 
@@ -22,42 +23,16 @@ from mechanics.solvers._kernels import body_admm as kernel
 from mechanics.solvers._kernels import body_cholesky as cholesky
 from mechanics.solvers._kernels.body_parts import Parts, parts_of
 from mechanics.solvers.first_order.body_factors import factorise
+from mechanics.solvers.scales import LOOK, MANY, OVERSHOOT, ROUNDING, SPARE
 from moma.errors import SolverError
 
-__all__ = ["STAGES", "BodyADMM", "Stage"]
+__all__ = ["SORTED", "BodyADMM", "Stage"]
 
 
-# overshoot of the impulses [-]
-_OVER = 1.6
 # velocities of a body
 _VELOCITIES = 6
-# zeros that a panel of the factors may hold, over its other blocks [-]
-_SPARE = 0.2
-# bodies below which the order of elimination depends on their pairs alone, and is kept while these stay, and factors
-# are of double precision: they stay in the fastest memory, and tolerances may be very small
-_FEW = 1000
-# numbers in factors that are kept until contacts are detected again, at most: 32 MB
-_KEPT = 4_000_000
-# work of a block of contacts in an iteration, over that of a number in the factors [-]
-_CONTACT = 3000
-# difference of the offsets between the centres of two bodies at contacts of one run: rounding [-]
-_SAME = 1e-12
-# σ over E of joints that yield, beyond that of rigid ones: of small contacts E is 10⁴ times W_αα [-]
-_GIVING = 10.0
-# iterations before the first look at the residual
-_FIRST_LOOK = 10
-# fewest iterations between two looks
-_LEAST_LOOK = 5
-# and most, over the iterations so far: changes of velocities foretell the residual for so long alone [-]
-_LATE_LOOK = 0.2
-# part of the change at which the residual is expected to be small enough, at which it is looked at [-]
-_EARLY = 0.8
-# errors over their tolerances up to which a first stage has come near [-]
-_NEAR = 1e3
-# iterates from which is extrapolated
+# iterates from which is extrapolated, at most
 _DEPTH = 6
-# distance of x from its cone, over the impulse, beyond which a contact slides: less is rounding [-]
-_BESIDE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -71,16 +46,22 @@ class Stage:
         slide and stick as the stage begins, which cost a factorisation of their own [-]
     iterations : their number
     extrapolated : from the iterates before (Anderson 1965)
-    longer : iterations more of a first stage that has come near at its end
     """
 
     penalty: float | tuple[float, float, float]
-    iterations: int
-    extrapolated: bool
-    longer: int = 0
+    iterations: int = 50
+    extrapolated: bool = True
 
 
-STAGES = (Stage(0.02, 150, False), Stage(0.05, 150, True), Stage(0.2, 250, True))
+# penalty of contacts that slide [-]
+_SLIDING = 0.05
+# penalty of those that stick: their forces, which grow steadily until one slips, arrive 200 times as soon as with that
+# of open contacts [-]
+_STICKING = 0.005
+# in turn, contacts sort themselves into open, sliding and sticking, and their forces arrive
+_TURNS = (Stage(1.0, extrapolated=False), Stage((1.0, _SLIDING, _STICKING), extrapolated=False))
+SORTED = (Stage(1.0, LOOK, extrapolated=False), _TURNS[1])
+"""The first turn: few iterations tell most contacts apart."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +73,8 @@ class BodyADMM:
     Attributes
     ----------
     tolerance, velocity_tolerance, max_iterations : as in `NSGS`, iterations for sweeps
-    stages : in turn, as long as it is not solved
+    stages : first, one after the other, as long as it is not solved
+    turns : stages that follow, again and again
     further : tolerances of the first stage over those asked for: the next steps begin where the last ones lead, and
         gain from what these go further [-]
     """
@@ -100,7 +82,8 @@ class BodyADMM:
     tolerance: float = 1e-6
     velocity_tolerance: float = 1e-5
     max_iterations: int = 1000
-    stages: tuple[Stage, ...] = STAGES
+    stages: tuple[Stage, ...] = SORTED
+    turns: tuple[Stage, ...] = _TURNS
     further: float = 1.0
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
@@ -118,15 +101,12 @@ class BodyADMM:
         if len(start.impulse) == 0:
             return ContactSolution(start.impulse, start.velocity, 0, 0.0, True)
         run = _Run(problem, contacts, start, self)
-        most = min(self.max_iterations, sum(stage.iterations for stage in self.stages))
-        try:
+        run.look()
+        while run.excess > run.goal and run.iterations < self.max_iterations:
+            if not run.iterate():
+                break
             run.look()
-            while run.excess > run.goal and run.iterations < most:
-                run.iterate()
-                run.look()
-            impulse, velocity = run.best()
-        finally:
-            run.end()
+        impulse, velocity = run.best()
         left = residual(problem, impulse)
         within = left.within(self.tolerance, self.velocity_tolerance)
         return ContactSolution(impulse, velocity, run.iterations, left.natural_map, within)
@@ -149,9 +129,9 @@ class _Run:
             settings,
             _bodies_of(problem.delassus, contacts),
         )
-        bodies, scale = self._bodies, settings.stages[0].penalty
+        bodies, first = self._bodies, (*settings.stages, *settings.turns)[0]
         self._compliance = bodies.compliance(problem.delassus.joint_compliance)
-        self._soft = bodies.soft(np.max(scale), self._compliance)
+        self._soft = bodies.soft(np.max(first.penalty), self._compliance)
         free = kernel.to_world(bodies.geometry, problem.u_free)
         self._free = bodies.spread(free)
         rows = [free + problem.bias[:, None] * bodies.geometry[:, :3], problem.friction, problem.cohesion]
@@ -164,10 +144,10 @@ class _Run:
         x = bodies.spread(kernel.to_world(bodies.geometry, x))
         self._iterate = kernel.Iterate(x, np.zeros_like(x), np.zeros(6 * len(bodies.inertia)), bodies.load())
         self._z = np.empty_like(x)
-        self._stages = list(settings.stages)
+        self._stages: Iterator[Stage] = chain(settings.stages, cycle(settings.turns))
         self._factors: kernel.Factors | None = None
         self._memory = _acceleration(0, 0)
-        self._until, self._first, self._longer = 0, settings.stages[0].iterations, settings.stages[0].longer
+        self._until, self._first = 0, first.iterations
         self.iterations, self.excess, self._change, self._limit = 0, np.inf, np.inf, 0.0
 
     @property
@@ -175,19 +155,21 @@ class _Run:
         """Errors over their tolerances at which the iteration ends [-]."""
         return self._settings.further if self.iterations < self._first else 1.0
 
-    def iterate(self) -> None:
-        """Make iterations until the next look."""
+    def iterate(self) -> bool:
+        """Make iterations until the next look; return whether there was a stage for them."""
         if self.iterations == self._until:
-            self._begin(self._stages.pop(0))
-        most = min(self._settings.max_iterations, self._until) - self.iterations
-        if self.iterations == 0:
-            self._advance(min(_FIRST_LOOK, most), 0.0)
-            return
-        least = min(_LEAST_LOOK, most)
+            stage = next(self._stages, None)
+            if stage is None:
+                return False
+            self._begin(stage)
+        first, most = self.iterations == 0, min(self._settings.max_iterations, self._until) - self.iterations
+        least = min(LOOK, most)
         self._advance(least, 0.0)
-        if self._change > self._limit:
-            later = max(int(_LATE_LOOK * self.iterations), _LEAST_LOOK)
+        if not first and self._change > self._limit:
+            # changes of velocities foretell the residual for a part of the iterations so far alone
+            later = max(self.iterations // LOOK, LOOK)
             self._advance(min(most - least, later), self._limit)
+        return True
 
     def _advance(self, count: int, limit: float) -> None:
         if len(self._bodies.groups) > 1 and not self._memory.image.size:
@@ -197,7 +179,7 @@ class _Run:
             self._iterate,
             count,
             limit,
-            _OVER,
+            OVERSHOOT,
             self._bodies.length,
             self._touching,
             self._factors,
@@ -220,7 +202,7 @@ class _Run:
         for _ in range(count):
             each(kernel.down, step, factors)
             change = kernel.between(iterate, step, length, factors)
-            self._change = max(change, *each(kernel.up, step, (_OVER, length), touching, factors))
+            self._change = max(change, *each(kernel.up, step, (OVERSHOOT, length), touching, factors))
             self.iterations += 1
             if not self._change > limit:
                 return
@@ -265,18 +247,10 @@ class _Run:
         eta = whole / max(size, 1e-300)
         excess = max(eta / settings.tolerance, largest * scale / self._pace / settings.velocity_tolerance)
         if np.isfinite(self._change) and excess > 0:
-            self._limit = self._change * _EARLY * self.goal / excess
+            self._limit = self._change * self.goal / excess
         if self.iterations == 0 or excess < self.excess:
             found = self._iterate.x.copy(), self._z.copy(), self._soft
             self.excess, self._best = float(excess), found
-        if self.iterations == self._first and excess <= _NEAR:
-            self._first = self._until = self._first + self._longer
-            self._longer = 0
-
-    def end(self) -> None:
-        """Let go of factors that are too large to be kept."""
-        self._factors = None
-        self._bodies.forget()
 
     def best(self) -> tuple[Array, Array]:
         """Return the impulses and the velocities û (nc, 3) of the best look, local frames."""
@@ -304,7 +278,7 @@ class _Bodies:
     def __init__(self, delassus: Delassus, contacts: RigidContacts) -> None:
         moving = np.flatnonzero(contacts.inertia[:, 0] > 0)
         order, side, self._panels = _eliminated(contacts, moving)
-        self._parts = parts_of(self._panels, len(moving) >= _FEW)
+        self._parts = parts_of(self._panels, len(moving) >= MANY)
         self._place, self.runs = _runs(side, contacts.geometry, self._parts, len(moving))
         self._blocks = len(self.runs.block) - 1
         self.geometry = np.ascontiguousarray(contacts.geometry)
@@ -364,11 +338,11 @@ class _Bodies:
     def soft(self, penalty: float | Array, compliance: Array | None) -> Array:
         """Return 1/σ of each place for a penalty, or one of each, over the mean diagonals of W_αα; else 0 [kg].
 
-        Where joints yield by E, `compliance`, σ is larger by some E.
+        Where joints yield by E, `compliance`, σ is larger by E: of small contacts that is 10⁴ times W_αα.
         """
         sigma = penalty * self._compliance
         if compliance is not None:
-            sigma += _GIVING * compliance[:, 0].ravel()
+            sigma += compliance[:, 0].ravel()
         soft: Array = 1.0 / sigma
         return soft
 
@@ -381,8 +355,11 @@ class _Bodies:
         """
         if penalty in self._factors:
             return self._factors[penalty]
-        precision = np.float32 if len(self.inertia) >= _FEW else np.float64
-        value = np.zeros(self._panels.start[-1], dtype=precision)
+        many = len(self.inertia) >= MANY
+        if many and penalty is not None:
+            # room for one
+            self._factors.clear()
+        value = np.zeros(self._panels.start[-1], dtype=np.float32 if many else np.float64)
         kernel.assemble(touching, self._mass, self._panels, value)
         if not factorise(self._panels, value, self._parts, len(self.groups)):
             raise SolverError("W is not a number", where="ADMM of bodies", remedy="use another method")
@@ -390,10 +367,6 @@ class _Bodies:
         if penalty is not None:
             self._factors[penalty] = factors
         return factors
-
-    def forget(self) -> None:
-        """Let go of factors that are too large to be kept from step to step."""
-        self._factors = {key: one for key, one in self._factors.items() if len(one.value) <= _KEPT}
 
 
 def _bodies_of(delassus: Delassus, contacts: RigidContacts) -> _Bodies:
@@ -417,7 +390,7 @@ def _runs(side: Ints, geometry: Array, parts: Parts, count: int) -> tuple[Ints, 
     offset = geometry[:, 9:12] - geometry[:, 12:]
     new = np.ones(len(side), dtype=bool)
     new[1:] = (side[1:] != side[:-1]).any(axis=1)
-    new[1:] |= (np.abs(offset[1:] - offset[:-1]) > _SAME * np.abs(offset[1:]).max(axis=1)[:, None]).any(
+    new[1:] |= (np.abs(offset[1:] - offset[:-1]) > ROUNDING * np.abs(offset[1:]).max(axis=1)[:, None]).any(
         axis=1
     )
     number = np.arange(len(side))
@@ -451,7 +424,8 @@ def _vectors(values: Array) -> Array:
 def _groups(panels: cholesky.Panels, parts: Parts, runs: kernel.Runs, threads: int) -> list[Ints]:
     """Return the parts that each thread takes, so that all have about the same to do."""
     numbers = np.append(np.diff(panels.start[parts.panel], axis=1)[:, 0], 0)
-    work = numbers + _CONTACT * np.diff(runs.block[runs.part])
+    # a block of contacts costs as much as the numbers that it reads and writes
+    work = numbers + kernel.ROWS * kernel.BLOCK * np.diff(runs.block[runs.part])
     given: list[list[int]] = [[] for _ in range(threads)]
     for part in np.argsort(-work, kind="stable"):
         min(given, key=lambda one: work[one].sum()).append(int(part))
@@ -461,7 +435,7 @@ def _groups(panels: cholesky.Panels, parts: Parts, runs: kernel.Runs, threads: i
 def _kinds(x: Array, z: Array) -> Ints:
     """Return whether contacts are open (0), slide (1) or stick (2), from x and z = P_K(x) (n, 3, BLOCK)."""
     force, beyond = np.abs(z).max(axis=1), np.abs(x - z).max(axis=1)
-    kinds: Ints = np.where(force == 0.0, 0, np.where(beyond > _BESIDE * force, 1, 2))
+    kinds: Ints = np.where(force == 0.0, 0, np.where(beyond > ROUNDING * force, 1, 2))
     return kinds
 
 
@@ -486,7 +460,7 @@ def _eliminated(contacts: RigidContacts, moving: Ints) -> tuple[Ints, Ints, chol
     inner = side[new]
     inner = inner[(inner[:, 0] >= 0) & (inner[:, 1] >= 0)]
     pairs = np.unique(np.minimum(*inner.T) * len(moving) + np.maximum(*inner.T))
-    if len(moving) < _FEW:
+    if len(moving) < MANY:
         rank, panels = _pattern_of_few(pairs.tobytes(), len(moving))
     else:
         rank, panels = _pattern(pairs, moving, contacts.centre)
@@ -501,7 +475,7 @@ def _pattern(pairs: Ints, moving: Ints, centre: Array) -> tuple[Ints, cholesky.P
     both = np.column_stack([pairs // count, pairs % count])
     rank = elimination(both, moving, centre)
     rank = cholesky.postorder(np.ascontiguousarray(rank[both]), count)[rank]
-    return rank, cholesky.panels_of(np.ascontiguousarray(rank[both]), count, _SPARE, _VELOCITIES)
+    return rank, cholesky.panels_of(np.ascontiguousarray(rank[both]), count, SPARE, _VELOCITIES)
 
 
 @lru_cache(maxsize=1)

@@ -18,9 +18,6 @@ from mechanics.solvers._kernels.body_parts import Parts
 
 __all__ = ["factorise"]
 
-# bodies of a block: rows that one thread finishes while the others wait
-_BLOCK = 8
-
 _Each = Callable[..., Iterable[bool | None]]
 
 
@@ -67,8 +64,8 @@ def _factorise(panels: kernel.Panels, value: Array, parts: Parts, threads: int, 
 
 def _blocks(panels: kernel.Panels, which: Ints) -> Ints:
     """Return the first body of each block (n, 2) of some panels, and the one after its last."""
-    blocks = []
+    blocks, count = [], kernel.AT_ONCE // panels.size
     for first, end in zip(panels.body[which], panels.body[which + 1], strict=True):
-        begin = np.arange(first, end, _BLOCK)
-        blocks.append(np.column_stack([begin, np.minimum(begin + _BLOCK, end)]))
+        begin = np.arange(first, end, count)
+        blocks.append(np.column_stack([begin, np.minimum(begin + count, end)]))
     return np.concatenate(blocks) if blocks else np.zeros((0, 2), dtype=np.int64)

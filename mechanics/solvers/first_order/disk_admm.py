@@ -15,15 +15,12 @@ from mechanics.problem.residual import Residual, project_on_cone, residual
 from mechanics.solvers._kernels import body_cholesky as cholesky
 from mechanics.solvers._kernels import disk_admm as kernel
 from mechanics.solvers.first_order.body_factors import factorise
+from mechanics.solvers.scales import FOLLOWING, OVERSHOOT, PLAIN_LOOK, SPARE
 from moma.errors import SolverError
 
 __all__ = ["DiskADMM"]
 
 
-# overshoot of the impulses [-]
-_OVER = 1.6
-# zeros that a panel of the factors may hold, over its other blocks [-]
-_SPARE = 0.2
 # velocities of a body
 _VELOCITIES = 3
 
@@ -43,8 +40,8 @@ class DiskADMM:
     tolerance: float = 1e-6
     velocity_tolerance: float = 1e-5
     max_iterations: int = 2000
-    penalty: float = 0.1
-    check_every: int = 20
+    penalty: float = FOLLOWING
+    check_every: int = PLAIN_LOOK
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from `start`, whose velocity û lets the iteration continue where it stopped; return the best look.
@@ -126,7 +123,7 @@ class _Run:
 
     def advance(self, count: int) -> None:
         """Make iterations."""
-        kernel.advance_disks(self._iterate, count, _OVER, self._touching, self._factors)
+        kernel.advance_disks(self._iterate, count, OVERSHOOT, self._touching, self._factors)
 
 
 def _eliminated(contacts: PlaneContacts) -> tuple[Ints, Ints, cholesky.Panels]:
@@ -139,7 +136,7 @@ def _eliminated(contacts: PlaneContacts) -> tuple[Ints, Ints, cholesky.Panels]:
     pairs = np.unique(np.sort(inner, axis=1), axis=0) if len(inner) else inner
     rank = elimination(pairs, moving, contacts.centre)
     rank = cholesky.postorder(np.ascontiguousarray(rank[pairs]), len(moving))[rank]
-    panels = cholesky.panels_of(np.ascontiguousarray(rank[pairs]), len(moving), _SPARE, _VELOCITIES)
+    panels = cholesky.panels_of(np.ascontiguousarray(rank[pairs]), len(moving), SPARE, _VELOCITIES)
     order = np.empty_like(moving)
     order[rank] = moving
     return order, np.where(side >= 0, rank[side], -1), panels

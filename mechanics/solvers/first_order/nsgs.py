@@ -6,11 +6,13 @@ from mechanics.arrays import Array
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, GaussSeidel
 from mechanics.problem.residual import Residual, project_on_cone, residual
 from mechanics.solvers.first_order.anderson import Anderson
+from mechanics.solvers.scales import LOOK
 
 __all__ = ["NSGS"]
 
 
-# η of an extrapolation over that of the sweeps from which it is dropped, with the old iterates [-]
+# η of an extrapolation over that of the sweeps above which it is dropped, with the old iterates: one that looks worse
+# at first mostly leads on [-]
 _BAD = 10.0
 
 
@@ -45,7 +47,7 @@ class NSGS:
     tolerance: float = 1e-6
     velocity_tolerance: float = 1e-5
     max_iterations: int = 2000
-    check_every: int = 5
+    check_every: int = LOOK
     depth: int = 20
     min_iterations: int = 0
 

@@ -1,10 +1,11 @@
 """Deformable stones among many rigid ones, solved as rigid ones whose joints yield."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from mechanics.delassus.compliant import simplified
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
-from mechanics.solvers.first_order.body_admm import BodyADMM, Stage
+from mechanics.solvers.first_order.body_admm import BodyADMM
 from moma.errors import SolverError
 
 __all__ = ["StonesAsRigid"]
@@ -24,13 +25,13 @@ class StonesAsRigid:
     Attributes
     ----------
     tolerance, velocity_tolerance, max_iterations : as in `BodyADMM`
-    stages : as in `BodyADMM`
+    rigid : method for rigid stones
     """
 
     tolerance: float
     velocity_tolerance: float
     max_iterations: int
-    stages: tuple[Stage, ...]
+    rigid: Callable[[float, float, int], BodyADMM] = BodyADMM
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from `start`.
@@ -45,5 +46,5 @@ class StonesAsRigid:
             raise SolverError("no body deforms", where="stones as rigid ones", remedy='use the method "auto"')
         late = operator.apply(start.impulse) - simple.apply(start.impulse)
         stones = replace(problem, delassus=simple, u_free=problem.u_free + late)
-        solver = BodyADMM(self.tolerance, self.velocity_tolerance, self.max_iterations, self.stages)
+        solver = self.rigid(self.tolerance, self.velocity_tolerance, self.max_iterations)
         return solver(stones, start)

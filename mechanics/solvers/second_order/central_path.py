@@ -19,6 +19,7 @@ import numpy as np
 
 from mechanics.arrays import Array, Ints
 from mechanics.problem.problem import ContactProblem
+from mechanics.solvers.scales import CORRECTIONS, ROUNDING
 from mechanics.solvers.second_order.second_order_cones import (
     Scaling,
     central,
@@ -36,25 +37,13 @@ __all__ = ["NAME", "CentralPath"]
 NAME = "interior point"
 """Method in the messages of errors."""
 
-# friction below which a contact has no cone, only a side [-]
-_SMOOTH = 1e-9
-# compliance that holds tangential impulses of contacts without friction as they are, over the scale of W [-]
-_RIGID = 1e9
-# part of the way to the boundary that a step goes [-]
+# part of the way to the boundary of the cones that a step goes; on it Newton's matrix is singular [-]
 _BACK_OFF = 0.98
-# part of a step below which it counts as short [-]
-_SHORT = 0.1
-# most corrections of pairs far from the others in a step; each costs a substitution, a twentieth of the factors
-_CORRECTIONS = 5
-# part of a step from which none is needed, how much farther a corrected one aims, and what it has to gain [-]
-_LONG, _AIM, _WORTH = 0.95, 0.3, 0.01
-# complementarities over the one wanted between which pairs stay as they are [-]
-_WIDE = (0.1, 10.0)
-# distance of the start from the cones, over typical impulses and the velocities that they cause: nearer, the first
-# steps are short (measured: 13 iterations instead of 19) [-]
-_INSIDE = 10.0
-# compliance of the impulses that have no effect on any velocity, over the scale of W: without it they wander [-]
-_GIVE = 1e-10
+# length of a step, over Newton's, below which one towards the middle of the path is tried [-]
+_SHORT = 0.2
+# factor within which pairs are well centred: of their complementarities on the one wanted, and of the first ones on
+# typical impulses and their velocities: a start nearer to the cones takes 19 iterations instead of 13 [-]
+_CENTRAL = 10.0
 
 
 @dataclass
@@ -111,10 +100,10 @@ class CentralPath:
         self._system = partial(form.shifted, exact=False)
         self._free = problem.biased
         mu, k = problem.friction, problem.cohesion
-        cone, side = np.flatnonzero((mu > _SMOOTH) | (k > 0)), np.flatnonzero((mu <= _SMOOTH) | (k > 0))
-        self._smooth = np.flatnonzero((mu <= _SMOOTH) & (k <= 0))
+        cone, side = np.flatnonzero((mu > ROUNDING) | (k > 0)), np.flatnonzero((mu <= ROUNDING) | (k > 0))
+        self._smooth = np.flatnonzero((mu <= ROUNDING) & (k <= 0))
         self._hold = np.zeros((len(mu), 3, 3))
-        self._hold[self._smooth[:, None], [1, 2], [1, 2]] = _RIGID * problem.delassus.scale
+        self._hold[self._smooth[:, None], [1, 2], [1, 2]] = problem.delassus.scale / ROUNDING
         if near is None:
             self._begin_far(cone, side)
         else:
@@ -129,7 +118,7 @@ class CentralPath:
         self._unit = size * size * scale
         slack = mu[cone, None] * self._r[cone] * [1.0, 0.0, 0.0] + self._r[cone] * [0.0, 1.0, 1.0]
         slack[:, 0] += k[cone]
-        inside = _INSIDE * size
+        inside = _CENTRAL * size
         slack[:, 0] = np.maximum(slack[:, 0], tangential(slack) + inside)
         dual = np.tile([inside * scale, 0.0, 0.0], (len(cone), 1))
         self._cone = _Cone(cone, mu[cone], k[cone], slack, dual)
@@ -153,7 +142,7 @@ class CentralPath:
         point = diagonal * near[cone]
         point[:, 0] += k[cone]
         slack, other = central(
-            point - dual[cone] / (np.maximum(diagonal, _SMOOTH) * scale), level * size * size
+            point - dual[cone] / (np.maximum(diagonal, ROUNDING) * scale), level * size * size
         )
         self._cone = _Cone(cone, mu[cone], k[cone], slack, scale * other)
         point = near[side, 0] - normal / scale
@@ -188,16 +177,16 @@ class CentralPath:
         level = centring * self._gap
         step = newton.direction(newton.corrected(step, level), 1.0 - centring)
         length = min(1.0, _BACK_OFF * self._reach(step))
-        for _ in range(_CORRECTIONS):
-            if length > _LONG:
+        for _ in range(CORRECTIONS):
+            if length >= _BACK_OFF:
                 break
-            right = newton.recentred(step, min(1.0, length + _AIM), level)
+            right = newton.recentred(step, level)
             other = tuple(a + b for a, b in zip(step, newton.direction(right, 0.0), strict=True))
             farther = min(1.0, _BACK_OFF * self._reach(other))
-            if farther < length + _WORTH:
+            if farther <= length:
                 break
             step, length = other, farther
-        if length < 2.0 * _SHORT:
+        if length < _SHORT:
             other = newton.direction(newton.centred(0.5 * self._gap), 0.5)
             farther = min(1.0, _BACK_OFF * self._reach(other))
             if farther > length:
@@ -239,7 +228,8 @@ class _Newton:
         self._scaling: Scaling = scaling(cone.slack, cone.dual)
         self._lambda = self._scaling(cone.dual)
         self._square, self._back = self._scaling.inverse_squared, cone.transpose()
-        theta = path._hold + _GIVE * problem.delassus.scale * np.eye(3)
+        # impulses that affect no velocity would wander
+        theta = path._hold + ROUNDING * problem.delassus.scale * np.eye(3)
         theta[cone.rows] += self._back @ self._square * cone.diagonal[:, None, :]
         theta[side.rows, 0, 0] += side.dual / side.slack
         self._solve = path._system(theta)
@@ -264,14 +254,14 @@ class _Newton:
         own = level - side.slack * side.dual - slack_n * dual_n
         return divide(self._lambda, square), own / side.dual
 
-    def recentred(self, step: tuple[Array, ...], length: float, level: float) -> tuple[Array, Array]:
-        """Return the right side of a correction: of the pairs that a part of a step leaves far from the level."""
+    def recentred(self, step: tuple[Array, ...], level: float) -> tuple[Array, Array]:
+        """Return the right side of a correction: of the pairs that a whole step would leave far from the level."""
         _, slack, dual, slack_n, dual_n = step
         cone, side = self._cone, self._side
-        low, high = _WIDE[0] * level, _WIDE[1] * level
-        primal = self._scaling.inverse(cone.slack + length * slack)
-        pairs = product(primal, self._scaling(cone.dual + length * dual))
-        own = (side.slack + length * slack_n) * (side.dual + length * dual_n)
+        low, high = level / _CENTRAL, _CENTRAL * level
+        primal = self._scaling.inverse(cone.slack + slack)
+        pairs = product(primal, self._scaling(cone.dual + dual))
+        own = (side.slack + slack_n) * (side.dual + dual_n)
         change = np.maximum(np.clip(own, low, high) - own, -high)
         return divide(self._lambda, to_bounds(pairs, low, high)), change / side.dual
 

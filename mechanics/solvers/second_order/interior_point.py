@@ -17,13 +17,10 @@ __all__ = ["InteriorPoint"]
 # complementarity, relative to typical impulses, at which a path begins near the impulses of a start: those of the step
 # before cost 10 iterations at 1e-4, 13 at 1e-2 and 15 at 1e-6 [-]
 _NEAR = 1e-4
-# fall of η that is progress, and iterations without any after which the path has stalled [-]
-_PROGRESS, _STALLED = 0.9, 8
-# errors over the tolerances to which a solved path goes on [-], and iterations that it may take for that: what forces
-# that are kept from step to step lack would add up
-_FURTHER, _OVER = 0.1, 3
-# impulses, in even units, that only contradictions cause
-_WORTHLESS = 1e30
+# η over the least so far below which an iteration is progress [-]
+_PROGRESS = 0.9
+# iterations without progress after which the path has stalled: masses 10⁶ apart take a few short steps on the way
+_STALLED = 8
 
 
 @dataclass(frozen=True)
@@ -60,9 +57,9 @@ class InteriorPoint:
         even, unit = equilibrated(problem)
         units = unit[:, None]
         path = CentralPath(even, start.impulse / units, _NEAR) if start.impulse.any() else CentralPath(even)
-        count = idle = over = 0
+        count = idle = 0
         least = np.inf
-        while count < self.max_iterations and idle < _STALLED and over < _OVER and best.excess > _FURTHER:
+        while count < self.max_iterations and idle < _STALLED and best.excess > 1.0:
             try:
                 # where the laws contradict each other impulses grow until they overflow
                 with np.errstate(all="ignore"):
@@ -72,13 +69,12 @@ class InteriorPoint:
                 break
             count += 1
             impulse = path.impulse
-            if not (np.isfinite(path.complementarity) and np.abs(impulse).max() < _WORTHLESS):
+            if not (np.isfinite(path.complementarity) and np.isfinite(impulse).all()):
                 break
             found = self._looked(problem, impulse * units)
             idle = 0 if found.left.natural_map < _PROGRESS * least else idle + 1
             least = min(least, found.left.natural_map)
             best = found if found.excess < best.excess else best
-            over += best.excess <= 1.0
         return _solution(best, count)
 
     def _looked(self, problem: ContactProblem, impulse: Array) -> "_Look":

@@ -16,36 +16,25 @@ from mechanics.arrays import Array
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.problem.residual import residual
 from mechanics.solvers._kernels.body_newton import alart_curnier
+from mechanics.solvers.scales import HELD, ROUNDING
 from mechanics.solvers.second_order.newton_equations import Equations, equations_of
 from mechanics.solvers.second_order.scaling import equilibrated
 
 __all__ = ["Newton"]
 
 
-# α over η and the scale of W, at first and at least [-]
+# α over η and the scale of W, at first and at least: α falls with η, so convergence stays fast (Fan & Yuan 2005) [-]
 _SHARE = 0.1
-# η from which the contacts that bear are held first [-]
+# η above which a start is far from a solution, and the contacts that bear are held first [-]
 _FAR = 0.3
-# α over the scale of W meanwhile [-]
-_HOLD = 1e-4
-# impulse over the largest from which a contact bears [-]
-_BEARS = 1e-6
-# smallest α over the scale of W; below it rounding keeps η at 10⁻⁹ [-]
-_LEAST = 1e-8
-# part of a step below which α counts as too small [-]
-_SHORT = 0.2
-# factor by which α then grows, and falls again after whole steps
+# smallest α over the scale of W: rounding in self-stress is ε/α of it, and α itself as large [-]
+_LEAST = float(np.sqrt(np.finfo(float).eps))
+# factor by which α grows after steps shortened by more than that, and falls after whole ones [-]
 _ADAPT = 4.0
-# largest α over η and the scale of W [-]
-_MOST = 1e6
-# iterates to which the line search looks back
+# iterates whose worst merit a step must improve on (Grippo, Lampariello & Lucidi 1986)
 _MEMORY = 5
-# gain that a step must bring, over what it promises [-]
-_GAIN = 1e-4
-# shortest part of a step [-]
+# shortest part of a step, taken even where it gains nothing: it leads away from a kink [-]
 _SHORTEST = 1e-3
-# steps after which η tells whether others would wander
-_TRIED = 3
 # steps with the least α that may gain nothing
 _IDLE = 1
 _SPACE = 3  # components of an impulse in space
@@ -59,13 +48,11 @@ class Newton:
     ----------
     tolerance, velocity_tolerance : as in `NSGS`
     max_iterations : limit of the steps, with a factorisation each as a rule
-    hopeless : η from which it gives up after three steps, as the others would wander [-]
     """
 
     tolerance: float = 1e-6
     velocity_tolerance: float = 1e-5
     max_iterations: int = 100
-    hopeless: float = np.inf
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from the impulses of `start`; return the best of all iterates.
@@ -81,7 +68,7 @@ class Newton:
         best, idle = (run.left, run.r), 0
         if run.left.natural_map > _FAR:
             run.hold()
-        while run.iterations <= _TRIED or run.left.natural_map <= self.hopeless:
+        while True:
             gains = run.left.natural_map < best[0].natural_map
             best = (run.left, run.r) if gains else best
             # where α is least each step gains until rounding wins
@@ -145,10 +132,10 @@ class _Run:
         later step of 1 s the impulses are right, but whole stones would fly off by the next to nothing that these lack.
         """
         size = np.sqrt((self.r**2).sum(axis=1))
-        bears = (size >= _BEARS * size.max())[:, None]
+        bears = (size >= ROUNDING * size.max())[:, None]
         unit = np.eye(self.r.shape[1])
         self._first[:], self._second[:] = ~bears[:, :, None] * unit, bears[:, :, None] * unit
-        step = self._system.step(self._first, self._second, bears * self._u, _HOLD * self._scale)
+        step = self._system.step(self._first, self._second, bears * self._u, HELD * self._scale)
         if step is None:
             return
         self.iterations += 1
@@ -168,13 +155,13 @@ class _Run:
         change = self._delassus.apply(step)
         length, limit, error = 1.0, max(self._merits[-_MEMORY:]), np.empty_like(step)
         merit = self._look(self.r + step, self._u + change, error)
-        while not merit < (1.0 - _GAIN * length) * limit and length > _SHORTEST:
+        while not merit < limit and length > _SHORTEST:
             length *= 0.5
             merit = self._look(self.r + length * step, self._u + length * change, error)
         if not np.isfinite(merit):
             return False
-        if length < _SHORT:
-            self._share = min(self._share * _ADAPT, _MOST)
+        if length < 1.0 / _ADAPT:
+            self._share *= _ADAPT
         elif length == 1.0:
             self._share = max(self._share / _ADAPT, _SHARE)
         self._take(self.r + length * step)

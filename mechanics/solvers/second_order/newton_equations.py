@@ -6,7 +6,7 @@ Between rigid bodies they are those of the bodies' velocities, however many cont
 (mechanics/solvers/_kernels/body_newton.py). Where bodies deform, W is that of rigid ones and what they yield, of which
 the diagonal alone is a compliance of the joints: the equations with that lead a Krylov method (GMRES, Saad & Schultz
 1986) to the step within some five products with W. Factors that only lead may be of single precision, and those of an
-earlier step as long as next to no contact has changed since. Where most bodies deform, W + B⁻¹ A + α is factorised.
+earlier step as long as no contact has changed since. Where most bodies deform, W + B⁻¹ A + α is factorised.
 """
 
 from typing import Protocol
@@ -20,20 +20,21 @@ from mechanics.delassus.elimination import elimination
 from mechanics.problem.forms import Form
 from mechanics.problem.problem import ContactProblem, Delassus, RigidContacts
 from mechanics.solvers._kernels import body_newton as bodies
+from mechanics.solvers.scales import ROUNDING
 from mechanics.solvers.second_order.sparse_blocks import SparseBlocks
 from moma.errors import SolverError
 
 __all__ = ["Equations", "equations_of"]
 
 
-# error to which the equations of bodies that deform are solved, over their right side [-], and most products with W
-_INEXACT, _PRODUCTS = 1e-2, 30
-# change of a contact's derivatives that makes it unlike before [-], contacts that may be so while the factors of an
-# earlier step lead, most products with W that those took when they were new, and then, which take as long as a
-# factorisation and the products after it
-_UNLIKE, _TURNED, _NEW, _AGAIN = 0.3, 3, 6, 12
-# part of ρ added to B, which keeps it invertible where a contact is open [-]
-_SOFT = 1e-7
+# error of the equations of bodies that deform over their right side: Newton's steps correct it [-]
+_INEXACT = 1e-2
+# most products with W for them
+_PRODUCTS = 30
+# change of a contact's derivatives from which it opens, slides or sticks unlike before [-]
+_UNLIKE = 0.3
+# most products with W while the factors of an earlier step lead: as long as a factorisation and the products after it
+_AGAIN = 12
 
 
 class Equations(Protocol):
@@ -70,7 +71,8 @@ class _FormEquations:
     def step(self, first: Array, second: Array, error: Array, alpha: float) -> Array | None:
         """Return Δr (nc, 3); None if the equations are singular."""
         unit = np.eye(error.shape[1])
-        inverse = np.linalg.inv(second + _SOFT * self._rho[:, [0, 1, 1]][:, : len(unit), None] * unit)
+        # B is singular where a contact is open
+        inverse = np.linalg.inv(second + ROUNDING * self._rho[:, [0, 1, 1]][:, : len(unit), None] * unit)
         theta, right = inverse @ first + alpha * unit, -np.einsum("cij,cj->ci", inverse, error)
         try:
             return self._form.shifted(theta)(right.ravel()).reshape(error.shape)
@@ -131,13 +133,14 @@ class _YieldingEquations(_BodyEquations):
         assert simple.rigid is not None
         super().__init__(simple.rigid, simple.joint_compliance)
         self._operator = operator
+        # derivatives for impulses and velocities (nc, 3, 3) at which the factors were made
         self._led: tuple[Array, Array] | None = None
         self._lasts = True
         self._single = True
 
     def step(self, first: Array, second: Array, error: Array, alpha: float) -> Array | None:
         """Return Δr (nc, 3); None if the equations are singular."""
-        if self._lasts and self._led is not None and _turned(self._led[0], first) <= _TURNED:
+        if self._lasts and self._led is not None and np.abs(first - self._led[0]).max() <= _UNLIKE:
             found, products = self._found(first, second, error, alpha, _AGAIN)
             if products <= _AGAIN:
                 return found
@@ -146,7 +149,7 @@ class _YieldingEquations(_BodyEquations):
         if self._factorise(first, second, alpha):
             self._led = first.copy(), second.copy()
             found, products = self._found(first, second, error, alpha, _PRODUCTS)
-            self._lasts &= products <= _NEW
+            self._lasts &= products <= _AGAIN
             # the matrix may be too badly conditioned for single precision, as where joints hardly yield
             self._single &= products <= _PRODUCTS
             return found
@@ -175,11 +178,6 @@ class _YieldingEquations(_BodyEquations):
         y, unsolved = gmres(equations, -error.ravel(), rtol=_INEXACT, restart=most, maxiter=1)
         # the last product checks what the others found
         return before(y), min(made, most) if unsolved == 0 else most + 1
-
-
-def _turned(old: Array, new: Array) -> int:
-    """Return the number of contacts that open, slide or stick unlike before, by derivatives (nc, 3, 3) for impulses."""
-    return int(np.count_nonzero(np.abs(new - old).max(axis=(1, 2)) > _UNLIKE))
 
 
 def _pattern(side: Ints, count: int) -> tuple[Ints, Ints, Ints, Ints]:

@@ -14,12 +14,9 @@ import numpy as np
 
 from mechanics.arrays import Array
 from mechanics.problem.problem import ContactProblem
+from mechanics.solvers.scales import ROUNDING
 
 __all__ = ["equilibrated"]
-
-
-# difference of an operator's scale from its mean diagonal, over that, that is more than rounding [-]
-_OTHER = 1e-6
 
 
 def equilibrated(problem: ContactProblem) -> tuple[ContactProblem, Array]:
@@ -29,7 +26,7 @@ def equilibrated(problem: ContactProblem) -> tuple[ContactProblem, Array]:
     """
     operator = problem.delassus
     own = np.einsum("cii->c", operator.diagonal) / operator.diagonal.shape[1]
-    if abs(operator.scale / own.mean() - 1.0) > _OTHER:
+    if abs(operator.scale / own.mean() - 1.0) > ROUNDING:
         own = np.full(len(own), operator.scale)
     unit = 1.0 / np.sqrt(own)
     return replace(

@@ -7,14 +7,10 @@ import numpy as np
 
 from mechanics.delassus.compliant import CompliantDelassus
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, Delassus
+from mechanics.solvers.scales import HELD
 from mechanics.solvers.second_order.newton import Newton
 
 __all__ = ["SofterJoints"]
-
-# that of rigid joints for this purpose, over the scale of W [-]
-_RIGID = 1e-4
-# steps of Newton's method with each
-_STEPS = 30
 
 
 @dataclass(frozen=True)
@@ -24,20 +20,20 @@ class SofterJoints:
     Attributes
     ----------
     tolerance, velocity_tolerance : as in `NSGS`
-    max_iterations : steps of Newton's method in all
+    max_iterations : steps of Newton's method in all, of which each takes its share of what is left
     factors : on the compliance of joints, in turn [-]
     """
 
     tolerance: float = 1e-6
     velocity_tolerance: float = 1e-5
     max_iterations: int = 150
-    factors: tuple[float, ...] = (100.0, 30.0, 10.0, 3.0)
+    factors: tuple[float, ...] = (100.0,)
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from `start`; return the last iterate of the joints asked for, or of the hardest that were solved."""
-        count = 0
-        for operator in _softened(problem.delassus, self.factors):
-            most = min(_STEPS, self.max_iterations - count)
+        count, others = 0, len(self.factors)
+        for k, operator in enumerate(_softened(problem.delassus, self.factors)):
+            most = int(np.ceil((self.max_iterations - count) / (others + 1 - k)))
             newton = Newton(self.tolerance, self.velocity_tolerance, most)
             found = newton(replace(problem, delassus=operator), start)
             count += found.iterations
@@ -53,7 +49,7 @@ class SofterJoints:
 
 def _softened(operator: Delassus, factors: tuple[float, ...]) -> Iterator[Delassus]:
     """Yield the operator with softer joints, ever harder, and as it is; rigid joints yield next to nothing at first."""
-    inner, compliance = operator, np.full(operator.diagonal.shape[:2], _RIGID * operator.scale)
+    inner, compliance = operator, np.full(operator.diagonal.shape[:2], HELD * operator.scale)
     if isinstance(operator, CompliantDelassus):
         inner, compliance = operator.inner, operator.joint_compliance
     for factor in factors:

@@ -9,10 +9,6 @@ from mechanics.arrays import Array, Ints
 __all__ = ["SparseBlocks"]
 
 
-# smallest pivot over the largest of its column that is still taken, so that the order of elimination stays [-]
-_THRESHOLD = 0.01
-
-
 class SparseBlocks:
     """Pattern of a matrix of 3 × 3 blocks whose structure is symmetric, and its latest factors.
 
@@ -52,7 +48,8 @@ class SparseBlocks:
             self._factors = splu(
                 matrix,
                 permc_spec="NATURAL",
-                diag_pivot_thresh=_THRESHOLD,
+                # the order of elimination stays
+                diag_pivot_thresh=0.0,
                 options={"SymmetricMode": True},
             )
         except RuntimeError:

@@ -80,7 +80,7 @@ def test_a_slow_slide_is_a_motion_however_far_it_goes():
 
 
 def test_a_stone_at_rest_in_steps_that_are_not_solved_is_undecided():
-    stones = (brick(str(k), (0, 0, k), (1, 0.5, k + 1)) for k in range(2))
+    stones = (brick(str(k), (0, 0, k), (1, 0.7, k + 1)) for k in range(2))
     solver = SolverSettings(tolerance=1e-17, max_iterations=100)
     one = replace(scene(ground(), *stones, step=5e-3, duration=0.1), solver=solver)
     result = simulate(one)

@@ -3,6 +3,8 @@
 import numpy as np
 
 from mechanics.solvers.first_order.anderson import Anderson
+from mechanics.solvers.first_order.nsgs import NSGS
+from tests.mechanics.solvers.problems import cold, column
 
 
 def test_it_solves_a_linear_fixed_point_in_as_many_steps_as_it_has_directions():
@@ -29,3 +31,9 @@ def test_it_needs_two_steps_and_keeps_still_at_a_fixed_point():
     assert anderson(x, x) is None
     anderson.forget()
     assert anderson(x, 0.5 * x) is not None
+
+
+def test_sweeps_over_a_column_take_a_few_hundred():
+    """140 with 20 iterates; plain ones do not suffice, two iterates take 605, and 200 take 965."""
+    problem = column([2400.0] * 10)
+    assert NSGS(max_iterations=300)(problem, cold(problem)).converged

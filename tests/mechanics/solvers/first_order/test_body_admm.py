@@ -166,6 +166,14 @@ def test_iterations_are_limited_and_the_best_look_is_given_back(problem, most):
     assert found.natural_map <= 1.0
 
 
+def test_a_small_wall_takes_tens_of_iterations():
+    """With a tenth of the over-relaxation they are 190; from 2 on there is no end (Eckstein & Bertsekas 1992)."""
+    small = posed(leaning(0.3, 4, 4), step=5e-3).problem
+    found = BodyADMM()(small, cold(small))
+    assert found.converged
+    assert found.iterations < 100
+
+
 @pytest.mark.parametrize("direction", [_ALONG, _ACROSS])
 def test_every_step_of_a_shaken_wall_is_solved_mostly_by_this_method(direction):
     steps = followed(shaken(direction))
@@ -196,7 +204,7 @@ def test_the_loosest_motion_finds_contacts_seldom_takes_few_iterations_and_keeps
     found, seldom = (len({id(step.found) for step in steps}) for steps in (default, loose))
     assert found > 2 * seldom
     total, few = (sum(step.solution.iterations for step in steps[10:]) for steps in (default, loose))
-    assert total > 2.5 * few
+    assert total > 1.3 * few
 
 
 def test_the_default_follows_a_motion_to_nanometres(finest):
@@ -208,4 +216,4 @@ def test_a_looser_motion_takes_fewer_iterations():
         sum(step.solution.iterations for step in followed(shaken(_ALONG, **setting))[10:])
         for setting in ({}, {"motion_error": 1e-4})
     )
-    assert default > 1.5 * loose
+    assert default > loose

@@ -47,7 +47,7 @@ def factors(problem, threads=1, parts=None):
 @pytest.fixture
 def small_blocks(monkeypatch):
     """Blocks of three bodies, so that each panel between parts has several, the last of them shorter."""
-    monkeypatch.setattr(body_factors, "_BLOCK", 3)
+    monkeypatch.setattr(body_factors.kernel, "AT_ONCE", 18)
 
 
 @pytest.mark.usefixtures("small_blocks")
