@@ -253,6 +253,8 @@ def _cost(needs: Plan, scene: Scene, pictures: int) -> Cost:
     low, likely, high = beside / _SPREAD + least, beside + usual, _SPREAD * beside + most
     return Cost(
         pairs=len(needs.pairs),
+        open_pairs=needs.open_pairs[0],
+        widest=needs.open_pairs[1],
         contacts=needs.contacts,
         unknowns=needs.unknowns,
         memory=needs.memory,

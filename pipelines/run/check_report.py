@@ -77,6 +77,8 @@ class Cost:
     Attributes
     ----------
     pairs : touching pairs of stones
+    open_pairs : how many of these are open all over
+    widest : by how much at most [m]
     contacts : contact points at the start
     unknowns : velocities
     memory : of the largest arrays [bytes], estimated
@@ -89,6 +91,8 @@ class Cost:
     """
 
     pairs: int
+    open_pairs: int
+    widest: float
     contacts: int
     unknowns: int
     memory: int

@@ -8,6 +8,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from mechanics.arrays import Array, Bools, Ints
+from mechanics.contact.contacts import gaps
 from mechanics.delassus.assembly import side_kinds
 from mechanics.delassus.mixed_form import mixed_fronts
 from mechanics.dynamics.contact_search import detector
@@ -20,6 +21,7 @@ __all__ = ["Amounts", "Plan", "loose_blocks", "plan"]
 
 
 _NUMBER = 8  # size of a floating-point number [bytes]
+_SHUT = 1e-6  # gap over the smaller stone's width that rounding leaves of a closed joint [-]
 _CONTACT_NUMBERS = 80  # numbers kept for each contact point: frame, arms, impulses, its part of W, and copies
 
 
@@ -58,6 +60,7 @@ class Plan:
     ----------
     bodies : how many blocks at each fidelity
     pairs : codes of the blocks that touch at the start, without pairs of fixed blocks
+    open_pairs : how many of these are open, and by how much at most [m]
     contacts : contact points at the start
     unknowns : velocities: six for each rigid block, three for each node of a deformable one
     memory : estimate of the largest arrays, mainly dense compliances [bytes]
@@ -68,6 +71,7 @@ class Plan:
 
     bodies: Mapping[Fidelity, int]
     pairs: tuple[tuple[str, str], ...]
+    open_pairs: tuple[int, float]
     contacts: int
     unknowns: int
     memory: int
@@ -85,13 +89,17 @@ def plan(scene: Scene) -> Plan:
     """
     model, start = build_model(scene)
     contacts = detector(model)(start, np.zeros(len(scene.blocks)))
-    pairs = np.unique(np.sort(contacts.bodies, axis=1), axis=0)
+    pairs, pair = np.unique(np.sort(contacts.bodies, axis=1), axis=0, return_inverse=True)
+    narrowest = np.full(len(pairs), np.inf)
+    np.minimum.at(narrowest, pair.ravel(), gaps(contacts, start))
+    ajar = narrowest[narrowest > _SHUT * np.minimum(*model.surfaces.size[pairs.T])]
     codes = [block.code for block in scene.blocks]
     fidelities = [block.fidelity for block in scene.blocks]
     rigid = fidelities.count(Fidelity.RIGID)
     return Plan(
         bodies={one: fidelities.count(one) for one in Fidelity},
         pairs=tuple((codes[a], codes[b]) for a, b in pairs),
+        open_pairs=(len(ajar), float(ajar.max(initial=0.0))),
         contacts=len(contacts),
         unknowns=6 * rigid + 3 * len(start.node),
         memory=_memory(model, contacts.bodies),

@@ -53,6 +53,14 @@ def check_lines(report: "CheckReport", verbose: bool, explain: bool = False) -> 
         cost = report.cost
         lines += [
             f"  {cost.pairs} touching pairs, {cost.contacts} contact points at the start",
+            *(
+                [
+                    f"    {cost.open_pairs} of them open by up to {1e3 * cost.widest:.2g} mm: a run moves stones until "
+                    "they close; limit loads count gaps of up to a thousandth of a stone's width as closed"
+                ]
+                if cost.open_pairs
+                else []
+            ),
             f"  {cost.unknowns} unknowns, about {max(1, round(cost.memory / 2**20))} MiB of arrays",
             f"  at most {cost.steps} steps of {cost.step:g} s",
             _expected(cost),

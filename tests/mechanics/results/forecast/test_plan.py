@@ -3,7 +3,7 @@
 import pytest
 
 from mechanics.results.forecast.plan import plan
-from mechanics.scene.scene import Block, Fidelity, Scene
+from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene
 from mechanics.stones.materials import Material
 from tests.pipelines.results_by_hand import BOX_FACES, box
 
@@ -22,14 +22,16 @@ def test_two_cubes_on_the_ground_and_one_in_the_air():
             block("ground", (-1, -1, -1), (4, 2, 0), Fidelity.FIXED),
             block("left", (0, 0, 0), (1, 1, 1), Fidelity.RIGID),
             block("right", (2, 0, 0), (3, 1, 1), Fidelity.RIGID),
-            block("top", (0, 0, 1), (1, 1, 2), Fidelity.RIGID),
+            block("top", (0, 0, 1.002), (1, 1, 2.002), Fidelity.RIGID),
             block("air", (0, 0, 5), (1, 1, 6), Fidelity.RIGID),
         ),
+        contact=ContactSettings(alert_distance=0.05),
     )
     needs = plan(scene)
     assert needs.bodies == {Fidelity.FIXED: 1, Fidelity.RIGID: 4, Fidelity.DEFORMABLE: 0}
     assert set(needs.pairs) == {("ground", "left"), ("ground", "right"), ("left", "top")}
     assert needs.contacts == 3 * 4  # a corner each
+    assert needs.open_pairs == (1, pytest.approx(0.002))
     assert needs.unknowns == 4 * 6
     assert needs.loose == ("air",)
 
