@@ -29,6 +29,11 @@ from mechanics.scene.state import State
 
 __all__ = ["Archive", "simulate", "simulate_stages"]
 
+_CLAMPED = (
+    "its stones came to rest, but ones that do not deform would fall in their place: what holds them is "
+    "self-stress, which no load applies"
+)
+
 
 class Archive(Checkpointing, Protocol):
     """Place where a run is kept while it goes on."""
@@ -84,9 +89,12 @@ def simulate(
         result, _ = _simulate(built[0], of_run(built[1]), clock, progress, stop, archive)
         if result.outcome.rests and _keeps_strain(built[0]):
             with clock("confirm"):
-                clamped = _falls_without_strain(scene, progress, stop)
-            if clamped:
+                told = _without_strain(scene, progress, stop)
+            if told is Outcome.COLLAPSED:
                 result = replace(result, outcome=Outcome.UNDECIDED, reason=_CLAMPED)
+            elif told is Outcome.INTERRUPTED:
+                # a rest that is not confirmed is no verdict
+                result = replace(result, outcome=told, reason="")
             result = replace(result, wall_time=dict(clock.seconds))
         return result
 
@@ -134,12 +142,6 @@ def simulate_stages(
         return _Building(stages, whole, archive).built(progress, stop)
 
 
-_CLAMPED = (
-    "its stones came to rest, but ones that do not deform would fall in their place: what holds them is "
-    "self-stress, which no load applies"
-)
-
-
 def _keeps_strain(model: Model) -> bool:
     """Return whether stones deform between rigid joints under loads that last, so that strain may hold what falls."""
     scene = model.scene
@@ -147,8 +149,8 @@ def _keeps_strain(model: Model) -> bool:
     return bool(model.elastic.any()) and not model.laws.sprung and not moves
 
 
-def _falls_without_strain(scene: Scene, progress: Listener, stop: Callable[[], bool]) -> bool:
-    """Return whether the stones of a scene fall once none deforms.
+def _without_strain(scene: Scene, progress: Listener, stop: Callable[[], bool]) -> Outcome:
+    """Return the outcome of a scene whose stones are all rigid.
 
     Strain cannot be forgotten as contact forces can (`mechanics.dynamics.stopping.disproof`): what stones press against
     each other on the way to a rest stays. Rigid ones have no other forces than those that their loads bring about.
@@ -158,9 +160,8 @@ def _falls_without_strain(scene: Scene, progress: Listener, stop: Callable[[], b
         for block in scene.blocks
     )
     time = replace(scene.time, start=Start.REST, stop_at_equilibrium=True)
-    rigid = replace(scene, blocks=blocks, time=time)
-    told = simulate(rigid, lambda one: progress(replace(one, stage="confirm", total=None)), stop)
-    return told.outcome is Outcome.COLLAPSED
+    rigid = replace(scene, blocks=blocks, time=time, frame_every=0)
+    return simulate(rigid, lambda one: progress(replace(one, stage="confirm", total=None)), stop).outcome
 
 
 def _simulate(

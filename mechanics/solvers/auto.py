@@ -56,7 +56,10 @@ class Auto:
         if closed is not problem:
             found = _judged(problem, found, asked)
             if not found.converged:
-                found = follow(links, problem, start, asked, most)
+                count = found.iterations
+                other = follow(links, problem, start, asked, most - count)
+                found = min(found, other, key=lambda one: (not one.converged, one.natural_map))
+                found = replace(found, iterations=count + other.iterations)
         if not follows or steps is None:
             return found
         if not (found.converged and self._rests(problem, found)):

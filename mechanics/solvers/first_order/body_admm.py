@@ -73,8 +73,8 @@ class BodyADMM:
     Attributes
     ----------
     tolerance, velocity_tolerance, max_iterations : as in `NSGS`, iterations for sweeps
-    stages : first, one after the other, as long as it is not solved
-    turns : stages that follow, again and again
+    stages : first, one after the other, as long as it is not solved; contacts that sort themselves follow in turns with
+        forces that arrive, again and again
     further : tolerances of the first stage over those asked for: the next steps begin where the last ones lead, and
         gain from what these go further [-]
     """
@@ -83,7 +83,6 @@ class BodyADMM:
     velocity_tolerance: float = 1e-5
     max_iterations: int = 1000
     stages: tuple[Stage, ...] = SORTED
-    turns: tuple[Stage, ...] = _TURNS
     further: float = 1.0
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
@@ -103,8 +102,7 @@ class BodyADMM:
         run = _Run(problem, contacts, start, self)
         run.look()
         while run.excess > run.goal and run.iterations < self.max_iterations:
-            if not run.iterate():
-                break
+            run.iterate()
             run.look()
         impulse, velocity = run.best()
         left = residual(problem, impulse)
@@ -129,7 +127,7 @@ class _Run:
             settings,
             _bodies_of(problem.delassus, contacts),
         )
-        bodies, first = self._bodies, (*settings.stages, *settings.turns)[0]
+        bodies, first = self._bodies, settings.stages[0]
         self._compliance = bodies.compliance(problem.delassus.joint_compliance)
         self._soft = bodies.soft(np.max(first.penalty), self._compliance)
         free = kernel.to_world(bodies.geometry, problem.u_free)
@@ -144,7 +142,7 @@ class _Run:
         x = bodies.spread(kernel.to_world(bodies.geometry, x))
         self._iterate = kernel.Iterate(x, np.zeros_like(x), np.zeros(6 * len(bodies.inertia)), bodies.load())
         self._z = np.empty_like(x)
-        self._stages: Iterator[Stage] = chain(settings.stages, cycle(settings.turns))
+        self._stages: Iterator[Stage] = chain(settings.stages, cycle(_TURNS))
         self._factors: kernel.Factors | None = None
         self._memory = _acceleration(0, 0)
         self._until, self._first = 0, first.iterations
@@ -155,13 +153,10 @@ class _Run:
         """Errors over their tolerances at which the iteration ends [-]."""
         return self._settings.further if self.iterations < self._first else 1.0
 
-    def iterate(self) -> bool:
-        """Make iterations until the next look; return whether there was a stage for them."""
+    def iterate(self) -> None:
+        """Make iterations until the next look."""
         if self.iterations == self._until:
-            stage = next(self._stages, None)
-            if stage is None:
-                return False
-            self._begin(stage)
+            self._begin(next(self._stages))
         first, most = self.iterations == 0, min(self._settings.max_iterations, self._until) - self.iterations
         least = min(LOOK, most)
         self._advance(least, 0.0)
@@ -169,7 +164,6 @@ class _Run:
             # changes of velocities foretell the residual for a part of the iterations so far alone
             later = max(self.iterations // LOOK, LOOK)
             self._advance(min(most - least, later), self._limit)
-        return True
 
     def _advance(self, count: int, limit: float) -> None:
         if len(self._bodies.groups) > 1 and not self._memory.image.size:

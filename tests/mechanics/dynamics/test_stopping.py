@@ -9,7 +9,7 @@ from mechanics.dynamics.outcome import Outcome
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.elastic_joint import ElasticJoint
 from mechanics.scene.laws.mortar import MortarJoint
-from mechanics.scene.scene import ContactSettings, Method, SolverSettings, Start
+from mechanics.scene.scene import ContactSettings, Fidelity, Method, SolverSettings, Start
 from mechanics.scene.shapes import bond, box, wall
 from mechanics.simulate import simulate
 from tests.mechanics.shapes import brick, ground, moved, opening, scene
@@ -87,6 +87,27 @@ def test_a_stone_at_rest_in_steps_that_are_not_solved_is_undecided():
     assert result.errors.balance < 1e-6
     assert result.outcome is Outcome.UNDECIDED
     assert "of 20 steps were not solved" in result.reason
+
+
+def test_a_rest_of_deformable_stones_is_no_verdict_before_it_is_confirmed():
+    """Their scene is run again with rigid stones; stopped meanwhile, the run is interrupted."""
+    seen = []
+    cube = brick("cube", (0, 0, 0), (0.5, 0.5, 0.5), Fidelity.DEFORMABLE)
+    one = scene(ground(), cube, step=5e-3, duration=0.5, relaxation=True)
+    assert simulate(one, lambda told: seen.append(told.stage)).outcome is Outcome.EQUILIBRIUM
+    assert "confirm" in seen
+    seen.clear()
+    result = simulate(one, lambda told: seen.append(told.stage), lambda: "confirm" in seen)
+    assert result.outcome is Outcome.INTERRUPTED
+
+
+def test_rigid_stones_that_relax_are_balanced_whatever_the_velocity_tolerance():
+    """With 0.1 for their velocities alone they would not be in equilibrium."""
+    stones = (brick(str(k), (0, 0, 0.5 * k), (1, 0.5, 0.5 * (k + 1))) for k in range(6))
+    one = scene(ground(), *stones, step=5e-3, duration=0.1, relaxation=True)
+    result = simulate(replace(one, solver=SolverSettings(Method.ADMM, tolerance=0.5, velocity_tolerance=0.1)))
+    assert result.outcome is Outcome.EQUILIBRIUM
+    assert result.errors.balance <= one.time.balance_tolerance
 
 
 def test_a_fall_that_unsolved_steps_may_have_caused_is_undecided():

@@ -3,7 +3,7 @@
 A number is a literal in an assignment of a module, or in a default of a field or an argument. Not counted are 0 and 1,
 subscripts, the defaults of tolerances and iterations that all methods repeat, and sizes of arrays. Run as
 `python -m tests.mechanics.solvers.numbers` it lists them; with names after it, or `all`, it changes those, each in a
-process of its own, and prints a row of the table in docs/design/solvers.md.
+process of its own, and prints the figures of the table in docs/design/solvers.md, and processor times.
 """
 
 import ast

@@ -18,6 +18,7 @@ from mechanics.problem.residual import residual
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.scene import Fidelity, Method, SolverSettings
 from mechanics.scene.shapes import bond, wall
+from mechanics.solvers import auto, chain
 from mechanics.solvers.auto import Auto
 from mechanics.solvers.chain import KEPT
 from tests.mechanics.planar.shapes import box, grid_of_disks
@@ -107,6 +108,24 @@ def test_gaps_below_the_tolerance_do_not_set_stones_in_motion(seed):
     found = Auto()(gaping, cold(gaping))
     assert found.converged
     assert np.abs(velocity_of(gaping, found)).max() <= 1e-8 * FREE
+
+
+def test_iterations_with_gaps_closed_and_as_they_are_count_together(monkeypatch):
+    """An η that nothing reaches: with gaps closed the chain fails, and again with what is left of the iterations."""
+    spent = []
+
+    def counted(*given):
+        found = chain.follow(*given)
+        spent.append(found.iterations)
+        return found
+
+    monkeypatch.setattr(auto, "follow", counted)
+    problem = rest()[10].problem
+    gaping = replace(problem, bias=np.full(len(problem.bias), 1e-6 * FREE))
+    found = Auto(1e-30, 1e-5, 100)(gaping, cold(gaping))
+    assert len(spent) == 2
+    assert not found.converged
+    assert found.iterations == sum(spent) <= 100
 
 
 def pinched(count):
