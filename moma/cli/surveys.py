@@ -230,7 +230,7 @@ def orient(
 
 def _pixels(text: str) -> tuple[int, int]:
     width, _, height = text.lower().partition("x")
-    if not (width.strip().isdigit() and height.strip().isdigit()):
+    if not (width.strip().isdecimal() and height.strip().isdecimal()):
         raise UsageError(f"--size {text!r}", remedy="write width and height in pixels, e.g. --size 6000x4000")
     return int(width), int(height)
 

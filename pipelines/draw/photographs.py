@@ -236,6 +236,8 @@ def _outlines(axes: "Axes", oriented: Oriented, f: int, stones: Sequence[DrawnOu
     lines, colours, marks = list[Array](), list[str](), list[Array]()
     part = np.arange(_PARTS)[:, None] / _PARTS
     for stone in stones:
+        if photo.name in stone.marks:
+            marks.append(stone.marks[photo.name])
         if stone.normal @ (oriented.station(f) - stone.corners.mean(axis=0)) <= 0.0:
             continue
         sides = zip(stone.corners, np.roll(stone.corners, -1, axis=0), strict=True)
@@ -244,8 +246,6 @@ def _outlines(axes: "Axes", oriented: Oriented, f: int, stones: Sequence[DrawnOu
         if np.isfinite(seen).all() and ((seen > 0.0) & (seen < (width, height))).all(axis=1).any():
             lines.append(np.concatenate([seen, seen[:1]]))
             colours.append(FLAG if stone.drawn == photo.name else PLAIN)
-        if photo.name in stone.marks:
-            marks.append(stone.marks[photo.name])
     axes.add_collection(LineCollection(lines, colors=colours, linewidths=0.8))
     if marks:
         axes.plot(*np.concatenate(marks).T, ".", color=INK, markersize=1.5)

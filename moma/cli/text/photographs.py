@@ -43,7 +43,7 @@ def orient_lines(report: "OrientReport", verbose: bool) -> list[str]:
         (k for k, one in enumerate(marks["verdict"]) if one), key=lambda k: -(marks["test"][k] or 0.0)
     )
     if suspected:
-        lines.append(f"  {len(suspected)} marks suspected or left out:")
+        lines.append(f"  {len(suspected)} mark{'' if len(suspected) == 1 else 's'} suspected or left out:")
         ones = [
             f"    point {marks['point'][k]} on {marks['photo'][k]}, line {marks['line'][k]}: "
             f"{marks['test'][k] or 0.0:.1f} σ" + (", left out" if marks["verdict"][k] == "removed" else "")

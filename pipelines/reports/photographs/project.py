@@ -207,7 +207,7 @@ def read_project(path: Path) -> Project:
         network = with_control(
             network, rows, fixed=bool(values["fixed_control"]), check=_texts(values["check"])
         )
-    elif values["photomodeler"] is not None and network.control:
+    elif values["photomodeler"] is not None and network.control and not values["check"]:
         network = exported_control(network, bool(values["fixed_control"]))
     elif values["check"] or values["fixed_control"]:
         key = "check" if values["check"] else "fixed_control"
@@ -260,7 +260,7 @@ def _pictures(document: TomlDocument, folder: Path, network: Network) -> dict[st
             f"no folder {folder}", "pictures", remedy="give the folder of the photographs, or leave it out"
         )
     by_name = {one.stem.lower(): one for one in files} | {one.name.lower(): one for one in files}
-    out = {}
+    out = dict[str, Path]()
     for f, photo in enumerate(network.photos):
         found = by_name.get(photo.name.lower()) or by_name.get(Path(photo.name).stem.lower())
         if found is None:
@@ -268,6 +268,12 @@ def _pictures(document: TomlDocument, folder: Path, network: Network) -> dict[st
                 f"no picture of photograph {photo.name} in {folder}",
                 "pictures",
                 remedy=f"name it {photo.name}.jpg, or leave pictures out",
+            )
+        if (other := next((name for name, one in out.items() if one == found), None)) is not None:
+            document.fail(
+                f"{found} would be the picture of {other} and of {photo.name}",
+                "pictures",
+                remedy=f"give each photograph a picture of its own name, e.g. {photo.name}.jpg, or leave pictures out",
             )
         try:
             with Image.open(found) as picture:

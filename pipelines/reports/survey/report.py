@@ -148,7 +148,7 @@ def _outlines(study: SurveyStudy, photos: set[str]) -> Iterator[DrawnOutline]:
                     drawn.add(ray["photo"])
         if marks.keys() & photos:
             places = {name: np.array(ones) for name, ones in marks.items()}
-            yield DrawnOutline(stone.code, stone.outline, stone.normal, places, next(iter(drawn), None))
+            yield DrawnOutline(stone.code, stone.outline, stone.normal, places, min(drawn, default=None))
 
 
 def _draw(study: SurveyStudy, folder: Path, photo: Orthophoto | None) -> dict[str, str]:

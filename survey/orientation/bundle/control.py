@@ -7,6 +7,7 @@ import numpy as np
 from moma.errors import SurveyError
 from survey.arrays import Array
 from survey.orientation.bundle.adjustment import Solution
+from survey.orientation.bundle.start import FLAT
 from survey.orientation.bundle.statistics import Statistics
 from survey.orientation.network import Network, Photo
 
@@ -18,9 +19,6 @@ MISSES = 2.33
 FAR_OFF = 10.0
 """The same, beyond which it is a mistake, not chance."""
 
-_FLAT = (
-    5e-3  # extent of control points off their plane over that in it, below which a mirrored set fits as well
-)
 _NEAR = 0.3  # distance of a station from where it was given, over that from the control points, up to which they agree
 _FOOTPRINT = 0.5  # of a pixel on the object, beyond which coordinates are hardly in metres [m]
 _FINE = 3e-3  # standard deviation of coordinates over that, below which they are not
@@ -80,7 +78,7 @@ def control_remarks(network: Network, solution: Solution, photos: Sequence[Photo
     off = [float(np.linalg.norm(here - there)) for there, here in found if there is not None]
     placed = bool(off) and np.median(off) < _NEAR * np.linalg.norm(towards)
     placed = placed or any(one.observed_station is not None or one.fixed for one in photos)
-    if sizes[2] < _FLAT * sizes[0] and not placed:
+    if sizes[2] < FLAT * sizes[0] and not placed:
         normal = axes[2] * np.sign(axes[2] @ towards)
         x, y, z = normal.round(2) + 0.0
         out.append(

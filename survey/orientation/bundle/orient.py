@@ -108,9 +108,10 @@ def orient(network: Network, blunders: Blunders = "report") -> Orientation:
         try:
             result = statistics(network, prepared, solution)
         except GeometryError:
-            _check_control_alone(network)
+            if _sigma0(prepared, solution) > _AGREE:
+                _check_control_alone(network)
             raise
-        _check_control(network, solution, result)
+        _check_control(network, solution, result, blunders)
         removed, control = dict[int, float](), network.control
         if blunders == "remove":
             network, used, prepared, solution, result = _snooped(
@@ -126,11 +127,14 @@ def orient(network: Network, blunders: Blunders = "report") -> Orientation:
             if len(removed) == 1
             else f"{len(removed)} marks left out as blunders"
         )
-    if result.redundancy > 0 and (result.sigma0 > _LARGE or len(removed) > _MANY * len(network.photo)):
+    doubts = list[str]()
+    if result.redundancy > 0 and result.sigma0 > _LARGE:
+        doubts.append(f"the marks fit {result.sigma0:.1f} times worse than stated")
+    if len(removed) > _MANY * len(network.photo):
+        doubts.append(f"{len(removed) / len(network.photo):.0%} of the marks are left out")
+    if doubts:
         remarks.append(
-            f"the marks fit {result.sigma0:.1f} times worse than stated"
-            + (f", and {len(removed) / len(network.photo):.0%} of them are left out" if removed else "")
-            + ": check the camera (calibrate c, K1), the control points, and sigma"
+            f"{' and '.join(doubts)}: check the camera (calibrate c, K1), the control points, and sigma"
         )
     return Orientation(
         network, prepared, solution, result, removed, tuple(sorted(suspected)), (*network.remarks, *remarks)
@@ -168,8 +172,10 @@ def _tested_control(network: Network, solution: Solution, result: Statistics) ->
     return [f"control points that miss their places: {listed(names)}"]
 
 
-def _check_control(network: Network, solution: Solution, result: Statistics) -> None:
+def _check_control(network: Network, solution: Solution, result: Statistics, blunders: Blunders) -> None:
     """Refuse control points of which most are far off, where the photographs agree with each other without them.
+
+    A few that are wrong pull the others off; they are left to the search for blunders where there is one.
 
     Raises
     ------
@@ -180,8 +186,10 @@ def _check_control(network: Network, solution: Solution, result: Statistics) -> 
     if not (held > FAR_OFF).any() or (alone := _alone(network)) is None:
         return
     _check_hand(network, alone[0])
-    if np.median(held) > FAR_OFF and alone[1] < _AGREE:
-        raise _control_misfit(network)
+    if np.median(held) <= FAR_OFF or alone[1] >= _AGREE:
+        return
+    if blunders == "report" or not _minority(network, alone[0]):
+        raise _control_misfit(network, alone[0])
 
 
 @contextmanager
@@ -298,16 +306,40 @@ def _check_control_alone(network: Network) -> None:
     if not given or (alone := _alone(network)) is None:
         return
     _check_hand(network, alone[0])
-    raise _control_misfit(network)
+    raise _control_misfit(network, alone[0])
 
 
-def _control_misfit(network: Network) -> SurveyError:
+def _control_misfit(network: Network, alone: Solution) -> SurveyError:
+    """Return the error that names the few control points that are wrong, or tells that they do not fit as a whole."""
+    if wrong := _minority(network, alone):
+        names = [f"{network.names[one.point]} ({off:.3g} m)" for one, off in wrong]
+        return SurveyError(
+            f"control points are far from where the others put them: {listed(names)}",
+            where=wrong[0][0].where or network.path,
+            remedy="check their coordinates and their number on the photographs, or let them only check the result",
+        )
     first = next(one for one in network.control if not one.check)
     return SurveyError(
         "the control points do not fit the photographs, which agree with each other without them",
         where=first.where or network.path,
         remedy="check the numbers, the order and the unit of their coordinates",
     )
+
+
+def _minority(network: Network, alone: Solution) -> list[tuple[Control, float]]:
+    """Return the control points that most others contradict, the worst first, and how far off they are [m]."""
+    given = [
+        one for one in network.control if not one.check and np.isfinite(alone.unknowns.point[one.point]).all()
+    ]
+    if len(given) <= _ENOUGH:
+        return []
+    there = np.array([one.place for one in given])
+    off = np.linalg.norm(_fitted(alone.unknowns.point[[one.point for one in given]], there) - there, axis=1)
+    sigma = np.sqrt([np.trace(one.covariance) / 3.0 for one in given])
+    wrong = off > FAR_OFF * np.maximum(np.median(off), sigma)
+    if len(given) - wrong.sum() < _ENOUGH:
+        return []
+    return [(given[k], float(off[k])) for k in np.argsort(-off) if wrong[k]]
 
 
 def _check_stations(network: Network, solution: Solution) -> None:
@@ -384,8 +416,12 @@ def _alone(network: Network) -> tuple[Solution, float] | None:
         return None
     if _misfit(start, prepared, alone) >= _POOR:
         return None
+    return alone, _sigma0(prepared, alone)
+
+
+def _sigma0(prepared: Prepared, solution: Solution) -> float:
     redundancy = prepared.observations - prepared.count + prepared.datum
-    return alone, float(np.sqrt(alone.square / max(redundancy, 1)))
+    return float(np.sqrt(solution.square / max(redundancy, 1)))
 
 
 def _check_hand(network: Network, alone: Solution) -> None:
@@ -442,7 +478,8 @@ def _snooped(
     for _ in range(_SEARCHES):
         tests = np.nan_to_num(np.abs(result.standardised)).max(axis=1)
         suspects = _suspects(result)
-        wrong = _wrong_control(network, solution, result, float(tests.max(initial=0.0)))
+        rays = np.bincount(network.point[used], minlength=len(network.names))
+        wrong = _wrong_control(network, solution, result, rays, float(tests.max(initial=0.0)))
         if wrong is not None:
             control = tuple(
                 replace(one, check=one.check or k == wrong) for k, one in enumerate(network.control)
@@ -451,7 +488,7 @@ def _snooped(
             free = prepared.unknowns.free.copy()
             free[network.control[wrong].point] = True
         else:
-            out = _worst_marks(network, used, suspects[np.argsort(-tests[suspects])])
+            out = _worst_marks(network, rays, suspects[np.argsort(-tests[suspects])])
             if not out:
                 break
             removed |= {k: float(tests[k]) for k in out}
@@ -464,10 +501,15 @@ def _snooped(
     return network, used, prepared, solution, result
 
 
-def _wrong_control(network: Network, solution: Solution, result: Statistics, most: float) -> int | None:
-    """Return the control point that is farthest off, if it is farther off than any mark, and enough others are left."""
+def _wrong_control(
+    network: Network, solution: Solution, result: Statistics, rays: NDArray[np.intp], most: float
+) -> int | None:
+    """Return the control point that is farthest off, if it is farther off than any mark, and enough others are left.
+
+    A point with one ray is not determined without its place: its mark is blamed.
+    """
     tests = control_tests(network, solution, result)
-    tests[[one.check for one in network.control]] = 0.0
+    tests[[one.check or rays[one.point] < 2 for one in network.control]] = 0.0
     if not len(tests) or tests.max() <= MISSES or np.sqrt(3.0) * tests.max() <= most:
         return None
     worst = int(np.argmax(tests))
@@ -475,11 +517,10 @@ def _wrong_control(network: Network, solution: Solution, result: Statistics, mos
     return worst if len(left) >= _ENOUGH else None
 
 
-def _worst_marks(network: Network, used: NDArray[np.bool_], suspects: NDArray[np.intp]) -> list[int]:
+def _worst_marks(network: Network, rays: NDArray[np.intp], suspects: NDArray[np.intp]) -> list[int]:
     """Choose marks to leave out, the worst first: one of a photograph and of a point."""
     held = np.zeros(len(network.names), dtype=bool)
     held[[one.point for one in network.control if not one.check]] = True
-    rays = np.bincount(network.point[used], minlength=len(network.names))
     photos, points, out = set[int](), set[int](), list[int]()
     for k in suspects:
         f, i = int(network.photo[k]), int(network.point[k])

@@ -11,7 +11,7 @@ __all__ = ["check_cameras", "check_network"]
 _PIXELS_MM = (5e-4, 0.5)  # sizes of pixels, of sensors and of scanned plates [mm]
 _ANGLES = (0.25, 60.0)  # camera constant over the longer side of the photograph: from 127° to telescopes
 _DISTORTED = 0.5  # distortion in the corners over their distance from the principal point
-_TINY = 0.03  # extent of all marks over that of the photographs, below which they are not in pixels
+_TINY = 0.03  # largest coordinate of all marks over the size of the photographs, below which they are not in pixels
 _OUTSIDE = 0.02  # of the size of the photograph, marks may lie outside it
 _ON_LINE = 1e-3  # extent of control points across a line, over that along it
 
@@ -47,11 +47,11 @@ def check_network(network: Network) -> None:
         )
     for m, camera in enumerate(network.cameras):
         mine = np.array([one.camera == m for one in network.photos])[network.photo]
-        if mine.any() and (np.ptp(network.image[mine], axis=0) < _TINY * np.array(camera.size)).all():
-            span = np.ptp(network.image[mine], axis=0)
+        reach = np.abs(network.image[mine]).max(axis=0, initial=0.0)
+        if mine.any() and (reach < _TINY * np.array(camera.size)).all():
             raise SurveyError(
-                f"all marks lie within {span[0]:.3g} × {span[1]:.3g} of {camera.size[0]} × {camera.size[1]} pixels: "
-                "they are of another unit",
+                f"all marks of camera {camera.name} lie within {reach[0]:.3g} × {reach[1]:.3g} of {camera.size[0]} × "
+                f"{camera.size[1]} pixels: they are of another unit",
                 where=network.where(int(np.flatnonzero(mine)[0])),
                 remedy="give marks in pixels, to the right and down from the upper left corner",
             )
@@ -121,7 +121,7 @@ def _check_control(network: Network) -> None:
         raise SurveyError(
             f"all {len(network.control)} control points only check the result: none holds the photographs",
             where=network.control[0].where or network.path,
-            remedy="take three or more out of the list of those that check",
+            remedy="let three or more take part that are not on one line, or leave all out for a frame of its own",
         )
     if not places or any(one.fixed for one in network.photos):
         return

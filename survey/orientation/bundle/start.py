@@ -21,11 +21,13 @@ from survey.orientation.bundle.resection import (
 from survey.orientation.network import Network, Photo
 from survey.orientation.projection import directions
 
-__all__ = ["aligned", "check_mirrored", "start_values", "swapped", "without_start"]
+__all__ = ["FLAT", "aligned", "check_mirrored", "start_values", "swapped", "without_start"]
+
+FLAT = 5e-3
+"""Extent of control points off their plane over that in it, below which mirrored ones fit as well."""
 
 _APART = 0.05  # mean distance of start values from control points, over the extent of these, from which they are moved
 _BETTER = 0.2  # misfit of the right hand over that of the wrong one
-_FLAT = 5e-3  # extent of control points off their plane over that in it, below which either hand fits
 _ALIKE = 0.1  # difference of a reflection from an exchange or a change of sign of coordinates
 _MOST_AGREE = 0.6  # part of the known points of a photograph that must agree on its orientation
 _FEWEST = 4  # known points of a resection
@@ -129,7 +131,7 @@ def aligned(network: Network, always: bool = False) -> Network:
         return network
     rotation, shift, scale = similarity_between(source, target)
     shape = np.linalg.svd(target - target.mean(axis=0), compute_uv=False)
-    if control and not always and shape[2] < _FLAT * shape[0] and _looks_mirrored(source, target):
+    if control and not always and shape[2] < FLAT * shape[0] and _looks_mirrored(source, target):
         raise SurveyError(
             "the control points lie in a plane that shows its other side to the photographs: they are mirrored",
             where=control[0].where or network.path,

@@ -142,20 +142,28 @@ def _placed(photo: Photo, row: Mapping[str, object], where: str, radian: float) 
 
     def three(names: tuple[str, str, str], *common: str) -> Array | None:
         texts = [row.get(name, next((row[one] for one in common if one in row), None)) for name in names]
-        if any(one is None for one in texts):
+        if all(one is None for one in texts):
             return None
+        if any(one is None for one in texts):
+            raise SurveyError(
+                f"some of {', '.join(names)} without the others",
+                where=where,
+                remedy="give all of them, or none",
+            )
         return np.array([parse_number(str(one), name, where) for one, name in zip(texts, names, strict=True)])
 
     station, station_sigma = three(("x", "y", "z")), three(("sx", "sy", "sz"), "sxyz")
     angles, angle_sigma = three(("omega", "phi", "kappa")), three(("so", "sp", "sk"))
     for sigma in (station_sigma, angle_sigma):
-        if sigma is not None and (sigma < 0.0).any():
+        if sigma is not None and not (sigma > 0.0).all():
             raise SurveyError(
-                f"a deviation of {sigma.min():g}", where=where, remedy="it must not be negative"
+                f"a deviation of {sigma.min():g}",
+                where=where,
+                remedy="give more than 0, or leave these columns out",
             )
     rotation = None if angles is None else from_angles(*(radian * angles))
-    observed = station is not None and station_sigma is not None and bool(station_sigma.all())
-    turned = rotation is not None and angle_sigma is not None and bool(angle_sigma.all())
+    observed = station is not None and station_sigma is not None
+    turned = rotation is not None and angle_sigma is not None
     return replace(
         photo,
         station=station,
@@ -376,27 +384,32 @@ def write_dbat(network: Network, folder: Path) -> Path:
 
 
 def _prior_table(network: Network, path: Path) -> tuple[str, ...]:
-    """Write the observed stations, or all stations to start from; return the line of the script."""
-    observed = [one for one in network.photos if one.observed_station is not None]
-    rows = []
+    """Write stations and angles, observed ones with their deviations; return the lines of the script.
+
+    Photographs with different columns are in tables of their own: `path`, and others with a number behind its name.
+    """
+    tables: dict[str, list[str]] = {}
     for k, one in enumerate(network.photos, start=1):
-        station, rotation = (
-            (one.observed_station, one.observed_rotation) if observed else (one.station, one.rotation)
-        )
-        if station is None or (rotation is None and not observed):
-            continue
-        turn = np.degrees(angles(rotation)).tolist() if rotation is not None else []
-        sigma = [] if one.station_sigma is None else one.station_sigma.tolist()
-        if observed and (rotation is not None or not sigma):
-            raise SurveyError(
-                f"photograph {one.name} has observed angles", where=str(path), remedy="observe stations alone"
-            )
-        rows.append(", ".join([str(k), *map(repr, [*station.tolist(), *turn, *sigma])]))
-    if not rows:
-        return ()
-    _lines(path, rows)
-    columns = "id,x,y,z,sx,sy,sz" if observed else "id,x,y,z,omega,phi,kappa"
-    return (f'<prior_eo><file format="{columns}" units="degrees">{path.name}</file></prior_eo>',)
+        columns, values = ["id"], list[float]()
+        station = one.station if one.observed_station is None else one.observed_station
+        rotation = one.rotation if one.observed_rotation is None else one.observed_rotation
+        for names, row in (
+            ("x,y,z", station),
+            ("sx,sy,sz", None if one.observed_station is None else one.station_sigma),
+            ("omega,phi,kappa", None if rotation is None else np.degrees(angles(rotation))),
+            ("so,sp,sk", None if one.angle_sigma is None else np.degrees(one.angle_sigma)),
+        ):
+            if row is not None:
+                columns.append(names)
+                values += row.tolist()
+        if values:
+            tables.setdefault(",".join(columns), []).append(", ".join([str(k), *map(repr, values)]))
+    files = []
+    for number, (names, rows) in enumerate(tables.items(), start=1):
+        table = path if number == 1 else path.with_stem(f"{path.stem}-{number}")
+        _lines(table, rows)
+        files.append(f'<file format="{names}" units="degrees">{table.name}</file>')
+    return ("<prior_eo>", *files, "</prior_eo>") if files else ()
 
 
 def _control_table(rows: list[ControlRow], path: Path) -> str:

@@ -249,7 +249,8 @@ def write_photomodeler(network: Network, path: Path, title: str = "moma") -> Non
     Raises
     ------
     SurveyError
-        if a camera has another model or unit, affinity or skew: the format has no place
+        if a camera has another model or unit, affinity or skew, or cameras have different sizes: the format has no
+        place
     """
     camera = network.cameras[0]
     for one in network.cameras:
@@ -258,6 +259,12 @@ def write_photomodeler(network: Network, path: Path, title: str = "moma") -> Non
                 f"camera {one.name}: {one.model} distortion, as {one.inner[3]:g}, sk {one.inner[4]:g}, {one.unit}",
                 where=str(path),
                 remedy="this format holds backward distortion in millimetres, without affinity and skew",
+            )
+        if one.size != camera.size:
+            raise SurveyError(
+                f"cameras {camera.name} and {one.name} have photographs of different sizes",
+                where=str(path),
+                remedy="this format holds one size",
             )
     names = numbered(network, path.with_name(f"{path.stem}-points.txt"))
 

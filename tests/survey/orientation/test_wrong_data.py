@@ -151,7 +151,7 @@ def test_control_points_in_millimetres():
 
 def test_marks_in_millimetres():
     one = network()
-    refused(replace(one, image=one.image * 0.006), "all marks lie within", one.where(0))
+    refused(replace(one, image=one.image * 0.006), "all marks of camera camera1 lie within", one.where(0))
 
 
 def test_a_control_point_that_is_off_is_left_out_and_its_marks_are_not_blamed():
@@ -304,3 +304,56 @@ def test_points_that_one_photograph_shows_are_left_out_with_a_remark():
     result = orient(more)
     assert any("one photograph only and left out: lone" in text for text in result.remarks)
     assert result.statistics.sigma0 == pytest.approx(orient(one).statistics.sigma0, rel=1e-9)
+
+
+def shifted(one, number, by):
+    """The network with one control point moved along x."""
+    moved = (
+        replace(c, place=c.place + (k == number) * np.array([by, 0, 0])) for k, c in enumerate(one.control)
+    )
+    return replace(one, control=tuple(moved))
+
+
+def seen_less(one, kept):
+    """The network with some of its marks."""
+    return replace(
+        one, photo=one.photo[kept], point=one.point[kept], image=one.image[kept], sigma=one.sigma[kept],
+        lines=one.lines[kept],
+    )  # fmt: skip
+
+
+def test_a_control_point_that_is_far_off_is_named_although_it_pulls_the_others_off():
+    one = shifted(network(), 3, 0.4)
+    name = one.names[one.control[3].point]
+    refused(one, rf"far from where the others put them: {name} \(0\.4", "control.txt:4")
+    result = orient(one, "remove")
+    assert [c.check for c in result.network.control] == [k == 3 for k in range(8)]
+
+
+def test_a_wrong_control_point_with_one_mark_loses_this_mark():
+    """Its place and its mark cannot be told apart."""
+    one = shifted(network(), 3, 0.1)
+    marks = np.flatnonzero(one.point == one.control[3].point)
+    result = orient(seen_less(one, np.setdiff1d(np.arange(len(one.photo)), marks[1:])), "remove")
+    assert marks[0] in result.removed
+    assert not any(c.check for c in result.network.control)
+
+
+def test_a_camera_that_is_not_determined_is_no_fault_of_the_control_points():
+    one = network()
+    second = replace(one.cameras[0], name="second", free=("c", "xp", "yp", "as", "sk"))
+    last = len(one.photos) - 1
+    photos = (*one.photos[:-1], replace(one.photos[-1], camera=1))
+    few = np.setdiff1d(np.arange(len(one.photo)), np.flatnonzero(one.photo == last)[4:])
+    two = replace(seen_less(one, few), cameras=(*one.cameras, second), photos=photos)
+    refused(two, "do not determine second", "block.txt:4")
+
+
+def test_marks_in_a_corner_of_the_photographs_of_one_camera_name_it():
+    one = network()
+    second = replace(one.cameras[0], name="second")
+    last = one.photo == len(one.photos) - 1
+    photos = (*one.photos[:-1], replace(one.photos[-1], camera=1))
+    image = np.where(last[:, None], 0.006 * one.image, one.image)
+    two = replace(one, cameras=(*one.cameras, second), photos=photos, image=image)
+    refused(two, "all marks of camera second lie within", one.where(int(np.flatnonzero(last)[0])))

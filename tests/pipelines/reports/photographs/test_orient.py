@@ -238,3 +238,16 @@ def test_control_points_of_an_export_are_results_unless_they_are_fixed(tmp_path)
         assert any("are left out, as it has their adjusted places" in one for one in told["remarks"]) == (
             not points
         )
+    path.write_text('photomodeler = "export.txt"\ncheck = ["1"]\n', encoding="utf-8")
+    assert "check without control points" in fails(2, "orient", path, "--out", tmp_path / "out")
+
+
+def test_a_picture_is_not_taken_for_two_photographs(tmp_path):
+    path = project(tmp_path, 'pictures = "pictures"')
+    pictures(tmp_path / "pictures", network(), (600, 400))
+    marks = tmp_path / "marks.txt"
+    marks.write_text(
+        marks.read_text(encoding="utf-8").replace("P01,", "a/P01,").replace("P02,", "b/P01,"),
+        encoding="utf-8",
+    )
+    assert "would be the picture of a/P01 and of b/P01" in fails(2, "orient", path, "--out", tmp_path / "out")

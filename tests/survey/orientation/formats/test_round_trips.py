@@ -176,7 +176,7 @@ def test_points_with_names_are_numbered_and_the_table_says_how(tmp_path):
         same_pictures(network, replace(back, names=tuple(name[one] for one in back.names)))
 
 
-def test_dbat_writes_distortion_as_the_toolbox_does(tmp_path):
+def test_dbat_reads_distortion_as_the_toolbox_writes_it(tmp_path):
     """Its calibration has K1 0.00458861 and as 0.000389598 in the report, and in the script of the camera this."""
     script = write_dbat(written(), tmp_path)
     text = script.read_text(encoding="utf-8")
@@ -208,6 +208,32 @@ def test_dbat_stations_known_beforehand(tmp_path):
     np.testing.assert_array_equal(photo.station_sigma, [0.05] * 3)
     np.testing.assert_allclose(angles(photo.rotation), [0.1, 0.2, 0.3])
     assert photo.observed_rotation is None
+    (tmp_path / "stations.txt").write_text("\n".join(rows).replace("0.05", "0.0"), encoding="utf-8")
+    with pytest.raises(SurveyError, match="a deviation of 0"):
+        read_dbat(script)
+
+
+def test_dbat_keeps_stations_and_angles_that_are_observed(tmp_path):
+    made = written()
+    station = {"observed_station": np.array([1.0, 2.0, 3.0]), "station_sigma": np.array([0.1, 0.2, 0.3])}
+    turn = {"observed_rotation": made.photos[1].rotation, "angle_sigma": np.array([0.01, 0.02, 0.03])}
+    given = (replace(made.photos[0], **station), replace(made.photos[1], **station, **turn), *made.photos[2:])
+    back = read_dbat(write_dbat(replace(made, photos=given), tmp_path)).photos
+    np.testing.assert_array_equal(back[0].observed_station, station["observed_station"])
+    assert back[0].observed_rotation is None
+    np.testing.assert_allclose(back[0].rotation, made.photos[0].rotation, atol=1e-9)
+    np.testing.assert_array_equal(back[1].station_sigma, station["station_sigma"])
+    np.testing.assert_allclose(back[1].observed_rotation, turn["observed_rotation"], atol=1e-9)
+    np.testing.assert_allclose(back[1].angle_sigma, turn["angle_sigma"])
+    assert back[2].observed_station is None
+    np.testing.assert_allclose(back[2].station, made.photos[2].station)
+
+
+def test_photomodeler_holds_one_size_of_photographs(tmp_path):
+    made = written(plain=True)
+    cameras = (made.cameras[0], replace(made.cameras[0], name="other", size=(4000, 3000)))
+    with pytest.raises(SurveyError, match="different sizes"):
+        write_photomodeler(replace(made, cameras=cameras), tmp_path / "a.txt")
 
 
 def test_check_points_of_metashape_remain_check_points(tmp_path):
