@@ -23,9 +23,10 @@ from mechanics.results.log import Log, result_of, stage_result
 from mechanics.results.result import BodyResult, Frame, Result
 from mechanics.results.stages import StageResult
 from mechanics.scene.laws.law import REST
-from mechanics.scene.scene import Fidelity, Scene, Start
+from mechanics.scene.scene import Fidelity, Method, Scene, Start
 from mechanics.scene.stages import Stage, check_stages, whole_scene
 from mechanics.scene.state import State
+from moma.errors import SolverError
 
 __all__ = ["Archive", "simulate", "simulate_stages"]
 
@@ -33,6 +34,7 @@ _CLAMPED = (
     "its stones came to rest, but ones that do not deform would fall in their place: what holds them is "
     "self-stress, which no load applies"
 )
+_UNTRIED = "whether stones that do not deform would fall in their place is not known: their run failed"
 
 
 class Archive(Checkpointing, Protocol):
@@ -90,7 +92,9 @@ def simulate(
         if result.outcome.rests and _keeps_strain(built[0]):
             with clock("confirm"):
                 told = _without_strain(scene, progress, stop)
-            if told is Outcome.COLLAPSED:
+            if told is None:
+                result = replace(result, cautions=(*result.cautions, _UNTRIED))
+            elif told is Outcome.COLLAPSED:
                 result = replace(result, outcome=Outcome.UNDECIDED, reason=_CLAMPED)
             elif told is Outcome.INTERRUPTED:
                 # a rest that is not confirmed is no verdict
@@ -149,8 +153,8 @@ def _keeps_strain(model: Model) -> bool:
     return bool(model.elastic.any()) and not model.laws.sprung and not moves
 
 
-def _without_strain(scene: Scene, progress: Listener, stop: Callable[[], bool]) -> Outcome:
-    """Return the outcome of a scene whose stones are all rigid.
+def _without_strain(scene: Scene, progress: Listener, stop: Callable[[], bool]) -> Outcome | None:
+    """Return the outcome of a scene whose stones are all rigid, by the automatic method; None where none was found.
 
     Strain cannot be forgotten as contact forces can (`mechanics.dynamics.stopping.disproof`): what stones press against
     each other on the way to a rest stays. Rigid ones have no other forces than those that their loads bring about.
@@ -160,8 +164,12 @@ def _without_strain(scene: Scene, progress: Listener, stop: Callable[[], bool]) 
         for block in scene.blocks
     )
     time = replace(scene.time, start=Start.REST, stop_at_equilibrium=True)
-    rigid = replace(scene, blocks=blocks, time=time, frame_every=0)
-    return simulate(rigid, lambda one: progress(replace(one, stage="confirm", total=None)), stop).outcome
+    solver = replace(scene.solver, method=Method.AUTO)
+    rigid = replace(scene, blocks=blocks, time=time, solver=solver, frame_every=0)
+    try:
+        return simulate(rigid, lambda one: progress(replace(one, stage="confirm", total=None)), stop).outcome
+    except SolverError:
+        return None
 
 
 def _simulate(

@@ -8,7 +8,7 @@ import numpy as np
 from mechanics.scene.scene import Method, SolverSettings
 from mechanics.solvers.auto import Auto
 from mechanics.solvers.chain import Chain, Solver
-from mechanics.solvers.first_order.body_admm import BodyADMM
+from mechanics.solvers.first_order.body_admm import STEADY, BodyADMM
 from mechanics.solvers.first_order.disk_admm import DiskADMM
 from mechanics.solvers.first_order.nsgs import NSGS
 from mechanics.solvers.kinds import ENDED_PATH
@@ -26,7 +26,7 @@ _ADDS_UP = 8.0
 _METHODS: Mapping[Method, Callable[[float, float, int], Solver]] = {
     Method.AUTO: Auto,
     Method.NSGS: NSGS,
-    Method.ADMM: BodyADMM,
+    Method.ADMM: partial(BodyADMM, stages=STEADY),
     Method.INTERIOR_POINT: partial(Chain, links=ENDED_PATH),
     Method.NEWTON: Newton,
 }

@@ -25,6 +25,7 @@ __all__ = ["ENDED_PATH", "EXACT", "POLISH", "SOME", "chain_of", "moving_bodies"]
 # budgets of links that others follow; what needs more is mostly solved by none of them
 _ADMM = 500  # iterations of ADMM, and sweeps over disks
 _NEWTON = 20  # steps of Newton's method
+_FAR = 100  # steps of Newton's method by way of soft joints, as the forces of a rest are far from nothing
 _PATH = 60  # factorisations of a path, and steps of Newton's method where nothing else is left
 # moving rigid bodies from which a factorisation in each step of Newton's method takes longer than iterations with kept
 # factors, in the steps of a motion
@@ -84,7 +85,7 @@ _REST = (
 _FROM_NOTHING = Link(
     "Newton from soft joints",
     partial(SofterJoints, factors=tuple(share / HELD for share in JOINTS)),
-    _PATH,
+    _FAR,
     Begin.GIVEN,
     EXACT,
 )

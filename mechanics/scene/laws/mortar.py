@@ -93,9 +93,12 @@ class MortarJoint:
         terms = self.terms(contacts)
         state, holds = contacts.state.copy(), bonded(contacts)
         opening = contacts.gap - state[:, REST] + contacts.step * contacts.theta * velocity[:, 0]
-        opened = (impulse[:, 0] <= 0) & (opening > _OPENED * contacts.size)
         path = contacts.step * np.linalg.norm(velocity[:, 1:], axis=1)
-        state[:, SLIP] += np.where(holds & at_limit(terms, impulse), path, 0.0)
+        yields = at_limit(terms, impulse)
+        state[:, SLIP] += np.where(holds & yields, path, 0.0)
+        # at the apex of its cone a bond has no shear left, whichever way it moves
+        away = np.where(yields, opening, np.maximum(opening, path))
+        opened = (impulse[:, 0] <= 0) & (away > _OPENED * contacts.size)
         state[:, SLIDING] = slid(contacts, terms, impulse, velocity)
         sheared = (state[:, SLIDING] > 0) | (state[:, SLIP] > _CREPT * contacts.size)
         state[holds & (opened | sheared), BOND] = BROKEN

@@ -26,7 +26,7 @@ from mechanics.solvers.first_order.body_factors import factorise
 from mechanics.solvers.scales import LOOK, MANY, OVERSHOOT, ROUNDING, SPARE
 from moma.errors import SolverError
 
-__all__ = ["SORTED", "BodyADMM", "Stage"]
+__all__ = ["SORTED", "STEADY", "BodyADMM", "Stage"]
 
 
 # velocities of a body
@@ -62,6 +62,11 @@ _STICKING = 0.005
 _TURNS = (Stage(1.0, extrapolated=False), Stage((1.0, _SLIDING, _STICKING), extrapolated=False))
 SORTED = (Stage(1.0, LOOK, extrapolated=False), _TURNS[1])
 """The first turn: few iterations tell most contacts apart."""
+
+# penalty of all contacts that carries forces across stones whose masses differ by 10⁶ [-], and its iterations
+_CARRIES, _LONG = 0.02, 150
+STEADY = (Stage(_CARRIES, _LONG, extrapolated=False), Stage(_SLIDING, _LONG), *SORTED)
+"""Stages that need no other method before or after them."""
 
 
 @dataclass(frozen=True)

@@ -138,7 +138,7 @@ def _three(stones: Sequence[Array]) -> Ints:
     counts = np.array([len(points) for points in stones])
     for count in np.unique(counts).tolist():
         rows = np.flatnonzero(counts == count)
-        arms = np.array([stones[row] for row in rows])
+        arms = np.array([stones[row] for row in rows.tolist()])
         arms -= arms[:, :1]
         far = np.argmax(np.sum(arms**2, axis=2), axis=1)
         away = np.cross(arms, arms[np.arange(len(rows)), far][:, None])

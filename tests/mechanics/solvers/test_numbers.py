@@ -4,7 +4,7 @@ import pytest
 
 from tests.mechanics.solvers.numbers import changed, numbers
 
-MOST = 55
+MOST = 58
 
 
 def test_there_are_no_more_numbers_than_today():

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mechanics.scene.scene import Method
 from mechanics.stones.meshing.elements import Element
 from pipelines.results.quantities import QUANTITIES, Quantities, StoneQuantities
 from pipelines.tradeoff.grid import Variant
@@ -91,6 +92,14 @@ def test_who_asks_for_less_never_pays_more(listed, asked):
     strict, lax = (cheapest(runs, reference("-", 0.0), "von_mises_p99", one) for one in (asked, 2.0 * asked))
     if strict.holds:
         assert runs[int(lax.name)].run.cpu <= runs[int(strict.name)].run.cpu
+
+
+def test_a_method_is_not_changed_for_times_that_differ_by_chance():
+    slow, fast = judged([(1.1, 0.01, False), (1.0, 0.01, False)])
+    other = replace(fast, run=replace(fast.run, overlay=Overlay(method=Method.NSGS)))
+    for time, name in ((1.1, "0"), (1.5, "1")):
+        runs = [replace(slow, run=replace(slow.run, cpu=time)), other]
+        assert cheapest(runs, reference("-", 0.0), "von_mises_p99", 0.05).name == name
 
 
 def test_the_reference_is_no_better_than_its_own_estimate():
