@@ -148,9 +148,7 @@ def simulate_stages(
 
 def _keeps_strain(model: Model) -> bool:
     """Return whether stones deform between rigid joints under loads that last, so that strain may hold what falls."""
-    scene = model.scene
-    moves = scene.loads.until > 0 or any(any(block.velocity) for block in scene.blocks)
-    return bool(model.elastic.any()) and not model.laws.sprung and not moves
+    return bool(model.elastic.any()) and not model.laws.sprung and model.scene.steady
 
 
 def _without_strain(scene: Scene, progress: Listener, stop: Callable[[], bool]) -> Outcome | None:
@@ -159,13 +157,9 @@ def _without_strain(scene: Scene, progress: Listener, stop: Callable[[], bool]) 
     Strain cannot be forgotten as contact forces can (`mechanics.dynamics.stopping.disproof`): what stones press against
     each other on the way to a rest stays. Rigid ones have no other forces than those that their loads bring about.
     """
-    blocks = tuple(
-        replace(block, fidelity=Fidelity.RIGID) if block.fidelity is Fidelity.DEFORMABLE else block
-        for block in scene.blocks
-    )
     time = replace(scene.time, start=Start.REST, stop_at_equilibrium=True)
     solver = replace(scene.solver, method=Method.AUTO)
-    rigid = replace(scene, blocks=blocks, time=time, solver=solver, frame_every=0)
+    rigid = replace(scene.rigid, time=time, solver=solver, frame_every=0)
     try:
         return simulate(rigid, lambda one: progress(replace(one, stage="confirm", total=None)), stop).outcome
     except SolverError:

@@ -10,7 +10,7 @@ stones whose compressive strength is known may also crush (`mechanics.limit.join
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from difflib import get_close_matches
 
 import numpy as np
@@ -23,7 +23,7 @@ from mechanics.limit.joints import Joints, StressBlocks, find_joints, stress_blo
 from mechanics.model.model import Model, build_model
 from mechanics.problem.forms import SparseForm
 from mechanics.scene.laws.law import STATE, Approach
-from mechanics.scene.scene import Fidelity, Scene
+from mechanics.scene.scene import Scene
 from mechanics.scene.state import State
 from moma.errors import SceneError
 
@@ -122,11 +122,8 @@ def assembly(scene: Scene) -> RigidAssembly:
     ------
     SceneError : no stone may move, or no joint is closed
     """
-    blocks = tuple(
-        replace(block, fidelity=Fidelity.RIGID) if block.fidelity is Fidelity.DEFORMABLE else block
-        for block in scene.blocks
-    )
-    model, state = build_model(replace(scene, blocks=blocks))
+    scene = scene.rigid
+    model, state = build_model(scene)
     free = np.flatnonzero(~model.fixed)
     if not len(free):
         raise SceneError("no stone may move", where=scene.name, remedy="fix the supports only")
@@ -144,7 +141,7 @@ def assembly(scene: Scene) -> RigidAssembly:
     form = found.operator.form
     assert isinstance(form, SparseForm)
     joints = find_joints(model, state, found.contacts)
-    crushes = [block.material.compressive_strength for block in blocks]
+    crushes = [block.material.compressive_strength for block in scene.blocks]
     return RigidAssembly(
         model=model,
         state=state,

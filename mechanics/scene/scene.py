@@ -3,7 +3,7 @@
 import math
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Annotated
 
@@ -402,3 +402,17 @@ class Scene:
         unknown = sorted(set(self.series) - set(codes))
         if unknown:
             raise SceneError(f"series names no block: {', '.join(unknown)}", where=self.name)
+
+    @property
+    def rigid(self) -> "Scene":
+        """The same scene with rigid stones in the place of those that deform."""
+        blocks = tuple(
+            replace(block, fidelity=Fidelity.RIGID) if block.fidelity is Fidelity.DEFORMABLE else block
+            for block in self.blocks
+        )
+        return replace(self, blocks=blocks)
+
+    @property
+    def steady(self) -> bool:
+        """True where loads and supports do not change, and no stone begins in motion."""
+        return not self.loads.until and not any(any(block.velocity) for block in self.blocks)

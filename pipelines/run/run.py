@@ -273,9 +273,10 @@ _SELF_STRESS = "rigid joints admit a rest as surveyed, held only by self-stress,
 def _by_self_stress(result: Result) -> bool:
     """Return whether forces between rigid joints could hold stones that do not stand, as no load brings them about."""
     scene = result.scene
-    still = not scene.loads.until and not any(any(block.velocity) for block in scene.blocks)
     rigid = all(block.fidelity is not Fidelity.DEFORMABLE for block in scene.blocks)
-    if not (still and rigid and result.outcome in (Outcome.COLLAPSED, Outcome.MOVING, Outcome.SETTLED)):
+    if not (
+        scene.steady and rigid and result.outcome in (Outcome.COLLAPSED, Outcome.MOVING, Outcome.SETTLED)
+    ):
         return False
     try:
         return admits_rest(scene)

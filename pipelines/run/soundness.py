@@ -161,11 +161,7 @@ def unsupported_stages(scene: SceneFile, assembly: Assembly) -> list[str]:
     remarks = []
     for entry, stage in zip(scene.stages, assembly.stages, strict=True):
         # what touches does not depend on meshes
-        blocks = tuple(
-            replace(one, fidelity=Fidelity.RIGID) if one.fidelity is Fidelity.DEFORMABLE else one
-            for one in stage.scene.blocks
-        )
-        loose = loose_blocks(*build_model(replace(stage.scene, blocks=blocks, loads=Loads())))
+        loose = loose_blocks(*build_model(replace(stage.scene.rigid, loads=Loads())))
         if loose:
             remarks.append(
                 f"{scene.document.where(*entry.path)}: in stage {stage.name!r} no chain of touching stones ties these "

@@ -172,11 +172,7 @@ def _in_rig(scene: SceneFile, stones: Scene, groups: Groups, rig: Rig) -> Scene:
         rig.pieces, general
     )
     rules = law_rules(scene.document, scene.laws, groups, materials, stones.contact.thickness)
-    blocks = tuple(
-        replace(block, fidelity=Fidelity.RIGID) if block.fidelity is Fidelity.DEFORMABLE else block
-        for block in stones.blocks
-    )
-    return replace(stones, blocks=blocks, contact=replace(stones.contact, rules=rules))
+    return replace(stones.rigid, contact=replace(stones.contact, rules=rules))
 
 
 def _headline(test: LoadingTest, band: Band | None) -> str:
