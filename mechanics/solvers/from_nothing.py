@@ -38,7 +38,7 @@ def rests_from_nothing(problem: ContactProblem) -> tuple[bool | None, Array]:
     """
     operator, pace = problem.delassus, float(np.abs(problem.u_free).max(initial=0.0))
     nothing = np.zeros_like(problem.u_free)
-    start, speeds, error = ContactStart(nothing, nothing), [], 0.0
+    start, slips, errors = ContactStart(nothing, nothing), [pace], [0.0]
     # each joint in the measure of its own stones: heavy ones hardly answer
     each = np.repeat(
         np.einsum("cii->c", operator.diagonal)[:, None] / nothing.shape[1], nothing.shape[1], axis=1
@@ -47,13 +47,15 @@ def rests_from_nothing(problem: ContactProblem) -> tuple[bool | None, Array]:
     for share in JOINTS:
         yields = share * each
         yielding = replace(problem, delassus=CompliantDelassus(operator, yields))
-        found = follow((link,), yielding, start, _LIMITS, link.iterations)
+        # to a tenth of what slips come down to where they vanish with E
+        exact = max(_LIMITS[1], _SMALL * JOINTS[1] / JOINTS[0] * slips[-1] / (pace or 1.0))
+        found = follow((link,), yielding, start, (_LIMITS[0], exact), link.iterations)
         start = ContactStart(found.impulse, found.velocity)
-        error = pace * residual(yielding, found.impulse).velocity
-        slips = operator.apply(found.impulse) + yields * found.impulse + problem.u_free
-        speeds.append(float(np.abs(slips).max(initial=0.0)))
-    *_, softer, harder = speeds
-    if harder + error <= max(_SMALL * softer, _LIMITS[1] * pace):
+        errors.append(pace * residual(yielding, found.impulse).velocity)
+        moved = operator.apply(found.impulse) + yields * found.impulse + problem.u_free
+        slips.append(float(np.abs(moved).max(initial=0.0)))
+    (*_, softer, harder), (*_, unsure, error) = slips, errors
+    if harder + error <= max(_SMALL * (softer - unsure), _LIMITS[1] * pace):
         return True, start.impulse
-    falls = harder - error > max(_SMALL * pace, _STAYS * softer)
+    falls = harder - error > max(_SMALL * pace, _STAYS * (softer + unsure))
     return (False if falls else None), start.impulse

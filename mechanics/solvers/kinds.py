@@ -11,7 +11,7 @@ import numpy as np
 
 from mechanics.problem.problem import ContactProblem
 from mechanics.solvers.chain import Begin, Link, Solver
-from mechanics.solvers.first_order.body_admm import SORTED, BodyADMM, Stage
+from mechanics.solvers.first_order.body_admm import RESTING, SORTED, BodyADMM, Stage
 from mechanics.solvers.first_order.disk_admm import DiskADMM
 from mechanics.solvers.first_order.nsgs import NSGS
 from mechanics.solvers.first_order.stones_as_rigid import StonesAsRigid
@@ -43,15 +43,15 @@ _FURTHER = 0.03
 # such a start, and η up to which forces of the last step lead them between deformable and rigid stones [-]
 _NEAR = 1e-3
 
-# joints of a rest hold as a rule: with a small penalty their forces arrive at once
-_HOLD = Stage(1e-3)
-# so do those of a motion, with a larger one
-_FOLLOW = Stage(FOLLOWING)
+# forces of a rest, and of what slides or opens little by little until it rests
+_HOLD, _DRIFT = (replace(stage, further=EXACT) for stage in (RESTING, SORTED[1]))
+# joints of a motion hold as a rule, too
+_FOLLOW = Stage(FOLLOWING, further=_FURTHER)
 
 _Method = Callable[[float, float, int], Solver]
-_rest: _Method = partial(BodyADMM, stages=(_HOLD, *SORTED), further=EXACT)
-_motion: _Method = partial(BodyADMM, stages=(_FOLLOW, *SORTED), further=_FURTHER)
-_loosely: _Method = partial(BodyADMM, stages=(_FOLLOW, *SORTED))
+_rest: _Method = partial(BodyADMM, stages=(SORTED[0], _HOLD, _DRIFT, _HOLD))
+_motion: _Method = partial(BodyADMM, stages=(_FOLLOW, *SORTED))
+_loosely: _Method = partial(BodyADMM, stages=(replace(_FOLLOW, further=1.0), *SORTED))
 # a look costs two sweeps over disks, an extrapolation ten
 _sweeps: _Method = partial(NSGS, check_every=PLAIN_LOOK, depth=0)
 

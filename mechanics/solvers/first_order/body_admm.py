@@ -26,7 +26,7 @@ from mechanics.solvers.first_order.body_factors import factorise
 from mechanics.solvers.scales import LOOK, MANY, OVERSHOOT, ROUNDING, SPARE
 from moma.errors import SolverError
 
-__all__ = ["SORTED", "STEADY", "BodyADMM", "Stage"]
+__all__ = ["RESTING", "SORTED", "STEADY", "BodyADMM", "Stage"]
 
 
 # velocities of a body
@@ -46,11 +46,14 @@ class Stage:
         slide and stick as the stage begins, which cost a factorisation of their own [-]
     iterations : their number
     extrapolated : from the iterates before (Anderson 1965)
+    further : tolerances over those asked for, of a stage that goes on at little cost: the next steps begin where the
+        last ones lead, and gain from what these go further [-]
     """
 
     penalty: float | tuple[float, float, float]
     iterations: int = 50
     extrapolated: bool = True
+    further: float = 1.0
 
 
 # penalty of contacts that slide [-]
@@ -62,6 +65,11 @@ _STICKING = 0.005
 _TURNS = (Stage(1.0, extrapolated=False), Stage((1.0, _SLIDING, _STICKING), extrapolated=False))
 SORTED = (Stage(1.0, LOOK, extrapolated=False), _TURNS[1])
 """The first turn: few iterations tell most contacts apart."""
+
+# penalty of those that stick in stones at rest: joints hold as a rule, and their forces arrive at once [-]
+_HOLDING = 1e-3
+RESTING = Stage((1.0, _SLIDING, _HOLDING))
+"""The forces of a rest, once contacts are sorted."""
 
 # penalty of all contacts that carries forces across stones whose masses differ by 10⁶ [-], and its iterations
 _CARRIES, _LONG = 0.02, 150
@@ -80,15 +88,12 @@ class BodyADMM:
     tolerance, velocity_tolerance, max_iterations : as in `NSGS`, iterations for sweeps
     stages : first, one after the other, as long as it is not solved; contacts that sort themselves follow in turns with
         forces that arrive, again and again
-    further : tolerances of the first stage over those asked for: the next steps begin where the last ones lead, and
-        gain from what these go further [-]
     """
 
     tolerance: float = 1e-6
     velocity_tolerance: float = 1e-5
     max_iterations: int = 1000
     stages: tuple[Stage, ...] = SORTED
-    further: float = 1.0
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from `start`; return the best of all looks.
@@ -150,13 +155,13 @@ class _Run:
         self._stages: Iterator[Stage] = chain(settings.stages, cycle(_TURNS))
         self._factors: kernel.Factors | None = None
         self._memory = _acceleration(0, 0)
-        self._until, self._first = 0, first.iterations
+        self._until, self._further = 0, first.further
         self.iterations, self.excess, self._change, self._limit = 0, np.inf, np.inf, 0.0
 
     @property
     def goal(self) -> float:
         """Errors over their tolerances at which the iteration ends [-]."""
-        return self._settings.further if self.iterations < self._first else 1.0
+        return 1.0 if 0 < self.iterations == self._until else self._further
 
     def iterate(self) -> None:
         """Make iterations until the next look."""
@@ -208,7 +213,7 @@ class _Run:
 
     def _begin(self, stage: Stage) -> None:
         """Go on with the penalty of a stage; y keeps its velocities."""
-        self._until += stage.iterations
+        self._until, self._further = self._until + stage.iterations, stage.further
         self._memory = _acceleration(_DEPTH if stage.extrapolated else 0, self._iterate.x.size)
         self._broken()
         x, z = _vectors(self._iterate.x), _vectors(self._z)
