@@ -467,6 +467,32 @@ def test_the_true_cause_is_ranked_first_and_its_amount_within_its_interval(truth
     assert verdict(done.ranking).startswith("no movement is needed")
 
 
+def test_what_cannot_be_told_apart_is_tried_beside_its_amounts_and_distrust_is_told(truth, tmp_path):
+    """Both hypotheses turn the stones; the runs of one of them do not come to rest."""
+    file = read_diagnosis(written(tmp_path, SCENE + HYPOTHESES))
+    pivot, along, course, motion = truth
+
+    def runs(places):
+        for case, (x,) in places:
+            fault = "its run did not come to rest: moving" if case.hypothesis.name == "sheared" else ""
+            yield Tried(turning(x, 0.0, pivot, along, list(course)), fault, 0.0)
+
+    found = surveyed(file, turned_wall(dict.fromkeys(course, motion), 3))
+    done = fit_cases(cases_of(file, {}), found.deformation, runs)
+    assert len(done.ranking.rivals) == 1
+    for one in done.ranking.hypotheses:
+        assert np.isfinite(one.estimates[0].run_sigma)
+        assert ("its run did not come to rest: moving" in one.remarks) == (one.name == "sheared")
+
+
+def test_stones_that_a_scene_leaves_out_stay_out_at_every_date(tmp_path):
+    text = SCENE.replace("[materials", '[select]\nexclude = ["loose"]\n[materials') + HYPOTHESES
+    file = read_diagnosis(written(tmp_path, text.replace("battered = true", 'phases = ["old", "new"]')))
+    whole, early = cases_of(file, {"a": "old", "b": "new"})[:2]
+    assert whole.scene(file, (1.0,))["select"]["exclude"] == ["loose"]
+    assert early.scene(file, (1.0,))["select"]["exclude"] == ["loose", "b"]
+
+
 @pytest.mark.parametrize("last", [3, 99])
 def test_a_movement_is_dated_by_the_phase_that_was_laid_level_over_it(truth, tmp_path, last):
     text = HYPOTHESES.replace("battered = true", 'battered = true\nphases = ["old", "new"]')
