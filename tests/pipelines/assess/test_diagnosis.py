@@ -468,18 +468,22 @@ def test_the_true_cause_is_ranked_first_and_its_amount_within_its_interval(truth
 
 
 def test_what_cannot_be_told_apart_is_tried_beside_its_amounts_and_distrust_is_told(truth, tmp_path):
-    """Both hypotheses turn the stones; the runs of one of them do not come to rest."""
+    """Both hypotheses turn the stones, but the other one of them by half; its runs do not come to rest."""
     file = read_diagnosis(written(tmp_path, SCENE + HYPOTHESES))
     pivot, along, course, motion = truth
 
     def runs(places):
         for case, (x,) in places:
-            fault = "its run did not come to rest: moving" if case.hypothesis.name == "sheared" else ""
-            yield Tried(turning(x, 0.0, pivot, along, list(course)), fault, 0.0)
+            whole = case.hypothesis.name == "turned"
+            fault = "" if whole else "its run did not come to rest: moving"
+            motions = turning(x, 0.0, pivot, along, list(course))
+            field = dict(motions.field) | {"W01-01": (1.0 if whole else 0.5) * motions.field["W01-01"]}
+            yield Tried(replace(motions, field=field), fault, 0.0)
 
     found = surveyed(file, turned_wall(dict.fromkeys(course, motion), 3))
     done = fit_cases(cases_of(file, {}), found.deformation, runs)
-    assert len(done.ranking.rivals) == 1
+    first, second = done.ranking.hypotheses
+    assert 0.1 < second.aicc - first.aicc < 5.0
     for one in done.ranking.hypotheses:
         assert np.isfinite(one.estimates[0].run_sigma)
         assert ("its run did not come to rest: moving" in one.remarks) == (one.name == "sheared")
