@@ -5,12 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.limit import facade_case
 from mechanics.dynamics.outcome import Outcome
 from mechanics.limit.assembly import assembly
 from mechanics.limit.confirm import Confirmation, ConfirmationRun, likeness
-from mechanics.limit.limit_load import Mechanism
+from mechanics.limit.limit_load import Flow, Mechanism, limit_load
+from mechanics.limit.live_loads import Acceleration
 from mechanics.limit.loading_test import loading_test
-from mechanics.limit.pushover import Pushover
+from mechanics.limit.pushover import Pushover, pushover
 from mechanics.limit.thrust import thrust
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.rig import Rig
@@ -78,6 +80,20 @@ def test_a_load_is_lost_after_its_peak_and_not_on_the_way_to_it():
     assert curve([0.1, 0.2], inertia=0.1).falls_to(0.1) == np.inf
 
 
+def test_the_load_that_sets_stones_in_motion_is_none_that_they_bear():
+    """A block that tips bears tan(α - θ); in the first interval of its curve 7 ‰ of the load make it move."""
+    wide, high, push = 0.3, 0.6, Acceleration((1.0, 0.0, 0.0))
+    on = assembly(scene(ground(), brick("a", (0, 0, 0), (wide, 1, high))))
+    found, seen = limit_load(on, push), []
+    # led as if the limit were 15 % higher, which takes fewer steps to motion
+    known = replace(found, multiplier=1.15 * found.multiplier)
+    told = pushover(on, push, known, wide / 2, 20, progress=seen.append, stop=lambda: len(seen) > 0)
+    slope, radius = np.arctan(wide / high), np.hypot(wide, high) / 2
+    assert told.inertia == pytest.approx([3.5e-3], rel=0.1)
+    tipped = slope - np.arcsin(np.sin(slope) - told.displacement / radius)
+    assert told.multiplier == pytest.approx(np.tan(slope - tipped), abs=4e-3)
+
+
 def test_what_moves_in_collapse_and_mechanism_alike_is_a_part_of_what_moves_in_either():
     """Of two equal stones one moves in the mechanism, and both, or the other alone, in the collapse."""
     on = assembly(scene(ground(), brick("a", (0, 0, 0), (1, 1, 1)), brick("b", (2, 0, 0), (3, 1, 1))))
@@ -89,6 +105,17 @@ def test_what_moves_in_collapse_and_mechanism_alike_is_a_part_of_what_moves_in_e
         found = likeness(on, mechanism, np.outer(moves, along))
         assert found.common == pytest.approx(common)
         assert found.collapse == pytest.approx(sum(moves) / 2)
+
+
+def test_the_higher_of_two_candidates_is_told_with_the_lower_beside_it():
+    """Of a façade of four courses with return walls, pushed out: 0.61 and 0.56."""
+    one = facade_case(4, 4, 2, 0.7, "out")
+    found = limit_load(one.assembly(), one.live, Flow.COULOMB)
+    assert found.converged
+    assert found.lower.converged
+    assert found.lowest is found.lower
+    assert found.multiplier > 1.03 * found.lowest.multiplier
+    assert found.lowest.multiplier == pytest.approx(0.557, rel=0.02)
 
 
 @pytest.fixture(scope="module")
