@@ -338,3 +338,15 @@ def test_a_relaxation_under_loads_that_change_leaves_out_inertia_and_says_so():
     assert said not in simulate(one).cautions
     ramp = replace(one, loads=Loads(gravity=(GravityRamp(0.05),)))
     assert said in simulate(ramp).cautions
+
+
+def test_a_stone_that_its_load_pushes_away_has_collapsed_on_level_ground():
+    """Pushed by its weight, against a friction of 0.6 of it: what falls along its load falls, wherever that points."""
+    push = StoneForce(frozenset({"a"}), History.constant([2000.0 * 0.4 * G, 0.0, 0.0]))
+    one = scene(ground(), brick("a", (0, 0, 0), (1, 1, 0.4)), step=5e-3, duration=1.0)
+    result = simulate(replace(one, loads=Loads(forces=(push,))))
+    assert result.outcome is Outcome.COLLAPSED
+    # the load points downwards by as much: its way along it is 1/√2 of that along the ground
+    along = result.bodies[1].displacement[:, 0].max() * np.sqrt(0.5)
+    assert along > one.time.collapse_displacement * 0.4
+    assert f"has sunk by {1e3 * along:.3g} mm" in result.reason
