@@ -17,7 +17,7 @@ from mechanics.scene.laws.mortar import MortarJoint
 from mechanics.scene.loads.forces import StoneForce
 from mechanics.scene.loads.gravity import GravityRamp
 from mechanics.scene.loads.load import Loads
-from mechanics.scene.loads.motions import ImposedMotion
+from mechanics.scene.loads.motions import ImposedMotion, settlement
 from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import ContactSettings, Fidelity, Method, SolverSettings, Start
 from mechanics.scene.shapes import bond, box, wall
@@ -247,6 +247,15 @@ def test_a_rest_before_the_last_load_has_come_is_no_equilibrium(share, rests):
     result = simulate(replace(one, loads=Loads(forces=(StoneForce(frozenset({"a"}), push),))))
     assert (result.outcome is Outcome.EQUILIBRIUM) == rests
     assert result.time > 0.15
+
+
+def test_a_rest_before_a_support_has_moved_is_no_equilibrium():
+    """The ground sinks by 20 mm between 0.1 and 0.15 s."""
+    one = scene(ground(), brick("a", (0, 0, 0), (1, 1, 0.4)), step=5e-3, duration=0.3)
+    result = simulate(replace(one, loads=Loads(motions=(settlement(["ground"], (0, 0, -0.02), 0.05, 0.1),))))
+    assert result.outcome is Outcome.EQUILIBRIUM
+    assert 0.15 < result.time < 0.25
+    assert result.bodies[1].displacement[:, 2] == pytest.approx(-0.02, abs=1e-5)
 
 
 def stepped(one):

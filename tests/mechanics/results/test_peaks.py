@@ -72,6 +72,19 @@ def test_the_series_holds_free_flight_and_then_the_weight(thrown):
     assert joints.shear[-1, 0] < 1e-3 * weight
 
 
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_joint_opens_by_its_widest_corner_whichever_that_is(way):
+    """A slender block begins to tip about an edge of its foot, to either side."""
+    block = brick("cube", (0, 0, 0), (0.25, 0.5, 1.0))
+    one = scene(
+        ground(), block, gravity=(0.5 * G * way, 0, -G), theta=0.5, duration=0.2, **(ALWAYS | {"step": 4e-3})
+    )
+    result = simulate(replace(one, series=("cube", "ground")))
+    turn = np.linalg.norm(result.series.turn[-1, 0])
+    assert turn > 0.02
+    assert result.series.joints.opening[-1, 0] == pytest.approx(0.25 * turn, rel=0.02)
+
+
 def test_turns_are_those_since_the_start():
     """A cube in free flight turns by ω t about its axis."""
     cube = brick("cube", (0, 0, 1), (0.5, 0.5, 1.5), velocity=(0, 0, 0, 0, 0, 2.0))
