@@ -143,7 +143,7 @@ def joint_results(
     return JointResult(
         bodies=bodies,
         parted=away & np.append(start.closed, np.zeros(count - len(start.face), dtype=bool)),
-        polygon=section.polygons(),
+        polygon=_shown(section, away).polygons(),
         frame=section.frame,
         centroid=section.centroid,
         area=section.area,
@@ -247,6 +247,12 @@ def _with_parted(
         middle=_put(then.middle, parted, then.middle[parted] + 0.5 * (gap - then.gap[parted])),
     )
     return _merged(section, moved, parted)
+
+
+def _shown(section: JointPolygons, parted: Bools) -> JointPolygons:
+    """Return the sections, those of parted joints on the second stone rather than half-way between both."""
+    beside = section.middle - 0.5 * section.gap
+    return replace(section, middle=np.where(parted[:, None], beside, section.middle))
 
 
 def _sides(section: JointPolygons, rows: Ints) -> tuple[Array, Array]:

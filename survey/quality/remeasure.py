@@ -251,7 +251,7 @@ def short_list(
             reason, action = f"{first.reason}; {one.reason}", first.action
             if one.action not in action:
                 action = f"{action}; {one.action}"
-            rows[key] = replace(first, reason=reason, action=action, changes=first.changes or changes)
+            rows[key] = replace(first, reason=reason, action=action)
         else:
             rows[key] = replace(one, changes=changes)
     ordered = sorted(rows.values(), key=lambda one: (one.changes is None, one.urgency, -one.severity))

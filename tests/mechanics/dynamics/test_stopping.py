@@ -5,10 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mechanics.dynamics.energy_balance import EnergyBalance
 from mechanics.dynamics.outcome import Outcome
+from mechanics.dynamics.rest.relaxation import Relaxation
+from mechanics.dynamics.simulation import Simulation
+from mechanics.dynamics.stopping import Watch
+from mechanics.model.model import build_model
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.elastic_joint import ElasticJoint
 from mechanics.scene.laws.mortar import MortarJoint
+from mechanics.scene.loads.forces import StoneForce
+from mechanics.scene.loads.gravity import GravityRamp
+from mechanics.scene.loads.load import Loads
+from mechanics.scene.loads.motions import ImposedMotion, settlement
+from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import ContactSettings, Fidelity, Method, SolverSettings, Start
 from mechanics.scene.shapes import bond, box, wall
 from mechanics.simulate import simulate
@@ -226,3 +236,126 @@ def test_what_dashpots_hold_for_a_while_does_not_rest(damping_time, outcome):
     law = ElasticJoint(0.6, normal_stiffness=1e6, shear_stiffness=1e6, damping_time=damping_time)
     one = scene(ground(), brick("a", (0, 0, 0), (0.5, 0.5, 0.5)), step=5e-3, duration=1.0, theta=1.0)
     assert simulate(replace(one, contact=ContactSettings(law))).outcome is outcome
+
+
+@pytest.mark.parametrize(("share", "rests"), [(0.5, True), (1.2, False)])
+def test_a_rest_before_the_last_load_has_come_is_no_equilibrium(share, rests):
+    """A block rests from the start; a push that is a share of its friction comes between 0.1 and 0.15 s."""
+    most = share * 0.6 * 2000.0 * 0.4 * G
+    push = History(np.array([0.1, 0.15]), np.array([[0.0, 0, 0], [most, 0, 0]]))
+    one = scene(ground(), brick("a", (0, 0, 0), (1, 1, 0.4)), step=5e-3, duration=0.3)
+    result = simulate(replace(one, loads=Loads(forces=(StoneForce(frozenset({"a"}), push),))))
+    assert (result.outcome is Outcome.EQUILIBRIUM) == rests
+    assert result.time > 0.15
+
+
+def test_a_rest_before_a_support_has_moved_is_no_equilibrium():
+    """The ground sinks by 20 mm between 0.1 and 0.15 s."""
+    one = scene(ground(), brick("a", (0, 0, 0), (1, 1, 0.4)), step=5e-3, duration=0.3)
+    result = simulate(replace(one, loads=Loads(motions=(settlement(["ground"], (0, 0, -0.02), 0.05, 0.1),))))
+    assert result.outcome is Outcome.EQUILIBRIUM
+    assert 0.15 < result.time < 0.25
+    assert result.bodies[1].displacement[:, 2] == pytest.approx(-0.02, abs=1e-5)
+
+
+def stepped(one):
+    """A scene, its start, and its first step."""
+    model, start = build_model(one)
+    return model, start, Simulation(model, start).step()
+
+
+def test_a_rest_lasts_for_five_steps_in_a_row():
+    """Balance that comes and goes is none, however often it comes."""
+    model, start, step = stepped(scene(ground(), brick("a", (0, 0, 0), (1, 1, 0.4)), step=5e-3))
+    watch, calm, not_calm = Watch(model, start), np.zeros(2), np.array([0.0, 1.0])
+    for _ in range(3):
+        assert [watch(step, calm) for _ in range(4)] == [Outcome.MOVING] * 4
+        assert watch(step, not_calm) is Outcome.MOVING
+    assert [watch(step, calm) for _ in range(5)] == [Outcome.MOVING] * 4 + [Outcome.EQUILIBRIUM]
+
+
+@pytest.mark.parametrize(
+    ("degrees", "aside", "outcome"),
+    [
+        (90.0, 0.5, Outcome.COLLAPSED),  # it lies on its side, as high as before
+        (90.0, 0.0, Outcome.COLLAPSED),  # its corners are elsewhere all the same
+        (5.0, 0.5, Outcome.SETTLED),
+        (0.0, 0.0, Outcome.EQUILIBRIUM),
+    ],
+)
+def test_a_stone_at_rest_on_its_side_has_toppled_without_having_sunk(degrees, aside, outcome):
+    model, start, step = stepped(scene(ground(), brick("a", (0, 0, 0), (0.5, 0.5, 0.5)), step=5e-3))
+    turn = np.radians(degrees)
+    about = np.array([[np.cos(turn), 0, np.sin(turn)], [0, 1, 0], [-np.sin(turn), 0, np.cos(turn)]])
+    after = replace(
+        step.after,
+        centre=start.centre + np.array([[0.0, 0.0, 0.0], [aside, 0.0, 0.0]]),
+        rotation=np.array([np.eye(3), about]),
+        velocity=np.zeros((2, 6)),
+    )
+    watch, lying = Watch(model, start), replace(step, after=after)
+    assert [watch(lying, np.zeros(2)) for _ in range(5)][-1] is outcome
+    if outcome is Outcome.COLLAPSED:
+        reason = watch.verdict(outcome, None).reason
+        assert reason == "stone a has fallen or toppled, and lies 0 mm lower"
+
+
+def test_supports_that_drive_apart_are_not_what_moves():
+    """Two grounds part at 0.5 m/s each; a stone between them slides at a tenth of that."""
+    away = [
+        ImposedMotion(frozenset({code}), History.constant([way, 0.0, 0.0]))
+        for code, way in (("left", -0.5), ("right", 0.5))
+    ]
+    stone = brick("a", (0, 0, 0), (1, 1, 0.4), velocity=(0.05, 0, 0, 0, 0, 0))
+    grounds = [ground((x, -2, -1), (x + 1, 3, 0), code) for x, code in ((-5, "left"), (5, "right"))]
+    one = scene(ground(), *grounds, stone, gravity=(0.0, 0.0, 0.0), step=5e-3, duration=0.05)
+    result = simulate(replace(one, loads=Loads(motions=tuple(away))))
+    assert result.outcome is Outcome.MOVING
+    assert result.reason == "stone a moves at 50 mm/s"
+
+
+def test_a_relaxation_forgets_the_energy_that_it_has_taken():
+    """Halted after its peak, a motion begins anew, and goes on as long as its energy grows."""
+    one = scene(ground(), brick("a", (0, 0, 0), (1, 1, 0.4)), relaxation=True)
+    model, state = build_model(one)
+    relax, halts = Relaxation(model), []
+    for pace in (1.0, 2.0, 1.5, 0.5, 1.0, 0.9):
+        moving = replace(state, velocity=np.array([[0.0] * 6, [pace, 0, 0, 0, 0, 0]]))
+        halts.append(not relax(moving).velocity.any())
+    assert halts == [False, False, True, False, False, True]
+
+
+def test_a_halt_takes_its_energy_from_the_balance():
+    """A stone in flight is halted between two steps, and falls on from there."""
+    flying = brick("a", (0, 0, 5), (1, 1, 5.4), velocity=(1.0, 0, 2.0, 0, 0, 0))
+    model, start = build_model(scene(ground(), flying, step=5e-3))
+    simulation, balance = Simulation(model, start), EnergyBalance(model, start)
+    for count in range(6):
+        if count == 3:
+            balance.halted(simulation.state)
+            simulation.halt(simulation.state.time)
+        balance(simulation.step())
+    # ½ m v² with v_z = 2 m/s - 3 g h
+    taken = 0.5 * 2000.0 * 0.4 * (1.0 + (2.0 - 3 * G * 5e-3) ** 2)
+    assert balance.scheme == pytest.approx(taken, rel=0.02)
+    assert balance.error < 1e-9
+
+
+def test_a_relaxation_under_loads_that_change_leaves_out_inertia_and_says_so():
+    one = scene(ground(), brick("a", (0, 0, 0), (1, 1, 0.4)), step=5e-3, relaxation=True)
+    said = "relaxation left out the inertia of the motion while loads or supports changed"
+    assert said not in simulate(one).cautions
+    ramp = replace(one, loads=Loads(gravity=(GravityRamp(0.05),)))
+    assert said in simulate(ramp).cautions
+
+
+def test_a_stone_that_its_load_pushes_away_has_collapsed_on_level_ground():
+    """Pushed by its weight, against a friction of 0.6 of it: what falls along its load falls, wherever that points."""
+    push = StoneForce(frozenset({"a"}), History.constant([2000.0 * 0.4 * G, 0.0, 0.0]))
+    one = scene(ground(), brick("a", (0, 0, 0), (1, 1, 0.4)), step=5e-3, duration=1.0)
+    result = simulate(replace(one, loads=Loads(forces=(push,))))
+    assert result.outcome is Outcome.COLLAPSED
+    # the load points downwards by as much: its way along it is 1/√2 of that along the ground
+    along = result.bodies[1].displacement[:, 0].max() * np.sqrt(0.5)
+    assert along > one.time.collapse_displacement * 0.4
+    assert f"has sunk by {1e3 * along:.3g} mm" in result.reason

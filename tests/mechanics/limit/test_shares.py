@@ -17,6 +17,7 @@ from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import ContactSettings, Scene
 from mechanics.scene.shapes import prism
+from moma.errors import SceneError
 from tests.mechanics.shapes import brick, ground, scene
 from tests.validation.masonry import semicircular_arch
 
@@ -45,6 +46,14 @@ def test_a_force_is_that_of_the_instant_and_stays():
     halfway = at_instant(one, 1.0)
     assert assembly(halfway).dead[0] == pytest.approx(40.0)
     assert halfway.loads.until == 0.0
+
+
+def test_a_gap_counts_as_closed_by_the_smaller_stone():
+    """A thousandth of a stone 0.2 m wide, whatever it stands on."""
+    closed = assembly(scene(ground(), brick("a", (0, 0, 1e-4), (0.2, 0.3, 0.5))))
+    assert closed.widest == pytest.approx(1e-4)
+    with pytest.raises(SceneError, match="no joint is closed"):
+        assembly(scene(ground(), brick("a", (0, 0, 5e-4), (0.2, 0.3, 0.5))))
 
 
 def test_the_share_of_the_mass_is_that_of_the_code():

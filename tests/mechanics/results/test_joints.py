@@ -12,6 +12,9 @@ from mechanics.results.interfaces import placed_faces
 from mechanics.results.joints import joint_results, parting, starting_joints
 from mechanics.results.postprocess import Observer
 from mechanics.scene.laws.mortar import MortarJoint
+from mechanics.scene.loads.load import Loads
+from mechanics.scene.loads.motions import ImposedMotion
+from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import Fidelity, Part
 from mechanics.simulate import simulate
 from tests.mechanics.shapes import BOX_FACES, brick, detected, ground, moved, scene
@@ -182,14 +185,18 @@ def test_a_joint_that_has_parted_is_not_forgotten():
     assert joints.open[0] == 1.0
     assert np.isnan(joints.kern[0])
     assert joints.force[0] == pytest.approx([0.0, 0.0, 0.0])
-    assert len(joints.polygon[0]) == 4
+    # what was the joint goes with the second stone
+    foot = result.bodies[1].position[result.bodies[1].reference[:, 2] == 0.0]
+    assert sorted(joints.polygon[0].tolist()) == pytest.approx(np.array(sorted(foot.tolist())))
+    assert joints.centroid[0] == pytest.approx(foot.mean(axis=0))
 
 
-def test_stones_that_were_only_near_each_other_do_not_part():
-    """A block that flies past 20 mm above the ground has not left it, but the gap has grown."""
+@pytest.mark.parametrize("gap", [0.007, 0.02])
+def test_stones_that_were_only_near_each_other_do_not_part(gap):
+    """A block that flies past above the ground, by more than a hundredth of its width, has not left it."""
     one = scene(
         ground(),
-        brick("a", (0, 0, 0.02), (0.5, 0.5, 0.52), velocity=(0, 0, 2.0, 0, 0, 0)),
+        brick("a", (0, 0, gap), (0.5, 0.5, gap + 0.5), velocity=(0, 0, 2.0, 0, 0, 0)),
         step=1e-3,
         duration=0.1,
         **FALLING,
@@ -197,7 +204,7 @@ def test_stones_that_were_only_near_each_other_do_not_part():
     result = simulate(one)
     assert result.joints.parted.tolist() == [False]
     assert result.joints.opening[0] == pytest.approx(result.bodies[1].displacement[0, 2])
-    assert result.joints.gap[0] == pytest.approx(result.bodies[1].displacement[0, 2] + 0.02)
+    assert result.joints.gap[0] == pytest.approx(result.bodies[1].displacement[0, 2] + gap)
 
 
 def test_a_joint_that_is_found_later_comes_after_those_of_the_start():
@@ -296,6 +303,21 @@ def test_a_stone_of_two_parts_has_a_joint_for_each_face_that_touches():
     assert sorted(result.joints.centroid[:, 0]) == pytest.approx([0.15, 0.85], abs=1e-6)
     weight = DENSITY * G * (1.0 - 0.4 * 0.6)
     assert -result.joints.force[:, 2] == pytest.approx([weight / 2] * 2, rel=1e-4)
+
+
+def test_contact_points_are_where_the_stones_are_at_the_end():
+    """A block rides on ground that goes by 20 mm in a step."""
+    ride = ImposedMotion(frozenset({"ground"}), History.constant([2.0, 0.0, 0.0]))
+    block = brick("a", (0, 0, 0), (0.5, 0.5, 0.5), velocity=(2.0, 0, 0, 0, 0, 0))
+    one = replace(scene(ground(), block, step=0.01, duration=0.05), loads=Loads(motions=(ride,)))
+    result = simulate(one)
+    foot = result.bodies[1].position[result.bodies[1].reference[:, 2] == 0.0]
+    assert foot[:, 0].min() == pytest.approx(0.1, abs=1e-6)
+    there = [
+        result.contacts.point[np.lexsort(result.contacts.point.T.round(3))],
+        foot[np.lexsort(foot.T.round(3))],
+    ]
+    np.testing.assert_allclose(*there, atol=1e-6)
 
 
 def test_edges_make_no_joint():

@@ -11,10 +11,11 @@ from mechanics.scene.loads.forces import StoneForce
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.motions import ImposedMotion
 from mechanics.scene.loads.time_series import History
-from mechanics.scene.scene import Fidelity
+from mechanics.scene.scene import Fidelity, Part
 from mechanics.simulate import simulate
 from mechanics.stones.elasticity.tensors import principal, von_mises
-from tests.mechanics.shapes import brick, ground, scene
+from tests.mechanics.shapes import BOX_FACES, brick, ground, scene
+from tests.pipelines.results_by_hand import box
 
 G, DENSITY = 9.81, 2000.0
 STEP = 1e-3
@@ -69,6 +70,19 @@ def test_the_series_holds_free_flight_and_then_the_weight(thrown):
     assert (joints.normal[flying & (series.time > 0.01), 0] == 0).all()
     assert joints.normal[-1, 0] == pytest.approx(weight, rel=1e-2)
     assert joints.shear[-1, 0] < 1e-3 * weight
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_joint_opens_by_its_widest_corner_whichever_that_is(way):
+    """A slender block begins to tip about an edge of its foot, to either side."""
+    block = brick("cube", (0, 0, 0), (0.25, 0.5, 1.0))
+    one = scene(
+        ground(), block, gravity=(0.5 * G * way, 0, -G), theta=0.5, duration=0.2, **(ALWAYS | {"step": 4e-3})
+    )
+    result = simulate(replace(one, series=("cube", "ground")))
+    turn = np.linalg.norm(result.series.turn[-1, 0])
+    assert turn > 0.02
+    assert result.series.joints.opening[-1, 0] == pytest.approx(0.25 * turn, rel=0.02)
 
 
 def test_turns_are_those_since_the_start():
@@ -156,3 +170,42 @@ def test_a_stone_on_a_splinter_says_nothing_of_pressure():
     assert narrow.any()
     np.testing.assert_array_equal(joints.sliver, narrow)
     assert result.peaks.pressure.value.max() == pytest.approx(joints.pressure_max[~narrow].max())
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_joints_of_two_stones_keep_their_forces_apart_whichever_stone_is_first(order):
+    """A stone of 9.81 kN in a slot, without friction, pushed against its right side by 3 kN."""
+    parts = ((-1, -1, -1), (2, 2, 0)), ((-1, -1, 0), (0, 2, 1)), ((1, -1, 0), (2, 2, 1))
+    ring = [(-1, -1), (2, -1), (2, 1), (1, 1), (1, 0), (0, 0), (0, 1), (-1, 1)]
+    outline = np.array([[x, y, z] for y in (-1, 2) for x, z in ring], dtype=float)
+    front = tuple(range(8))
+    sides = [(a, a + 8, (a + 1) % 8 + 8, (a + 1) % 8) for a in front]
+    slot = replace(
+        brick("slot", *parts[0], Fidelity.FIXED),
+        vertices=outline,
+        faces=(front, tuple(a + 8 for a in reversed(front)), *sides),
+        parts=tuple(Part(box(*one), BOX_FACES) for one in parts),
+    )
+    stones = (slot, brick("stone", (0, 0, 0), (1, 1, 0.5)))[::order]
+    push = StoneForce(frozenset({"stone"}), History.constant([3e3, 0.0, 0.0]))
+    one = scene(*stones, friction=0.0, step=5e-3, duration=0.1)
+    result = simulate(replace(one, loads=Loads(forces=(push,)), series=("stone", "slot")))
+    joints = result.joints
+    across = np.einsum("ji,ji->j", joints.force, joints.frame[:, 0])
+    assert sorted(across) == pytest.approx([0.0, 3e3, 9810.0], rel=1e-6, abs=1e-3)
+    assert result.series.joints.normal[-1] == pytest.approx(across, rel=1e-6, abs=1e-3)
+
+
+def test_shear_reaction_and_pressure_have_instants_of_their_own():
+    """A stone of W = 530 N on a wide ground is pushed aside by 0.2 kN at 0.1 s, and down by 1 kN at 0.2 s."""
+    at = np.array([0.05, 0.1, 0.15, 0.2, 0.25])
+    aside, down = (np.array(one)[:, None] for one in ([0, 200.0, 0, 0, 0], [0, 0, 0, -1e3, 0]))
+    push = History(at, aside * [1.0, 0, 0] + down * [0, 0, 1.0])
+    one = scene(ground(), brick("cube", (0, 0, 0), (0.3, 0.3, 0.3)), step=5e-3, duration=0.3)
+    peaks = simulate(replace(one, loads=Loads(forces=(StoneForce(frozenset({"cube"}), push),)))).peaks
+    most = DENSITY * G * 0.3**3 + 1e3
+    assert (peaks.shear.value, peaks.shear.time) == pytest.approx((200.0, 0.1), rel=0.06)
+    assert (peaks.reaction.value, peaks.reaction.time) == pytest.approx((most, 0.2), rel=0.06)
+    assert peaks.shear.end == pytest.approx(0.0, abs=0.1)
+    assert peaks.pressure.time == pytest.approx([0.2, 0.2], abs=0.01)
+    assert (peaks.pressure.value > 0.9 * most / 0.09).all()

@@ -8,13 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from moma.errors import SceneError
 from pipelines.assess.compare import facades_of
 from pipelines.assess.diagnosis.dating import date_movement
 from pipelines.assess.diagnosis.file import Unknown, read_diagnosis
 from pipelines.assess.diagnosis.fit import Fit, fit
-from pipelines.assess.diagnosis.measurements import measure
+from pipelines.assess.diagnosis.measurements import Measurements, measure
 from pipelines.assess.diagnosis.ranking import STILL, Ranking, rank, verdict, with_others
 from pipelines.assess.diagnosis.search import cases_of, fit_cases, kept_runner, runs_of
 from pipelines.assess.diagnosis.smoothness import probes, with_unevenness
@@ -26,6 +27,7 @@ from pipelines.samples.frame import RigidMotion
 from pipelines.scene.file import parse_scene
 from pipelines.toml.lines import parse_toml
 from pipelines.toml.writer import toml_text
+from survey.quality.deformation import Deformation
 from survey.quality.precision import appraise
 from tests.paths import ROOT
 
@@ -338,6 +340,58 @@ def test_the_first_line_gives_the_verdict_with_its_caution():
     assert verdict(level).startswith("no movement is needed")
 
 
+def test_still_stones_are_no_answer_where_a_movement_explains_far_better():
+    """χ² 60 of 50 may be chance; but 30 with one amount is 28 less in AICc."""
+    still = still_of(60.0, 50)
+    assert still.explains
+    assert verdict(Ranking((hypothesis("a", 30.0),), still)).startswith("'a' explains what was measured")
+    assert verdict(Ranking((hypothesis("a", 57.0),), still)).startswith("no movement is needed")
+
+
+def fitted(chi2, unknowns):
+    return Fit((0.03,) * unknowns, np.full(1, chi2**0.5), 1e-6 * np.eye(unknowns), (), 3)
+
+
+def test_few_values_make_each_amount_dearer():
+    """AICc = χ² + 2k + 2k (k + 1)/(n - k - 1) (Hurvich & Tsai 1989), with n = 10."""
+    for count, added in ((0, 0.0), (1, 2.0 + 4.0 / 8.0), (2, 4.0 + 12.0 / 7.0)):
+        names = [unknown(f"{k}") for k in range(count)]
+        assert rank("x", (), names, fitted(8.0, count), 10, 0).aicc == pytest.approx(8.0 + added)
+
+
+def test_a_scatter_that_few_steps_tell_makes_a_large_misfit_likelier():
+    """χ² over its degrees of freedom follows F(dof, steps), not χ² alone."""
+    few, exact = (rank("x", (), [unknown("a")], fitted(80.0, 1), 51, steps) for steps in (12, 0))
+    assert few.probability == pytest.approx(stats.f.sf(80.0 / 50.0, 50, 12), rel=1e-6)
+    assert exact.probability == pytest.approx(stats.chi2.sf(80.0, 50), rel=1e-4)
+    assert few.explains
+    assert not exact.explains
+
+
+def test_an_interval_is_as_wide_as_the_misfit_says():
+    """Residuals of twice their standard deviation double it; smaller ones than expected do not narrow it."""
+    student = stats.t.ppf(0.975, 50)
+    for chi2, wider in ((20.0, 1.0), (50.0, 1.0), (200.0, 2.0)):
+        (one,) = rank("x", (), [unknown("a")], fitted(chi2, 1), 51, 0).estimates
+        assert one.high - one.value == pytest.approx(wider * student * 1e-3)
+        assert one.value - one.low == pytest.approx(wider * student * 1e-3)
+
+
+def test_a_date_is_as_certain_as_the_nearest_other_one(tmp_path):
+    text = HYPOTHESES.replace("battered = true", 'phases = ["old", "later", "new"]')
+    file = read_diagnosis(written(tmp_path, SCENE + text))
+    dates = [
+        replace(hypothesis("turned", chi2), stood=file.phases[:count])
+        for chi2, count in ((40.0, 1), (55.0, 2), (90.0, 3))
+    ]
+    nothing = Measurements((), (), Deformation((), {}, 0), {}, frozenset())
+    dating = date_movement(file, Ranking(tuple(dates), still_of(900.0, 50)), nothing, Motions({}, {}))
+    assert dating.verdict == (
+        "the movement is younger than phase old and older than phase later "
+        "(AICc of other dates larger by 15 or more)"
+    )
+
+
 def turning(angle, slip, pivot, along, codes):
     """Motions of stones that turn in the plane of the wall and slip over each other [mm/m]."""
     up = np.array([0.0, 0.0, 1.0])
@@ -411,6 +465,36 @@ def test_the_true_cause_is_ranked_first_and_its_amount_within_its_interval(truth
     unmoved = surveyed(file, laid())
     done = fit_cases(cases, unmoved.deformation, answers(truth))
     assert verdict(done.ranking).startswith("no movement is needed")
+
+
+def test_what_cannot_be_told_apart_is_tried_beside_its_amounts_and_distrust_is_told(truth, tmp_path):
+    """Both hypotheses turn the stones, but the other one of them by half; its runs do not come to rest."""
+    file = read_diagnosis(written(tmp_path, SCENE + HYPOTHESES))
+    pivot, along, course, motion = truth
+
+    def runs(places):
+        for case, (x,) in places:
+            whole = case.hypothesis.name == "turned"
+            fault = "" if whole else "its run did not come to rest: moving"
+            motions = turning(x, 0.0, pivot, along, list(course))
+            field = dict(motions.field) | {"W01-01": (1.0 if whole else 0.5) * motions.field["W01-01"]}
+            yield Tried(replace(motions, field=field), fault, 0.0)
+
+    found = surveyed(file, turned_wall(dict.fromkeys(course, motion), 3))
+    done = fit_cases(cases_of(file, {}), found.deformation, runs)
+    first, second = done.ranking.hypotheses
+    assert 0.1 < second.aicc - first.aicc < 5.0
+    for one in done.ranking.hypotheses:
+        assert np.isfinite(one.estimates[0].run_sigma)
+        assert ("its run did not come to rest: moving" in one.remarks) == (one.name == "sheared")
+
+
+def test_stones_that_a_scene_leaves_out_stay_out_at_every_date(tmp_path):
+    text = SCENE.replace("[materials", '[select]\nexclude = ["loose"]\n[materials') + HYPOTHESES
+    file = read_diagnosis(written(tmp_path, text.replace("battered = true", 'phases = ["old", "new"]')))
+    whole, early = cases_of(file, {"a": "old", "b": "new"})[:2]
+    assert whole.scene(file, (1.0,))["select"]["exclude"] == ["loose"]
+    assert early.scene(file, (1.0,))["select"]["exclude"] == ["loose", "b"]
 
 
 @pytest.mark.parametrize("last", [3, 99])

@@ -162,3 +162,11 @@ def test_a_scene_that_does_not_rest_without_any_cause_is_told():
     assert since_rest(tried, fallen).motions is None
     assert since_rest(fallen, tried).fault == fallen.fault
     assert since_rest(tried, replace(tried, fault="moving")).fault == "without any cause: moving"
+
+
+def test_a_run_that_collapses_has_no_motions(url, tmp_path):
+    """The block weighs 19.6 kN, and is pushed away by 20 kN."""
+    push = '[[loads]]\ntype = "force"\nstones = ["A"]\nforce = [20e3, 0.0, 0.0]\n'
+    text = SCENE.split("[[hypotheses]]")[0].replace("[diagnosis]", "") + push
+    tried = run_trial(Trial(text, str(tmp_path / "scene.toml"), url))
+    assert (tried.motions, tried.fault) == (None, "the run ended in collapse")

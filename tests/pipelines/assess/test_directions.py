@@ -14,7 +14,7 @@ from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.motions import settlement
 from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import Scene
-from mechanics.scene.shapes import bond, box, drum, wall
+from mechanics.scene.shapes import bond, box, drum, prism, wall
 from moma.errors import SceneError
 from pipelines.assess.directions import facade_pushes, push, weakest_push
 from tests.mechanics.shapes import brick, ground, moved, scene
@@ -44,6 +44,13 @@ def test_walls_that_meet_askew_have_pushes_of_their_own():
     assert len(facade_pushes(both)) == 8
 
 
+def test_the_ground_is_no_facade():
+    """A footing that stands askew below the wall is not pushed."""
+    stones = turned(wall(bond(4, 4), 0.4, 0.2, 0.2), 28.0)
+    footing = ground((-3.0, -3.0, -1.0), (6.0, 6.0, 0.0))
+    assert facade_pushes((footing, *stones)) == facade_pushes(stones)
+
+
 def test_a_round_tower_is_pushed_along_the_axes():
     stones = [drum("d", RING, RING, (0.0, 0.5))]
     assert [one.name for one in facade_pushes(stones)][:2] == ["horizontal x", "horizontal -x"]
@@ -55,6 +62,13 @@ def test_the_weakest_push_of_a_wall_is_square_to_it():
     angle = float(found.name.split()[1])
     assert min(abs(angle - 118), abs(angle - 298)) < 6
     assert found.name.endswith("(weakest)")
+
+
+def test_the_weakest_push_has_a_sense():
+    """A stone whose weight lies near its back tips backwards first."""
+    leaning = prism("leaning", [(0.0, 0.0), (0.6, 0.0), (0.1, 2.0), (0.0, 2.0)], 1.0)
+    found = weakest_push(assembly(scene(ground(), leaning)))
+    assert found.name == "horizontal -x (weakest)"
 
 
 def test_an_angle_near_an_axis_is_named_by_it():

@@ -9,6 +9,8 @@ from survey.quality.courses import measure_courses
 from survey.quality.facades import find_facades
 from survey.quality.movement import compare_courses, compare_plumb
 from survey.quality.precision import appraise
+from tests.survey.quality.departures import walls_by_hand
+from tests.survey.quality.plain_stones import facades_of
 
 
 def surveyed(building):
@@ -103,3 +105,18 @@ def test_another_movement_does_not_explain_it(tilted):
     for one in none:
         assert one.misfit.chi2 == pytest.approx(one.misfit.still, rel=1e-9)
         assert one.slope == pytest.approx(0.0, abs=1e-12)
+
+
+def test_beds_that_scatter_are_known_no_better_than_they_scatter():
+    """Beds laid to 8 mm, measured to 1 mm: at rest they depart from their course by one σ, not by eight."""
+    stones = walls_by_hand.wall(21, beds=0.008, sigma=0.001)
+    lines = measure_courses(stones, facades_of(stones))
+    beds = [
+        one
+        for course in compare_courses(lines, lambda code, points: np.zeros_like(points))
+        for one in course.stones.values()
+    ]
+    assert np.mean([one.sigma for one in beds]) == pytest.approx(0.008, rel=0.25)
+    assert np.std([(one.measured - one.simulated) / one.sigma for one in beds]) == pytest.approx(
+        1.0, abs=0.25
+    )

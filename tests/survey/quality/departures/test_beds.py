@@ -196,6 +196,10 @@ def test_the_lift_of_a_movement_is_what_was_put_in() -> None:
     one = only(wall(3, lambda s, c: -0.02 if s > 3.0 else 0.0, beds=0.0, sigma=0.0001))
     places = np.array([-2.0, 2.0])
     assert one.lift(places, (-MIDDLE, MIDDLE)) == pytest.approx([0.0, -0.02], abs=1e-3)
+    # where the left side sank the right side lies higher, and it is the left that moved
+    left = only(wall(3, lambda s, c: -0.02 if s < 3.0 else 0.0, beds=0.0, sigma=0.0001))
+    assert left.amount > 0.0
+    assert left.lift(places, (-MIDDLE, MIDDLE)) == pytest.approx([-0.02, 0.0], abs=1e-3)
     sag = only(wall(3, lambda s, c: -0.02 * (1 - (s / 2.9 - 1) ** 2), beds=0.0, sigma=0.0005))
     assert sag.lift(np.array([-MIDDLE, 0.0, MIDDLE]), (-MIDDLE, MIDDLE)) == pytest.approx(
         [0.0, sag.amount, 0.0]

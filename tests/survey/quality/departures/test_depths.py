@@ -100,7 +100,10 @@ def test_a_stone_longer_than_the_wall_is_thick_comes_out_of_the_opposite_face() 
 def test_all_depths_may_be_wrong_together(depth: float, doubted: bool) -> None:
     """A face of 0.49 by 0.30 m: a slab of 5 cm, or a beam of more than six times its length."""
     stones = row(3, depth=depth)
-    assert [one.against for one in found(stones)] == ["own face"] * (3 if doubted else 0)
+    doubts = found(stones)
+    assert [one.against for one in doubts] == ["own face"] * (3 if doubted else 0)
+    nearest = 0.2 * 0.3 if depth < 1.0 else 6.0 * 0.49
+    assert [one.expected for one in doubts] == pytest.approx([nearest] * len(doubts))
 
 
 def test_the_worst_comes_first_and_a_stone_once() -> None:

@@ -190,6 +190,24 @@ def test_what_is_excluded_would_have_been_found() -> None:
     assert stone >= 9
 
 
+def test_nineteen_of_twenty_movements_of_the_size_that_is_excluded_are_found() -> None:
+    """Of those that just reach the critical value half are found."""
+    shapes = (lambda c: 1.0 - (2.0 * (c - 1) / 4.0 - 1.0) ** 2, lambda c: (c - 1) / 4.0)
+    found = 0
+    for seed in range(10):
+        size = face_of(wall(seed, courses=5, length=4.0)).excluded
+        assert size is not None
+        for shape in shapes:
+            moved = wall(
+                seed,
+                courses=5,
+                length=4.0,
+                out=lambda s, c, size=size, shape=shape: size * shape(c),  # type: ignore[misc]
+            )
+            found += bool(face_of(moved).movements)
+    assert found >= 17
+
+
 def test_a_facade_without_enough_stones_is_not_judged() -> None:
     stones = wall(13, courses=1, length=2.0)
     assert find_face_departures(stones, facades_of(stones), 0.003) == ()

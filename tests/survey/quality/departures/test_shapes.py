@@ -76,6 +76,9 @@ def test_a_frame_that_may_be_tilted_explains_a_tilt_but_no_step():
     assert shaken[1] == pytest.approx(math.hypot(level[1], 0.045))
     assert shaken[0] == pytest.approx(math.hypot(level[0], 0.025))  # a tilt looks like a step of 5 stones
     assert fit_shapes(sample(tilted, tilt=0.005), [STEP, TILT], FIELDS, RUNS, 0.01)[0] == []
+    # 20 mm are more than a frame that is level to 4.5 mm over the wall explains, and known no better than it
+    (uncertain,), _ = fit_shapes(sample(tilted, tilt=0.0005), [STEP, TILT], FIELDS, RUNS, 0.01)
+    assert uncertain.sigma == pytest.approx(math.hypot(found.sigma, 0.0045))
 
 
 def test_what_a_shape_leaves_because_it_does_not_fit_exactly_is_no_movement():
