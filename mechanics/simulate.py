@@ -202,7 +202,7 @@ def _simulate(
             if other is not None:
                 if settings.relaxation:
                     log.energy.halted(run.simulation.state)
-                outcome, run.simulation = watch.disproved(), other
+                outcome, run.simulation = watch.disproved(run.simulation.state), other
         text = f"balance {balance.max():.1e}, η {step.solution.natural_map:.1e}"
         report(Progress("step", count, total, text))
         done = settings.stop_at_equilibrium and outcome is not Outcome.MOVING

@@ -35,6 +35,7 @@ _DOUBT = 0.5  # velocity that unsolved steps may have added, over that of a prov
 _RELEASED = 50  # most steps in which a rest must show that it lasts without its forces
 _UNFILLED = 0.01  # area of joints that mortar does not fill, over that which it was to fill, that is told [-]
 _LOWER = 0.7  # way along the load over the whole way from which a stone has sunk rather than moved aside [-]
+_CLAMPED = "held only by self-stress, which no load applies: rigid joints admit this rest and a motion"
 _STAYS = 1e-3  # displacement over the width within which a released stone stays where it rested [-]
 
 
@@ -70,8 +71,9 @@ class Watch(Carrier):
     """
 
     CARRIED = (
-        "_clamped", "_compliant", "_culprit", "_deepest", "_depth", "_doubt", "_fastest", "_moved", "_pair", "_quiet",
-        "_speed", "_steps", "_still", "_sunk", "_unbonded", "_unsolved", "_worst_error", "rest_time",
+        "_clamped", "_comes_back", "_compliant", "_culprit", "_deepest", "_depth", "_doubt", "_doubted", "_fastest",
+        "_moved", "_pair", "_quiet", "_speed", "_steps", "_still", "_sunk", "_unbonded", "_unsolved", "_worst_error",
+        "rest_time",
     )  # fmt: skip
     REBUILT = ("_model", "_start")
 
@@ -81,7 +83,8 @@ class Watch(Carrier):
         self._doubt = self._worst_error = self._fastest = 0.0
         self._still = False
         self._culprit, self._sunk, self._moved, self._speed = 0, 0.0, 0.0, 0.0
-        self._clamped = False
+        self._clamped = self._comes_back = False
+        self._doubted = start
         self._compliant, self._deepest, self._depth, self._pair = 0, 0.0, 0.0, (0, 0)
         self._unbonded: tuple[str, ...] = ()
         self.rest_time = 0.0
@@ -128,17 +131,21 @@ class Watch(Carrier):
         self._sunk, self._moved = float(sunk[self._culprit]), float(moved[self._culprit])
         return Outcome.SETTLED if share[self._culprit] > MOVED else Outcome.EQUILIBRIUM
 
-    def disproved(self) -> Outcome:
-        """Take back a rest that did not last once its forces were forgotten."""
-        self._quiet, self._clamped = 0, True
-        return Outcome.MOVING
+    def disproved(self, state: State) -> Outcome:
+        """Take back a rest that did not last once its forces were forgotten; *undecided* where it comes back.
+
+        Rigid joints then admit both, and the methods of the steps lead to the one, forces from nothing to the other.
+        """
+        back = self._clamped and not _moves(self._model, self._doubted, state)
+        self._quiet, self._clamped, self._comes_back, self._doubted = 0, True, back, state
+        return Outcome.UNDECIDED if back else Outcome.MOVING
 
     def verdict(self, outcome: Outcome, static: StaticStart | None) -> Verdict:
         """Return the outcome in words, from that of the last step, and the static start."""
         if outcome is Outcome.MOVING and (self._still or self._doubt > _DOUBT * self._fastest):
             outcome = Outcome.UNDECIDED
         cautions = [*self._gave_way(), *self._unbonded]
-        if self._clamped and outcome is not Outcome.EQUILIBRIUM:
+        if self._clamped and not self._comes_back and outcome is not Outcome.EQUILIBRIUM:
             cautions.insert(0, "a rest on the way was held only by self-stress, which no load applies")
         if outcome is Outcome.MOVING:
             cautions.insert(0, "whether it stands is not decided: its time was over before it rested or fell")
@@ -153,7 +160,7 @@ class Watch(Carrier):
     def _reason(self, outcome: Outcome) -> str:
         code = self._model.scene.blocks[self._culprit].code
         if outcome is Outcome.UNDECIDED:
-            return self._unsolved_steps()
+            return _CLAMPED if self._comes_back else self._unsolved_steps()
         if outcome is Outcome.MOVING:
             return f"stone {code} moves at {_short(self._speed)}/s"
         if outcome is Outcome.SETTLED:
@@ -247,7 +254,7 @@ def _lasts(simulation: Simulation) -> bool:
     for _ in range(_RELEASED):
         step = simulation.step()
         seen = seen_from_supports(model, begin, step.after)
-        if (displacement(model, begin, seen) > _STAYS * model.surfaces.size)[~model.fixed].any():
+        if _moves(model, begin, seen):
             return False
         speeds = np.where(model.fixed, 0.0, speed(model, seen))
         calm = step.solution.converged and _rests(model, step.after, balance_of(model, step), speeds)
@@ -255,6 +262,12 @@ def _lasts(simulation: Simulation) -> bool:
         if quiet >= LASTING:
             return True
     return False
+
+
+def _moves(model: Model, before: State, after: State) -> bool:
+    """Return whether a stone has left the place where it rested."""
+    moved = displacement(model, before, after) > _STAYS * model.surfaces.size
+    return bool(moved[~model.fixed].any())
 
 
 def rests(model: Model, state: State, balance: Array) -> bool:

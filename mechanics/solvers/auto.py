@@ -7,7 +7,7 @@ import numpy as np
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.problem.residual import residual
 from mechanics.solvers.chain import KEPT, follow
-from mechanics.solvers.kinds import EXACT, POLISH, chain_of
+from mechanics.solvers.kinds import EXACT, FURTHER, POLISH, chain_of
 
 __all__ = ["Auto"]
 
@@ -44,7 +44,9 @@ class Auto:
         warm, steps = bool(start.impulse.any()), start.motion
         if warm and not steps:
             left = residual(problem, start.impulse)
-            if left.within(*limits):
+            # at the limits they would set rigid stones in motion that the next step stops, and so on
+            share = FURTHER if problem.delassus.rigid is not None else 1.0
+            if left.within(share * limits[0], share * limits[1]):
                 return ContactSolution(start.impulse.copy(), left.dual, 0, left.natural_map, True, KEPT)
         follows = steps is not None and problem.delassus.rigid is not None
         # a motion that has long been still may have come to rest: one step brakes it, one finds its forces

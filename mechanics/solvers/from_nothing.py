@@ -43,13 +43,15 @@ def rests_from_nothing(problem: ContactProblem) -> tuple[bool | None, Array]:
     each = np.repeat(
         np.einsum("cii->c", operator.diagonal)[:, None] / nothing.shape[1], nothing.shape[1], axis=1
     )
-    link = _ADMM if operator.rigid is not None and moving_bodies(problem) >= SOME else _NEWTON
+    links = [_NEWTON, _ADMM]
+    if operator.rigid is not None and moving_bodies(problem) >= SOME:
+        links.remove(_NEWTON)
     for share in JOINTS:
         yields = share * each
         yielding = replace(problem, delassus=CompliantDelassus(operator, yields))
         # to a tenth of what slips come down to where they vanish with E
         exact = max(_LIMITS[1], _SMALL * JOINTS[1] / JOINTS[0] * slips[-1] / (pace or 1.0))
-        found = follow((link,), yielding, start, (_LIMITS[0], exact), link.iterations)
+        found = follow(links, yielding, start, (_LIMITS[0], exact), np.inf)
         start = ContactStart(found.impulse, found.velocity)
         errors.append(pace * residual(yielding, found.impulse).velocity)
         moved = operator.apply(found.impulse) + yields * found.impulse + problem.u_free

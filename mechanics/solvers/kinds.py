@@ -20,7 +20,7 @@ from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.second_order.newton import Newton
 from mechanics.solvers.second_order.softer_joints import SofterJoints
 
-__all__ = ["ENDED_PATH", "EXACT", "POLISH", "SOME", "chain_of", "moving_bodies"]
+__all__ = ["ENDED_PATH", "EXACT", "FURTHER", "POLISH", "SOME", "chain_of", "moving_bodies"]
 
 # budgets of links that others follow; what needs more is mostly solved by none of them
 _ADMM = 500  # iterations of ADMM, and sweeps over disks
@@ -37,8 +37,9 @@ EXACT = 1e-3
 """Tolerances over those asked for, of forces that a rest keeps for hundreds of steps: what they lack would be a creep.
 """
 
-# the same of forces that the next step begins with [-]
-_FURTHER = 0.03
+FURTHER = 0.03
+"""The same of forces that the next step begins with, or keeps [-]."""
+
 # error up to which forces are near a solution: velocity tolerance below which a motion is solved by methods that need
 # such a start, and η up to which forces of the last step lead them between deformable and rigid stones [-]
 _NEAR = 1e-3
@@ -46,7 +47,7 @@ _NEAR = 1e-3
 # forces of a rest, and of what slides or opens little by little until it rests
 _HOLD, _DRIFT = (replace(stage, further=EXACT) for stage in (RESTING, SORTED[1]))
 # joints of a motion hold as a rule, too
-_FOLLOW = Stage(FOLLOWING, further=_FURTHER)
+_FOLLOW = Stage(FOLLOWING, further=FURTHER)
 
 _Method = Callable[[float, float, int], Solver]
 _rest: _Method = partial(BodyADMM, stages=(SORTED[0], _HOLD, _DRIFT, _HOLD))
@@ -55,8 +56,8 @@ _loosely: _Method = partial(BodyADMM, stages=(replace(_FOLLOW, further=1.0), *SO
 # a look costs two sweeps over disks, an extrapolation ten
 _sweeps: _Method = partial(NSGS, check_every=PLAIN_LOOK, depth=0)
 
-_newton = Link("Newton", Newton, _NEWTON, further=_FURTHER)
-_path = Link("interior point", InteriorPoint, _PATH, Begin.NOTHING, _FURTHER)
+_newton = Link("Newton", Newton, _NEWTON, further=FURTHER)
+_path = Link("interior point", InteriorPoint, _PATH, Begin.NOTHING, FURTHER)
 _from_best = replace(_path, begin=Begin.BEST)
 _endless = Link("body ADMM", BodyADMM)
 _admm = replace(_endless, iterations=_ADMM)

@@ -56,6 +56,18 @@ def test_a_rest_by_self_stress_is_disproved_and_told():
     assert "a rest on the way was held only by self-stress, which no load applies" in result.cautions
 
 
+def test_a_rest_that_comes_back_where_it_was_disproved_is_undecided_one_elsewhere_is_not():
+    """Rigid joints admit the rest and a motion: neither waiting nor a verdict of motion would be true."""
+    one = between_walls(Method.AUTO)
+    model, start = build_model(one)
+    low, beside = (replace(start, centre=start.centre - np.array([0.0, 0.0, z])) for z in (0.01, 0.01001))
+    watch = Watch(model, start)
+    assert [watch.disproved(state) for state in (start, low)] == [Outcome.MOVING, Outcome.MOVING]
+    again = watch.disproved(beside)
+    assert again is Outcome.UNDECIDED
+    assert watch.verdict(again, None).reason.startswith("held only by self-stress, which no load applies")
+
+
 def test_a_rest_near_its_limit_is_found_again_after_next_to_nothing():
     """A wall of 20 courses under .9 of the load of its candidate begins to slide in the step from nothing."""
     stones = wall(bond(12, 12), 0.4, 0.2, 0.2)

@@ -93,6 +93,18 @@ def test_forces_are_not_kept_where_they_solve_the_step_no_longer():
     assert velocity_of(lifted, found)[:, 0].min() > -1e-5 * FREE
 
 
+def test_forces_at_the_edge_of_the_tolerances_are_solved_further_not_kept():
+    """Rigid stones that they set in motion would be stopped by the next step, and set in motion again for ever."""
+    problem, last = rest()[-1].problem, rest()[-1].solution
+    rough = (1 + 4e-7) * last.impulse
+    assert residual(problem, rough).within(1e-6, 1e-5)
+    found = Auto()(problem, ContactStart(rough, last.velocity))
+    assert found.iterations > 0
+    assert residual(problem, found.impulse).within(3e-8, 3e-7)
+    again = Auto()(problem, ContactStart(found.impulse, found.velocity))
+    assert (again.iterations, again.why) == (0, KEPT)
+
+
 def test_forces_of_a_rest_are_exact_where_they_are_kept_for_long():
     """What they lack would add up to a creep: from step two on, a hundredth of the tolerances is left at most."""
     left = residual(rest()[-1].problem, rest()[-1].solution.impulse)
