@@ -89,18 +89,9 @@ def simulate(
             with clock("mesh"):
                 built = build_model(scene, lambda done, total: progress(Progress("mesh", done, total)))
         result, _ = _simulate(built[0], of_run(built[1]), clock, progress, stop, archive)
-        if result.outcome.rests and _keeps_strain(built[0]):
-            with clock("confirm"):
-                told = _without_strain(scene, progress, stop)
-            if told is None:
-                result = replace(result, cautions=(*result.cautions, _UNTRIED))
-            elif told is Outcome.COLLAPSED:
-                result = replace(result, outcome=Outcome.UNDECIDED, reason=_CLAMPED)
-            elif told is Outcome.INTERRUPTED:
-                # a rest that is not confirmed is no verdict
-                result = replace(result, outcome=told, reason="")
-            result = replace(result, wall_time=dict(clock.seconds))
-        return result
+        if not _keeps_strain(built[0], scene):
+            return result
+        return _confirmed(result, lambda: simulate(_without_strain(scene), _confirming(progress), stop))
 
 
 def simulate_stages(
@@ -143,27 +134,61 @@ def simulate_stages(
         scene = whole_scene(stages)
         if whole is None and any(one.fidelity is Fidelity.DEFORMABLE for one in scene.blocks):
             whole = build_model(scene, lambda done, total: progress(Progress("mesh", done, total)))
-        return _Building(stages, whole, archive).built(progress, stop)
+        result = _Building(stages, whole, archive).built(progress, stop)
+        if whole is None or not _keeps_strain(whole[0], *(stage.scene for stage in stages)):
+            return result
+        rigid = [replace(stage, scene=_without_strain(stage.scene)) for stage in stages]
+        return _confirmed(result, lambda: simulate_stages(rigid, _confirming(progress), stop))
 
 
-def _keeps_strain(model: Model) -> bool:
+def _keeps_strain(model: Model, *scenes: Scene) -> bool:
     """Return whether stones deform between rigid joints under loads that last, so that strain may hold what falls."""
-    return bool(model.elastic.any()) and not model.laws.sprung and model.scene.steady
+    steady = all(scene.steady for scene in scenes)
+    return bool(model.elastic.any()) and not model.laws.sprung and steady
 
 
-def _without_strain(scene: Scene, progress: Listener, stop: Callable[[], bool]) -> Outcome | None:
-    """Return the outcome of a scene whose stones are all rigid, by the automatic method; None where none was found.
+def _without_strain(scene: Scene) -> Scene:
+    """Return the scene with stones that are all rigid, to be run until it rests by the automatic method.
 
     Strain cannot be forgotten as contact forces can (`mechanics.dynamics.stopping.disproof`): what stones press against
     each other on the way to a rest stays. Rigid ones have no other forces than those that their loads bring about.
     """
     time = replace(scene.time, start=Start.REST, stop_at_equilibrium=True)
     solver = replace(scene.solver, method=Method.AUTO)
-    rigid = replace(scene.rigid, time=time, solver=solver, frame_every=0)
-    try:
-        return simulate(rigid, lambda one: progress(replace(one, stage="confirm", total=None)), stop).outcome
-    except SolverError:
-        return None
+    return replace(scene.rigid, time=time, solver=solver, frame_every=0)
+
+
+def _confirming(progress: Listener) -> Listener:
+    """Return the listener of a run that confirms another."""
+    return lambda one: progress(replace(one, stage="confirm", total=None))
+
+
+def _confirmed(result: Result, run: Callable[[], Result]) -> Result:
+    """Return the result of deformable stones, whose rest those of `run`, which do not deform, must share."""
+    if not result.outcome.rests:
+        return result
+    clock = Clock()
+    with clock("confirm"):
+        try:
+            told = run().outcome
+        except SolverError:
+            result = replace(result, cautions=(*result.cautions, _UNTRIED))
+            told = result.outcome
+    if told is Outcome.COLLAPSED:
+        result = _instead(result, Outcome.UNDECIDED, _CLAMPED)
+    elif told is Outcome.INTERRUPTED:
+        # a rest that is not confirmed is no verdict
+        result = _instead(result, told, "")
+    seconds = result.wall_time.get("confirm", 0.0) + clock.seconds["confirm"]
+    return replace(result, wall_time={**result.wall_time, "confirm": seconds})
+
+
+def _instead(result: Result, outcome: Outcome, reason: str) -> Result:
+    """Return the result with another outcome, of its last stage too."""
+    stages = result.stages
+    if stages:
+        stages = (*stages[:-1], replace(stages[-1], outcome=outcome.value, reason=reason))
+    return replace(result, outcome=outcome, reason=reason, stages=stages)
 
 
 def _simulate(

@@ -23,6 +23,8 @@ from mechanics.simulate import simulate, simulate_stages
 from moma.errors import SceneError
 from tests.mechanics.dynamics.test_resuming import Kept, assert_same_bits
 from tests.mechanics.shapes import brick, ground, scene
+from tests.validation.one_answer.matrix import Setting, at
+from tests.validation.one_answer.scenes import SCENES
 
 G = 9.81
 SUNK = 0.02
@@ -228,3 +230,17 @@ def test_an_ordinary_run_is_a_building_of_one_stage():
 def test_all_contacts_of_a_run_meet_as_it_begins():
     _, drawn = build_model(portal()[0].scene)
     assert of_run(drawn).meets(np.array([[0, 2], [2, 3]])).all()
+
+
+def test_a_rest_that_strain_alone_holds_is_undecided_in_stages_too():
+    """A lintel of two stones with upright joints, struck from its centring, falls if they do not deform."""
+    setting = Setting("accurate", "auto", relaxation=True, static=False, step=1e-2)
+    struck = at(SCENES["lintel of 2, 3×0.3, μ 0.7"], setting)
+    held = replace(struck, blocks=tuple(replace(one, fidelity=Fidelity.FIXED) for one in struck.blocks))
+    built = simulate_stages([Stage("centring", held), Stage("struck", struck)])
+    assert built.outcome is Outcome.UNDECIDED
+    assert "self-stress" in built.reason
+    assert [(one.outcome, one.reason) for one in built.stages] == [
+        ("equilibrium", ""),
+        ("undecided", built.reason),
+    ]
