@@ -44,8 +44,8 @@ class Auto:
         warm, steps = bool(start.impulse.any()), start.motion
         if warm and not steps:
             left = residual(problem, start.impulse)
-            # at the limits they would set rigid stones in motion that the next step stops, and so on
-            share = FURTHER if problem.delassus.rigid is not None else 1.0
+            # at the limits they would set rigid stones in motion that a relaxation halts, and so on
+            share = FURTHER if steps is None and problem.delassus.rigid is not None else 1.0
             if left.within(share * limits[0], share * limits[1]):
                 return ContactSolution(start.impulse.copy(), left.dual, 0, left.natural_map, True, KEPT)
         follows = steps is not None and problem.delassus.rigid is not None
