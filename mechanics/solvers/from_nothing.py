@@ -50,8 +50,9 @@ def rests_from_nothing(problem: ContactProblem) -> tuple[bool | None, Array]:
         yields = share * each
         yielding = replace(problem, delassus=CompliantDelassus(operator, yields))
         # to a tenth of what slips come down to where they vanish with E
-        exact = max(_LIMITS[1], _SMALL * JOINTS[1] / JOINTS[0] * slips[-1] / (pace or 1.0))
-        found = follow(links, yielding, start, (_LIMITS[0], exact), np.inf)
+        exact = _SMALL * JOINTS[1] / JOINTS[0] * slips[-1] / (pace or 1.0)
+        looser = max(1.0, exact / _LIMITS[1])
+        found = follow(links, yielding, start, (looser * _LIMITS[0], looser * _LIMITS[1]), np.inf)
         start = ContactStart(found.impulse, found.velocity)
         errors.append(pace * residual(yielding, found.impulse).velocity)
         moved = operator.apply(found.impulse) + yields * found.impulse + problem.u_free
