@@ -57,7 +57,8 @@ class Watch(Carrier):
     *Settled*: the same, but farther away. *Collapsed*: a body has sunk, along the load that acts on it, by more than
     the scene's fraction of its width, and is faster than 0.05 √(g · width); or it has come to rest after such a fall,
     or after toppling. A body that rocks lifts its centre, one that slides slowly keeps its support: both move, and may
-    still come to rest. *Undecided*: steps that were not solved may have added as much velocity as the motion has.
+    still come to rest. *Undecided*: steps that were not solved may have added as much velocity as the motion has; or a
+    rest that was disproved came back at the same place.
     Without gravity g counts as 1 m/s². Displacements and speeds are relative to the supports where these are driven.
     Steps with compliant joints count as solved, and are told.
 

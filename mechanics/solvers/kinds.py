@@ -38,7 +38,7 @@ EXACT = 1e-3
 """
 
 FURTHER = 0.03
-"""The same of forces that the next step begins with, or keeps [-]."""
+"""Tolerances over those asked for, of forces that the next step begins with, or keeps [-]."""
 
 # error up to which forces are near a solution: velocity tolerance below which a motion is solved by methods that need
 # such a start, and η up to which forces of the last step lead them between deformable and rigid stones [-]
