@@ -4,6 +4,7 @@ Every survey is measured point by point with 3 mm of noise and goes through the 
 lines. Movements are as large as three times the noise, or little more.
 """
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +15,7 @@ from survey.quality.contradictions import contradictions
 from survey.quality.courses import measure_courses
 from survey.quality.departures.beds import WallBeds, find_bed_movements
 from survey.quality.departures.depths import DoubtfulDepth, doubtful_depths
-from survey.quality.departures.faces import WallFace, find_face_departures
+from survey.quality.departures.faces import OddStone, WallFace, find_face_departures
 from survey.quality.facades import find_facades
 from survey.quality.precision import StoneQuality, judge_survey
 from survey.quality.remeasure import ShortList, list_remeasures, short_list
@@ -126,23 +127,45 @@ def test_of_a_thousand_sound_surveys_fewer_than_ten_are_given_a_finding():
     assert len(wrong) < 10
 
 
+Case = tuple[Wall, Movement, dict[str, float]]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("moved", "beds"),
+    ("case", "found"),
     [
-        (settled_pier(3.0 * NOISE, 3.6, 9.0, 7), True),
-        (leaning(3.0 * NOISE, 2.7), False),
-        (bulging(5.0 * NOISE, (3.0, 1.5), 1.5), False),
-        (leaning_corner(4.0 * NOISE, 4.0, 6.0, 2.7), False),
-        (still, None),
+        ((Wall(), settled_pier(3.0 * NOISE, 3.6, 9.0, 7), {}), lambda one: kinds(one.beds) == {"step"}),
+        (
+            (Wall(opening=None), settled_pier(3.0 * NOISE, 2.0, 4.0), {}),
+            lambda one: kinds(one.beds) == {"part"},
+        ),
+        ((Wall(), leaning(3.0 * NOISE, 2.7), {}), lambda one: kinds(one.face) == {"lean"}),
+        ((Wall(), bulging(5.0 * NOISE, (3.0, 1.5), 1.5), {}), lambda one: "local bulge" in kinds(one.face)),
+        (
+            (Wall(), leaning_corner(4.0 * NOISE, 4.0, 6.0, 2.7), {}),
+            lambda one: kinds(one.face) == {"right corner"},
+        ),
+        ((Wall(laid=0.001), still, {"5-3": 4.0 * NOISE}), lambda one: codes(one.face.odd) == {"5-3"}),
+        ((Wall(laid=0.001), still, {"5-3": -4.0 * NOISE}), lambda one: codes(one.face.odd) == {"5-3"}),
+        (
+            (Wall(depths={"5-2": 0.05, "8-4": 5.0}, depth=0.5), still, {}),
+            lambda one: codes(one.depths) == {"5-2", "8-4"},
+        ),
     ],
+    ids=["settled pier", "settled part", "rotated", "bulge", "corner", "proud", "sunk", "depths"],
 )
-def test_movements_of_a_few_times_the_noise_are_found_in_nearly_all_surveys(
-    moved: Movement, beds: bool | None
+def test_each_kind_of_movement_is_found_and_named_in_nearly_all_surveys(
+    case: Case, found: Callable[[Findings], bool]
 ):
-    found = 0
-    for seed in range(60):
-        one = findings(survey_of(1000 + seed, moved=moved))
-        found += bool(one.beds.movements) if beds else bool(one.face.movements)
-    print(f"{found} of 60")
-    assert found <= 1 if beds is None else found >= 57
+    wall, moved, proud = case
+    named = sum(found(findings(survey_of(1000 + seed, wall, moved, proud))) for seed in range(60))
+    print(f"{named} of 60")
+    assert named >= 57
+
+
+def kinds(wall: WallBeds | WallFace) -> set[str]:
+    return {str(one.kind) for one in wall.movements}
+
+
+def codes(stones: Iterable[OddStone | DoubtfulDepth]) -> set[str]:
+    return {one.code for one in stones}
