@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from moma.cli.console import reporting, say
+from moma.cli.console import reporting, say, short_lived
 from moma.cli.options import (
     DEFAULT_DB,
     AcceptUnsound,
@@ -88,12 +88,13 @@ def run(
     verbose: Verbose = False,
 ) -> None:
     """Simulate a scene; write tables, pictures and a report, and store the results in the database."""
-    from moma.cli.text.formats import as_json
-    from moma.cli.text.runs_and_surveys import run_lines
-    from moma.kernels.beside import compiling_beside
-    from pipelines.run.run import run_scene
-    from pipelines.run.unfinished import finished_run
-    from pipelines.scene.file import read_scene
+    with short_lived():
+        from moma.cli.text.formats import as_json
+        from moma.cli.text.runs_and_surveys import run_lines
+        from moma.kernels.beside import compiling_beside
+        from pipelines.run.run import run_scene
+        from pipelines.run.unfinished import finished_run
+        from pipelines.scene.file import read_scene
 
     folder, stop = out or Path("out") / scene.stem, Interruption()
     if resume and (summary := finished_run(folder, read_scene(scene).text)) is not None:
