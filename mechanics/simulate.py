@@ -223,11 +223,13 @@ def _simulate(
             outcome = watch(step, balance)
         if outcome.rests and (settings.stop_at_equilibrium or count == total):
             with clock("confirm"):
-                other = disproof(run.simulation)
+                other, surely = disproof(run.simulation)
             if other is not None:
-                if settings.relaxation:
-                    log.energy.halted(run.simulation.state)
-                outcome, run.simulation = watch.disproved(run.simulation.state), other
+                outcome = watch.disproved(outcome, run.simulation.state, surely)
+                if outcome is Outcome.MOVING:
+                    if settings.relaxation:
+                        log.energy.halted(run.simulation.state)
+                    run.simulation = other
         text = f"balance {balance.max():.1e}, η {step.solution.natural_map:.1e}"
         report(Progress("step", count, total, text))
         done = settings.stop_at_equilibrium and outcome is not Outcome.MOVING

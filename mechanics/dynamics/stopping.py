@@ -132,12 +132,15 @@ class Watch(Carrier):
         self._sunk, self._moved = float(sunk[self._culprit]), float(moved[self._culprit])
         return Outcome.SETTLED if share[self._culprit] > MOVED else Outcome.EQUILIBRIUM
 
-    def disproved(self, state: State) -> Outcome:
-        """Take back a rest that did not last once its forces were forgotten; *undecided* where it comes back.
+    def disproved(self, rest: Outcome, state: State, surely: bool) -> Outcome:
+        """Return the outcome of a rest that did not last once its forces were forgotten.
 
-        Rigid joints then admit both, and the methods of the steps lead to the one, forces from nothing to the other.
+        *Moving*, the first time. One that comes back to the same place was found again without leaving it, and stays;
+        but where forces that arise from nothing `surely` move its stones it is *undecided*: rigid joints admit both.
         """
         back = self._clamped and not _moves(self._model, self._doubted, state)
+        if back and not surely:
+            return rest
         self._quiet, self._clamped, self._comes_back, self._doubted = 0, True, back, state
         return Outcome.UNDECIDED if back else Outcome.MOVING
 
@@ -233,19 +236,18 @@ def balance_of(model: Model, step: Step) -> Array:
     return imbalance(model, step.after, active.contacts, active.force, step.kick.load, step.resting)
 
 
-def disproof(simulation: Simulation) -> Simulation | None:
-    """Return the simulation with which a run goes on where a rest does not last; None where it lasts.
+def disproof(simulation: Simulation) -> tuple[Simulation | None, bool]:
+    """Return the simulation with which a run goes on where a rest does not last, and whether its stones surely move.
 
-    Rigid stones in a gap admit forces that press them against each other without cause: an overlap that was pushed
-    out, an impact or a solver's long way may leave such forces, and friction then holds what nothing carries. So
-    the stones forget all contact forces, and must find those of their rest again without leaving it: rigid ones from
-    forces that arise from nothing.
+    Without a simulation it lasts. Rigid stones in a gap admit forces that press them against each other without cause:
+    an overlap that was pushed out, an impact or a solver's long way may leave such forces, and friction then holds what
+    nothing carries. So the stones forget all contact forces, and must find those of their rest again without leaving
+    it: rigid ones from forces that arise from nothing.
     """
     other = simulation.released()
-    lasting = other.rests_from_nothing()
-    if lasting is None:
-        lasting = _lasts(other.released(forgets=False))
-    return None if lasting else other
+    found = other.rests_from_nothing()
+    lasting = _lasts(other.released(forgets=False)) if found is None else found
+    return None if lasting else other, found is False
 
 
 def _lasts(simulation: Simulation) -> bool:

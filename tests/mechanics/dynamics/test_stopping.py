@@ -56,14 +56,15 @@ def test_a_rest_by_self_stress_is_disproved_and_told():
     assert "a rest on the way was held only by self-stress, which no load applies" in result.cautions
 
 
-def test_a_rest_that_comes_back_where_it_was_disproved_is_undecided_one_elsewhere_is_not():
-    """Rigid joints admit the rest and a motion: neither waiting nor a verdict of motion would be true."""
+def test_a_rest_that_comes_back_is_one_or_undecided_where_forces_from_nothing_surely_move_it():
+    """Rigid joints admit the rest and a motion then: neither waiting nor a verdict of motion would be true."""
     one = between_walls(Method.AUTO)
     model, start = build_model(one)
     low, beside = (replace(start, centre=start.centre - np.array([0.0, 0.0, z])) for z in (0.01, 0.01001))
-    watch = Watch(model, start)
-    assert [watch.disproved(state) for state in (start, low)] == [Outcome.MOVING, Outcome.MOVING]
-    again = watch.disproved(beside)
+    watch, rest = Watch(model, start), Outcome.SETTLED
+    assert [watch.disproved(rest, state, surely=True) for state in (start, low)] == [Outcome.MOVING] * 2
+    assert watch.disproved(rest, beside, surely=False) is rest
+    again = watch.disproved(rest, beside, surely=True)
     assert again is Outcome.UNDECIDED
     assert watch.verdict(again, None).reason.startswith("held only by self-stress, which no load applies")
 
