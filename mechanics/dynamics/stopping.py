@@ -35,7 +35,7 @@ _DOUBT = 0.5  # velocity that unsolved steps may have added, over that of a prov
 _RELEASED = 50  # most steps in which a rest must show that it lasts without its forces
 _UNFILLED = 0.01  # area of joints that mortar does not fill, over that which it was to fill, that is told [-]
 _LOWER = 0.7  # way along the load over the whole way from which a stone has sunk rather than moved aside [-]
-_CLAMPED = "held only by self-stress, which no load applies: rigid joints admit this rest and a motion"
+_SELF_STRESS = "held only by self-stress, which no load applies: rigid joints admit this rest and a motion"
 _STAYS = 1e-3  # displacement over the width within which a released stone stays where it rested [-]
 
 
@@ -164,7 +164,7 @@ class Watch(Carrier):
     def _reason(self, outcome: Outcome) -> str:
         code = self._model.scene.blocks[self._culprit].code
         if outcome is Outcome.UNDECIDED:
-            return _CLAMPED if self._comes_back else self._unsolved_steps()
+            return _SELF_STRESS if self._comes_back else self._unsolved_steps()
         if outcome is Outcome.MOVING:
             return f"stone {code} moves at {_short(self._speed)}/s"
         if outcome is Outcome.SETTLED:

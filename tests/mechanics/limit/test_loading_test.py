@@ -49,8 +49,13 @@ def test_a_block_under_a_beam_rocks_about_its_toe_both_ways(turn):
     assert test.energy_error < 1e-6
 
 
+def slippery(way):
+    """The test of a block that slides below a beam, as far as `way` [m]."""
+    return loading_test(scene(DryJoint(0.1)), Rig((1.0, 0.0, 0.0), PUSH, LOAD), (way,), 5e-4)
+
+
 def test_a_slippery_block_slides():
-    test = loading_test(scene(DryJoint(0.1)), Rig((1.0, 0.0, 0.0), PUSH, LOAD), (0.005,), 5e-4)
+    test = slippery(0.005)
     assert test.force[-1] == pytest.approx(0.1 * LOAD, rel=0.02)  # below the beam
     assert test.turning == pytest.approx(0.0, abs=1e-3)
 

@@ -11,14 +11,10 @@ from mechanics.limit.assembly import assembly
 from mechanics.limit.confirm import Confirmation, ConfirmationRun, likeness
 from mechanics.limit.limit_load import Flow, Mechanism, limit_load
 from mechanics.limit.live_loads import Acceleration
-from mechanics.limit.loading_test import loading_test
 from mechanics.limit.pushover import Pushover, pushover
 from mechanics.limit.thrust import thrust
-from mechanics.scene.laws.dry_joint import DryJoint
-from mechanics.scene.rig import Rig
-from mechanics.scene.scene import ContactSettings, Fidelity, Scene
-from mechanics.scene.shapes import box
-from mechanics.stones.materials import Material
+from mechanics.scene.scene import Fidelity
+from tests.mechanics.limit.test_loading_test import slippery
 from tests.mechanics.shapes import brick, ground, scene
 
 
@@ -121,9 +117,7 @@ def test_the_higher_of_two_candidates_is_told_with_the_lower_beside_it():
 @pytest.fixture(scope="module")
 def slid():
     """A test of a block that slides below a beam."""
-    block = box("block", (0.0, 0.0, 0.0), (0.6, 0.2, 1.0), Material("stone", 2000.0, 10e9, 0.2))
-    one = Scene("block", (block,), contact=ContactSettings(DryJoint(0.1)))
-    return loading_test(one, Rig((1.0, 0.0, 0.0), 1.1, 40e3), (0.002,), 5e-4)
+    return slippery(0.002)
 
 
 def test_the_stiffness_is_the_secant_at_three_tenths_of_the_strength(slid):

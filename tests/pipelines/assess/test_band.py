@@ -6,21 +6,14 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from mechanics.limit.loading_test import loading_test
-from mechanics.scene.laws.dry_joint import DryJoint
-from mechanics.scene.rig import Rig
-from mechanics.scene.scene import ContactSettings, Scene
-from mechanics.scene.shapes import box
-from mechanics.stones.materials import Material
 from pipelines.assess.pushover.band import banded
+from tests.mechanics.limit.test_loading_test import slippery
 
 
 @pytest.fixture(scope="module")
 def test():
     """A block that slides below a beam."""
-    block = box("block", (0.0, 0.0, 0.0), (0.6, 0.2, 1.0), Material("stone", 2000.0, 10e9, 0.2))
-    scene = Scene("block", (block,), contact=ContactSettings(DryJoint(0.1)))
-    return loading_test(scene, Rig((1.0, 0.0, 0.0), 1.1, 40e3), (0.002,), 5e-4)
+    return slippery(0.002)
 
 
 def test_the_band_adds_squares_and_has_its_level_on_both_sides(test):
