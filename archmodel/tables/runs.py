@@ -191,7 +191,7 @@ class CellResult(Base):
     cell : its name
     step, time : number of the step, [s]
     x, y : mean place of its disks [m]
-    lambda_x, lambda_y : standard deviations of x and y over those at the start [-]
+    lambda_x, lambda_y : max - min of x and of y over that at the start [-]
     volume, shear, turned : of the linear map nearest to the motion: change of area [-], ln of the ratio of the
         principal stretches [-], rotation [°]
     sigma_xx, sigma_yy, sigma_xy, p, q : mean stress, compression positive; (σ1 + σ2)/2, (σ1 - σ2)/2 [Pa]

@@ -23,10 +23,16 @@ class PlanarObserver:
     ----------
     every : number of steps between two instants; the last one of the run is handed out too
     take : called with each; in a resumed run, with those after its checkpoint
+    steps : further steps after which an instant is handed out
     """
 
     every: int
     take: Callable[[PlanarInstant], None]
+    steps: frozenset[int] = frozenset()
+
+    def wants(self, step: int) -> bool:
+        """Return whether the instant after a step is handed out."""
+        return step % self.every == 0 or step in self.steps
 
 
 def simulate_planar(
@@ -82,7 +88,7 @@ def _simulated(
         report(Progress("step", run.steps, run.total, f"η {step.solution.natural_map:.1e}"))
         stopped = not run.done and stop()
         last = run.done or stopped
-        due = [one for one in observers if last or run.steps % one.every == 0]
+        due = [one for one in observers if last or one.wants(run.steps)]
         if due:
             instant = run.instant()
             for one in due:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["draw_curves", "draw_instant", "draw_trishear"]
+__all__ = ["draw_course", "draw_curves", "draw_instant", "draw_shapes", "draw_trishear"]
 
 _WIDE = 10.0  # of a figure [inch]
 _ROW = 130  # characters in a line of a footnote
@@ -25,36 +25,48 @@ _LAYERS = (
     "#8a3b12",
     "#e3c78f",
     "#5f5a4f",
-    "#d9b38c",
     "#6b7a2a",
-)  # colours, from the base in turns
+    "#d98c5f",
+    "#3f6f6b",
+    "#f2e6c9",
+    "#a3a08f",
+    "#b8860b",
+)  # colours, from the base; more layers than these take them in turns
+_CELL = "#1f3fbf"  # colour of the disks of a cell among the layers
 _ARROWS = 600  # of velocities, at most
 _STRONGEST = 3.0  # width of a line of the strongest force [point]
 _SHARE = 0.99  # of the values that the scale of shear covers [-]
 
 
 def draw_instant(
-    folder: Path, fields: Fields, radius: Array, layer: Ints, walls: Array, quality: str
+    folder: Path,
+    fields: Fields,
+    radius: Array,
+    layer: Ints,
+    walls: Array,
+    followed: Mapping[str, Ints],
+    quality: str,
 ) -> list[str]:
-    """Draw the deformed layers, velocities, force chains and local shear of one instant; return the names of the files.
+    """Draw layers and cells, velocities, force chains and local shear of one instant; return the names of the files.
+
+    Of the start the layers alone are drawn.
 
     Parameters
     ----------
     folder : for the pictures
     radius, layer : (nd,)
     walls : (nw, 2, 2) ends of the walls now [m]
+    followed : disks of each cell
     quality : a line about overlaps and residuals, for every figure
     """
     names = []
-    for name, draw in (
-        ("layers", _layers),
-        ("velocity", _velocities),
-        ("forces", _forces),
-        ("shear", _shears),
-    ):
+    drawings = (("layers", _layers), ("velocity", _velocities), ("forces", _forces), ("shear", _shears))
+    for name, draw in drawings if fields.step else drawings[:1]:
         figure = new_sheet(_size(fields, radius))
         axes = figure.subplots()
         title = draw(axes, fields, radius, layer)
+        if draw is _layers:
+            _mark_cells(axes, fields, radius, followed)
         _frame(axes, fields, radius, walls)
         axes.set_title(f"{title}, t = {fields.time:g} s, step {fields.step}", fontsize=9)
         _footnote(figure, quality)
@@ -89,16 +101,18 @@ def _frame(axes: "Axes", fields: Fields, radius: Array, walls: Array) -> None:
     axes.tick_params(labelsize=7)
 
 
-def _disks(axes: "Axes", fields: Fields, radius: Array, **more: Any) -> Any:
+def _disks(axes: "Axes", fields: Fields, radius: Array, group: Ints | None = None, **more: Any) -> Any:
+    """Draw all disks, or those of a group."""
     from matplotlib.collections import EllipseCollection
 
-    width = 2.0 * radius
+    chosen = np.arange(len(radius)) if group is None else group
+    width = 2.0 * radius[chosen]
     disks = EllipseCollection(
         width,
         width,
-        np.zeros(len(radius)),
+        np.zeros(len(chosen)),
         units="xy",
-        offsets=fields.position[: len(radius), :2],
+        offsets=fields.position[chosen, :2],
         offset_transform=axes.transData,
         linewidths=0.0,
         **more,
@@ -111,6 +125,16 @@ def _layers(axes: "Axes", fields: Fields, radius: Array, layer: Ints) -> str:
     colours = np.array(_LAYERS)[layer % len(_LAYERS)]
     _disks(axes, fields, radius, facecolors=list(colours))
     return "Marker layers"
+
+
+def _mark_cells(axes: "Axes", fields: Fields, radius: Array, followed: Mapping[str, Ints]) -> None:
+    """Draw the disks of the cells over the others, and the names of the cells above them."""
+    for name, group in followed.items():
+        _disks(axes, fields, radius, group, facecolors=_CELL)
+        place = fields.position[group, :2]
+        axes.annotate(
+            name, (float(place[:, 0].mean()), float(place[:, 1].max())), ha="center", va="bottom", fontsize=7
+        )
 
 
 def _velocities(axes: "Axes", fields: Fields, radius: Array, layer: Ints) -> str:
@@ -234,5 +258,64 @@ def draw_curves(
     figure.axes[0].legend(frameon=False, fontsize=7, ncols=2)
     for axes in figure.axes[-2:]:
         axes.set_xlabel("time [s]", fontsize=8)
+    _footnote(figure, quality)
+    figure.savefig(path, dpi=150)
+
+
+def draw_course(path: Path, rows: Mapping[str, Array], phases: Sequence[float], quality: str) -> None:
+    """Draw what an experiment observes against time; quantities of one unit share a panel.
+
+    Parameters
+    ----------
+    path : of the picture
+    rows : columns `step`, `time`, and others whose names end with their unit
+    phases : instants at which a phase ends [s]
+    quality : a line about overlaps and residuals
+    """
+    names = [name for name in rows if name not in ("step", "time")]
+    units = list(dict.fromkeys(name.rpartition(" ")[2] for name in names))
+    figure = new_sheet((_WIDE, 0.6 + 2.4 * len(units)))
+    panels = figure.subplots(len(units), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, unit in zip(panels, units, strict=True):
+        for name in (one for one in names if one.endswith(unit)):
+            axes.plot(rows["time"], rows[name], label=name.removesuffix(unit).strip(), linewidth=0.9)
+        for time in phases:
+            axes.axvline(time, color="black", linewidth=0.5, linestyle="--")
+        axes.set_ylabel(unit, fontsize=8)
+        axes.tick_params(labelsize=7)
+        axes.grid(alpha=0.3)
+        axes.legend(frameon=False, fontsize=7)
+    panels[-1].set_xlabel("time [s]", fontsize=8)
+    _footnote(figure, quality)
+    figure.savefig(path, dpi=150)
+
+
+def draw_shapes(
+    path: Path, instants: Sequence[Fields], radius: Array, followed: Mapping[str, Ints], quality: str
+) -> None:
+    """Draw the disks of each cell (rows) at each instant (columns), all at one scale in a row.
+
+    Parameters
+    ----------
+    path : of the picture
+    instants : whose cells are drawn
+    radius : (nd,) [m]
+    followed : disks of each cell
+    quality : a line about overlaps and residuals
+    """
+    wide = _WIDE / max(len(instants), 4)
+    figure = new_sheet((wide * len(instants), 0.4 + wide * len(followed)))
+    panels = figure.subplots(len(followed), len(instants), squeeze=False)
+    for row, (name, group) in zip(panels, followed.items(), strict=True):
+        places = [fields.position[group, :2] for fields in instants]
+        half = 0.55 * max(float(np.ptp(place, axis=0).max()) for place in places) + float(radius.max())
+        for axes, fields, place in zip(row, instants, places, strict=True):
+            _disks(axes, fields, radius, group, facecolors=_CELL)
+            middle = 0.5 * (place.min(axis=0) + place.max(axis=0))
+            axes.set_xlim(middle[0] - half, middle[0] + half)
+            axes.set_ylim(middle[1] - half, middle[1] + half)
+            axes.set_aspect("equal")
+            axes.tick_params(labelsize=5)
+            axes.set_title(f"{name}, t = {fields.time:g} s", fontsize=7)
     _footnote(figure, quality)
     figure.savefig(path, dpi=150)

@@ -1,7 +1,7 @@
 """Observation of a run of disks: rows of the cells and of the whole sample, and instants of all disks."""
 
 import csv
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, overload
@@ -18,6 +18,7 @@ from mechanics.planar.result import PlanarInstant
 
 __all__ = ["CELL_COLUMNS", "WHOLE", "Fields", "Instants", "ObservedRun", "read_rows"]
 
+_EXPERIMENT = "experiment.csv"  # rows of what an experiment observes
 WHOLE = "whole sample"
 """Name of the rows of all disks."""
 
@@ -26,8 +27,10 @@ CELL_COLUMNS: Mapping[str, str] = {
     "time": "[s]",
     "x": "mean place of the disks [m]",
     "y": "mean place of the disks [m]",
-    "lambda_x": "standard deviation of x over that at the start [-]",
-    "lambda_y": "standard deviation of y over that at the start [-]",
+    "lambda_x": "max - min of x over that at the start [-]",
+    "lambda_y": "max - min of y over that at the start [-]",
+    "spread_x": "standard deviation of x over that at the start [-]",
+    "spread_y": "standard deviation of y over that at the start [-]",
     "volume": "change of the area by the linear map nearest to the motion [-]",
     "shear": "ln of the ratio of its principal stretches [-]",
     "turned": "its rotation, counter-clockwise [°]",
@@ -38,6 +41,7 @@ CELL_COLUMNS: Mapping[str, str] = {
     "q": "(σ1 - σ2)/2 [Pa]",
     "direction": "angle of σ1 from the x axis [°]",
     "anisotropy": "2 (φ1 - φ2) of the fabric [-]",
+    "a": "(f1 - f2)/2 of the fabric over the area [1/m²]",
     "fabric_direction": "angle of φ1 from the x axis [°]",
     "coordination": "contacts that bear a force per disk [-]",
     "porosity": "share of the area that no disk fills [-]",
@@ -104,6 +108,7 @@ class ObservedRun:
     radius : (nd,) [m]
     thickness : of the slice [m]
     layer : (nd,) number of the layer of each disk, 0 at the base: layers are followed too; None: they are not
+    observables : of the experiment, by centres at the start and now, radii and time (`Observed`); None: it has none
 
     Raises
     ------
@@ -118,11 +123,13 @@ class ObservedRun:
         radius: Array,
         thickness: float,
         layer: Ints | None = None,
+        observables: Callable[[Array, Array, Array, float], Mapping[str, float]] | None = None,
     ) -> None:
         self._folder, self._start, self._radius, self._thickness = folder, start, radius, thickness
         groups: dict[str, Ints] = {cell.name: members(cell, start) for cell in cells}
         layers = {} if layer is None else layer_members(layer)
         self._groups = layers | groups | {WHOLE: np.arange(len(radius))}
+        self._observables = observables
         self._reference = tessellation(start, radius)
         self._last: tuple[PlanarInstant, Tessellation, Array] | None = None
 
@@ -132,13 +139,12 @@ class ObservedRun:
         shares, moment = self._measured(instant)
         for number, (name, group) in enumerate(self._groups.items()):
             values = self._values(instant, name, group, place, shares, moment)
-            path = self._folder / f"cell-{number:03d}.csv"
-            new = not path.exists()
-            with path.open("a", encoding="utf-8", newline="") as file:
-                writer = csv.writer(file)
-                if new:
-                    writer.writerow(CELL_COLUMNS)
-                writer.writerow([repr(values[column]) for column in CELL_COLUMNS])
+            _append(
+                self._folder / f"cell-{number:03d}.csv", {column: values[column] for column in CELL_COLUMNS}
+            )
+        if self._observables is not None:
+            seen = self._observables(self._start, place, self._radius, instant.time)
+            _append(self._folder / _EXPERIMENT, {"step": instant.step, "time": instant.time, **seen})
 
     def _measured(self, instant: PlanarInstant) -> tuple[Tessellation, Array]:
         """Return the tessellation and the moments of the disks, made once for rows and fields of the same instant."""
@@ -173,6 +179,8 @@ class ObservedRun:
             "y": float(shape.centre[1]),
             "lambda_x": float(shape.extent[0]),
             "lambda_y": float(shape.extent[1]),
+            "spread_x": float(shape.spread[0]),
+            "spread_y": float(shape.spread[1]),
             "volume": shape.volume,
             "shear": shape.shear,
             "turned": float(np.degrees(shape.turned)),
@@ -183,6 +191,7 @@ class ObservedRun:
             "q": stress.deviator,
             "direction": float(np.degrees(stress.direction)),
             "anisotropy": fabric.anisotropy,
+            "a": fabric.density,
             "fabric_direction": float(np.degrees(fabric.direction)),
             "coordination": fabric.coordination,
             "porosity": fabric.porosity,
@@ -221,12 +230,14 @@ class ObservedRun:
             for number, name in enumerate(self._groups)
         }
 
-    def instants(self, every: int) -> "Instants":
-        """Return the instants of each `every`-th step and the last, in the order of steps."""
+    def experiment_rows(self, every: int) -> dict[str, Array]:
+        """Return the columns of what the experiment observes, by rows as `rows`; none if it observes nothing."""
+        return {} if self._observables is None else read_rows(self._folder / _EXPERIMENT, every)
+
+    def instants(self, wanted: Callable[[int], bool]) -> "Instants":
+        """Return the instants of the steps that are wanted and the last, in the order of steps."""
         paths = sorted(self._folder.glob("fields-*.npz"))
-        chosen = [
-            path for path in paths if int(path.stem.partition("-")[2]) % every == 0 or path == paths[-1]
-        ]
+        chosen = [path for path in paths if wanted(int(path.stem.partition("-")[2])) or path == paths[-1]]
         return Instants(tuple(chosen))
 
 
@@ -260,9 +271,20 @@ def read_rows(path: Path, every: int = 1) -> dict[str, Array]:
     """
     rows: dict[int, list[float]] = {}
     with path.open(encoding="utf-8", newline="") as file:
-        for values in list(csv.reader(file))[1:]:
-            if len(values) == len(CELL_COLUMNS):
-                rows[int(values[0])] = [float(value) for value in values[1:]]
+        columns, *lines = csv.reader(file)
+    for values in lines:
+        if len(values) == len(columns):
+            rows[int(values[0])] = [float(value) for value in values[1:]]
     steps = sorted(step for step in rows if step % every == 0 or step == max(rows))
-    table = np.array([rows[step] for step in steps]).reshape(-1, len(CELL_COLUMNS) - 1)
-    return dict(zip(CELL_COLUMNS, [np.array(steps), *table.T], strict=True))
+    table = np.array([rows[step] for step in steps]).reshape(-1, len(columns) - 1)
+    return dict(zip(columns, [np.array(steps), *table.T], strict=True))
+
+
+def _append(path: Path, values: Mapping[str, float]) -> None:
+    """Add a row to a file, which begins with the names of its columns."""
+    new = not path.exists()
+    with path.open("a", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file)
+        if new:
+            writer.writerow(values)
+        writer.writerow([repr(value) for value in values.values()])

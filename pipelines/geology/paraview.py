@@ -4,16 +4,16 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
-from mechanics.arrays import Array
-from mechanics.planar.measures.cells import Cell
+from mechanics.arrays import Array, Ints
+from mechanics.planar.measures.cells import Cell, members
 from pipelines.geology.observe import CELL_COLUMNS, Fields
 from pipelines.geology.sample import PreparedSample
 from pipelines.results.vtu import LINE, POLYGON, VERTEX, UnstructuredGrid, cells_of, write_pvd, write_vtu
 
 __all__ = ["write_series"]
 
-_CORNERS = 48  # of the polygon that stands for a cell
 _UNITS = {
     "radius": "m",
     "velocity": "m/s",
@@ -24,6 +24,7 @@ _UNITS = {
     "force_normal": "N",
     "force_tangential": "N",
     "gap": "m",
+    "a": "1/m²",
     "time": "s",
     **dict.fromkeys(("x", "y"), "m"),
     **dict.fromkeys(("sigma_xx", "sigma_yy", "sigma_xy", "p", "q"), "Pa"),
@@ -52,10 +53,11 @@ def write_series(
         series["cells"] = []
     for name in series:
         (folder / name).mkdir()
+    followed = {cell.name: members(cell, sample.centre) for cell in cells}
     for fields in instants:
-        grids = {"fields": _disks(fields, sample), "contacts": _contacts(fields)}
+        grids = {"fields": _disks(fields, sample, followed), "contacts": _contacts(fields)}
         if cells:
-            grids["cells"] = _cells(fields, cells, rows)
+            grids["cells"] = _cells(fields, followed, rows)
         for name, grid in grids.items():
             path = f"{name}/{fields.step:08d}.vtu"
             write_vtu(folder / path, grid)
@@ -69,12 +71,16 @@ def _space(vectors: Array) -> Array:
     return np.column_stack([vectors, np.zeros(len(vectors))])
 
 
-def _disks(fields: Fields, sample: PreparedSample) -> UnstructuredGrid:
-    """Return a point for each disk."""
+def _disks(fields: Fields, sample: PreparedSample, followed: Mapping[str, Ints]) -> UnstructuredGrid:
+    """Return a point for each disk; `cell` is the number of its cell from 1 on, 0 if it is in none."""
     count = len(sample.radius)
+    cell = np.zeros(count, dtype=np.int64)
+    for number, group in enumerate(followed.values(), start=1):
+        cell[group] = number
     data = {
         "radius": sample.radius,
         "layer": sample.layer,
+        "cell": cell,
         "velocity": _space(fields.velocity[:count, :2]),
         "spin": fields.velocity[:count, 2],
         "turn": fields.position[:count, 2],
@@ -103,18 +109,20 @@ def _contacts(fields: Fields) -> UnstructuredGrid:
 
 
 def _cells(
-    fields: Fields, cells: Sequence[Cell], rows: Mapping[str, Mapping[str, Array]]
+    fields: Fields, followed: Mapping[str, Ints], rows: Mapping[str, Mapping[str, Array]]
 ) -> UnstructuredGrid:
-    """Return an ellipse for each cell, its circle at the start stretched by λx and λy, with its row."""
-    turn = np.linspace(0.0, 2.0 * np.pi, _CORNERS, endpoint=False)
-    points, data = [], {column: np.zeros(len(cells)) for column in CELL_COLUMNS}
-    for number, cell in enumerate(cells):
-        row = rows[cell.name]
+    """Return the convex hull of the centres of each cell's disks, with its row."""
+    points: list[Array] = []
+    corners: list[list[int]] = []
+    data = {column: np.zeros(len(followed)) for column in CELL_COLUMNS}
+    for number, (name, group) in enumerate(followed.items()):
+        row = rows[name]
         nearest = int(np.argmin(np.abs(row["step"] - fields.step)))
         for column, values in data.items():
             values[number] = row[column][nearest]
-        axes = cell.radius * np.array([data["lambda_x"][number], data["lambda_y"][number]])
-        middle = np.array([data["x"][number], data["y"][number]])
-        points.append(middle + axes * np.column_stack([np.cos(turn), np.sin(turn)]))
-    corners = np.arange(len(cells) * _CORNERS).reshape(len(cells), _CORNERS).tolist()
+        place = fields.position[group, :2]
+        hull = place[ConvexHull(place).vertices]
+        first = sum(map(len, points))
+        corners.append(list(range(first, first + len(hull))))
+        points.append(hull)
     return UnstructuredGrid(_space(np.vstack(points)), cells_of(POLYGON, corners), {}, data, _UNITS)

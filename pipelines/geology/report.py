@@ -15,11 +15,13 @@ from pipelines.reports.page.model import Model
 __all__ = ["write_report"]
 
 _CAPTIONS = {
-    "layers": "Marker layers, which were level at the start.",
+    "layers": "Marker layers, which were level at the start, and the disks of the cells.",
     "velocity": "Velocities of some of the disks.",
     "forces": "Normal forces of the contacts that are pressed; the widest line is the strongest.",
     "trishear": "Velocities beside those of the trishear that comes nearest.",
     "shear": "Local shear since the start: the logarithm of the ratio of the principal stretches.",
+    "shapes": "Disks of each cell at the instants of the figures; a row has one scale.",
+    "course": "What the experiment observes with time; dashed lines part the phases of the run.",
     "cells": "The cells with time; dashed lines part the phases of the run.",
 }
 _HEAD = ("Cell", "λx", "λy", "p", "q", "σ1 from x", "Anisotropy", "φ1 from x", "Coordination", "Porosity")
@@ -46,7 +48,9 @@ def write_report(
     rows : columns by cell; the table shows the last
     model : content of the viewer; None: the page has none
     """
-    figures = [(one, words) for name, words in _CAPTIONS.items() for one in path.parent.glob(f"{name}*.png")]
+    figures = [
+        (one, words) for name, words in _CAPTIONS.items() for one in sorted(path.parent.glob(f"{name}*.png"))
+    ]
     write_page(
         path,
         "geology.html",

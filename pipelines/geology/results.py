@@ -3,6 +3,7 @@
 import csv
 import shutil
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -10,12 +11,13 @@ from typing import Any
 import numpy as np
 
 from mechanics.arrays import Array
+from mechanics.planar.measures.cells import members
 from mechanics.planar.model import PlanarState, build_planar_model
 from mechanics.planar.result import PlanarResult
 from pipelines.geology.experiments.fault import Fault
-from pipelines.geology.figures import draw_curves, draw_instant, draw_trishear
+from pipelines.geology.figures import draw_course, draw_curves, draw_instant, draw_shapes, draw_trishear
 from pipelines.geology.file import GeologyScene
-from pipelines.geology.observe import CELL_COLUMNS, WHOLE, Fields, Instants
+from pipelines.geology.observe import WHOLE, Fields, Instants
 from pipelines.geology.paraview import write_series
 from pipelines.geology.report import write_report
 from pipelines.geology.sample import PreparedSample
@@ -25,11 +27,28 @@ from pipelines.results.summary import as_json
 from pipelines.run.record import versions
 from pipelines.run.unfinished import UnfinishedRun
 
-__all__ = ["quality_of", "write_results"]
+__all__ = ["Observations", "quality_of", "write_results"]
 
 _MOST_OVERLAP = 0.01  # over the smallest radius, beyond which a run says so first [-]
 _FABRIC = ("anisotropy", "fabric_direction", "coordination", "porosity")  # columns of a cell
+_EXPERIMENT = "experiment.csv"  # rows of what the experiment observes
 _ROUNDING = 1e-3  # of an overlap that is just as large as allowed [-]
+
+
+@dataclass(frozen=True)
+class Observations:
+    """All that was observed in a run.
+
+    Attributes
+    ----------
+    cells : columns of the rows by cell
+    experiment : columns of what the experiment observes; none if it observes nothing
+    instants : of all disks
+    """
+
+    cells: Mapping[str, Mapping[str, Array]]
+    experiment: Mapping[str, Array]
+    instants: Instants
 
 
 def quality_of(scene: GeologyScene, sample: PreparedSample, result: PlanarResult) -> dict[str, Any]:
@@ -83,23 +102,22 @@ def write_results(
     scene: GeologyScene,
     sample: PreparedSample,
     result: PlanarResult,
-    rows: Mapping[str, Mapping[str, Array]],
-    instants: Instants,
+    observed: Observations,
     archive: UnfinishedRun,
 ) -> dict[str, Any]:
     """Write all files of a run into an empty folder; return the summary."""
     quality = quality_of(scene, sample, result)
+    rows, instants = observed.cells, observed.instants
     cells = _write_rows(folder, rows)
+    if observed.experiment:
+        _write_columns(folder / _EXPERIMENT, observed.experiment)
     write_series(folder, instants, sample, scene.cells, rows)
     (folder / "arrays").mkdir()
     for path in instants.paths:
         shutil.copyfile(path, folder / "arrays" / path.name)
     if scene.output.figures:
-        _draw(folder, scene, sample, result, instants, rows, quality["headline"])
+        _draw(folder, scene, sample, result, observed, quality["headline"])
     measures = scene.experiment.measures(sample.centre, sample.radius, instants, rows[WHOLE])
-    if scene.output.figures and isinstance(scene.experiment, Fault):
-        trishear, speed = scene.experiment.trishear(measures), scene.experiment.speed
-        draw_trishear(folder, instants[-1], sample.radius, trishear, speed, quality["headline"])
     summary: dict[str, Any] = {
         "scene": scene.name,
         "kind": scene.kind,
@@ -133,11 +151,15 @@ def _write_rows(folder: Path, rows: Mapping[str, Mapping[str, Array]]) -> dict[s
     cells = {}
     for number, (name, columns) in enumerate(rows.items()):
         cells[name] = f"cell-{number:03d}.csv"
-        with (folder / cells[name]).open("w", encoding="utf-8", newline="") as file:
-            writer = csv.writer(file)
-            writer.writerow(CELL_COLUMNS)
-            writer.writerows(zip(*(map(repr, column.tolist()) for column in columns.values()), strict=True))
+        _write_columns(folder / cells[name], columns)
     return cells
+
+
+def _write_columns(path: Path, columns: Mapping[str, Array]) -> None:
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(columns)
+        writer.writerows(zip(*(map(repr, column.tolist()) for column in columns.values()), strict=True))
 
 
 def _fabric(columns: Mapping[str, Array]) -> dict[str, float | None]:
@@ -151,16 +173,39 @@ def _draw(
     scene: GeologyScene,
     sample: PreparedSample,
     result: PlanarResult,
-    instants: Instants,
-    rows: Mapping[str, Mapping[str, Array]],
+    observed: Observations,
     line: str,
 ) -> None:
-    """Draw the curves of the cells, and the last instant."""
-    model, _ = build_planar_model(result.scene)
-    phases = scene.experiment.phases(scene.time.step * scene.time.steps)
-    draw_curves(folder / "cells.png", rows, _ends_of(phases), line)
-    for fields in instants[-1:]:
-        draw_instant(folder, fields, sample.radius, sample.layer, model.ends(_state(fields)), line)
+    """Draw the curves of the cells and of the experiment, the instants that are asked for, and the last one."""
+    model, start = build_planar_model(result.scene)
+    ends = _ends_of(scene.experiment.phases(scene.time.step * scene.time.steps))
+    draw_curves(folder / "cells.png", observed.cells, ends, line)
+    if observed.experiment:
+        draw_course(folder / "course.png", observed.experiment, ends, line)
+    chosen = _drawn(scene, start, observed.instants)
+    followed = {cell.name: members(cell, sample.centre) for cell in scene.cells}
+    for fields in chosen:
+        walls = model.ends(_state(fields))
+        draw_instant(folder, fields, sample.radius, sample.layer, walls, followed, line)
+    if followed:
+        draw_shapes(folder / "shapes.png", chosen, sample.radius, followed, line)
+    last = observed.instants[-1]
+    fit = scene.experiment.trishear(sample.centre, last) if isinstance(scene.experiment, Fault) else None
+    if fit is not None:
+        draw_trishear(folder, last, sample.radius, fit.model, scene.experiment.speed, line)
+
+
+def _drawn(scene: GeologyScene, start: PlanarState, instants: Instants) -> list[Fields]:
+    """Return the instants of which figures are drawn, in the order of time; the start, if it is asked for."""
+    steps = {round(time / scene.time.step) for time in scene.output.figures_at}
+    last = instants[-1]
+    chosen = [fields for fields in instants[:-1] if fields.step in steps]
+    if 0 in steps:
+        place, pairs = np.column_stack([start.centre, start.angle]), np.zeros((0, 2))
+        rest, bodies = np.zeros_like(last.pressure), pairs.astype(np.int64)
+        begin = Fields(0, 0.0, place, start.velocity, rest, rest, rest, bodies, pairs, pairs, pairs, rest[:0])
+        chosen.insert(0, begin)
+    return [*chosen, last]
 
 
 def _ends_of(phases: Mapping[str, tuple[float, float]]) -> Sequence[float]:

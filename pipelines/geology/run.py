@@ -22,11 +22,11 @@ from mechanics.scene.laws.lennard_jones import LennardJones
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.scene import LawRule, Method, SolverSettings
 from moma.errors import SceneError
-from pipelines.geology.experiments.experiment import Setup
+from pipelines.geology.experiments.experiment import Observed, Setup
 from pipelines.geology.experiments.membrane import Membrane
 from pipelines.geology.file import GeologyScene, read_geology
 from pipelines.geology.observe import ObservedRun
-from pipelines.geology.results import write_results
+from pipelines.geology.results import Observations, write_results
 from pipelines.geology.sample import PreparedSample, prepare
 from pipelines.geology.settings import Layer
 from pipelines.results.folder import UNFINISHED, check_replaceable
@@ -39,6 +39,7 @@ __all__ = ["GeologyReport", "planar_scene", "run_geology"]
 _ON_THE_FLOOR = 0.1  # gap over the smallest radius below which a disk stands on the floor [-]
 _START = 2000  # iterations of ADMM, at most, that find the forces of the sample at rest
 _SAMPLES = ".samples"  # folder of prepared samples, beside that of the results
+_NOT_STORED = ("spread_x", "spread_y", "a")  # columns of the rows of cells that the database does not have
 
 
 @dataclass(frozen=True)
@@ -190,16 +191,17 @@ def run_geology(
         sample = prepare(scene, Path(samples) if samples is not None else folder.parent / _SAMPLES, progress)
         planar = planar_scene(scene, sample)
         observation = _observation(scene, sample, planar, folder / UNFINISHED)
-        observers = (
-            PlanarObserver(scene.output.every, observation.row),
-            PlanarObserver(scene.output.fields_every, observation.fields),
-        )
+        drawn = frozenset(round(time / scene.time.step) for time in scene.output.figures_at)
+        kept = PlanarObserver(scene.output.fields_every, observation.fields, drawn)
+        observers = (PlanarObserver(scene.output.every, observation.row), kept)
 
         def write(fresh: Path, result: PlanarResult, archive: UnfinishedRun) -> None:
             progress(Progress("write", 0, 1, "results"))
             rows.update(observation.rows(scene.output.every))
-            instants = observation.instants(scene.output.fields_every)
-            summary.update(write_results(fresh, scene, sample, result, rows, instants, archive))
+            observed = Observations(
+                rows, observation.experiment_rows(scene.output.every), observation.instants(kept.wants)
+            )
+            summary.update(write_results(fresh, scene, sample, result, observed, archive))
 
         with scene.document.at(kind):
             result, _ = run_planar(
@@ -222,7 +224,15 @@ def _observation(
 ) -> ObservedRun:
     layer = _followed_layers(scene, sample)
     try:
-        return ObservedRun(place, scene.cells, sample.centre, sample.radius, planar.thickness, layer)
+        return ObservedRun(
+            place,
+            scene.cells,
+            sample.centre,
+            sample.radius,
+            planar.thickness,
+            layer,
+            scene.experiment.observables if isinstance(scene.experiment, Observed) else None,
+        )
     except SceneError as error:
         scene.document.fail(f"{error.where}: {error.what}", "cells", remedy=error.remedy)
 
@@ -256,5 +266,8 @@ def _geology_record(
         simulated=result.time,
         wall=summary["time"]["wall"],
         errors=error_measures(result.errors),
-        cells=rows,
+        cells={
+            name: {column: values for column, values in columns.items() if column not in _NOT_STORED}
+            for name, columns in rows.items()
+        },
     )

@@ -50,7 +50,9 @@ def prepare(scene: GeologyScene, cache: Path, progress: Listener = silent) -> Pr
     settings = {
         "version": _VERSION,
         "sample": {
-            name: value for name, value in asdict(asked).items() if name != "layers" and value is not None
+            name: value
+            for name, value in asdict(asked).items()
+            if name not in ("layers", "layer_tops") and value is not None
         },
         "friction": scene.contact.friction,
         "rolling": scene.contact.rolling,
@@ -84,8 +86,8 @@ def prepare(scene: GeologyScene, cache: Path, progress: Listener = silent) -> Pr
         np.savez(fresh, centre=found[0], radius=found[1])
         fresh.replace(path)
     centre, radius = found
-    part = centre[:, 1] / own.highest
-    layer = np.clip((part * asked.layers).astype(np.int64), 0, asked.layers - 1)
+    tops = asked.layer_tops or own.highest * np.arange(1, asked.layers) / asked.layers
+    layer = np.searchsorted(tops, centre[:, 1], side="right").astype(np.int64)
     return PreparedSample(centre, radius, layer, digest)
 
 

@@ -28,11 +28,19 @@ class SampleSettings:
     falling_friction: Annotated[
         float,
         Setting(
-            "Friction while disks are deposited; less makes the sample denser.", "-", at_least=0, at_most=2
+            "Friction while disks are deposited; less makes the sample denser.", "-", at_least=0, at_most=10
         ),
     ] = 0.4
     seed: Annotated[int, Setting("Of sizes and places; another seed is another sample.", at_least=0)] = 1
-    layers: Annotated[int, Setting("Marker layers of pictures and measures.", at_least=1, at_most=50)] = 6
+    layers: Annotated[
+        int, Setting("Marker layers of pictures and measures, of equal heights.", at_least=1, at_most=50)
+    ] = 6
+    layer_tops: Annotated[
+        tuple[float, ...],
+        Setting(
+            "Heights up to which marker layers reach, from below, instead; what lies above is one more.", "m"
+        ),
+    ] = ()
 
     def __post_init__(self) -> None:
         if self.largest < self.smallest:
@@ -41,16 +49,24 @@ class SampleSettings:
                 where="sample",
                 remedy="exchange them",
             )
+        if any(
+            upper <= lower for lower, upper in zip((0.0, *self.layer_tops), self.layer_tops, strict=False)
+        ):
+            raise SceneError(
+                f"layer_tops = {list(self.layer_tops)} do not grow from 0",
+                where="sample",
+                remedy="give the heights from below",
+            )
 
 
 @dataclass(frozen=True)
 class DiskContact:
     """`[contact]`: the laws of the contacts."""
 
-    friction: Annotated[float, Setting("Between disks.", "-", at_least=0, at_most=2)] = 0.4
+    friction: Annotated[float, Setting("Between disks.", "-", at_least=0, at_most=10)] = 0.4
     wall_friction: Annotated[
         float | None,
-        Setting("Between disks and walls; without it, that between disks.", "-", at_least=0, at_most=2),
+        Setting("Between disks and walls; without it, that between disks.", "-", at_least=0, at_most=10),
     ] = None
     rolling: Annotated[
         bool, Setting("Disks turn; false: their rotation is blocked, as by a strong resistance to rolling.")
@@ -75,7 +91,7 @@ class Layer:
         Setting("Height up to which it reaches; the last layer reaches up to the surface.", "m", above=0),
     ]
     density: Annotated[float | None, Setting("Of its disks.", "kg/m³", above=0)] = None
-    friction: Annotated[float | None, Setting("Between its disks.", "-", at_least=0, at_most=2)] = None
+    friction: Annotated[float | None, Setting("Between its disks.", "-", at_least=0, at_most=10)] = None
     cohesion: Annotated[
         float | None, Setting("Pull γ of each contact between its disks.", "N", at_least=0)
     ] = None
@@ -120,3 +136,17 @@ class GeologyOutput:
     fields_every: Annotated[int, Setting("Steps between two instants of all disks.", at_least=1)] = 500
     checkpoint: Annotated[int, Setting("Steps between two checkpoints; 0: none.", at_least=0)] = 200
     figures: Annotated[bool, Setting("Draw the figures.")] = True
+    figures_at: Annotated[
+        tuple[float, ...],
+        Setting(
+            "Instants of which figures are drawn, and all disks kept, besides the last; 0: the start.", "s"
+        ),
+    ] = ()
+
+    def __post_init__(self) -> None:
+        if any(not time >= 0.0 for time in self.figures_at):
+            raise SceneError(
+                f"figures_at = {list(self.figures_at)}",
+                where="output",
+                remedy="give times from 0 on, in seconds",
+            )

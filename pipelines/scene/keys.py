@@ -24,6 +24,7 @@ _KINDS: Mapping[Any, ValueKind] = {
     str: ValueKind.TEXT,
     tuple[str, ...]: ValueKind.TEXTS,
     tuple[float, float, float]: ValueKind.VECTOR,
+    tuple[float, ...]: ValueKind.NUMBERS,
     tuple[tuple[float, float, float], ...]: ValueKind.ROWS,
 }
 

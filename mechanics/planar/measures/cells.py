@@ -41,7 +41,9 @@ class Shape:
 
     Attributes
     ----------
-    extent : λx and λy, standard deviations of x and y of its disks over those at the start [-]
+    extent : λx and λy, max - min of x and of y of its disks' centres over that at the start (Renouf, Dubois & Alart
+        2006, eq. 11) [-]
+    spread : standard deviations of x and y of its disks over those at the start [-]
     gradient : F (2, 2), the linear map that comes nearest to the motion of its disks [-]
     turned : angle of the rotation in F = R U, counter-clockwise [rad]
     volume : det F - 1 [-]
@@ -50,6 +52,7 @@ class Shape:
     """
 
     extent: Array
+    spread: Array
     gradient: Array
     turned: float
     volume: float
@@ -94,21 +97,25 @@ def layer_members(layer: Ints) -> dict[str, Ints]:
 def shape_of(start: Array, now: Array) -> Shape:
     """Compare a cell's places (n, 2) now with those at the start.
 
+    λ is not objective: a rigid turn by 45° makes the extents of a square √2 times as large, and it follows the two
+    outermost disks alone. `gradient` is objective, and made of all disks.
+
     Examples
     --------
-    Simple shear by 1 keeps the area and the height, and lengthens a square by √2:
+    Simple shear by 1 keeps the area and the height. It doubles the width of a square, and spreads its points by √2:
 
     >>> square = np.array([(x, y) for x in range(3) for y in range(3)], dtype=float)
     >>> sheared = shape_of(square, square @ np.array([[1.0, 0.0], [1.0, 1.0]]))
-    >>> sheared.extent.round(6).tolist(), round(abs(sheared.volume), 6)
-    ([1.414214, 1.0], 0.0)
+    >>> sheared.extent.round(6).tolist(), sheared.spread.round(6).tolist(), round(abs(sheared.volume), 6)
+    ([2.0, 1.0], [1.414214, 1.0], 0.0)
     """
     before, after = start - start.mean(axis=0), now - now.mean(axis=0)
     gradient = np.linalg.lstsq(before, after, rcond=None)[0].T
     (left, stretch, right) = np.linalg.svd(gradient)
     rotation = left @ right
     return Shape(
-        extent=after.std(axis=0) / before.std(axis=0),
+        extent=np.ptp(now, axis=0) / np.ptp(start, axis=0),
+        spread=after.std(axis=0) / before.std(axis=0),
         gradient=gradient,
         turned=float(np.arctan2(rotation[1, 0], rotation[0, 0])),
         volume=float(np.linalg.det(gradient)) - 1.0,

@@ -20,6 +20,8 @@ class Fabric:
     ----------
     tensor : mean of n ⊗ n (2, 2) over the contacts that bear a force (Satake 1982) [-]
     anisotropy : 2 (φ1 - φ2) of its principal values; zero if contacts look into all directions alike [-]
+    density : a = (f1 - f2)/2 of f = (1/area) Σ n ⊗ n over the contacts that bear a force (Renouf, Dubois & Alart 2006,
+        eq. 9 and 10): it grows with the number of contacts in an area; nan where no disk has triangles all around [1/m²]
     direction : angle of the larger one from the x axis, within ± π/2 [rad]
     coordination : contacts that bear a force per disk [-]
     porosity : share of the area that no disk fills; nan where no disk has triangles all around [-]
@@ -27,6 +29,7 @@ class Fabric:
 
     tensor: Array
     anisotropy: float
+    density: float
     direction: float
     coordination: float
     porosity: float
@@ -46,8 +49,7 @@ def fabric_of(
     """
     size = np.hypot(force[:, 0], force[:, 1])
     bears = size > _BEARS * (size.mean() if len(size) else 0.0)
-    of_group = np.append(group, False)[np.minimum(bodies, len(group))]
-    ends = of_group[bears].sum(axis=1)
+    ends = _ends(group, bodies[bears])
     looks = normal[bears][ends > 0]
     weight = ends[ends > 0].astype(float)
     tensor = np.full((2, 2), np.nan)
@@ -64,7 +66,22 @@ def fabric_of(
     return Fabric(
         tensor=tensor,
         anisotropy=anisotropy,
+        density=_density(_ends(inner, bodies[bears]), normal[bears], room),
         direction=direction,
         coordination=float(ends.sum()) / max(1, int(group.sum())),
         porosity=1.0 - filled / room if room > 0 else np.nan,
     )
+
+
+def _ends(group: Bools, bodies: Ints) -> Ints:
+    """Return how many of the two bodies of each contact (nc,) are disks of a group (nd,)."""
+    ends: Ints = np.append(group, False)[np.minimum(bodies, len(group))].sum(axis=1)
+    return ends
+
+
+def _density(ends: Ints, normal: Array, area: float) -> float:
+    """Return a = (f1 - f2)/2; a contact with one disk of the group belongs to it by half, as its force to the stress."""
+    if area <= 0:
+        return np.nan
+    low, high = np.linalg.eigvalsh(np.einsum("c,ci,cj->ij", 0.5 * ends, normal, normal) / area)
+    return 0.5 * float(high - low)

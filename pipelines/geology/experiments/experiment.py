@@ -2,14 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from mechanics.arrays import Array
 from mechanics.planar.scene import Wall
 from mechanics.scene.loads.load import Loads
 from pipelines.geology.observe import Fields
 
-__all__ = ["Experiment", "Setup"]
+__all__ = ["Experiment", "Observed", "Setup"]
 
 
 @dataclass(frozen=True)
@@ -65,4 +65,19 @@ class Experiment(Protocol):
         radius : (nd,) [m]
         instants : those that were kept
         whole : columns of the rows of the whole sample
+        """
+
+
+@runtime_checkable
+class Observed(Protocol):
+    """An experiment that observes more than its cells at each row, as the front of a fold."""
+
+    def observables(self, start: Array, now: Array, radius: Array, time: float) -> Mapping[str, float]:
+        """Return what is observed at one instant, by name with the unit; always the same names.
+
+        Parameters
+        ----------
+        start, now : (nd, 2) centres [m]
+        radius : (nd,) [m]
+        time : [s]
         """

@@ -7,8 +7,10 @@ from typing import Annotated
 import numpy as np
 
 from mechanics.arrays import Array
-from mechanics.planar.measures.surface import front, rise
-from mechanics.planar.measures.trishear import Trishear, trishear_fit
+from mechanics.planar.measures.limits import crest_radius, shear_limits
+from mechanics.planar.measures.surface import front, profile, rise
+from mechanics.planar.measures.trishear import Trishear, TrishearFit, trishear_fit
+from mechanics.planar.measures.trishear_gain import trishear_gain
 from mechanics.planar.scene import Wall
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.motions import ImposedMotion
@@ -21,9 +23,15 @@ from pipelines.geology.observe import Fields
 __all__ = ["Fault"]
 
 _FIRST_PHASE = 0.25  # of the paper's run, 10 of 40 s [-]
+_SLIP = "slip [m]"
+_FRONT = "front ahead of the tip [m]"
+_OBSERVED = (_FRONT, "left limit [°]", "right limit [°]", "limits, θ_l [°]", "radius of the crest [m]")
 _APICAL = "trishear: apical angle [°]"
 _RATIO = "trishear: propagation to slip [-]"
 _RISEN = 0.1  # rise of the surface over that of the basement, at the front of the fold [-]
+_CREST = (0.5, 0.95)  # rise of the surface over that of the basement, between which its crest bends [-]
+_PART = 4.0  # lengths over which the surface is averaged, over the mean radius: those of two disks [-]
+_SLIPPED = 2.0  # slip over the mean radius, before which a fault has no zone of shear to measure [-]
 
 
 @dataclass(frozen=True)
@@ -88,32 +96,64 @@ class Fault:
         middle = _FIRST_PHASE * duration
         return {"first": (0.0, middle), "second": (middle, duration)}
 
-    def trishear(self, measures: Mapping[str, float]) -> Trishear:
-        """Return the trishear that these measures tell of."""
-        half = 0.5 * float(np.radians(measures[_APICAL]))
-        return Trishear((self.tip, 0.0), float(np.radians(self.dip)), half, measures[_RATIO])
+    def trishear(self, start: Array, last: Fields) -> TrishearFit | None:
+        """Fit a trishear to the motion since the start; None in a run without slip."""
+        slip = self.speed * last.time
+        now = last.position[: len(start), :2]
+        if slip <= 0:
+            return None
+        return trishear_fit(start, now, (self.tip, 0.0), float(np.radians(self.dip)), slip)
+
+    def observables(self, start: Array, now: Array, radius: Array, time: float) -> Mapping[str, float]:
+        """Return the front of the fold, the limits of the sheared zone, and the radius of the surface's crest.
+
+        The front is the farthest place whose surface has risen by a tenth of the rise of the basement, ahead of where
+        the fault's tip was at the start. θ_l is the mean angle of both limits. Nothing but the slip is known before two
+        mean radii of slip.
+        """
+        slip, angle = self.speed * time, float(np.radians(self.dip))
+        if slip < _SLIPPED * radius.mean():
+            return {_SLIP: slip, **dict.fromkeys(_OBSERVED, float("nan"))}
+        where, risen = rise(start, now, radius, self.length, _PART * float(radius.mean()))
+        uplift = slip * np.sin(angle)
+        share = (now - start) @ np.array([np.cos(angle), np.sin(angle)]) / slip
+        limits = shear_limits(now, share)
+        crest = (risen > _CREST[0] * uplift) & (risen < _CREST[1] * uplift) & (where > self.tip)
+        found = (
+            front(where, risen, _RISEN * uplift) - self.tip,
+            float(np.degrees(limits.left)),
+            float(np.degrees(limits.right)),
+            float(np.degrees(limits.mean)),
+            crest_radius(where[crest], profile(now, radius, where[crest])),
+        )
+        return {_SLIP: slip, **dict(zip(_OBSERVED, found, strict=True))}
 
     def measures(
         self, start: Array, radius: Array, instants: Sequence[Fields], whole: Mapping[str, Array]
     ) -> Mapping[str, float]:
-        """Return the front of the fold, and the trishear that comes nearest to the motion of the disks, and how near.
+        """Return what is observed at the end, and the trishear that comes nearest to the motion of the disks.
 
-        The front is the farthest place whose surface has risen by a tenth of the rise of the basement, ahead of where
-        the fault's tip was at the start.
+        Its gain is over the best plain fault, among disks that move by 5 to 95 % of the slip. Angle and P/S are left out
+        where the motion does not determine them, and all of it in a run without slip.
         """
         last = instants[-1]
-        slip = self.speed * last.time
-        fit = trishear_fit(
-            start, last.position[: len(start), :2], (self.tip, 0.0), float(np.radians(self.dip)), slip
-        )
-        # parts of two disks
-        where, risen = rise(start, last.position[: len(start), :2], radius, self.length, 4.0 * radius.mean())
-        ahead = front(where, risen, _RISEN * slip * np.sin(np.radians(self.dip))) - self.tip
-        return {
-            "slip [m]": slip,
-            "front ahead of the tip [m]": ahead,
-            _APICAL: 2.0 * float(np.degrees(fit.model.half_angle)),
-            _RATIO: fit.model.ratio,
-            "trishear: residual over slip [-]": fit.relative,
-            "trishear: share of the motion explained [-]": fit.explained,
-        }
+        now = last.position[: len(start), :2]
+        seen = dict(self.observables(start, now, radius, last.time))
+        fit = self.trishear(start, last)
+        if fit is None or not np.isfinite(seen[_FRONT]):
+            return {_SLIP: seen[_SLIP]}
+        found = trishear_gain(fit, start, now, seen[_SLIP], 2.0 * float(radius.mean()))
+        seen["trishear: residual over slip [-]"] = fit.relative
+        if found is None:
+            return seen
+        seen["trishear: gain over a plain fault [-]"] = found.gain
+        seen["trishear: gain, from [-]"], seen["trishear: gain, to [-]"] = found.interval
+        for name, value, unit, limits in (
+            (_APICAL, fit.model.half_angle, 2.0 * float(np.degrees(1.0)), found.half_angles),
+            (_RATIO, fit.model.ratio, 1.0, found.ratios),
+        ):
+            if limits is not None:
+                kind, _, symbol = name.rpartition(" ")
+                seen[name] = unit * value
+                seen[f"{kind}, from {symbol}"], seen[f"{kind}, to {symbol}"] = (unit * one for one in limits)
+        return seen

@@ -76,20 +76,28 @@ class Fold:
         """Return the one phase of the run."""
         return {"shortening": (0.0, duration)}
 
-    def measures(
-        self, start: Array, radius: Array, instants: Sequence[Fields], whole: Mapping[str, Array]
-    ) -> Mapping[str, float]:
-        """Return how far the wall went, how high the sample rose, and how far its front has come.
+    def observables(self, start: Array, now: Array, radius: Array, time: float) -> Mapping[str, float]:
+        """Return the places of the wall at the rear and of the front, and the largest height.
 
         The front is the farthest place at which the surface has risen by more than a tenth of its largest rise, and by
         two mean radii, over lengths of ten disks.
         """
-        last = instants[-1]
-        now, mean = last.position[: len(start), :2], float(radius.mean())
+        mean = float(radius.mean())
         where, risen = rise(start, now, radius, self.length, _PART * mean)
         least = max(_RISEN * float(risen.max()), 2.0 * mean)
         return {
-            "shortening [m]": self.speed * last.time,
-            "highest [m]": float((now[:, 1] + radius).max()),
+            "rear [m]": self.speed * time,
             "front [m]": front(where, risen, least) if risen.max() > least else 0.0,
+            "highest [m]": float((now[:, 1] + radius).max()),
+        }
+
+    def measures(
+        self, start: Array, radius: Array, instants: Sequence[Fields], whole: Mapping[str, Array]
+    ) -> Mapping[str, float]:
+        """Return how far the wall went, how high the sample rose, and how far its front has come."""
+        last = instants[-1]
+        seen = self.observables(start, last.position[: len(start), :2], radius, last.time)
+        return {
+            "shortening [m]": seen["rear [m]"],
+            **{name: seen[name] for name in ("highest [m]", "front [m]")},
         }

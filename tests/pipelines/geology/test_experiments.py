@@ -80,7 +80,8 @@ def test_the_front_of_a_fault_is_where_a_tenth_of_its_rise_ends(tmp_path):
     radius = np.full(len(start), 0.25)
     found = fault.measures(start, radius, [fields(now)], {})
     assert found["front ahead of the tip [m]"] == pytest.approx(13.6, abs=0.6)
-    name = draw_trishear(tmp_path, fields(now), radius, fault.trishear(found), fault.speed, "")
+    model = fault.trishear(start, fields(now)).model
+    name = draw_trishear(tmp_path, fields(now), radius, model, fault.speed, "")
     assert (tmp_path / name).stat().st_size > 10_000
 
 
