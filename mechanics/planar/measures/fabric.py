@@ -21,7 +21,7 @@ class Fabric:
     tensor : mean of n ⊗ n (2, 2) over the contacts that bear a force (Satake 1982) [-]
     anisotropy : 2 (φ1 - φ2) of its principal values; zero if contacts look into all directions alike [-]
     density : a = (f1 - f2)/2 of f = (1/area) Σ n ⊗ n over the contacts that bear a force (Renouf, Dubois & Alart 2006,
-        eq. 9 and 10): it grows with the number of contacts in an area; nan where no disk has triangles all around [1/m²]
+        eq. 9 and 10), which grows with the number of contacts in an area; nan where porosity is [1/m²]
     direction : angle of the larger one from the x axis, within ± π/2 [rad]
     coordination : contacts that bear a force per disk [-]
     porosity : share of the area that no disk fills; nan where no disk has triangles all around [-]
@@ -80,7 +80,7 @@ def _ends(group: Bools, bodies: Ints) -> Ints:
 
 
 def _density(ends: Ints, normal: Array, area: float) -> float:
-    """Return a = (f1 - f2)/2; a contact with one disk of the group belongs to it by half, as its force to the stress."""
+    """Return a = (f1 - f2)/2; of a contact with one disk of the group a half counts, as in the stress."""
     if area <= 0:
         return np.nan
     low, high = np.linalg.eigvalsh(np.einsum("c,ci,cj->ij", 0.5 * ends, normal, normal) / area)

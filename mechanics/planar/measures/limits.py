@@ -73,7 +73,7 @@ def shear_limits(now: Array, share: Array) -> ShearLimits:
 
 
 def _split(x: Array, moves: Bools) -> float:
-    """Return the place that parts what moves, at its left, from what does not, with the fewest errors; nan at an end."""
+    """Return the place with the fewest disks that move at its right or rest at its left; nan at an end."""
     order = np.argsort(x)
     ordered = moves[order]
     wrong = np.concatenate([[0], np.cumsum(~ordered)]) + np.concatenate([np.cumsum(ordered[::-1])[::-1], [0]])

@@ -32,9 +32,9 @@ def moments(count: int, centre: Array, bodies: Ints, point: Array, force: Array)
 
         M_i = -Σ f ⊗ (x - x_i)   over the contacts of disk i, with the force f on it at the point x
 
-    (Moreau 1997; Staron, Radjai & Vilotte 2005). Moments add up over disks: a contact between two disks of a group gives
-    f ⊗ l with the vector l between their centres, so that the sum over the area of the group is the mean stress of Love
-    and Weber, and of Renouf, Dubois & Alart (2006, eq. 7); a contact with a disk outside gives the part of l within.
+    (Moreau 1997; Staron, Radjai & Vilotte 2005). Moments add up over disks: a contact between two disks of a group
+    gives f ⊗ l with the vector l between their centres, so that the sum over the area of the group is the mean stress
+    of Love and Weber, and of Renouf, Dubois & Alart (2006, eq. 7); one with a disk outside gives the part of l within.
 
     Parameters
     ----------

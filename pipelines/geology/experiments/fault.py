@@ -9,7 +9,7 @@ import numpy as np
 from mechanics.arrays import Array
 from mechanics.planar.measures.limits import crest_radius, shear_limits
 from mechanics.planar.measures.surface import front, profile, rise
-from mechanics.planar.measures.trishear import Trishear, TrishearFit, trishear_fit
+from mechanics.planar.measures.trishear import TrishearFit, trishear_fit
 from mechanics.planar.measures.trishear_gain import trishear_gain
 from mechanics.planar.scene import Wall
 from mechanics.scene.loads.load import Loads
@@ -133,8 +133,8 @@ class Fault:
     ) -> Mapping[str, float]:
         """Return what is observed at the end, and the trishear that comes nearest to the motion of the disks.
 
-        Its gain is over the best plain fault, among disks that move by 5 to 95 % of the slip. Angle and P/S are left out
-        where the motion does not determine them, and all of it in a run without slip.
+        Its gain is over the best plain fault, among disks that move by 5 to 95 % of the slip. Angle and P/S are left
+        out where the motion does not determine them, and all of it in a run without slip.
         """
         last = instants[-1]
         now = last.position[: len(start), :2]

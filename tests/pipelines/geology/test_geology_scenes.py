@@ -1,6 +1,7 @@
 """Geological scenes: keys are checked with their lines, the shipped ones are the paper's, runs leave their measures."""
 
 import json
+from dataclasses import replace
 
 import meshio
 import numpy as np
@@ -59,7 +60,9 @@ radius = 1.0
 @pytest.mark.parametrize(("name", "kind"), [("fold", "fold"), ("fault", "fault")])
 def test_shipped_scenes_are_those_of_the_paper_and_a_tenth_has_its_lengths_over_the_root_of_ten(name, kind):
     whole, tenth = (read_geology(SAMPLES / f"{name}{part}.toml", kind) for part in ("", "-tenth"))
-    assert whole.sample == tenth.sample
+    smaller = tuple(top / np.sqrt(10) for top in whole.sample.layer_tops)
+    assert tenth.sample.layer_tops == pytest.approx(smaller, rel=1e-3)
+    assert replace(tenth.sample, layer_tops=whole.sample.layer_tops) == whole.sample
     assert whole.time == tenth.time
     assert tenth.experiment.length == pytest.approx(whole.experiment.length / np.sqrt(10), rel=1e-3)
     assert [cell.name for cell in whole.cells] == [cell.name for cell in tenth.cells]
@@ -110,6 +113,55 @@ def test_what_is_wrong_is_refused_at_its_line(written, instead, line, said):
         parse_geology(SMALL.replace(written, instead, 1), "fault.toml", "fault")
     assert str(caught.value).startswith(f"fault.toml:{line}: ")
     assert said in str(caught.value)
+
+
+def test_both_readings_of_the_fault_have_the_paper_s_number_of_disks_and_its_cell():
+    """15,000 disks fill 150 × 15 m with the paper's radii, and the paper's 300 × 30 m with twice these."""
+    for name, size in (("fault", 1.0), ("fault-doubled", 2.0)):
+        scene = read_geology(SAMPLES / f"{name}.toml", "fault")
+        own, (cell,) = scene.experiment, scene.cells
+        assert (own.length, own.thickness, scene.sample.smallest) == (150.0 * size, 15.0 * size, 0.13 * size)
+        mean = np.pi * (0.13**2 + 0.13 * 0.26 + 0.26**2) / 3.0 * size**2
+        assert 15_000 * mean / (own.length * own.thickness) == pytest.approx(0.82, abs=0.02)
+        assert (cell.centre, cell.radius, own.tip) == ((85.0, 7.5), 6.0, 75.0)
+
+
+@pytest.mark.parametrize(
+    ("written", "instead", "said"),
+    [
+        ("layers = 3", "layer_tops = [1.0, 0.5]", "layer_tops = [1.0, 0.5] do not grow from 0"),
+        ("layers = 3", "layer_tops = [0.0, 0.5]", "layer_tops = [0.0, 0.5] do not grow from 0"),
+        ("figures = false", "figures_at = [-1.0]", "figures_at = [-1.0]; give times from 0 on"),
+        ("[time]", "[contact]\nfriction = 11\n[time]", "friction = 11"),
+    ],
+)
+def test_settings_of_layers_figures_and_friction_are_checked(written, instead, said):
+    with pytest.raises(SceneError) as caught:
+        parse_geology(SMALL.replace(written, instead), "fault.toml", "fault")
+    assert said in str(caught.value)
+
+
+def test_disks_accept_the_friction_that_stones_accept():
+    scene = parse_geology(SMALL.replace("[time]", "[contact]\nfriction = 9.5\n[time]"), "fault.toml", "fault")
+    assert scene.contact.friction == 9.5
+
+
+def test_marker_layers_have_the_heights_that_are_given(tmp_path):
+    text = SMALL.replace("layers = 3", "layer_tops = [0.5, 2.0]")
+    sample = prepare(parse_geology(text, "fault.toml", "fault"), tmp_path)
+    assert sample.layer.tolist() == np.digitize(sample.centre[:, 1], [0.5, 2.0]).tolist()
+
+
+def test_figures_are_drawn_of_the_instants_that_are_asked_for(tmp_path):
+    text = SMALL.replace("figures = false", "figures_at = [0.0, 0.07]").replace(
+        "fields_every = 15", "fields_every = 40"
+    )
+    (tmp_path / "fault.toml").write_text(text, encoding="utf-8")
+    run_geology(tmp_path / "fault.toml", "fault", tmp_path / "out")
+    drawn = sorted(path.name for path in (tmp_path / "out").glob("layers-*.png"))
+    assert drawn == ["layers-00000000.png", "layers-00000007.png", "layers-00000030.png"]
+    assert (tmp_path / "out/arrays/fields-00000007.npz").exists()
+    assert {"course.png", "shapes.png"} <= {path.name for path in (tmp_path / "out").iterdir()}
 
 
 def test_negative_cohesion_is_refused():

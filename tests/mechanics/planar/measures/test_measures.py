@@ -5,6 +5,7 @@ import pytest
 
 from mechanics.planar.measures.cells import Cell, members, shape_of
 from mechanics.planar.measures.fabric import fabric_of
+from mechanics.planar.measures.limits import crest_radius, shear_limits
 from mechanics.planar.measures.strain import deformation
 from mechanics.planar.measures.stress import mean_stress, moments
 from mechanics.planar.measures.surface import profile, slope
@@ -110,3 +111,81 @@ def test_the_surface_of_a_heap_has_its_slope():
     assert height == pytest.approx(
         places * np.tan(np.radians(20.0)) + 0.5 / np.cos(np.radians(20.0)), abs=0.01
     )
+
+
+def twenty_disks():
+    """Twenty disks in a packing of 225, with random forces, and a third of the contacts without any."""
+    centre, bodies, normal = packing()
+    group = np.isin(np.arange(len(centre)), np.argsort(np.linalg.norm(centre - [13.0, 12.0], axis=1))[:20])
+    rng = np.random.default_rng(7)
+    force = rng.normal(size=(len(bodies), 2)) * (rng.uniform(size=len(bodies)) > 0.3)[:, None]
+    return centre, bodies, normal, force, group
+
+
+def test_stress_and_fabric_of_twenty_disks_are_the_sums_of_renouf_dubois_and_alart():
+    """Their equations 7 to 10, one contact at a time; of one that leaves the cell the half within it counts."""
+    centre, bodies, normal, force, group = twenty_disks()
+    radius, area = np.ones(len(centre)), 20 * 2 * np.sqrt(3.0)
+    sigma, f = np.zeros((2, 2)), np.zeros((2, 2))
+    for (first, second), n, r in zip(bodies, normal, force, strict=True):
+        part = 0.5 * (int(group[first]) + int(group[second])) * bool(np.any(r))
+        for i in range(2):
+            for j in range(2):
+                # the normal points to the candidate, and compression is positive
+                sigma[i, j] += part * r[i] * 2.0 * n[j] / area
+                f[i, j] += part * n[i] * n[j] / area
+    tessellated = tessellation(centre, radius)
+    share = float(tessellated.share[group].sum())
+    assert share == pytest.approx(area, rel=1e-12)
+    moment = moments(len(centre), centre, bodies, centre[bodies[:, 0]] - normal, force)
+    found = mean_stress(moment[group], share)
+    low, high = np.linalg.eigvalsh(0.5 * (sigma + sigma.T))
+    assert found.pressure == pytest.approx(0.5 * (high + low), rel=1e-12)
+    assert found.deviator == pytest.approx(0.5 * (high - low), rel=1e-12)
+    low, high = np.linalg.eigvalsh(f)
+    fabric = fabric_of(group, bodies, normal, force, radius, tessellated)
+    assert fabric.density == pytest.approx(0.5 * (high - low), rel=1e-12)
+    assert fabric.density > 1e-3
+
+
+def test_lambda_of_twenty_disks_is_that_of_their_outermost_places():
+    """Equation 11 of Renouf, Dubois & Alart (2006)."""
+    centre, *_, group = twenty_disks()
+    start = centre[group]
+    now = start @ MAP.T + 0.1 * np.random.default_rng(3).normal(size=start.shape)
+    for axis in range(2):
+        ratio = (max(now[:, axis]) - min(now[:, axis])) / (max(start[:, axis]) - min(start[:, axis]))
+        assert shape_of(start, now).extent[axis] == pytest.approx(ratio, rel=1e-12)
+
+
+def test_lambda_changes_with_a_rigid_turn_and_the_shear_does_not():
+    """A square of 2 × 1 that turns by 90° has λx = 1/2, λy = 2."""
+    x, y = np.meshgrid(np.linspace(0.0, 2.0, 9), np.linspace(0.0, 1.0, 5))
+    start = np.column_stack([x.ravel(), y.ravel()])
+    shape = shape_of(start, start @ np.array([[0.0, 1.0], [-1.0, 0.0]]))
+    assert shape.extent == pytest.approx([0.5, 2.0])
+    assert shape.shear == pytest.approx(0.0, abs=1e-9)
+    assert shape.turned == pytest.approx(0.5 * np.pi)
+
+
+@pytest.mark.parametrize(("left", "right"), [(60.0, 20.0), (110.0, 45.0), (35.0, 25.0)])
+def test_the_limits_of_a_sheared_zone_are_found(left, right):
+    rng = np.random.default_rng(2)
+    place = rng.uniform([-40.0, 0.0], [60.0, 10.0], (8000, 2))
+    ends = [place[:, 1] / np.tan(np.radians(angle)) for angle in (left, right)]
+    share = np.clip((ends[1] - place[:, 0]) / np.maximum(ends[1] - ends[0], 1e-9), 0.0, 1.0)
+    limits = shear_limits(place, share)
+    # between the limits the share falls evenly, and 5 % of it are not told from none
+    run = [1.0 / np.tan(np.radians(angle)) for angle in (left, right)]
+    expected = [run[0] + part * (run[1] - run[0]) for part in (0.05, 0.95)]
+    assert np.degrees(limits.left) == pytest.approx(np.degrees(np.arctan2(1.0, expected[0])), abs=3.0)
+    assert np.degrees(limits.right) == pytest.approx(np.degrees(np.arctan2(1.0, expected[1])), abs=3.0)
+
+
+def test_a_motion_without_a_zone_has_no_limits_and_a_level_surface_no_radius():
+    place = np.random.default_rng(2).uniform([0.0, 0.0], [60.0, 10.0], (2000, 2))
+    limits = shear_limits(place, np.ones(len(place)))
+    assert np.isnan([limits.left, limits.right, limits.mean]).all()
+    x = np.linspace(0.0, 10.0, 40)
+    assert crest_radius(x, 0.01 * np.random.default_rng(1).normal(size=40)) == np.inf
+    assert np.isnan(crest_radius(x[:3], x[:3]))

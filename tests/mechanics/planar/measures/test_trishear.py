@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from mechanics.planar.measures.trishear import Trishear, trishear_fit
+from mechanics.planar.measures.trishear_gain import trishear_gain
 
 TIP, DIP = (2.0, 1.0), np.radians(30.0)
 
@@ -54,3 +55,37 @@ def test_a_rigid_block_is_explained_badly():
     places = grid()
     fit = trishear_fit(places, places + 2.0 * np.array([np.cos(DIP), np.sin(DIP)]), TIP, DIP, 2.0)
     assert fit.relative > 0.3
+
+
+def test_a_trishear_gains_over_a_plain_fault_and_its_angle_is_determined():
+    places = grid(0.3)
+    made = Trishear(TIP, DIP, np.radians(30.0), 1.0).moved(places, 2.0)
+    made = made + np.random.default_rng(5).normal(scale=0.02, size=made.shape)
+    gain = trishear_gain(trishear_fit(places, made, TIP, DIP, 2.0), places, made, 2.0, 0.3)
+    assert gain.gain > 0.9
+    assert gain.interval[0] < gain.gain < gain.interval[1]
+    assert gain.half_angles[0] <= np.radians(30.0) <= gain.half_angles[1]
+    assert gain.half_angles[1] - gain.half_angles[0] < np.radians(10.0)
+    assert gain.ratios[0] <= 1.0 <= gain.ratios[1]
+
+
+def test_a_plain_fault_that_is_smeared_leaves_a_trishear_without_gain():
+    """A zone of constant width along a line is no triangle: what trishear explains of it, a step explains as well."""
+    places = grid(0.3)
+    along, up = np.array([np.cos(DIP), np.sin(DIP)]), np.array([-np.sin(DIP), np.cos(DIP)])
+    across = (places - TIP) @ up
+    rng = np.random.default_rng(5)
+    share = np.where(np.abs(across) < 1.0, rng.uniform(0.05, 0.95, len(places)), across > 0)
+    made = places + 2.0 * share[:, None] * along
+    gain = trishear_gain(trishear_fit(places, made, TIP, DIP, 2.0), places, made, 2.0, 0.3)
+    assert gain.gain < 0.5
+
+
+def test_where_nothing_shears_there_is_no_gain():
+    places = grid(0.3)
+    made = places + 2.0 * ((places - TIP) @ [-np.sin(DIP), np.cos(DIP)] > 0)[:, None] * [
+        np.cos(DIP),
+        np.sin(DIP),
+    ]
+    fit = trishear_fit(places, made, TIP, DIP, 2.0)
+    assert trishear_gain(fit, places, made, 2.0, 0.3) is None
