@@ -189,10 +189,11 @@ def _draw(
         draw_instant(folder, fields, sample.radius, sample.layer, walls, followed, line)
     if followed:
         draw_shapes(folder / "shapes.png", chosen, sample.radius, followed, line)
-    last = observed.instants[-1]
-    fit = scene.experiment.trishear(sample.centre, last) if isinstance(scene.experiment, Fault) else None
-    if fit is not None:
-        draw_trishear(folder, last, sample.radius, fit.model, scene.experiment.speed, line)
+    if isinstance(fault := scene.experiment, Fault):
+        last = observed.instants[-1]
+        fit = fault.trishear(sample.centre, last)
+        if fit is not None:
+            draw_trishear(folder, last, sample.radius, fit.model, fault.speed, line)
 
 
 def _drawn(scene: GeologyScene, start: PlanarState, instants: Instants) -> list[Fields]:

@@ -107,4 +107,4 @@ def crest_radius(place: Array, height: Array) -> float:
     # rounding alone leaves no error to compare with
     if -curved <= max(_CERTAIN * np.sqrt(variance), 1e-9 / np.ptp(place)):
         return float("inf")
-    return (1.0 + slope**2) ** 1.5 / (-2.0 * curved)
+    return float((1.0 + slope**2) ** 1.5 / (-2.0 * curved))

@@ -74,14 +74,13 @@ def trishear_gain(
 
 def _misfit(model: Trishear, place: Array, motion: Array, slip: float) -> Array:
     """Return the squared distance (n,) between a motion and that of a trishear [m²]."""
-    square: Array = ((model.moved(place, slip) - place - motion) ** 2).sum(axis=1)
-    return square
+    return np.asarray(((model.moved(place, slip) - place - motion) ** 2).sum(axis=1), dtype=float)
 
 
 def _plain_misfit(place: Array, motion: Array, step: Array) -> Array:
     """Return the squared misfit (n,) of the best rigid step along a line of any angle and place [m²]."""
     moves, rests = ((motion - step) ** 2).sum(axis=1), (motion**2).sum(axis=1)
-    best, found = np.inf, rests
+    best, found = np.inf, np.array(rests)
     for turn in _TURNS:
         order = np.argsort(place @ np.array([-np.sin(turn), np.cos(turn)]))
         # disks below the line rest, those above it move
@@ -95,8 +94,7 @@ def _plain_misfit(place: Array, motion: Array, step: Array) -> Array:
 
 
 def _by_block(values: Array, block: Ints) -> Array:
-    total: Array = np.bincount(block, values)
-    return total
+    return np.asarray(np.bincount(block, values), dtype=float)
 
 
 def _not_excluded(
