@@ -35,6 +35,7 @@ from pipelines.results.folder import UNFINISHED_ASSESSMENT, check_replaceable, r
 from pipelines.results.summary import as_json
 from pipelines.results.table_csv import inert
 from pipelines.run.assemble import Assembly, assemble_stones
+from pipelines.run.inputs import scene_inputs
 from pipelines.run.record import store_record, versions
 from pipelines.run.soundness import problems_of, refuse_unsound, some
 from pipelines.scene.file import SceneFile, read_scene
@@ -148,6 +149,7 @@ def assess(
         progress(Progress("blocks", 0, None, f"closing the joints of {len(models)} stones"))
         groups = select_groups(scene, session, models)
         assembled = assemble_stones(scene, models, groups)
+        inputs = scene_inputs(scene, assembled, groups, session)
         known = known_stones(session, [model.record.code for model in models])
     questions = [
         _asked(one, confirm, code) for one in asked or scene_questions(scene, groups, assembled.origin)
@@ -174,6 +176,7 @@ def assess(
             answers = [fallen(on, question, standing) for question in questions]
     unchecked = [one.name for one in questions if code and isinstance(one, LoadQuestion) and one.code is None]
     summary = _summary(assembled, on, answers, unchecked, standing, left_out)
+    summary["inputs"] = {title: list(lines) for title, lines in inputs.items()}
     progress(Progress("write", 0, 1, "pictures"))
     warnings: list[str] = []
     with replacing(folder, INDEX) as fresh:

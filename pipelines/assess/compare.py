@@ -27,6 +27,7 @@ from pipelines.results.folder import check_replaceable, replacing, source_of
 from pipelines.results.stone_values import stone_results
 from pipelines.results.summary import as_json, summarise
 from pipelines.run.assemble import Assembly, assemble_stones
+from pipelines.run.inputs import run_inputs
 from pipelines.run.record import run_record, store_record, versions
 from pipelines.run.soundness import problems_of, refuse_unsound
 from pipelines.scene.file import read_scene
@@ -108,7 +109,9 @@ def compare(
         with database.session(read_only=True) as session:
             as_of, models = latest_entry(session), select_stones(scene, session)
             progress(Progress("blocks", 0, None, f"closing the joints of {len(models)} stones"))
-            assembly = assemble_stones(scene, models, select_groups(scene, session, models))
+            groups = select_groups(scene, session, models)
+            assembly = assemble_stones(scene, models, groups)
+            inputs = run_inputs(scene, assembly, groups, session)
             known = known_stones(session, [model.record.code for model in models])
         built = build_model(assembly.scene, lambda done, total: progress(Progress("mesh", done, total)))
         problems = problems_of(scene, assembly, loose_blocks(*built))
@@ -121,6 +124,7 @@ def compare(
         plumb = compare_plumb(stones, facades, moved, battered)
         progress(Progress("write", 0, 1, "pictures"))
         summary = _summary(result, assembly, courses, plumb, battered)
+        summary["inputs"] = {title: list(lines) for title, lines in inputs.items()}
         values = _values(courses, plumb)
         results = tuple(_with_values(one, values.get(one.code, {})) for one in stone_results(result))
         lines = [

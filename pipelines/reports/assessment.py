@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from pipelines.reports.html import picture, write_page
+from pipelines.reports.html import input_rows, picture, write_page
 from pipelines.reports.page.model import Model
 
 __all__ = ["write_assessment"]
@@ -38,6 +38,7 @@ def write_assessment(path: Path, summary: Mapping[str, Any], model: Model | None
         lead=f"{summary['headline']}. {summary['free']} stones that may move, {summary['contacts']} contact points, "
         f"weight {1e-3 * summary['weight']:.2f} kN.",
         cautions=summary["cautions"],
+        inputs=input_rows(summary),
         warnings=(),
         version=summary["versions"]["moma"],
         versions=summary["versions"],

@@ -1,8 +1,10 @@
 """Self-contained HTML pages, and the format of the numbers in them."""
 
 import base64
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -15,6 +17,7 @@ from pipelines.reports.page.paper import contents, sealed, title_block
 
 __all__ = [
     "Picture",
+    "input_rows",
     "kilonewtons",
     "kilopascals",
     "megapascals",
@@ -70,6 +73,14 @@ def page_text(template: str, model: Model | None = None, **values: object) -> st
 def picture(path: Path, caption: str) -> Picture:
     """Read a PNG for embedding in a page."""
     return {"caption": caption, "content": base64.b64encode(path.read_bytes()).decode("ascii")}
+
+
+def input_rows(summary: Mapping[str, Any]) -> list[tuple[str, list[str]]]:
+    """Return the lines of each input of a result, by title, and the versions of the programs."""
+    rows = [(title, lines) for title, lines in summary.get("inputs", {}).items() if lines]
+    if "versions" in summary:
+        rows.append(("Versions", [", ".join(f"{name} {one}" for name, one in summary["versions"].items())]))
+    return rows
 
 
 @cache

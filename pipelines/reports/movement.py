@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pipelines.reports.html import millimetres, picture, ratio, write_page
+from pipelines.reports.html import input_rows, millimetres, picture, ratio, write_page
 from pipelines.reports.page.model import Model
 
 __all__ = ["write_comparison", "write_diagnosis_page"]
@@ -60,6 +60,7 @@ def write_comparison(path: Path, summary: Mapping[str, Any], model: Model | None
         lead=f"Measured against simulated deformation: χ² {summary['chi2']:.1f} of {summary['dof']} degrees of "
         f"freedom; {summary['chi2_still']:.1f} if nothing had moved.",
         cautions=summary["cautions"],
+        inputs=input_rows(summary),
         warnings=(),
         version=summary["versions"]["moma"],
         versions=summary["versions"],
@@ -83,6 +84,7 @@ def write_diagnosis_page(path: Path, name: str, summary: Mapping[str, Any], mode
         name=name,
         lead=summary["verdict"],
         cautions=summary["cautions"],
+        inputs=input_rows(summary),
         warnings=(),
         version=summary["versions"]["moma"],
         versions=summary["versions"],

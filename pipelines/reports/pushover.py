@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from pipelines.reports.html import picture, write_page
+from pipelines.reports.html import input_rows, picture, write_page
 
 __all__ = ["write_pushover"]
 
@@ -30,6 +30,7 @@ def write_pushover(path: Path, summary: Mapping[str, Any]) -> None:
         lead=f"{summary['headline']}. {summary['stones']} stones, weight {1e-3 * summary['weight']:.2f} kN, vertical "
         f"force {1e-3 * summary['load']:.4g} kN, pushed at {summary['height']:g} m.",
         cautions=summary["cautions"],
+        inputs=input_rows(summary),
         warnings=(),
         version=summary["versions"]["moma"],
         versions=summary["versions"],

@@ -12,6 +12,7 @@ from mechanics.arrays import Array
 from mechanics.results.result import Result
 from pipelines.draw.plots import history_svg
 from pipelines.reports.html import (
+    input_rows,
     kilonewtons,
     kilopascals,
     megapascals,
@@ -143,7 +144,7 @@ def write_report(
         summary=_summary_rows(summary),
         notes=_notes(summary),
         peaks=peak_rows(summary),
-        inputs=_inputs(summary),
+        inputs=input_rows(summary),
         errors=[(name, _error(key, result, summary), words) for key, name, words in _ERRORS],
         profile=_profile(summary["profile"]),
         sections=[
@@ -217,14 +218,6 @@ def _notes(summary: Mapping[str, Any]) -> list[str]:
         f"Movements below {summary['tolerance']['length'] * 1e3:.1g} mm are within the tolerance of the solver."
     )
     return notes
-
-
-def _inputs(summary: Mapping[str, Any]) -> list[tuple[str, list[str]]]:
-    """Return the lines of each input, and the versions of the programs."""
-    rows = [(title, lines) for title, lines in summary.get("inputs", {}).items() if lines]
-    if "versions" in summary:
-        rows.append(("Versions", [", ".join(f"{name} {one}" for name, one in summary["versions"].items())]))
-    return rows
 
 
 def _error(key: str, result: Result, summary: Mapping[str, Any]) -> str:

@@ -12,6 +12,7 @@ from mechanics.scene.scene import Block, Fidelity, LawRule, Part, Scene
 from mechanics.scene.stages import Stage
 from pipelines.draw.catalogue import PICTURES
 from pipelines.ingest.records import surveyed_block
+from pipelines.results.wall_axes import WallAxes, wall_axes
 from pipelines.run.fidelity import Modelled, Wishes, modelled, neighbours
 from pipelines.run.remarks import remarks, remarks_on_laws, remarks_on_stones
 from pipelines.scene.array_tables import ArrayTable
@@ -67,6 +68,16 @@ class Assembly:
     remarks: tuple[str, ...] = ()
     inputs: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     stages: tuple[Stage, ...] = ()
+
+    @property
+    def wall(self) -> WallAxes | None:
+        """Axes of the wall that the surveyed faces make; None where they look several ways."""
+        records = [model.record for model in self.models]
+        return wall_axes(
+            np.array([one.normal for one in records]),
+            np.array([one.area for one in records]),
+            np.concatenate([block.vertices for block in self.scene.blocks]),
+        )
 
 
 def assemble(scene: SceneFile, session: Session) -> Assembly:

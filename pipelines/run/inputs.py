@@ -1,4 +1,4 @@
-"""Inputs of a run, in words, as its report states them: survey, materials, laws, supports, loads, joints, settings."""
+"""Inputs of runs, assessments and loading tests, in words, as their reports state them."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
+from archmodel.store.stone_record import StoneRecord
 from archmodel.tables.entities import Entity
 from archmodel.tables.surveys import Measurement, Survey
 from mechanics.scene.scene import Fidelity, Scene
@@ -15,18 +16,18 @@ from pipelines.run.closing_check import JointsReport, joints_report
 from pipelines.run.record import settings_of
 from pipelines.scene.array_tables import describe
 from pipelines.scene.file import SceneFile
-from pipelines.scene.selection import Groups
+from pipelines.scene.selection import Groups, StoneModel
 from pipelines.scene.stages import ACTS_IN
 
-__all__ = ["closing_lines", "run_inputs", "stage_lines"]
+__all__ = ["closing_lines", "run_inputs", "scene_inputs", "stage_lines"]
 
-_MOST = 4  # surveys, gaps and overlaps that are named
+_MOST = 4  # surveys, sources of depths, gaps and overlaps that are named
 
 
-def run_inputs(
+def scene_inputs(
     scene: SceneFile, assembly: Assembly, groups: Groups, session: Session
 ) -> dict[str, tuple[str, ...]]:
-    """Return what went into a run: lines of text by title, codes under "Supports".
+    """Return what went into a building: lines of text by title, codes under "Supports".
 
     Parameters
     ----------
@@ -36,12 +37,11 @@ def run_inputs(
     """
     built, models = assembly.scene, assembly.models
     materials = Counter(model.material for model in models)
+    kinds = Counter(model.record.kind for model in models)
     return {
         "Survey": tuple(_surveys(session, [model.record.code for model in models])),
-        "Stones": (
-            f"{len(models)}: "
-            + ", ".join(f"{n} {kind}" for kind, n in Counter(model.record.kind for model in models).items()),
-        ),
+        "Stones": (f"{len(models)}: " + ", ".join(f"{count} {kind}" for kind, count in kinds.items()),),
+        "Depths of the stones": tuple(_depths(models)),
         "Materials": tuple(_material(one, count) for one, count in materials.items()),
         "Contact": tuple(_laws(scene, built, groups)),
         "Supports": tuple(block.code for block in built.blocks if block.fidelity is Fidelity.FIXED),
@@ -51,8 +51,18 @@ def run_inputs(
         ),
         "Stages": stage_lines(scene, assembly),
         "Joints of the survey": closing_lines(joints_report(assembly.closing, assembly.origin)),
-        "Time": (_named(settings_of(scene, built)["time"]),),
-        "Solver": (_named(settings_of(scene, built)["solver"]),),
+    }
+
+
+def run_inputs(
+    scene: SceneFile, assembly: Assembly, groups: Groups, session: Session
+) -> dict[str, tuple[str, ...]]:
+    """Return what went into a run: `scene_inputs`, its steps and its solver."""
+    settings = settings_of(scene, assembly.scene)
+    return {
+        **scene_inputs(scene, assembly, groups, session),
+        "Time": (_named(settings["time"]),),
+        "Solver": (_named(settings["solver"]),),
     }
 
 
@@ -104,6 +114,22 @@ def _surveys(session: Session, codes: Iterable[str]) -> Iterator[str]:
         )
     if len(counts) > _MOST:
         yield f"and {len(counts) - _MOST} more"
+
+
+def _depths(models: Iterable[StoneModel]) -> Iterator[str]:
+    """Yield the range of the depths by their source, with the largest standard deviation that is known."""
+    sources: dict[str, list[StoneRecord]] = {}
+    for model in models:
+        sources.setdefault(model.record.depth_source, []).append(model.record)
+    for source, records in sorted(sources.items(), key=lambda one: -len(one[1]))[:_MOST]:
+        depths = [one.depth for one in records]
+        least, most = (f"{value:.3g}" for value in (min(depths), max(depths)))
+        span = least if least == most else f"{least} to {most}"
+        sigmas = [one.depth_sigma for one in records if one.depth_sigma is not None]
+        known = f"σ up to {1e3 * max(sigmas):.2g} mm" if sigmas else "taken as certain"
+        yield f"{source or 'source not stated'}, {len(records)} stones: {span} m, {known}"
+    if len(sources) > _MOST:
+        yield f"and {len(sources) - _MOST} more sources"
 
 
 def _material(material: Material, count: int) -> str:

@@ -1,16 +1,18 @@
 """Measurements of a diagnosis: the deformation of the stones in the database, by phases if it is to be dated."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from archmodel.database.session import open_database
 from archmodel.query.api import find_rows
 from archmodel.tables.entries import latest_entry
 from pipelines.assess.compare import measured_stones
 from pipelines.assess.diagnosis.file import DiagnosisFile
+from pipelines.run.assemble import assemble_stones
+from pipelines.run.inputs import scene_inputs
 from pipelines.scene.file import read_scene
 from pipelines.scene.fingerprint import digest
-from pipelines.scene.selection import select_stones
+from pipelines.scene.selection import select_groups, select_stones
 from survey.quality.deformation import Built, Deformation, measure_deformation
 from survey.quality.facades import Facade
 from survey.quality.precision import StoneQuality
@@ -30,6 +32,7 @@ class Measurements:
     phases : of each stone by code; empty if the movement is not to be dated
     resting : codes of stones that rest on those of an earlier phase
     solids : digest of the stones in the database
+    inputs : what went into the scene, lines of text by title
     """
 
     stones: tuple[StoneQuality, ...]
@@ -38,6 +41,7 @@ class Measurements:
     phases: Mapping[str, str]
     resting: frozenset[str]
     solids: str = ""
+    inputs: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 def measurements(file: DiagnosisFile, url: str) -> Measurements:
@@ -52,6 +56,8 @@ def measurements(file: DiagnosisFile, url: str) -> Measurements:
     with open_database(url, create=False) as database, database.session(read_only=True) as session:
         models = select_stones(scene, session)
         stones, facades = measured_stones(models)
+        groups = select_groups(scene, session, models)
+        inputs = scene_inputs(scene, assemble_stones(scene, models, groups), groups, session)
         records = [[one.record.code, one.record.solid_vertices, one.record.solid_faces] for one in models]
         solids = digest([latest_entry(session), records])
         rows = find_rows(session, "entity", (), columns=("code", "phase")) if file.phases else ()
@@ -64,7 +70,7 @@ def measurements(file: DiagnosisFile, url: str) -> Measurements:
             )
             file.document.fail(what, "diagnosis", "phases", remedy="record its phase, or leave 'phases' out")
     found = measure(file, stones, facades, {code: str(phase) for code, phase in phases.items()})
-    return replace(found, solids=solids)
+    return replace(found, solids=solids, inputs=inputs)
 
 
 def measure(

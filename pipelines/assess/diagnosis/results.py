@@ -63,6 +63,7 @@ def write_diagnosis(
     write_best(folder, file, case, best)
     summary = _summary(file, found, done, dating)
     summary["cautions"] += cautions
+    summary["inputs"] = {title: list(lines) for title, lines in found.inputs.items()}
     summary["source"] = source_of([file.document.path], folder)
     lines = bed_lines(courses, {facade.name: facade.frame.axes[2] for facade in found.facades})
     model = survey_model(best.title, found.stones, moved=motions.displacement, lines=lines, colour="course")

@@ -23,6 +23,7 @@ from pipelines.reports.pushover import write_pushover
 from pipelines.results.folder import check_replaceable, replacing, source_of
 from pipelines.results.summary import as_json
 from pipelines.run.assemble import Assembly, assemble_stones
+from pipelines.run.inputs import scene_inputs
 from pipelines.run.plausibility import impossible_values
 from pipelines.run.record import store_record, versions
 from pipelines.run.soundness import refuse_unsound, unsound_stones
@@ -109,6 +110,7 @@ def push(
         models = select_stones(scene, session)
         groups = select_groups(scene, session, models)
         assembled = assemble_stones(scene, models, groups)
+        inputs = scene_inputs(scene, assembled, groups, session) | {"Rig": _rig(asked)}
     problems = (*impossible_values(scene, assembled.models), *unsound_stones(assembled))
     refuse_unsound(problems, str(path), _SOUND_FIRST)
     stones = _in_rig(scene, assembled.scene, groups, asked.rig)
@@ -129,6 +131,7 @@ def push(
     progress(Progress("push", 1, total, found=_headline(test, None)))
     band = banded(test, asked.scatter, asked.level, tested) if asked.scatter and not test.stopped else None
     summary = _summary(assembled, asked, test, band, measured)
+    summary["inputs"] = {title: list(lines) for title, lines in inputs.items()}
     with replacing(folder, INDEX) as fresh:
         title = f"{scene.name}: {summary['headline']}"
         np.savetxt(
@@ -173,6 +176,17 @@ def _in_rig(scene: SceneFile, stones: Scene, groups: Groups, rig: Rig) -> Scene:
     )
     rules = law_rules(scene.document, scene.laws, groups, materials, stones.contact.thickness)
     return replace(stones.rigid, contact=replace(stones.contact, rules=rules))
+
+
+def _rig(asked: Pushing) -> tuple[str, ...]:
+    """Describe the rig, its push, and the scatter that makes the band."""
+    rig, way = asked.rig, ", ".join(f"{1e3 * to:g}" for to in asked.to)
+    scatter = ", ".join(f"{name} {100 * value:g} %" for name, value in asked.scatter.items())
+    return (
+        f"head {rig.head}, vertical force {1e-3 * rig.load:g} kN, pushed at {rig.height:g} m above the lowest point",
+        f"push along ({', '.join(f'{one:z.4g}' for one in rig.direction)}) to {way} mm in turn",
+        f"coefficients of variation: {scatter}" if scatter else "no scatter: all values are taken as certain",
+    )
 
 
 def _headline(test: LoadingTest, band: Band | None) -> str:
