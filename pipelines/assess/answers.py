@@ -20,6 +20,7 @@ from mechanics.limit.thrust import thrust
 from moma.errors import SolverError
 from pipelines.assess.codes.check import check_code
 from pipelines.assess.questions import LoadQuestion, Question, Thickness, ThrustQuestion
+from pipelines.assess.sensitivity import sensitivity
 from pipelines.scene.site import Site
 
 __all__ = [
@@ -70,7 +71,12 @@ class Answer:
 
 
 def answer(
-    on: RigidAssembly, question: Question, confirming: Confirm, leading: Lead, site: Site | None
+    on: RigidAssembly,
+    question: Question,
+    confirming: Confirm,
+    leading: Lead,
+    site: Site | None,
+    outwards: Array | None = None,
 ) -> Answer:
     """Answer a question about an assembly.
 
@@ -79,6 +85,7 @@ def answer(
     confirming : runs that confirm the candidate of a load, if the question asks for them
     leading : runs that lead the stones of its mechanism to collapse, if the question asks for them
     site : of the check by a code; None: no question asks for one
+    outwards : (3,) along which the stones are deep; None: not known
 
     Raises
     ------
@@ -86,7 +93,7 @@ def answer(
     """
     match question:
         case LoadQuestion():
-            return _load(on, question, confirming, leading, site)
+            return _load(on, question, confirming, leading, site, outwards)
         case ThrustQuestion():
             return _thrust(on, question)
         case Thickness():
@@ -145,7 +152,12 @@ def fallen(on: RigidAssembly, question: Question, standing: Standing) -> Answer:
 
 
 def _load(
-    on: RigidAssembly, question: LoadQuestion, confirming: Confirm, leading: Lead, site: Site | None
+    on: RigidAssembly,
+    question: LoadQuestion,
+    confirming: Confirm,
+    leading: Lead,
+    site: Site | None,
+    outwards: Array | None,
 ) -> Answer:
     live = question.live
     bound = limit_load(on, live)
@@ -163,6 +175,10 @@ def _load(
         "candidate_converged": None if candidate is None else candidate.converged,
         "outcome": _outcome(bound.multiplier),
     }
+    if isinstance(live, Acceleration):
+        changes = sensitivity(on, live, bound, outwards)
+        told["direction"] = list(live.direction)
+        told["sensitivity"] = None if changes is None else asdict(changes)
     if question.whole and np.isfinite(lowest.multiplier):
         told["tilt"] = float(np.degrees(np.arctan(lowest.multiplier)))
     unlimited = np.isinf(bound.multiplier)
@@ -331,6 +347,7 @@ def _moving(on: RigidAssembly, mechanism: Mechanism) -> dict[str, Any]:
         "stones": [
             {
                 "code": on.model.scene.blocks[row].code,
+                "centre": on.state.centre[row].tolist(),
                 "velocity": mechanism.velocity[row, :3].tolist(),
                 "spin": mechanism.velocity[row, 3:].tolist(),
             }

@@ -11,6 +11,7 @@ import numpy as np
 from archmodel.database.session import open_database
 from archmodel.store.run_record import MovingStone, RunRecord
 from archmodel.tables.entries import latest_entry
+from mechanics.arrays import Array
 from mechanics.dynamics.outcome import Outcome
 from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.limit.assembly import RigidAssembly, assembly
@@ -171,7 +172,8 @@ def assess(
             text = f"going on, with {len(kept)} answers that were found before"
             progress(Progress("assess", 0, len(questions), found=text))
         if standing.outcome.rests:
-            answers = _answered(on, questions, scene.site, kept, given, progress)
+            outwards = None if assembled.wall is None else assembled.wall.outwards
+            answers = _answered(on, questions, scene.site, kept, given, progress, outwards)
         else:
             answers = [fallen(on, question, standing) for question in questions]
     unchecked = [one.name for one in questions if code and isinstance(one, LoadQuestion) and one.code is None]
@@ -240,6 +242,7 @@ def _answered(
     kept: Kept,
     given: str,
     progress: Listener,
+    outwards: Array | None,
 ) -> list[Answer]:
     """Answer the questions that are not answered yet; each answer is kept, and told, as soon as there is one."""
     answers: list[Answer] = []
@@ -257,7 +260,7 @@ def _answered(
         decides = [given, digest([question, site])]
         found: Answer | None = kept.get(decides)
         if found is None:
-            found = answer(on, question, confirming, leading, site)
+            found = answer(on, question, confirming, leading, site, outwards)
             kept.put(decides, found)
         answers.append(found)
         progress(Progress("assess", number + 1, total, question.name, found.told["headline"]))
@@ -324,6 +327,9 @@ def _summary(
         "contacts": len(on.contacts),
         "cautions": [*cautions, *assembled.remarks],
         "loads": told,
+        "governs": min(range(len(told)), key=lambda number: _limit(told[number])),
+        "wall": None if assembled.wall is None else assembled.wall.record,
+        "origin": assembled.origin.tolist(),
         "standing": {
             "outcome": str(standing.outcome),
             "reason": standing.reason,

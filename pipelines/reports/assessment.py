@@ -4,8 +4,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from pipelines.reports.html import input_rows, picture, write_page
+import numpy as np
+
+from pipelines.reports.html import direction_text, input_rows, kilonewtons, percent, picture, write_page
 from pipelines.reports.page.model import Model
+from pipelines.results.wall_axes import WallAxes, axes_of
 
 __all__ = ["write_assessment"]
 
@@ -18,6 +21,7 @@ _CAPTIONS = {
     "forces": "Resultants of the joints at the limit: blue within the kern, red outside.",
 }
 _FEW = 12  # stones of a mechanism that are named
+_SHARE = 0.1  # change of friction and depth by which the sensitivity of a limit is told [-]
 
 
 def write_assessment(path: Path, summary: Mapping[str, Any], model: Model | None = None) -> None:
@@ -39,6 +43,7 @@ def write_assessment(path: Path, summary: Mapping[str, Any], model: Model | None
         f"weight {1e-3 * summary['weight']:.2f} kN.",
         cautions=summary["cautions"],
         inputs=input_rows(summary),
+        governs=_governs(summary),
         warnings=(),
         version=summary["versions"]["moma"],
         versions=summary["versions"],
@@ -48,6 +53,60 @@ def write_assessment(path: Path, summary: Mapping[str, Any], model: Model | None
         check_head=_CHECKS,
         parts=[_part(path.parent, number, one) for number, one in enumerate(loads, start=1)],
     )
+
+
+def _governs(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return what governs in words: direction, capacity against demand, mechanism, and how sure it is."""
+    one, axes = summary["loads"][summary["governs"]], axes_of(summary["wall"])
+    rows = [("Load", one["name"])]
+    if "direction" in one:
+        rows.append(("Direction", direction_text(axes, one["direction"])))
+    if one["kind"] == "load" and (limit := one.get("candidate") or one.get("bound")):
+        push = "direction" in one and "tilt" in one
+        force = f": {kilonewtons(limit * summary['weight'])} on all stones that may move" if push else ""
+        rows += [("Capacity", f"λ = {_number(limit)}{force}"), ("Capacity against demand", _demand(one))]
+    if stones := one["mechanism"]["stones"]:
+        rows.append(("How it falls", _place(axes, stones)))
+    rows.append(("How sure it is", _sure(one.get("sensitivity"))))
+    return rows
+
+
+def _demand(one: Mapping[str, Any]) -> str:
+    """Return the comparisons of a code in words."""
+    if "code" not in one:
+        return "no demand was stated: --code with a table [site] compares this load with that of a code"
+    return "; ".join(
+        f"{check['name']}: {check['capacity']:.4g} against {check['demand']:.4g} {check['unit']}, ratio "
+        f"{check['ratio']:.2f}, {'passed' if check['passed'] else 'NOT PASSED'}"
+        for check in one["code"]["checks"]
+    )
+
+
+def _place(axes: WallAxes | None, stones: Sequence[Mapping[str, Any]]) -> str:
+    """Return how many stones move, where they are in the wall, and which way the fastest goes."""
+    first = stones[0]
+    text = f"{len(stones)} stones move, the fastest, {first['code']}, {direction_text(axes, first['velocity'])}"
+    if axes is None or any("centre" not in one for one in stones):
+        return text
+    places = [axes.place(np.array(one["centre"])) for one in stones]
+    (left, right), (low, high) = ((min(values), max(values)) for values in zip(*places, strict=True))
+    return (
+        f"{text}; their centres are {low:.2f} to {high:.2f} m above the foot and {left:.2f} to {right:.2f} m from the "
+        "left end"
+    )
+
+
+def _sure(found: Mapping[str, Any] | None) -> str:
+    """Return by how much the bound changes with friction and depth, to first order."""
+    if found is None:
+        return "friction, depths and densities are taken as certain"
+    changes = [("less friction in all joints", found["friction"]), ("less depth of all stones", found["depth"])]
+    told = " and ".join(
+        f"{'falls' if change >= 0.0 else 'rises'} by {percent(_SHARE * abs(change))} with {100 * _SHARE:g} % {what}"
+        for what, change in changes
+        if change is not None
+    )
+    return f"the bound {told}, to first order; all else is taken as certain"
 
 
 def _row(one: Mapping[str, Any]) -> tuple[str, ...]:

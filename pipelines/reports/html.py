@@ -1,7 +1,7 @@
 """Self-contained HTML pages, and the format of the numbers in them."""
 
 import base64
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -14,9 +14,11 @@ from pipelines.reports.page.inline import languages_packed, script, style, viewe
 from pipelines.reports.page.languages import catalogues
 from pipelines.reports.page.model import Model
 from pipelines.reports.page.paper import contents, sealed, title_block
+from pipelines.results.wall_axes import WallAxes
 
 __all__ = [
     "Picture",
+    "direction_text",
     "input_rows",
     "kilonewtons",
     "kilopascals",
@@ -73,6 +75,13 @@ def page_text(template: str, model: Model | None = None, **values: object) -> st
 def picture(path: Path, caption: str) -> Picture:
     """Read a PNG for embedding in a page."""
     return {"caption": caption, "content": base64.b64encode(path.read_bytes()).decode("ascii")}
+
+
+def direction_text(axes: WallAxes | None, vector: Sequence[float]) -> str:
+    """Name a direction along the axes x, y, z and, where a wall has its own, along these."""
+    size = float(np.linalg.norm(vector)) or 1.0
+    text = f"({', '.join(f'{one / size + 0.0:.3g}' for one in vector)})"
+    return text if axes is None else f"{axes.direction(np.array(vector))}, {text}"
 
 
 def input_rows(summary: Mapping[str, Any]) -> list[tuple[str, list[str]]]:

@@ -4,7 +4,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from pipelines.reports.html import input_rows, picture, write_page
+from pipelines.reports.html import direction_text, input_rows, kilonewtons, picture, write_page
+from pipelines.results.wall_axes import axes_of
 
 __all__ = ["write_pushover"]
 
@@ -34,11 +35,38 @@ def write_pushover(path: Path, summary: Mapping[str, Any]) -> None:
         warnings=(),
         version=summary["versions"]["moma"],
         versions=summary["versions"],
+        governs=list(_governs(summary)),
         values=list(_values(summary)),
         band=list(_band(summary)),
         level=None if summary["band"] is None else f"{100 * summary['band']['level']:g} %",
         figures=[picture(path.parent / name, words) for name, words in _PICTURES.items()],
     )
+
+
+def _governs(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Yield what governs in words: direction, what the stones bear, against what was measured, and how sure it is."""
+    axes, direction = axes_of(summary["wall"]), summary["direction"]
+    ways = {"forwards": direction, "backwards": [-one for one in direction]}
+    for way, force in summary["strength"].items():
+        if force:
+            yield (
+                f"Bears {way}",
+                f"{kilonewtons(abs(force))} {direction_text(axes, ways[way])}, {summary['height']:g} m above the "
+                f"foot, under {kilonewtons(summary['load'])} from above",
+            )
+    for name, ratio in ((summary["measured"] or {}).get("ratio") or {}).items():
+        if ratio is not None:
+            measured = summary["measured"]["strength"][name]
+            yield f"Measured {name}", f"{kilonewtons(abs(measured))}; predicted over measured {ratio:.3f}"
+    if (band := summary["band"]) is None:
+        yield "How sure it is", "strengths, stiffness, loads and depths are taken as certain: no scatter was stated"
+    else:
+        known = ", ".join(band["scatter"])
+        yield (
+            "How sure it is",
+            f"± {kilonewtons(band['strength'])} holds {100 * band['level']:g} % of the outcomes, from the scatter of "
+            f"{known}; all else, as the depths, is taken as certain",
+        )
 
 
 def _values(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
@@ -55,10 +83,6 @@ def _values(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         (f"{summary['steps']}, {errors['unsolved']}, {errors['disturbed']}"),
     )
     yield "Energy that no term explains", f"{errors['energy']:.1e}"
-    for name, ratio in ((summary["measured"] or {}).get("ratio") or {}).items():
-        if ratio is not None:
-            measured = summary["measured"]["strength"][name]
-            yield f"Measured {name}; predicted over it", f"{1e-3 * measured:.4g} kN; {ratio:.3f}"
 
 
 def _band(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:

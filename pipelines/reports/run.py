@@ -95,6 +95,7 @@ _STAGES = (
     "before a stone was laid; negative: cut off it."
 )
 
+_WALL = {"along": "to the right along the wall", "outwards": "outwards", "up": "upwards"}
 _MOST = 10  # stones and joints of a table
 _SEEN = 1e-6  # over the width of a joint: a smaller movement is rounding
 
@@ -169,6 +170,7 @@ def _summary_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("Weight carried", kilonewtons(reaction["weight"])),
         ("Reaction of the supports", kilonewtons(reaction["total_vertical"])),
         ("Largest displacement", _displacement(summary)),
+        *_in_wall(summary),
     ]
     if stress is not None:
         rows += [
@@ -197,6 +199,17 @@ def _displacement(summary: Mapping[str, Any]) -> str:
     if found["time"] is None or largest == end:
         return largest
     return f"{largest} after {found['time']:.4g} s; {end} at the end"
+
+
+def _in_wall(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return the largest displacement at the end in the axes of the wall, and its place; nothing of a still one."""
+    found, least = summary.get("wall"), summary["tolerance"]["length"]
+    if found is None or summary["displacement"]["end"] < least:
+        return []
+    one = found["displacement"]
+    parts = ", ".join(f"{millimetres(one[key], least)} {words}" for key, words in _WALL.items())
+    place = f"{one['above_foot']:.2f} m above the foot, {one['from_left']:.2f} m from the left end"
+    return [("In the axes of the wall, at the end", f"{parts} ({one['stone']}, {place})")]
 
 
 def _notes(summary: Mapping[str, Any]) -> list[str]:

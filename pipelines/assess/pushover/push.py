@@ -235,6 +235,8 @@ def _summary(
         "cautions": [*cautions, *assembled.remarks],
         "stones": len(assembled.scene.blocks),
         "weight": weight,
+        "direction": list(asked.rig.direction),
+        "wall": None if assembled.wall is None else assembled.wall.record,
         "load": asked.rig.load,
         "height": asked.rig.height,
         "head": str(asked.rig.head),
