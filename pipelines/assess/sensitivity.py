@@ -6,7 +6,7 @@ velocities count in the change of λ: with the sliding velocities u_T and the no
 
     μ dλ/dμ = Σ μ (f_N + s) |u_T|,
 
-and if all stones grow deeper by a share, about their centres along the direction o, weights and strengths in proportion,
+and if all stones grow deeper by a share, about their centres along the direction o, weights and strengths with them,
 
     d dλ/dd = -Σ ω·((r·o) o × f),
 

@@ -85,7 +85,9 @@ def _demand(one: Mapping[str, Any]) -> str:
 def _place(axes: WallAxes | None, stones: Sequence[Mapping[str, Any]]) -> str:
     """Return how many stones move, where they are in the wall, and which way the fastest goes."""
     first = stones[0]
-    text = f"{len(stones)} stones move, the fastest, {first['code']}, {direction_text(axes, first['velocity'])}"
+    text = (
+        f"{len(stones)} stones move, the fastest, {first['code']}, {direction_text(axes, first['velocity'])}"
+    )
     if axes is None or any("centre" not in one for one in stones):
         return text
     places = [axes.place(np.array(one["centre"])) for one in stones]
@@ -100,7 +102,10 @@ def _sure(found: Mapping[str, Any] | None) -> str:
     """Return by how much the bound changes with friction and depth, to first order."""
     if found is None:
         return "friction, depths and densities are taken as certain"
-    changes = [("less friction in all joints", found["friction"]), ("less depth of all stones", found["depth"])]
+    changes = [
+        ("less friction in all joints", found["friction"]),
+        ("less depth of all stones", found["depth"]),
+    ]
     told = " and ".join(
         f"{'falls' if change >= 0.0 else 'rises'} by {percent(_SHARE * abs(change))} with {100 * _SHARE:g} % {what}"
         for what, change in changes

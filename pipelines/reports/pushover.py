@@ -59,7 +59,10 @@ def _governs(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
             measured = summary["measured"]["strength"][name]
             yield f"Measured {name}", f"{kilonewtons(abs(measured))}; predicted over measured {ratio:.3f}"
     if (band := summary["band"]) is None:
-        yield "How sure it is", "strengths, stiffness, loads and depths are taken as certain: no scatter was stated"
+        yield (
+            "How sure it is",
+            "strengths, stiffness, loads and depths are taken as certain: no scatter was stated",
+        )
     else:
         known = ", ".join(band["scatter"])
         yield (

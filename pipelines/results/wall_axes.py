@@ -47,7 +47,11 @@ class WallAxes:
         size = float(np.linalg.norm(parts))
         if size == 0.0:
             return "none"
-        names = (("to the right along the wall", "to the left along the wall"), ("outwards", "inwards"), ("up", "down"))
+        names = (
+            ("to the right along the wall", "to the left along the wall"),
+            ("outwards", "inwards"),
+            ("up", "down"),
+        )
         row = int(np.abs(parts).argmax())
         name = names[row][int(parts[row] < 0.0)]
         cosine = abs(float(parts[row])) / size
