@@ -1,11 +1,13 @@
 """What each test costs: `python -m tests.costs` measures all of them, which takes an hour, and renews `dear.txt`.
 
-`dear.txt` lists the tests that take more than 0.7 s of processor time; they run with `-m slow`. Never listed are the
-cheapest test of a file, so that each keeps a guard, and the tests of the folders that `KEPT` names.
+`dear.txt` lists the tests that take more than 0.7 s of processor time. Those that guard what a user has run in
+`.ci/run` (`-m guard`), the others with `-m slow`. Never listed are the cheapest test of a file, so that each keeps a
+guard, and the tests of the folders that `KEPT` names.
 """
 
 import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -15,13 +17,33 @@ from pathlib import Path
 
 import pytest
 
-__all__ = ["DEAR", "KEPT", "dear", "is_dear", "listed"]
+__all__ = ["DEAR", "GUARDS", "KEPT", "RISKS", "dear", "guards", "is_dear", "listed"]
 
 DEAR = Path(__file__).with_name("dear.txt")
 """List of dear tests: their file, then, indented, their names."""
 
 KEPT = ("tests/test_", "tests/validation/wild/", "tests/validation/one_answer/", "tests/docs/")
 """Rules of the source, scenes that were found to break a verdict, and documented commands: they run in every suite."""
+
+GUARDS = (
+    "tests/archmodel/database/",
+    "tests/archmodel/exchange/test_round_trip.py",
+    "tests/archmodel/migrations/",
+    "tests/mechanics/dynamics/test_resuming.py",
+    "tests/mechanics/planar/test_resuming.py",
+    "tests/moma/cli/test_database.py",
+    "tests/moma/cli/test_read_only.py",
+    "tests/pipelines/ingest/test_crashes.py",
+    "tests/pipelines/ingest/test_exchange.py",
+    "tests/pipelines/results/test_folder.py",
+    "tests/pipelines/results/test_vtkhdf.py",
+    "tests/pipelines/run/test_unfinished.py",
+    "tests/validation/elastic/test_laws.py",
+)
+"""Files and folders of tests that guard what a user has: kills, locks, resumption, migration, files that come back."""
+
+RISKS = re.compile(r"::test_\w*(kill|resum|interrupt|full_disk|same_bits|goes_on|read_only|is_lost|lose)")
+"""Names of tests that guard the same, wherever they stand."""
 
 _LIMIT = 0.7  # processor time [s]
 _FOLDER = "MOMA_COSTS"  # variable that names the folder of the measurements
@@ -30,6 +52,17 @@ _FOLDER = "MOMA_COSTS"  # variable that names the folder of the measurements
 def is_dear(node: str, listed: frozenset[str]) -> bool:
     """Return True for a test that is listed, by its whole name or by that of its function."""
     return node in listed or node.split("[")[0] in listed
+
+
+def guards(node: str) -> bool:
+    """Return True for a test that guards what a user has, and so runs in `.ci/run` whatever it costs.
+
+    >>> guards("tests/pipelines/run/test_run.py::test_a_killed_run_goes_on")
+    True
+    >>> guards("tests/survey/faces/test_planes.py::test_the_rms_is_that_of_the_residuals")
+    False
+    """
+    return node.startswith(GUARDS) or RISKS.search(node) is not None
 
 
 def listed() -> frozenset[str]:
