@@ -145,8 +145,9 @@ class ContactSettings:
         it, where they reproduce its area and second moments exactly, as a uniform pressure does; *centroid*: corners,
         and a further point at the centroid, which take shares of the area that carry its second moments, so that
         elastic joints bend like the area and stones still rock about its edge; *area*: one in each cell of a grid, so
-        that elastic joints also gap and crush like the area. The grid lies along the longest edge of the smaller face,
-        from its corner, with two or more cells each way, and stays with that face as stones slide and rock
+        that elastic joints also gap and crush like the area, and one in each corner, about which stones rock. The grid
+        lies along the longest edge of the smaller face, from its corner, with two or more cells each way, and stays
+        with that face as stones slide and rock
     spacing : the number of cells along a face is its length over `spacing`, rounded up; a joint of two faces has two
         or more each way, of an area of its own
     thickness : of the mortar between two blocks, by their codes, for laws whose stiffness depends on it; by the code of
@@ -177,7 +178,7 @@ class ContactSettings:
         Setting(
             "corners: at the true edge of the common face; inertia: inside it, where they carry its second moments; "
             "centroid: corners and centroid, which together bend like the face where joints are elastic; "
-            "area: in cells all over it, `spacing` wide, so that elastic joints open and crush like the face."
+            "area: corners, and cells all over it, `spacing` wide, so that elastic joints open and crush like the face."
         ),
     ] = Placement.CORNERS
     spacing: Annotated[

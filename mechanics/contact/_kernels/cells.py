@@ -5,12 +5,16 @@ from numba import njit
 
 from mechanics.contact._kernels.vectors import along, cross, dot, minus, norm, over, row
 
-__all__ = ["cell_points", "face_grid"]
+__all__ = ["cell_points", "corner_points", "face_grid"]
 
 _EQUAL = 1.0 - 1e-6  # of lengths and areas that are equal but for rounding, the first counts [-]
 _WHOLE = 1e-6  # part of a cell that a face may be longer than whole cells [-]
 _NARROW = 0.25  # a cell of which the overlap reaches over less of its width belongs to its neighbour [-]
 _SLIVER = 1e-3  # a cell of which the overlap takes less of its area belongs to the next one [-]
+_ON_LINE = 1e-6  # of a cell: a corner nearer than this to a line of the grid lies beyond it, whatever the rounding [-]
+# part of a cell's area that its corners take: with a quarter at its corner and the rest where the centroid stays, a
+# rectangular cell keeps its second moments, f/(1 - f) b²/4 = b²/12 along each side b [-]
+_AT_CORNERS = 0.25
 
 
 @njit(cache=True)
@@ -95,6 +99,14 @@ def _part(number, first, last, middle, pitch):
 
 
 @njit(cache=True)
+def _cell_of(place, first, last, middle, pitch):
+    """Return the number of the cell, counted from the first, that a coordinate lies in."""
+    if first == last:
+        return 0 if place < middle else 1
+    return min(max(int(np.floor(place / pitch + _ON_LINE)), first), last) - first
+
+
+@njit(cache=True)
 def _within(ring, count, axis, low, high, scratch, kept):
     """Write the part of a ring between two bounds; return its corners."""
     k = _cut(ring, count, axis, high, 1.0, scratch)
@@ -116,7 +128,7 @@ def _area(ring, count):
 
 
 @njit(cache=True)
-def cell_points(ring, count, grid, rings, x, y, label, share):  # pragma: no cover - compiled
+def cell_points(ring, count, grid, rings, points, taker):  # pragma: no cover - compiled
     """Find the centroids of the cells of an overlap, with their areas; both add up to those of the overlap.
 
     The cells are those of the grid, cut to the overlap. Narrow ones at its ends belong to their neighbours, and so do
@@ -129,17 +141,20 @@ def cell_points(ring, count, grid, rings, x, y, label, share):  # pragma: no cov
     count : int64
     grid : n1, n2, p1, p2 of `face_grid`
     rings : (4, room, 4) float64, scratch; there is room for four corners more than the overlap has
-    x, y, label, share : (≥ n1 n2,) to which points [m], names below 9 n1 n2 and areas [m²] are written
+    points : x, y, label, share, each (≥ n1 n2,), to which points [m], names below 9 n1 n2 and areas [m²] are written
+    taker : (≥ count,) int64, to which the point of the cell is written that each corner of the overlap belongs to
 
     Outputs
     -------
     int64, number of points
     """
     n1, n2, p1, p2 = grid
+    x, y, label, share = points
     a, b, u = _range(ring, count, 0, p1, n1)
     c, d, v = _range(ring, count, 1, p2, n2)
     k = np.int64(0)  # of no literal type
     area = mx = my = 0.0
+    taker[:count] = 0
     for i in range(max(b - a + 1, 2)):
         low, high, row_name = _part(i, a, b, u, p1)
         strip = _within(ring, count, 0, low, high, rings[0], rings[1])
@@ -147,6 +162,9 @@ def cell_points(ring, count, grid, rings, x, y, label, share):  # pragma: no cov
             low, high, name = _part(j, c, d, v, p2)
             corners = _within(rings[1], strip, 1, low, high, rings[2], rings[3])
             own = _area(rings[3], corners)
+            for q in range(count):
+                if _cell_of(ring[q, 0], a, b, u, p1) == i and _cell_of(ring[q, 1], c, d, v, p2) == j:
+                    taker[q] = k
             area, mx, my = area + own[0], mx + own[1], my + own[2]
             if area >= _SLIVER * p1 * p2:
                 x[k], y[k], share[k], label[k] = mx / area, my / area, area, row_name * 3 * n2 + name
@@ -158,7 +176,48 @@ def cell_points(ring, count, grid, rings, x, y, label, share):  # pragma: no cov
     if area > 0.0:
         # what slivers at the end leave belongs to the last point
         q = k - 1
+        for p in range(count):
+            taker[p] = min(taker[p], q)
         whole = share[q] + area
         x[q], y[q] = (share[q] * x[q] + mx) / whole, (share[q] * y[q] + my) / whole
         share[q] = whole
     return k
+
+
+@njit(cache=True)
+def corner_points(x_corner, y_corner, taker, cells, stride, points):  # pragma: no cover - compiled
+    """Add corners of an overlap to the points of its cells, so that a stone rocks about the true edge of its joint.
+
+    The corners of a cell share a quarter of its area, and its point moves so that area and centroid of each cell stay.
+    They are named after their cell, not after corners of either face, since rounding would choose between faces that
+    end together.
+
+    Inputs
+    ------
+    x_corner, y_corner : (n,) float64 [m]
+    taker : (n,) int64, point of the cell of each corner
+    cells, stride : int64, number of points of cells, and a number above all their names
+    points : x, y, label, share, each (≥ cells + n,): points of the cells, behind which the corners are written
+
+    Outputs
+    -------
+    int64, number of points
+    """
+    x, y, label, share = points
+    count = taker.shape[0]
+    for k in range(cells):
+        among, mx, my = 0, 0.0, 0.0
+        for q in range(count):
+            if taker[q] == k:
+                label[cells + q] = among * stride + label[k]
+                among, mx, my = among + 1, mx + x_corner[q], my + y_corner[q]
+        if among == 0:
+            continue
+        for q in range(count):
+            if taker[q] == k:
+                x[cells + q], y[cells + q] = x_corner[q], y_corner[q]
+                share[cells + q] = _AT_CORNERS * share[k] / among
+        x[k] = (x[k] - _AT_CORNERS * mx / among) / (1.0 - _AT_CORNERS)
+        y[k] = (y[k] - _AT_CORNERS * my / among) / (1.0 - _AT_CORNERS)
+        share[k] *= 1.0 - _AT_CORNERS
+    return cells + count

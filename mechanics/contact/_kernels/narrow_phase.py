@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from mechanics.arrays import Array, Bools, Ints
-from mechanics.contact._kernels.cells import cell_points, face_grid
+from mechanics.contact._kernels.cells import cell_points, corner_points, face_grid
 from mechanics.contact._kernels.vectors import (
     along,
     cross,
@@ -34,9 +34,9 @@ __all__ = [
 ]
 
 # Contact points are named by numbers below 2²⁷ within a pair of shapes: the kind of the pair, what the point is (a
-# corner of the incident face, a cut by a side of the reference face, a point inside, or the centroid), and a corner
-# of one shape with a face of the other, or two edges. Shapes have at most a third as many faces as corners of faces,
-# half as many edges.
+# corner of the incident face, a cut by a side of the reference face, a point inside, or the centroid or a corner
+# beside points inside), and a corner of one shape with a face of the other, or two edges. Shapes have at most a third
+# as many faces as corners of faces, half as many edges.
 NAME_BITS = 27
 _KIND_BIT, _WHAT_BIT = 25, 23
 MAX_CORNERS = 5000  # corners over all faces of a shape: 5000 · 5000 / 3 < 2²³
@@ -537,9 +537,9 @@ def _room_needed(pairs, points, spacing, flat, shapes):
                 faces = 0
                 for s in pairs.shapes[p]:
                     faces = max(faces, shapes.fptr[s + 1] - shapes.fptr[s])
-                if 9.0 * n1 * n2 * faces >= 1 << _WHAT_BIT:
+                if 9.0 * n1 * n2 * faces * corners >= 1 << _WHAT_BIT:
                     return -1, -1
-                corners = max(corners, n1 * n2)
+                corners += n1 * n2
             largest, total = max(largest, corners), total + corners
     return largest, total
 
@@ -557,8 +557,8 @@ def interface_points(
         the overlap
     inner : bool, points of flat faces lie inside, where they carry the area's second moments
     middle : bool, flat faces have a further point at the centroid, so that springs in all points bend like the area
-    spacing : float64, flat faces have a point in each cell, of this width or less, of a grid on the smaller one; zero:
-        at corners or inside [m]
+    spacing : float64, flat faces have a point in each cell, of this width or less, of a grid on the smaller one, and at
+        the corners of the overlap; zero: at corners or inside [m]
     flat : float64, cosine of the angle within which faces lie flat on one another [-]
     thin : float64, flat faces that overlap by less than this part of the smaller one do not touch [-]
     shapes : Polyhedra
@@ -582,6 +582,7 @@ def interface_points(
     polygon, kept = _polygon_of(largest), _polygon_of(largest)
     x, y, z, label = polygon
     share, chosen = np.empty(largest), np.empty(largest, dtype=np.int64)
+    taker = np.empty(largest, dtype=np.int64)
     rings = np.empty((5, largest + 4 if spacing > 0.0 else 0, 4))
     # unpacked once: in the loop the compiler would count references
     pair, limit, _, kind, feature, axis = pairs
@@ -629,7 +630,7 @@ def interface_points(
         m, lies_flat = _moments(x, y, k), -dot(g, n) > flat
         if lies_flat and m.area < thin * min(face_area[reference], face_area[incident]):
             continue
-        near, inside, whole = 0, False, False
+        near, numbered, whole = 0, 0, False  # points that are named by numbers come first
         for q in range(k):
             if z[q] <= limit[p]:
                 near += 1
@@ -648,14 +649,21 @@ def interface_points(
                     x[q],
                     y[q],
                 )
-            k, inside = cell_points(rings[0], k, (n1, n2, p1, p2), rings[1:], x, y, label, share), True
+            corners = spread(x, y, k, max(points, 3), 2.0 * _RECEDES * _gyration(m), chosen)
+            for q in range(corners):
+                kept.x[q], kept.y[q] = x[chosen[q]], y[chosen[q]]
+            cells = x, y, label, share
+            numbered = cell_points(rings[0], k, (n1, n2, p1, p2), rings[1:], cells, taker)
+            for q in range(corners):
+                taker[q] = taker[chosen[q]]
+            k = corner_points(kept.x, kept.y, taker[:corners], numbered, 9 * n1 * n2, cells)
             for q in range(k):
                 z[q] = height + gx * x[q] + gy * y[q]
         elif (inner or points == 1) and lies_flat and near == k:
             gx, gy = _slope(f, g)
             height = z[0] - gx * x[0] - gy * y[0]
             _inner_points(points, m, x, y)
-            k, inside = points, True
+            k, numbered = points, points
             for q in range(k):
                 z[q], label[q], share[q] = height + gx * x[q] + gy * y[q], q, m.area / k
         elif near == 0:
@@ -680,10 +688,10 @@ def interface_points(
             write_row(nearest, 2 * count, along(foot, z[q], n))
             write_row(nearest, 2 * count + 1, foot)
             place[count, 0], place[count, 1] = p, 1 if owner == i else 0
-            if inside:
+            if q < numbered:
                 name = (2 << _WHAT_BIT) + label[q] * faces + face
-            elif whole and q == k - 1:
-                name = (3 << _WHAT_BIT) + face
+            elif numbered or (whole and q == k - 1):
+                name = (3 << _WHAT_BIT) + label[q] * faces + face
             elif label[q] >= 0:
                 name = (label[q] - cptr[fptr[other]]) * faces + face
             else:

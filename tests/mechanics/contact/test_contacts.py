@@ -181,12 +181,22 @@ def test_points_over_the_area_keep_their_names_as_equal_faces_tilt_either_way():
 
 
 @pytest.mark.parametrize(("spacing", "count"), [(1.0, 4), (0.2, 12), (0.05, 160)])
-def test_a_joint_has_a_point_in_each_cell_two_each_way_at_least(spacing, count):
+def test_a_joint_has_a_point_in_each_cell_two_each_way_at_least_and_in_its_corners(spacing, count):
     one = scene(ground(), brick("a", (0, 0, 0), (0.8, 0.5, 0.6)))
-    key, _, gap, area, _ = facts(one, 4, Placement.AREA, spacing)
-    assert len(key) == count
+    key, _, gap, area, place = facts(one, 4, Placement.AREA, spacing)
+    assert len(key) == count + 4
     np.testing.assert_allclose(gap, 0.0, atol=1e-14)
-    np.testing.assert_allclose(area, 0.4 / count, rtol=1e-12)
+    quarters, rests = (0.25 * 0.4 / count, 0.75 * 0.4 / count)
+    expected = np.sort([quarters] * 4 + [rests] * 4 + [0.4 / count] * (count - 4))
+    np.testing.assert_allclose(np.sort(area), expected, rtol=1e-12)
+    at = place[:, 0, :2]
+    corners = at[(np.abs(at / [0.8, 0.5] - 0.5) > 0.5 - 1e-12).all(axis=1)]
+    assert {tuple(one.round(9)) for one in corners} == {(0, 0), (0.8, 0), (0, 0.5), (0.8, 0.5)}
+    np.testing.assert_allclose(area @ at / 0.4, [0.4, 0.25], rtol=1e-12)
+    if count == 4:  # cells in corners carry their second moments
+        local = at - [0.4, 0.25]
+        second = np.einsum("c,ci,cj->ij", area, local, local)
+        np.testing.assert_allclose(second, 0.4 / 12 * np.diag([0.64, 0.25]), atol=1e-14)
 
 
 @pytest.mark.parametrize(("points", "placement", "count"), [

@@ -410,7 +410,7 @@ def test_shares_do_not_jump_where_one_would_vanish():
 
 
 def cells_twin(stack, spacing, swap):
-    """Areas and centroids of the cells of a grid on the smaller face, by clipping."""
+    """Areas and first moments of the cells of a grid on the smaller face, by clipping, and the corners in each."""
     common = stack.common[:, :2]
     lower, upper = stack.top[:, :2], stack.bottom[:, :2]
     first, second = ((upper, -1.0), (lower, 1.0)) if swap else ((lower, 1.0), (upper, -1.0))
@@ -434,7 +434,7 @@ def cells_twin(stack, spacing, swap):
             inner = np.array([(across.min() + across.max()) / 2])
         lines.append([-np.inf, *inner, np.inf])
     flat = np.column_stack([common, np.zeros(len(common))])
-    found, pending = [], np.zeros(3)
+    found, pending, corners, among = [], np.zeros(3), [], set()
     for a in range(len(lines[0]) - 1):
         for b in range(len(lines[1]) - 1):
             cell = flat
@@ -445,19 +445,28 @@ def cells_twin(stack, spacing, swap):
                         cell = clip(cell, (bound + low[axis]) * normal, sign * normal)
             area, first_moment, _ = moments(cell[:, :2]) if len(cell) > 2 else (0.0, np.zeros(2), 0)
             pending = pending + np.array([area, *first_moment])
+            among |= {q for q, x in enumerate(common) if len(cell)
+                      and np.linalg.norm(cell[:, :2] - x, axis=1).min() < 1e-9}  # fmt: skip
             if pending[0] >= 1e-3 * pitch.prod():
                 found.append(pending)
-                pending = np.zeros(3)
+                corners.append(among)
+                pending, among = np.zeros(3), set()
     if found:
         found[-1] = found[-1] + pending
+        corners[-1] = corners[-1] | among
     else:
-        found = [pending]
-    return np.array(found)
+        found, corners = [pending], [among]
+    return np.array(found), corners
+
+
+def at_corners(place):
+    """Tell which contact points are named after corners of the overlap, not after cells."""
+    return place[:, 2] >> 23 & 3 == 3
 
 
 @settings(max_examples=60, deadline=None)
 @given(seeds, st.sampled_from([0.07, 0.3, 2.0]), st.sampled_from([0.0, 3.0]), st.booleans())
-def test_points_over_the_area_are_centroids_of_cells(seed, spacing, degrees, swap):
+def test_points_over_the_area_are_those_of_cells_whose_corners_share_a_quarter(seed, spacing, degrees, swap):
     stack = Stack(seed, degrees, swap)
     large_enough(stack)
     assume(stack.common[:, 2].min() <= 0.1)
@@ -467,10 +476,23 @@ def test_points_over_the_area_are_centroids_of_cells(seed, spacing, degrees, swa
     assert len(set(place[:, 2].tolist())) == len(place) >= 3
     assert area.sum() == pytest.approx(whole, rel=1e-12)
     np.testing.assert_allclose(area @ x, first, atol=1e-12 * whole)
+    corner = at_corners(place)
+    assert corner.sum() >= 3
     if degrees == 0.0:
-        twin = cells_twin(stack, spacing, swap)
-        np.testing.assert_allclose(area, twin[:, 0], atol=1e-11)
-        np.testing.assert_allclose(area[:, None] * x, twin[:, 1:], atol=1e-11)
+        twin, among = cells_twin(stack, spacing, swap)
+        common = stack.common[:, :2]
+        chosen = {int(np.linalg.norm(common - one, axis=1).argmin()): k for k, one in enumerate(x[corner])}
+        np.testing.assert_allclose(common[list(chosen)], x[corner], atol=1e-9)
+        expected, shares = twin.copy(), np.zeros(corner.sum())
+        for cell, inside in enumerate(among):
+            # a corner on a line of the grid lies beyond it
+            taken = sorted(inside.difference(*among[cell + 1 :]) & chosen.keys())
+            for q in taken:
+                shares[chosen[q]] = twin[cell, 0] / (4 * len(taken))
+                expected[cell] -= shares[chosen[q]] * np.array([1.0, *common[q]])
+        np.testing.assert_allclose(area[corner], shares, atol=1e-11)
+        np.testing.assert_allclose(area[~corner], expected[:, 0], atol=1e-11)
+        np.testing.assert_allclose((area[:, None] * x)[~corner], expected[:, 1:], atol=1e-11)
     n = np.cross(*(stack.bottom[1:3] - stack.bottom[0]))
     np.testing.assert_allclose((nearest[:, 0] - stack.bottom[0]) @ n, 0.0, atol=1e-12)
 
@@ -486,12 +508,15 @@ def test_cells_stay_with_the_smaller_face_as_it_slides_over_a_larger_one_and_ove
         place, _, nearest, area = points_of(plate, stone, kernel.FACE_FIRST, feature, spacing=0.1)
         assert area.sum() == pytest.approx(0.2 * min(0.4, 2.0 - way), rel=1e-12)
         seen.append(dict(zip(place[:, 2].tolist(), nearest[:, 0, :2] - [way, 0.3], strict=True)))
-    assert [len(one) for one in seen] == [8, 8, 8, 8, 6]
+    # and four corners
+    assert [len(one) for one in seen] == [12, 12, 12, 12, 10]
     for one in seen[1:3]:
         assert one.keys() == seen[0].keys()
         np.testing.assert_allclose([one[name] for name in seen[0]], list(seen[0].values()), atol=1e-12)
-    # over 0.37 m the last cells are 0.07 m long, over 0.25 m they are halves
-    assert seen[3].keys() == seen[0].keys() > seen[4].keys()
+    # over 0.37 m the last cells are 0.07 m long, over 0.25 m they are halves; corners are named after cells
+    cells = [{name for name in one if name >> 23 & 3 == 2} for one in seen]
+    assert cells[3] == cells[0] > cells[4]
+    assert seen[3].keys() == seen[0].keys()
 
 
 def test_too_many_cells_are_refused():
