@@ -26,11 +26,9 @@ from pipelines.run.check_report import (
     MeshUse,
     StoneModelling,
 )
-from pipelines.run.closing_check import (
-    joints_report,
-    simplification_report,
-)
+from pipelines.run.closing_check import joints_report, simplification_report
 from pipelines.run.fidelity import Modelled, modelled
+from pipelines.run.filling import filling
 from pipelines.run.inputs import stage_lines
 from pipelines.run.plausibility import corner_warnings, impossible_values, unusual_values
 from pipelines.run.run import USUAL
@@ -197,6 +195,7 @@ def _report(
         laws=tuple(describe(one.entry, groups) for one in scene.laws),
         loads=tuple(describe(entry, groups) for entry in (*scene.loads, *scene.throws)),
         stages=() if assembly is None else stage_lines(scene, assembly),
+        filling=None if assembly is None else filling(scene, assembly),
         problems=problems,
         warnings=(
             *unusual_values(scene, models),

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from pipelines.run.closing_check import JointsReport, SimplificationReport
+from pipelines.run.filling import Filling
 
 __all__ = [
     "CheckReport",
@@ -113,6 +114,7 @@ class CheckReport:
     ring : number of stones that deform for the stress of others
     stones : model of each stone, and its reason; where joints could not be closed, as if there were none
     simplification, joints : changes of the stones and of their joints; None if they could not be made
+    filling : volume and weight of all stones as surveyed and as modelled; None likewise
     files : pictures that were drawn
     source : the scene file, relative to the folder of the pictures; empty if none were drawn
     warnings : keys without effect, limits of the stresses, and pictures that could not be drawn
@@ -136,3 +138,4 @@ class CheckReport:
     files: tuple[str, ...] = ()
     source: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    filling: Filling | None = None

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechanics.arrays import Array
-from survey.joints.report import ClosingReport, GrownLeaf, StoneJoint
+from pipelines.run.filling import LeafReport, leaf_report
+from survey.joints.report import ClosingReport
 from survey.simplify.simplify import BlockyStone
 
 __all__ = [
     "GapPlace",
     "JointsReport",
-    "LeafReport",
     "OutsideStone",
     "OverlapPlace",
     "SimplificationReport",
@@ -22,7 +22,6 @@ __all__ = [
 ]
 
 
-_NAMED = 5  # pairs of stones that a line names
 _DEEP = 0.005  # measured overlap of two stones [m]; deeper ones should be looked at
 
 
@@ -105,54 +104,6 @@ class OverlapPlace:
     volume: float
     depth: float
     place: tuple[float, float, float]
-
-
-@dataclass(frozen=True)
-class LeafReport:
-    """Rubble of one leaf, whose stones grew to the middle of the mortar between their outlines.
-
-    Attributes
-    ----------
-    stones : their number
-    width, height : of the leaf with its mortar [m]
-    stone_share : area of the outlines over that of the leaf [-]
-    pairs, edges : pairs of neighbours, and straight edges between them
-    thickness : of the mortar between two stones: mean of all, weighted by the lengths of the joints [m]
-    thinnest, thickest : smallest and largest mean thickness between two stones [m]
-    growth : largest distance of a corner of a grown stone from its outline [m], of the stone `farthest`
-    crossing : pairs of stones whose outlines touch or cross
-    """
-
-    stones: int
-    width: float
-    height: float
-    stone_share: float
-    pairs: int
-    edges: int
-    thickness: float
-    thinnest: float
-    thickest: float
-    growth: float
-    farthest: str
-    crossing: tuple[tuple[str, str], ...]
-
-    def in_words(self) -> tuple[str, ...]:
-        """Return the report as lines for a person."""
-        share = 100.0 * self.stone_share
-        lines = [
-            f"leaf of {self.stones} stones, {self.width:.3f} × {self.height:.3f} m: {share:.1f} % stone, "
-            f"{100.0 - share:.1f} % mortar",
-            f"mortar between {self.pairs} pairs of stones, in {self.edges} straight edges: "
-            f"{1e3 * self.thickness:.1f} mm thick on average, {1e3 * self.thinnest:.1f} to "
-            f"{1e3 * self.thickest:.1f} mm; stones grew by {1e3 * self.growth:.1f} mm at most (stone {self.farthest})",
-        ]
-        if self.crossing:
-            pairs = ", ".join(" and ".join(one) for one in self.crossing[:_NAMED])
-            more = ", …" if len(self.crossing) > _NAMED else ""
-            lines.append(
-                f"{len(self.crossing)} pairs of outlines touch or cross: {pairs}{more}; look at them"
-            )
-        return tuple(lines)
 
 
 @dataclass(frozen=True)
@@ -257,28 +208,7 @@ def joints_report(
             OverlapPlace(one.stones, one.volume, one.depth, _place(one.centroid + origin))
             for one in sorted(closing.overlaps, key=lambda one: -one.volume)
         ),
-        leaves=tuple(_leaf_report(one, closing.joints) for one in closing.leaves),
-    )
-
-
-def _leaf_report(leaf: GrownLeaf, joints: Sequence[StoneJoint]) -> LeafReport:
-    own = [one for one in joints if all(code in leaf.grown for code in one.stones)]
-    pairs = [value for stones, value in leaf.thickness.items() if len(stones) > 1]
-    areas = np.array([one.area for one in own])
-    mean = float(np.average([one.width for one in own], weights=areas)) if len(own) else 0.0
-    return LeafReport(
-        stones=len(leaf.grown),
-        width=leaf.size[0],
-        height=leaf.size[1],
-        stone_share=leaf.stones_over_all,
-        pairs=len(pairs),
-        edges=leaf.edges,
-        thickness=mean,
-        thinnest=min(pairs, default=0.0),
-        thickest=max(pairs, default=0.0),
-        growth=leaf.growth,
-        farthest=leaf.farthest,
-        crossing=leaf.crossing,
+        leaves=tuple(leaf_report(one, closing.joints, origin) for one in closing.leaves),
     )
 
 

@@ -13,6 +13,7 @@ from mechanics.scene.scene import Fidelity, Scene
 from mechanics.stones.materials import Material
 from pipelines.run.assemble import Assembly
 from pipelines.run.closing_check import JointsReport, joints_report
+from pipelines.run.filling import filling
 from pipelines.run.record import settings_of
 from pipelines.scene.array_tables import describe
 from pipelines.scene.file import SceneFile
@@ -50,7 +51,10 @@ def scene_inputs(
             *(describe(entry, groups) for entry in (*scene.loads, *scene.throws)),
         ),
         "Stages": stage_lines(scene, assembly),
-        "Joints of the survey": closing_lines(joints_report(assembly.closing, assembly.origin)),
+        "Joints of the survey": (
+            *closing_lines(joints_report(assembly.closing, assembly.origin)),
+            filling(scene, assembly).in_words(),
+        ),
     }
 
 

@@ -39,6 +39,7 @@ from pipelines.results.vtk import write_frames, write_joint_grid
 from pipelines.results.vtkhdf import RESULTS, write_vtkhdf
 from pipelines.results.wall_axes import wall_record
 from pipelines.run.assemble import Assembly, assemble_stones
+from pipelines.run.filling import filling
 from pipelines.run.inputs import run_inputs
 from pipelines.run.plausibility import corner_warnings, unusual_values
 from pipelines.run.record import run_record, store_record, versions
@@ -254,6 +255,7 @@ def write_results(
     reached = None if profile is None else asdict(profile)
     summary = summarise(result, version=version("moma-masonry"), seconds=seconds, profile=reached)
     summary["inputs"] = {title: list(lines) for title, lines in assembly.inputs.items()}
+    summary["filling"] = asdict(filling(scene, assembly))
     summary["wall"] = wall_record(assembly.wall, result.bodies)
     summary["versions"] = dict(versions())
     model = run_model(result, stones, assembly.towards, assembly.origin, known)

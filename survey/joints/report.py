@@ -9,13 +9,13 @@ import numpy as np
 from survey.arrays import Array
 from survey.geometry.adjacency import SolidArrays
 from survey.geometry.cutting import moves
-from survey.geometry.polygons import ring_area
 from survey.joints.bounded_closing import Cut, LocalStones
 from survey.joints.facing import FacePlanes, FacingFaces, find_facing, planes_of
+from survey.joints.grown_leaf import GrownLeaf
 from survey.joints.overlaps import Overlapping
 from survey.joints.settings import JointMode, JointSettings
 
-__all__ = ["ClosingReport", "Gap", "GrownLeaf", "Overlap", "StoneJoint", "closing_report"]
+__all__ = ["ClosingReport", "Gap", "Overlap", "StoneJoint", "closing_report"]
 
 
 @dataclass(frozen=True)
@@ -80,43 +80,6 @@ class Overlap:
     volume: float
     depth: float
     centroid: Array
-
-
-@dataclass(frozen=True)
-class GrownLeaf:
-    """A leaf of stones that grew to the medial lines of the mortar between their outlines.
-
-    Attributes
-    ----------
-    size : width and height of the frame that its stones and their mortar fill [m]
-    outlines : by code, (n, 2) outline of each stone, to the right and upwards from the lower left corner of the frame,
-        counter-clockwise [m]
-    grown : by code, (m, 2) of what it grew to, likewise [m]
-    thickness : by the codes of two neighbours, mean thickness of the mortar between them; by the code of a stone alone,
-        mean distance of its outline from the foot and the top of the frame, where it reaches these [m]
-    stone_share : by code, area of its outline over that of what it grew to, at most 1 [-]
-    edges : of the joints; one that bends has several
-    collapsed : edges that were too short, and became a corner
-    growth : largest distance of a corner of a stone from its outline [m], of `farthest`
-    farthest : code of a stone
-    crossing : pairs of stones whose outlines touch or cross
-    """
-
-    size: tuple[float, float]
-    outlines: Mapping[str, Array]
-    grown: Mapping[str, Array]
-    thickness: Mapping[frozenset[str], float]
-    stone_share: Mapping[str, float]
-    edges: int
-    collapsed: int
-    growth: float
-    farthest: str
-    crossing: tuple[tuple[str, str], ...]
-
-    @property
-    def stones_over_all(self) -> float:
-        """Area of the outlines over that of the frame [-]."""
-        return sum(abs(ring_area(one)) for one in self.outlines.values()) / (self.size[0] * self.size[1])
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,15 @@ class JointSettings:
             "and outlines of one leaf grow to meet in its middle; as-surveyed: stones keep their measured sides."
         ),
     ] = JointMode.CLOSE
-    max_width: Annotated[float, Setting("Faces farther apart do not make a joint.", "m", above=0)] = 0.05
+    max_width: Annotated[
+        float,
+        Setting(
+            "Faces farther apart do not make a joint; mortar between outlines that grow fills what is up to this wide, "
+            "or up to four times as wide as their usual joint, and wider places stay open.",
+            "m",
+            above=0,
+        ),
+    ] = 0.05
     max_angle: Annotated[
         float, Setting("Faces that open wider do not make a joint.", "°", above=0, below=45)
     ] = 20.0

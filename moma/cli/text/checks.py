@@ -49,6 +49,8 @@ def check_lines(report: "CheckReport", verbose: bool, explain: bool = False) -> 
         lines += _simplification_lines(report.simplification, verbose)
     if report.joints is not None:
         lines += _joint_lines(report.joints, verbose)
+    if report.filling is not None:
+        lines.append(f"  {report.filling.in_words()}")
     if report.cost is not None:
         cost = report.cost
         lines += [

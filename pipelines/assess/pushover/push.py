@@ -23,6 +23,7 @@ from pipelines.reports.pushover import write_pushover
 from pipelines.results.folder import check_replaceable, replacing, source_of
 from pipelines.results.summary import as_json
 from pipelines.run.assemble import Assembly, assemble_stones
+from pipelines.run.filling import stays_open
 from pipelines.run.inputs import scene_inputs
 from pipelines.run.plausibility import impossible_values
 from pipelines.run.record import store_record, versions
@@ -225,6 +226,7 @@ def _summary(
             else []
         ),
         *([f"{soft} deformable stones count as rigid"] if soft else []),
+        *stays_open(assembled),
     ]
     forwards, backwards = test.strength
     model = test.model

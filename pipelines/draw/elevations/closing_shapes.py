@@ -8,6 +8,7 @@ import numpy as np
 
 from mechanics.arrays import Array
 from survey.geometry.solids import Solid, area_vector
+from survey.joints.grown_leaf import Opening
 from survey.joints.report import ClosingReport, StoneJoint
 
 __all__ = [
@@ -102,12 +103,14 @@ class ClosingShapes:
     scene : its name
     stones, joints : of the scene
     places : gaps and overlaps, the largest first
+    openings : of leaves, that mortar does not fill
     """
 
     scene: str
     stones: tuple[DrawnStone, ...]
     joints: tuple[DrawnJoint, ...]
     places: tuple[Place, ...]
+    openings: tuple[Opening, ...] = ()
 
 
 class Stages(NamedTuple):
@@ -161,7 +164,8 @@ def closing_shapes(
         DrawnJoint(one, joint_polygon(closed[one.stones[0]], closed[one.stones[1]], one.normal, one.centroid))
         for one in closing.joints
     )
-    return ClosingShapes(scene, stones, joints, places(closing))
+    openings = tuple(opening for leaf in closing.leaves for opening in leaf.openings)
+    return ClosingShapes(scene, stones, joints, places(closing), openings)
 
 
 def places(closing: ClosingReport) -> tuple[Place, ...]:

@@ -12,6 +12,7 @@ from pipelines.draw.elevations.closing import back_to_front, guess_key, hatch, n
 from pipelines.draw.elevations.closing_shapes import ClosingShapes, DrawnJoint, Place
 from pipelines.draw.elevations.sheet import (
     FLAG,
+    INK,
     PALE,
     extent,
     frame_elevation,
@@ -21,6 +22,7 @@ from pipelines.draw.elevations.sheet import (
     sheet_size,
 )
 from pipelines.draw.offscreen.parts import robust_ceiling
+from survey.joints.grown_leaf import Opening
 from survey.quality.facades import Facade
 
 if TYPE_CHECKING:
@@ -56,7 +58,9 @@ def draw_joints(path: Path, shapes: ClosingShapes, facade: Facade) -> None:
     low, high = extent(flat)
     shown = [one for one in shapes.joints if _is_seen(one, facade, codes)]
     marked = [place for place in shapes.places if codes & {*place.stones}]
+    openings = [one for one in shapes.openings if codes & {*one.stones}]
     keys = _keys(shown, marked, len(shapes.places), any(one.hypothesis for one in own))
+    keys += [_open_key()] if openings else []
     width, height = sheet_size(high - low)
     figure = new_sheet((width, height + _LINE * len(keys)))
     axes = figure.subplots()
@@ -71,6 +75,7 @@ def draw_joints(path: Path, shapes: ClosingShapes, facade: Facade) -> None:
     _add_closed(figure, axes, closed, facade, stroke)
     _add_open(axes, left, facade, stroke)
     _mark(axes, marked, facade)
+    _draw_openings(axes, openings, facade)
     frame_elevation(axes, facade, low, high, _title(shapes.scene, facade, closed, left))
     if keys:
         figure.legend(handles=keys, loc="outside lower left", ncols=1, frameon=False, fontsize=9)
@@ -109,6 +114,27 @@ def _add_open(axes: "Axes", joints: Sequence[DrawnJoint], facade: Facade, stroke
     traces = [_trace(one, facade) for one in joints]
     for colour, share in ((FLAG, 2.4), ("white", 1.0)):
         axes.add_collection(LineCollection(traces, colors=colour, linewidths=share * stroke))
+
+
+def _draw_openings(axes: "Axes", openings: Sequence[Opening], facade: Facade) -> None:
+    """Draw the edges of openings dashed, and write the size of each into it."""
+    from matplotlib.collections import LineCollection
+
+    for one in openings:
+        edges = project(one.front.reshape(-1, 3), facade).reshape(-1, 2, 2)
+        axes.add_collection(
+            LineCollection(list(edges), colors=INK, linewidths=1.0, linestyles="dashed", zorder=4)
+        )
+        (x, y), (width, height) = 0.5 * (edges.min(axis=(0, 1)) + edges.max(axis=(0, 1))), one.size
+        text = f"open\n{width:.2f} × {height:.2f} m"
+        axes.annotate(text, (x, y), ha="center", va="center", fontsize=7.0, color=INK, clip_on=True)
+
+
+def _open_key() -> Any:
+    """Make the legend entry of openings."""
+    from matplotlib.lines import Line2D
+
+    return Line2D([], [], color=INK, linestyle="dashed", label="opening: wider than mortar, stays open")
 
 
 def _is_seen(one: DrawnJoint, facade: Facade, codes: set[str]) -> bool:

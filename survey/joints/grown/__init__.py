@@ -1,5 +1,5 @@
 """Rubble of one leaf: stones grown to the medial lines of the mortar between their outlines.
 
 Public: `Leaf`, `find_leaves` (leaf); `MedialLines`, `Line`, `medial_lines` (medial_lines); `Partition`, `Edge`,
-`partition` (partition); `GrownStones`, `grow` (grow).
+`partition` (partition); `open_places`, `usual_width` (openings); `GrownStones`, `grow` (grow).
 """

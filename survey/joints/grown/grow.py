@@ -1,7 +1,7 @@
 """Growth of the stones of a leaf to the medial lines of their mortar."""
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,13 +12,16 @@ from survey.geometry.polygons import ring_area
 from survey.geometry.solids import Solid
 from survey.joints.grown.leaf import Leaf
 from survey.joints.grown.medial_lines import LEFT_BELOW_RIGHT_ABOVE, medial_lines
-from survey.joints.grown.partition import Partition, apart, partition
-from survey.joints.report import GrownLeaf, StoneJoint
+from survey.joints.grown.partition import Edge, Partition, apart, partition
+from survey.joints.grown_leaf import GrownLeaf, Opening
+from survey.joints.report import StoneJoint
 from survey.joints.settings import JointSettings
 
 __all__ = ["GrownStones", "grow"]
 
 _SAMPLES = 50  # along the side of a usual stone
+_CLOSE = 8  # and across the widest mortar, so that samples tell what it fills
+_SIDES = ("left", "below", "right", "above")  # of the frame
 _THINNEST = 1e-3  # metres: least thickness of mortar, where outlines touch
 
 _, _BELOW, _, _ABOVE = LEFT_BELOW_RIGHT_ABOVE
@@ -47,11 +50,14 @@ class GrownStones:
 def grow(leaf: Leaf, codes: Sequence[str], settings: JointSettings, fineness: float = 1.0) -> GrownStones:
     """Let the stones of a leaf grow until they meet in the middle of their mortar.
 
+    Places too far from all of them stay open, and outlines beside these as they are.
+
     Parameters
     ----------
     leaf : outlines and frame
     codes : of its members
-    settings : `straightness` bounds the distance of edges from medial lines, `min_overlap` their length from below
+    settings : `straightness` bounds the distance of edges from medial lines, `min_overlap` their length from below;
+        `max_width` is the width up to which mortar is filled in, or four times that of the usual joint where more
     fineness : number by which samples along the outlines are denser
 
     Raises
@@ -60,8 +66,8 @@ def grow(leaf: Leaf, codes: Sequence[str], settings: JointSettings, fineness: fl
         if an outline lies within another, or outlines cross so much that they cannot be told apart
     """
     areas = np.array([abs(ring_area(one)) for one in leaf.outlines])
-    step = float(np.sqrt(np.median(areas))) / (_SAMPLES * fineness)
-    lines = medial_lines(leaf.outlines, leaf.frame, step)
+    step = min(float(np.sqrt(np.median(areas))) / _SAMPLES, settings.max_width / _CLOSE) / fineness
+    lines = medial_lines(leaf.outlines, leaf.frame, step, settings.max_width)
     found = partition(lines, leaf.outlines, settings.straightness, settings.min_overlap)
     rings = [found.corners[list(one)] for one in found.rings]
     grown = [
@@ -80,11 +86,13 @@ def grow(leaf: Leaf, codes: Sequence[str], settings: JointSettings, fineness: fl
         grown={code: one - low for code, one in zip(codes, rings, strict=True)},
         thickness=_thickness(found, codes),
         stone_share=dict(zip(codes, np.minimum(areas / new, 1.0).tolist(), strict=True)),
-        edges=sum(one.left >= 0 and one.right >= 0 for one in found.edges),
+        edges=sum(_between_stones(one, codes) for one in found.edges),
         collapsed=found.collapsed,
         growth=growth[farthest],
         farthest=codes[farthest],
         crossing=tuple((codes[i], codes[j]) for i, j in lines.crossing),
+        filled=lines.filled,
+        openings=tuple(sorted(_openings(leaf, found, codes), key=lambda one: -one.area)),
     )
     return GrownStones(
         solids=tuple(grown),
@@ -102,8 +110,8 @@ def _thickness(found: Partition, codes: Sequence[str]) -> dict[frozenset[str], f
     """
     sums: dict[frozenset[str], list[tuple[float, float]]] = defaultdict(list)
     for one in found.edges:
-        stones = [k for k in (one.left, one.right) if k >= 0]
-        if len(stones) == 2 or min(one.left, one.right) in (_BELOW, _ABOVE):
+        stones = [k for k in (one.left, one.right) if 0 <= k < len(codes)]
+        if len(stones) == 2 or (len(stones) == 1 and min(one.left, one.right) in (_BELOW, _ABOVE)):
             length = float(np.hypot(*(found.corners[one.ends[1]] - found.corners[one.ends[0]])))
             sums[frozenset(codes[k] for k in stones)].append((one.thickness, length))
     return {
@@ -112,10 +120,32 @@ def _thickness(found: Partition, codes: Sequence[str]) -> dict[frozenset[str], f
     }
 
 
+def _between_stones(edge: Edge, codes: Sequence[str]) -> bool:
+    return min(edge.left, edge.right) >= 0 and max(edge.left, edge.right) < len(codes)
+
+
+def _openings(leaf: Leaf, found: Partition, codes: Sequence[str]) -> Iterator[Opening]:
+    """Yield what stays open in a leaf."""
+    for number in range(len(codes), len(codes) + found.openings):
+        own = [one for one in found.edges if number in (one.left, one.right)]
+        # with the opening to their left, edges sum to its area whatever lies within it
+        ends = np.array([one.ends if one.left == number else one.ends[::-1] for one in own])
+        edges = found.corners[ends]
+        start, stop = (edges - leaf.frame[0]).swapaxes(0, 1)
+        beside = {one.left + one.right - number for one in own}
+        yield Opening(
+            edges=edges - leaf.frame[0],
+            front=leaf.place(edges.reshape(-1, 2), 0.0).reshape(-1, 2, 3),
+            area=0.5 * float((start[:, 0] * stop[:, 1] - start[:, 1] * stop[:, 0]).sum()),
+            stones=tuple(codes[k] for k in sorted(beside) if 0 <= k < len(codes)),
+            sides=tuple(_SIDES[-1 - k] for k in sorted(beside, reverse=True) if k < 0),
+        )
+
+
 def _joints(leaf: Leaf, found: Partition, codes: Sequence[str]) -> tuple[StoneJoint, ...]:
     joints = []
     for number, one in enumerate(found.edges):
-        if one.left < 0 or one.right < 0:
+        if not _between_stones(one, codes):
             continue
         start, stop = found.corners[list(one.ends)]
         way = stop - start

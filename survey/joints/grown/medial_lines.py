@@ -7,7 +7,7 @@ Samples are mirrored at the sides of the rectangle, so that ridges between a sam
 
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -15,8 +15,9 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import Voronoi, cKDTree
 
 from moma.errors import GeometryError
-from survey.arrays import Array, Bools, Ints
+from survey.arrays import Array, Ints
 from survey.geometry.polygons import inside
+from survey.joints.grown.openings import open_places, usual_width
 
 __all__ = ["LEFT_BELOW_RIGHT_ABOVE", "Line", "MedialLines", "medial_lines"]
 
@@ -29,6 +30,7 @@ _INSET = (
 )  # of the sampling distance: samples lie within outlines by this, so that those that touch differ
 _TOUCHING = 1.0 / 64.0  # of the sampling distance: samples of two stones nearer than this belong to neither
 _NEAR = 2.0  # sampling distances within which another outline calls for finer samples
+_WIDEST = 4.0  # widths of the usual joint that mortar fills; traced rubble has pockets three of them wide
 _NEIGHBOURS = 16  # samples that are looked at for one of another stone
 
 
@@ -40,7 +42,8 @@ class Line:
     ----------
     ends : numbers of the nodes at its ends
     path : (k, 2) its places from the first end to the last, both included [m]
-    left, right : numbers of the stones on its sides, as seen from the first end; negative for a side of the frame
+    left, right : numbers of the stones on its sides, as seen from the first end; openings follow the stones; negative
+        for a side of the frame
     """
 
     ends: tuple[int, int]
@@ -51,28 +54,35 @@ class Line:
 
 @dataclass(frozen=True)
 class MedialLines:
-    """Network of medial lines that divides a rectangle among stones.
+    """Network of medial lines that divides a rectangle among stones and openings.
 
     Attributes
     ----------
     nodes : (n, 2) [m]
     lines : between them
     crossing : pairs of stones whose outlines touch or cross
+    openings : number of the places beyond reach of the mortar
+    usual : median width of the joints, weighted by length [m]
+    filled : mortar is filled in up to this width [m]
     """
 
     nodes: Array
     lines: tuple[Line, ...]
     crossing: tuple[tuple[int, int], ...]
+    openings: int = 0
+    usual: float = 0.0
+    filled: float = np.inf
 
 
-def medial_lines(outlines: Sequence[Array], frame: Array, step: float) -> MedialLines:
-    """Divide a rectangle among outlines: each place belongs to the nearest.
+def medial_lines(outlines: Sequence[Array], frame: Array, step: float, widest: float = np.inf) -> MedialLines:
+    """Divide a rectangle among outlines: each place belongs to the nearest, or to an opening.
 
     Parameters
     ----------
     outlines : (n, 2) corners of each stone, counter-clockwise [m]
     frame : (2, 2) lower left and upper right corner of the rectangle [m]
     step : distance of the samples along outlines [m]; finer where outlines are near to each other
+    widest : mortar is filled in up to this width, or up to four times that of the usual joint where this is more [m]
 
     Raises
     ------
@@ -84,13 +94,40 @@ def medial_lines(outlines: Sequence[Array], frame: Array, step: float) -> Medial
     if len(lost):
         what = f"outline {lost[0]} lies within another"
         raise GeometryError(what, where="joints", remedy="leave one of the two out")
-    count = len(points)
+    inset = _INSET * step
+    diagram, original, side = _diagram(points, frame, step)
+    lengths, pairs = _lengths(diagram), diagram.ridge_points
+    between = (pairs < len(points)).all(axis=1)
+    between[between] = owner[pairs[between, 0]] != owner[pairs[between, 1]]
+    apart = np.linalg.norm(points[pairs[between, 0]] - points[pairs[between, 1]], axis=1)
+    usual = usual_width(lengths[between], apart) - 2.0 * inset
+    filled = max(widest, _WIDEST * usual)
+    places, opening = open_places(diagram, points, outlines, frame, 0.5 * filled, inset)
+    openings = 0
+    if len(places):
+        openings = int(opening.max()) + 1
+        points = np.concatenate([points, places])
+        owner = np.concatenate([owner, len(outlines) + opening])
+        diagram, original, side = _diagram(points, frame, step)
+    found = _divided(diagram, points, owner, frame, original, side)
+    return replace(found, crossing=crossing, openings=openings, usual=usual, filled=filled)
+
+
+def _diagram(points: Array, frame: Array, step: float) -> tuple[Voronoi, Ints, Ints]:
+    """Return the diagram of samples and their images, of which samples the images are, and beyond which sides."""
     images, original, side = _images(points, frame, step)
-    diagram = Voronoi(np.concatenate([points, images]))
+    return Voronoi(np.concatenate([points, images])), original, side
+
+
+def _divided(
+    diagram: Voronoi, points: Array, owner: Ints, frame: Array, original: Ints, side: Ints
+) -> MedialLines:
+    """Return the lines between the regions of different owners, and between these and the frame."""
+    count = len(points)
     pairs, ends = diagram.ridge_points, np.asarray(diagram.ridge_vertices)
     first, second = pairs.min(axis=1), pairs.max(axis=1)
-    owner = _in_one_piece(owner, pairs[second < count], _lengths(diagram, second < count))
     own = second < count
+    owner = _in_one_piece(owner, pairs[own], _lengths(diagram)[own])
     own[own] = owner[first[own]] != owner[second[own]]
     bound = (first < count) & (second >= count)
     bound[bound] = original[second[bound] - count] == first[bound]
@@ -102,7 +139,7 @@ def medial_lines(outlines: Sequence[Array], frame: Array, step: float) -> Medial
     labels[:, 1] = np.where(
         beside < count, owner[np.minimum(beside, count - 1)], -1 - side[np.maximum(beside - count, 0)]
     )
-    return _walk(vertices, ends[kept], labels, points[first[kept]], crossing)
+    return _walk(vertices, ends[kept], labels, points[first[kept]])
 
 
 def _samples(
@@ -201,8 +238,9 @@ def _images(points: Array, frame: Array, step: float) -> tuple[Array, Ints, Ints
     return np.concatenate(images), np.concatenate(original), np.concatenate(sides)
 
 
-def _lengths(diagram: Voronoi, kept: Bools) -> Array:
-    ends = np.asarray(diagram.ridge_vertices)[kept]
+def _lengths(diagram: Voronoi) -> Array:
+    """Return the lengths (n,) of the ridges, zero for those without an end [m]."""
+    ends = np.asarray(diagram.ridge_vertices)
     apart = np.linalg.norm(diagram.vertices[ends[:, 1]] - diagram.vertices[ends[:, 0]], axis=1)
     out: Array = np.where((ends >= 0).all(axis=1), apart, 0.0)
     return out
@@ -245,9 +283,7 @@ def _on_frame(vertices: Array, ends: Ints, sides: Ints, frame: Array) -> Array:
     return out
 
 
-def _walk(
-    vertices: Array, ends: Ints, labels: Ints, beside: Array, crossing: tuple[tuple[int, int], ...]
-) -> MedialLines:
+def _walk(vertices: Array, ends: Ints, labels: Ints, beside: Array) -> MedialLines:
     """Join ridges to lines between nodes: vertices where another number of ridges than two, or other stones, meet."""
     at: dict[int, list[int]] = defaultdict(list)
     for ridge, (a, b) in enumerate(ends.tolist()):
@@ -296,7 +332,7 @@ def _walk(
                 for other in at[vertex]:
                     if not used[other]:
                         follow(vertex, other)
-    return MedialLines(vertices[list(nodes)], tuple(lines), crossing)
+    return MedialLines(vertices[list(nodes)], tuple(lines), ())
 
 
 def _ring(start: int, ridge: int, ends: Ints, at: dict[int, list[int]]) -> list[int]:

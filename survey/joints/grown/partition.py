@@ -2,13 +2,13 @@
 
 from collections import Counter, defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from moma.errors import GeometryError
-from survey.arrays import Array
+from survey.arrays import Array, Bools
 from survey.geometry.polygons import inside, ring_area
 from survey.joints.grown.medial_lines import Line, MedialLines
 
@@ -30,7 +30,7 @@ class Edge:
     Attributes
     ----------
     ends : numbers of the corners at its ends
-    left, right : numbers of the stones on its sides; negative for a side of the frame
+    left, right : numbers of the stones on its sides; openings follow the stones; negative for a side of the frame
     thickness : of the mortar: mean along it of the distances from the outlines of its stones [m]
     opening : angle by which the joint widens along it [degrees]
     """
@@ -52,12 +52,14 @@ class Partition:
     rings : of each stone, the numbers of its corners, counter-clockwise
     edges : between them
     collapsed : number of edges that were too short and became a corner
+    openings : number of the openings
     """
 
     corners: Array
     rings: tuple[tuple[int, ...], ...]
     edges: tuple[Edge, ...]
     collapsed: int
+    openings: int = 0
 
 
 def partition(
@@ -69,12 +71,13 @@ def partition(
     ----------
     lines : medial lines
     outlines : (n, 2) of the stones [m]
-    straightness : largest distance of an edge from its line; half the mean thickness of the joint where less [m]
+    straightness : largest distance of an edge from its line; half the mean thickness of the joint where less, beside an
+        opening that of the usual joint [m]
     shortest : edges shorter than this become a corner [m]
 
     Returns
     -------
-    Partition, whose polygons are simple and fill the rectangle
+    Partition, whose polygons are simple and fill the rectangle but for its openings
 
     Raises
     ------
@@ -82,7 +85,9 @@ def partition(
         if the lines cannot be straightened without crossing each other
     """
     for drawn in (_exact(lines, outlines), lines):  # those of the samples hold where outlines cross
-        bound = [min(straightness, _CHORD * _mean_thickness(one, outlines)) for one in drawn.lines]
+        bound = [
+            min(straightness, _CHORD * _mean_thickness(one, outlines, lines.usual)) for one in drawn.lines
+        ]
         for least in (shortest, 0.5 * shortest, 0.25 * shortest, 0.0):
             network = _Network(drawn)
             network.collapse(least)
@@ -94,7 +99,7 @@ def partition(
                     for line, chain in chains
                     for a, b in pairwise(chain)
                 )
-                return Partition(corners, rings, edges, network.collapsed)
+                return Partition(corners, rings, edges, network.collapsed, lines.openings)
     what = "the lines between the outlines cross each other when straightened"
     raise GeometryError(
         what, where="joints", remedy="look at outlines that touch or cross, and draw them apart"
@@ -104,21 +109,27 @@ def partition(
 def _exact(lines: MedialLines, outlines: Sequence[Array]) -> MedialLines:
     """Return the lines moved to where the distances from the outlines beside them are equal, and not from samples.
 
-    So edges hardly depend on where samples lie. Places move by Newton's rule; those on the frame stay on it.
+    So edges hardly depend on where samples lie. Places move by Newton's rule; those on the frame stay on it, and those
+    beside an opening where they are, on outlines.
     """
     about: dict[int, set[int]] = defaultdict(set)
     for one in lines.lines:
         for node in one.ends:
             about[node] |= {one.left, one.right}
-    nodes = np.array([_met(place, about[k], outlines) for k, place in enumerate(lines.nodes)])
+    nodes = np.array(
+        [
+            place if max(about[k], default=0) >= len(outlines) else _met(place, about[k], outlines)
+            for k, place in enumerate(lines.nodes)
+        ]
+    )
     moved = []
     for one in lines.lines:
         path = one.path.copy()
         path[[0, -1]] = nodes[list(one.ends)]
-        if min(one.left, one.right) >= 0:
+        if min(one.left, one.right) >= 0 and max(one.left, one.right) < len(outlines):
             path[1:-1] = _halfway(path[1:-1], outlines[one.left], outlines[one.right])
         moved.append(Line(one.ends, path, one.left, one.right))
-    return MedialLines(nodes, tuple(moved), lines.crossing)
+    return replace(lines, nodes=nodes, lines=tuple(moved))
 
 
 def _halfway(places: Array, first: Array, second: Array) -> Array:
@@ -253,6 +264,9 @@ def _straightened(
         places = np.array(corners)
         rings = [_ring(stone, [chains[k] for k in of_stone[stone]]) for stone in range(count)]
         wrong = [k for k, ring in enumerate(rings) if ring is None or not is_simple(places[list(ring)])]
+        wrong += [
+            k for k in of_stone if k >= count and _crosses(places, [chains[one][1] for one in of_stone[k]])
+        ]
         if not wrong:
             return places, chains, tuple(ring for ring in rings if ring is not None)
         for number, line in network.lines.items():
@@ -322,13 +336,8 @@ def is_simple(ring: Array) -> bool:
     count = len(ring)
     if count < 3 or not ring_area(ring) > 0.0:
         return False
-    start, way = ring, np.roll(ring, -1, axis=0) - ring
-    offset = start[None] - start[:, None]
-    turn = way[:, None, 0] * way[None, :, 1] - way[:, None, 1] * way[None, :, 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        along = (offset[..., 0] * way[None, :, 1] - offset[..., 1] * way[None, :, 0]) / turn
-    met = (along >= 0.0) & (along <= 1.0)
-    met = met & met.T
+    way = np.roll(ring, -1, axis=0) - ring
+    met = _met_along(ring, way)
     k = np.arange(count)
     met[k, k] = met[k, (k + 1) % count] = met[(k + 1) % count, k] = False
     if met.any():
@@ -336,6 +345,26 @@ def is_simple(ring: Array) -> bool:
     back = np.roll(way, 1, axis=0)
     folded = np.abs(back[:, 0] * way[:, 1] - back[:, 1] * way[:, 0]) < 1e-12
     return not bool((folded & ((back * way).sum(axis=1) < 0.0)).any())
+
+
+def _crosses(places: Array, chains: Sequence[Sequence[int]]) -> bool:
+    """Return whether edges of chains of corners meet elsewhere than at a common corner."""
+    pairs = np.array([pair for chain in chains for pair in pairwise(chain)])
+    start = places[pairs[:, 0]]
+    way = places[pairs[:, 1]] - start
+    common = (pairs[:, None, :, None] == pairs[None, :, None, :]).any(axis=(2, 3))
+    return bool((_met_along(start, way) & ~common).any())
+
+
+def _met_along(start: Array, way: Array) -> Bools:
+    """Return which of n segments meet which, (n, n)."""
+    offset = start[None] - start[:, None]
+    turn = way[:, None, 0] * way[None, :, 1] - way[:, None, 1] * way[None, :, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along = (offset[..., 0] * way[None, :, 1] - offset[..., 1] * way[None, :, 0]) / turn
+    met = (along >= 0.0) & (along <= 1.0)
+    out: Bools = met & met.T
+    return out
 
 
 def apart(places: Array, ring: Array, closed: bool = True) -> Array:
@@ -353,13 +382,15 @@ def _thickness(places: Array, line: Line, outlines: Sequence[Array]) -> Array:
     """Return the thickness (n,) of the mortar at places along a line: the distances from the outlines beside it [m]."""
     total = np.zeros(len(places))
     for stone in (line.left, line.right):
-        if stone >= 0:
+        if 0 <= stone < len(outlines):
             ring = outlines[stone]
             total += np.where(inside(places, ring), 0.0, apart(places, ring))
     return total
 
 
-def _mean_thickness(line: Line, outlines: Sequence[Array]) -> float:
+def _mean_thickness(line: Line, outlines: Sequence[Array], usual: float) -> float:
+    if max(line.left, line.right) >= len(outlines):
+        return usual
     places, lengths = _middles(line.path)
     return float(np.average(_thickness(places, line, outlines), weights=lengths)) if lengths.any() else 0.0
 
