@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from moma.cli.assess import assess, compare, diagnose, pushover
-from moma.cli.console import PlainCommand, PlainGroup
+from moma.cli.console import PlainCommand, PlainGroup, open_streams
 from moma.cli.database import export, import_, migrate, serve, view
 from moma.cli.entities import query, schema, show
 from moma.cli.geology import geology
@@ -32,6 +32,7 @@ app = typer.Typer(
 
 def main() -> None:
     """Run the command line; exit code 0 done, 1 failed, 2 wrong use, 130 ended by Ctrl-C or SIGTERM."""
+    open_streams()
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # raises KeyboardInterrupt, as Ctrl-C does
     try:
         app(prog_name="moma")

@@ -1,9 +1,12 @@
-"""Output on stderr, beside the results, warnings and errors; help as plain text; and how short commands end soon."""
+"""Standard streams that never fail for what is printed; warnings and errors; help as plain text; ends of commands."""
 
+import codecs
 import gc
+import io
 import os
 import sys
 import traceback
+import unicodedata
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -15,9 +18,56 @@ from typer.core import HAS_RICH, TyperCommand, TyperGroup
 
 from moma.errors import MomaError, storage_error
 
-__all__ = ["PlainCommand", "PlainGroup", "reporting", "say", "short_lived"]
+__all__ = ["PlainCommand", "PlainGroup", "open_streams", "reporting", "say", "short_lived"]
 
 P = ParamSpec("P")
+_CLOSEST = "moma.closest"  # name of the error handler
+# what decomposes into no ASCII
+_ASCII = str.maketrans({
+    "–": "-", "—": "-", "−": "-", "─": "-", "·": "*", "×": "x", "÷": "/", "→": "->", "←": "<-", "↑": "^", "≤": "<=",
+    "≥": ">=", "≈": "~", "≠": "!=", "±": "+-", "∞": "inf", "√": "sqrt", "“": '"', "”": '"', "„": '"', "‘": "'",
+    "’": "'", "«": "<<", "»": ">>", "°": "deg", "µ": "u", "μ": "u", "ß": "ss", "æ": "ae", "ø": "o", "ł": "l",
+})  # fmt: skip
+
+
+class _Pipe(io.FileIO):
+    """Standard stream of which the reader may have seen enough: a command ends as if it had gone on reading."""
+
+    def write(self, data: Any) -> int:
+        """Write bytes; drop them where nobody reads any more."""
+        try:
+            return super().write(data)
+        except BrokenPipeError:
+            return len(memoryview(data).cast("B"))
+
+
+def open_streams() -> None:
+    """Prepare standard output and error, so that no command fails for what it prints.
+
+    Characters that the encoding of a stream lacks become the closest ASCII ones, or "?". What is written to a closed
+    stream, or to a pipe without a reader, is dropped; other failures, such as a full disk, are those of the command.
+    """
+    codecs.register_error(_CLOSEST, _closest)
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
+        elif isinstance(stream, io.TextIOWrapper) and stream.isatty():
+            stream.reconfigure(errors=_CLOSEST)
+        elif isinstance(stream, io.TextIOWrapper):
+            stream.flush()
+            bytes_ = io.BufferedWriter(_Pipe(stream.fileno(), "wb", closefd=False))
+            line = stream.line_buffering
+            setattr(sys, name, io.TextIOWrapper(bytes_, stream.encoding, _CLOSEST, line_buffering=line))
+
+
+def _closest(error: UnicodeError) -> tuple[str, int]:
+    """Return ASCII for the characters that an encoding lacks, and where to go on."""
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    lacking = error.object[error.start : error.end].translate(_ASCII)
+    plain = (unicodedata.normalize("NFKD", one).encode("ascii", "ignore").decode() or "?" for one in lacking)
+    return "".join(plain), error.end
 
 
 class PlainCommand(TyperCommand):

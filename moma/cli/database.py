@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from moma.cli.console import reporting, say
-from moma.cli.options import DEFAULT_DB, Db, Json, Verbose
+from moma.cli.options import DEFAULT_DB, Db, Json, Verbose, check_ending
 from moma.errors import UsageError
 
 __all__ = ["export", "import_", "migrate", "serve", "view"]
@@ -72,6 +72,7 @@ def export(document: Target, db: Db = DEFAULT_DB, json: Json = False, verbose: V
     if str(document) == "-":
         export_to_stream(db, sys.stdout.buffer)
         return
+    check_ending(document, ".json", ".json.gz")
     report = export_database(db, document)
     print(as_json(asdict(report)) if json else "\n".join(_lines(report, "from", verbose)))
 
@@ -139,6 +140,8 @@ def view(
     from moma.cli.text.formats import as_json
     from pipelines.reports.view import write_comparison_view, write_view
 
+    check_ending(out, ".html", ".htm")
+    check_ending(elevation, ".svg")
     if pages:
         for name, given in (("--where", where), ("--run", run), ("--elevation", elevation)):
             if given:

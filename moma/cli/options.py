@@ -6,6 +6,8 @@ from typing import Annotated
 
 import typer
 
+from moma.errors import UsageError
+
 __all__ = [
     "DEFAULT_DB",
     "AcceptUnsound",
@@ -50,9 +52,25 @@ __all__ = [
     "UpAxis",
     "Verbose",
     "Wall",
+    "check_ending",
 ]
 
 DEFAULT_DB = "sqlite:///moma.db"
+
+
+def check_ending(file: Path | None, *endings: str) -> None:
+    """Check that the name of a file to be written ends as the format in which it is written; None: nothing is written.
+
+    Raises
+    ------
+    UsageError : it has another ending
+    """
+    if file is not None and not file.name.lower().endswith(endings):
+        raise UsageError(
+            f"no format that is written here has the ending {''.join(file.suffixes[-1:])!r}",
+            where=str(file),
+            remedy=f"give a name that ends in {' or '.join(endings)}",
+        )
 
 
 class SurveyFormat(StrEnum):

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from moma.cli.console import reporting, say
-from moma.cli.options import DEFAULT_DB, Db, Json, Verbose
+from moma.cli.options import DEFAULT_DB, Db, Json, Verbose, check_ending
 from moma.errors import UsageError
 
 __all__ = ["report", "runs"]
@@ -144,6 +144,7 @@ def report(
     from moma.cli.text.formats import as_json
     from pipelines.reports.page.paper import appraise_page, print_pdf
 
+    check_ending(out, ".pdf")
     page = run / "report.html" if run.is_dir() else run
     sound = appraise_page(page)
     target = None

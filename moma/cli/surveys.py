@@ -43,6 +43,7 @@ from moma.cli.options import (
     Up,
     Verbose,
     Wall,
+    check_ending,
 )
 from moma.cli.progress import progress_bars
 from moma.errors import UsageError
@@ -302,6 +303,7 @@ def ingest(
     from pipelines.ingest.kind_rules import kind_rules
     from pipelines.ingest.reading_options import format_of_all, reading_options
 
+    check_ending(review, ".csv")
     if rejects is not None and not keep_going:
         raise UsageError("--rejects without --keep-going", remedy="give --keep-going too")
     options = reading_options(

@@ -7,7 +7,7 @@ from pathlib import Path
 from moma.errors import UsageError
 from survey.formats.options import ReadingOptions
 from survey.formats.reading import ENDINGS, format_of, solid_files, with_header
-from survey.formats.tables.columns import UNITS
+from survey.formats.tables.columns import UNITS, length_unit
 from survey.formats.tables.kinds import read_kinds
 
 __all__ = ["UNITS", "Source", "format_of_all", "reading_options", "survey_sources"]
@@ -173,10 +173,10 @@ def reading_options(
             raise UsageError(f"sigma is {sigma:g} m", where="--sigma", remedy="give it in metres, e.g. 0.003")
         options = replace(options, sigma=sigma)
     if unit is not None:
-        if unit not in UNITS:
+        if (known := length_unit(unit)) is None:
             what, remedy = f"unknown unit {unit!r}", f"units: {', '.join(UNITS)}"
             raise UsageError(what, where="--unit", remedy=remedy)
-        options = replace(options, unit=UNITS[unit])
+        options = replace(options, unit=UNITS[known])
     if snap is not None:
         if not 0.0 <= snap < 1.0:
             what, remedy = f"the tolerance is {snap:g} m", "give it in metres, e.g. 0.002; 0: none"

@@ -39,7 +39,7 @@ def default_path(survey: Path) -> Path:
 
 
 def check_targets(targets: Sequence[Path], surveys: Sequence[Path]) -> None:
-    """Check that files of rejects replace neither a survey nor any other file of the user.
+    """Check that files of rejects are text, and replace neither a survey nor any other file of the user.
 
     Parameters
     ----------
@@ -56,6 +56,9 @@ def check_targets(targets: Sequence[Path], surveys: Sequence[Path]) -> None:
         if target.resolve() in read:
             remedy = "name another file with --rejects"
             raise UsageError("is the survey file itself", where=str(target), remedy=remedy)
+        if target.suffix.lower() in _BOOKS:
+            remedy = "name a text file, such as rejects.csv, with --rejects"
+            raise UsageError("rejects are not written as a workbook", where=str(target), remedy=remedy)
         _check_replaceable(target)
 
 

@@ -12,7 +12,7 @@ from mechanics.scene.loads.gravity import GravityRamp, TiltingTable
 from mechanics.scene.loads.ground_motion import Component, GroundMotion
 from mechanics.scene.loads.load import Force, GravityChange, Loads, Motion
 from mechanics.scene.loads.motions import ImposedMotion, settlement, spreading
-from mechanics.scene.loads.record_files import UNITS, read_accelerogram, read_station
+from mechanics.scene.loads.record_files import UNITS, read_accelerogram, read_station, unit_of
 from mechanics.scene.loads.record_processing import band_pass, without_drift
 from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import Block, Fidelity
@@ -110,9 +110,9 @@ LOAD_TYPES: Mapping[str, tuple[Key, ...]] = {
         Key(
             "unit",
             ValueKind.TEXT,
-            "Unit of the acceleration in files that state none.",
+            "Unit of the acceleration in files that state none: `g`, `%g`, `m/s²`, `cm/s²`, `mm/s²` or `gal`, in any "
+            "spelling (`m/s2`, `m/s^2`, `m s⁻²`).",
             default=None,
-            choices=tuple(UNITS),
         ),
         Key("dt", ValueKind.NUMBER, "Time step of records in files that state none.", "s", None, above=0),
         Key("azimuth", ValueKind.NUMBER, "Angle by which x and y are first turned about z.", "°", 0.0),
@@ -280,6 +280,9 @@ def _with_records(document: TomlDocument, entry: ArrayTable) -> ArrayTable:
             *entry.path,
             remedy="give at least one of x, y, z, or station",
         )
+    if values["unit"] is not None and unit_of(values["unit"]) is None:
+        remedy = f"give {', '.join(UNITS)}"
+        document.fail(f"unknown unit {values['unit']!r}", *entry.path, "unit", remedy=remedy)
     for axis in given:
         path = file_beside(document, values[axis])
         if values["unit"] is None and path.suffix.lower() in _TABLES and not path.exists():

@@ -13,7 +13,15 @@ from mechanics.scene.loads.tables import Table, fail_at, numbered_lines, read_ta
 from mechanics.scene.loads.waveforms import is_waveform, read_waveforms
 from moma.errors import SceneError
 
-__all__ = ["UNITS", "read_accelerogram", "read_accelerograms", "read_at2", "read_csv", "read_station"]
+__all__ = [
+    "UNITS",
+    "read_accelerogram",
+    "read_accelerograms",
+    "read_at2",
+    "read_csv",
+    "read_station",
+    "unit_of",
+]
 
 _UNEVEN = 0.1  # largest deviation of the times of a table from equal steps, of a step [-]: tables round them
 _TIMES = ("t", "time", "times", "zeit", "temps", "tempo", "tiempo", "s", "sec", "seconds")
@@ -122,7 +130,7 @@ def read_csv(path: str | Path, unit: str | None, dt: float | None = None) -> Acc
 
 def _of_table(path: str | Path, unit: str | None, dt: float | None) -> tuple[Accelerogram, ...]:
     """Read a table of one to four columns: times [s] if it has any, then up to three components."""
-    if unit is not None and unit not in UNITS:
+    if unit is not None and unit_of(unit) is None:
         raise SceneError(f"unknown unit {unit!r}", where=str(path), remedy=f"give {', '.join(UNITS)}")
     table = read_table(path, "time, acceleration")
     count = table.rows.shape[1]
@@ -207,7 +215,7 @@ def _size(path: str | Path, unit: str | None, table: Table | None) -> float:
         raise SceneError(
             f"two units: {', '.join(map(str, stated.values()))}", where=str(path), remedy="keep one"
         )
-    given = None if unit is None else UNITS.get(unit)
+    given = None if unit is None else unit_of(unit)
     if unit is not None and given is None:
         raise SceneError(f"unknown unit {unit!r}", where=str(path), remedy=f"give {', '.join(UNITS)}")
     for size, word in stated.items():

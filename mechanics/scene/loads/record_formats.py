@@ -6,6 +6,7 @@ header has it: east, north and up are x, y and z.
 
 import math
 import re
+import unicodedata
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
@@ -17,11 +18,14 @@ from moma.errors import SceneError
 
 __all__ = ["UNITS", "direction_of", "read_at2", "read_esm", "read_knet", "read_smc", "reader_of", "unit_of"]
 
-UNITS = {"g": 9.80665, "m/s2": 1.0, "cm/s2": 0.01}
+UNITS = {"g": 9.80665, "m/s2": 1.0, "cm/s2": 0.01, "gal": 0.01, "mm/s2": 1e-3, "%g": 0.0980665}
+"""Sizes of the units of acceleration [m/s²]; each may be spelt as `unit_of` reads it."""
 
-_WORDS = {"gal": 0.01, "cm/s^2": 0.01, "cm/s**2": 0.01, "cm/s/s": 0.01, "cm/s²": 0.01, "cm/sec2": 0.01} | {
-    "m/s^2": 1.0, "m/s**2": 1.0, "m/s/s": 1.0, "m/s²": 1.0, "mm/s2": 1e-3, "mm/s^2": 1e-3, "%g": 0.0980665,
-}  # fmt: skip
+_MORE = {"gals": 0.01, "mgal": 1e-5, "um/s2": 1e-6, "nm/s2": 1e-9, "in/s2": 0.0254, "ft/s2": 0.3048}
+_MARKS = str.maketrans(
+    {"μ": "u", "−": "-", "\u2044": "/", "\u2215": "/"} | dict.fromkeys(" \t\u2009^*·⋅()[]")
+)
+_PER_SECOND = re.compile(r"(?P<length>[a-z]+?)(?:/s/s|/s2|/?s-2|/s-2)")
 
 _NUMBER = r"([0-9]*\.?[0-9]+(?:[Ee][+-]?[0-9]+)?|[0-9]+\.)"
 # both generations of the database: "NPTS=  7817, DT=   .0050 SEC" and "7817    .0050    NPTS, DT"
@@ -53,9 +57,14 @@ Lines = Sequence[tuple[int, str]]
 
 
 def unit_of(text: str) -> float | None:
-    """Return the size of a unit of acceleration [m/s²]; None if it is not known."""
-    bare = text.strip().casefold()
-    return {**UNITS, **_WORDS}.get(bare)
+    """Return the size of a unit of acceleration, however it is spelt [m/s²]; None if it is not known.
+
+    >>> [unit_of(one) for one in ("m/s²", "m s⁻²", "cm/s^2", "MM/SEC**2", "Gal", "furlong")]
+    [1.0, 1.0, 0.01, 0.001, 0.01, None]
+    """
+    bare = unicodedata.normalize("NFKC", text).casefold().translate(_MARKS).replace("sec", "s")
+    found = _PER_SECOND.fullmatch(bare)
+    return {**UNITS, **_MORE}.get(bare if found is None else f"{found['length']}/s2")
 
 
 def direction_of(text: str) -> Direction | None:

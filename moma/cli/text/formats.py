@@ -1,6 +1,7 @@
 """Formats of rows and entities: tables for people, CSV and JSON for programs."""
 
 import json
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -88,14 +89,27 @@ def some(names: Sequence[str], shown: int = 6) -> str:
 
 
 def as_json(value: object) -> str:
-    """Format a value as indented JSON."""
-    return json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False)
+    """Format a value as indented JSON, with escapes where standard output lacks a character: values stay exact."""
+    text = json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False)
+    return text if _printable(text) else json.dumps(value, indent=2, allow_nan=False)
 
 
 def as_geojson(collection: Mapping[str, Any]) -> str:
     """Format a FeatureCollection with one feature on each line."""
-    features = (json.dumps(one, ensure_ascii=False, allow_nan=False) for one in collection["features"])
+    features = (
+        json.dumps(one, ensure_ascii=not _printable(str(one)), allow_nan=False)
+        for one in collection["features"]
+    )
     return '{"type": "FeatureCollection", "features": [\n' + ",\n".join(features) + "\n]}"
+
+
+def _printable(text: str) -> bool:
+    """Tell whether the encoding of standard output has every character of a text."""
+    try:
+        text.encode(sys.stdout.encoding or "utf-8")
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def as_lines(value: Mapping[str, Any], indent: int = 0) -> str:

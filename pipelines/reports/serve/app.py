@@ -17,6 +17,7 @@ from fastapi.responses import HTMLResponse, JSONResponse, PlainTextResponse
 from sqlalchemy.orm import Session
 from starlette.exceptions import HTTPException as StarletteHTTPException
 from starlette.middleware.trustedhost import TrustedHostMiddleware
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from archmodel.database.limits import deadline
 from archmodel.database.session import Database
@@ -226,7 +227,7 @@ def _guards(app: FastAPI, settings: ServeSettings) -> None:
         given = _given(request)
         allowed = settings.token is None or hmac.compare_digest(given.encode(), settings.token.encode())
         if request.method != "GET":
-            response: Response = PlainTextResponse("read only\n", 405, {"Allow": "GET"})
+            response: Response = PlainTextResponse("read only\n", 405, {"Allow": "GET, HEAD"})
         elif not allowed:
             response = PlainTextResponse("a token is needed\n", 401, {"WWW-Authenticate": "Bearer"})
         else:
@@ -247,6 +248,25 @@ def _guards(app: FastAPI, settings: ServeSettings) -> None:
         return response
 
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=settings.hosts)
+    app.add_middleware(_Heads)
+
+
+class _Heads:
+    """Middleware that answers HEAD as GET, with the same status and headers, without a body."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass a request on, a HEAD as a GET."""
+        if scope["type"] != "http" or scope["method"] != "HEAD":
+            await self._app(scope, receive, send)
+            return
+
+        async def without_body(message: Message) -> None:
+            await send({**message, "body": b""} if message["type"] == "http.response.body" else message)
+
+        await self._app({**scope, "method": "GET"}, receive, without_body)
 
 
 def _given(request: Request) -> str:

@@ -21,6 +21,7 @@ __all__ = [
     "Columns",
     "find_columns",
     "kind_of_column",
+    "length_unit",
     "plain",
     "read_map",
     "unit_of",
@@ -209,6 +210,13 @@ def plain(name: str) -> str:
     return "".join(one for one in folded if one.isalnum())
 
 
+def length_unit(text: str) -> str | None:
+    """Return the name in `UNITS` of a unit of length, however it is spelt; None if it is not known."""
+    bare = unicodedata.normalize("NFKC", text).strip().rstrip(".").casefold()
+    word = _WORDS.get(bare, bare)
+    return word if word in UNITS else None
+
+
 def unit_of(name: str) -> tuple[str, str | None]:
     """Split the name of a column into the name itself and its unit, None if it has none.
 
@@ -221,8 +229,8 @@ def unit_of(name: str) -> tuple[str, str | None]:
     if found is None:
         return name.strip(), None
     unit = found["a"] or found["b"] or found["c"] or ""
-    unit = _WORDS.get(unit.casefold(), unit.casefold())
-    return (found["name"].strip(), unit) if unit in UNITS else (name.strip(), None)
+    known = length_unit(unit)
+    return (found["name"].strip(), known) if known is not None else (name.strip(), None)
 
 
 def _spellings(name: str) -> Iterable[str]:

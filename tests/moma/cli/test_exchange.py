@@ -69,3 +69,23 @@ def test_a_filled_database_is_refused(url: str):
     message = fails(1, "import", "castle.json", "--db", url)
     assert message.startswith(f"moma: error: {url}: it is not empty, its table entry has rows; ")
     assert "--db" in message
+
+
+@pytest.mark.parametrize(
+    ("words", "endings"),
+    [
+        (["export", "castle.ifc"], ".json or .json.gz"),
+        (["export", "castle"], ".json or .json.gz"),
+        (["export", "castle.gz"], ".json or .json.gz"),
+        (["view", "--out", "castle.glb"], ".html or .htm"),
+        (["view", "--elevation", "castle.dxf"], ".svg"),
+        (["ingest", "wall.csv", "--review", "review.xlsx"], ".csv"),
+        (["report", "run.html", "--pdf", "--out", "run.docx"], ".pdf"),
+    ],
+)
+def test_a_file_is_never_written_in_another_format_than_its_name_says(
+    words: list[str], endings: str, url: str
+):
+    line = fails(2, *words, *([] if words[0] == "report" else ["--db", url]))
+    assert line.endswith(f"give a name that ends in {endings}")
+    assert [one.name for one in Path().iterdir()] == ["castle.db"]

@@ -164,9 +164,9 @@ def test_the_general_law_and_the_contact_points_are_those_of_the_contact_table()
             "the unit of the acceleration in 'a.csv'",
         ),
         (
-            "[[loads]]\ntype = 'ground_motion'\nstones = ['S']\nx = 'a.csv'\nunit = 'gal'\n",
+            "[[loads]]\ntype = 'ground_motion'\nstones = ['S']\nx = 'a.csv'\nunit = 'furlong'\n",
             5,
-            "unit = 'gal' is unknown",
+            "unknown unit 'furlong'",
         ),
         ("[[meshes]]\nsize = 0.1\n", 1, "[[meshes]] has no 'stones'"),
         ("[[meshes]]\nstones = ['S']\nsize = 0\n", 3, "give a number [m], greater than 0"),
@@ -243,6 +243,15 @@ def test_histories_are_constants_tables_or_files_beside_the_scene(tmp_path):
     (tmp_path / "push.csv").unlink()
     with pytest.raises(SceneError, match=r"push.csv: no such file"):
         parse_scene(text, str(tmp_path / "scene.toml"))
+
+
+@pytest.mark.parametrize("unit", ["m/s²", "m s⁻²", "M/SEC^2"])
+def test_units_of_acceleration_are_read_in_any_spelling(tmp_path, unit):
+    (tmp_path / "a.csv").write_text("0 0\n1 2\n2 0\n")
+    head = f"[[loads]]\ntype = 'ground_motion'\nstones = ['S']\nunit = '{unit}'\ny = 'a.csv'\n"
+    assert parse_scene(head + STONE, str(tmp_path / "scene.toml")).loads[0].values["y"].peak == 2.0
+    with pytest.raises(SceneError, match=r"scene.toml:4: .*unknown unit 'm/s3'; give g, m/s2"):
+        parse_scene(head.replace(unit, "m/s3") + STONE, str(tmp_path / "scene.toml"))
 
 
 def test_records_are_read_filtered_and_corrected_as_asked(tmp_path):

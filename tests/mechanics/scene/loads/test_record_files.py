@@ -96,7 +96,10 @@ def test_a_file_that_is_too_short_is_refused(tmp_path):
     assert f"{path}:1: less than four lines" in message_of(read_at2, path)
 
 
-@pytest.mark.parametrize(("unit", "factor"), [("g", 9.80665), ("m/s2", 1.0), ("cm/s2", 0.01)])
+@pytest.mark.parametrize(
+    ("unit", "factor"),
+    [("g", 9.80665), ("m/s2", 1.0), ("cm/s2", 0.01), ("m/s²", 1.0), ("CM/SEC²", 0.01), ("m·s⁻²", 1.0)],
+)
 @pytest.mark.parametrize("separator", [",", ";", "\t", " ", ", "])
 def test_a_table_is_read_in_its_unit(tmp_path, unit, factor, separator):
     rows = [f"{2.0 + 0.02 * i:.2f}{separator}{a:.9f}" for i, a in enumerate(ACCELERATION)]
@@ -139,9 +142,9 @@ def test_a_table_without_rows_unit_or_file_is_refused(tmp_path):
     path.write_text("time,a\n0.0,1.0\n")
     assert "1 rows of numbers" in message_of(read_csv, path, "g")
     path.write_text("time,a\n0.0,1.0\n0.1,1.0\n")
-    assert "the unit of the acceleration is not known; give g, m/s2, cm/s2" in message_of(
+    assert "the unit of the acceleration is not known; give g, m/s2, cm/s2, gal, mm/s2, %g" in message_of(
         read_accelerogram, path
     )
-    assert "unknown unit 'gal'" in message_of(read_csv, path, "gal")
+    assert "unknown unit 'furlong'" in message_of(read_csv, path, "furlong")
     assert "no such file; check the path" in message_of(read_at2, tmp_path / "none.AT2")
     assert "cannot be read" in message_of(read_csv, tmp_path, "g")

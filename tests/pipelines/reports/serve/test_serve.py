@@ -147,6 +147,24 @@ def test_cells_of_csv_are_no_formulas():
     assert {row[1] for row in found} == {"-0.5"}  # a number stays one
 
 
+@pytest.mark.parametrize(
+    "address", ["/", "/query?kind=voussoir&format=csv", "/stones.glb", "/runs", "/nowhere", "/static/none"]
+)
+def test_head_answers_as_get_without_a_body(client, address):
+    got, head = client.get(address), client.head(address)
+    assert (head.status_code, head.content) == (got.status_code, b"")
+    assert got.content
+    assert head.headers == got.headers
+
+
+def test_head_needs_the_token_and_changes_answer_405_with_the_methods_there_are(database):
+    guarded = client_of(database, token="swallow")
+    assert guarded.head("/").status_code == 401
+    assert guarded.head("/", headers={"authorization": "Bearer swallow"}).status_code == 200
+    refused = guarded.delete("/")
+    assert (refused.status_code, refused.headers["allow"]) == (405, "GET, HEAD")
+
+
 PATHS = (
     "/",
     "/query",
