@@ -18,6 +18,7 @@ __all__ = [
     "RunRecord",
     "SimplificationRecord",
     "StoneResult",
+    "without_rounding",
 ]
 
 
@@ -52,6 +53,19 @@ STONE_VALUES: Mapping[str, tuple[str, str]] = {
     "von_mises_peak": ("Pa", "largest Von Mises stress in the frames of the run"),
 }
 """Unit and meaning of the named values of a stone's result that can be asked for."""
+
+
+# by unit: 10⁻¹² of a metre, of 1 MN and of 1 MPa, which are usual in masonry
+_ROUNDING: Mapping[str, float] = {"m": 1e-12, "N": 1e-6, "Pa": 1e-6}
+
+
+def without_rounding(value: float, unit: str | None) -> float:
+    """Return a number as people read it: 0 where it is so small that rounding alone made it, else as it is.
+
+    >>> without_rounding(9.6e-12, "Pa"), without_rounding(-6e-17, "m"), without_rounding(2e-9, "m")
+    (0.0, 0.0, 2e-09)
+    """
+    return 0.0 if abs(value) < _ROUNDING.get(unit or "", 0.0) else value
 
 
 @dataclass(frozen=True)

@@ -184,10 +184,7 @@ def assess(
     with replacing(folder, INDEX) as fresh:
         carried = [_carried(on, one) for one in answers]
         summary["files"] = [INDEX, REPORT, "scene.toml", *_write_forces(fresh, on, assembled, carried)]
-        titles = [
-            f"{scene.name}\n{one.told['headline'].split(';')[0].replace('λ ≤', 'multiplier at most')}"
-            for one in answers
-        ]
+        titles = [_title(scene.name, one.told["headline"]) for one in answers]
         moving = [one.mechanism for one in answers]
         summary["files"] += _write_curves(fresh, answers, titles)
         try:
@@ -356,6 +353,11 @@ def _headline(loads: Sequence[dict[str, Any]], standing: Standing, left_out: Seq
         return f"{without}nothing limits its loads"
     governs = "governs: " if sum(one["kind"] == "load" for one in loads) > 1 else ""
     return f"{without}{governs}{least['headline']}"
+
+
+def _title(name: str, headline: str) -> str:
+    """Return the title of the pictures of an answer: all that its first line says, in letters that VTK's font has."""
+    return f"{name}\n{headline}".replace("λ ≤", "multiplier at most").replace("≤", "at most")
 
 
 def _limit(one: dict[str, Any]) -> float:

@@ -1,6 +1,7 @@
 """Pictures of a loading test: the capacity curve with its band and a measured one, and the stones at its end."""
 
 from pathlib import Path
+from textwrap import wrap
 
 import numpy as np
 from matplotlib.collections import PolyCollection
@@ -14,6 +15,7 @@ from pipelines.draw.elevations.sheet import new_sheet
 
 __all__ = ["draw_curve", "draw_pushed"]
 
+_ROW = 80  # characters in a line of a title
 _WAY = 0.08  # way of the push in the picture over the extent of the stones [-]
 _OPEN = 0.05  # opening of a joint that is marked, over the displacement of the push [-]
 _SEEN = -0.5  # component of a normal towards the viewer up to which a face is drawn [-]
@@ -41,7 +43,7 @@ def draw_curve(path: Path, title: str, test: LoadingTest, band: Array | None, me
     axes.axhline(0.0, color="black", lw=0.5)
     axes.set_xlabel("displacement of the push [mm]")
     axes.set_ylabel("force [kN]")
-    axes.set_title(title, fontsize=10, parse_math=False)
+    axes.set_title("\n".join(wrap(title, _ROW)), fontsize=10, parse_math=False)
     axes.grid(alpha=0.3)
     axes.legend(frameon=False, loc="best")
     figure.savefig(path)
@@ -85,6 +87,8 @@ def draw_pushed(path: Path, title: str, test: LoadingTest, step: Step) -> None:
     axes.set_aspect("equal")
     axes.set_axis_off()
     axes.set_title(
-        f"{title}\ndisplacements × {factor:.3g}; red: joints that are open", fontsize=9, parse_math=False
+        "\n".join([*wrap(title, _ROW), f"displacements × {factor:.3g}; red: joints that are open"]),
+        fontsize=9,
+        parse_math=False,
     )
     figure.savefig(path)

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from archmodel.store.run_record import without_rounding
 from mechanics.arrays import Array
 from mechanics.results.contact_result import JointResult
 from mechanics.results.result import BodyResult, Outcome, Result
@@ -23,6 +24,7 @@ from pipelines.draw.catalogue import PICTURES
 from pipelines.draw.offscreen.jobs import save_job
 from pipelines.draw.offscreen.surfaces import FIELDS, stone_fields, support_motion, wall_surface
 from pipelines.results.peaks import peak_records
+from pipelines.results.summary import length_tolerance
 
 __all__ = ["OF_RESULTS", "draw_apart", "draw_pictures", "drawing_process", "missing", "package_of"]
 
@@ -111,6 +113,13 @@ def missing(result: Result, name: str) -> str | None:
         return "no stress was asked for" if deforms else "no stone deforms"
     if name == "utilisation" and all(one.utilisation is None for one in stressed):
         return "no material of a deformable stone has a strength"
+    if name == "principal_tension" and all(
+        without_rounding(one.principal_tension, "Pa") <= 0.0 for one in stressed
+    ):
+        return "no stone is in tension"
+    least = length_tolerance(result)  # [m]
+    if name == "displacement" and all(np.abs(body.displacement).max() < least for body in result.bodies):
+        return f"no stone has moved by more than the tolerance of the solver, {least * 1e3:.1g} mm"
     return None
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from archmodel.store.run_record import without_rounding
 from pipelines.reports.page.elevation import elevation
 from pipelines.reports.page.inline import languages_packed, script, style, viewer_html
 from pipelines.reports.page.languages import catalogues
@@ -113,12 +114,12 @@ def _is_quantity(cell: str) -> bool:
 
 def megapascals(pascals: float | None) -> str:
     """Format a stress given in pascals."""
-    return "–" if pascals is None else f"{pascals / 1e6:z.4f} MPa"
+    return "–" if pascals is None else f"{pascals / 1e6:z.4f} MPa"  # four decimals round 50 Pa to 0
 
 
 def kilopascals(pascals: float) -> str:
     """Format a pressure given in pascals."""
-    return f"{pascals / 1e3:z.4g} kPa"
+    return f"{without_rounding(pascals, 'Pa') / 1e3:z.4g} kPa"
 
 
 def kilonewtons(newtons: float) -> str:
@@ -130,7 +131,7 @@ def millimetres(metres: float, least: float = 0.0) -> str:
     """Format a length given in metres; a smaller one than `least` [m], the tolerance, as such."""
     if abs(metres) < least:
         return f"0 within {least * 1e3:.1g} mm"
-    return f"{metres * 1e3:z.4g} mm"
+    return f"{without_rounding(metres, 'm') * 1e3:z.4g} mm"
 
 
 def percent(part: float) -> str:

@@ -25,6 +25,7 @@ from mechanics.stones.meshing.files import check_mesh_file, write_meshes
 from mechanics.stones.meshing.mesh import VolumeMesh
 from moma.errors import MissingLibraryError, MomaError, storing
 from pipelines.draw.animation import draw_motion
+from pipelines.draw.catalogue import PICTURES
 from pipelines.draw.pictures import OF_RESULTS, draw_pictures, drawing_process, missing
 from pipelines.draw.plots import history_svg
 from pipelines.reports.page.known import Known, known_stones
@@ -52,7 +53,7 @@ from pipelines.scene.settings import ParaView
 from pipelines.tuning.expected_errors import ProfileReport, profile_report
 from pipelines.tuning.profiles import with_profile
 
-__all__ = ["USUAL", "RunReport", "run_scene", "write_results"]
+__all__ = ["USUAL", "RunReport", "chosen_pictures", "run_scene", "write_results"]
 
 USUAL = ("von_mises", "displacement")
 """Pictures of a scene that does not name any."""
@@ -229,7 +230,7 @@ def write_results(
             f"no static equilibrium was found in {result.static.steps} steps, with balance "
             f"{result.static.balance:.1e}; the run began at rest, all loads at once"
         )
-    pictures, omitted = _pictures(scene, result)
+    pictures, omitted = chosen_pictures(scene, result)
     warnings += omitted
     with ThreadPoolExecutor(1) as beside:
         drawing = beside.submit(draw_pictures, result, folder, pictures, assembly.towards, ready)
@@ -308,11 +309,19 @@ def _asked(scene: SceneFile) -> tuple[str, ...]:
     return USUAL if scene.output.pictures is None else scene.output.pictures
 
 
-def _pictures(scene: SceneFile, result: Result) -> tuple[tuple[str, ...], list[str]]:
-    """Return the pictures to draw, and a warning for each requested one that would show nothing."""
+def chosen_pictures(scene: SceneFile, result: Result) -> tuple[tuple[str, ...], list[str]]:
+    """Return the pictures to draw, and a warning for each requested one that would show nothing.
+
+    Where none of them shows anything, the first of all that does is drawn.
+    """
     reasons = {name: missing(result, name) for name in _asked(scene)}
-    omitted = [f"no picture {name}: {reason}" for name, reason in reasons.items() if reason is not None]
     drawn = tuple(name for name, reason in reasons.items() if reason is None)
+    if reasons and not drawn:
+        drawn = tuple(name for name in PICTURES if missing(result, name) is None)[:1]
+    instead = f"; {drawn[0]}.png is drawn instead" if drawn and drawn[0] not in reasons else ""
+    omitted = [
+        f"no picture {name}: {reason}{instead}" for name, reason in reasons.items() if reason is not None
+    ]
     return drawn, [] if scene.output.pictures is None else omitted
 
 

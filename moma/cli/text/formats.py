@@ -5,7 +5,7 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from archmodel.store.run_record import STONE_VALUES
+from archmodel.store.run_record import STONE_VALUES, without_rounding
 
 __all__ = [
     "USUAL_COLUMNS",
@@ -52,7 +52,7 @@ def shown_columns(
 def as_table(columns: Mapping[str, str | None], rows: Sequence[Mapping[str, object]]) -> str:
     """Format rows as an aligned table; `columns` gives the unit of each column, None or "-" for none."""
     heads = [name if unit in (None, "-") else f"{name} [{unit}]" for name, unit in columns.items()]
-    cells = [[_cell(row[name], name) for name in columns] for row in rows]
+    cells = [[_cell(row[name], name, unit) for name, unit in columns.items()] for row in rows]
     numeric = [
         all(isinstance(row[name], int | float | None) and not isinstance(row[name], bool) for row in rows)
         and bool(rows)
@@ -126,17 +126,21 @@ def as_lines(value: Mapping[str, Any], indent: int = 0) -> str:
             lines.append(f"{margin}{label}")
             lines += [f"{margin}  - {as_lines(one, indent + 2).lstrip()}" for one in content]
         elif isinstance(content, list):
-            lines.append(f"{margin}{label:<18} {'  '.join(_cell(one, name) for one in content)}{unit}")
+            lines.append(
+                f"{margin}{label:<18} {'  '.join(_cell(one, name, _UNITS.get(name)) for one in content)}{unit}"
+            )
         else:
-            lines.append(f"{margin}{label:<18} {_cell(content, name)}{unit}")
+            lines.append(f"{margin}{label:<18} {_cell(content, name, _UNITS.get(name))}{unit}")
     return "\n".join(lines)
 
 
-def _cell(value: object, name: str) -> str:
+def _cell(value: object, name: str, unit: str | None) -> str:
     if value is None:
         return ""
     if isinstance(value, bool):
         return str(value).lower()  # as queries write it
     if name in _PLACES and isinstance(value, float):
         return f"{value:.3f}"  # to the millimetre, however far the origin is
-    return f"{value + 0.0:.4g}" if isinstance(value, float) else str(value)  # -0.0 is 0
+    return (
+        f"{without_rounding(value, unit) + 0.0:.4g}" if isinstance(value, float) else str(value)
+    )  # -0.0 is 0

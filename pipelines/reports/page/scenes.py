@@ -24,6 +24,7 @@ from pipelines.reports.page.model import (
     VertexField,
 )
 from pipelines.reports.page.surfaces import rigid_motion, stones_of
+from pipelines.results.summary import length_tolerance
 
 __all__ = ["assessment_model", "run_model", "with_known"]
 
@@ -99,12 +100,19 @@ def run_model(
         motion=motion,
         joints=_joints(result.joints, centres, shift[-1], turn[-1]),
         lines=lines,
-        colour="von_mises" if stress is not None else "displacement",
+        colour="von_mises" if stress is not None else _first_colour(result, columns),
         towards=towards,
         origin=origin,
         notes=notes,
     )
     return with_known(model, known)
+
+
+def _first_colour(result: Result, columns: Sequence[Column]) -> str:
+    """Return the displacement; of stones that have not moved, what their joints carry, where they carry anything."""
+    still = all(np.abs(body.displacement).max() < length_tolerance(result) for body in result.bodies)
+    carried = any(one.name == "joint_pressure" for one in columns)
+    return "joint_pressure" if still and carried else "displacement"
 
 
 def assessment_model(

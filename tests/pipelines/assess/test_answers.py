@@ -12,6 +12,7 @@ from mechanics.limit.limit_load import Flow, limit_load
 from mechanics.limit.live_loads import Acceleration
 from pipelines.assess import answers
 from pipelines.assess.answers import answer
+from pipelines.assess.assess import _title
 from pipelines.assess.questions import LoadQuestion
 from pipelines.scene.site import Site
 from tests.mechanics.shapes import brick, ground, scene
@@ -60,3 +61,11 @@ def test_a_code_checks_the_lower_of_two_candidates(on, monkeypatch):
     assert both["kinematics"]["acceleration"] == pytest.approx(0.5 * alone["kinematics"]["acceleration"])
     (first, second) = (one["code"]["checks"][0]["capacity"] for one in (alone, both))
     assert second == pytest.approx(0.5 * first)
+
+
+def test_the_title_of_a_picture_is_not_cut():
+    said = "horizontal y: λ ≤ 0.13 (bound), 0.125 (candidate; other forces hold no more than 0.1); passed"
+    assert _title("Bay; north", said) == (
+        "Bay; north\nhorizontal y: multiplier at most 0.13 (bound), 0.125 (candidate; other forces hold no more than "
+        "0.1); passed"
+    )

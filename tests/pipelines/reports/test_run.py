@@ -9,6 +9,7 @@ import pytest
 
 from mechanics.dynamics.outcome import Outcome
 from mechanics.scene.scene import Fidelity
+from pipelines.reports.html import kilonewtons, kilopascals, megapascals, millimetres
 from pipelines.reports.run import write_report
 from pipelines.results.stone_values import stone_results
 from pipelines.results.summary import summarise
@@ -87,6 +88,22 @@ def test_the_report_gives_every_number_in_its_unit_under_its_head(tmp_path):
     assert (upper["Over the kern"], upper["Over the edge"]) == ("1.2", "0.4")
     assert (upper["Opening"], upper["Sliding"], upper["Friction used"]) == ("0.1 mm", "2 mm", "0.5")
     assert upper["Pressure, mean"] == "0.8 kPa"
+
+
+@pytest.mark.parametrize(
+    ("written", "text"),
+    [
+        (kilopascals(9.6e-12), "0 kPa"),
+        (kilopascals(-3e-9), "0 kPa"),
+        (kilopascals(0.5), "0.0005 kPa"),
+        (millimetres(-6e-17), "0 mm"),
+        (millimetres(2e-9), "2e-06 mm"),
+        (kilonewtons(-4.8e-10), "0.00 kN"),
+        (megapascals(-1e-9), "0.0000 MPa"),
+    ],
+)
+def test_what_rounds_to_nothing_is_nothing(written, text):
+    assert written == text
 
 
 def test_the_report_lists_the_worst_first(tmp_path):

@@ -40,6 +40,11 @@ export function readable(unit, largest) {
   return found && Math.abs(largest) > 0 ? { factor: found[0], unit: found[1] } : { factor: 1, unit: unit === "-" ? "" : unit };
 }
 
+const ROUNDING = { m: 1e-12, N: 1e-6, Pa: 1e-6 }; // what is smaller is what rounding leaves of zero
+
+/** The value, or 0 where rounding alone made it. */
+export const withoutRounding = (value, unit) => (Math.abs(value) < (ROUNDING[unit] ?? 0) ? 0 : value);
+
 /** Write a number with four digits in the language of the page. */
 export function written(value, digits = 4) {
   if (value === null || value === undefined || Number.isNaN(value)) return "–";
@@ -52,6 +57,6 @@ const point = () => (1.5).toLocaleString(document.documentElement.lang || "en")[
 
 /** A value with its unit, in one that is easy to read. */
 export function quantity(value, unit) {
-  const { factor, unit: name } = readable(unit, value);
-  return `${written(value / factor)}${name ? ` ${name}` : ""}`;
+  const shown = withoutRounding(value, unit), { factor, unit: name } = readable(unit, shown);
+  return `${written(shown / factor)}${name ? ` ${name}` : ""}`;
 }

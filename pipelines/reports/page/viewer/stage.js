@@ -1,6 +1,6 @@
 // From the model and the state of a viewer to what is drawn: poses, colours, joints, lines.
 
-import { colourOf, fromHex, GREY, wordColour } from "./colours.js";
+import { colourOf, fromHex, GREY, withoutRounding, wordColour } from "./colours.js";
 import { add, boxOf, cross, length, minus, rotation, times } from "./vectors.js";
 
 const BLUE = [0, 90, 181], RED = [220, 50, 32], DARK = [40, 40, 60];
@@ -234,13 +234,14 @@ export class Stage {
       for (const value of scale.at({ ...state, instant })) if (value < low) low = value; else if (value > high) high = value;
     if (low > high && Number.isFinite(low)) high = low;
     if (!Number.isFinite(low)) return [0, 1];
-    return [scale.moving ? Math.min(low, 0) : low, Number.isFinite(high) ? high : low];
+    if (!Number.isFinite(high)) high = low;
+    return [scale.moving ? Math.min(low, 0) : low, high].map((value) => withoutRounding(value, scale.unit));
   }
 
   /** Colour the stones; `colour` has by, map, low and high. */
   setColours(state) {
     const scale = this.scale(state.colour.by), values = scale?.at(state);
-    const share = (value) => (value - state.colour.low) / (state.colour.high - state.colour.low || 1);
+    const { low, high } = state.colour, share = (value) => (high > low ? (value - low) / (high - low) : 0.5);
     const tint = (value) => !scale ? [214, 205, 188] : scale.text ? (value < 0 ? GREY : wordColour(value))
       : Number.isNaN(value) ? GREY : colourOf(state.colour.map, share(value));
     const { owner } = this.model, whole = new Uint8Array(3 * this.count), table = new Uint8Array(4 * owner.length);
@@ -296,12 +297,12 @@ export class Stage {
     const column = joints.columns.find((one) => one.name === state.joint.by) ?? joints.columns[0];
     let high = 0;
     for (const value of column.values) if (value > high) high = value;
-    this.jointScale = { ...column, low: 0, high: high || 1 };
+    this.jointScale = { ...column, low: 0, high: withoutRounding(high, column.unit) };
     const index = [], owner = new Int32Array(joints.corners.length / 3), tint = new Uint8Array(4 * owner.length);
     let first = 0;
     joints.counts.forEach((count, joint) => {
       const value = column.values[joint];
-      const own = Number.isNaN(value) ? GREY : colourOf(state.colour.map, value / this.jointScale.high);
+      const own = Number.isNaN(value) ? GREY : colourOf(state.colour.map, this.jointScale.high > 0 ? value / this.jointScale.high : 0.5);
       for (let i = first; i < first + count; i++) {
         owner[i] = joints.bodies[2 * joint + 1];
         tint.set([...own, 255], 4 * i);

@@ -15,6 +15,7 @@ from archmodel.describe.schema_tree import schema
 from archmodel.query.attributes import ATTRIBUTES
 from archmodel.store.stones import store_survey
 from archmodel.tables.entities import Rubble, Voussoir, kinds, own_attributes
+from moma.cli.text.formats import as_table
 from moma.cli.text.schema import print_schema, schema_lines
 from tests.archmodel.conftest import WALL
 from tests.archmodel.known_wall import furnish
@@ -153,3 +154,17 @@ def test_on_a_terminal_the_schema_is_the_same_in_colours(
     shown = capsys.readouterr().out
     plain = re.sub(r"\x1b\[[0-9;]*m", "", shown)
     assert [line.rstrip() for line in plain.splitlines()] == list(schema_lines(schema(kind="voussoir")))
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "cell"),
+    [
+        (9.6e-12, "Pa", "0"),
+        (-6e-17, "m", "0"),
+        (2e-9, "m", "2e-09"),
+        (6.7e-15, None, "6.7e-15"),
+        (-4.8e-10, "N", "0"),
+    ],
+)
+def test_a_table_writes_what_rounding_leaves_of_zero_as_zero(value, unit, cell):
+    assert as_table({"value": unit}, [{"value": value}]).splitlines()[-1].strip() == cell

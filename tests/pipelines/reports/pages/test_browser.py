@@ -117,6 +117,20 @@ def test_stones_clicked_at_random_are_those_that_a_ray_meets(browser, window):
     assert (right, asked) == (200, 200)
 
 
+def test_what_rounding_leaves_of_zero_has_no_scale_of_a_metre(browser, tmp_path):
+    values = np.array([-6e-17, 0.0, 3e-17])
+    model = replace(
+        wall_model(3),
+        columns=(Column("way", "way", "m", values, "Results"),),
+        colour="way",
+        fields=(),
+        motion=None,
+    )
+    with browser.page(page_of(model, tmp_path / "page.html")) as page:
+        assert page.locator(".legend .ends").text_content() == "00"
+        assert page.locator(".legend b").first.text_content() == "way [m]"
+
+
 def test_the_page_of_a_run_shows_its_last_instant_its_legend_and_its_unit(browser, mixed, tmp_path):
     stones = stone_results(mixed)
     model = run_model(mixed, stones, np.array([0.0, -1.0, 0.0]), np.zeros(3))
