@@ -302,7 +302,7 @@ Layer = Annotated[
     typer.Option(
         "--layer",
         metavar="NAME",
-        help="Layer of the outlines, if the file has several.",
+        help="Layer of the outlines, if the file has several; number or colour of the stones in a picture of classes.",
         rich_help_panel=_PANEL,
     ),
 ]

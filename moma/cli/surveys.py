@@ -573,6 +573,6 @@ def _check_fitting(
         raise UsageError(f"--unit with format {name}", remedy="its lengths are metres")
 
 
-_OF_MASKS = ("size", "depth", "wall", "fields")
-_OF_OUTLINES = (*_OF_MASKS, "layer", "outline_sigma")
+_OF_MASKS = ("size", "depth", "wall", "fields", "layer")
+_OF_OUTLINES = (*_OF_MASKS, "outline_sigma")
 _OF_CLOUDS = ("outlines", "wall", "layer", "fields", "outline_sigma", "margin", "slab")

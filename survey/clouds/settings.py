@@ -46,7 +46,7 @@ class MaskOptions(ReadingOptions):
         says where the pixels of a picture lie, and the wall is as large as the outlines
     depth : of all stones [m]; None: by the rules of the header file
     wall : frame of the picture in space; None: it stands on the x axis, seen along y
-    layer : of a file of outlines with several
+    layer : of a file of outlines with several; of a picture of classes, the number or colour of the stones
     chosen : names of attributes of outlines, by meaning
     outline_sigma : standard deviation of a drawn corner, where the outline states none [m]
     smooth : largest distance of the boundary of a mask from the sides of its outline [px]

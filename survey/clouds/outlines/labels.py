@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from moma.errors import SurveyError
 from survey.arrays import Array
+from survey.clouds.outlines.classes import check_stones, neck, of_class, refuse_mortar
 from survey.clouds.outlines.outline import Attributes, Outline
 from survey.clouds.outlines.tracing import few_corners, trace
 from survey.clouds.world import PixelPlace, world_of
@@ -22,6 +23,7 @@ _GREY = 0.02  # share of pixels that are neither black nor white in a picture of
 _DARK, _WHITE = 32, 223  # of 255
 _SPECK = 0.02  # area of a piece over the median of all below which it is a speck, not a stone [-]
 _SMALLEST = 12  # pixels of the smallest piece that can be a stone
+_MOST = 0.5  # share of a picture above which a piece is rather the wall than a stone
 _WHOLE = 0.95  # share of the largest piece above which the others are specks
 
 
@@ -47,21 +49,30 @@ class Labels:
     places: PixelPlace | None
 
 
-def read_labels(path: Path) -> Labels:
+def read_labels(path: Path, stones: str | None = None) -> Labels:
     """Read a picture of labels.
 
     A picture with blacks and whites alone has stones in white and mortar in black, and each piece of white is a stone.
     In any other, each number or colour is a stone, and 0 or black is mortar.
 
+    Parameters
+    ----------
+    path : the picture
+    stones : number or colour of the stones in a picture of classes, each piece of which is a stone; None: as above
+
     Raises
     ------
     SurveyError
-        if it cannot be read, or has no stones
+        if it cannot be read, has no stones, or one number is not one stone
+    UsageError
+        if it has no pixel of this number or colour
     """
     pixels, tags = _pixels(path)
     places = world_of(path, tags)
-    two = _two_colours(pixels)
+    two = _two_colours(pixels) if stones is None else of_class(pixels, stones, path)
     if two is not None:
+        if stones is None:
+            refuse_mortar(two, path)
         numbers, specks, smallest = _pieces(two)
         if not numbers.any():
             raise SurveyError("no white piece is large enough for a stone", where=str(path), remedy=_REMEDY)
@@ -71,6 +82,7 @@ def read_labels(path: Path) -> Labels:
     values, numbers = _ranked(flat, path)
     if len(values) < 2 or values[0] != 0:
         raise SurveyError(f"{len(values)} numbers and no 0 among them", where=str(path), remedy=_REMEDY)
+    check_stones(numbers, values, colours, path)
     return Labels(path, numbers, None if colours else values, 0, _SMALLEST, places)
 
 
@@ -101,7 +113,10 @@ def outlines_of(labels: Labels, tolerance: float) -> Iterator[Outline]:
         where = f"{labels.path}, label {own}"
         outline = outline_of_mask(number, mask, (box[1].start, box[0].start), tolerance, where)
         if outline is not None:
-            yield replace(outline, code=f"S{own:03d}")
+            share = np.count_nonzero(mask) / labels.numbers.size
+            whole = ("whole wall", f"it fills {share:.0%} of the picture: joints may be missing in the mask")
+            doubts = (*outline.doubts, *([whole] if share > _MOST else []))
+            yield replace(outline, code=f"S{own:03d}", doubts=doubts)
 
 
 def outline_of_mask(
@@ -119,6 +134,8 @@ def outline_of_mask(
     doubts = []
     if share < _WHOLE:
         doubts.append(("in pieces", f"{pieces} pieces; the largest, with {share:.0%} of the area, is taken"))
+    if (bridged := neck(mask)) is not None:
+        doubts.append(bridged)
     corners = few_corners(ring, tolerance) + corner
     return Outline(number, f"S{number:03d}", corners, said or Attributes(), where, tuple(doubts))
 

@@ -65,7 +65,7 @@ def read_outlines(
     Parameters
     ----------
     path : GeoPackage, GeoJSON, Shapefile, DXF, a picture of labels, COCO's JSON, plain JSON or CSV
-    layer : of a file with several
+    layer : of a file with several; of a picture of classes, the number or colour of the stones
     chosen : names of attributes that the user has given, by meaning
     sigma : standard deviation of a drawn corner [m], to which curves are described by straight sides
     smooth : largest distance of the boundary of a mask from the sides of its outline [px]
@@ -94,7 +94,7 @@ def _read(path: Path, layer: str | None, chosen: Mapping[str, str], smooth: floa
     if ending == ".dxf":
         return Drawing(path, read_dxf(path, layer, chosen))
     if ending in PICTURES:
-        labels = read_labels(path)
+        labels = read_labels(path, layer)
         size = labels.numbers.shape[1], labels.numbers.shape[0]
         placed = _placed(path, tuple(outlines_of(labels, smooth)), labels.places, size)
         return replace(placed, specks=labels.specks, smallest=labels.smallest)

@@ -1,0 +1,105 @@
+"""Pictures that are no masks of stones: classes, white mortar, resampled colours; stones joined by a bridge."""
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from moma.errors import SurveyError, UsageError
+from survey.clouds.outlines.reading import read_outlines
+from tests.paths import ROOT
+
+CASES = ROOT.parent / "shared/cases/wild/mask-semantic-classes"
+needs_shared = pytest.mark.skipif(not CASES.is_dir(), reason="the cases lie beside the project")
+ROWS, COLUMNS, STONE, JOINT = 4, 5, 40, 6
+TALL, WIDE = ROWS * (STONE + JOINT) + JOINT, COLUMNS * (STONE + JOINT) + JOINT
+
+
+def bricks():
+    """Return the number of the stone of each pixel, from 1; 0: mortar."""
+    out = np.zeros((TALL, WIDE), np.uint8)
+    for k in range(ROWS * COLUMNS):
+        y, x = (JOINT + one * (STONE + JOINT) for one in divmod(k, COLUMNS))
+        out[y : y + STONE, x : x + STONE] = k + 1
+    return out
+
+
+def saved(pixels, path):
+    Image.fromarray(pixels.astype(np.uint8)).save(path)
+    return path
+
+
+def reasons(drawing):
+    return {(one.code, reason) for one in drawing.outlines for reason, _ in one.doubts}
+
+
+def test_classes_are_asked_for_and_each_piece_of_one_is_a_stone(tmp_path):
+    classes = np.pad(np.where(bricks() > 0, 100, 200), 20)  # void, stone, mortar
+    path = saved(classes, tmp_path / "a.png")
+    with pytest.raises(SurveyError, match="100 has 20 pieces: a picture of classes") as refused:
+        read_outlines(path)
+    assert "--layer 100" in str(refused.value)
+    assert len(read_outlines(path, layer="100").outlines) == ROWS * COLUMNS
+    with pytest.raises(UsageError, match=r"no pixel is 7; the picture has 0, 100, 200"):
+        read_outlines(path, layer="7")
+
+
+def test_classes_in_colours(tmp_path):
+    colours = np.zeros((TALL, WIDE, 3), np.uint8)
+    colours[bricks() > 0] = (255, 0, 0)
+    colours[bricks() == 0] = (0, 0, 255)
+    colours[:JOINT] = 0
+    path = saved(colours, tmp_path / "a.png")
+    with pytest.raises(SurveyError, match="--layer #ff0000"):
+        read_outlines(path)
+    assert len(read_outlines(path, layer="#ff0000").outlines) == ROWS * COLUMNS
+
+
+def test_white_mortar_is_refused_and_black_stones_can_be_named(tmp_path):
+    path = saved(np.where(bricks() > 0, 0, 255), tmp_path / "a.png")
+    with pytest.raises(SurveyError, match="black has 20 pieces: white is the mortar"):
+        read_outlines(path)
+    assert len(read_outlines(path, layer="0").outlines) == ROWS * COLUMNS
+
+
+def test_labels_of_stones_some_in_pieces_are_none_of_this(tmp_path):
+    labels = bricks()
+    labels[:, WIDE // 2 - 2 : WIDE // 2 + 2] = 0  # a pole stands before the middle stones
+    drawing = read_outlines(saved(labels, tmp_path / "a.png"))
+    assert len(drawing.outlines) == ROWS * COLUMNS
+    assert {reason for _, reason in reasons(drawing)} == {"in pieces"}
+
+
+@pytest.mark.parametrize(("pixels", "doubted"), [(1, True), (3, True), (STONE // 2, False)])
+def test_a_bridge_between_two_stones_is_questioned(tmp_path, pixels, doubted):
+    white = bricks() > 0
+    y, x = JOINT + STONE // 2, JOINT + STONE
+    white[y : y + pixels, x : x + JOINT] = True
+    drawing = read_outlines(saved(np.where(white, 255, 0), tmp_path / "a.png"))
+    assert len(drawing.outlines) == ROWS * COLUMNS - 1
+    assert ("neck" in {reason for _, reason in reasons(drawing)}) == doubted
+
+
+def test_most_of_the_wall_in_one_piece_is_questioned(tmp_path):
+    white = bricks() > 0
+    white[TALL // 2 - 20 : TALL // 2 + 20] = white[:, WIDE // 2 - 20 : WIDE // 2 + 20] = True
+    white[:, JOINT : JOINT + 20] = white[JOINT : JOINT + 20] = True
+    drawing = read_outlines(saved(np.where(white, 255, 0), tmp_path / "a.png"))
+    assert "whole wall" in {reason for _, reason in reasons(drawing)}
+
+
+def test_resampled_labels_are_refused(tmp_path):
+    picture = Image.fromarray(bricks() * 10).resize(
+        (int(0.77 * WIDE), int(0.77 * TALL)), Image.Resampling.BICUBIC
+    )
+    picture.save(tmp_path / "a.png")
+    with pytest.raises(SurveyError, match="thin rims: the picture was resampled"):
+        read_outlines(tmp_path / "a.png")
+
+
+@needs_shared
+def test_pictures_of_the_cases():
+    with pytest.raises(SurveyError, match="100 has 12 pieces"):
+        read_outlines(CASES / "i_three_classes.png")
+    assert len(read_outlines(CASES / "i_three_classes.png", layer="100").outlines) == 12
+    with pytest.raises(SurveyError, match="resampled"):
+        read_outlines(CASES / "c_rgb_antialiased.png")
