@@ -17,9 +17,9 @@ from mechanics.dynamics.stopping import LASTING, Verdict, balance_of
 from mechanics.model.model import Model
 from mechanics.results.peaks import PeakTracker
 from mechanics.results.postprocess import Observer
-from mechanics.results.result import Energies, Errors, Frame, Result, RunHistory
+from mechanics.results.result import Energies, Errors, Frame, Outcome, Result, RunHistory
 from mechanics.results.stages import StageResult
-from mechanics.scene.scene import Fidelity
+from mechanics.scene.scene import Fidelity, Scene
 from mechanics.scene.state import State
 
 __all__ = ["Log", "result_of", "stage_result"]
@@ -130,10 +130,18 @@ def result_of(
         static=static,
         solvers=dict(log.solvers.most_common()),
         reason=verdict.reason,
-        cautions=verdict.cautions,
+        cautions=_with_loads(model.scene, verdict, last.after.time),
         peaks=log.peaks.peaks(log.frames, joints, last.after),
         series=log.peaks.series(),
     )
+
+
+def _with_loads(scene: Scene, verdict: Verdict, end: float) -> tuple[str, ...]:
+    """Return the cautions of a verdict, and loads that are not over: first those whose peak or strong part it lacks."""
+    if verdict.outcome in (Outcome.COLLAPSED, Outcome.INTERRUPTED):
+        return verdict.cautions
+    first, last = (scene.loads.unfinished(end, missed) for missed in (True, False))
+    return (*first, *verdict.cautions, *last)
 
 
 def stage_result(result: Result, name: str, laid: int, removed: int, held: int, bed: float) -> StageResult:

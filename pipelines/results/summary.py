@@ -78,6 +78,7 @@ def summarise(
         "peaks": peaks,
         "tolerance": {"length": length_tolerance(result)},
         "admissible": indeterminacy(result),
+        "loads": [asdict(one) for one in result.scene.loads.courses],
         "stages": [_stage(one) for one in result.stages],
         "profile": profile,
         "version": version,

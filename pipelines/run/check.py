@@ -32,7 +32,13 @@ from pipelines.run.filling import filling
 from pipelines.run.inputs import stage_lines
 from pipelines.run.plausibility import corner_warnings, impossible_values, unusual_values
 from pipelines.run.run import USUAL
-from pipelines.run.soundness import stands_alone, unsound_stones, unsupported, unsupported_stages
+from pipelines.run.soundness import (
+    stands_alone,
+    unfinished_loads,
+    unsound_stones,
+    unsupported,
+    unsupported_stages,
+)
 from pipelines.scene.array_tables import describe
 from pipelines.scene.file import SceneFile, read_scene
 from pipelines.scene.selection import Groups, StoneModel, select_groups, select_stones
@@ -204,6 +210,7 @@ def _report(
             *(() if assembly is None else unsupported_stages(scene, assembly)),
             *(() if assembly is None or not _in_rig(scene, assembly) else (_IN_RIG,)),
         ),
+        cautions=() if assembly is None else unfinished_loads(assembly),
     )
 
 

@@ -117,6 +117,7 @@ class CheckReport:
     filling : volume and weight of all stones as surveyed and as modelled; None likewise
     files : pictures that were drawn
     source : the scene file, relative to the folder of the pictures; empty if none were drawn
+    cautions : facts without which "sound" misleads, the gravest first
     warnings : keys without effect, limits of the stresses, and pictures that could not be drawn
     """
 
@@ -138,4 +139,5 @@ class CheckReport:
     files: tuple[str, ...] = ()
     source: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    cautions: tuple[str, ...] = ()
     filling: Filling | None = None

@@ -16,8 +16,8 @@ from survey.geometry.watertight import check_watertight, doubtful_solids
 from survey.joints.settings import JointMode
 
 __all__ = [
-    "caution_of", "problems_of", "refuse_unsound", "some", "stands_alone", "unsound_stones", "unsupported",
-    "unsupported_stages",
+    "caution_of", "problems_of", "refuse_unsound", "some", "stands_alone", "unfinished_loads", "unsound_stones",
+    "unsupported", "unsupported_stages",
 ]  # fmt: skip
 
 _DEEP = 0.005  # overlap [m]; less is survey noise, which the contacts absorb
@@ -180,3 +180,11 @@ def _facts(problems: Sequence[str]) -> str:
     """Return the first problem without its remedy, and the number of the others."""
     first, more = problems[0].split("; ")[0], len(problems) - 1
     return first + (f" (and {more} more problem{'s' if more > 1 else ''})" if more else "")
+
+
+def unfinished_loads(assembly: Assembly) -> tuple[str, ...]:
+    """Return in words the loads that are not over when a run ends, first those whose peak or strong part it misses."""
+    scenes = [stage.scene for stage in assembly.stages] or [assembly.scene]
+    missed = [one for built in scenes for one in built.loads.unfinished(built.time.duration, True)]
+    others = [one for built in scenes for one in built.loads.unfinished(built.time.duration, False)]
+    return tuple(dict.fromkeys((*missed, *others)))

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
 
+import numpy as np
+
 from mechanics.scene.loads.accelerogram import Accelerogram
 from mechanics.scene.loads.ground_motion import braking_time
 from mechanics.scene.loads.tables import read_history
@@ -78,7 +80,8 @@ def _shown(value: Any) -> str:
             rest = f"{value.velocity[-1]:.2g} m/s, {value.displacement[-1]:.2g} m"
             braking = braking_time(value)
             rest += f", brakes for {braking:.3g} s" * (braking > value.dt)
-            return f"{value.name!r} ({value.duration:g} s, peak {value.peak:.3g} m/s², ends with {rest})"
+            peak = f"peak {value.peak:.3g} m/s² at {value.time[np.abs(value.acceleration).argmax()]:.4g} s"
+            return f"{value.name!r} ({value.duration:g} s, {peak}, ends with {rest})"
         case float():
             return f"{value:g}"
         case _:

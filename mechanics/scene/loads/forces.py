@@ -6,6 +6,7 @@ from typing import Annotated
 import numpy as np
 
 from mechanics.arrays import Array
+from mechanics.scene.loads.load import Course
 from mechanics.scene.loads.time_series import History
 from mechanics.stones.settings import Setting
 from mechanics.stones.validation import finite, refuse_unless
@@ -42,6 +43,14 @@ class StoneForce:
     def until(self) -> float:
         """Time from which the force is constant [s]."""
         return self.force.until
+
+    @property
+    def course(self) -> Course | None:
+        """Course of the force; None if it is constant."""
+        if not self.until:
+            return None
+        stones = ", ".join(sorted(self.stones)[:2]) + ", …" * (len(self.stones) > 2)
+        return Course.of(f"force on {stones}", self.force.time, self.force.value, self.until)
 
     def __call__(self, time: float, centre: Array, rotation: Array) -> tuple[Array, Array]:
         """Return the force (n, 3) [N] and its moment (n, 3) [N m] about the centre of mass, world axes."""

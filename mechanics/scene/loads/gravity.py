@@ -7,6 +7,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mechanics.arrays import Array
+from mechanics.scene.loads.load import Course
 from mechanics.scene.loads.time_series import History
 from mechanics.stones.settings import Setting, check_settings
 from moma.errors import SceneError
@@ -27,6 +28,11 @@ class GravityRamp:
     def until(self) -> float:
         """T [s]."""
         return self.duration
+
+    @property
+    def course(self) -> Course:
+        """Course of the part of gravity that acts."""
+        return Course.of("ramp of gravity", np.array([0.0, self.duration]), np.array([0.0, 1.0]), self.until)
 
     def __call__(self, time: float, gravity: Array) -> Array:
         """Return g t/T up to the duration T, then g (3,) [m/s²]."""
@@ -74,6 +80,11 @@ class TiltingTable:
     def until(self) -> float:
         """Time from which the angle is constant [s]."""
         return self.angle.until
+
+    @property
+    def course(self) -> Course | None:
+        """Course of the angle; None if it is constant."""
+        return Course.of("tilt", self.angle.time, self.angle.value, self.until) if self.until else None
 
     def __call__(self, time: float, gravity: Array) -> Array:
         """Return gravity (3,) turned by minus the angle [m/s²]."""

@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 
 from mechanics.scene.loads.accelerogram import Accelerogram
-from mechanics.scene.loads.load import Pose
+from mechanics.scene.loads.load import Course, Pose
 from mechanics.scene.loads.time_series import History
 from mechanics.stones.settings import Setting
 from moma.errors import SceneError
@@ -70,6 +70,12 @@ class GroundMotion:
     def until(self) -> float:
         """Time at which the ground comes to rest [s]."""
         return max(one.until for one in self._velocity)
+
+    @property
+    def course(self) -> Course:
+        """Course of the acceleration of the strongest component."""
+        record = max((one.record for one in self.components), key=lambda one: one.peak)
+        return Course.of("ground motion", self.start + record.time, record.acceleration, self.until)
 
     def pose(self, time: float) -> Pose:
         """Return the pose of the ground at `time` [s]."""

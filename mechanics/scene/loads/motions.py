@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mechanics.scene.loads.load import Pose
+from mechanics.scene.loads.load import Course, Pose
 from mechanics.scene.loads.time_series import History
 from mechanics.stones.settings import Setting
 from mechanics.stones.validation import finite
@@ -62,6 +62,15 @@ class ImposedMotion:
         """Time at which the stones come to rest [s]; infinity if they never do."""
         moving = self.velocity.value[-1].any() or self.spin.value[-1].any()
         return float(np.inf) if moving else max(self.velocity.until, self.spin.until)
+
+    @property
+    def course(self) -> Course | None:
+        """Course of the velocity, or of the spin where there is no velocity; None if neither changes."""
+        changing = self.velocity if self.velocity.until else self.spin
+        if not changing.until:
+            return None
+        stones = ", ".join(sorted(self.stones)[:2]) + ", …" * (len(self.stones) > 2)
+        return Course.of(f"motion of {stones}", changing.time, changing.value, self.until)
 
     def pose(self, time: float) -> Pose:
         """Return the pose of the stones at `time` [s]."""

@@ -31,6 +31,7 @@ def check_lines(report: "CheckReport", verbose: bool, explain: bool = False) -> 
     lines = [
         f"{report.scene}: {sum(report.kinds.values())} stones "
         f"({', '.join(f'{count} {kind}' for kind, count in report.kinds.items())})",
+        *(f"  caution: {one}" for one in report.cautions),
         f"  models: {', '.join(f'{count} {name}' for name, count in report.bodies.items())}",
         *_stress_lines(report),
         *(_explanation(report) if explain else []),
@@ -69,7 +70,7 @@ def check_lines(report: "CheckReport", verbose: bool, explain: bool = False) -> 
         ]
     lines += [f"problem: {problem}" for problem in report.problems]
     if not report.problems:
-        lines.append("sound: it can be run")
+        lines.append("; but ".join(["sound: it can be run", *report.cautions[:1]]))
     return lines
 
 

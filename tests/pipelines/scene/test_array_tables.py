@@ -13,6 +13,7 @@ from mechanics.scene.laws.mortar import MortarJoint
 from mechanics.scene.scene import Block, Fidelity, Placement
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.polyhedra import mass_properties
+from moma.cli.text.checks import check_lines
 from moma.errors import SceneError
 from pipelines.run.check import check_scene
 from pipelines.scene.file import parse_scene
@@ -462,10 +463,25 @@ def test_check_reports_laws_and_loads(url, tmp_path):
     report = check_scene(path, url)
     assert report.laws == ("mortar, 1 stones and 8 stones: friction 0.5, tension 100000, shear 200000",)
     assert report.loads == (
-        "ground_motion, 10 stones: x 'a' (2 s, peak 2 m/s², ends with 2 m/s, 2 m, brakes for 10 s), unit m/s2, "
+        "ground_motion, 10 stones: x 'a' (2 s, peak 2 m/s² at 1 s, ends with 2 m/s, 2 m, brakes for 10 s), unit m/s2, "
         "azimuth 0, scale 1, start 0, order 4, baseline 0",
         "throw, 1 stones: velocity (1, 0, 0), spin (0, 0, 0)",
     )
+
+
+def test_check_warns_first_of_a_run_that_ends_before_its_load_is_over(url, tmp_path):
+    (tmp_path / "a.csv").write_text("0 0\n1 2\n2 0\n")
+    path = tmp_path / "scene.toml"
+    motion = '[[loads]]\ntype = "ground_motion"\nstones = ["course = 1"]\nx = "a.csv"\nunit = "m/s2"\n'
+    path.write_text(TWO_COURSES + "[time]\nduration = 0.9\n" + motion)
+    report = check_scene(path, url)
+    said = "the run ends at 0.9 s, before the peak of the ground motion at 1 s, and it goes on until 12 s"
+    assert report.cautions == (said,)
+    lines = check_lines(report, verbose=False)
+    assert lines[1] == f"  caution: {said}"
+    assert lines[-1] == f"sound: it can be run; but {said}"
+    path.write_text(path.read_text().replace("duration = 0.9", "duration = 12.5"))
+    assert check_scene(path, url).cautions == ()
 
 
 def test_a_station_gives_all_its_components(tmp_path):
