@@ -150,13 +150,16 @@ def limit_load(
     return _candidate(on, programme, bound)
 
 
-def mechanism(on: RigidAssembly, velocity: Array, moving: Array | None = None) -> Mechanism:
+def mechanism(
+    on: RigidAssembly, velocity: Array, moving: Array | None = None, still: float = _STILL
+) -> Mechanism:
     """Return the mechanism of velocities of any length.
 
     Parameters
     ----------
     velocity : (n, 6) of the free stones
     moving : (nb, 6) of the fixed ones, without spin; None: they stand
+    still : velocity over the largest below which a contact stays closed [-]
     """
     u = (on.lift.T @ velocity.ravel()).reshape(-1, 3)
     every = np.zeros((len(on.model.mass), 6))
@@ -168,7 +171,7 @@ def mechanism(on: RigidAssembly, velocity: Array, moving: Array | None = None) -
     speed = np.linalg.norm(every[:, :3], axis=1) + turning
     unit = float(speed.max(initial=0.0)) or 1.0
     u /= unit
-    return Mechanism(every / unit, speed / unit, u[:, 0] > _STILL, np.linalg.norm(u[:, 1:], axis=1) > _STILL)
+    return Mechanism(every / unit, speed / unit, u[:, 0] > still, np.linalg.norm(u[:, 1:], axis=1) > still)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,90 @@
+"""Limit loads by the rule of runs: closed forms, published walls, and what `simulate` says just below and above."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.limit import WALLS
+from mechanics.dynamics.outcome import Outcome
+from mechanics.limit.assembly import assembly
+from mechanics.limit.held import WIDTH, held_limit
+from mechanics.limit.limit_load import limit_load
+from mechanics.limit.live_loads import Acceleration, PointForce
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.laws.mortar import MortarJoint
+from mechanics.scene.scene import ContactSettings
+from mechanics.simulate import simulate
+from tests.mechanics.shapes import brick, ground, scene
+
+ALONG = Acceleration((1.0, 0.0, 0.0))
+SQUAT, TALL = brick("squat", (0, 0, 0), (1.0, 1.0, 0.5)), brick("tall", (0, 0, 0), (0.2, 0.2, 0.8))
+
+
+def limit_of(on, live=ALONG):
+    return held_limit(on, live, limit_load(on, live))
+
+
+def within(found, value):
+    """Hold a bracket of the asked width around a value; a bound is known to 10⁻⁶ of itself."""
+    assert found.lost - found.held <= WIDTH * found.lost
+    assert found.held <= value * (1 + 1e-5)
+    assert found.lost >= value * (1 - 1e-5)
+
+
+@pytest.mark.parametrize(("stone", "friction", "value"), [(SQUAT, 0.3, 0.3), (TALL, 0.7, 0.25)])
+def test_a_block_slides_or_tips(stone, friction, value):
+    within(limit_of(assembly(scene(ground(), stone, friction=friction))), value)
+
+
+def test_mortar_and_point_forces_count():
+    """λ W = μ W + c A; a force twice as high up tips a block by half as much."""
+    law = MortarJoint(0.5, tension=5e3, shear=4e3)
+    on = assembly(replace(scene(ground(), SQUAT), contact=ContactSettings(law)))
+    within(limit_of(on, PointForce("squat", (on.weight, 0, 0), (0.5, 0.5, 0.0))), 0.5 + 4e3 / on.weight)
+    on = assembly(scene(ground(), TALL, friction=0.7))
+    within(limit_of(on, PointForce("tall", (on.weight, 0, 0), (0.1, 0.1, 0.8))), 0.125)
+
+
+def test_what_falls_by_itself_has_none_and_what_nothing_limits_has_no_end():
+    leaning = brick("over", (4.0, 0, 0), (6.5, 0.8, 1.0))
+    found = limit_of(assembly(scene(ground(high=(5.0, 3.0, 0.0)), leaning)))
+    assert (found.held, found.lost) == (0.0, 0.0)
+    assert found.mechanism.velocity.any()
+    found = limit_of(assembly(scene(ground(), TALL)), Acceleration((0.0, 0.0, -1.0)))
+    assert np.isinf(found.held)
+    assert found.mechanism is None
+
+
+@pytest.mark.slow
+def test_the_step_that_falls_shows_how():
+    """Without dilatancy a wall with windows falls at less than the bound; its base course stays."""
+    one = WALLS["W04"]
+    on = one.assembly()
+    found = limit_of(on)
+    assert 0.995 * one.candidate < found.held < found.lost < 1.02 * one.candidate
+    assert found.mechanism.opening.any()
+    assert found.mechanism.velocity[on.free, 0].max() > 0.1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", WALLS)
+def test_walls_lie_up_to_two_hundredths_above_the_lowest_published_loads(name):
+    one = WALLS[name]
+    found = limit_of(one.assembly())
+    assert 0.998 * one.candidate < found.held <= found.lost < 1.02 * one.candidate
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["W03", "W05"])
+@pytest.mark.parametrize("step", [1e-4, 1e-2])
+def test_runs_hold_below_and_fall_above(name, step):
+    one = WALLS[name]
+    on = one.assembly()
+    found = limit_of(on)
+    for factor, rests in ((0.98, True), (1.03, False)):
+        load = ALONG.applied(on, factor * (found.held if rests else found.lost))
+        time = replace(load.time, step=step, duration=max(0.2, 60 * step))
+        run = simulate(replace(load, time=time, contact=ContactSettings(DryJoint(one.friction))))
+        assert run.outcome.rests == rests
+        assert rests or run.outcome in (Outcome.COLLAPSED, Outcome.MOVING)
