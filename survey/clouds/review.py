@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from moma.errors import UsageError
 from survey.arrays import Array, Ints
 from survey.clouds.extras import optional
 from survey.clouds.outlines.outline import Outline
@@ -16,6 +17,8 @@ from survey.records.review import Doubtful
 __all__ = ["drawn_doubts", "flat_doubts", "measured_doubts"]
 
 _OVERLAP = 0.05  # part of the smaller stone's area that two outlines may share: jitter of neighbours
+_WITHIN = 0.5  # of an outline's area in a larger one, above which it lies within this
+_FRAMED = 3  # outlines that a frame holds at least
 _THICK = 0.02  # by which boxes of outlines are widened: neighbours do not lie in one plane [m]
 _SOLID = (
     0.80  # area over that of the convex hull below which an outline leaks: a stone with a deep notch has more
@@ -37,13 +40,29 @@ def drawn_doubts(placed: Sequence[PlacedOutline], drawing: Drawing) -> list[Doub
     placed : outlines in their planes
     drawing : the file that they come from
     """
-    found = list(flat_doubts([one.outline for one in placed], [one.ring for one in placed], drawing))
+    outlines = [one.outline for one in placed]
+    found = list(_shape_doubts(outlines, [one.ring for one in placed], drawing))
     if drawing.path.suffix.lower() not in PICTURES:
-        found += _overlaps(placed)
+        found += _overlaps_in_space(placed)
     return found
 
 
 def flat_doubts(outlines: Sequence[Outline], rings: Sequence[Array], drawing: Drawing) -> Iterator[Doubtful]:
+    """Yield what is odd about outlines in one plane, whose rings (n, 2) are given in metres."""
+    yield from _shape_doubts(outlines, rings, drawing)
+    if drawing.path.suffix.lower() in PICTURES:
+        return  # a pixel is of one stone
+    low, high = (np.array([end(ring, axis=0) for ring in rings]) for end in (np.min, np.max))
+    pairs = _near_pairs(low, high)
+    try:
+        yield from _overlaps(outlines, pairs, [rings[i] for i, _ in pairs], [rings[j] for _, j in pairs])
+    except UsageError as error:  # shapely is missing, which the reader of these outlines does without
+        yield Doubtful("", "overlap", f"not looked for: {error}", str(drawing.path))
+
+
+def _shape_doubts(
+    outlines: Sequence[Outline], rings: Sequence[Array], drawing: Drawing
+) -> Iterator[Doubtful]:
     """Yield what is odd about the shape and size of outlines, whose rings (n, 2) are given in metres."""
     if drawing.specks:
         area = "" if drawing.pixel is None else f", {1e4 * drawing.smallest * drawing.pixel**2:.2g} cm²"
@@ -88,22 +107,43 @@ def measured_doubts(one: PlacedOutline, plane: Array, numbers: Array) -> Iterato
         )
 
 
-def _overlaps(placed: Sequence[PlacedOutline]) -> Iterator[Doubtful]:
+def _overlaps_in_space(placed: Sequence[PlacedOutline]) -> Iterator[Doubtful]:
     """Yield pairs of outlines that share much of their area, seen along the line of sight of the first."""
-    shapely = optional("shapely", "overlaps of outlines")
     corners = [one.corners for one in placed]
     low = np.array([one.min(axis=0) for one in corners]) - _THICK
     high = np.array([one.max(axis=0) for one in corners]) + _THICK
     pairs = _near_pairs(low, high)
     pairs = pairs[[abs(float(placed[i].axes[2] @ placed[j].axes[2])) > 0.5 for i, j in pairs]]
+    second = [((corners[j] - placed[i].origin) @ placed[i].axes[:2].T) for i, j in pairs]
+    yield from _overlaps([one.outline for one in placed], pairs, [placed[i].ring for i, _ in pairs], second)
+
+
+def _overlaps(
+    outlines: Sequence[Outline], pairs: Ints, first: Sequence[Array], second: Sequence[Array]
+) -> Iterator[Doubtful]:
+    """Yield the pairs (m, 2) of outlines that share much of their area, and those that hold all others.
+
+    Parameters
+    ----------
+    outlines : all of them
+    pairs : whose boxes overlap
+    first, second : (n, 2) ring of either outline of each pair, in the same plane [m]
+    """
     if not len(pairs):
         return
-    first = _polygons(shapely, [placed[i].ring for i, _ in pairs])
-    second = _polygons(shapely, [((corners[j] - placed[i].origin) @ placed[i].axes[:2].T) for i, j in pairs])
-    shared = shapely.area(shapely.intersection(first, second))
-    smaller = np.minimum(shapely.area(first), shapely.area(second))
-    for k in np.flatnonzero(shared > _OVERLAP * smaller):
-        a, b = (placed[i].outline for i in pairs[k])
+    shapely = optional("shapely", "overlaps of outlines")
+    one, other = _polygons(shapely, first), _polygons(shapely, second)
+    shared, areas = shapely.area(shapely.intersection(one, other)), (shapely.area(one), shapely.area(other))
+    smaller = np.minimum(*areas)
+    within = shared > _WITHIN * smaller
+    larger = np.where(areas[0] > areas[1], pairs[:, 0], pairs[:, 1])
+    holding = np.bincount(larger[within], minlength=len(outlines))
+    frames = np.flatnonzero((holding == len(outlines) - 1) & (holding >= _FRAMED))
+    for k in frames:
+        text = f"it holds all {holding[k]} others: it is the wall's edge rather than a stone, leave it out"
+        yield Doubtful(outlines[k].code, "overlap", text, outlines[k].where)
+    for k in np.flatnonzero((shared > _OVERLAP * smaller) & ~np.isin(pairs, frames).any(axis=1)):
+        a, b = (outlines[i] for i in pairs[k])
         text = f"it shares {shared[k]:.2g} m² with {b.code}, {shared[k] / max(smaller[k], 1e-12):.0%} of the smaller"
         yield Doubtful(a.code, "overlap", text, a.where)
 
