@@ -17,7 +17,10 @@ _LIST = {
     "wall": "s",
 }
 _MORE = {"penetration": "-", "energy": "-"}
-_STRESSES = {"code": None, "kind": None, "von_mises_max": "Pa", "von_mises_mean": "Pa"}
+_STRESSES = {
+    **dict.fromkeys(("code", "kind")),
+    **dict.fromkeys(("von_mises_p99", "von_mises_mean", "von_mises_max"), "Pa"),
+}
 _JOINTS = {
     "first": None,
     "second": None,
@@ -51,7 +54,7 @@ _TABLES = {
     "stages": ("stages of building", _STAGES),
     "cells": ("cells of disks at the end", _CELLS),
     "peaks": ("largest values during the run, and at its end", _PEAKS),
-    "largest_stresses": ("largest Von Mises stresses", _STRESSES),
+    "largest_stresses": ("largest Von Mises stresses, exceeded in 1 % of the volume", _STRESSES),
     "largest_openings": ("joints that have opened most", _JOINTS),
     "least_centred": ("joints with the resultant farthest out of the kern", _JOINTS),
     "most_used_friction": ("joints that use most of their friction", _JOINTS),

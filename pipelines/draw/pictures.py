@@ -146,7 +146,7 @@ def _top(result: Result, name: str) -> float | None:
 
 
 def _heading(result: Result, name: str) -> list[str]:
-    """Return the lines above a picture: content and outcome, the gravest caution, the largest value."""
+    """Return the lines above a picture: content and outcome, the gravest caution, how large the values are."""
     picture, ending = PICTURES[name], f"{_ENDINGS[result.outcome]} after {result.time:.3g} s"
     seen = ""
     if (
@@ -163,8 +163,13 @@ def _heading(result: Result, name: str) -> list[str]:
     largest = _largest(result, name) if picture.capped else None
     if largest is not None:
         value, place = largest
+        top = _top(result, name) or value
         factor, unit = picture.unit_of(value)
-        lines.append(f"largest: {value * factor:.4g}{f' {unit}' if unit else ''}, {place}")
+        written = [f"{one * factor:.4g}{f' {unit}' if unit else ''}" for one in (top, value)]
+        if picture.shows == "stress":
+            lines.append(f"1 % of the volume exceeds {written[0]}; at a corner up to {written[1]}, {place}")
+        else:
+            lines.append(f"largest: {written[1]}, {place}")
     return lines
 
 
@@ -173,12 +178,15 @@ def _largest(result: Result, name: str) -> tuple[float, str] | None:
     if name == "pressure":
         return _largest_pressure(result)
     found = [
-        (float(np.nanmax(values)), body.code)
+        (float(np.nanmax(values)), body)
         for body, block in zip(result.bodies, result.scene.blocks, strict=True)
         if np.isfinite(values := _fields_of(body, block.material, name)).any()
     ]
-    value, code = max(found, default=(0.0, ""))
-    return (value, f"in {code}") if value > 0.0 else None
+    value, body = max(found, key=lambda one: one[0], default=(0.0, None))
+    if body is None or value <= 0.0:
+        return None
+    error = "" if body.values is None else f" (error of its stress {100.0 * body.values.error:.0f} %)"
+    return value, f"in {body.code}{error}"
 
 
 def _largest_pressure(result: Result) -> tuple[float, str] | None:

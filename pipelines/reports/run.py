@@ -85,6 +85,10 @@ _KERN = (
     "The resultant of a joint lies within its kern, up to 1 here, if a linear pressure compresses the whole "
     "joint; beyond, part of the joint is unloaded. Where it reaches the edge, at 1 in the next column, a hinge forms."
 )
+_CORNERS = (
+    "The largest stress is that of a corner or an edge, and grows with every finer mesh; what 1 % of the volume "
+    "exceeds does not."
+)
 _STRESS_ERROR = (
     "Estimated from the jumps of the stress between finite elements; a finer mesh makes it smaller."
 )
@@ -142,7 +146,7 @@ def write_report(
         cautions=summary["cautions"],
         warnings=warnings,
         pictures=[picture(one, _CAPTIONS[one.name]) for one in pictures if one.is_file()],
-        summary=_summary_rows(summary),
+        summary=_summary_rows(summary, stones),
         notes=_notes(summary),
         peaks=peak_rows(summary),
         inputs=input_rows(summary),
@@ -162,7 +166,7 @@ def write_report(
     )
 
 
-def _summary_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
+def _summary_rows(summary: Mapping[str, Any], stones: Sequence[StoneResult]) -> list[tuple[str, str]]:
     bodies, stress, reaction = summary["bodies"], summary["von_mises"], summary["reaction"]
     rows = [
         ("Stones", ", ".join(f"{count} {name}" for name, count in bodies.items())),
@@ -174,9 +178,9 @@ def _summary_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
     ]
     if stress is not None:
         rows += [
-            ("Von Mises stress, mean", megapascals(stress["mean"])),
             ("Von Mises stress, exceeded in 1 % of the volume", megapascals(stress["p99"])),
-            ("Von Mises stress, largest", megapascals(stress["max"])),
+            ("Von Mises stress, mean", megapascals(stress["mean"])),
+            ("Von Mises stress, largest", f"{megapascals(stress['max'])}{_largest_error(stones)}"),
         ]
     if (static := summary["static"]) is not None and static["found"]:
         rows.append(
@@ -190,6 +194,13 @@ def _summary_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("Simulated", f"{time['simulated']:.4g} s in {summary['steps']} steps, {time['wall']:.1f} s of work")
     )
     return rows
+
+
+def _largest_error(stones: Sequence[StoneResult]) -> str:
+    """Return the estimated error of the stress of the stone with the largest one."""
+    worst = _worst(stones, lambda stone: stone.von_mises_max)[:1]
+    known = [stone.values["stress_error"] for stone in worst if "stress_error" in stone.values]
+    return "".join(f" in {worst[0].code}, error of its stress {percent(error)}" for error in known)
 
 
 def _displacement(summary: Mapping[str, Any]) -> str:
@@ -285,18 +296,23 @@ def _stages(summary: Mapping[str, Any]) -> _Section:
 
 
 def _stressed(stones: Sequence[StoneResult], least: float) -> _Section:
-    """List the stones with the largest stress."""
+    """List the stones with the largest stress that 1 % of their volume exceeds."""
     rows = [
         (
             stone.code,
-            megapascals(stone.von_mises_max),
+            megapascals(stone.values.get("von_mises_p99")),
             megapascals(stone.von_mises_mean),
+            megapascals(stone.von_mises_max),
+            percent(stone.values["stress_error"]) if "stress_error" in stone.values else "–",
             millimetres(stone.displacement_max, least),
         )
-        for stone in _worst(stones, lambda stone: stone.von_mises_max)
+        for stone in _worst(stones, lambda stone: stone.values.get("von_mises_p99"))
     ]
-    head = ("Stone", "Von Mises, largest", "Von Mises, mean", "Largest displacement")
-    return _Section("Most stressed stones", head, rows)
+    head = (
+        "Stone", "Von Mises, exceeded in 1 % of the volume", "Von Mises, mean", "Von Mises, largest",
+        "Error of the stress", "Largest displacement",
+    )  # fmt: skip
+    return _Section("Most stressed stones", head, rows, _CORNERS)
 
 
 def _pulled(stones: Sequence[StoneResult]) -> _Section:
@@ -324,10 +340,10 @@ def _pulled(stones: Sequence[StoneResult]) -> _Section:
 def _uncertain(stones: Sequence[StoneResult]) -> _Section:
     """List the stones whose stress is least certain."""
     rows = [
-        (stone.code, percent(stone.values["stress_error"]), megapascals(stone.von_mises_max))
+        (stone.code, percent(stone.values["stress_error"]), megapascals(stone.values.get("von_mises_p99")))
         for stone in _worst(stones, lambda stone: stone.values.get("stress_error"))
     ]
-    head = ("Stone", "Error of the stress", "Von Mises, largest")
+    head = ("Stone", "Error of the stress", "Von Mises, exceeded in 1 % of the volume")
     return _Section("Stones with the least certain stress", head, rows, _STRESS_ERROR)
 
 

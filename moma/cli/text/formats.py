@@ -20,7 +20,7 @@ __all__ = [
 ]
 
 USUAL_COLUMNS = (
-    "code", "kind", "course", "depth", "length", "height", "volume", "rms", "rejected", "fidelity", "von_mises_max",
+    "code", "kind", "course", "depth", "length", "height", "volume", "rms", "rejected", "fidelity", "von_mises_p99",
     "displacement_max",
 )  # fmt: skip
 """Columns of a table beside requested ones; CSV and JSON have every attribute."""

@@ -118,8 +118,8 @@ def run_lines(report: "RunReport", verbose: bool) -> list[str]:
     if stress is not None:
         mean, p99, largest = (stress[name] / 1e6 for name in ("mean", "p99", "max"))
         lines.append(
-            f"  Von Mises stress: mean {mean:.4f} MPa, 1 % of the volume above {p99:.4f} MPa, "
-            f"largest {largest:.4f} MPa"
+            f"  Von Mises stress: 1 % of the volume above {p99:.4f} MPa, mean {mean:.4f} MPa, "
+            f"largest {largest:.4f} MPa, at a corner or an edge, where it grows with a finer mesh"
         )
     if (static := summary["static"]) is not None and static["found"]:
         lines.append(

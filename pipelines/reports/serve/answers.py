@@ -28,7 +28,7 @@ COLUMNS = (
     "phase",
     "depth",
     "depth_origin",
-    "von_mises_max",
+    "von_mises_p99",
     "displacement_max",
 )
 """Attributes of a table where a request names none."""

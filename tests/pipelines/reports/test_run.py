@@ -9,6 +9,7 @@ import pytest
 
 from mechanics.dynamics.outcome import Outcome
 from mechanics.scene.scene import Fidelity
+from pipelines.draw.pictures import _heading
 from pipelines.reports.html import kilonewtons, kilopascals, megapascals, millimetres
 from pipelines.reports.run import write_report
 from pipelines.results.stone_values import stone_results
@@ -72,7 +73,7 @@ def test_the_report_gives_every_number_in_its_unit_under_its_head(tmp_path):
         ("Weight carried", "20.00 kN"),
         ("Reaction of the supports", "20.01 kN"),
         ("Largest displacement", "5 mm"),
-        ("Von Mises stress, largest", "1.5000 MPa"),
+        ("Von Mises stress, largest", "1.5000 MPa in D1, error of its stress 10.0 %"),
         ("Overlap", "2.0e-06"),
         ("Energy", "not known"),
         ("Unsolved steps", "1"),
@@ -129,6 +130,31 @@ def test_the_report_lists_the_worst_first(tmp_path):
         ["S2 – S3", "S1 – S2", "S0 – S1"],
         ["S2 – S3", "S1 – S2"],  # the lowest has not opened
     ]
+
+
+def test_stress_at_a_corner_does_not_lead(tmp_path):
+    """D1 has a peak of 9 MPa in a corner, D2 2 MPa all over: the volume decides the order, the corner stands behind."""
+    bodies = [
+        deformable_body("D1", (0, 0, 0), (1, 1, 1), lambda p: np.where(p.sum(axis=1) > 2.99, 9e6, 1e6), 0.1),
+        deformable_body("D2", (2, 0, 0), (3, 1, 1), lambda p: 2e6 * np.ones(len(p)), 0.5),
+    ]
+    result = result_of(bodies, pairs=(), forces=())
+    summary = summarise(result, version="1.2", seconds={})
+    write_report(tmp_path / "report.html", result, summary, stone_results(result), [])
+    words = Page(tmp_path / "report.html").text
+    leads, behind = (
+        words.index(f"Von Mises stress, {what}") for what in ("exceeded in 1 % of the volume", "largest")
+    )
+    assert leads < behind
+    assert words[leads + 1] == "2.0000 MPa"
+    assert words[behind + 1].startswith("9.0000 MPa in D1")
+    start = words.index("Most stressed stones")
+    assert words.index("D2", start) < words.index("D1", start)
+    first, second = (
+        "1 % of the volume exceeds 2 MPa",
+        "at a corner up to 9 MPa, in D1 (error of its stress 10 %)",
+    )
+    assert _heading(result, "von_mises")[-1] == f"{first}; {second}"
 
 
 def test_the_report_lists_the_most_stressed_stones_first(tmp_path):
