@@ -3,8 +3,9 @@
 The seconds of a stage are a sum over the amounts on which its algorithm depends (`Amounts`), each times the seconds of
 one unit on the machine named in cost_rates. Two numbers are unknown beforehand: the iterations of the contact problems,
 and the steps until a scene rests. The result is therefore a range: each stage has the factors by which measured runs
-lay above and below, and the number of steps has a least, a likely and a largest value. Where a run ends as soon as it
-rests, nothing bounds these factors: its range reaches to a run of its whole duration whose contacts never converge.
+lay above and below, and the number of steps has a least, a likely and a largest value. Where stones may move, or a run
+ends as soon as it rests, nothing bounds the iterations: its range reaches from steps that are solved at once to a run
+of its whole duration whose contacts never converge.
 """
 
 import time
@@ -25,6 +26,8 @@ _RESTING = (5, 6, 40)  # from an equilibrium: the steps in which it must last, a
 _RELAXING = (5, 20, 80)  # of a kinetic relaxation
 _SETTLING = (5, 30, 300)  # of a run from rest that ends where it begins
 _SWEEP = 1.5e-7  # one sweep of projections over the contacts, for each [s]
+_ATTEMPTS = 3.0  # a step is tried by Newton, by ADMM, and between compliant joints [-]
+_TOUCHING = 12.0  # contact points of a stone in a heap, where few or none touch at the start: four on each of three [-]
 _HARDER = 15.0  # step of deformable stones whose contacts do not converge, over one that relaxes [-]
 
 
@@ -32,8 +35,11 @@ _UNKNOWN: Mapping[str, str] = {
     "settled": "whether it begins in equilibrium, and how hard its contacts are to solve, shows in the run",
     "relaxing": "when it rests shows in the run",
     "moving": "when it rests shows in the run",
+    "driven": "when it rests shows in the run",
 }
 """Reasons why the time of a run cannot be known, by the kind of its steps."""
+
+_ITERATIONS = "how many iterations the contacts of moving stones take shows in the run"
 
 
 @dataclass(frozen=True)
@@ -76,7 +82,10 @@ def expected_cost(plan: Plan, scene: Scene, slowness: float = 1.0) -> ExpectedCo
     if time_.start is not Start.EQUILIBRIUM:
         del stages["start"]
     work, steps = measures(amounts), _steps(time_, scene.loads.until)
-    step = RATES[kind, _pace(time_)]
+    pace = _pace(scene)
+    moves = pace in ("moving", "driven")
+    step = RATES[kind, "moving" if moves else pace]
+    usual = RATES.get((kind, pace), step)
     low = likely = high = 0.0
     by_stage = {}
     for stage in stages:
@@ -86,16 +95,18 @@ def expected_cost(plan: Plan, scene: Scene, slowness: float = 1.0) -> ExpectedCo
         seconds = slowness * rate(work)
         by_stage[stage] = seconds
         low, likely, high = low + seconds / rate.below, likely + seconds, high + seconds * rate.above
-    one = slowness * step(work)
-    by_stage["steps"] = steps[1] * one
+    one, likely_step = slowness * step(work), slowness * usual(work)
+    by_stage["steps"] = steps[1] * likely_step
     total = time_.steps
     moving = high + total * slowness * RATES[kind, "moving"](work)
-    unknown = "" if steps[0] == steps[2] else _UNKNOWN[_pace(time_)]
+    unknown = _ITERATIONS if moves else ""
+    if steps[0] != steps[2]:
+        unknown = _UNKNOWN[pace]
     if unknown:
         moving = high + total * slowness * _hardest(kind, scene, work)
     seconds_range = (
         low + steps[0] * one / step.below,
-        likely + steps[1] * one,
+        likely + steps[1] * likely_step,
         max(high + steps[2] * one * step.above, moving if unknown else 0.0),
     )
     return ExpectedCost(
@@ -113,8 +124,9 @@ def _hardest(kind: str, scene: Scene, work: Mapping[str, float]) -> float:
     """Return the seconds of a step whose contacts do not converge."""
     if kind == "elastic":
         return _HARDER * max(RATES["elastic", "relaxing"](work), RATES["elastic", "moving"](work))
-    sweeps = scene.solver.max_iterations * work["contacts"] * _SWEEP
-    return max(sweeps, RATES["rigid", "moving"](work))
+    contacts = max(work["contacts"], _TOUCHING * work["stones"])
+    sweeps = scene.solver.max_iterations * contacts * _SWEEP
+    return _ATTEMPTS * max(sweeps, RATES["rigid", "moving"](work), RATES["rigid", "driven"](work))
 
 
 def measures(amounts: Amounts) -> dict[str, float]:
@@ -129,10 +141,13 @@ def _asleep(kind: str, time_: TimeSettings, rest: float, steps: float) -> float 
     return None if useless else rest + steps
 
 
-def _pace(time_: TimeSettings) -> str:
+def _pace(scene: Scene) -> str:
     """Return the kind of step that prevails in a run."""
+    time_ = scene.time
     if time_.relaxation:
         return "relaxing"
+    if not scene.steady:
+        return "driven"
     return "settled" if time_.start is Start.EQUILIBRIUM and time_.stop_at_equilibrium else "moving"
 
 

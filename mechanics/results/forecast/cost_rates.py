@@ -35,6 +35,8 @@ RATES: Mapping[tuple[str, str], Rate] = {
         per={"one": 0.00146, "contacts": 4.74e-06, "tangle": 9.24e-09}, below=1.25, above=1.34
     ),
     ("rigid", "moving"): Rate(per={"one": 0.00103, "tangle": 1.62e-07}, below=1.29, above=1.7),
+    # shaken walls, columns and portals of 7 to 69 stones (tests/mechanics/results/forecast/test_moving_scenes.py)
+    ("rigid", "driven"): Rate(per={"one": 0.03, "contacts": 2e-05}, below=1.75, above=1.75),
     ("rigid", "asleep"): Rate(per={"one": 0.000722, "stones": 1.12e-06}, below=2.0, above=2.0),
     ("rigid", "stress"): Rate(per={"stones": 8.35e-05, "contacts": 1.96e-05}, below=1.25, above=1.91),
     ("elastic", "mesh"): Rate(per={"stones": 0.00149, "distinct_nodes": 7.06e-05}, below=1.25, above=1.35),

@@ -141,8 +141,9 @@ def test_what_sleep_would_save_is_told_where_it_can():
 @pytest.mark.parametrize(
     ("time", "words"),
     [
-        ({"stop_at_equilibrium": False, "duration": 0.5}, ""),
-        ({"duration": 0.004}, ""),  # shorter than any rest
+        ({"stop_at_equilibrium": False, "duration": 0.5}, "how many iterations"),
+        ({"duration": 0.004}, "how many iterations"),  # shorter than any rest
+        ({"duration": 0.04, "step": 1e-2, "relaxation": True}, ""),
         ({"start": Start.EQUILIBRIUM}, "whether it begins in equilibrium"),
         ({"relaxation": True}, "when it rests"),
         ({}, "when it rests"),
