@@ -286,6 +286,7 @@ class Result:
     peaks : largest values of the whole run
     series : motion of the stones of `Scene.series`; None without any
     stages : of a building in stages, those that were built; all else is of the last one
+    repeated : the same run at half the step; None where it was not repeated
     """
 
     scene: Scene
@@ -310,3 +311,4 @@ class Result:
     peaks: Peaks | None = None
     series: Series | None = None
     stages: tuple[StageResult, ...] = ()
+    repeated: "Result | None" = None

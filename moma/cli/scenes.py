@@ -79,6 +79,13 @@ def run(
     animate: Annotated[
         bool, typer.Option("--animate", help="Draw the motion as motion.gif too, of up to 60 pictures.")
     ] = False,
+    repeat: Annotated[
+        bool,
+        typer.Option(
+            "--repeat-half-step",
+            help="Run it once more at half the step: how far peaks of stones that rock lie apart.",
+        ),
+    ] = False,
     resume: Resume = None,
     overwrite: Overwrite = False,
     accept_unsound: AcceptUnsound = False,
@@ -114,6 +121,7 @@ def run(
             resume,
             overwrite,
             animate,
+            repeat,
         )
     for warning in done.warnings:
         say(f"warning: {warning}")

@@ -1,6 +1,6 @@
 """Result files: VTK, CSV, checkpoints, and the folder that holds them.
 
 Public: `write_frames` (vtk); `write_vtkhdf`, `GrowingResults` (vtkhdf); `write_joints` (joints_csv); `write_series`
-(series_csv); `peak_records` (peaks); `UnstructuredGrid`, `Cells`, `write_vtu`, `write_pvd` (vtu); `replacing`,
-`check_replaceable` (folder); `Checkpoints` (checkpoints).
+(series_csv); `peak_records`, `realisations`, `rocking_caution` (peaks); `UnstructuredGrid`, `Cells`, `write_vtu`,
+`write_pvd` (vtu); `replacing`, `check_replaceable` (folder); `Checkpoints` (checkpoints).
 """

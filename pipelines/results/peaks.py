@@ -6,10 +6,19 @@ from typing import Any
 import numpy as np
 
 from mechanics.arrays import Array, Bools
-from mechanics.results.result import Largest, Peaks, Result
+from mechanics.results.result import Largest, Outcome, Peaks, Result
 from mechanics.scene.scene import Fidelity
 
-__all__ = ["PEAKS", "peak_records"]
+__all__ = ["PEAKS", "peak_records", "realisations", "rocking_caution", "rocking_stones"]
+
+_LIFTED = 1e-3  # opening over the width of a stone, an angle [rad], from which it rocks: a hundredth of a slender one's
+_CLOSED = 0.5  # part of its largest opening that a joint has in the end, below which it has closed again [-]
+_CHAOTIC = (
+    "relative_displacement",
+    "opening",
+    "sliding",
+    "shear",
+)  # peaks of which rocking makes one realisation
 
 PEAKS = {
     "displacement": "Displacement",
@@ -88,3 +97,57 @@ def _at_end(result: Result, peaks: Peaks) -> dict[str, float]:
 
 def _most(values: Array, rows: Bools) -> float:
     return float(values[rows].max(initial=0.0))
+
+
+def rocking_stones(result: Result) -> list[str]:
+    """Return the codes of stones whose joints open under a motion of supports, and close again or still move."""
+    if result.peaks is None or not result.scene.loads.motions:
+        return []
+    moving = result.outcome in (Outcome.MOVING, Outcome.UNDECIDED)
+    last = np.full(len(result.bodies), np.inf)  # a stone that has left all others does not rock
+    last[np.unique(result.joints.bodies)] = 0.0
+    np.maximum.at(last, result.joints.bodies.ravel(), np.repeat(result.joints.opening, 2))
+    found = []
+    for number, block in enumerate(result.scene.blocks):
+        most = float(result.peaks.opening.value[number])
+        lifted = most > _LIFTED * float(np.ptp(block.vertices, axis=0).min())
+        back = moving or last[number] < _CLOSED * most
+        if block.fidelity is not Fidelity.FIXED and lifted and back:
+            found.append(block.code)
+    return found
+
+
+def realisations(result: Result) -> list[dict[str, Any]]:
+    """Return the step [s] and the peaks of a run, and of the same run at half the step where it was repeated."""
+    runs = [result] if result.repeated is None else [result, result.repeated]
+    return [
+        {
+            "step": one.scene.time.step,
+            "outcome": str(one.outcome),
+            "peaks": {
+                name: record["value"] for name, record in peak_records(one).items() if record is not None
+            },
+        }
+        for one in runs
+    ]
+
+
+def rocking_caution(result: Result) -> str:
+    """Return what the peaks of a run with stones that rock are worth, in words; nothing where none rocks."""
+    stones = rocking_stones(result)
+    if not stones:
+        return ""
+    said = f"{len(stones)} stones rock, e.g. {stones[0]}: their peaks are one realisation of a chaotic motion"
+    if result.repeated is None:
+        return f"{said}, and another step gives others; moma run --repeat-half-step tells how far apart"
+    first, second = realisations(result)
+    units = {"m": (1e3, "mm"), "N": (1e-3, "kN")}
+    parts = []
+    for name in _CHAOTIC:
+        if name in first["peaks"] and name in second["peaks"]:
+            factor, unit = units[_UNITS[name]]
+            values = (f"{factor * one['peaks'][name]:.3g}" for one in (first, second))
+            parts.append(f"{PEAKS[name].lower()} {' and '.join(values)} {unit}")
+    steps = " and ".join(f"{1e3 * one['step']:.3g}" for one in (first, second))
+    other = "" if first["outcome"] == second["outcome"] else f"the second run is {second['outcome']}; "
+    return f"{said}; with steps of {steps} ms: {other}{', '.join(parts)}"

@@ -16,7 +16,7 @@ from mechanics.results.result import Result
 from mechanics.results.stages import StageResult
 from mechanics.scene.laws.elastic_joint import ElasticJoint
 from mechanics.scene.scene import Fidelity
-from pipelines.results.peaks import peak_records
+from pipelines.results.peaks import peak_records, realisations, rocking_stones
 from pipelines.results.quantities import quantities
 from pipelines.results.stone_values import stress_statistics
 
@@ -78,6 +78,7 @@ def summarise(
         "peaks": peaks,
         "tolerance": {"length": length_tolerance(result)},
         "admissible": indeterminacy(result),
+        "rocking": {"stones": rocking_stones(result), "realisations": realisations(result)},
         "loads": [asdict(one) for one in result.scene.loads.courses],
         "stages": [_stage(one) for one in result.stages],
         "profile": profile,

@@ -23,7 +23,7 @@ from mechanics.simulate import simulate, simulate_stages
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.files import check_mesh_file, write_meshes
 from mechanics.stones.meshing.mesh import VolumeMesh
-from moma.errors import MissingLibraryError, MomaError, storing
+from moma.errors import MissingLibraryError, MomaError, UsageError, storing
 from pipelines.draw.animation import draw_motion
 from pipelines.draw.catalogue import PICTURES
 from pipelines.draw.pictures import OF_RESULTS, draw_pictures, drawing_process, missing
@@ -33,6 +33,7 @@ from pipelines.reports.page.scenes import run_model
 from pipelines.reports.run import write_report
 from pipelines.results.folder import check_replaceable, replacing, source_of
 from pipelines.results.joints_csv import write_joints
+from pipelines.results.peaks import rocking_caution
 from pipelines.results.series_csv import write_series
 from pipelines.results.stone_values import stone_results
 from pipelines.results.summary import as_json, summarise
@@ -89,6 +90,7 @@ def run_scene(
     resume: bool | None = None,
     overwrite: bool = False,
     animate: bool = False,
+    repeat: bool = False,
 ) -> RunReport:
     """Run a scene file on the stones of a database, and write the results into a folder.
 
@@ -105,11 +107,13 @@ def run_scene(
     resume : go on with the unfinished run in the folder, if there is one; False: give it up; None: refuse to run then
     overwrite : replace the results of another scene in the folder
     animate : draw the motion as motion.gif too
+    repeat : run it once more at half the step, to tell how far peaks of stones that rock lie apart
 
     Raises
     ------
-    UsageError : the folder holds other files, results of another scene or an unfinished run, the scene is not that of
-        the run to be resumed, there is no such profile, or the meshes cannot be written
+    UsageError : a building in stages is to be repeated, the folder holds other files, results of another scene or an
+        unfinished run, the scene is not that of the run to be resumed, there is no such profile, or the meshes cannot
+        be written
     UnsoundSceneError : the scene has problems that `check_scene` reports, and they are not accepted
     SceneError, GeometryError, MeshError, SolverError : see `assemble` and `mechanics.simulate`
     DatabaseError : the database cannot be read, or not written at the end; the folder is complete then
@@ -150,6 +154,9 @@ def run_scene(
             problems = problems_of(scene, assembly, loose_blocks(*built))
         if not accept_unsound:
             refuse_unsound(problems, str(path))
+        if repeat and assembly.stages:
+            remedy = "leave out --repeat-half-step, and halve step in [time] by hand"
+            raise UsageError("a building in stages is not repeated", where=str(path), remedy=remedy)
         steps = assembly.scene.time.steps
         last = assembly.stages[-1].scene if assembly.stages else assembly.scene
         # steps of a stage count from the next checkpoint after those of the stages before
@@ -166,6 +173,12 @@ def run_scene(
                 result = simulate_stages(assembly.stages, progress, stop, built, unfinished)
             else:
                 result = simulate(assembly.scene, progress, stop, built, unfinished)
+                if repeat and result.outcome is not Outcome.INTERRUPTED:
+                    time_ = assembly.scene.time
+                    halved = replace(assembly.scene, time=replace(time_, step=0.5 * time_.step))
+                    result = replace(result, repeated=simulate(halved, progress, stop))
+            if rocking := rocking_caution(result):
+                result = replace(result, cautions=(*result.cautions, rocking))
             if problems:
                 result = replace(result, cautions=(caution_of(problems), *result.cautions))
             if not assembly.stages and _by_self_stress(result):
