@@ -92,7 +92,7 @@ class Observer(Carrier):
 
     def first_frame(self, state: State) -> Frame:
         """Return the frame of the start, before the first contact forces are known."""
-        return self._frame(state, _no_contacts())
+        return self._frame(state, _no_contacts(), np.zeros_like(state.node))
 
     def begin(self, step: Step) -> StartingJoints:
         """Take the contacts of the first step as the joints of the start, and return these."""
@@ -116,7 +116,7 @@ class Observer(Carrier):
     def frame(self, step: Step) -> Frame:
         """Return the frame of the end of a step."""
         _, interfaces = self._interfaces(step)
-        return self._frame(step.after, self._contacts(step, interfaces))
+        return self._frame(step.after, self._contacts(step, interfaces), _on_nodes(step))
 
     def contacts_and_joints(self, step: Step) -> tuple[ContactResult, JointResult]:
         """Return the contact points of a step with their mean forces, and their sums over each joint."""
@@ -130,7 +130,7 @@ class Observer(Carrier):
         before = positions(self._model, self._start)
         return tuple(self._body(b, before[b], frame, float(balance[b])) for b in range(len(before)))
 
-    def _frame(self, state: State, contacts: ContactResult) -> Frame:
+    def _frame(self, state: State, contacts: ContactResult, on_nodes: Array) -> Frame:
         seen: list[tuple[Array | None, float | None]] = [(None, None)] * len(self._model.mass)
         for b in np.flatnonzero(self._model.elastic).tolist():
             stone = self._model.stones[b]
@@ -143,6 +143,10 @@ class Observer(Carrier):
             stresses=tuple(stress for stress, _ in seen),
             stress_errors=tuple(error for _, error in seen),
             contacts=contacts,
+            nodal_forces=tuple(
+                on_nodes[self._model.nodes_of(b)] if elastic else None
+                for b, elastic in enumerate(self._model.elastic.tolist())
+            ),
         )
 
     def _interfaces(self, step: Step) -> tuple[Faces, Interfaces]:
@@ -213,6 +217,15 @@ class Observer(Carrier):
             principal=principal(stress)[0],
             values=stress_values(stress, now, volume, stone.material, error),
         )
+
+
+def _on_nodes(step: Step) -> Array:
+    """Return the forces (nn, 3) of all contacts on the nodes of deformable stones [N]."""
+    both = np.stack([step.force, -step.force], axis=1).reshape(-1, 3)
+    forces: Array = (
+        step.contacts.weights.T @ both if step.contacts.weights.nnz else np.zeros_like(step.after.node)
+    )
+    return forces
 
 
 def _no_contacts() -> ContactResult:

@@ -107,6 +107,7 @@ class Frame:
     stresses : (n, 6) as in BodyResult; None without stress [Pa]
     stress_errors : as StressValues.error; None without stress [-]
     contacts : the contact points; joints of the start have the same numbers as at the end
+    nodal_forces : (n, 3) of the contacts on the nodes of deformable stones, mean over the last step; None of others [N]
     """
 
     time: float
@@ -115,6 +116,7 @@ class Frame:
     stresses: tuple[Array | None, ...]
     stress_errors: tuple[float | None, ...]
     contacts: ContactResult
+    nodal_forces: tuple[Array | None, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -51,7 +51,7 @@ UNITS: Mapping[str, str] = {
     "velocity": "m/s",
     **dict.fromkeys(("stress", "von_mises", "principal", "mean_pressure"), "Pa"),
     **dict.fromkeys(("pressure", "pressure_mean", "pressure_max"), "Pa"),
-    "force": "N",
+    **dict.fromkeys(("force", "contact_force"), "N"),
     "moment": "N m",
     "area": "m²",
 }
@@ -122,8 +122,9 @@ def _stream(body: BodyResult, offset: int) -> Iterator[int]:
 def body_grid(result: Result, frame: Frame, cells: Cells) -> UnstructuredGrid:
     """Make the grid of all stones in one frame, in single precision, which halves the files.
 
-    Point data: displacement [m], velocity [m/s]; stress (xx, yy, zz, xy, yz, zx), von_mises, principal (σ1 ≥ σ2 ≥ σ3),
-    mean_pressure [Pa]; principal_direction_1, principal_direction_3; utilisation [-].
+    Point data: displacement [m], velocity [m/s]; contact_force on the nodes of deformable stones [N];
+    stress (xx, yy, zz, xy, yz, zx), von_mises, principal (σ1 ≥ σ2 ≥ σ3), mean_pressure [Pa];
+    principal_direction_1, principal_direction_3; utilisation [-].
     Cell data: stone (index in the scene), fidelity (0 fixed, 1 rigid, 2 deformable), stress_error [-].
     """
     bodies = result.bodies
@@ -149,10 +150,17 @@ def body_grid(result: Result, frame: Frame, cells: Cells) -> UnstructuredGrid:
 def point_fields(
     bodies: Sequence[BodyResult], blocks: Sequence[Block], frame: Frame, stress: bool = True
 ) -> dict[str, Array]:
-    """Compute the fields of the points of all stones in one frame; those of stresses only if they are wanted."""
+    """Compute the fields of the points of all stones in one frame; of stresses and nodal forces only if wanted."""
     before, now = np.concatenate([body.reference for body in bodies]), np.concatenate(frame.positions)
     motion = {"displacement": now - before, "velocity": np.concatenate(frame.velocities)}
-    return motion | _stresses(blocks, frame) if stress else motion
+    if not stress:
+        return motion
+    forces = frame.nodal_forces or (None,) * len(bodies)
+    on_nodes = [
+        np.full((len(place), 3), np.nan) if one is None else one
+        for place, one in zip(frame.positions, forces, strict=True)
+    ]
+    return motion | _stresses(blocks, frame) | {"contact_force": np.concatenate(on_nodes)}
 
 
 def _stresses(blocks: Sequence[Block], frame: Frame) -> dict[str, Array]:
