@@ -27,6 +27,11 @@ class Outcome(StrEnum):
         """True where all stones have come to rest without a fall."""
         return self in (Outcome.EQUILIBRIUM, Outcome.SETTLED)
 
+    @property
+    def decided(self) -> bool:
+        """True where it is known whether the stones stand: they rest, or have collapsed."""
+        return self.rests or self is Outcome.COLLAPSED
+
 
 @dataclass(frozen=True)
 class StaticStart:

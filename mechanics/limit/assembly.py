@@ -27,11 +27,11 @@ from mechanics.scene.scene import Scene
 from mechanics.scene.state import State
 from moma.errors import SceneError
 
-__all__ = ["RigidAssembly", "Strength", "assembly"]
+__all__ = ["CLOSED", "RigidAssembly", "Strength", "assembly"]
 
 
 # gap up to which a joint counts as closed, over the width of the smaller stone: a thousandth is a survey's error [-]
-_CLOSED = 1e-3
+CLOSED = 1e-3
 
 
 @dataclass(frozen=True)
@@ -115,8 +115,10 @@ class RigidAssembly:
         return np.array(sorted(known[code] for code in codes), dtype=np.int64)
 
 
-def assembly(scene: Scene) -> RigidAssembly:
+def assembly(scene: Scene, widest: float = CLOSED) -> RigidAssembly:
     """Return the equilibrium of a scene as it stands at its start; deformable stones count as rigid.
+
+    Joints count as closed up to a `widest` gap, over the width of the smaller stone [-].
 
     Raises
     ------
@@ -130,12 +132,12 @@ def assembly(scene: Scene) -> RigidAssembly:
     contacts = detector(model)(state, np.zeros(len(model.mass)))
     gap = gaps(contacts, state)
     size = np.minimum(*model.surfaces.size[contacts.bodies.T])
-    closed = np.flatnonzero(gap <= _CLOSED * size)
+    closed = np.flatnonzero(gap <= widest * size)
     if not len(closed):
         raise SceneError(
             "no joint is closed",
             where=scene.name,
-            remedy=f"close the joints: gaps up to {_CLOSED:g} of a stone's width count as closed",
+            remedy=f"close the joints: gaps up to {widest:g} of a stone's width count as closed",
         )
     found = detection(model, state, take(contacts, closed), ())
     form = found.operator.form

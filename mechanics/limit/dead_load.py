@@ -1,4 +1,8 @@
-"""Dead load: the loads of a scene at one instant, and whether its stones stand under them."""
+"""Dead load: the loads of a scene at one instant, whether its stones stand under them, and in which state.
+
+Where the dead load moves stones by more than the gaps that count as closed, or breaks bonds, limit loads are those of
+the state at rest: the stones lie where they rest, joints that opened are open, and broken bonds hold nothing.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -9,14 +13,21 @@ from mechanics.arrays import Array
 from mechanics.dynamics.outcome import Outcome
 from mechanics.dynamics.progress import Listener, silent
 from mechanics.dynamics.stopping import MOVED
-from mechanics.limit.assembly import RigidAssembly, assembly
+from mechanics.limit.assembly import CLOSED, RigidAssembly, assembly
 from mechanics.limit.programme import Ending, Programme
+from mechanics.results.result import Result
+from mechanics.scene.laws.table import without_bond
 from mechanics.scene.loads.load import Force, Loads
-from mechanics.scene.scene import Scene, Start
+from mechanics.scene.scene import Block, LawRule, Part, Scene, Start
 from mechanics.simulate import simulate
 from moma.errors import SceneError
 
 __all__ = ["Standing", "admits_rest", "at_instant", "stands"]
+
+# gap over the width up to which a joint is closed where stones rest: a run leaves 1e-8, and a block falls by more [-]
+_SHUT = 1e-5
+# status of contacts whose bond has not broken, and of those that bear nothing
+_HOLDS, _PARTED = ("bonded", "crush"), ("open", "broken")
 
 
 @dataclass(frozen=True)
@@ -79,12 +90,20 @@ class Standing:
     reason : its reason, in words
     moved : codes of the stones that do not stand as surveyed, the farthest first
     displacement : (nb, 3) of the centres of all stones' corners [m]
+    rest : stones and joints at rest; None where they do not rest, or rest as they are drawn with all bonds
+    broken : pairs of stones, by their codes, whose bonds the dead load has broken
+    falls_as_drawn : no forces balance the dead load in the joints as they are drawn, though the stones rest elsewhere
+    farthest : largest displacement of a corner [m]
     """
 
     outcome: Outcome
     reason: str
     moved: tuple[str, ...]
     displacement: Array
+    rest: RigidAssembly | None = None
+    broken: tuple[tuple[str, str], ...] = ()
+    falls_as_drawn: bool = False
+    farthest: float = 0.0
 
 
 def admits_rest(scene: Scene) -> bool:
@@ -94,10 +113,15 @@ def admits_rest(scene: Scene) -> bool:
     ------
     SceneError, SolverError : see `assembly` and `Programme`
     """
-    on = assembly(at_instant(scene))
+    return _balances(assembly(at_instant(scene)))
+
+
+def _balances(on: RigidAssembly) -> bool:
+    """Return whether some forces within the strength of the joints balance the dead load."""
     least = np.zeros((len(on.contacts), 3))
     least[:, 0] = 1.0 / len(least)
-    return Programme(on, None, scene.name).solve(on.strength, cost=least).ending is Ending.FOUND
+    found = Programme(on, None, on.model.scene.name).solve(on.strength, cost=least)
+    return found.ending is Ending.FOUND
 
 
 def stands(
@@ -112,4 +136,76 @@ def stands(
     share = np.where(on.model.fixed, 0.0, farthest / on.model.surfaces.size)
     order = np.argsort(-share, kind="stable")
     moved = tuple(scene.blocks[body].code for body in order if share[body] > MOVED)
-    return Standing(result.outcome, result.reason, moved, displacement)
+    found = Standing(
+        result.outcome, result.reason, moved, displacement, farthest=float(farthest.max(initial=0.0))
+    )
+    if not result.outcome.rests:
+        return found
+    broken = _broken(on, result)
+    # springs settle under the weight anew in each run, so that their joints stay where they are drawn
+    leaves = bool(share.max(initial=0.0) > CLOSED) and not on.model.laws.sprung
+    if not broken and not leaves:
+        return found
+    drawn = set(map(tuple, np.sort(on.contacts.bodies, axis=1).tolist()))
+    codes = tuple((scene.blocks[a].code, scene.blocks[b].code) for a, b in broken if (a, b) in drawn)
+    falls = leaves and not _balances(on)
+    return replace(found, rest=_at_rest(on, result, broken, leaves), broken=codes, falls_as_drawn=falls)
+
+
+def _at_rest(
+    on: RigidAssembly, result: Result, broken: dict[tuple[int, int], bool], leaves: bool
+) -> RigidAssembly:
+    """Return stones and joints at the end of a run, without the bonds of pairs that are `broken`.
+
+    Where the run `leaves` the drawing, or has parted a joint, joints are closed only up to what a run leaves of them,
+    if forces balance the dead load in these.
+    """
+    scene, laws = on.model.scene, on.model.laws
+    rules = list[LawRule]()
+    for (a, b), parted in broken.items():
+        law = laws.laws[int(laws.of(np.array([[a, b]]))[0])]
+        first, second = (frozenset([scene.blocks[body].code]) for body in (a, b))
+        rules.append(LawRule(first, second, without_bond(law, parted)))
+    moves = (leaves or any(broken.values())) and not laws.sprung
+    blocks = (
+        _moved(block, body.reference, body.position)
+        for block, body in zip(scene.blocks, result.bodies, strict=True)
+    )
+    rested = replace(
+        scene,
+        blocks=tuple(blocks) if moves else scene.blocks,
+        contact=replace(scene.contact, rules=(*scene.contact.rules, *rules)),
+    )
+    if moves:
+        try:
+            tight = assembly(rested, _SHUT)
+        except SceneError:
+            tight = None
+        if tight is not None and _balances(tight):
+            return tight
+    return assembly(rested)
+
+
+def _moved(block: Block, before: Array, after: Array) -> Block:
+    """Return a rigid block that has moved as its corners (n, 3) have, without rounding of its shape."""
+    if np.array_equal(before, after):
+        return block
+    middle, now = before.mean(axis=0), after.mean(axis=0)
+    left, _, right = np.linalg.svd((after - now).T @ (before - middle))
+    turn = left @ np.diag([1.0, 1.0, float(np.sign(np.linalg.det(left @ right)))]) @ right
+    parts = tuple(Part((one.vertices - middle) @ turn.T + now, one.faces) for one in block.parts)
+    return replace(block, vertices=(block.vertices - middle) @ turn.T + now, parts=parts)
+
+
+def _broken(on: RigidAssembly, result: Result) -> dict[tuple[int, int], bool]:
+    """Return the pairs of bodies that mortar was to hold and does not at some point, and whether they have parted.
+
+    On the safe side: a joint that has cracked at one point holds no tension and no cohesion at the others.
+    """
+    laws, contacts = on.model.laws, result.contacts
+    meant = laws.makes_bonds(laws.of(contacts.bodies)) & (contacts.area > 0)
+    pairs = np.sort(contacts.bodies[meant], axis=1).tolist()
+    status = contacts.status[meant].tolist()
+    lost = {(a, b) for (a, b), one in zip(pairs, status, strict=True) if one not in _HOLDS}
+    touching = {(a, b) for (a, b), one in zip(pairs, status, strict=True) if one not in _PARTED}
+    return {pair: pair not in touching for pair in sorted(lost)}

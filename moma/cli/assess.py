@@ -96,6 +96,8 @@ def assess(
     for warning in done.warnings:
         say(f"warning: {warning}")
     print(as_json(done.summary) if json else "\n".join(assessment_lines(done, verbose)))
+    if not done.decided:
+        raise typer.Exit(1)
 
 
 @reporting

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from mechanics.dynamics.outcome import Outcome
 from moma.cli.console import reporting, say, short_lived
 from moma.cli.options import (
     DEFAULT_DB,
@@ -128,7 +129,7 @@ def run(
     print(as_json(done.summary) if json else "\n".join(run_lines(done, verbose)))
     if done.summary["outcome"] == "interrupted":
         say(f"the same command with --resume goes on after step {done.summary['steps']}")
-    if done.summary["outcome"] in ("moving", "undecided", "interrupted"):
+    if not Outcome(done.summary["outcome"]).decided:
         raise typer.Exit(1)
 
 

@@ -25,6 +25,7 @@ from pipelines.scene.site import Site
 
 __all__ = [
     "FALLS",
+    "NOT_DECIDED",
     "Answer",
     "Confirm",
     "Lead",
@@ -37,6 +38,9 @@ __all__ = [
 
 FALLS = "falls under its own weight"
 """Outcome of what does not stand at all."""
+
+NOT_DECIDED = "not decided"
+"""Outcome of what neither rests nor has fallen when its time is over."""
 
 _DROP = 0.8  # share of the peak of a capacity curve at which the way counts as ultimate [-]
 _ONE = 1.03  # highest over lowest candidate up to which they are one [-]
@@ -127,12 +131,13 @@ def leader(on: RigidAssembly, **listeners: Any) -> Lead:
 
 
 def fallen(on: RigidAssembly, question: Question, standing: Standing) -> Answer:
-    """Return the answer to any question about stones that do not stand under their dead load."""
+    """Return the answer to any question about stones that do not rest under their dead load."""
     velocity = np.zeros((len(on.model.mass), 6))
     velocity[:, :3] = standing.displacement
     falls = mechanism(on, velocity[on.free])
     kind = "load"
-    told: dict[str, Any] = {"name": question.name, "outcome": FALLS, "headline": f"{question.name}: {FALLS}"}
+    state = FALLS if standing.outcome is Outcome.COLLAPSED else NOT_DECIDED
+    told: dict[str, Any] = {"name": question.name, "outcome": state, "headline": f"{question.name}: {state}"}
     match question:
         case LoadQuestion():
             told |= {"meaning": str(question.live), "candidate": None, "candidate_lowest": None}
@@ -182,7 +187,8 @@ def _load(
     if question.whole and np.isfinite(lowest.multiplier):
         told["tilt"] = float(np.degrees(np.arctan(lowest.multiplier)))
     unlimited = np.isinf(bound.multiplier)
-    if question.confirm or candidate is None or not candidate.converged:
+    balances = not np.isnan(bound.multiplier)
+    if balances and (question.confirm or candidate is None or not candidate.converged):
         # where statics gives no number, only runs can
         first = _FIRST if unlimited else lowest.multiplier
         told["confirmation"] = _confirmed(on, confirming(live, first, bound.multiplier), lowest)
@@ -374,7 +380,9 @@ def _outcome(value: float) -> str:
 
 def _sentence(one: dict[str, Any]) -> str:
     if one["bound"] is None:
-        if one["outcome"] == FALLS or "confirmation" not in one:
+        if one["outcome"] == FALLS:
+            return f"{one['name']}: λ = 0, as no forces in its joints balance the dead load"
+        if "confirmation" not in one:
             return f"{one['name']}: {one['outcome']}"
         return f"{one['name']}: no bound{_dynamics(one)}"
     text = f"{one['name']}: λ ≤ {one['bound']:.4g} (bound)"

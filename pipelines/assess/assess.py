@@ -22,7 +22,16 @@ from mechanics.limit.pushover import Pushover
 from mechanics.results.forecast.plan import loose_blocks
 from mechanics.scene.scene import Fidelity, Scene
 from moma.errors import MissingLibraryError, UsageError
-from pipelines.assess.answers import FALLS, Answer, answer, confirmer, fallen, leader, refuse_unanswerable
+from pipelines.assess.answers import (
+    FALLS,
+    NOT_DECIDED,
+    Answer,
+    answer,
+    confirmer,
+    fallen,
+    leader,
+    refuse_unanswerable,
+)
 from pipelines.assess.codes.check import CODES
 from pipelines.assess.directions import facade_pushes, weakest_push
 from pipelines.assess.kept import Kept, kept_answers
@@ -88,12 +97,14 @@ class Assessment:
     summary : contents of assessment.json
     run : its number in the database
     warnings : requests that were not met
+    decided : it is known whether the stones stand under their dead load
     """
 
     folder: Path
     summary: dict[str, Any]
     run: int
     warnings: tuple[str, ...]
+    decided: bool = True
 
 
 def assess(
@@ -211,7 +222,7 @@ def assess(
     with open_database(url, create=False) as database:
         run = store_record(database, folder, _record(scene, on, answers, summary, as_of))
     progress(Progress("write", 1, 1))
-    return Assessment(folder, summary, run, tuple(warnings))
+    return Assessment(folder, summary, run, tuple(warnings), standing.outcome.decided)
 
 
 def _standing(
@@ -220,7 +231,7 @@ def _standing(
     """Return stones under their dead load alone, without those that fall if they may be left out, and their codes."""
     left_out: tuple[str, ...] = ()
     standing = stands(on, progress)
-    first = on, standing
+    first = standing.rest or on, standing
     while leave_out and standing.outcome is Outcome.COLLAPSED and standing.moved:
         loose = set(left_out) | set(standing.moved)
         kept = tuple(block for block in dead.blocks if block.code not in loose)
@@ -229,7 +240,7 @@ def _standing(
         left_out = tuple(sorted(loose))
         on = assembly(replace(dead, blocks=kept))
         standing = stands(on, progress)
-    return on, standing, left_out
+    return standing.rest or on, standing, left_out
 
 
 def _answered(
@@ -300,7 +311,7 @@ def _summary(
     until = assembled.scene.loads.until
     cautions = [
         *([f"left out, as they fall under their own weight: {', '.join(left_out)}"] if left_out else []),
-        *([f"under the dead load alone {standing.reason}"] if standing.outcome is Outcome.SETTLED else []),
+        *_states(standing),
         *(
             ["loads that change are taken as they are in the end, but where an instant is named"]
             if until
@@ -345,8 +356,10 @@ def _headline(loads: Sequence[dict[str, Any]], standing: Standing, left_out: Seq
         loose = f": {some(standing.moved)}" if standing.moved else ""
         return f"it {FALLS}{loose}; --leave-out-loose assesses the rest, if that stands"
     if not standing.outcome.rests:
-        return f"under its own weight it does not come to rest: {standing.reason}"
-    if standing.outcome is Outcome.SETTLED:
+        return f"{NOT_DECIDED} whether it stands under its own weight: {standing.reason}"
+    if standing.falls_as_drawn:
+        without += f"rests only after moving by {_short(standing.farthest)}; as drawn it falls; "
+    elif standing.outcome is Outcome.SETTLED:
         without += f"although {standing.reason}, "
     least = min(loads, key=_limit)
     if loads[0]["kind"] == "load" and not np.isfinite(_limit(least)):
@@ -360,8 +373,37 @@ def _title(name: str, headline: str) -> str:
     return f"{name}\n{headline}".replace("λ ≤", "multiplier at most").replace("≤", "at most")
 
 
+def _states(standing: Standing) -> list[str]:
+    """Return cautions on the state from which limit loads start, where the dead load moves stones or breaks bonds."""
+    if not standing.outcome.rests:
+        return []
+    told = []
+    if standing.outcome is Outcome.SETTLED:
+        told.append(f"under the dead load alone {standing.reason}")
+    if standing.falls_as_drawn:
+        told.append(
+            f"as drawn it falls: no forces in its joints balance the dead load. It rests after moving by "
+            f"{_short(standing.farthest)}, and joints are taken where stones rest"
+        )
+    elif standing.rest is not None and standing.farthest > 0.0:
+        told.append(
+            f"joints are those of the stones at rest, {_short(standing.farthest)} at most from where they are drawn"
+        )
+    if standing.broken:
+        pairs = some([" and ".join(pair) for pair in standing.broken])
+        told.append(f"the dead load breaks the mortar between {pairs}: it holds nothing here")
+    return told
+
+
+def _short(length: float) -> str:
+    """Return a length [m] in millimetres."""
+    return f"{1e3 * length:.2g} mm"
+
+
 def _limit(one: dict[str, Any]) -> float:
     """Return the least load known at which an answer says that stones fall [-]; infinite without one."""
+    if one.get("outcome") == FALLS:
+        return 0.0
     runs = one.get("confirmation", {})
     known = [one.get("candidate"), one.get("bound"), runs.get("held") or runs.get("lost")]
     return min((value for value in known if value is not None), default=float("inf"))

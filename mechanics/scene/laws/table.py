@@ -1,18 +1,19 @@
 """Table of the laws between bodies, and all laws of a step as one shift and cone."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from mechanics.arrays import Array, Bools, Ints
 from mechanics.scene.laws.cohesive_zone import CohesiveZone
+from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.elastic_joint import ElasticJoint
 from mechanics.scene.laws.law import Approach, Law, Springs, Terms
 from mechanics.scene.laws.mortar import MortarJoint
 
-__all__ = ["LawTable", "law_table"]
+__all__ = ["LawTable", "law_table", "without_bond"]
 
 _PER_CONTACT = ("gap", "speed", "slide", "area", "size", "compliance", "state", "pair", "first")
 _IF_KNOWN = ("thickness", "crushing")
@@ -117,6 +118,23 @@ class LawTable:
         for index, rows in _groups(law):
             state[rows] = self.laws[index].after(_some(contacts, rows), impulse[rows], velocity[rows])
         return state
+
+
+def without_bond(law: Law, parted: bool = False) -> Law:
+    """Return the law of a joint whose bond has broken.
+
+    Mortar remains in a joint that bears: the gap that it filled counts as closed. One that has `parted` is a dry joint.
+    """
+    match law:
+        case ElasticJoint():
+            return replace(law, tension=0.0, shear=0.0, energy_tension=0.0, energy_shear=0.0)
+        case MortarJoint() if not parted:
+            return replace(law, tension=0.0, shear=0.0)
+        case MortarJoint():
+            return DryJoint(law.friction, law.dynamic_friction)
+        case CohesiveZone():
+            return MortarJoint(law.friction, 0.0, 0.0) if not parted else DryJoint(law.friction)
+    return law
 
 
 def law_table(

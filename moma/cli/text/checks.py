@@ -7,7 +7,7 @@ from moma.cli.text.formats import shorten
 
 if TYPE_CHECKING:
     from pipelines.run.check_report import CheckReport, Cost, MeshQualityReport
-    from pipelines.run.closing_check import JointsReport, SimplificationReport
+    from pipelines.run.closing_check import GapPlace, JointsReport, SimplificationReport
 
 __all__ = ["check_lines", "duration"]
 
@@ -140,11 +140,14 @@ def _simplification_lines(report: "SimplificationReport", verbose: bool) -> list
 def _joint_lines(report: "JointsReport", verbose: bool) -> list[str]:
     """Describe the joints, and list gaps and overlaps."""
     left, as_surveyed = sum(report.left_open.values()), report.mode == "as-surveyed"
+    in_part = sum(one.reason not in report.left_open for one in report.gaps)
+    touching = sum(one.reason not in report.left_open and one.width <= _NOTHING for one in report.gaps)
+    partly = f" ({touching} of them on less than half of their area)" if touching else ""
     lines = [
         f"  joints ({report.mode}): {left} left as they are, {_mm(report.mean_width)} wide on average"
         if as_surveyed
-        else f"  joints ({report.mode}): {report.count} closed on {report.planes} planes, {report.area:.2f} m² in all; "
-        f"{_mm(report.mean_width)} wide on average as surveyed; {left} left open"
+        else f"  joints ({report.mode}): {report.count} closed{partly} on {report.planes} planes, "
+        f"{report.area:.2f} m² in all; {_mm(report.mean_width)} wide on average as surveyed; {left} left open"
     ]
     if report.count and report.worst_stone is not None:
         lines.append(
@@ -168,13 +171,12 @@ def _joint_lines(report: "JointsReport", verbose: bool) -> list[str]:
     if overlaps:
         lines += [f"  {_count(len(overlaps), 'overlap')} left:", *_shortened(overlaps, verbose)]
     gaps = [
-        f"    {' and '.join(one.stones)} open by {_mm(one.width)} over {one.area:.3f} m² at {_place(one.place)}"
+        f"    {' and '.join(one.stones)} {_apart(one)} at {_place(one.place)}"
         + ("" if as_surveyed else f": {one.reason}")
         for one in report.gaps
     ]
     if gaps:
         left_by = ", the largest first:" if len(gaps) > 1 else ":"
-        in_part = sum(one.reason not in report.left_open for one in report.gaps)
         these = f" ({in_part} in joints that are closed on less than half of their area)" if in_part else ""
         lines += [f"  {_count(len(gaps), 'gap')} left{these}{left_by}", *_shortened(gaps, verbose)]
     if report.alone:
@@ -184,6 +186,13 @@ def _joint_lines(report: "JointsReport", verbose: bool) -> list[str]:
         moved = {code: distance for code, distance in report.displacement.items() if distance > _NOTHING}
         lines += [f"    {code} moved by {_mm(distance)}" for code, distance in moved.items()]
     return lines
+
+
+def _apart(gap: "GapPlace") -> str:
+    """Return how far two stones are apart; those drawn without a gap touch in a part of their faces alone."""
+    if gap.width > _NOTHING:
+        return f"open by {_mm(gap.width)} over {gap.area:.3f} m²"
+    return f"touch on less than half of {gap.area:.3f} m²"
 
 
 def _shortened(lines: Sequence[str], verbose: bool) -> list[str]:

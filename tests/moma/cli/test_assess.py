@@ -59,6 +59,16 @@ def test_the_first_line_says_what_decides_and_the_others_what_it_is(url, scene, 
     assert any("moves: W02" in line for line in rest)
 
 
+def test_what_is_not_decided_ends_with_the_exit_code_of_a_run(url, scene, plain, tmp_path, monkeypatch):
+    """Two steps of 10 ms: too short for a rest, as for `moma run`."""
+    scene.write_text(f"{TWO_COURSES}[time]\nstep = 0.01\nduration = 0.02\n[output]\npictures = []\n")
+    codes = [
+        invoke(name, scene, "--db", url, "--out", tmp_path / name, *more).exit_code
+        for name, *more in (("assess", "--load", "horizontal x"), ("run",))
+    ]
+    assert codes == [1, 1]
+
+
 def test_a_scene_names_its_loads(url, scene, tmp_path):
     scene.write_text(
         TWO_COURSES_MIXED

@@ -1,6 +1,7 @@
 """An assessment from its questions to what it tells: what governs, what is left out, and in which frame it is told."""
 
 import csv
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from mechanics.limit.dead_load import Standing
 from mechanics.limit.limit_load import Mechanism
 from moma import ingest
 from pipelines.assess import assess as assess_module
-from pipelines.assess.answers import Answer
+from pipelines.assess.answers import FALLS, Answer
 from pipelines.assess.assess import assess
 from pipelines.assess.compare import compare
 from pipelines.assess.questions import scene_questions
@@ -94,6 +95,51 @@ def test_a_scene_asks_for_runs_by_itself_and_the_option_for_all(url, plain, tmp_
         monkeypatch.setattr(assess_module, "answer", told_by([limits(0.3, 0.32)] * 2, asked))
         assess(path, url, tmp_path / "out", confirm=option)
         assert [one.confirm for one in asked] == expected
+
+
+@pytest.mark.parametrize("outcome", [Outcome.MOVING, Outcome.UNDECIDED])
+def test_what_has_not_rested_is_not_decided(url, plain, tmp_path, monkeypatch, outcome):
+    still = Standing(outcome, "stone W02-02 moves at 2e-10 mm/s", (), np.zeros((18, 3)))
+    monkeypatch.setattr(assess_module, "stands", lambda *_: still)
+    done = assess(written(tmp_path, TWO_COURSES), url, tmp_path / "out", ("horizontal x", "thickness"))
+    assert not done.decided
+    assert done.summary["headline"].startswith(
+        "not decided whether it stands under its own weight: stone W02-02"
+    )
+    assert [one["outcome"] for one in done.summary["loads"]] == ["not decided"] * 2
+    assert "falls" not in json.dumps(done.summary["loads"])
+
+
+def test_what_falls_is_decided_and_says_so(url, plain, tmp_path, monkeypatch):
+    monkeypatch.setattr(assess_module, "stands", lambda on, *_: stood(on, Outcome.COLLAPSED, ("W02-02",)))
+    done = assess(written(tmp_path, TWO_COURSES), url, tmp_path / "out", ("horizontal x",))
+    assert done.decided
+    assert done.summary["headline"].startswith("it falls under its own weight: W02-02")
+    assert done.summary["loads"][0]["outcome"] == "falls under its own weight"
+
+
+def test_a_load_under_which_nothing_balances_governs_with_zero(url, plain, tmp_path, monkeypatch):
+    """Never "nothing limits its loads" beside a load that falls."""
+    falls = limits(None, None) | {"outcome": FALLS, "headline": "horizontal x: λ = 0"}
+    monkeypatch.setattr(assess_module, "answer", told_by([falls, limits(0.3, 0.32)]))
+    moved = {"falls_as_drawn": True, "farthest": 1.2e-3}
+    monkeypatch.setattr(assess_module, "stands", lambda on, *_: replace(stood(on), **moved))
+    done = assess(written(tmp_path, TWO_COURSES), url, tmp_path / "out", ("horizontal x", "horizontal y"))
+    expected = "rests only after moving by 1.2 mm; as drawn it falls; governs: horizontal x: λ = 0"
+    assert done.summary["headline"] == expected
+    assert any("joints are taken where stones rest" in one for one in done.summary["cautions"])
+
+
+def test_mortar_that_has_broken_is_named(url, plain, tmp_path, monkeypatch):
+    monkeypatch.setattr(assess_module, "answer", told_by([limits(0.3, 0.32)]))
+    monkeypatch.setattr(
+        assess_module, "stands", lambda on, *_: replace(stood(on), broken=(("W01-01", "W02-01"),))
+    )
+    done = assess(written(tmp_path, TWO_COURSES), url, tmp_path / "out", ("horizontal x",))
+    assert (
+        "the dead load breaks the mortar between W01-01 and W02-01: it holds nothing here"
+        in done.summary["cautions"]
+    )
 
 
 def test_loose_stones_stay_out_while_others_are_found(url, plain, tmp_path, monkeypatch):

@@ -66,7 +66,9 @@ def test_zero_is_never_negative():
     told = joints_report(ClosingReport(JointMode.CLOSE, (), {}, {}, (), gaps, ()), np.zeros(3))
     report = CheckReport("s", {}, {"deformable": 0}, 0, (), (), (), None, None, told, None, (), (), (), ())
     lines = "\n".join(check_lines(report, verbose=False))
-    assert "open by 0.0 mm over 0.100 m² at (0.000, 0.000, 0.000)" in lines
+    assert "A and B touch on less than half of 0.100 m² at (0.000, 0.000, 0.000)" in lines
+    # a bed of which less than half is closed is no closed joint without a word
+    assert "0 closed (1 of them on less than half of their area)" in lines
 
 
 def test_simplified_stones_are_reported_by_shape_and_against_the_tolerance_of_the_survey():
