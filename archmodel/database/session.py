@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Protocol, Self
 
-from sqlalchemy import Connection, Engine, insert, inspect, make_url, select
+from sqlalchemy import Connection, Engine, MetaData, insert, inspect, make_url, select
 from sqlalchemy.exc import ArgumentError, DBAPIError
 from sqlalchemy.orm import Session, configure_mappers
 
@@ -18,7 +18,14 @@ from archmodel.tables.layout import SCHEMA_VERSION, SchemaVersion, metadata
 from archmodel.tables.registered import declare_registered, release_registered
 from moma.errors import DatabaseError, NoDatabaseError
 
-__all__ = ["Database", "Home", "home_of", "open_database", "version_of"]
+__all__ = ["Database", "Home", "home_of", "missing_columns", "open_database", "version_of"]
+
+_COLUMNS = {
+    "sqlite": "SELECT m.name, c.name FROM sqlite_master AS m, pragma_table_info(m.name) AS c WHERE m.type = 'table'",
+    "postgresql": "SELECT table_name, column_name FROM information_schema.columns "
+    "WHERE table_schema = ANY(current_schemas(false))",
+}
+"""Query of all columns with their tables, by dialect: one for all, as databases are opened by every command."""
 
 
 class Home(Protocol):
@@ -174,6 +181,17 @@ def version_of(connection: Connection, place: str) -> int | None:
     return connection.scalar(select(SchemaVersion.__table__.c.version)) or 0
 
 
+def missing_columns(connection: Connection, layout: MetaData) -> list[str]:
+    """Return the columns of a layout, as table.column, that a database does not have."""
+    there = set(map(tuple, connection.exec_driver_sql(_COLUMNS[connection.dialect.name])))
+    return [
+        f"{table.name}.{column.name}"
+        for table in layout.sorted_tables
+        for column in table.columns
+        if (table.name, column.name) not in there
+    ]
+
+
 def _prepare(connection: Connection, home: Home, create: bool) -> None:
     """Check that this is a MOMA database of this program's version; lay out an empty one."""
     read_only = connection.execution_options(moma_read_only=True)
@@ -202,5 +220,12 @@ def _is_ours(connection: Connection, home: Home) -> bool:
             f"has schema version {version}, this program reads version {SCHEMA_VERSION}",
             where=home.place,
             remedy=f"moma migrate --db {home.shown}" if older else "install the version of MOMA that made it",
+        )
+    if missing := missing_columns(connection, metadata):
+        raise DatabaseError(
+            f"says that its layout is version {version}, but has no {', '.join(missing[:3])}",
+            where=home.place,
+            remedy="it was changed by hand or by another program: export it with the MOMA that made it, "
+            "and import the document here",
         )
     return True

@@ -1,6 +1,7 @@
 """Head of a building document: its format, its writer, units and frame."""
 
 import re
+from collections.abc import Mapping
 from importlib.metadata import version
 from typing import Any
 
@@ -13,7 +14,17 @@ from archmodel.tables.entries import Entry
 from archmodel.tables.layout import SCHEMA_VERSION
 from moma.errors import ExchangeError
 
-__all__ = ["FORMAT", "FORMAT_VERSION", "HEAD", "TABLES", "check_head", "head_of", "head_schema"]
+__all__ = [
+    "FORMAT",
+    "FORMAT_VERSION",
+    "HEAD",
+    "READ",
+    "SINCE",
+    "TABLES",
+    "check_head",
+    "head_of",
+    "head_schema",
+]
 
 FORMAT = "moma building"
 FORMAT_VERSION = 1
@@ -21,6 +32,12 @@ FORMAT_VERSION = 1
 
 TABLES = "tables"
 """Key of the object that holds the sections; it comes last."""
+
+READ = (1, SCHEMA_VERSION)
+"""Versions of the layout whose documents are read."""
+
+SINCE: Mapping[int, Mapping[str, Mapping[str, Any]]] = {1: {"measurement": {"evidence": []}}}
+"""Values that rows of older documents lack and must have, by version and table; what may be null is null."""
 
 UNITS = {
     "length": "m",
@@ -62,11 +79,12 @@ def check_head(head: dict[str, Any], name: str) -> None:
         with the JSON path
     """
     expected = {"format": FORMAT, "format_version": FORMAT_VERSION, "schema_version": SCHEMA_VERSION}
+    if type(older := head.get("schema_version")) is int and older in READ:
+        expected["schema_version"] = older
     remedies = {
         "format": "give a document that `moma export` wrote",
         "format_version": "use the version of MOMA that wrote it",
-        "schema_version": "with the version of MOMA that wrote it, import it there; migrate that database with "
-        "this version (moma migrate) and export it again",
+        "schema_version": f"use the version of MOMA that wrote it; this one reads {' and '.join(map(str, READ))}",
         "units": "convert the numbers, then say these units",
         "frame": "carry the coordinates into that frame, then say it",
     }

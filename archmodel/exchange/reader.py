@@ -1,7 +1,7 @@
 """Import: a JSON document read row by row into an empty database, all of it or nothing."""
 
 import gzip
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -9,7 +9,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from archmodel.database.session import Database
-from archmodel.exchange.head import HEAD, TABLES, check_head
+from archmodel.exchange.head import HEAD, SINCE, TABLES, check_head
 from archmodel.exchange.json_stream import JsonText
 from archmodel.exchange.rows import Row, RowReader, nearest
 from archmodel.exchange.sections import Section, sections
@@ -57,8 +57,8 @@ def _read_building(session: Session, stream: BinaryIO, name: str) -> dict[str, i
     _refuse_filled(session)
     text = JsonText(stream, name)
     try:
-        _read_head(text, name)
-        counts = _read_tables(session, text, name)
+        version = _read_head(text, name)
+        counts = _read_tables(session, text, name, SINCE.get(version, {}))
         text.take("}")
         text.take("")
     except BaseException:
@@ -76,8 +76,8 @@ def _refuse_filled(session: Session) -> None:
             raise ExchangeError(what, where=url, remedy=remedy)
 
 
-def _read_head(text: JsonText, name: str) -> None:
-    """Read up to the value of `TABLES`."""
+def _read_head(text: JsonText, name: str) -> int:
+    """Read up to the value of `TABLES`; return the version of the layout."""
     head: dict[str, Any] = {}
     text.take("{")
     if text.peek() != "}":
@@ -87,7 +87,7 @@ def _read_head(text: JsonText, name: str) -> None:
                 break
         else:
             check_head(head, name)
-            return
+            return int(head["schema_version"])
     check_head(head, name)
     raise ExchangeError("is missing", where=f"{name} $.{TABLES}", remedy="export the building again")
 
@@ -105,8 +105,15 @@ def _key(text: JsonText, before: dict[str, Any], known: Sequence[str]) -> str:
     return key
 
 
-def _read_tables(session: Session, text: JsonText, name: str) -> dict[str, int]:
-    """Read the sections, whose order is fixed so that references can be checked at once."""
+def _read_tables(
+    session: Session, text: JsonText, name: str, absent: Mapping[str, Mapping[str, Any]]
+) -> dict[str, int]:
+    """Read the sections, whose order is fixed so that references can be checked at once.
+
+    Parameters
+    ----------
+    absent : values that rows of an older document lack, by section
+    """
     known = [section.name for section in sections()]
     counts: dict[str, int] = {}
     kinds: set[str] = set()
@@ -119,7 +126,8 @@ def _read_tables(session: Session, text: JsonText, name: str) -> dict[str, int]:
         key = _key(text, counts, known)
         if key != section.name:
             text.refuse(f"found section {key}, expected {section.name}", f"the order is {', '.join(known)}")
-        counts[key] = _read_section(session, section, text, name, kinds)
+        reader = RowReader(section, name, kinds, absent.get(section.name))
+        counts[key] = _read_section(session, section, text, reader, name)
         if section is not sections()[-1] and text.peek() != "}":
             text.take(",")
     if text.take(",", "}") == ",":
@@ -127,8 +135,7 @@ def _read_tables(session: Session, text: JsonText, name: str) -> dict[str, int]:
     return counts
 
 
-def _read_section(session: Session, section: Section, text: JsonText, name: str, kinds: set[str]) -> int:
-    reader = RowReader(section, name, kinds)
+def _read_section(session: Session, section: Section, text: JsonText, reader: RowReader, name: str) -> int:
     store = SectionStore(session, section, name)
     text.take("[")
     count = 0

@@ -2,7 +2,7 @@
 
 import difflib
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -49,15 +49,19 @@ class RowReader:
     document : its name, for errors
     kinds : names of the kinds that the document registers; filled from their section, which declares them before
         those of entities and structures are read
+    absent : values of columns that a document of an older layout does not have
     """
 
-    def __init__(self, section: Section, document: str, kinds: set[str]) -> None:
+    def __init__(
+        self, section: Section, document: str, kinds: set[str], absent: Mapping[str, Any] | None = None
+    ) -> None:
         self._section, self._document = section, document
         self._registered = kinds
         self._labels = {label.name for label in section.labels}
         self._fields = [
             (field.name, field.value.decode, field.required, field.within) for field in section.fields
         ]
+        self._absent = absent or {}
         self._last: tuple[Any, ...] | None = None
         column = section.mapper.polymorphic_on
         self._kind = None if column is None else str(column.key)
@@ -75,7 +79,7 @@ class RowReader:
         if type(given) is not dict:
             raise row.wrong(f"is {quoted(given)}, expected an object")
         for name, decode, required, within in self._fields:
-            value = given.pop(name, None)
+            value = given.pop(name, self._absent.get(name))
             if value is None:
                 if required:
                     raise row.wrong("is missing or null", f".{name}", "give a value")

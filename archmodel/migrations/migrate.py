@@ -14,12 +14,16 @@ from alembic.script import ScriptDirectory
 from sqlalchemy import Connection, Engine, inspect
 from sqlalchemy.exc import DBAPIError
 
-from archmodel.database.session import Home, home_of, version_of
+from archmodel.database.session import Home, home_of, missing_columns, version_of
 from archmodel.database.sqlite import SqliteFile
-from archmodel.tables.layout import SCHEMA_VERSION
+from archmodel.migrations.layouts import version1
+from archmodel.tables.layout import SCHEMA_VERSION, metadata
 from moma.errors import DatabaseError, UsageError
 
 __all__ = ["Migration", "migrate"]
+
+LAYOUTS = {1: version1.metadata, 2: metadata}
+"""Tables of each version."""
 
 VERSION_FOLDERS = ["archmodel:migrations/versions"]
 """Folders of the scripts, as Alembic names them."""
@@ -87,6 +91,12 @@ def _migrate(connection: Connection, home: Home, to: int, lossy: bool) -> Migrat
     if before > SCHEMA_VERSION:
         what = f"has schema version {before}, this program knows versions up to {SCHEMA_VERSION}"
         raise DatabaseError(what, where=home.place, remedy="install the MOMA that made it")
+    if missing := missing_columns(connection, LAYOUTS[before]):
+        raise DatabaseError(
+            f"says that its layout is version {before}, but has no {', '.join(missing[:3])}",
+            where=home.place,
+            remedy="it was changed by hand or by another program: export it with the MOMA that made it",
+        )
     if before == to:
         return Migration(home.shown, before, to)
     backup = _copy_beside(home.file, before) if isinstance(home, SqliteFile) and home.file else None

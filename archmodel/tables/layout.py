@@ -16,8 +16,12 @@ from archmodel.tables.base import Base
 
 __all__ = ["SCHEMA_VERSION", "SchemaVersion", "metadata"]
 
-SCHEMA_VERSION = 1
-"""Version of the layout that this program reads and writes."""
+SCHEMA_VERSION = 2
+"""Version of the layout that this program reads and writes.
+
+A change of any table, column, key or index takes a new one: a script in `archmodel/migrations/versions`, the tables of
+this version in `archmodel/migrations/layouts`, and a line in `tests/archmodel/migrations/test_layouts.py`.
+"""
 
 
 class SchemaVersion(Base):

@@ -192,11 +192,13 @@ class CellResult(Base):
     step, time : number of the step, [s]
     x, y : mean place of its disks [m]
     lambda_x, lambda_y : max - min of x and of y over that at the start [-]
+    spread_x, spread_y : standard deviations of x and y over those at the start [-]
     volume, shear, turned : of the linear map nearest to the motion: change of area [-], ln of the ratio of the
         principal stretches [-], rotation [°]
     sigma_xx, sigma_yy, sigma_xy, p, q : mean stress, compression positive; (σ1 + σ2)/2, (σ1 - σ2)/2 [Pa]
     direction : of σ1 from the x axis [°]
     anisotropy, fabric_direction : of the directions of contacts [-], [°]
+    a : half the difference of the principal values of the fabric over the area [1/m²]
     coordination, porosity : [-]
     """
 
@@ -210,6 +212,8 @@ class CellResult(Base):
     y: Mapped[float | None]
     lambda_x: Mapped[float | None]
     lambda_y: Mapped[float | None]
+    spread_x: Mapped[float | None]
+    spread_y: Mapped[float | None]
     volume: Mapped[float | None]
     shear: Mapped[float | None]
     turned: Mapped[float | None]
@@ -221,6 +225,7 @@ class CellResult(Base):
     direction: Mapped[float | None]
     anisotropy: Mapped[float | None]
     fabric_direction: Mapped[float | None]
+    a: Mapped[float | None]
     coordination: Mapped[float | None]
     porosity: Mapped[float | None]
 

@@ -39,7 +39,6 @@ __all__ = ["GeologyReport", "planar_scene", "run_geology"]
 _ON_THE_FLOOR = 0.1  # gap over the smallest radius below which a disk stands on the floor [-]
 _START = 2000  # iterations of ADMM, at most, that find the forces of the sample at rest
 _SAMPLES = ".samples"  # folder of prepared samples, beside that of the results
-_NOT_STORED = ("spread_x", "spread_y", "a")  # columns of the rows of cells that the database does not have
 
 
 @dataclass(frozen=True)
@@ -266,8 +265,5 @@ def _geology_record(
         simulated=result.time,
         wall=summary["time"]["wall"],
         errors=error_measures(result.errors),
-        cells={
-            name: {column: values for column, values in columns.items() if column not in _NOT_STORED}
-            for name, columns in rows.items()
-        },
+        cells=rows,
     )

@@ -66,7 +66,7 @@ def test_the_errors_are_those_that_are_said(folder: Path, monkeypatch: pytest.Mo
     whole = (folder / "window.json").read_text(encoding="utf-8")
     broken = (
         '{"format": no}',
-        whole.replace(f'"schema_version": {SCHEMA_VERSION}', '"schema_version": 2'),
+        whole.replace(f'"schema_version": {SCHEMA_VERSION}', '"schema_version": 99'),
         whole.replace('"course"', '"coarse"', 1),
         whole.replace('"entity_id": 3, "entity": "', '"entity_id": 4000, "entity": "', 1),
     )

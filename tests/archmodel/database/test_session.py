@@ -25,7 +25,7 @@ def test_foreign_keys_are_enforced(empty: Database) -> None:
 def test_a_database_of_another_schema_version_is_refused(empty: Database) -> None:
     with empty.session() as session:
         session.scalars(select(SchemaVersion)).one().version = 99
-    with pytest.raises(DatabaseError, match="schema version 99, this program reads version 1"):
+    with pytest.raises(DatabaseError, match="schema version 99, this program reads version 2"):
         open_database(empty.url)
 
 

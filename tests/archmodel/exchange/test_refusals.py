@@ -96,7 +96,7 @@ WRONG = (
     ("format", "a diary", r"given \$\.format: is 'a diary', expected 'moma building'; give a document that"),
     ("format_version", 2, r"\$\.format_version: is 2, expected 1; use the version of MOMA"),
     ("format_version", True, r"\$\.format_version: is true, expected 1"),
-    ("schema_version", 2, rf"\$\.schema_version: is 2, expected {SCHEMA_VERSION}; .*moma migrate.*export it again"),
+    ("schema_version", 3, rf"\$\.schema_version: is 3, expected {SCHEMA_VERSION}; .*; this one reads 1 and 2"),
     ("schema_version", DROP, r"\$\.schema_version: is missing"),
     ("recorded_until", "today", r"\$\.recorded_until: is 'today', expected the instant"),
     ("moma", 7, r"\$\.moma: is 7"),

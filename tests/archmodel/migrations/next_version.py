@@ -1,7 +1,7 @@
-"""A made-up version 2 of the layout, to migrate to and from while the program has one version only.
+"""A made-up version 3 of the layout, to migrate to and from.
 
 It adds a column `entity.weathering` and a table `photograph`, and keeps the names of surveys backwards. The classes of
-version 1 work on it, so that databases of both can be opened. `declare` makes it the program's version.
+version 2 work on it, so that databases of both can be opened. `declare` makes it the program's version.
 """
 
 from collections.abc import Iterator
@@ -13,11 +13,11 @@ from alembic import command
 from alembic.config import Config
 from sqlalchemy import Column, Connection, ForeignKey, Integer, MetaData, Table, create_engine, select
 
-from archmodel.migrations.migrate import VERSION_FOLDERS
+from archmodel.migrations import migrate
 from archmodel.tables import layout
 from archmodel.tables.base import TEXT
 
-FOLDERS = [*VERSION_FOLDERS, str(Path(__file__).parent / "made_up")]
+FOLDERS = [*migrate.VERSION_FOLDERS, str(Path(__file__).parent / "made_up")]
 
 metadata = MetaData()
 for _table in layout.metadata.sorted_tables:
@@ -31,16 +31,17 @@ Table(
     Column("path", TEXT, nullable=False, unique=True),
 )
 
-LAYOUTS = {1: layout.metadata, 2: metadata}
+LAYOUTS = {**migrate.LAYOUTS, 3: metadata}
 
 Rows = dict[str, list[str]]
 
 
 def declare(patch: pytest.MonkeyPatch) -> None:
-    """Make version 2 the newest of the program."""
+    """Make version 3 the newest of the program."""
     patch.setattr("archmodel.migrations.migrate.VERSION_FOLDERS", FOLDERS)
+    patch.setattr("archmodel.migrations.migrate.LAYOUTS", LAYOUTS)
     for module in ("archmodel.tables.layout", "archmodel.migrations.migrate", "archmodel.database.session"):
-        patch.setattr(f"{module}.SCHEMA_VERSION", 2)
+        patch.setattr(f"{module}.SCHEMA_VERSION", 3)
 
 
 def rows_of(url: str, version: int) -> Rows:

@@ -1,4 +1,4 @@
-"""A made-up version 2, which adds a column and a table and moves a value; see `second_version`."""
+"""A made-up version 3, which adds a column and a table and moves a value; see `next_version`."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -8,23 +8,23 @@ from sqlalchemy import Connection, MetaData, Row, func, null, select
 
 from archmodel.migrations import steps
 from archmodel.tables import layout
-from tests.archmodel.migrations import second_version
+from tests.archmodel.migrations import next_version
 
-revision = "0002"
-down_revision = "0001"
+revision = "0003"
+down_revision = "0002"
 depends_on = None
 
 
 def upgrade() -> None:
-    _migrate(layout.metadata, second_version.metadata, 2)
+    _migrate(layout.metadata, next_version.metadata, 3)
 
 
 def downgrade() -> None:
-    _migrate(second_version.metadata, layout.metadata, 1)
+    _migrate(next_version.metadata, layout.metadata, 2)
 
 
 def losses(connection: Connection) -> Iterator[str]:
-    tables = second_version.metadata.tables
+    tables = next_version.metadata.tables
     for text, query in {
         "photographs": select(func.count()).select_from(tables["photograph"]),
         "the weathering of stones": select(func.count(tables["entity"].c.weathering)),
@@ -47,5 +47,5 @@ def _migrate(before: MetaData, after: MetaData, version: int) -> None:
 
 
 def _survey(row: Row[Any]) -> dict[str, Any]:
-    """Version 2 keeps names of surveys the other way round."""
+    """Version 3 keeps names of surveys the other way round."""
     return row._asdict() | {"name": row.name[::-1]}

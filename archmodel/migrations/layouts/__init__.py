@@ -1,0 +1,6 @@
+"""Layouts of earlier versions, as they were: they never change with the program.
+
+Public: `metadata` (version1).
+"""
+
+__all__: list[str] = []
