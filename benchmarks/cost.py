@@ -33,7 +33,8 @@ from benchmarks.report import (
 from mechanics.arrays import Array
 from mechanics.dynamics.energy_balance import EnergyBalance
 from mechanics.dynamics.simulation import Simulation
-from mechanics.dynamics.stopping import Watch, balance_of
+from mechanics.dynamics.verdicts.lasting import balance_of
+from mechanics.dynamics.verdicts.watch import Watch
 from mechanics.model.model import build_model
 from mechanics.results.forecast.cost import calibration, expected_cost, measures
 from mechanics.results.forecast.cost_rates import Rate

@@ -24,7 +24,8 @@ from mechanics.dynamics.observers.equilibrium import displacement, seen_from_sup
 from mechanics.dynamics.progress import Clock
 from mechanics.dynamics.simulation import Simulation
 from mechanics.dynamics.step import Step
-from mechanics.dynamics.stopping import Watch, balance_of
+from mechanics.dynamics.verdicts.lasting import balance_of
+from mechanics.dynamics.verdicts.watch import Watch
 from mechanics.model.model import Model, build_model
 from mechanics.results.peaks import PeakTracker
 from mechanics.results.postprocess import Observer

@@ -16,7 +16,8 @@ from mechanics.dynamics.progress import Clock, Listener, Progress, silent
 from mechanics.dynamics.simulation import Simulation
 from mechanics.dynamics.static_start import static_start
 from mechanics.dynamics.step import Step
-from mechanics.dynamics.stopping import Watch, disproof
+from mechanics.dynamics.verdicts.lasting import disproof
+from mechanics.dynamics.verdicts.watch import Watch
 from mechanics.dynamics.warm_start import Memory
 from mechanics.model.model import Model, build_model
 from mechanics.results.log import Log, result_of, stage_result
@@ -150,8 +151,9 @@ def _keeps_strain(model: Model, *scenes: Scene) -> bool:
 def _without_strain(scene: Scene) -> Scene:
     """Return the scene with stones that are all rigid, to be run until it rests by the automatic method.
 
-    Strain cannot be forgotten as contact forces can (`mechanics.dynamics.stopping.disproof`): what stones press against
-    each other on the way to a rest stays. Rigid ones have no other forces than those that their loads bring about.
+    Strain cannot be forgotten as contact forces can (`mechanics.dynamics.verdicts.lasting.disproof`): what stones press
+    against each other on the way to a rest stays. Rigid ones have no other forces than those that their loads bring
+    about.
     """
     time = replace(scene.time, start=Start.REST, stop_at_equilibrium=True)
     solver = replace(scene.solver, method=Method.AUTO)
@@ -232,7 +234,7 @@ def _simulate(
                     run.simulation = other
         text = f"balance {balance.max():.1e}, η {step.solution.natural_map:.1e}"
         report(Progress("step", count, total, text))
-        done = settings.stop_at_equilibrium and outcome is not Outcome.MOVING
+        done = watch.hopeless or (settings.stop_at_equilibrium and outcome is not Outcome.MOVING)
         stopped = not done and count < total and stop()
         last = done or stopped or count == total
         regular = bool(scene.frame_every) and count % scene.frame_every == 0

@@ -1,7 +1,7 @@
 """Time stepping: predict, detect, state the contact problem, solve, advance.
 
 Public: `Simulation` (simulation); `Step`, `ContactForces` (step); `static_start` (static_start);
-`Watch` (stopping); `Outcome`, `StaticStart` (outcome); `EnergyBalance` (energy_balance); `Progress`, `Listener`,
+`Outcome`, `StaticStart` (outcome); `EnergyBalance` (energy_balance); `Progress`, `Listener`,
 `Clock` (progress); `Memory` (warm_start); `Handover`, `Beginning` (handover);
 `contact_problem`, `JointCompliance` (contact_problem); `Detection`, `detector` (contact_search).
 """

@@ -35,10 +35,11 @@ from mechanics.solvers.choice import choose_solver
 from mechanics.solvers.from_nothing import rests_from_nothing
 from moma.errors import SolverError
 
-__all__ = ["Simulation"]
+__all__ = ["CLOSED_BIAS", "Simulation"]
 
-# bias of a gap over the largest u_free up to which it is one of an inexact step, and counts as closed [-]
-_CLOSED = 1e-3
+CLOSED_BIAS = 1e-3
+"""Bias of a gap over the largest u_free up to which it is one of an inexact step, and counts as closed [-]."""
+
 # velocity tolerance over that of the balance: contacts that break their laws by more leave stones unbalanced [-]
 _BALANCED = 0.1
 _CRUSHING = 10  # most solutions of a step in search of the joints that crush
@@ -173,7 +174,7 @@ class Simulation(Carrier):
         _, internal = self._memory.recall(found.contacts.key, found.place)
         free = free_kick(model, self.start, predicted, self._compliance, h, self._theta)
         problem, approach = contact_problem(model, predicted, found, free, internal, None)
-        near = problem.bias <= _CLOSED * float(np.abs(problem.u_free).max())
+        near = problem.bias <= CLOSED_BIAS * float(np.abs(problem.u_free).max())
         problem = replace(problem, bias=np.where(near, 0.0, problem.bias))
         rests, impulse = rests_from_nothing(problem)
         if not rests:
@@ -306,7 +307,8 @@ class Simulation(Carrier):
 def _solver_of(model: Model, settings: SolverSettings) -> Solver:
     """Return the solver of a model; where only the rest of rigid stones is asked for, it suits their balance."""
     deforms, sprung, time = bool(model.elastic.any()), model.laws.sprung, model.scene.time
-    if time.relaxation and not deforms:
-        exact = min(settings.velocity_tolerance, _BALANCED * time.balance_tolerance)
+    balanced = np.inf if deforms else _BALANCED * time.balance_tolerance
+    if time.relaxation:
+        exact = min(settings.velocity_tolerance, balanced)
         settings = replace(settings, velocity_tolerance=exact)
-    return choose_solver(settings, deforms, sprung, time.duration)
+    return choose_solver(settings, deforms, sprung, time.duration, balanced)

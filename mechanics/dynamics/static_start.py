@@ -12,7 +12,7 @@ from mechanics.dynamics.progress import Progress
 from mechanics.dynamics.rest.relaxation import halted
 from mechanics.dynamics.simulation import Simulation
 from mechanics.dynamics.step import Step
-from mechanics.dynamics.stopping import rests
+from mechanics.dynamics.verdicts.lasting import rests
 from mechanics.model.model import Model
 from mechanics.scene.scene import Method, SolverSettings, TimeSettings
 from mechanics.scene.state import State

@@ -12,7 +12,8 @@ import numpy as np
 from mechanics.arrays import Array
 from mechanics.dynamics.outcome import Outcome
 from mechanics.dynamics.progress import Listener, silent
-from mechanics.dynamics.stopping import MOVED
+from mechanics.dynamics.simulation import CLOSED_BIAS, Simulation
+from mechanics.dynamics.verdicts.watch import MOVED
 from mechanics.limit.assembly import CLOSED, RigidAssembly, assembly
 from mechanics.limit.programme import Ending, Programme
 from mechanics.results.result import Result
@@ -22,7 +23,7 @@ from mechanics.scene.scene import Block, LawRule, Part, Scene, Start
 from mechanics.simulate import simulate
 from moma.errors import SceneError
 
-__all__ = ["Standing", "admits_rest", "at_instant", "stands"]
+__all__ = ["Standing", "admits_rest", "at_instant", "self_stress_alone_holds", "stands"]
 
 # gap over the width up to which a joint is closed where stones rest: a run leaves 1e-8, and a block falls by more [-]
 _SHUT = 1e-5
@@ -114,6 +115,24 @@ def admits_rest(scene: Scene) -> bool:
     SceneError, SolverError : see `assembly` and `Programme`
     """
     return _balances(assembly(at_instant(scene)))
+
+
+def self_stress_alone_holds(scene: Scene) -> bool:
+    """Return whether forces between rigid joints could hold stones as they are drawn, but no load brings them about.
+
+    Forces from nothing are tried, and must surely move the stones. False where joints have springs, or are drawn open
+    by more than a step of the scene closes: then the motion needs no self-stress to be explained.
+
+    Raises
+    ------
+    SceneError, SolverError : as `admits_rest`
+    """
+    on = assembly(at_instant(scene))
+    closed = CLOSED_BIAS * float(np.linalg.norm(on.model.gravity(0.0))) * scene.time.step**2
+    if on.model.laws.sprung or on.widest > closed:
+        return False
+    moves = Simulation(on.model, on.state).rests_from_nothing() is False
+    return moves and _balances(on)
 
 
 def _balances(on: RigidAssembly) -> bool:

@@ -5,7 +5,7 @@ import numpy as np
 from mechanics.arrays import Array
 from mechanics.carried import Carrier
 from mechanics.dynamics.outcome import Outcome
-from mechanics.dynamics.stopping import LASTING
+from mechanics.dynamics.verdicts.lasting import LASTING
 from mechanics.planar.contacts import PlanarContacts
 from mechanics.planar.model import PlanarModel, PlanarState
 from mechanics.planar.simulation import PlanarStep

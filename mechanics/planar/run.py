@@ -8,7 +8,7 @@ from mechanics.arrays import Array
 from mechanics.carried import Carried, Carrier, Rows
 from mechanics.dynamics.outcome import Outcome
 from mechanics.dynamics.progress import Clock
-from mechanics.dynamics.stopping import LASTING
+from mechanics.dynamics.verdicts.lasting import LASTING
 from mechanics.planar.contacts import PlanarDetector
 from mechanics.planar.model import PlanarModel, PlanarState, build_planar_model
 from mechanics.planar.observers import (

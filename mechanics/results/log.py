@@ -13,7 +13,8 @@ from mechanics.dynamics.observers.equilibrium import settlement, speed, support_
 from mechanics.dynamics.outcome import StaticStart
 from mechanics.dynamics.progress import Clock
 from mechanics.dynamics.step import Step
-from mechanics.dynamics.stopping import LASTING, Verdict, balance_of
+from mechanics.dynamics.verdicts.lasting import LASTING, balance_of
+from mechanics.dynamics.verdicts.watch import Verdict
 from mechanics.model.model import Model
 from mechanics.results.peaks import PeakTracker
 from mechanics.results.postprocess import Observer

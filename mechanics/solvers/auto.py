@@ -16,6 +16,8 @@ _MOTION = 40
 # loosest tolerance of η and of velocities in a motion, and largest velocity of a contact at rest over the largest
 # u_free; beyond it contacts no longer obey their laws [-]
 _LOOSEST = 0.025
+# velocity over the tolerance of a motion up to which a contact may be at rest: errors hold u_N + μ‖u_T‖ [-]
+_UNTOLD = 2.0
 # velocity from which a contact moves, over the velocity tolerance: below it are errors of one step that add up [-]
 _MOVES = 10.0
 
@@ -29,12 +31,14 @@ class Auto:
     tolerance, velocity_tolerance : as in `NSGS`
     max_iterations : of all methods together
     motion_speed : velocity by which contacts may break their laws in the steps of a motion [m/s]; None: as in others
+    rest_tolerance : velocity tolerance of steps of a motion in which nothing moves faster than errors let it [-]
     """
 
     tolerance: float = 1e-6
     velocity_tolerance: float = 1e-5
     max_iterations: int = 2000
     motion_speed: float | None = None
+    rest_tolerance: float = np.inf
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from `start`; `why` of the solution names the method, and what the one before left."""
@@ -62,6 +66,8 @@ class Auto:
                 other = follow(links, problem, start, asked, most - count)
                 found = min(found, other, key=lambda one: (not one.converged, one.natural_map))
                 found = replace(found, iterations=count + other.iterations)
+        if moving:
+            found = self._as_at_rest(problem, found, asked, warm)
         if not follows or steps is None:
             return found
         if not (found.converged and self._rests(problem, found)):
@@ -83,6 +89,24 @@ class Auto:
         small = (1.0 - EXACT) * self.velocity_tolerance * float(np.abs(problem.u_free).max())
         ajar = (problem.bias != 0.0) & (np.abs(problem.bias) <= small)
         return replace(problem, bias=np.where(ajar, 0.0, problem.bias)) if ajar.any() else problem
+
+    def _as_at_rest(
+        self, problem: ContactProblem, found: ContactSolution, asked: tuple[float, float], warm: bool
+    ) -> ContactSolution:
+        """Return a step of a motion solved as exactly as a rest asks, if nothing moves faster than errors may let it.
+
+        Velocities within the errors of a motion would otherwise add up from step to step, and stones in balance drift.
+        """
+        limits = self.tolerance, min(self.velocity_tolerance, self.rest_tolerance)
+        exact_already = asked[0] <= limits[0] and asked[1] <= limits[1]
+        if exact_already or not found.converged or not self._within(problem, found, _UNTOLD * asked[1]):
+            return found
+        links = chain_of(problem, True, True, limits[1], warm)
+        exact = follow(
+            links, problem, ContactStart(found.impulse, found.velocity), limits, self.max_iterations
+        )
+        count = found.iterations + exact.iterations
+        return replace(exact if exact.converged else found, iterations=count)
 
     def _exact(
         self, problem: ContactProblem, closed: ContactProblem, found: ContactSolution
@@ -108,9 +132,12 @@ class Auto:
 
     def _rests(self, problem: ContactProblem, found: ContactSolution) -> bool:
         """Return whether no contact moves, neither one that carries a force nor one that opens."""
+        return self._within(problem, found, min(_MOVES * self.velocity_tolerance, _LOOSEST))
+
+    def _within(self, problem: ContactProblem, found: ContactSolution, share: float) -> bool:
+        """Return whether no contact is faster than a share of the largest u_free."""
         u = problem.delassus.apply(found.impulse) + problem.u_free
-        pace = min(_MOVES * self.velocity_tolerance, _LOOSEST) * float(np.abs(problem.u_free).max())
-        return bool(np.abs(u).max() <= pace)
+        return bool(np.abs(u).max() <= share * float(np.abs(problem.u_free).max()))
 
 
 def _judged(problem: ContactProblem, found: ContactSolution, limits: tuple[float, float]) -> ContactSolution:

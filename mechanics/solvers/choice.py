@@ -1,6 +1,7 @@
 """Solver registry."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -33,9 +34,20 @@ _METHODS: Mapping[Method, Callable[[float, float, int], Solver]] = {
 
 
 def choose_solver(
-    settings: SolverSettings, deformable: bool = False, sprung: bool = False, duration: float = np.inf
+    settings: SolverSettings,
+    deformable: bool = False,
+    sprung: bool = False,
+    duration: float = np.inf,
+    rest_tolerance: float = np.inf,
 ) -> Solver:
-    """Return the solver that the settings ask for, in a run of a duration [s], over which errors of motion add up.
+    """Return the solver that the settings ask for.
+
+    Parameters
+    ----------
+    settings : of the scene
+    deformable, sprung : there are stones that deform, and joints that yield
+    duration : of the run, over which errors of motion add up [s]
+    rest_tolerance : velocity tolerance of steps in which stones may be at rest [-]
 
     Raises
     ------
@@ -48,10 +60,11 @@ def choose_solver(
     solver = _METHODS[settings.method](
         settings.tolerance, settings.velocity_tolerance, settings.max_iterations
     )
-    if isinstance(solver, Auto) and settings.motion_error is not None:
-        speed = settings.motion_error / (_ADDS_UP * duration)
-        return Auto(solver.tolerance, solver.velocity_tolerance, solver.max_iterations, speed)
-    return solver
+    if not isinstance(solver, Auto):
+        return solver
+    error = settings.motion_error
+    speed = None if error is None else error / (_ADDS_UP * duration)
+    return replace(solver, motion_speed=speed, rest_tolerance=rest_tolerance)
 
 
 def choose_planar_solver(settings: SolverSettings, min_sweeps: int = 0) -> Solver:

@@ -14,7 +14,7 @@ from archmodel.database.session import open_database
 from archmodel.store.run_record import StoneResult
 from archmodel.tables.entries import latest_entry
 from mechanics.dynamics.progress import Listener, Progress, silent
-from mechanics.limit.dead_load import admits_rest
+from mechanics.limit.dead_load import self_stress_alone_holds
 from mechanics.model.model import build_model
 from mechanics.results.forecast.plan import loose_blocks
 from mechanics.results.result import Outcome, Result
@@ -297,7 +297,7 @@ def _by_self_stress(result: Result) -> bool:
     ):
         return False
     try:
-        return admits_rest(scene)
+        return self_stress_alone_holds(scene)
     except MomaError:
         return False
 

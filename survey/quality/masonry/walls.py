@@ -22,6 +22,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
+from scipy.special import expit
 
 from survey.arrays import Array
 from survey.geometry.polygons import ring_area
@@ -223,7 +224,7 @@ def _share(share: float, count: int, bounds: tuple[float, float], text: str) -> 
 def _size(own: Sequence[WallStone]) -> Grade:
     sides = np.array([_side(one) for one in own])
     sigma = np.array([max(math.sqrt(2.0) * one.sigma, 1e-9) for one in own])
-    above = [float((1.0 / (1.0 + np.exp(-1.702 * (sides - limit) / sigma))).mean()) for limit in _SIZES]
+    above = [float((expit(1.702 * (sides - limit) / sigma)).mean()) for limit in _SIZES]
     count = len(own)
     text = f"larger sides {np.median(sides):.2f} m, {100.0 * above[1]:.0f} % of them above 0.40 m"
     # fulfilled if most are large, not if most are small

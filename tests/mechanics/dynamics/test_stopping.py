@@ -9,7 +9,7 @@ from mechanics.dynamics.energy_balance import EnergyBalance
 from mechanics.dynamics.outcome import Outcome
 from mechanics.dynamics.rest.relaxation import Relaxation
 from mechanics.dynamics.simulation import Simulation
-from mechanics.dynamics.stopping import Watch
+from mechanics.dynamics.verdicts.watch import Watch
 from mechanics.model.model import build_model
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.elastic_joint import ElasticJoint

@@ -8,35 +8,29 @@ from mechanics.arrays import Array, Bools
 from mechanics.carried import Carrier
 from mechanics.dynamics.observers.equilibrium import (
     displacement,
-    imbalance,
     seen_from_supports,
     speed,
     tilt,
 )
 from mechanics.dynamics.outcome import Outcome, StaticStart
 from mechanics.dynamics.rest.relaxation import relaxation_caution
-from mechanics.dynamics.simulation import Simulation
 from mechanics.dynamics.step import Step
+from mechanics.dynamics.verdicts.doubt import UnsolvedSteps, length
+from mechanics.dynamics.verdicts.lasting import LASTING, fall_speed, moves, rest_speed
 from mechanics.model.model import Model
-from mechanics.problem.residual import residual
 from mechanics.scene.laws.law import BOND
 from mechanics.scene.state import State
 
-__all__ = ["LASTING", "MOVED", "Verdict", "Watch", "balance_of", "disproof", "rests"]
+__all__ = ["MOVED", "Verdict", "Watch"]
 
 
-LASTING = 5  # steps in a row that must be in balance
 MOVED = 0.01  # displacement over a stone's width from which it does not stand as it is drawn [-]
-_REST_SPEED = 1e-4  # of √(g · width), the speed of a fall over a body's own width, below which it rests [-]
 _FALL_SPEED = 0.05  # of the same speed, above which a body falls [-]
 _TOPPLED = np.pi / 4  # tilt from which a stone at rest away from its place has toppled [rad]
 _LEANS = np.radians(10.0)  # tilt from which one that has sunk by half a collapse has toppled [rad]
-_DOUBT = 0.5  # velocity that unsolved steps may have added, over that of a proven motion [-]
-_RELEASED = 50  # most steps in which a rest must show that it lasts without its forces
 _UNFILLED = 0.01  # area of joints that mortar does not fill, over that which it was to fill, that is told [-]
 _LOWER = 0.7  # way along the load over the whole way from which a stone has sunk rather than moved aside [-]
 _SELF_STRESS = "held only by self-stress, which no load applies: rigid joints admit this rest and a motion"
-_STAYS = 1e-3  # displacement over the width within which a released stone stays where it rested [-]
 
 
 @dataclass(frozen=True)
@@ -58,7 +52,9 @@ class Watch(Carrier):
     the scene's fraction of its width, and is faster than 0.05 √(g · width); or it has come to rest after such a fall,
     or after toppling. A body that rocks lifts its centre, one that slides slowly keeps its support: both move, and may
     still come to rest. *Undecided*: steps that were not solved may have added as much velocity as the motion has; or a
-    rest that was disproved came back at the same place.
+    rest that was disproved came back at the same place; or no step could be solved.
+    The first proven collapse is final, whatever the stones do later. At the end of the time, stones that have fallen or
+    toppled and lie still against the supports have collapsed, also while loads change.
     Without gravity g counts as 1 m/s². Displacements and speeds are relative to the supports where these are driven.
     Steps with compliant joints count as solved, and are told.
 
@@ -72,20 +68,25 @@ class Watch(Carrier):
     """
 
     CARRIED = (
-        "_clamped", "_comes_back", "_compliant", "_culprit", "_deepest", "_depth", "_doubt", "_doubted", "_fastest",
-        "_moved", "_pair", "_quiet", "_speed", "_steps", "_still", "_sunk", "_unbonded", "_unsolved", "_worst_error",
-        "rest_time",
+        "_clamped", "_collapse", "_comes_back", "_compliant", "_culprit", "_deepest", "_depth", "_doubted", "_fastest",
+        "_moved", "_pair", "_quiet", "_speed", "_steps", "_still", "_still_steps", "_sunk", "_time", "_unbonded",
+        "_unsolved", "rest_time",
     )  # fmt: skip
     REBUILT = ("_model", "_start")
 
     def __init__(self, model: Model, start: State) -> None:
         self._model, self._start = model, start
-        self._quiet = self._unsolved = self._steps = 0
-        self._doubt = self._worst_error = self._fastest = 0.0
+        self._quiet = self._steps = 0
+        self._fastest = 0.0
+        self._unsolved = UnsolvedSteps(model)
         self._still = False
         self._culprit, self._sunk, self._moved, self._speed = 0, 0.0, 0.0, 0.0
         self._clamped = self._comes_back = False
         self._doubted = start
+        # stone, how far it had sunk [m], its speed [m/s] and the time [s]
+        self._collapse: tuple[int, float, float, float] | None = None
+        self._still_steps = np.zeros(len(model.mass), dtype=np.int64)
+        self._time = start.time
         self._compliant, self._deepest, self._depth, self._pair = 0, 0.0, 0.0, (0, 0)
         self._unbonded: tuple[str, ...] = ()
         self.rest_time = 0.0
@@ -94,18 +95,19 @@ class Watch(Carrier):
         """Return the outcome so far, from a step and the imbalance of each body (nb,) after it."""
         model, state, solution = self._model, step.after, step.solution
         self._steps += 1
-        error = 0.0 if solution.converged else _error(step)
-        self._unsolved += not solution.converged
-        self._doubt += error
-        self._worst_error = max(self._worst_error, error)
+        self._time = state.time
+        self._unsolved(step)
         self._see_joints(step)
         if self._steps == 1:
             self._unbonded = _unbonded(model, step)
         seen = seen_from_supports(model, self._start, state)
         speeds = np.where(model.fixed, 0.0, speed(model, seen))
-        pace = speeds / _fall(model, state)
+        pace = speeds / fall_speed(model, state)
         self._fastest = max(self._fastest, float(speeds.max()))
-        still = state.time >= model.scene.loads.until and _rests(model, state, balance, speeds)
+        slow = speeds <= rest_speed(model, state)
+        self._still_steps = np.where(slow, self._still_steps + 1, 0)
+        balanced = bool(balance.max() <= model.scene.time.balance_tolerance)
+        still = state.time >= model.scene.loads.until and balanced and bool(slow.all())
         self._still = still and not solution.converged
         self._quiet = self._quiet + 1 if still and solution.converged else 0
         if self._quiet == 1:
@@ -114,23 +116,44 @@ class Watch(Carrier):
         sunk = self._sinking(step, seen)
         fallen = ~model.fixed & (sunk > limit)
         falling = fallen & (pace > _FALL_SPEED)
+        if self._collapse is not None:
+            self._culprit = self._collapse[0]
+            self._sunk, self._speed = float(sunk[self._culprit]), float(speeds[self._culprit])
+            return Outcome.COLLAPSED
         if falling.any():
-            proven = falling & (self._doubt <= _DOUBT * speeds)
+            proven = falling & ~np.array([self._unsolved.may_cause(one) for one in speeds])
             self._blame(proven if proven.any() else falling, sunk, speeds)
-            return Outcome.COLLAPSED if proven.any() else Outcome.UNDECIDED
+            if not proven.any():
+                return Outcome.UNDECIDED
+            self._collapse = self._culprit, self._sunk, self._speed, state.time
+            return Outcome.COLLAPSED
+        if self._quiet >= LASTING or self._ends:
+            fallen |= self._toppled(seen, sunk, limit)
+            lies = fallen & (self._still_steps >= LASTING)
+            if lies.any() and (self._quiet >= LASTING or not self._unsolved.may_cause(self._fastest)):
+                self._blame(lies, sunk, speeds)
+                return Outcome.COLLAPSED
         self._culprit = int(speeds.argmax())
         self._speed = float(speeds[self._culprit])
+        if self.hopeless:
+            return Outcome.UNDECIDED
         if self._quiet < LASTING:
             return Outcome.MOVING
-        fallen |= self._toppled(seen, sunk, limit)
-        if fallen.any():
-            self._blame(fallen, sunk, speeds)
-            return Outcome.COLLAPSED
         moved = np.where(model.fixed, 0.0, displacement(model, self._start, seen))
         share = moved / model.surfaces.size
         self._culprit = int(share.argmax())
         self._sunk, self._moved = float(sunk[self._culprit]), float(moved[self._culprit])
         return Outcome.SETTLED if share[self._culprit] > MOVED else Outcome.EQUILIBRIUM
+
+    @property
+    def hopeless(self) -> bool:
+        """True where so far no step was solved, and errors may have caused the motion."""
+        return self._unsolved.hopeless(self._fastest)
+
+    @property
+    def _ends(self) -> bool:
+        """True where the time of the run is over."""
+        return self._steps >= self._model.scene.time.steps
 
     def disproved(self, rest: Outcome, state: State, surely: bool) -> Outcome:
         """Return the outcome of a rest that did not last once its forces were forgotten.
@@ -138,7 +161,7 @@ class Watch(Carrier):
         *Moving*, the first time. One that comes back to the same place was found again without leaving it, and stays;
         but where forces that arise from nothing `surely` move its stones it is *undecided*: rigid joints admit both.
         """
-        back = self._clamped and not _moves(self._model, self._doubted, state)
+        back = self._clamped and not moves(self._model, self._doubted, state)
         if back and not surely:
             return rest
         self._quiet, self._clamped, self._comes_back, self._doubted = 0, True, back, state
@@ -146,15 +169,17 @@ class Watch(Carrier):
 
     def verdict(self, outcome: Outcome, static: StaticStart | None) -> Verdict:
         """Return the outcome in words, from that of the last step, and the static start."""
-        if outcome is Outcome.MOVING and (self._still or self._doubt > _DOUBT * self._fastest):
+        if outcome is Outcome.MOVING and (self._still or self._unsolved.may_cause(self._fastest)):
             outcome = Outcome.UNDECIDED
         cautions = [*self._gave_way(), *self._unbonded]
         if self._clamped and not self._comes_back and outcome is not Outcome.EQUILIBRIUM:
             cautions.insert(0, "a rest on the way was held only by self-stress, which no load applies")
         if outcome is Outcome.MOVING:
             cautions.insert(0, "whether it stands is not decided: its time was over before it rested or fell")
-        if outcome.rests and self._doubt > _DOUBT * self._fastest:
-            cautions.append(f"on the way {self._unsolved_steps()}")
+        if self._ends and self._time < self._model.scene.loads.until:
+            cautions.append(self._loads_go_on())
+        if outcome.rests and self._unsolved.may_cause(self._fastest):
+            cautions.append(f"on the way {self._unsolved.text()}")
         if (left_out := relaxation_caution(self._model)) is not None:
             cautions.append(left_out)
         if static is not None and not static.found:
@@ -164,25 +189,34 @@ class Watch(Carrier):
     def _reason(self, outcome: Outcome) -> str:
         code = self._model.scene.blocks[self._culprit].code
         if outcome is Outcome.UNDECIDED:
-            return _SELF_STRESS if self._comes_back else self._unsolved_steps()
+            if self._comes_back:
+                return _SELF_STRESS
+            return self._unsolved.surrender() if self.hopeless else self._unsolved.text()
         if outcome is Outcome.MOVING:
-            return f"stone {code} moves at {_short(self._speed)}/s"
+            return f"stone {code} moves at {length(self._speed)}/s"
         if outcome is Outcome.SETTLED:
             share = _percent(self._moved / float(self._model.surfaces.size[self._culprit]))
             lower = self._sunk > _LOWER * self._moved
-            way = f"{_short(self._sunk)} lower" if lower else f"{_short(self._moved)} away"
+            way = f"{length(self._sunk)} lower" if lower else f"{length(self._moved)} away"
             return f"it does not stand as surveyed: stone {code} came to rest {way}, {share} of its width"
-        if outcome is Outcome.COLLAPSED and self._quiet >= LASTING:
-            return f"stone {code} has fallen or toppled, and lies {_short(max(self._sunk, 0.0))} lower"
+        if outcome is Outcome.COLLAPSED and self._collapse is not None and self._time > self._collapse[3]:
+            _, sunk, pace, time = self._collapse
+            end = (
+                f"at the end it is {length(self._sunk)} lower"
+                if self._sunk > 0
+                else "at the end it is no lower"
+            )
+            return f"stone {code} had sunk by {length(sunk)} after {time:.3g} s and moved at {length(pace)}/s; {end}"
+        if outcome is Outcome.COLLAPSED and self._collapse is None:
+            return f"stone {code} has fallen or toppled, and lies {length(max(self._sunk, 0.0))} lower"
         if outcome is Outcome.COLLAPSED:
-            return f"stone {code} has sunk by {_short(self._sunk)} and moves at {_short(self._speed)}/s"
+            return f"stone {code} has sunk by {length(self._sunk)} and moves at {length(self._speed)}/s"
         return ""
 
-    def _unsolved_steps(self) -> str:
-        return (
-            f"{self._unsolved} of {self._steps} steps were not solved, with errors of up to "
-            f"{_short(self._worst_error)}/s"
-        )
+    def _loads_go_on(self) -> str:
+        until = self._model.scene.loads.until
+        over = f"they change until {until:g} s" if np.isfinite(until) else "they never cease to change"
+        return f"the loads were not over when the run ended at {self._time:g} s: {over}"
 
     def _see_joints(self, step: Step) -> None:
         """Remember how far compliant joints let stones into each other."""
@@ -199,10 +233,10 @@ class Watch(Carrier):
         if not self._compliant:
             return []
         one, other = (self._model.scene.blocks[body].code for body in self._pair)
-        end = f"{_short(self._depth)} at the end" if self._depth > 0 else "rigid again at the end"
+        end = f"{length(self._depth)} at the end" if self._depth > 0 else "rigid again at the end"
         return [
             f"joints gave way elastically in {self._compliant} of {self._steps} steps, which rigid joints did not "
-            f"solve: stones overlap by at most {_short(self._deepest)} for it ({one} and {other}; {end})"
+            f"solve: stones overlap by at most {length(self._deepest)} for it ({one} and {other}; {end})"
         ]
 
     def _sinking(self, step: Step, seen: State) -> Array:
@@ -230,54 +264,6 @@ class Watch(Carrier):
         self._sunk, self._speed = float(sunk[self._culprit]), float(speeds[self._culprit])
 
 
-def balance_of(model: Model, step: Step) -> Array:
-    """Return the imbalance of each body (nb,) after a step [-]."""
-    active = step.active
-    return imbalance(model, step.after, active.contacts, active.force, step.kick.load, step.resting)
-
-
-def disproof(simulation: Simulation) -> tuple[Simulation | None, bool]:
-    """Return the simulation with which a run goes on where a rest does not last, and whether its stones surely move.
-
-    Without a simulation it lasts. Rigid stones in a gap admit forces that press them against each other without cause:
-    an overlap that was pushed out, an impact or a solver's long way may leave such forces, and friction then holds what
-    nothing carries. So the stones forget all contact forces, and must find those of their rest again without leaving
-    it: rigid ones from forces that arise from nothing.
-    """
-    other = simulation.released()
-    found = other.rests_from_nothing()
-    lasting = _lasts(other.released(forgets=False)) if found is None else found
-    return None if lasting else other, found is False
-
-
-def _lasts(simulation: Simulation) -> bool:
-    """Return whether a rest lasts in a released simulation, which this advances."""
-    model, begin = simulation.model, simulation.state
-    quiet = 0
-    for _ in range(_RELEASED):
-        step = simulation.step()
-        seen = seen_from_supports(model, begin, step.after)
-        if _moves(model, begin, seen):
-            return False
-        speeds = np.where(model.fixed, 0.0, speed(model, seen))
-        calm = step.solution.converged and _rests(model, step.after, balance_of(model, step), speeds)
-        quiet = quiet + 1 if calm else 0
-        if quiet >= LASTING:
-            return True
-    return False
-
-
-def _moves(model: Model, before: State, after: State) -> bool:
-    """Return whether a stone has left the place where it rested."""
-    moved = displacement(model, before, after) > _STAYS * model.surfaces.size
-    return bool(moved[~model.fixed].any())
-
-
-def rests(model: Model, state: State, balance: Array) -> bool:
-    """Return whether all bodies are in balance (nb,) and slow, where no support is driven."""
-    return _rests(model, state, balance, np.where(model.fixed, 0.0, speed(model, state)))
-
-
 def _unbonded(model: Model, step: Step) -> tuple[str, ...]:
     """Return a caution on mortar that was to hold joints, but fills too little of them in the first step."""
     contacts, internal = step.contacts, step.internal
@@ -290,37 +276,8 @@ def _unbonded(model: Model, step: Step) -> tuple[str, ...]:
     one, other = (model.scene.blocks[body].code for body in sorted(contacts.bodies[wide[gap.argmax()]]))
     return (
         f"mortar does not hold {_percent(share)} of the area of its joints, where gaps or overlaps exceed a hundredth "
-        f"of the smaller stone's width ({one} and {other}: {_short(float(gap.max()))})",
+        f"of the smaller stone's width ({one} and {other}: {length(float(gap.max()))})",
     )
-
-
-def _rests(model: Model, state: State, balance: Array, speeds: Array) -> bool:
-    """Return whether all bodies are in balance (nb,) and slow (nb,).
-
-    A dashpot over a spring, c = τ k, may balance what the spring has yet to bear; a body then has the way v τ to go.
-    """
-    slow = _REST_SPEED * _fall(model, state)
-    if model.lag > 0.0:
-        slow = np.minimum(slow, _STAYS * model.surfaces.size / model.lag)
-    return bool(balance.max() <= model.scene.time.balance_tolerance and (speeds <= slow).all())
-
-
-def _fall(model: Model, state: State) -> Array:
-    """Return √(g · width) of each body (nb,) [m/s], with g = 1 m/s² where there is no gravity."""
-    speed: Array = np.sqrt((float(np.linalg.norm(model.gravity(state.time))) or 1.0) * model.surfaces.size)
-    return speed
-
-
-def _error(step: Step) -> float:
-    """Return the largest velocity by which a contact of an unsolved step breaks its law [m/s]."""
-    problem = step.problem
-    fastest = float(np.abs(problem.u_free).max(initial=0.0)) or float(np.abs(problem.bias).max(initial=0.0))
-    return residual(problem, step.solution.impulse).velocity * fastest
-
-
-def _short(length: float) -> str:
-    """Return a length in a unit that suits it."""
-    return f"{length:.3g} m" if length >= 1.0 else f"{1e3 * length:.3g} mm"
 
 
 def _percent(share: float) -> str:

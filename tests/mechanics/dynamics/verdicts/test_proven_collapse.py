@@ -1,0 +1,86 @@
+"""Collapses that are remembered, what lies when the time is over, and runs that are given up."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mechanics.dynamics.outcome import Outcome
+from mechanics.scene.loads.load import Loads, Pose
+from mechanics.scene.scene import SolverSettings
+from mechanics.simulate import simulate
+from tests.mechanics.shapes import brick, ground, scene
+
+
+class Jerk:
+    """Ground that moves by one versed sine along x from the start on; its record ends at `until` [s]."""
+
+    def __init__(self, size, period, until):
+        self.size, self.period, self.until = size, period, until
+        self.stones = frozenset({"ground"})
+
+    def pose(self, time):
+        part = min(time / self.period, 1.0)
+        away = 0.5 * self.size * (1.0 - np.cos(np.pi * part))
+        return Pose(np.array([away, 0.0, 0.0]), np.eye(3), np.zeros(3))
+
+
+def shaken(*stones, duration, size=0.35, until=5.0, **time):
+    """Slender blocks on ground that jerks for .3 s."""
+    one = scene(ground((-3, -3, -1), (6, 3, 0)), *stones, step=8e-3, theta=0.5, duration=duration, **time)
+    return replace(one, loads=Loads(motions=(Jerk(size, 0.3, until),)))
+
+
+def slender(code="a", x=0.0, width=0.2):
+    return brick(code, (x, 0, 0), (x + width, 0.2, 0.8))
+
+
+GOES_ON = "the loads were not over when the run ended at {} s: they change until 5 s"
+
+
+@pytest.mark.parametrize("duration", [1.6, pytest.param(2.4, marks=pytest.mark.slow)])
+def test_a_block_that_has_toppled_has_collapsed_though_its_record_goes_on(duration):
+    result = simulate(shaken(slender(), duration=duration, stop_at_equilibrium=False))
+    assert result.outcome is Outcome.COLLAPSED
+    assert result.reason.startswith("stone a had sunk by ")
+    assert result.reason.endswith("at the end it is 300 mm lower")
+    assert GOES_ON.format(f"{duration:g}") in result.cautions
+
+
+@pytest.mark.slow
+def test_a_collapse_ends_a_run_that_stops_without_a_word_on_its_record():
+    result = simulate(shaken(slender(), duration=2.4))
+    assert result.outcome is Outcome.COLLAPSED
+    assert result.reason.startswith("stone a has sunk by ")
+    assert not result.cautions
+
+
+@pytest.mark.slow
+def test_a_block_that_rocks_and_stays_upright_is_not_decided_before_its_record_ends():
+    result = simulate(shaken(slender(width=0.6), duration=1.0, stop_at_equilibrium=False))
+    assert result.outcome is Outcome.MOVING
+    assert GOES_ON.format("1") in result.cautions
+
+
+@pytest.mark.slow
+def test_of_two_blocks_the_one_that_topples_is_named():
+    stones = slender("stays", 2.0, 0.8), slender("falls")
+    result = simulate(shaken(*stones, duration=2.0, stop_at_equilibrium=False))
+    assert result.outcome is Outcome.COLLAPSED
+    assert result.reason.startswith("stone falls had sunk by ")
+
+
+def test_stones_that_contradict_each_other_are_given_up_and_named():
+    """Two stones are driven into each other: no step can be solved."""
+    stones = (
+        brick("a", (0, 0, 0), (1, 1, 1)),
+        brick("b", (0, 0, 1), (1, 1, 2)),
+        brick("c", (2, 2, 0), (3, 3, 1)),
+    )
+    solver = SolverSettings(tolerance=1e-17, velocity_tolerance=1e-17, max_iterations=20)
+    one = scene(ground(), *stones, step=5e-3, duration=2.0, stop_at_equilibrium=False)
+    result = simulate(replace(one, solver=solver))
+    assert result.outcome is Outcome.UNDECIDED
+    assert result.steps == 20
+    assert result.reason.startswith("the run was given up, as 20 of 20 steps were not solved")
+    assert "contacts of the stones " in result.reason
