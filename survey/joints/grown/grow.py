@@ -10,9 +10,10 @@ from survey.arrays import Array
 from survey.extrusion.extrusion import prism
 from survey.geometry.polygons import ring_area
 from survey.geometry.solids import Solid
+from survey.joints.grown.chains import apart
 from survey.joints.grown.leaf import Leaf
 from survey.joints.grown.medial_lines import LEFT_BELOW_RIGHT_ABOVE, medial_lines
-from survey.joints.grown.partition import Edge, Partition, apart, partition
+from survey.joints.grown.partition import Edge, Partition, partition
 from survey.joints.grown_leaf import GrownLeaf, Opening
 from survey.joints.report import StoneJoint
 from survey.joints.settings import JointSettings

@@ -8,11 +8,12 @@ from itertools import pairwise
 import numpy as np
 
 from moma.errors import GeometryError
-from survey.arrays import Array, Bools
-from survey.geometry.polygons import inside, ring_area
+from survey.arrays import Array
+from survey.geometry.polygons import inside
+from survey.joints.grown.chains import apart, crosses, is_simple
 from survey.joints.grown.medial_lines import Line, MedialLines
 
-__all__ = ["Edge", "Partition", "apart", "is_simple", "partition"]
+__all__ = ["Edge", "Partition", "partition"]
 
 _CHORD = 0.5  # of the mean thickness of a joint: largest distance of an edge from the medial line, within the mortar
 _ROUNDS = 10  # in each of which edges that cross others follow their lines twice as closely
@@ -265,7 +266,7 @@ def _straightened(
         rings = [_ring(stone, [chains[k] for k in of_stone[stone]]) for stone in range(count)]
         wrong = [k for k, ring in enumerate(rings) if ring is None or not is_simple(places[list(ring)])]
         wrong += [
-            k for k in of_stone if k >= count and _crosses(places, [chains[one][1] for one in of_stone[k]])
+            k for k in of_stone if k >= count and crosses(places, [chains[one][1] for one in of_stone[k]])
         ]
         if not wrong:
             return places, chains, tuple(ring for ring in rings if ring is not None)
@@ -329,53 +330,6 @@ def _ring(stone: int, chains: Chains) -> tuple[int, ...] | None:
         if here == start:
             break
     return tuple(ring) if here == start and len(ring) == sum(len(one) - 1 for one in after.values()) else None
-
-
-def is_simple(ring: Array) -> bool:
-    """Return whether a polygon (n, 2) runs counter-clockwise and no two of its sides meet but at their corner."""
-    count = len(ring)
-    if count < 3 or not ring_area(ring) > 0.0:
-        return False
-    way = np.roll(ring, -1, axis=0) - ring
-    met = _met_along(ring, way)
-    k = np.arange(count)
-    met[k, k] = met[k, (k + 1) % count] = met[(k + 1) % count, k] = False
-    if met.any():
-        return False
-    back = np.roll(way, 1, axis=0)
-    folded = np.abs(back[:, 0] * way[:, 1] - back[:, 1] * way[:, 0]) < 1e-12
-    return not bool((folded & ((back * way).sum(axis=1) < 0.0)).any())
-
-
-def _crosses(places: Array, chains: Sequence[Sequence[int]]) -> bool:
-    """Return whether edges of chains of corners meet elsewhere than at a common corner."""
-    pairs = np.array([pair for chain in chains for pair in pairwise(chain)])
-    start = places[pairs[:, 0]]
-    way = places[pairs[:, 1]] - start
-    common = (pairs[:, None, :, None] == pairs[None, :, None, :]).any(axis=(2, 3))
-    return bool((_met_along(start, way) & ~common).any())
-
-
-def _met_along(start: Array, way: Array) -> Bools:
-    """Return which of n segments meet which, (n, n)."""
-    offset = start[None] - start[:, None]
-    turn = way[:, None, 0] * way[None, :, 1] - way[:, None, 1] * way[None, :, 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        along = (offset[..., 0] * way[None, :, 1] - offset[..., 1] * way[None, :, 0]) / turn
-    met = (along >= 0.0) & (along <= 1.0)
-    out: Bools = met & met.T
-    return out
-
-
-def apart(places: Array, ring: Array, closed: bool = True) -> Array:
-    """Return the distances (n,) of places (n, 2) from the sides of a polygon, or of an open chain [m]."""
-    start, stop = (ring, np.roll(ring, -1, axis=0)) if closed else (ring[:-1], ring[1:])
-    way = stop - start
-    size = np.maximum((way**2).sum(axis=1), 1e-300)
-    off = places[:, None] - start[None]
-    along = np.clip((off * way).sum(axis=2) / size, 0.0, 1.0)
-    out: Array = np.linalg.norm(off - along[..., None] * way, axis=2).min(axis=1)
-    return out
 
 
 def _thickness(places: Array, line: Line, outlines: Sequence[Array]) -> Array:

@@ -12,10 +12,11 @@ from survey.clouds.masks import open_masks
 from survey.clouds.settings import MaskOptions
 from survey.geometry.solids import volume_of
 from survey.joints.close import close_joints
+from survey.joints.grown.chains import is_simple
 from survey.joints.grown.grow import grow
 from survey.joints.grown.leaf import find_leaves
 from survey.joints.grown.medial_lines import medial_lines
-from survey.joints.grown.partition import is_simple, partition
+from survey.joints.grown.partition import partition
 from survey.joints.settings import JointMode, JointSettings
 from survey.stones import survey_stones
 
