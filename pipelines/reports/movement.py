@@ -7,7 +7,9 @@ from typing import Any
 from pipelines.reports.html import input_rows, millimetres, picture, ratio, write_page
 from pipelines.reports.page.model import Model
 
-__all__ = ["write_comparison", "write_diagnosis_page"]
+__all__ = ["unrested", "write_comparison", "write_diagnosis_page"]
+
+_RESTS = ("equilibrium", "settled")  # outcomes whose movement is over
 
 _BEDS = (
     "Bed lines at their heights; departure from level, exaggerated as stated. Orange: measured, bars ± one standard "
@@ -58,7 +60,7 @@ def write_comparison(path: Path, summary: Mapping[str, Any], model: Model | None
         model,
         name=summary["scene"],
         lead=f"Measured against simulated deformation: χ² {summary['chi2']:.1f} of {summary['dof']} degrees of "
-        f"freedom; {summary['chi2_still']:.1f} if nothing had moved.",
+        f"freedom; {summary['chi2_still']:.1f} if nothing had moved{unrested(summary['outcome'])}.",
         cautions=summary["cautions"],
         inputs=input_rows(summary),
         warnings=(),
@@ -99,6 +101,11 @@ def write_diagnosis_page(path: Path, name: str, summary: Mapping[str, Any], mode
         ],
         notes=notes,
     )
+
+
+def unrested(outcome: str) -> str:
+    """Return the doubt that a run casts on its movement which did not come to rest; nothing after one that did."""
+    return "" if outcome in _RESTS else f"; but the stones did not come to rest: {outcome}"
 
 
 def _figures(folder: Path) -> list[dict[str, str]]:

@@ -61,11 +61,13 @@ def _mechanism(found: dict[str, Any], verbose: bool) -> list[str]:
 
 def comparison_lines(done: "SurveyComparison", verbose: bool) -> list[str]:
     """Return the lines of a comparison: the whole, each wall, and the courses with the largest misfits."""
+    from pipelines.reports.movement import unrested
+
     summary = done.summary
     courses = sorted(summary["courses"], key=lambda one: -_ratio(one))
     shown = courses if verbose else courses[:_COURSES]
     return [
-        f"{summary['scene']}: {_misfit(summary)}",
+        f"{summary['scene']}: {_misfit(summary)}{unrested(summary['outcome'])}",
         "  χ² near its degrees of freedom: the movement explains what was measured; in brackets, if nothing had moved",
         *(f"  {caution}" for caution in summary["cautions"]),
         *(f"  {_wall(one)}, {one['quantity']}: {_misfit(one)}" for one in summary["walls"]),

@@ -202,13 +202,10 @@ def _headline(test: LoadingTest, band: Band | None) -> str:
     return f"{text}; it {way}"
 
 
-def _summary(
-    assembled: Assembly, asked: Pushing, test: LoadingTest, band: Band | None, measured: Array | None
-) -> dict[str, Any]:
-    """Return the contents of pushover.json, but for its files."""
-    steps, disturbed = len(test.force), int(np.sum(~test.calm))
-    soft = sum(block.fidelity is Fidelity.DEFORMABLE for block in assembled.scene.blocks)
-    cautions = [
+def _doubts(test: LoadingTest, disturbed: int) -> list[str]:
+    """Return why the curve may be wrong, the gravest reason first; `disturbed` steps were not calm."""
+    steps = len(test.force)
+    return [
         *(["it was stopped before its end"] if test.stopped else []),
         *(
             [f"{test.unsolved} of {steps} steps were not solved to the tolerance"]
@@ -225,6 +222,18 @@ def _summary(
             if test.energy_error > _BALANCE
             else []
         ),
+    ]
+
+
+def _summary(
+    assembled: Assembly, asked: Pushing, test: LoadingTest, band: Band | None, measured: Array | None
+) -> dict[str, Any]:
+    """Return the contents of pushover.json, but for its files."""
+    steps, disturbed = len(test.force), int(np.sum(~test.calm))
+    soft = sum(block.fidelity is Fidelity.DEFORMABLE for block in assembled.scene.blocks)
+    doubts = _doubts(test, disturbed)
+    cautions = [
+        *doubts,
         *([f"{soft} deformable stones count as rigid"] if soft else []),
         *stays_open(assembled),
     ]
@@ -233,7 +242,7 @@ def _summary(
     weight = float(model.mass[test.free].sum() * np.linalg.norm(model.scene.gravity))
     return {
         "scene": assembled.scene.name,
-        "headline": _headline(test, band),
+        "headline": "; but ".join([_headline(test, band), *doubts[:1]]),
         "cautions": [*cautions, *assembled.remarks],
         "stones": len(assembled.scene.blocks),
         "weight": weight,

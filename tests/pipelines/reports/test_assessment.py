@@ -5,6 +5,7 @@ import base64
 import pytest
 
 from pipelines.reports.assessment import write_assessment
+from pipelines.reports.movement import write_comparison
 from pipelines.reports.pushover import write_pushover
 from tests.pipelines.reports.page import Page
 from tests.pipelines.reports.summaries import WALL, assessed, pushed
@@ -75,3 +76,11 @@ def test_a_loading_test_says_first_what_the_stones_bear_and_how_sure_that_is(tmp
     )
     assert "72.00 kN to the left along the wall" in told
     assert "no scatter was stated" in told
+
+
+@pytest.mark.parametrize(("outcome", "doubt"), [("moving", True), ("undecided", True), ("settled", False)])
+def test_a_comparison_with_a_run_that_did_not_rest_says_so_in_its_first_line(tmp_path, outcome, doubt):
+    one = assessed(chi2=10.0, dof=8, chi2_still=20.0, walls=[], courses=[], outcome=outcome)
+    write_comparison(tmp_path / "c.html", one, None)
+    lead = next(text for text in Page(tmp_path / "c.html").text if text.startswith("Measured against"))
+    assert (f"the stones did not come to rest: {outcome}" in lead) == doubt

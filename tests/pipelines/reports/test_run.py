@@ -196,6 +196,23 @@ def test_the_report_begins_with_the_outcome(tmp_path, outcome, lead):
     assert lead in " ".join(Page(tmp_path / "report.html").text[:6])
 
 
+@pytest.mark.parametrize("caution", ["it is unsound: a hole", "3 of 9 steps were not solved"])
+def test_what_may_be_wrong_says_so_in_the_first_line_of_the_report(tmp_path, caution):
+    result = result_of([rigid_body("a", (0, 0, 0), (1, 1, 1))], pairs=(), forces=())
+    result = replace(result, cautions=(caution, "another"))
+    write_report(
+        tmp_path / "report.html",
+        result,
+        summarise(result, version="1.2", seconds={}),
+        stone_results(result),
+        [],
+    )
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    first = text[text.index('<p class="lead open">') :]
+    assert f"Caution: {caution}" in first[: first.index("</p>")]
+    assert text.count("Caution: another") == 1
+
+
 def test_the_report_of_a_rigid_collapse_says_so(rigid, tmp_path):
     summary = summarise(rigid, version="1.2", seconds={})
     write_report(tmp_path / "report.html", rigid, summary, stone_results(rigid), [])

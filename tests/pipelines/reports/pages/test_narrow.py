@@ -75,6 +75,7 @@ def test_reports_of_assessments_loading_tests_and_comparisons_fit(browser, tmp_p
         dof=8,
         chi2_still=20.0,
         walls=[],
+        outcome="settled",
         courses=[course | {"measured": 1e-3, "simulated": 1e-3, "sigma": 1e-4}],
     )
     write_assessment(tmp_path / "a.html", assessed(scene=LONG))
