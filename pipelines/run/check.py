@@ -30,7 +30,7 @@ from pipelines.run.closing_check import joints_report, simplification_report
 from pipelines.run.fidelity import Modelled, modelled
 from pipelines.run.filling import filling
 from pipelines.run.inputs import stage_lines
-from pipelines.run.plausibility import corner_warnings, impossible_values, unusual_values
+from pipelines.run.plausibility import corner_warnings, depth_warnings, impossible_values, unusual_values
 from pipelines.run.run import USUAL
 from pipelines.run.soundness import (
     stands_alone,
@@ -206,6 +206,7 @@ def _report(
         warnings=(
             *unusual_values(scene, models),
             *corner_warnings(models),
+            *depth_warnings(models),
             *(() if assembly is None else assembly.remarks),
             *(() if assembly is None else unsupported_stages(scene, assembly)),
             *(() if assembly is None or not _in_rig(scene, assembly) else (_IN_RIG,)),

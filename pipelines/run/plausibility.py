@@ -5,6 +5,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from archmodel.store.stone_record import StoneRecord
+from mechanics.arrays import Array, Ints
 from mechanics.scene.scene import Fidelity
 from pipelines.scene.file import SceneFile
 from pipelines.scene.selection import StoneModel
@@ -12,9 +14,13 @@ from survey.quality.corners import SeenFace, misplaced_corners
 from survey.quality.plausible import DENSITY, FRICTION, LENGTH, POISSON, YOUNG, Doubt, doubt_of
 from survey.records.survey import OUTLINE_NOTE
 
-__all__ = ["corner_warnings", "impossible_values", "unusual_values"]
+__all__ = ["corner_warnings", "depth_warnings", "impossible_values", "unusual_values"]
 
 _SHOWN = 6  # most findings of one sort that are named
+_HEADERS = 0.1  # share of a façade's area whose stones reach through the leaf, as headers do, at least [-]
+_THIN = 0.8  # depth over that of the leaf below which a stone leaves a void behind it: backs are hewn to a tenth [-]
+_BEHIND = 0.01  # by which a stone must reach farther back to lie behind another: a joint [m]
+_SQUARE = 10.0  # angle of faces that belong to one façade [°]
 _MANY_STEPS = 1e7  # an hour for the smallest scenes, at 0.3 ms for a step
 _ENDLESS_STEPS = 1e9  # days even for a single stone
 _LONG_STEP = 0.05  # in which a falling stone moves by its joint's width and more: g h² = 25 mm [s]
@@ -43,6 +49,55 @@ def corner_warnings(models: Sequence[StoneModel]) -> list[str]:
     texts = [f"stone {one.code}: {one.text}; measure its corners again" for one in found]
     left = len(texts) - _SHOWN
     return [*texts[:_SHOWN], *([f"{left} more signs of corners out of place"] if left > 0 else [])]
+
+
+def depth_warnings(models: Sequence[StoneModel]) -> list[str]:
+    """List the stones of each façade that are thinner than its leaf, with nothing behind them.
+
+    The leaf is as thick as the stones that reach through it: those of the deepest tenth of the façade's area.
+    """
+    records = [one.record for one in models]
+    facing = np.array([one.normal for one in records]).reshape(-1, 3)
+    upright = np.abs(facing[:, 2]) <= np.sin(np.radians(_SQUARE))
+    turn = np.degrees(np.arctan2(facing[:, 1], facing[:, 0]))
+    left, texts = upright.copy(), list[str]()
+    while left.any():
+        first = float(turn[np.flatnonzero(left)[0]])
+        here = left & (np.abs((turn - first + 180.0) % 360.0 - 180.0) <= _SQUARE)
+        left &= ~here
+        outwards = facing[here].mean(axis=0) * [1.0, 1.0, 0.0]
+        texts += _thin(records, np.flatnonzero(here), outwards / np.linalg.norm(outwards))
+    return texts
+
+
+def _thin(records: Sequence[StoneRecord], facade: Ints, outwards: Array) -> list[str]:
+    """Return a warning on the stones of a façade (rows of the records) that are thinner than its leaf."""
+    axes = np.array([(-outwards[1], outwards[0], 0.0), outwards, (0.0, 0.0, 1.0)]).T
+    low, high = (
+        np.array([bound(one.solid_vertices @ axes, axis=0) for one in records]) for bound in (np.min, np.max)
+    )
+    depth = (high - low)[facade, 1]
+    order = np.argsort(-depth, kind="stable")
+    area = np.cumsum(np.array([records[row].area for row in facade])[order])
+    through = order[int(np.searchsorted(area, _HEADERS * area[-1]))]
+    leaf, back = float(depth[through]), float(low[facade[through], 1])
+    void = list[tuple[str, float]]()
+    for row, deep in zip(facade.tolist(), depth.tolist(), strict=True):
+        if deep >= _THIN * leaf or low[row, 1] <= back + _BEHIND:
+            continue
+        middle = 0.5 * (low[row] + high[row])
+        covers = ((low <= middle) & (middle <= high))[:, [0, 2]].all(axis=1)
+        if not (covers & (low[:, 1] < low[row, 1] - _BEHIND)).any():
+            void.append((records[row].code, deep))
+    if not void:
+        return []
+    named = ", ".join(f"{code} {deep:.2f} m" for code, deep in void[:_SHOWN])
+    more = f" and {len(void) - _SHOWN} more" if len(void) > _SHOWN else ""
+    count = f"{len(void)} stones are" if len(void) > 1 else "1 stone is"
+    return [
+        f"{count} thinner than the wall, {leaf:.2f} m, with nothing behind: {named}{more}; the void counts as empty: "
+        "propose a core (`moma propose infill`), give their depth, or state why"
+    ]
 
 
 def _doubts(scene: SceneFile, models: Sequence[StoneModel]) -> Iterator[tuple[str, Doubt]]:

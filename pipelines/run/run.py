@@ -43,7 +43,7 @@ from pipelines.results.wall_axes import wall_record
 from pipelines.run.assemble import Assembly, assemble_stones
 from pipelines.run.filling import filling
 from pipelines.run.inputs import run_inputs
-from pipelines.run.plausibility import corner_warnings, unusual_values
+from pipelines.run.plausibility import corner_warnings, depth_warnings, unusual_values
 from pipelines.run.record import run_record, store_record, versions
 from pipelines.run.soundness import caution_of, problems_of, refuse_unsound, unsupported_stages
 from pipelines.run.unfinished import UnfinishedRun, unfinished_run
@@ -140,6 +140,7 @@ def run_scene(
                     *assembly.remarks,
                     *unusual_values(scene, models),
                     *corner_warnings(models),
+                    *depth_warnings(models),
                     *unsupported_stages(scene, assembly),
                 ),
                 inputs=run_inputs(scene, assembly, groups, session),

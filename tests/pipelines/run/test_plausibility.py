@@ -1,13 +1,16 @@
 """Checks of values that no stone can have, and of corners out of place, before a scene is built."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from moma.errors import SceneError
 from pipelines.ingest.ingest import ingest
 from pipelines.reports.survey.report import report_surveys
 from pipelines.run.check import check_scene
+from pipelines.run.plausibility import depth_warnings
 from tests.moma.commands import invoke, prints
 
 WINDOW = Path("data/samples/window/window.moma")
@@ -148,3 +151,43 @@ def test_check_exits_with_1_on_what_no_stone_can_be(tmp_path, url):
     assert done.exit_code == 1
     assert "in GPa it would be 1e+10 Pa" in done.stdout
     assert "sound" not in done.stdout
+
+
+def laid(depths, normal=(0.0, -1.0, 0.0), behind=()):
+    """Stones of 0.6 x 0.3 m side by side in a façade at y = 0 with these depths, and others behind some of them."""
+    turn = np.array([(-normal[1], normal[0], 0.0), (-normal[0], -normal[1], 0.0), (0.0, 0.0, 1.0)])
+    stones = []
+    for place, front, deep in [*((k, 0.0, one) for k, one in enumerate(depths)), *behind]:
+        corners = [
+            (x, y, z)
+            for x in (0.6 * place, 0.6 * place + 0.6)
+            for y in (front, front + deep)
+            for z in (0, 0.3)
+        ]
+        record = SimpleNamespace(
+            code=f"s{len(stones)}",
+            normal=np.array(normal),
+            solid_vertices=np.array(corners) @ turn,
+            area=0.18,
+        )
+        stones.append(SimpleNamespace(record=record))
+    return stones
+
+
+@pytest.mark.parametrize("normal", [(0.0, -1.0, 0.0), (0.6, 0.8, 0.0)])
+def test_stones_thinner_than_their_wall_are_told(normal):
+    (said,) = depth_warnings(laid([0.3, 0.5, 0.3, 0.3, 0.5], normal))
+    assert said.startswith(
+        "3 stones are thinner than the wall, 0.50 m, with nothing behind: s0 0.30 m, s2 0.30 m"
+    )
+    assert "propose a core" in said
+    assert depth_warnings(laid([0.45, 0.5, 0.48], normal)) == []
+    assert depth_warnings(laid([0.3] * 5, normal)) == []
+
+
+def test_a_core_or_a_second_leaf_fills_what_lies_behind_thin_stones():
+    assert depth_warnings(laid([0.3, 0.5, 0.3], behind=[(0, 0.31, 0.19), (2, 0.31, 0.19)])) == []
+    (said,) = depth_warnings(laid([0.3, 0.5, 0.3], behind=[(0, 0.31, 0.19)]))
+    assert said.startswith("1 stone is thinner than the wall, 0.50 m, with nothing behind: s2 0.30 m;")
+    # one deep quoin in thirty stones does not make the wall as deep
+    assert depth_warnings(laid([0.3] * 29 + [0.9])) == []
