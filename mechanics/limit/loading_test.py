@@ -14,28 +14,35 @@ from scipy.spatial.transform import Rotation
 from mechanics.arrays import Array, Bools, Ints
 from mechanics.dynamics.energy_balance import EnergyBalance
 from mechanics.dynamics.observers.energy import kinetic_energy
+from mechanics.dynamics.observers.equilibrium import displacement
 from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.dynamics.simulation import Simulation
 from mechanics.dynamics.static_start import static_start
 from mechanics.dynamics.step import Step
 from mechanics.limit.pushover import SPEED
 from mechanics.model.model import Model, build_model
-from mechanics.scene.loads.load import Pose
+from mechanics.scene.jaws import JawPath
+from mechanics.scene.laws.cohesive_zone import CohesiveZone
+from mechanics.scene.laws.elastic_joint import ElasticJoint
 from mechanics.scene.rig import BEAM, JAWS, Rig, rigged
 from mechanics.scene.scene import Scene, TimeSettings
 from mechanics.scene.state import State
 from moma.errors import SceneError, SolverError
 
-__all__ = ["LoadingTest", "loading_test"]
+__all__ = ["LoadingTest", "loading_test", "softening_step"]
 
 # steps over the largest way, where no other step is asked for
 _STEPS = 200
+# steps over the displacement 2 G/c in which a bond softens: at the half of its strength it is seen once at least
+_SOFTENING_STEPS = 2
 # inertia over the largest force up to which a step is calm [-]
 _CALM = 0.01
 # of displacements, over the largest [-]
 _ROUNDING = 1e-9
-# share of the largest force up to which the curve gives the initial stiffness [-]
-_INITIAL = 0.3
+# shares of the largest force at which laboratories take secants [-]
+_EARLY, _INITIAL = 0.15, 0.3
+# stones that an error names: so many at most, of those that moved by this share of the largest displacement
+_NAMED, _MOVES = 6, 0.5
 
 
 @dataclass(frozen=True)
@@ -73,8 +80,7 @@ class LoadingTest:
     @property
     def free(self) -> Bools:
         """Bodies (nb,) that are stones and not fixed."""
-        found: Bools = ~self.model.fixed & [block.code != BEAM for block in self.model.scene.blocks]
-        return found
+        return _stones(self.model)
 
     @property
     def calm(self) -> Bools:
@@ -91,7 +97,16 @@ class LoadingTest:
     @property
     def stiffness(self) -> float:
         """Secant of the curve's first branch at 0.3 of the largest force [N/m]."""
-        goal = _INITIAL * np.abs(self.force).max()
+        return self.secant(_INITIAL)
+
+    @property
+    def early_stiffness(self) -> float:
+        """Secant of the curve's first branch at 0.15 of the largest force [N/m]."""
+        return self.secant(_EARLY)
+
+    def secant(self, share: float) -> float:
+        """Return the secant of the curve's first branch at a share of the largest force [N/m]."""
+        goal = share * np.abs(self.force).max()
         first = int(np.argmax(np.abs(self.force) >= goal))
         places, forces = np.insert(self.displacement, 0, 0.0), np.insert(self.force, 0, 0.0)
         one, two = np.abs(forces[first : first + 2])
@@ -128,39 +143,10 @@ class LoadingTest:
         return float(middle * self.rig.height / self.displacement[-1])
 
 
-class _Path:
-    """Motion of jaws to given displacements in turn, at a constant speed; they rise with what they push.
-
-    Parameters
-    ----------
-    stones : codes of the jaws
-    direction : (3,) unit vector
-    to : displacements in turn [m]
-    speed : [m/s]
-
-    Attributes
-    ----------
-    rise : of the jaws so far [m]
-    """
-
-    def __init__(self, stones: frozenset[str], direction: Array, to: Sequence[float], speed: float) -> None:
-        self.stones, self._direction = stones, direction
-        self._way = np.concatenate([[0.0], to])
-        self._time = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(self._way)))]) / speed
-        self.rise = 0.0
-
-    @property
-    def until(self) -> float:
-        """Time at which they come to rest [s]."""
-        return float(self._time[-1])
-
-    def at(self, time: float) -> float:
-        """Return the displacement at `time` [m]."""
-        return float(np.interp(time, self._time, self._way))
-
-    def pose(self, time: float) -> Pose:
-        """Return the pose at `time` [s]."""
-        return Pose(self.at(time) * self._direction + [0.0, 0.0, self.rise], np.eye(3), np.zeros(3))
+def _stones(model: Model) -> Bools:
+    """Return the bodies (nb,) that are stones and not fixed."""
+    found: Bools = ~model.fixed & [block.code != BEAM for block in model.scene.blocks]
+    return found
 
 
 class _Pushed:
@@ -204,7 +190,7 @@ def loading_test(
     scene : the stones and their laws, without loads that change with time; its time settings are not used
     rig : where it is pushed
     to : displacements of the push, in turn; their signs are those of the rig's direction [m]
-    step : way of one step; None: 1/200 of the largest displacement [m]
+    step : way of one step; None: 1/200 of the largest displacement, or `softening_step` where that is less [m]
     progress, stop : called and asked at every step
 
     Raises
@@ -226,19 +212,15 @@ def loading_test(
             remedy="give displacements of one sign, or turn the direction",
         )
     furthest = float(np.abs(to).max())
-    way = step or furthest / _STEPS
+    way = step or min(furthest / _STEPS, softening_step(scene))
     speed = SPEED * float(np.sqrt(2.0 * np.linalg.norm(scene.gravity) * furthest))
-    path = _Path(frozenset(JAWS if rig.has_beam else JAWS[:1]), rig.axes[0], to, speed)
+    path = JawPath(frozenset(JAWS if rig.has_beam else JAWS[:1]), rig.axes[0], to, speed)
     duration = way / speed
     scene = replace(scene, time=TimeSettings(duration, theta=1.0, duration=path.until + duration))
     model, begin = build_model(rigged(scene, rig, path))
-    told, search = static_start(model, begin, progress)
+    told, search = static_start(_loaded(model, rig), begin, progress)
     if not told.found:
-        raise SolverError(
-            "the stones do not come to rest under the vertical force",
-            where=scene.name,
-            remedy="look at them with `moma check` and `moma run`, or lower the load",
-        )
+        raise _restless(model, begin, search.state)
     simulation = Simulation(model, begin)
     simulation.take_over(search)
     settled = simulation.state
@@ -280,6 +262,40 @@ def loading_test(
         unsolved,
         abs(balance.unexplained) / balance.reference,
         number < steps,
+    )
+
+
+def _loaded(model: Model, rig: Rig) -> Model:
+    """Return the model whose rest is judged by what its stones carry: their weight and the force on their top."""
+    scene = model.scene
+    weight = float(model.mass[_stones(model)].sum() * np.linalg.norm(scene.gravity))
+    carried = 1.0 + rig.load / weight if weight > 0 else 1.0
+    time = replace(scene.time, balance_tolerance=carried * scene.time.balance_tolerance)
+    return replace(model, scene=replace(scene, time=time))
+
+
+def softening_step(scene: Scene) -> float:
+    """Return the longest step that resolves the softening of all bonds, from 2 G/c; infinite where none soften [m]."""
+    laws = (scene.contact.law, *(rule.law for rule in scene.contact.rules))
+    ways = [law.softening for law in laws if isinstance(law, CohesiveZone | ElasticJoint)]
+    return min(ways, default=np.inf) / _SOFTENING_STEPS
+
+
+def _restless(model: Model, begin: State, now: State) -> SolverError:
+    """Return the error that names the stones which have moved most, with their places."""
+    moved = np.where(_stones(model), displacement(model, begin, now), 0.0)
+    order = [k for k in np.argsort(-moved).tolist() if moved[k] >= _MOVES * moved.max()]
+    names = ", ".join(
+        f"{model.scene.blocks[k].code} at ({', '.join(f'{x:.2f}' for x in begin.centre[k])}) m by "
+        f"{1e3 * moved[k]:.3g} mm"
+        for k in order[:_NAMED]
+    )
+    more = f" and {len(order) - _NAMED} more" if len(order) > _NAMED else ""
+    return SolverError(
+        f"the stones do not come to rest under the vertical force; still moving or fallen: {names}{more}",
+        where=model.scene.name,
+        remedy="look there for joints that are steep, weak or of little area (`moma check SCENE --pictures DIR` draws "
+        "them), and lower the load, or raise friction and strengths",
     )
 
 

@@ -76,7 +76,8 @@ def _values(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     for name, value in summary["strength"].items():
         if value:
             yield f"Largest force {name}", f"{1e-3 * value:.4g} kN"
-    yield "Initial stiffness, secant at 0.3 of it", f"{1e-6 * summary['stiffness']:.4g} kN/mm"
+    secants = f"{1e-6 * summary['early_stiffness']:.3g} and {1e-6 * summary['stiffness']:.3g} kN/mm"
+    yield "Initial stiffness, secants at 15 and 30 % of it", secants
     yield "Share of the displacement by stones that turn", f"{summary['turning']:.2f}"
     yield "Settling under the vertical force", f"{1e3 * summary['settling']:.3g} mm"
     errors = summary["errors"]

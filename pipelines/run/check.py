@@ -33,7 +33,7 @@ from pipelines.run.inputs import stage_lines
 from pipelines.run.plausibility import corner_warnings, depth_warnings, impossible_values, unusual_values
 from pipelines.run.run import USUAL
 from pipelines.run.soundness import (
-    stands_alone,
+    in_rig,
     unfinished_loads,
     unsound_stones,
     unsupported,
@@ -41,6 +41,7 @@ from pipelines.run.soundness import (
 )
 from pipelines.scene.array_tables import describe
 from pipelines.scene.file import SceneFile, read_scene
+from pipelines.scene.rig_cautions import rig_cautions
 from pipelines.scene.selection import Groups, StoneModel, select_groups, select_stones
 from pipelines.tuning.profiles import with_profile
 from survey.geometry.solids import Solid
@@ -57,7 +58,10 @@ _SPREAD = 2.0  # factor within which these lie [-]
 _LIBRARIES = 280_000_000  # memory of the libraries that read, draw and store [bytes]
 
 
-_IN_RIG = "no stone is fixed: only `moma pushover` can use the scene, whose rig has a base"
+_IN_RIG = (
+    "no stone is fixed: only `moma pushover` can use the scene, whose rig has a base; it also finds whether the stones "
+    "rest under the vertical force, and names those that do not"
+)
 
 
 def check_scene(
@@ -103,7 +107,7 @@ def check_scene(
         problems += unsound_stones(assembly)
         progress(Progress("check", 0, None, "meshes, and contacts at the start"))
         needs = plan(assembly.scene)
-        if not _in_rig(scene, assembly):
+        if not in_rig(scene, assembly):
             problems += unsupported(assembly.scene, needs.loose)
     except (GeometryError, MeshError) as error:
         problems.append(str(error))
@@ -128,9 +132,12 @@ def _with_pictures(report: CheckReport, assembly: Assembly, folder: Path, scene:
     return report
 
 
-def _in_rig(scene: SceneFile, assembly: Assembly) -> bool:
-    """Return True where the stones stand on the base of a test rig alone."""
-    return scene.pushover is not None and stands_alone(assembly.scene)
+def _of_rig(scene: SceneFile, assembly: Assembly) -> list[str]:
+    """Return the warnings about a loading test that the scene asks for."""
+    if scene.pushover is None:
+        return []
+    alone = [_IN_RIG] if in_rig(scene, assembly) else []
+    return [*rig_cautions(assembly.scene, scene.pushover.rig, scene.pushover.step), *alone]
 
 
 def _simplified(assembly: Assembly) -> list[BlockyStone]:
@@ -209,7 +216,7 @@ def _report(
             *depth_warnings(models),
             *(() if assembly is None else assembly.remarks),
             *(() if assembly is None else unsupported_stages(scene, assembly)),
-            *(() if assembly is None or not _in_rig(scene, assembly) else (_IN_RIG,)),
+            *(() if assembly is None else _of_rig(scene, assembly)),
         ),
         cautions=() if assembly is None else unfinished_loads(assembly),
     )

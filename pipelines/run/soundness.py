@@ -16,11 +16,12 @@ from survey.geometry.watertight import check_watertight, doubtful_solids
 from survey.joints.settings import JointMode
 
 __all__ = [
-    "caution_of", "problems_of", "refuse_unsound", "some", "stands_alone", "unfinished_loads", "unsound_stones",
-    "unsupported", "unsupported_stages",
+    "caution_of", "in_rig", "problems_of", "refuse_unsound", "some", "stands_alone", "unfinished_loads",
+    "unsound_stones", "unsupported", "unsupported_stages",
 ]  # fmt: skip
 
 _DEEP = 0.005  # overlap [m]; less is survey noise, which the contacts absorb
+_LEVEL = 1e-3  # over the height of all stones, by which bottoms in one level differ [-]
 _NAMED = 6  # most stones, or pairs of stones, that one problem names
 
 
@@ -36,8 +37,25 @@ def problems_of(scene: SceneFile, assembly: Assembly, loose: Sequence[str]) -> t
     return (
         *impossible_values(scene, assembly.models),
         *unsound_stones(assembly),
-        *unsupported(assembly.scene, loose),
+        *(_without_rig(assembly.scene) if in_rig(scene, assembly) else unsupported(assembly.scene, loose)),
     )
+
+
+def in_rig(scene: SceneFile, assembly: Assembly) -> bool:
+    """Return whether the stones stand on the base of a test rig alone."""
+    return scene.pushover is not None and stands_alone(assembly.scene)
+
+
+def _without_rig(scene: Scene) -> list[str]:
+    """Return the problem of stones that only a rig holds, and the stones that would stand on the ground instead."""
+    bottoms = {block.code: float(block.vertices[:, 2].min()) for block in scene.blocks}
+    tall = max(float(block.vertices[:, 2].max()) for block in scene.blocks) - min(bottoms.values())
+    lowest = [code for code, z in bottoms.items() if z <= min(bottoms.values()) + _LEVEL * tall]
+    codes = ", ".join(f'"{code}"' for code in lowest)
+    return [
+        "no stone is fixed: only the rig of `moma pushover` has a base; to run the stones under their weight alone, "
+        f"fix the lowest: [bodies] fixed = [{codes}]"
+    ]
 
 
 def caution_of(problems: Sequence[str]) -> str:

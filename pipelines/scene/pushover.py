@@ -28,7 +28,8 @@ PUSHOVER_KEYS = (
     Key(
         "step",
         ValueKind.NUMBER,
-        "Way of one step; if not given, 1/200 of the largest displacement.",
+        "Way of one step; if not given, 1/200 of the largest displacement, or half of the least 2 G/c of bonds that "
+        "soften, where that is less.",
         "m",
         None,
         above=0,

@@ -46,6 +46,11 @@ class CohesiveZone:
         return 2.0 * self.energy_tension / self.held
 
     @property
+    def softening(self) -> float:
+        """Shortest displacement over which the bond is lost, the least of δ_f,N and δ_f,T [m]."""
+        return min(self.reach, 2.0 * self.energy_shear / self.shear)
+
+    @property
     def held(self) -> float:
         """Tension that a whole bond holds [Pa]."""
         return held_tension(self.friction, self.tension, self.shear)

@@ -175,6 +175,11 @@ class ElasticJoint:
         return self._zone.reach if self.softens else 0.0
 
     @property
+    def softening(self) -> float:
+        """Shortest displacement over which a bond is lost, 2 G/c; infinite where none softens [m]."""
+        return self._zone.softening if self.softens else np.inf
+
+    @property
     def bonded(self) -> bool:
         """True for mortar, which holds tension or shear without pressure."""
         return self.shear > 0 or self.tension > 0

@@ -113,7 +113,8 @@ def pushover_lines(done: "Pushed") -> list[str]:
     return [
         f"{summary['scene']}: {summary['headline']}",
         *(f"  {caution}" for caution in summary["cautions"]),
-        f"  initial stiffness {1e-6 * summary['stiffness']:.4g} kN/mm, secant at 0.3 of the largest force",
+        f"  initial stiffness {1e-6 * summary['early_stiffness']:.3g} and {1e-6 * summary['stiffness']:.3g} kN/mm, "
+        "secants at 15 and 30 % of the largest force",
         f"  {summary['steps']} steps, {errors['unsolved']} not solved; "
         f"error of the rate {1e-3 * errors['rate']:.2g} kN",
         *(

@@ -17,6 +17,7 @@ from mechanics.scene.rig import Rig
 from mechanics.scene.scene import Fidelity, Scene
 from moma.errors import UsageError
 from pipelines.assess.pushover.band import Band, banded, varied
+from pipelines.assess.pushover.findings import doubts_of, headline_of
 from pipelines.assess.pushover.measured import read_curve
 from pipelines.draw.loading import draw_curve, draw_pushed
 from pipelines.reports.pushover import write_pushover
@@ -31,6 +32,7 @@ from pipelines.run.soundness import refuse_unsound, unsound_stones
 from pipelines.scene.file import SceneFile, read_scene
 from pipelines.scene.laws import law_rules
 from pipelines.scene.pushover import Pushing
+from pipelines.scene.rig_cautions import rig_cautions
 from pipelines.scene.selection import Groups, select_groups, select_stones
 from pipelines.scene.stages import refuse_stages
 
@@ -46,9 +48,6 @@ COLUMNS = ("displacement", "force", "inertia", "lift")
 """Columns of curve.csv: of the push [m], on the jaws [N], the error of the rate [N], and rise of the beam [m]."""
 
 _SOUND_FIRST = "mend the scene until `moma check` finds nothing"
-_ROCKS, _SLIDES = 0.5, 0.2  # share of turning from which stones rock, and up to which they slide [-]
-_FEW = 0.02  # share of steps that may be left unsolved, or that inertia may disturb, without a caution [-]
-_BALANCE = 1e-3  # energy that no term explains, up to which there is no caution [-]
 
 
 @dataclass(frozen=True)
@@ -129,9 +128,9 @@ def push(
         return loading_test(*varied(stones, asked.rig, name, factor), asked.to, asked.step, within, stop)
 
     test = loading_test(stones, asked.rig, asked.to, asked.step, within, stop)
-    progress(Progress("push", 1, total, found=_headline(test, None)))
+    progress(Progress("push", 1, total, found=headline_of(test, None)))
     band = banded(test, asked.scatter, asked.level, tested) if asked.scatter and not test.stopped else None
-    summary = _summary(assembled, asked, test, band, measured)
+    summary = _summary(assembled, stones, asked, test, band, measured)
     summary["inputs"] = {title: list(lines) for title, lines in inputs.items()}
     with replacing(folder, INDEX) as fresh:
         title = f"{scene.name}: {summary['headline']}"
@@ -190,50 +189,20 @@ def _rig(asked: Pushing) -> tuple[str, ...]:
     )
 
 
-def _headline(test: LoadingTest, band: Band | None) -> str:
-    """Return what the stones bear in a sentence."""
-    forwards, backwards = test.strength
-    told = [f"{1e-3 * value:.4g} kN" for value in (forwards, backwards) if value]
-    text = f"bears {' and '.join(told) or 'nothing'}"
-    if band is not None:
-        text += f" ± {1e-3 * band.strength:.2g} kN ({100 * band.level:g} % band)"
-    share = test.turning
-    way = "rocks" if share > _ROCKS else "slides in its joints" if share < _SLIDES else "rocks and slides"
-    return f"{text}; it {way}"
-
-
-def _doubts(test: LoadingTest, disturbed: int) -> list[str]:
-    """Return why the curve may be wrong, the gravest reason first; `disturbed` steps were not calm."""
-    steps = len(test.force)
-    return [
-        *(["it was stopped before its end"] if test.stopped else []),
-        *(
-            [f"{test.unsolved} of {steps} steps were not solved to the tolerance"]
-            if test.unsolved > _FEW * steps
-            else []
-        ),
-        *(
-            [f"in {disturbed} of {steps} steps stones gathered speed: their forces are not those of rest"]
-            if disturbed > _FEW * steps
-            else []
-        ),
-        *(
-            [f"energy does not balance by {100 * test.energy_error:.2g} %"]
-            if test.energy_error > _BALANCE
-            else []
-        ),
-    ]
-
-
 def _summary(
-    assembled: Assembly, asked: Pushing, test: LoadingTest, band: Band | None, measured: Array | None
+    assembled: Assembly,
+    stones: Scene,
+    asked: Pushing,
+    test: LoadingTest,
+    band: Band | None,
+    measured: Array | None,
 ) -> dict[str, Any]:
     """Return the contents of pushover.json, but for its files."""
-    steps, disturbed = len(test.force), int(np.sum(~test.calm))
     soft = sum(block.fidelity is Fidelity.DEFORMABLE for block in assembled.scene.blocks)
-    doubts = _doubts(test, disturbed)
+    doubts = doubts_of(test)
     cautions = [
         *doubts,
+        *rig_cautions(stones, asked.rig, asked.step),
         *([f"{soft} deformable stones count as rigid"] if soft else []),
         *stays_open(assembled),
     ]
@@ -242,7 +211,7 @@ def _summary(
     weight = float(model.mass[test.free].sum() * np.linalg.norm(model.scene.gravity))
     return {
         "scene": assembled.scene.name,
-        "headline": "; but ".join([_headline(test, band), *doubts[:1]]),
+        "headline": "; but ".join([headline_of(test, band), *doubts[:1]]),
         "cautions": [*cautions, *assembled.remarks],
         "stones": len(assembled.scene.blocks),
         "weight": weight,
@@ -253,13 +222,14 @@ def _summary(
         "head": str(asked.rig.head),
         "strength": {"forwards": forwards, "backwards": backwards},
         "stiffness": test.stiffness,
+        "early_stiffness": test.early_stiffness,
         "turning": test.turning,
         "settling": test.settling,
-        "steps": steps,
+        "steps": len(test.force),
         "errors": {
             "unsolved": test.unsolved,
             "rate": float(np.abs(test.inertia[test.calm]).max(initial=0.0)),
-            "disturbed": disturbed,
+            "disturbed": int(np.sum(~test.calm)),
             "energy": test.energy_error,
         },
         "band": None

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pipelines.assess.pushover.push import _doubts
+from pipelines.assess.pushover.findings import doubts_of
 
 
 @pytest.mark.parametrize(
@@ -21,4 +21,5 @@ from pipelines.assess.pushover.push import _doubts
 )
 def test_the_gravest_doubt_comes_first(changed, disturbed, first):
     sound = {"force": np.zeros(200), "stopped": False, "unsolved": 0, "energy_error": 0.0}
-    assert next(iter(_doubts(SimpleNamespace(**sound | changed), disturbed)), None) == first
+    sound["calm"] = np.arange(200) >= disturbed
+    assert next(iter(doubts_of(SimpleNamespace(**sound | changed))), None) == first
