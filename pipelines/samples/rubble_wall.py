@@ -31,15 +31,16 @@ RUBBLE_SCENE = """\
 [scene]
 name = "Rubble wall (synthetic)"
 
-# Granite in lime mortar; synthetic values, like the wall.
+# Granite in lime mortar. All values are assumed, like the wall: of yours, say of each where it comes from, measured (in
+# which test, on mortar, joint or masonry), of a model (whose) or assumed.
 [materials.granite]
-density = 2600.0   # kg/m³
-young = 20e9       # Pa
-poisson = 0.2
+density = 2600.0   # kg/m³; assumed
+young = 20e9       # Pa; assumed (without effect: stones count as rigid)
+poisson = 0.2      # assumed (without effect)
 
 [joints]
 mode = "mortar"          # stones grow to the middle of the mortar between their outlines
-mortar_density = 1800.0  # kg/m³
+mortar_density = 1800.0  # kg/m³; assumed
 
 [contact]
 placement = "area"  # joints open and crush like their area
@@ -47,14 +48,14 @@ spacing = 0.05      # m
 
 [[laws]]
 type = "elastic_joint"
-friction = 0.7
-mortar_young = 0.5e9        # Pa; over the thickness of each joint it is its stiffness
-mortar_poisson = 0.2
-tension = 0.1e6             # Pa
-shear = 0.1e6               # Pa
-energy_tension = 5.0        # J/m²
-energy_shear = 20.0         # J/m²
-compressive_strength = 5e6  # Pa
+friction = 0.7              # assumed
+mortar_young = 0.5e9        # Pa; assumed; over the thickness of each joint it is its stiffness
+mortar_poisson = 0.2        # assumed
+tension = 0.1e6             # Pa; assumed; of the face between mortar and stone, not of the mortar
+shear = 0.1e6               # Pa; assumed; of that face without pressure
+energy_tension = 5.0        # J/m²; assumed: half the strength times 0.1 mm
+energy_shear = 20.0         # J/m²; assumed: half the strength times 0.4 mm
+compressive_strength = 5e6  # Pa; assumed; of the masonry
 
 # The wall stands on the base of a rig, under a beam that is pushed and may turn.
 [pushover]
@@ -62,7 +63,6 @@ height = 1.325  # m
 load = 100e3    # N
 head = "turns"
 to = [0.01]     # m
-step = 1e-4     # m
 """
 """Scene of the sample."""
 

@@ -2,5 +2,5 @@
 
 Public: `read_scene`, `parse_scene`, `SceneFile` (file); `select_stones`, `select_groups` (selection); `law_rules`
 (laws); `build_loads`, `thrown` (loads); `keys_of`, `build` (keys); `TABLES` (tables);
-`fingerprint`, `changes` (fingerprint); `standing_stones`, `refuse_stages` (stages).
+`fingerprint`, `changes` (fingerprint); `rig_cautions` (rig_cautions); `standing_stones`, `refuse_stages` (stages).
 """

@@ -13,7 +13,7 @@ PAGE = "docs/howto/mask.md"
 
 
 COARSE = (
-    ("to = [0.01]     # m\nstep = 1e-4     # m", "to = [0.002]\nstep = 1e-3"),
+    ("to = [0.01]     # m", "to = [0.002]\nstep = 1e-3"),
     ("to = [0.03]", "to = [0.003]\nstep = 1e-3"),
 )
 

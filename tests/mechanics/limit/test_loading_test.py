@@ -5,17 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mechanics.limit.loading_test import loading_test
+from mechanics.limit.loading_test import _loaded, loading_test, softening_step
+from mechanics.model.model import build_model
+from mechanics.scene.jaws import JawPath
+from mechanics.scene.laws.cohesive_zone import CohesiveZone
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.elastic_joint import ElasticJoint
 from mechanics.scene.loads.forces import StoneForce
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.time_series import History
-from mechanics.scene.rig import BASE, BEAM, Head, Rig
-from mechanics.scene.scene import ContactSettings, Placement, Scene
+from mechanics.scene.rig import BASE, BEAM, JAWS, Head, Rig, rigged
+from mechanics.scene.scene import ContactSettings, LawRule, Placement, Scene
 from mechanics.scene.shapes import box
 from mechanics.stones.materials import Material
-from moma.errors import SceneError
+from moma.errors import SceneError, SolverError
 
 WIDTH, DEEP, TALL, PUSH, LOAD = 0.6, 0.2, 1.0, 1.1, 40e3
 STONE = Material("stone", 2000.0, 10e9, 0.2)
@@ -115,3 +118,86 @@ def test_the_rig_refuses_what_it_cannot_push():
     grows = StoneForce(frozenset({"block"}), History.trapezoid(0.0, 1.0, [0.0, 0.0, -1.0]))
     with pytest.raises(SceneError, match="changes with time"):
         loading_test(replace(block, loads=Loads(forces=(grows,))), Rig((1.0, 0.0, 0.0), 1.1, LOAD), (0.01,))
+
+
+def soft(tension=2e5, shear=2e5, opening=10.0, sliding=100.0):
+    """Joint whose bond is lost over 2 G/c: 0.1 mm of opening, 1 mm of sliding."""
+    return ElasticJoint(
+        0.5, 1e11, 4e10, tension=tension, shear=shear, energy_tension=opening, energy_shear=sliding
+    )
+
+
+def test_a_step_is_half_of_the_shortest_way_over_which_bonds_soften():
+    one = scene(soft())
+    assert softening_step(one) == pytest.approx(0.5e-4)
+    assert softening_step(scene(soft(opening=200.0))) == pytest.approx(0.5e-3)
+    # no more tension is held than shear over friction
+    assert softening_step(scene(soft(tension=8e5))) == pytest.approx(0.25e-4)
+    assert softening_step(scene(CohesiveZone(0.5, 1e5, 1e5, 3.0, 300.0))) == pytest.approx(3e-5)
+    assert softening_step(scene(DryJoint(0.6))) == np.inf
+    rule = LawRule(frozenset({"block"}), frozenset({BASE}), soft())
+    ruled = replace(one, contact=replace(one.contact, law=DryJoint(0.6), rules=(rule,)))
+    assert softening_step(ruled) == pytest.approx(0.5e-4)
+
+
+def test_steps_follow_from_the_softening_where_none_are_asked_for():
+    rig = Rig((1.0, 0.0, 0.0), PUSH, LOAD)
+    for opening, to, step in ((1.0, 0.01, 0.5e-5), (1.0, 1e-4, 5e-7), (10.0, 0.001, 5e-6)):
+        test = loading_test(scene(soft(opening=opening)), rig, (to,), stop=lambda: True)
+        assert test.displacement[0] == pytest.approx(step)
+
+
+def test_secants_are_taken_at_15_and_30_percent_of_the_largest_force():
+    """F = 100 kN u/(u + 1 mm): at 0.15 of 80 kN the secant is 88 kN/mm, at 0.3 of it 76."""
+    place = np.linspace(1e-6, 4e-3, 4000)
+    force = 1e5 * place / (place + 1e-3)
+    test = replace(slippery(0.001), displacement=place, force=force)
+    assert test.early_stiffness == pytest.approx((1e5 - 0.15 * 8e4) / 1e-3, rel=1e-3)
+    assert test.stiffness == pytest.approx((1e5 - 0.3 * 8e4) / 1e-3, rel=1e-3)
+
+
+def stacked(shift):
+    """Two boxes, the upper one aside by `shift` [m]."""
+    lower = box("lower", (0.0, 0.0, 0.0), (WIDTH, DEEP, 0.5), STONE)
+    upper = box("upper", (shift, 0.0, 0.5), (shift + WIDTH, DEEP, 1.0), STONE)
+    return Scene("stack", (lower, upper), contact=ContactSettings(ElasticJoint(0.7, 1e10, 4e9)))
+
+
+def wedged(slope):
+    """Two parts of a block, on a joint with a slope, and friction 0.2."""
+    blocks = []
+    for code, low in (("base", 0.0), ("slider", 0.5)):
+        part = box(code, (0.0, 0.0, low), (WIDTH, DEEP, low + 0.5), STONE)
+        corners = part.vertices.copy()
+        in_joint = np.isclose(corners[:, 2], 0.5)
+        corners[in_joint, 2] += slope * (corners[in_joint, 0] - WIDTH / 2)
+        blocks.append(replace(part, vertices=corners))
+    return Scene("wedge", tuple(blocks), contact=ContactSettings(ElasticJoint(0.2, 1e10, 4e9)))
+
+
+@pytest.mark.parametrize(
+    ("stones", "rig", "words"),
+    [
+        (stacked(0.4), Rig((1.0, 0.0, 0.0), 0.7, 0.0, Head.FREE), r"upper at \(0\.70, 0\.10, 0\.75\) m by"),
+        (
+            wedged(-0.5),
+            Rig((1.0, 0.0, 0.0), 0.7, 0.0, Head.FREE),
+            r"slider at \(0\.\d\d, 0\.10, 0\.\d\d\) m by",
+        ),
+        (wedged(-0.5), Rig((1.0, 0.0, 0.0), PUSH, LOAD), r"slider at \(0\.\d\d, 0\.10, 0\.\d\d\) m by"),
+    ],
+)
+def test_stones_that_do_not_come_to_rest_are_named_with_their_places(stones, rig, words):
+    with pytest.raises(SolverError, match=words):
+        loading_test(stones, rig, (0.01,))
+
+
+def test_rest_is_judged_by_what_stones_carry():
+    """What is out of balance counts over the weight and the force on top of it: (40 + 2.354)/2.354 = 17.99."""
+    rig = Rig((1.0, 0.0, 0.0), PUSH, LOAD)
+    jaws = JawPath(frozenset(JAWS), rig.axes[0], (0.01,), 1.0)
+    model, _ = build_model(rigged(scene(DryJoint(1.0)), rig, jaws))
+    loaded = _loaded(model, rig)
+    assert loaded.scene.time.balance_tolerance == pytest.approx(1e-4 * (LOAD + WEIGHT) / WEIGHT)
+    alone = _loaded(model, replace(rig, load=0.0))
+    assert alone.scene.time.balance_tolerance == pytest.approx(1e-4)

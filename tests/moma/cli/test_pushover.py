@@ -83,11 +83,13 @@ def test_the_curve_of_blocks_that_rock_stands_beside_the_measured_one_within_its
 def test_the_lines_tell_strength_stiffness_and_errors(url, scene, tmp_path):
     said = prints("pushover", scene, "--db", url, "--out", tmp_path / "out")
     assert said.startswith("Two blocks: bears 11")
-    assert "kN/mm, secant at 0.3" in said
+    assert "kN/mm, secants at 15 and 30 % of the largest force" in said
+    assert "dry joints of 1e+03 GPa/m" in said
     assert "20 steps, 0 not solved" in said
     checked = invoke("check", scene, "--db", url)
     assert checked.exit_code == 0
     assert "no stone is fixed: only `moma pushover`" in checked.stderr
+    assert "dry joints of 1e+03 GPa/m" in checked.stderr
 
 
 @pytest.mark.parametrize(
@@ -111,3 +113,25 @@ def test_mistakes_name_their_place(url, scene, tmp_path, old, new, words):
 def test_a_scene_without_a_rig_is_refused(url, scene, tmp_path):
     scene.write_text(SCENE[: SCENE.index("[pushover]")])
     assert "no table [pushover]" in fails(2, "pushover", scene, "--db", url, "--out", tmp_path / "out")
+
+
+REFUSED = 'fix the lowest: [bodies] fixed = ["A"]'
+
+
+def test_a_run_of_a_scene_for_a_rig_names_the_stones_to_fix(url, scene, tmp_path):
+    assert REFUSED in fails(2, "run", scene, "--db", url, "--out", tmp_path / "run")
+
+
+@pytest.mark.slow
+def test_a_run_with_these_stones_fixed_stands(url, scene, tmp_path):
+    scene.write_text(SCENE + '[bodies]\nfixed = ["A"]\n')
+    assert "equilibrium" in prints("run", scene, "--db", url, "--out", tmp_path / "run")
+
+
+def test_stones_that_do_not_rest_in_the_rig_are_named(scene, tmp_path):
+    (tmp_path / "aside.csv").write_text(OUTLINES.replace("B,0,", "B,0.35,").replace("B,0.6,", "B,0.95,"))
+    url = f"sqlite:///{tmp_path / 'aside.db'}"
+    prints("ingest", "--outlines", tmp_path / "aside.csv", "--size", "0.95x1", "--depth", "0.2", "--db", url)
+    scene.write_text(SCENE.replace("height = 1.1\nload = 40e3", 'height = 0.9\nhead = "free"'))
+    said = fails(1, "pushover", scene, "--db", url, "--out", tmp_path / "out")
+    assert "still moving or fallen: B at (" in said
