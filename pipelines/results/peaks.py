@@ -133,11 +133,16 @@ def realisations(result: Result) -> list[dict[str, Any]]:
 
 
 def rocking_caution(result: Result) -> str:
-    """Return what the peaks of a run with stones that rock are worth, in words; nothing where none rocks."""
+    """Return what the peaks of a run with stones that rock are worth, in words, and those of a repeated run.
+
+    Nothing is said where no stone rocks and the run was not repeated.
+    """
     stones = rocking_stones(result)
-    if not stones:
+    if not stones and result.repeated is None:
         return ""
-    said = f"{len(stones)} stones rock, e.g. {stones[0]}: their peaks are one realisation of a chaotic motion"
+    said = "no stone rocks, and the run was repeated at half the step"
+    if stones:
+        said = f"{len(stones)} stones rock, e.g. {stones[0]}: their peaks are one realisation of a chaotic motion"
     if result.repeated is None:
         return f"{said}, and another step gives others; moma run --repeat-half-step tells how far apart"
     first, second = realisations(result)

@@ -83,7 +83,7 @@ def test_no_word_where_nothing_rocks():
 def test_a_run_is_repeated_at_half_the_step_where_asked(tmp_path):
     url = f"sqlite:///{tmp_path / 'window.db'}"
     prints("ingest", ROOT / "data/samples/window/window.moma", "--db", url)
-    (tmp_path / "a.csv").write_text("0 0\n0.02 6\n0.08 6\n0.12 -6\n0.18 -6\n0.2 0\n")
+    (tmp_path / "a.csv").write_text("0 0\n0.05 6\n0.1 6\n0.15 -6\n0.2 -6\n0.25 0\n")
     motion = '[[loads]]\ntype = "ground_motion"\nstones = ["course = 1"]\ny = "a.csv"\nunit = "m/s²"\n'
     times = "[time]\nduration = 0.3\nstep = 2e-3\n[output]\npictures = []\n"
     (tmp_path / "jerk.toml").write_text(TWO_COURSES + times + motion)
@@ -91,6 +91,5 @@ def test_a_run_is_repeated_at_half_the_step_where_asked(tmp_path):
     summary = json.loads((tmp_path / "out/summary.json").read_text())
     first, second = summary["rocking"]["realisations"]
     assert (first["step"], second["step"]) == (2e-3, 1e-3)
-    assert summary["rocking"]["stones"]
     assert any("with steps of 2 and 1 ms: " in one for one in summary["cautions"])
     assert "with steps of 2 and 1 ms: " in (tmp_path / "out/report.html").read_text()
