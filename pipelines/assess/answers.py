@@ -1,7 +1,7 @@
 """Answers of an assessment: the numbers of a question, what they are called, and the mechanism that goes with them."""
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from mechanics.dynamics.outcome import Outcome
 from mechanics.limit.assembly import RigidAssembly
 from mechanics.limit.confirm import Confirmation, confirm, likeness
 from mechanics.limit.dead_load import Standing
+from mechanics.limit.held import WIDTH, held_limit
 from mechanics.limit.kinematic import Kinematics, kinematics
 from mechanics.limit.limit_load import Flow, LimitLoad, Mechanism, limit_load, mechanism
 from mechanics.limit.live_loads import Acceleration, LiveLoad
@@ -43,7 +44,13 @@ NOT_DECIDED = "not decided"
 """Outcome of what neither rests nor has fallen when its time is over."""
 
 _DROP = 0.8  # share of the peak of a capacity curve at which the way counts as ultimate [-]
-_ONE = 1.03  # highest over lowest candidate up to which they are one [-]
+_ONE = 1.03  # limit over lowest candidate up to which they are one [-]
+_SOUGHT = (
+    500  # stones up to which candidates are sought: their iteration takes ten times as long as the limit [-]
+)
+_BY_RUNS = "Coulomb's friction without dilatancy, by the rule of runs: the largest load that one step from rest holds"
+_CRUSHED = "Coulomb's friction without dilatancy, candidate: stones crush, which rigid ones in runs do not"
+_UNSURE = "candidate or bound: the stones rest, but one step from rest moves them under the dead load alone"
 _ALIKE = 0.9  # cosine between mechanism and collapse from which they are one [-]
 _MOVES = 0.01  # speed over that of the fastest stone from which a stone belongs to a mechanism [-]
 
@@ -141,7 +148,7 @@ def fallen(on: RigidAssembly, question: Question, standing: Standing) -> Answer:
     match question:
         case LoadQuestion():
             told |= {"meaning": str(question.live), "candidate": None, "candidate_lowest": None}
-            told |= {"bound": None, "candidate_converged": None}
+            told |= {"bound": None, "candidate_converged": None, "limit": 0.0, "limit_lost": 0.0}
         case ThrustQuestion():
             kind = "settlement" if question.settles else "thrust"
             told |= {
@@ -167,45 +174,79 @@ def _load(
     live = question.live
     bound = limit_load(on, live)
     candidate = _candidate(on, live, bound)
-    lowest = bound if candidate is None else candidate
+    limit, lost, kind = _limit(on, live, bound, candidate)
     told: dict[str, Any] = {
         "name": question.name,
         "kind": "load",
         "meaning": str(live),
+        "limit": _number(limit.multiplier),
+        "limit_lost": _number(lost),
+        "limit_kind": kind,
         "bound": _number(bound.multiplier),
         "bound_kind": "associative friction, rigorous upper bound",
         "candidate": None if candidate is None else _number(candidate.multiplier),
-        "candidate_kind": "Coulomb's friction without dilatancy, candidate: the stones may fall at less",
+        "candidate_kind": "Coulomb's friction without dilatancy, by cone programmes: the stones may fall at less",
         "candidate_lowest": None if candidate is None else _number(candidate.lowest.multiplier),
         "candidate_converged": None if candidate is None else candidate.converged,
-        "outcome": _outcome(bound.multiplier),
+        "candidate_sought": len(on.free) <= _SOUGHT,
+        "outcome": _outcome(limit.multiplier),
     }
     if isinstance(live, Acceleration):
         changes = sensitivity(on, live, bound, outwards)
         told["direction"] = list(live.direction)
         told["sensitivity"] = None if changes is None else asdict(changes)
-    if question.whole and np.isfinite(lowest.multiplier):
-        told["tilt"] = float(np.degrees(np.arctan(lowest.multiplier)))
-    unlimited = np.isinf(bound.multiplier)
-    balances = not np.isnan(bound.multiplier)
-    if balances and (question.confirm or candidate is None or not candidate.converged):
-        # where statics gives no number, only runs can
-        first = _FIRST if unlimited else lowest.multiplier
-        told["confirmation"] = _confirmed(on, confirming(live, first, bound.multiplier), lowest)
-        if unlimited and told["confirmation"]["lost"] is not None:
+    if question.whole and np.isfinite(limit.multiplier):
+        told["tilt"] = float(np.degrees(np.arctan(limit.multiplier)))
+    # where the step from rest decides nothing, only runs can
+    if not np.isnan(bound.multiplier) and (question.confirm or kind == _UNSURE):
+        first = limit.multiplier if np.isfinite(limit.multiplier) else _FIRST
+        told["confirmation"] = _confirmed(on, confirming(live, first, bound.multiplier), limit)
+        if told["confirmation"]["lost"] is not None:
             told["outcome"] = "limited"
-    if isinstance(live, Acceleration) and np.isfinite(lowest.multiplier):
+    if isinstance(live, Acceleration) and np.isfinite(limit.multiplier):
         code = None if question.code is None or site is None else (question.code, site)
-        # on the safe side: the check takes the lower of two candidates
-        told["kinematics"], checked = _kinematics(on, live, lowest.lowest, code)
+        told["kinematics"], checked = _kinematics(on, live, _checked_limit(limit, candidate), code)
         if checked:
             told["code"] = checked
-    curve = _led(live, lowest, told, leading) if question.pushover else None
+    curve = _led(live, limit, told, leading) if question.pushover else None
     if curve is not None:
         told["pushover"] = _capacity(curve)
     told["headline"] = _sentence(told)
-    told["mechanism"] = _moving(on, lowest.mechanism)
-    return Answer(told, lowest.mechanism, lowest.force, curve)
+    told["mechanism"] = _moving(on, limit.mechanism)
+    return Answer(told, limit.mechanism, limit.force, curve)
+
+
+def _limit(
+    on: RigidAssembly, live: LiveLoad, bound: LimitLoad, candidate: LimitLoad | None
+) -> tuple[LimitLoad, float, str]:
+    """Return the limit with its mechanism, the least load that is known to be lost, and what the limit is.
+
+    As a rule the largest load that a step from rest holds, and how the stones begin to fall under the least that it
+    loses.
+    """
+    if np.isnan(bound.multiplier):
+        return bound, 0.0, _BY_RUNS
+    if on.crushing is not None and candidate is not None:
+        return candidate, bound.multiplier, _CRUSHED
+    found = held_limit(on, live, bound)
+    if found.lost == 0.0:
+        return candidate or bound, bound.multiplier, _UNSURE
+    limit = replace(
+        bound,
+        flow=Flow.COULOMB,
+        multiplier=found.held,
+        force=found.force,
+        mechanism=found.mechanism or bound.mechanism,
+        programmes=found.problems,
+    )
+    return limit, found.lost, _BY_RUNS
+
+
+def _checked_limit(limit: LimitLoad, candidate: LimitLoad | None) -> LimitLoad:
+    """Return the load that a code checks: on the safe side, and by the mechanism of a programme where there is one."""
+    if candidate is None or candidate.lowest.multiplier > (1.0 + WIDTH) * limit.multiplier:
+        return limit
+    return candidate.lowest
 
 
 def _led(live: LiveLoad, found: LimitLoad, told: dict[str, Any], leading: Lead) -> Pushover | None:
@@ -243,8 +284,8 @@ def _capacity(curve: Pushover) -> dict[str, Any]:
 
 
 def _candidate(on: RigidAssembly, live: LiveLoad, bound: LimitLoad) -> LimitLoad | None:
-    """Return the candidate of Coulomb's friction; None where there is none to be found."""
-    if not np.isfinite(bound.multiplier):
+    """Return the candidate of Coulomb's friction; None where there is none to be found, or it would take too long."""
+    if not np.isfinite(bound.multiplier) or len(on.free) > _SOUGHT:
         return None
     try:
         candidate = limit_load(on, live, Flow.COULOMB, bound)
@@ -379,25 +420,31 @@ def _outcome(value: float) -> str:
 
 
 def _sentence(one: dict[str, Any]) -> str:
-    if one["bound"] is None:
-        if one["outcome"] == FALLS:
-            return f"{one['name']}: λ = 0, as no forces in its joints balance the dead load"
-        if "confirmation" not in one:
-            return f"{one['name']}: {one['outcome']}"
-        return f"{one['name']}: no bound{_dynamics(one)}"
-    text = f"{one['name']}: λ ≤ {one['bound']:.4g} (bound)"
-    if one["candidate"] is None:
-        return (
-            f"{text}, NO CANDIDATE found: below the bound nothing is known but what runs say{_dynamics(one)}"
-        )
-    stood = "" if one["candidate_converged"] else ", NOT CONVERGED"
-    if one["candidate"] > _ONE * one["candidate_lowest"]:
-        unsure = "" if "confirmation" in one else ": confirm it by runs"
-        stood += (
-            f"; other forces of the same friction hold no more than {one['candidate_lowest']:.4g}{unsure}"
-        )
+    if one["outcome"] == FALLS:
+        return f"{one['name']}: λ = 0, as no forces in its joints balance the dead load"
+    if one["limit"] is None:
+        return f"{one['name']}: {one['outcome']}{_dynamics(one)}"
+    lost = "" if one["limit_lost"] is None else f"; {one['limit_lost']:.4g} is lost"
+    how = {_CRUSHED: "candidate, as stones crush", _UNSURE: "NOT SURE, candidate or bound"}
+    stands = how.get(one["limit_kind"], f"held{lost}")
+    bound = "no bound" if one["bound"] is None else f"bound {one['bound']:.4g}"
+    text = f"{one['name']}: λ = {one['limit']:.4g} ({stands}), {bound}{_caution(one)}"
     angle = f", a tilt of {one['tilt']:.3g}°" if "tilt" in one else ""
-    return f"{text}, {one['candidate']:.4g} (candidate{stood}){angle}{_dynamics(one)}{_collapse(one)}{_verdict(one)}"
+    return f"{text}{angle}{_dynamics(one)}{_collapse(one)}{_verdict(one)}"
+
+
+def _caution(one: dict[str, Any]) -> str:
+    """Return what other forces of the same friction hold, if that is less, or that they were not sought."""
+    if one["bound"] is None:
+        return ""
+    if not one["candidate_sought"]:
+        return "; whether other forces hold less was not sought among so many stones"
+    if one["candidate"] is None:
+        return "; whether other forces hold less was not found"
+    if one["limit"] <= _ONE * one["candidate_lowest"]:
+        return ""
+    stood = "" if one["candidate_converged"] else ", NOT CONVERGED"
+    return f"; other forces of the same friction hold no more than {one['candidate_lowest']:.4g}{stood}"
 
 
 def _dynamics(one: dict[str, Any]) -> str:
@@ -407,7 +454,7 @@ def _dynamics(one: dict[str, Any]) -> str:
     held = "nothing held" if found["held"] is None else f"held at {found['held']:.4g}"
     lost = "nothing lost" if found["lost"] is None else f"lost at {found['lost']:.4g}"
     said = ""
-    if one["candidate"] is not None:
+    if one["limit"] is not None:
         said = " CONFIRMED" if found["agrees"] else " NOT CONFIRMED"
     text = f"; by the dynamics{said}: {held}, {lost}"
     if found["likeness"] is None:

@@ -370,7 +370,7 @@ def _headline(loads: Sequence[dict[str, Any]], standing: Standing, left_out: Seq
 
 def _title(name: str, headline: str) -> str:
     """Return the title of the pictures of an answer: all that its first line says, in letters that VTK's font has."""
-    return f"{name}\n{headline}".replace("λ ≤", "multiplier at most").replace("≤", "at most")
+    return f"{name}\n{headline}".replace("λ =", "multiplier")
 
 
 def _states(standing: Standing) -> list[str]:
@@ -405,7 +405,7 @@ def _limit(one: dict[str, Any]) -> float:
     if one.get("outcome") == FALLS:
         return 0.0
     runs = one.get("confirmation", {})
-    known = [one.get("candidate"), one.get("bound"), runs.get("held") or runs.get("lost")]
+    known = [one.get("limit", one.get("candidate")), one.get("bound"), runs.get("held") or runs.get("lost")]
     return min((value for value in known if value is not None), default=float("inf"))
 
 

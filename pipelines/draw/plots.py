@@ -51,7 +51,7 @@ def draw_capacity(path: Path, title: str, curve: "Pushover", bound: float) -> No
         span = np.clip(curve.multiplier[hit], 0.0, 1.2 * bound)
         axes.plot(way[hit], span, ".", color="#b0b0b0", label="inertia counts")
     axes.axhline(bound, color="#8a3b12", linestyle="--", label="bound")
-    axes.axhline(curve.limit, color="#6b7a2a", linestyle=":", label="limit load, candidate")
+    axes.axhline(curve.limit, color="#6b7a2a", linestyle=":", label="limit load")
     axes.set_xlim(left=0.0)
     axes.set_ylim(0.0, 1.2 * bound)
     axes.set_xlabel(f"way of {curve.control} along the load [mm]")

@@ -12,7 +12,16 @@ from pipelines.results.wall_axes import WallAxes, axes_of
 
 __all__ = ["write_assessment"]
 
-_HEAD = ("Question", "Bound or least", "Candidate or greatest", "Held", "Lost", "Tilt")
+_HEAD = (
+    "Question",
+    "Held or least",
+    "Lost or greatest",
+    "Bound",
+    "Lowest candidate",
+    "Runs hold",
+    "Runs lose",
+    "Tilt",
+)
 _VALUES = ("Symbol", "Value", "Formula", "Article")
 _CHECKS = ("Check", "Capacity", "Demand", "Ratio", "Verdict", "Formula", "Article")
 _CAPTIONS = {
@@ -61,7 +70,7 @@ def _governs(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
     rows = [("Load", one["name"])]
     if "direction" in one:
         rows.append(("Direction", direction_text(axes, one["direction"])))
-    if one["kind"] == "load" and (limit := one.get("candidate") or one.get("bound")):
+    if one["kind"] == "load" and (limit := one.get("limit")):
         push = "direction" in one and "tilt" in one
         force = f": {kilonewtons(limit * summary['weight'])} on all stones that may move" if push else ""
         rows += [("Capacity", f"λ = {_number(limit)}{force}"), ("Capacity against demand", _demand(one))]
@@ -116,19 +125,22 @@ def _sure(found: Mapping[str, Any] | None) -> str:
 
 def _row(one: Mapping[str, Any]) -> tuple[str, ...]:
     if one["kind"] == "thickness":
-        return (one["name"], _number(one["factor"]), "", "", "", "")
+        return (one["name"], _number(one["factor"]), *[""] * 6)
     if one["kind"] != "load":
         ends = (
             "without limit" if one[end] is None else f"{1e-3 * one[end]:.4g} kN"
             for end in ("least", "greatest")
         )
-        return (one["name"], *ends, "", "", "")
+        return (one["name"], *ends, *[""] * 5)
     runs = one.get("confirmation", {})
     tilt = f"{one['tilt']:.3g}°" if "tilt" in one else ""
     bound = one["outcome"] if one["bound"] is None else _number(one["bound"])
     held, lost = (_number(runs[end]) if runs.get(end) is not None else "" for end in ("held", "lost"))
+    limit, too_much = (
+        one["outcome"] if one[key] is None else _number(one[key]) for key in ("limit", "limit_lost")
+    )
     stood = "" if one["candidate_converged"] in (None, True) else " NOT CONVERGED"
-    return (one["name"], bound, _number(one["candidate"]) + stood, held, lost, tilt)
+    return (one["name"], limit, too_much, bound, _number(one["candidate_lowest"]) + stood, held, lost, tilt)
 
 
 def _part(folder: Path, number: int, one: Mapping[str, Any]) -> dict[str, Any]:

@@ -18,8 +18,8 @@ def assessment_lines(done: "Assessment", verbose: bool) -> list[str]:
     summary = done.summary
     lines = [
         f"{summary['scene']}: {summary['headline']}",
+        "  held: Coulomb's friction without dilatancy, the largest load that a run from rest holds",
         "  bound: associative friction, a rigorous upper bound",
-        "  candidate: Coulomb's friction without dilatancy; the stones may fall at less",
         f"  {summary['free']} stones that may move, {summary['contacts']} contact points, "
         f"weight {1e-3 * summary['weight']:.2f} kN",
         *(f"  {caution}" for caution in summary["cautions"]),

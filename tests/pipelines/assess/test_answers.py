@@ -42,13 +42,28 @@ def asked(on, monkeypatch, changed, held=0.2, lost=0.21, **question):
     return answer(on, push, runs, lambda *_: pytest.fail("nothing is led"), SITE).told
 
 
-def test_a_candidate_that_did_not_converge_is_tried_by_runs_and_says_so(on, monkeypatch):
-    told = asked(on, monkeypatch, lambda one: replace(one, converged=False))
-    assert ", 0.25 (candidate, NOT CONVERGED)" in told["headline"]
-    assert "by the dynamics NOT CONFIRMED: held at 0.2, lost at 0.21" in told["headline"]
+def test_the_line_says_what_runs_hold_and_where_other_forces_hold_less(on, monkeypatch):
     told = asked(on, monkeypatch, lambda one: one)
-    assert ", 0.25 (candidate)" in told["headline"]
+    assert told["headline"] == "push: λ = 0.2498 (held; 0.25 is lost), bound 0.25, a tilt of 14°"
+    assert told["limit"] < told["bound"] <= 1.002 * told["limit"]
     assert "confirmation" not in told
+    told = asked(on, monkeypatch, lambda one: replace(one, multiplier=0.2, converged=False))
+    assert "; other forces of the same friction hold no more than 0.2, NOT CONVERGED" in told["headline"]
+    assert told["limit"] == pytest.approx(0.25, rel=2e-3)
+
+
+def test_runs_confirm_the_limit_or_do_not(on, monkeypatch):
+    told = asked(on, monkeypatch, lambda one: one, confirm=True)
+    assert "by the dynamics NOT CONFIRMED: held at 0.2, lost at 0.21" in told["headline"]
+    told = asked(on, monkeypatch, lambda one: one, held=0.2497, lost=0.25, confirm=True)
+    assert "by the dynamics CONFIRMED: held at 0.2497, lost at 0.25" in told["headline"]
+
+
+def test_what_was_not_sought_is_said(on, monkeypatch):
+    monkeypatch.setattr(answers, "_SOUGHT", 0)
+    told = asked(on, monkeypatch, lambda one: one)
+    assert told["candidate"] is None
+    assert "was not sought among so many stones" in told["headline"]
 
 
 def test_a_code_checks_the_lower_of_two_candidates(on, monkeypatch):
@@ -64,8 +79,8 @@ def test_a_code_checks_the_lower_of_two_candidates(on, monkeypatch):
 
 
 def test_the_title_of_a_picture_is_not_cut():
-    said = "horizontal y: λ ≤ 0.13 (bound), 0.125 (candidate; other forces hold no more than 0.1); passed"
+    said = "horizontal y: λ = 0.125 (held; 0.1252 is lost), bound 0.13; other forces hold no more than 0.1; passed"
     assert _title("Bay; north", said) == (
-        "Bay; north\nhorizontal y: multiplier at most 0.13 (bound), 0.125 (candidate; other forces hold no more than "
-        "0.1); passed"
+        "Bay; north\nhorizontal y: multiplier 0.125 (held; 0.1252 is lost), bound 0.13; other forces hold no more than "
+        "0.1; passed"
     )

@@ -49,7 +49,13 @@ def test_stones_that_look_several_ways_have_no_axes_but_x_y_z(tmp_path):
 
 def test_what_falls_by_itself_states_no_capacity(tmp_path):
     one = assessed()
-    one["loads"][0] |= {"candidate": None, "bound": None, "outcome": "falls", "sensitivity": None}
+    one["loads"][0] |= {
+        "candidate": None,
+        "bound": None,
+        "limit": None,
+        "outcome": "falls",
+        "sensitivity": None,
+    }
     told = words(tmp_path, write_assessment, one)
     assert "Capacity" not in told
     assert "friction, depths and densities are taken as certain" in told
