@@ -123,6 +123,15 @@ class Detector:
         )
         return joined([points, *curved, take(contacts, np.flatnonzero(gaps(contacts, state) <= limit))])
 
+    def face_pairs(self, state: State) -> tuple[Ints, Ints]:
+        """Return the pairs of shapes that meet at faces within the alert distance, with or without contact points.
+
+        They are named (n,) by the high bits of the keys of contacts; their bodies (n, 2) come besides.
+        """
+        pairs = self._touching(_place(self.surfaces, state), np.zeros(len(self.surfaces.body)))
+        shapes = pairs.shapes[(pairs.kind > 0) & (pairs.kind != EDGES)]
+        return _pair_key(shapes, len(self.surfaces.body)) >> PAIR_BIT, self.surfaces.body[shapes]
+
     def _touching(self, placed: Placed, reach: Array) -> Pairs:
         """Find the pairs of shapes nearer than their alert distance."""
         own = self.surfaces

@@ -3,5 +3,5 @@
 Public: `Simulation` (simulation); `Step`, `ContactForces` (step); `static_start` (static_start);
 `Outcome`, `StaticStart` (outcome); `EnergyBalance` (energy_balance); `Progress`, `Listener`,
 `Clock` (progress); `Memory` (warm_start); `Handover`, `Beginning` (handover);
-`contact_problem`, `JointCompliance` (contact_problem); `Detection`, `detector` (contact_search).
+`contact_problem`, `JointCompliance` (contact_problem); `Detection`, `contacts_as_drawn`, `detector` (contact_search).
 """

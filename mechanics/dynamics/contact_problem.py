@@ -158,12 +158,13 @@ def contact_problem(
     approach : the contacts as the laws see them before the step
     """
     contacts, operator, time = found.contacts, found.operator, model.scene.time
-    gap = gaps(contacts, predicted)
+    # stones without a common area touch once they lie in each other by their recess
+    gap = gaps(contacts, predicted) + found.recess
     motion = local_velocity(contacts, operator, predicted.velocity, predicted.node_velocity)
     size = np.minimum(*model.surfaces.size[contacts.bodies.T])
     if begin is not None:
-        initial, meets = gaps(contacts, begin.state), begin.meets(contacts.bodies)
-        closed = begin.closed(initial, gaps(contacts, begin.drawn))
+        initial, meets = gaps(contacts, begin.state) + found.recess, begin.meets(contacts.bodies)
+        closed = begin.closed(initial, gaps(contacts, begin.drawn) + found.recess)
         elastic = model.elastic[contacts.bodies].any(axis=1)
         # a ball dents a meshed face by what the mesh does not see of it
         round_ = model.surfaces.radius[model.surfaces.sptr[:-1]][contacts.bodies].any(axis=1)

@@ -9,6 +9,7 @@ import numpy as np
 from mechanics.arrays import Array, Ints
 from mechanics.contact.contacts import Contacts, take
 from mechanics.contact.detection import Detector
+from mechanics.contact.shared_area import Recess, recess_at
 from mechanics.delassus.assembly import mixed_delassus, rigid_delassus
 from mechanics.delassus.mixed import MixedDelassus
 from mechanics.delassus.rigid import RigidDelassus, in_order, schedule
@@ -18,7 +19,7 @@ from mechanics.model.deformable import Compliance
 from mechanics.model.model import Model
 from mechanics.scene.state import State
 
-__all__ = ["ContactSearch", "Detection", "detection", "detector"]
+__all__ = ["ContactSearch", "Detection", "contacts_as_drawn", "detection", "detector"]
 
 
 # displacements since the last detection, over the smallest width, from which contacts are detected again [-]:
@@ -44,6 +45,7 @@ class Detection:
     place : (nc, 3) in the axes of one of the two bodies, the same whichever is the candidate [m]
     law : (nc,) index of the law of each
     operator : W
+    recess : (nc,) depth below which a contact acts, of pairs of stones that touch without a common area [m]
     """
 
     model: Model
@@ -52,6 +54,7 @@ class Detection:
     place: Array
     law: Ints
     operator: RigidDelassus | MixedDelassus
+    recess: Array
 
 
 def detector(model: Model, bed: float = 0.0) -> Detector:
@@ -69,12 +72,20 @@ def detector(model: Model, bed: float = 0.0) -> Detector:
     )
 
 
+def contacts_as_drawn(model: Model, state: State) -> Contacts:
+    """Return the contacts of stones where they are drawn; those that touch without a common area have none."""
+    find = detector(model)
+    contacts = find(state, np.zeros(len(model.mass)))
+    return take(contacts, np.flatnonzero(recess_at(find, state).of(contacts) == 0.0))
+
+
 def detection(
     model: Model,
     state: State,
     contacts: Contacts,
     compliance: Sequence[Compliance],
     elastic_scale: bool = False,
+    recess: Recess | None = None,
 ) -> Detection:
     """Return the contacts of a state with their places, laws and W, in the order of a schedule if rigid bodies move."""
     if model.rigid_only or model.inertia.moving.any():
@@ -89,7 +100,8 @@ def detection(
         operator = mixed_delassus(model, state, contacts, compliance, plan, elastic_scale)
     side = contacts.bodies.argmin(axis=1)
     place = contacts.arm[np.arange(len(side)), side]
-    return Detection(model, state, contacts, place, model.laws.of(contacts.bodies), operator)
+    depth = np.zeros(len(side)) if recess is None else recess.of(contacts)
+    return Detection(model, state, contacts, place, model.laws.of(contacts.bodies), operator, depth)
 
 
 class ContactSearch:
@@ -98,16 +110,22 @@ class ContactSearch:
     Parameters
     ----------
     model : the scene
+    start : where it begins
     compliance : ŵ of every group of equal elastic stones
     clock : takes the time of each stage
     every_step : detect whenever asked
     elastic_scale : as `mixed_delassus` takes it
     bed : as `detector` takes it
+
+    Attributes
+    ----------
+    recess : of pairs of stones that have touched without a common area since the start
     """
 
     def __init__(
         self,
         model: Model,
+        start: State,
         compliance: Sequence[Compliance],
         clock: Clock,
         every_step: bool = False,
@@ -117,6 +135,8 @@ class ContactSearch:
         self._detector, self._compliance, self._clock = detector(model, bed), compliance, clock
         self._every_step, self._elastic_scale = every_step, elastic_scale
         self._last: Detection | None = None
+        with clock("detect"):
+            self.recess = recess_at(self._detector, start)
 
     def __call__(self, model: Model, predicted: State) -> Detection:
         """Return the contacts at a predicted configuration; `model` has sleeping bodies as fixed ones."""
@@ -129,16 +149,19 @@ class ContactSearch:
         last = self._last
         return None if last is None or last.model is not model else last.configuration
 
-    def repeat(self, model: Model, configuration: State | None) -> None:
-        """Detect again where another run of the same scene last did; None: nowhere."""
+    def repeat(self, model: Model, configuration: State | None, recess: Recess) -> None:
+        """Detect again where another run of the same scene last did, None: nowhere, with the recess that it had."""
+        self.recess = recess
         self._last = None if configuration is None else self._detection(model, configuration)
 
     def _detection(self, model: Model, predicted: State) -> Detection:
         with self._clock("detect"):
             reach = model.scene.time.step * speed(model, predicted)
             contacts = replace(self._detector, fixed=model.fixed)(predicted, reach)
+            self.recess = self.recess.after(contacts, predicted, model.surfaces.size)
+            contacts = take(contacts, self.recess.acting(contacts, predicted, reach))
         with self._clock("assemble"):
-            return detection(model, predicted, contacts, self._compliance, self._elastic_scale)
+            return detection(model, predicted, contacts, self._compliance, self._elastic_scale, self.recess)
 
     def continued(self, model: Model, compliance: Sequence[Compliance]) -> "ContactSearch":
         """Return the search for other settings of time; it knows the last result where ŵ is still the same."""
@@ -153,6 +176,7 @@ class ContactSearch:
 
         Slivers of contacts may be found or not after movements of rounding alone, and with them their forces are lost.
         """
+        self.recess = other.recess
         if other._last is not None:
             self._last = replace(other._last, model=model)
 

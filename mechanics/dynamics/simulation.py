@@ -85,7 +85,9 @@ class Simulation(Carrier):
         with self.clock("assemble"):
             self._compliance = compliances(model, self._step, self._theta)
         bed = begin.bed(model)
-        self._detect = ContactSearch(model, self._compliance, self.clock, fresh_contacts, elastic_scale, bed)
+        self._detect = ContactSearch(
+            model, begin.state, self._compliance, self.clock, fresh_contacts, elastic_scale, bed
+        )
         self._given = solver
         self._solve = solver or _solver_of(model, model.scene.solver)
         self._may_yield = solver is None and may_yield(model)
@@ -121,6 +123,8 @@ class Simulation(Carrier):
         self._joints = replace(other._joints, value=other._joints.value / pace**2)
         if pace == 1.0 and self.model.rigid_only:
             self._detect.follow(other._detect, self.model)
+        else:
+            self._detect.recess = other._detect.recess
         self._sleepers = Sleepers(self.model, self.state, self._memory)
         self._first = False
 
@@ -191,6 +195,7 @@ class Simulation(Carrier):
         return super().carried() | {
             "detected": self._detect.configuration(self._sleepers.model),
             "condensed": tuple(one.condensed for one in self._compliance),
+            "recess": self._detect.recess,
         }
 
     def resumed(self, carried: Carried) -> "Simulation":
@@ -199,7 +204,7 @@ class Simulation(Carrier):
         other.restore(carried)
         for compliance, batches in zip(other._compliance, carried["condensed"], strict=True):
             compliance.condense_again(batches)
-        other._detect.repeat(other._sleepers.model, carried["detected"])
+        other._detect.repeat(other._sleepers.model, carried["detected"], carried["recess"])
         return other
 
     def step(self) -> Step:

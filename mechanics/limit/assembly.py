@@ -18,7 +18,8 @@ from scipy.sparse import csc_array, csr_array
 
 from mechanics.arrays import Array, Ints
 from mechanics.contact.contacts import Contacts, gaps, take
-from mechanics.dynamics.contact_search import Detection, detection, detector
+from mechanics.contact.shared_area import SLACK
+from mechanics.dynamics.contact_search import Detection, contacts_as_drawn, detection
 from mechanics.limit.joints import Joints, StressBlocks, find_joints, stress_blocks
 from mechanics.model.model import Model, build_model
 from mechanics.problem.forms import SparseForm
@@ -30,8 +31,7 @@ from moma.errors import SceneError
 __all__ = ["CLOSED", "RigidAssembly", "Strength", "assembly"]
 
 
-# gap up to which a joint counts as closed, over the width of the smaller stone: a thousandth is a survey's error [-]
-CLOSED = 1e-3
+CLOSED = SLACK  # gap up to which a joint counts as closed, over the width of the smaller stone [-]
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ def assembly(scene: Scene, widest: float = CLOSED) -> RigidAssembly:
     free = np.flatnonzero(~model.fixed)
     if not len(free):
         raise SceneError("no stone may move", where=scene.name, remedy="fix the supports only")
-    contacts = detector(model)(state, np.zeros(len(model.mass)))
+    contacts = contacts_as_drawn(model, state)
     gap = gaps(contacts, state)
     size = np.minimum(*model.surfaces.size[contacts.bodies.T])
     closed = np.flatnonzero(gap <= widest * size)

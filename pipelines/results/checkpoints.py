@@ -23,6 +23,7 @@ from scipy.sparse import csr_array
 
 from mechanics.carried import Carried, Rows
 from mechanics.contact.contacts import Contacts
+from mechanics.contact.shared_area import Recess
 from mechanics.dynamics.contact_problem import JointCompliance
 from mechanics.dynamics.outcome import StaticStart
 from mechanics.dynamics.step import ContactForces
@@ -47,6 +48,7 @@ _RECORDS = {
         Largest,
         PlanarFrame,
         PlanarState,
+        Recess,
         StageResult,
         State,
         StaticStart,

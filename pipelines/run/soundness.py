@@ -166,7 +166,10 @@ def unsupported(scene: Scene, loose: Sequence[str]) -> list[str]:
     falling = [code for code in loose if code not in thrown]
     if not falling:
         return []
-    return [f"no chain of touching stones ties these to a fixed one: {some(falling)}; they will fall"]
+    return [
+        f"no chain of touching stones ties these to a fixed one: {some(falling)}; they will fall: "
+        "stones that share an edge or a corner alone do not bear one another"
+    ]
 
 
 def stands_alone(scene: Scene) -> bool:

@@ -11,7 +11,7 @@ from mechanics.arrays import Array, Bools, Ints
 from mechanics.contact.contacts import gaps
 from mechanics.delassus.assembly import side_kinds
 from mechanics.delassus.mixed_form import mixed_fronts
-from mechanics.dynamics.contact_search import detector
+from mechanics.dynamics.contact_search import contacts_as_drawn
 from mechanics.model.model import Model, build_model
 from mechanics.scene.scene import Fidelity, Scene
 from mechanics.scene.state import State
@@ -88,7 +88,7 @@ def plan(scene: Scene) -> Plan:
     SceneError, GeometryError, MeshError : if the scene cannot be built
     """
     model, start = build_model(scene)
-    contacts = detector(model)(start, np.zeros(len(scene.blocks)))
+    contacts = contacts_as_drawn(model, start)
     pairs, pair = np.unique(np.sort(contacts.bodies, axis=1), axis=0, return_inverse=True)
     narrowest = np.full(len(pairs), np.inf)
     np.minimum.at(narrowest, pair.ravel(), gaps(contacts, start))
@@ -111,7 +111,7 @@ def plan(scene: Scene) -> Plan:
 
 def loose_blocks(model: Model, start: State) -> tuple[str, ...]:
     """Return the codes of the blocks that no chain of touching blocks ties to a fixed one at the start."""
-    pairs = detector(model)(start, np.zeros(len(model.mass))).bodies
+    pairs = contacts_as_drawn(model, start).bodies
     return tuple(model.scene.blocks[i].code for i in _loose(pairs, model.fixed))
 
 

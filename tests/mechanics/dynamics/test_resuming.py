@@ -218,7 +218,7 @@ def test_an_interrupted_run_goes_on_as_if_nothing_had_been():
 
 # attributes of objects that keep what they make: functions of the scene, of a configuration, of an order of nodes
 KEEPERS = {
-    ContactSearch: {"_clock", "_compliance", "_detector", "_elastic_scale", "_every_step", "_last"},
+    ContactSearch: {"_clock", "_compliance", "_detector", "_elastic_scale", "_every_step", "_last", "recess"},
     Compliance: {
         "_batch", "_condensed", "_duration", "_factor", "_modes", "_nodes", "_order", "_projector", "_stone", "_whole",
     },
