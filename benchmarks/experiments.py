@@ -110,11 +110,19 @@ def _input_rows(names: Mapping[str, Experiment]) -> list[Row]:
         {
             "walls": ", ".join(dict.fromkeys(walls)),
             "input": name,
-            "value": f"{value:.4g} {unit}" if unit != "-" else f"{value:.3g}",
+            "value": _quantity(value, unit),
             "origin": origin,
         }
         for (name, value, unit, origin), walls in shared.items()
     ]
+
+
+def _quantity(value: float, unit: str) -> str:
+    """Return a value with its unit, of pressures and stiffnesses with a prefix."""
+    for factor, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
+        if unit.startswith("Pa") and value >= factor:
+            return f"{value / factor:.3g} {prefix}{unit}"
+    return f"{value:.4g} {unit}" if unit != "-" else f"{value:.3g}"
 
 
 _INPUTS = columns("input input | value value | origin origin | walls of")
