@@ -139,11 +139,11 @@ def _overlaps(
     larger = np.where(areas[0] > areas[1], pairs[:, 0], pairs[:, 1])
     holding = np.bincount(larger[within], minlength=len(outlines))
     frames = np.flatnonzero((holding == len(outlines) - 1) & (holding >= _FRAMED))
-    for k in frames:
+    for k in frames.tolist():
         text = f"it holds all {holding[k]} others: it is the wall's edge rather than a stone, leave it out"
         yield Doubtful(outlines[k].code, "overlap", text, outlines[k].where)
     for k in np.flatnonzero((shared > _OVERLAP * smaller) & ~np.isin(pairs, frames).any(axis=1)):
-        a, b = (outlines[i] for i in pairs[k])
+        a, b = (outlines[i] for i in pairs[k].tolist())
         text = f"it shares {shared[k]:.2g} m² with {b.code}, {shared[k] / max(smaller[k], 1e-12):.0%} of the smaller"
         yield Doubtful(a.code, "overlap", text, a.where)
 

@@ -15,7 +15,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import Voronoi, cKDTree
 
 from moma.errors import GeometryError
-from survey.arrays import Array, Ints
+from survey.arrays import Array, Bools, Ints
 from survey.geometry.polygons import inside
 from survey.joints.grown.openings import open_places, usual_width
 
@@ -97,7 +97,7 @@ def medial_lines(outlines: Sequence[Array], frame: Array, step: float, widest: f
     inset = _INSET * step
     diagram, original, side = _diagram(points, frame, step)
     lengths, pairs = _lengths(diagram), diagram.ridge_points
-    between = (pairs < len(points)).all(axis=1)
+    between: Bools = (pairs < len(points)).all(axis=1)
     between[between] = owner[pairs[between, 0]] != owner[pairs[between, 1]]
     apart = np.linalg.norm(points[pairs[between, 0]] - points[pairs[between, 1]], axis=1)
     usual = usual_width(lengths[between], apart) - 2.0 * inset

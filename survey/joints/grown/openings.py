@@ -54,7 +54,8 @@ def open_places(
     places : (m, 2) samples of the openings, as far from their edges within them as those of the stones are outside [m]
     opening : (m,) number of the opening of each
     """
-    pairs, ends = diagram.ridge_points, np.asarray(diagram.ridge_vertices)
+    pairs: Ints = diagram.ridge_points.astype(np.int64)
+    ends = np.asarray(diagram.ridge_vertices)
     opened = _open_vertices(diagram, outlines, frame, reach, inset)
     if not opened.any():
         return np.empty((0, 2)), np.empty(0, np.int64)
