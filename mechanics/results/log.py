@@ -131,15 +131,19 @@ def result_of(
         static=static,
         solvers=dict(log.solvers.most_common()),
         reason=verdict.reason,
-        cautions=_with_loads(model.scene, verdict, last.after.time),
+        cautions=_with_loads(model.scene, verdict, last.after.time, len(history.time)),
         peaks=log.peaks.peaks(log.frames, joints, last.after),
         series=log.peaks.series(),
     )
 
 
-def _with_loads(scene: Scene, verdict: Verdict, end: float) -> tuple[str, ...]:
-    """Return the cautions of a verdict, and loads that are not over: first those whose peak or strong part it lacks."""
-    if verdict.outcome in (Outcome.COLLAPSED, Outcome.INTERRUPTED):
+def _with_loads(scene: Scene, verdict: Verdict, end: float, steps: int) -> tuple[str, ...]:
+    """Return the cautions of a verdict, and loads that are not over: first those whose peak or strong part it lacks.
+
+    A run that a collapse or its user ends before its time says nothing of them.
+    """
+    ended = verdict.outcome is Outcome.COLLAPSED and steps < scene.time.steps
+    if ended or verdict.outcome is Outcome.INTERRUPTED:
         return verdict.cautions
     first, last = (scene.loads.unfinished(end, missed) for missed in (True, False))
     return (*first, *verdict.cautions, *last)

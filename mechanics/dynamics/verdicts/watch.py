@@ -176,8 +176,6 @@ class Watch(Carrier):
             cautions.insert(0, "a rest on the way was held only by self-stress, which no load applies")
         if outcome is Outcome.MOVING:
             cautions.insert(0, "whether it stands is not decided: its time was over before it rested or fell")
-        if self._ends and self._time < self._model.scene.loads.until:
-            cautions.append(self._loads_go_on())
         if outcome.rests and self._unsolved.may_cause(self._fastest):
             cautions.append(f"on the way {self._unsolved.text()}")
         if (left_out := relaxation_caution(self._model)) is not None:
@@ -212,11 +210,6 @@ class Watch(Carrier):
         if outcome is Outcome.COLLAPSED:
             return f"stone {code} has sunk by {length(self._sunk)} and moves at {length(self._speed)}/s"
         return ""
-
-    def _loads_go_on(self) -> str:
-        until = self._model.scene.loads.until
-        over = f"they change until {until:g} s" if np.isfinite(until) else "they never cease to change"
-        return f"the loads were not over when the run ended at {self._time:g} s: {over}"
 
     def _see_joints(self, step: Step) -> None:
         """Remember how far compliant joints let stones into each other."""
