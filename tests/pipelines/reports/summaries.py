@@ -77,6 +77,7 @@ def pushed(**changed):
         "cautions": [],
         "strength": {"forwards": 72e3, "backwards": 0.0},
         "stiffness": 13e6,
+        "early_stiffness": 16e6,
         "turning": 0.9,
         "settling": 6e-4,
         "steps": 200,
