@@ -25,13 +25,14 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
+from scipy.sparse import bsr_array, csc_array
 
 from mechanics.arrays import Array, Bools
 from mechanics.limit.assembly import RigidAssembly, Strength
 from mechanics.limit.live_loads import LiveLoad
 from mechanics.limit.programme import Optimum, Programme
 
-__all__ = ["Flow", "LimitLoad", "Mechanism", "limit_load", "mechanism"]
+__all__ = ["Flow", "LimitLoad", "Mechanism", "limit_load", "mechanism", "without_friction_across"]
 
 # slope of the fictitious strength over that of the programme before, and over the friction in the end [-]
 _FLATTER, _DILATANCY = 0.3, 1e-3
@@ -49,6 +50,8 @@ _AGAIN, _SAME = 5, 1e-2
 _MOST = 40
 # friction beyond Coulomb's that a candidate may have, over the strength of all contacts [-]
 _BEYOND = 1e-2
+# share of the friction across the line of sliding that stays, without which nothing would hold stones there [-]
+_ACROSS = 1e-3
 # velocity over the largest below which a contact stays closed [-]
 _STILL = 1e-4
 
@@ -148,6 +151,28 @@ def limit_load(
     if flow is Flow.ASSOCIATIVE or not np.isfinite(bound.multiplier):
         return replace(bound, flow=flow)
     return _candidate(on, programme, bound)
+
+
+def without_friction_across(on: RigidAssembly, live: LiveLoad, found: LimitLoad) -> LimitLoad | None:
+    """Return the limit load where joints that slide rub along their slip alone; None where none slides.
+
+    Limit equilibrium, as rock engineers compute a wedge on two planes, has no friction across the line of sliding.
+
+    Parameters
+    ----------
+    on, live : the stones and the load
+    found : of Coulomb's friction, so that joints slide without opening; its mechanism has the directions of slip
+    """
+    slides = np.flatnonzero(found.mechanism.sliding)
+    if not len(slides):
+        return None
+    slip = (on.lift.T @ found.mechanism.velocity[on.free].ravel()).reshape(-1, 3)[slides, 1:]
+    along = slip / np.linalg.norm(slip, axis=1)[:, None]
+    rubs = np.tile(np.eye(3), (len(on.contacts), 1, 1))
+    rubs[slides, 1:, 1:] *= _ACROSS
+    rubs[slides, 1:, 1:] += (1.0 - _ACROSS) * np.einsum("ci,cj->cij", along, along)
+    projection = bsr_array((rubs, np.arange(len(rubs)), np.arange(len(rubs) + 1)))
+    return limit_load(replace(on, lift=csc_array(on.lift @ projection)), live)
 
 
 def mechanism(
