@@ -13,7 +13,14 @@ from mechanics.limit.confirm import Confirmation, confirm, likeness
 from mechanics.limit.dead_load import Standing
 from mechanics.limit.held import WIDTH, held_limit
 from mechanics.limit.kinematic import Kinematics, kinematics
-from mechanics.limit.limit_load import Flow, LimitLoad, Mechanism, limit_load, mechanism
+from mechanics.limit.limit_load import (
+    Flow,
+    LimitLoad,
+    Mechanism,
+    limit_load,
+    mechanism,
+    without_friction_across,
+)
 from mechanics.limit.live_loads import Acceleration, LiveLoad
 from mechanics.limit.pushover import Pushover, pushover
 from mechanics.limit.thickness import geometric_safety
@@ -52,6 +59,8 @@ _BY_RUNS = "Coulomb's friction without dilatancy, by the rule of runs: the large
 _CRUSHED = "Coulomb's friction without dilatancy, candidate: stones crush, which rigid ones in runs do not"
 _UNSURE = "candidate or bound: the stones rest, but one step from rest moves them under the dead load alone"
 _ALIKE = 0.9  # cosine between mechanism and collapse from which they are one [-]
+_TURNS = 0.15  # share of turning in the speed of a mechanism up to which it slides [-]
+_SAME = 0.01  # by which λ without friction across the line of sliding is lower, from which it is told [-]
 _MOVES = 0.01  # speed over that of the fastest stone from which a stone belongs to a mechanism [-]
 
 _FIRST = 1.0  # λ from which runs seek the limit of a load that the bound does not limit [-]
@@ -195,6 +204,7 @@ def _load(
         changes = sensitivity(on, live, bound, outwards)
         told["direction"] = list(live.direction)
         told["sensitivity"] = None if changes is None else asdict(changes)
+    told["without_friction_across"] = _without_friction_across(on, live, limit)
     if question.whole and np.isfinite(limit.multiplier):
         told["tilt"] = float(np.degrees(np.arctan(limit.multiplier)))
     # where the step from rest decides nothing, only runs can
@@ -214,6 +224,24 @@ def _load(
     told["headline"] = _sentence(told)
     told["mechanism"] = _moving(on, limit.mechanism)
     return Answer(told, limit.mechanism, limit.force, curve)
+
+
+def _without_friction_across(on: RigidAssembly, live: LiveLoad, found: LimitLoad) -> float | None:
+    """Return λ without friction across the line of sliding [-]; None where stones turn, or it is the same.
+
+    Zero where the stones do not stand without it.
+    """
+    motion = found.mechanism
+    if not np.isfinite(found.multiplier) or not motion.speed.any() or len(on.free) > _SOUGHT:
+        return None
+    turning = 0.5 * on.model.surfaces.size * np.linalg.norm(motion.velocity[:, 3:], axis=1)
+    if turning.max() > _TURNS * motion.speed.max():
+        return None
+    other = without_friction_across(on, live, found)
+    if other is None or np.isinf(other.multiplier):
+        return None
+    multiplier = 0.0 if np.isnan(other.multiplier) else other.multiplier
+    return multiplier if multiplier < (1.0 - _SAME) * found.multiplier else None
 
 
 def _limit(
@@ -429,6 +457,9 @@ def _sentence(one: dict[str, Any]) -> str:
     stands = how.get(one["limit_kind"], f"held{lost}")
     bound = "no bound" if one["bound"] is None else f"bound {one['bound']:.4g}"
     text = f"{one['name']}: λ = {one['limit']:.4g} ({stands}), {bound}{_caution(one)}"
+    across = one["without_friction_across"]
+    if across is not None:
+        text += f"; without friction across the line of sliding, as wedges are computed, λ = {across:.4g}"
     angle = f", a tilt of {one['tilt']:.3g}°" if "tilt" in one else ""
     return f"{text}{angle}{_dynamics(one)}{_collapse(one)}{_verdict(one)}"
 

@@ -84,3 +84,23 @@ def test_the_title_of_a_picture_is_not_cut():
         "Bay; north\nhorizontal y: multiplier 0.125 (held; 0.1252 is lost), bound 0.13; other forces hold no more than "
         "0.1; passed"
     )
+
+
+@pytest.mark.parametrize(
+    ("share", "expected"), [(0.9, 0.36), (float("nan"), 0.0), (0.999, None), (float("inf"), None)]
+)
+def test_what_slides_is_told_without_friction_across_its_way(monkeypatch, share, expected):
+    """A flat block slides at its friction; limits within 1 % are one, and what does not stand without it holds zero."""
+    flat = assembly(scene(ground(), brick("a", (0, 0, 0), (1.0, 1.0, 0.2)), friction=0.4))
+    monkeypatch.setattr(
+        answers, "without_friction_across", lambda on, live, found: replace(found, multiplier=0.4 * share)
+    )
+    told = asked(flat, monkeypatch, lambda one: one)
+    words = "without friction across the line of sliding, as wedges are computed, λ = "
+    assert told["without_friction_across"] == pytest.approx(expected)
+    assert (words in told["headline"]) is (expected is not None)
+
+
+def test_what_turns_is_not_asked_for_a_line_of_sliding(on, monkeypatch):
+    monkeypatch.setattr(answers, "without_friction_across", lambda *_: pytest.fail("it tips"))
+    assert asked(on, monkeypatch, lambda one: one)["without_friction_across"] is None
