@@ -8,6 +8,7 @@ import pytest
 from mechanics.dynamics.outcome import Outcome
 from mechanics.limit.assembly import assembly
 from mechanics.limit.confirm import Confirmation, ConfirmationRun
+from mechanics.limit.held import HeldLimit
 from mechanics.limit.limit_load import Flow, limit_load
 from mechanics.limit.live_loads import Acceleration
 from pipelines.assess import answers
@@ -64,6 +65,14 @@ def test_what_was_not_sought_is_said(on, monkeypatch):
     told = asked(on, monkeypatch, lambda one: one)
     assert told["candidate"] is None
     assert "was not sought among so many stones" in told["headline"]
+
+
+def test_a_step_that_moves_what_a_run_brings_to_rest_leaves_the_limit_to_runs(on, monkeypatch):
+    nothing = np.zeros((len(on.contacts), 3))
+    monkeypatch.setattr(answers, "held_limit", lambda *_: HeldLimit(0.0, 0.0, nothing, None, 1))
+    told = asked(on, monkeypatch, lambda one: one)
+    assert "λ = 0.25 (NOT SURE, candidate or bound), bound 0.25" in told["headline"]
+    assert "held at 0.2, lost at 0.21" in told["headline"]
 
 
 def test_a_code_checks_the_lower_of_two_candidates(on, monkeypatch):
