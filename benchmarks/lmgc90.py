@@ -273,6 +273,7 @@ class _GravityOfSteps:
 
     values: Array
     step: float
+    course = None
 
     @property
     def until(self) -> float:

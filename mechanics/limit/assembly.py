@@ -19,6 +19,7 @@ from scipy.sparse import csc_array, csr_array
 from mechanics.arrays import Array, Ints
 from mechanics.contact.contacts import Contacts, gaps, take
 from mechanics.contact.shared_area import SLACK
+from mechanics.delassus.rigid import RigidDelassus
 from mechanics.dynamics.contact_search import Detection, contacts_as_drawn, detection
 from mechanics.limit.joints import Joints, StressBlocks, find_joints, stress_blocks
 from mechanics.model.model import Model, build_model
@@ -63,6 +64,7 @@ class RigidAssembly:
     model, state : the stones, all rigid or fixed
     contacts : the contact points (nc) of closed joints
     free : (n,) bodies that may move
+    operator : W of the contact points
     lift : (6 n, 3 nc) H, forces at contacts → force [N] and moment about its centre [N m] of each free stone
     dead : (6 n,) weight, and the forces of the scene at its start [N, N m]
     strength : of the contact points
@@ -75,6 +77,7 @@ class RigidAssembly:
     state: State
     contacts: Contacts
     free: Ints
+    operator: RigidDelassus
     lift: "csc_array[np.float64]"
     dead: Array
     strength: Strength
@@ -140,6 +143,7 @@ def assembly(scene: Scene, widest: float = CLOSED) -> RigidAssembly:
             remedy=f"close the joints: gaps up to {widest:g} of a stone's width count as closed",
         )
     found = detection(model, state, take(contacts, closed), ())
+    assert isinstance(found.operator, RigidDelassus)
     form = found.operator.form
     assert isinstance(form, SparseForm)
     joints = find_joints(model, state, found.contacts)
@@ -149,6 +153,7 @@ def assembly(scene: Scene, widest: float = CLOSED) -> RigidAssembly:
         state=state,
         contacts=found.contacts,
         free=free,
+        operator=found.operator,
         lift=form.lift,
         dead=_dead(model, state, free),
         strength=_strength(found),

@@ -38,6 +38,7 @@ class _Held:
     force: Force
     instant: float
     until = 0.0
+    course = None
 
     @property
     def stones(self) -> frozenset[str]:

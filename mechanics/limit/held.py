@@ -18,7 +18,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechanics.arrays import Array
-from mechanics.dynamics.contact_search import detection
 from mechanics.limit.assembly import RigidAssembly
 from mechanics.limit.limit_load import LimitLoad, Mechanism, mechanism
 from mechanics.limit.live_loads import LiveLoad
@@ -126,7 +125,7 @@ class _Steps:
 
     def __init__(self, on: RigidAssembly, live: LiveLoad) -> None:
         self._on, self._dead, self._live = on, on.dead, live(on)
-        self._operator = detection(on.model, on.state, on.contacts, ()).operator
+        self._operator = on.operator
         self._free = self._motion(self._dead), self._motion(self._live)
         self._pull = np.zeros((len(on.contacts), 3))
         self._pull[:, 0] = on.strength.tension

@@ -118,6 +118,7 @@ class _Growing:
     force: Array
     arm: Array
     until = 0.0
+    course = None
 
     def __call__(self, time: float, centre: Array, rotation: Array) -> tuple[Array, Array]:
         """Return force and moment (n, 3) of all [N, N m]."""
@@ -131,6 +132,7 @@ class _Standing:
 
     load: Force
     until = 0.0
+    course = None
 
     @property
     def stones(self) -> frozenset[str]:

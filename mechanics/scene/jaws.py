@@ -23,7 +23,10 @@ class JawPath:
     Attributes
     ----------
     rise : of the jaws so far [m]
+    course : None: a test runs to its end
     """
+
+    course = None
 
     def __init__(self, stones: frozenset[str], direction: Array, to: Sequence[float], speed: float) -> None:
         self.stones, self._direction = stones, direction

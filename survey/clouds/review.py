@@ -142,9 +142,10 @@ def _overlaps(
     for k in frames.tolist():
         text = f"it holds all {holding[k]} others: it is the wall's edge rather than a stone, leave it out"
         yield Doubtful(outlines[k].code, "overlap", text, outlines[k].where)
-    for k in np.flatnonzero((shared > _OVERLAP * smaller) & ~np.isin(pairs, frames).any(axis=1)):
-        a, b = (outlines[i] for i in pairs[k].tolist())
-        text = f"it shares {shared[k]:.2g} m² with {b.code}, {shared[k] / max(smaller[k], 1e-12):.0%} of the smaller"
+    for pair in np.flatnonzero((shared > _OVERLAP * smaller) & ~np.isin(pairs, frames).any(axis=1)):
+        a, b = (outlines[i] for i in pairs[pair].tolist())
+        part = shared[pair] / max(smaller[pair], 1e-12)
+        text = f"it shares {shared[pair]:.2g} m² with {b.code}, {part:.0%} of the smaller"
         yield Doubtful(a.code, "overlap", text, a.where)
 
 

@@ -168,7 +168,8 @@ class Loads:
     @property
     def courses(self) -> tuple[Course, ...]:
         """Courses of the loads that change with time."""
-        found = (one.course for one in (*self.gravity, *self.forces, *self.motions))
+        gravity, forces = (one.course for one in self.gravity), (one.course for one in self.forces)
+        found = (*gravity, *forces, *(one.course for one in self.motions))
         return tuple(one for one in found if one is not None)
 
     def unfinished(self, end: float, missed: bool) -> tuple[str, ...]:

@@ -30,6 +30,7 @@ class Membrane:
     radius: Array
     pressure: float
     thickness: float = 1.0
+    course = None
 
     @property
     def until(self) -> float:

@@ -141,7 +141,7 @@ def neck(mask: Bools) -> tuple[str, str] | None:
     return "neck", text
 
 
-def _largest(pieces: NDArray[np.int32]) -> int:
+def _largest(pieces: NDArray[np.signedinteger]) -> int:
     return int(np.bincount(pieces.ravel())[1:].max(initial=0))
 
 

@@ -97,7 +97,7 @@ def medial_lines(outlines: Sequence[Array], frame: Array, step: float, widest: f
     inset = _INSET * step
     diagram, original, side = _diagram(points, frame, step)
     lengths, pairs = _lengths(diagram), diagram.ridge_points
-    between: Bools = (pairs < len(points)).all(axis=1)
+    between = pairs.max(axis=1) < len(points)
     between[between] = owner[pairs[between, 0]] != owner[pairs[between, 1]]
     apart = np.linalg.norm(points[pairs[between, 0]] - points[pairs[between, 1]], axis=1)
     usual = usual_width(lengths[between], apart) - 2.0 * inset

@@ -5,11 +5,11 @@ from collections.abc import Callable
 
 import pytest
 from sqlalchemy import insert
+from tests.archmodel.migrations.second_version import connected, rows_of
 
 from archmodel.database.session import open_database
 from archmodel.store.stones import store_survey
 from tests.archmodel.migrations import second_version
-from tests.archmodel.migrations.second_version import connected, rows_of
 from tests.archmodel.stones import SHA, box_stone
 from tests.moma.commands import invoke
 
