@@ -15,7 +15,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import Voronoi, cKDTree
 
 from moma.errors import GeometryError
-from survey.arrays import Array, Bools, Ints
+from survey.arrays import Array, Ints
 from survey.geometry.polygons import inside
 from survey.joints.grown.openings import open_places, usual_width
 
