@@ -19,6 +19,7 @@ from survey.arrays import Array, Ints
 from survey.quality.bed_fit import BedCorners, BedScatter, fit_bed, pool, scatter_of
 from survey.quality.facades import Facade, WallPlane
 from survey.quality.precision import StoneQuality
+from survey.quality.wedges import Side, arch_stones, lies_along, sides_of
 
 __all__ = [
     "ENOUGH",
@@ -187,18 +188,21 @@ def course_heights(lines: Sequence[CourseLine]) -> tuple[CourseHeight, ...]:
     return tuple(found)
 
 
-def lower_corners(outline: Array, frame: WallPlane) -> list[int]:
+def lower_corners(outline: Array, frame: WallPlane, arches: Side | None = None) -> list[int]:
     """Return the indices of the corners on which a face is bedded: the ends of its lower, nearly level sides.
 
     Parameters
     ----------
     outline : (nv, 3) counter-clockwise seen from outside [m]
     frame : elevation of the facade
+    arches : sides of arch stones; what is cut to one of them is no bed
     """
     flat = frame.flatten(outline)
     run = np.roll(flat, -1, axis=0) - flat
     # counter-clockwise, the lower sides run to the right
     bedded = (run[:, 0] > 0.0) & (np.abs(run[:, 1]) <= _LEVEL * run[:, 0])
+    if arches is not None:
+        bedded &= ~lies_along(flat, run, arches)
     return sorted({k for i in np.flatnonzero(bedded).tolist() for k in (i, (i + 1) % len(flat))})
 
 
@@ -210,13 +214,16 @@ def _tilt(facade: Facade, tilts: Sequence[Array]) -> float:
 
 
 def _courses(stones: Sequence[StoneQuality], facade: Facade, frame_sigma: float) -> list[_Course]:
-    """Return the lower corners of a facade, by zone and course."""
+    """Return the lower corners of a facade, by zone and course; arch stones have none."""
     groups: dict[tuple[str, int], list[StoneQuality]] = {}
+    sides = sides_of(stones, facade)
+    arch = arch_stones(stones, sides)
     for i in facade.members.tolist():
         course = stones[i].course
-        if course is not None:
+        if course is not None and i not in arch:
             groups.setdefault((stones[i].zone or "", course), []).append(stones[i])
-    courses = [_course(groups[key], facade, frame_sigma) for key in sorted(groups)]
+    arches = sides.of(arch)
+    courses = [_course(groups[key], facade, frame_sigma, arches) for key in sorted(groups)]
     return [one for one in courses if one is not None]
 
 
@@ -227,12 +234,14 @@ def _bedded(along: Array, height: Array, sigma: Array) -> Ints:
     return np.flatnonzero(~(near & rises).any(axis=0))
 
 
-def _course(stones: Sequence[StoneQuality], facade: Facade, frame_sigma: float) -> _Course | None:
+def _course(
+    stones: Sequence[StoneQuality], facade: Facade, frame_sigma: float, arches: Side
+) -> _Course | None:
     codes: list[str] = []
     parts: list[Array] = []
     left_out = 0
     for stone in stones:
-        lower = lower_corners(stone.outline, facade.frame)
+        lower = lower_corners(stone.outline, facade.frame, arches)
         known = np.isfinite(stone.corner_sigma[:, 2])
         sound = [k for k in lower if k not in stone.worn_corners and known[k]]
         places, sigma = stone.outline[sound], stone.corner_sigma[sound, 2]

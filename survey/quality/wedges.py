@@ -1,17 +1,21 @@
-"""Convergence and slope of the sides of arch stones."""
+"""Arch stones: convergence and slope of their sides, and the stones of arches by the fan of their joints."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from survey.arrays import Array
 from survey.quality.facades import Facade, upright_frame
 from survey.quality.precision import StoneQuality
 
-__all__ = ["SideConvergence", "sloped_side", "wedges"]
+__all__ = ["Side", "SideConvergence", "arch_stones", "lies_along", "sides_of", "sloped_side", "wedges"]
 
 
 _ARCH = ("voussoir", "keystone")
@@ -19,6 +23,13 @@ _REACH = 3.0  # of the stone's larger dimension: distance within which its neigh
 _BULGE = 0.02  # least rise over the chord of the neighbours, over their distance, that shows the extrados
 _LEVEL = 0.5  # sine of a radius' rise below which it does not show which end is up
 _SHORT = 0.5  # of the longest side: length below which a side is an arris or a worn corner
+_JOINT = 0.05  # widest joint between two stones that touch [m]
+_ALONG = math.radians(15.0)  # largest angle between two sides of a joint
+_OVERLAP = 0.6  # of the longer of two sides of a radial joint: their common length, at least
+_CONVERGES = math.radians(2.0)  # least angle between the joints of an arch stone: stones are cut to 1° or 2°
+_FAN = math.radians(20.0)  # least angle that the joints of an arch turn by: a flat arch's turn by 30° and more
+_FEWEST = 3  # least number of stones in such a fan
+_SOME = 0.25  # of the shorter of two sides: common length beyond which one lies along the other
 
 
 @dataclass(frozen=True)
@@ -56,6 +67,165 @@ def wedges(stones: Sequence[StoneQuality], facades: Sequence[Facade]) -> dict[in
             if wedge is not None:
                 found[index] = wedge
     return found
+
+
+class Side(NamedTuple):
+    """Sides of stones in the elevation of their facade, m of them.
+
+    Attributes
+    ----------
+    stone : (m,) index of the stone of each
+    start, run : (m, 2) its first corner, and the way to the next; the stone is to its left [m]
+    """
+
+    stone: NDArray[np.intp]
+    start: Array
+    run: Array
+
+    @property
+    def length(self) -> Array:
+        """Length of each [m]."""
+        return np.asarray(np.linalg.norm(self.run, axis=1))
+
+    def of(self, stones: Collection[int]) -> "Side":
+        """Return the sides of some stones."""
+        chosen = np.isin(self.stone, list(stones))
+        return Side(self.stone[chosen], self.start[chosen], self.run[chosen])
+
+
+def sides_of(stones: Sequence[StoneQuality], facade: Facade) -> Side:
+    """Return all sides of the stones of a facade that have a length."""
+    members = facade.members.tolist()
+    flats = [facade.frame.flatten(stones[i].outline) for i in members]
+    index = np.repeat(np.array(members, dtype=np.intp), [len(flat) for flat in flats])
+    start = np.concatenate([np.zeros((0, 2)), *flats])
+    run = np.concatenate([np.zeros((0, 2)), *(np.roll(flat, -1, axis=0) - flat for flat in flats)])
+    sound = np.linalg.norm(run, axis=1) > 1e-6
+    return Side(index[sound], start[sound], run[sound])
+
+
+def arch_stones(stones: Sequence[StoneQuality], sides: Side) -> frozenset[int]:
+    """Return the indices of the stones that make arches: by their kinds, or by joints that fan out.
+
+    A stone of an arch has two joints, which converge towards the intrados; its neighbours in the arch have one of them
+    each, and converge on the same side. Three stones and more whose joints turn by 20° in all are an arch, whatever
+    they are called.
+
+    Parameters
+    ----------
+    stones : of the survey
+    sides : of the stones of one facade
+    """
+    named = {int(i) for i in np.unique(sides.stone) if stones[i].kind in _ARCH}
+    joints = _radial_joints(sides)
+    angles: dict[int, float] = {}
+    radial: set[int] = set()
+    for i in np.unique(joints.stone).tolist():
+        fan = _fan(sides, joints, i, _corner(stones[i]))
+        if fan is not None:
+            angles[i] = fan[0]
+            radial.update(fan[1])
+    kept = np.isin(joints.side, list(radial)) & np.isin(joints.opposite, list(radial))
+    links = list(zip(joints.stone[kept].tolist(), joints.neighbour[kept].tolist(), strict=True))
+    fans: set[int] = set()
+    for group in _connected(angles, links):
+        if len(group) >= _FEWEST and sum(angles[i] for i in group) >= _FAN:
+            fans |= group
+    return frozenset(named | fans)
+
+
+def lies_along(start: Array, run: Array, sides: Side) -> NDArray[np.bool_]:
+    """Return which sides (m,) of a stone face one of other sides across a joint, over some of their length.
+
+    Parameters
+    ----------
+    start, run : (m, 2) of the stone [m]
+    sides : of other stones
+    """
+    found = np.zeros(len(start), dtype=bool)
+    if len(sides.stone) == 0:
+        return found
+    length, other = np.linalg.norm(run, axis=1), sides.length
+    for k in range(len(start)):
+        if length[k] <= 0.0:
+            continue
+        way = run[k] / length[k]
+        parallel = -(sides.run @ way) >= math.cos(_ALONG) * other
+        first = sides.start - start[k]
+        ends = np.stack([first, first + sides.run])
+        along, across = ends @ way, ends @ np.array([-way[1], way[0]])
+        common = np.minimum(along.max(axis=0), length[k]) - np.maximum(along.min(axis=0), 0.0)
+        close = (np.abs(across.mean(axis=0)) <= _JOINT) & (np.abs(across).min(axis=0) <= _JOINT)
+        found[k] = bool((parallel & close & (common >= _SOME * np.minimum(length[k], other))).any())
+    return found
+
+
+class _Joints(NamedTuple):
+    """Radial joints, twice each: rows of the side and of that across it, and the stones of both."""
+
+    side: NDArray[np.intp]
+    opposite: NDArray[np.intp]
+    stone: NDArray[np.intp]
+    neighbour: NDArray[np.intp]
+
+
+def _radial_joints(sides: Side) -> _Joints:
+    """Return the joints between sides that are nearly as long as each other and lie along each other."""
+    middle, length = sides.start + 0.5 * sides.run, sides.length
+    pairs = cKDTree(middle).query_pairs(4.0 * _JOINT, output_type="ndarray") if len(middle) else np.zeros((0, 2), int)
+    a, b = pairs[:, 0], pairs[:, 1]
+    way = sides.run[a] / length[a][:, None]
+    gap = middle[b] - middle[a]
+    shift = np.abs((gap * way).sum(axis=1))
+    apart = np.abs(gap[:, 0] * way[:, 1] - gap[:, 1] * way[:, 0])
+    common = 0.5 * (length[a] + length[b]) - shift
+    facing = -(sides.run[a] * sides.run[b]).sum(axis=1) >= math.cos(_ALONG) * length[a] * length[b]
+    kept = (
+        (sides.stone[a] != sides.stone[b])
+        & facing
+        & (apart <= _JOINT)
+        & (common >= _OVERLAP * np.maximum(length[a], length[b]))
+    )
+    here, there = np.concatenate([a[kept], b[kept]]), np.concatenate([b[kept], a[kept]])
+    return _Joints(here, there, sides.stone[here], sides.stone[there])
+
+
+def _fan(sides: Side, joints: _Joints, stone: int, sigma: float) -> tuple[float, tuple[int, int]] | None:
+    """Return the angle between the two longest joints of a stone that face apart [rad], and the rows of their sides.
+
+    None stands for an angle that is not significant.
+    """
+    rows = np.unique(joints.side[joints.stone == stone])
+    if len(rows) < 2:
+        return None
+    run, length = sides.run[rows], sides.length[rows]
+    turn = np.arctan2(run[:, 1], run[:, 0])
+    best: tuple[float, float, tuple[int, int]] | None = None
+    for i in range(len(rows)):
+        for k in range(i):
+            # opposite sides of a counter-clockwise outline run in opposite ways
+            angle = abs((turn[i] - turn[k]) % (2.0 * math.pi) - math.pi)
+            size = float(min(length[i], length[k]))
+            if angle <= math.pi / 4.0 and (best is None or size > best[0]):
+                best = size, angle, (int(rows[i]), int(rows[k]))
+    if best is None:
+        return None
+    size, angle, ends = best
+    # the angle of two sides has four corners' errors across them
+    return (angle, ends) if angle > max(_CONVERGES, 3.0 * 2.0 * sigma / size) else None
+
+
+def _connected(members: Collection[int], links: Sequence[tuple[int, int]]) -> Iterator[set[int]]:
+    """Yield the sets of members that links join."""
+    number = {one: k for k, one in enumerate(members)}
+    if not number:
+        return
+    rows = np.array([(number[a], number[b]) for a, b in links], dtype=np.intp).reshape(-1, 2)
+    graph = coo_array((np.ones(len(rows)), (rows[:, 0], rows[:, 1])), shape=(len(number), len(number)))
+    label = connected_components(graph, directed=False)[1]
+    names = np.array(list(number))
+    for k in np.unique(label):
+        yield set(names[label == k].tolist())
 
 
 def sloped_side(stone: StoneQuality) -> tuple[float, float]:

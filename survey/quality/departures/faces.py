@@ -41,10 +41,12 @@ _PER_STONE = 0.7  # degrees of freedom that a stone gives the scatter: neighbour
 _PROJECTING = frozenset({"cornice", "coping", "corbel", "sill", "base", "capital", "slab", "boss"})
 _RANKS = {
     "lean": 0, "bulge": 1, "bow": 1, "setback": 2, "offset": 2, "left end": 3, "right end": 3, "left corner": 3,
-    "right corner": 3, "local bulge": 4,
+    "right corner": 3, "leaning part": 3, "local bulge": 4,
 }  # fmt: skip
 _GRID = 8  # places along and up the wall at which ends, offsets and bulges are looked for
 _FEWEST = 3  # stones that a shape must move
+_ROUNDS = 3  # of odd stones and movements in turn, until the odd stones stay the same
+_BESIDE = 1.0  # of the median size of a stone: distance from a straight joint to which a crack zigzags
 _TRIALS = 12  # by which the place of a shape is sharpened
 
 
@@ -60,6 +62,7 @@ class FaceKind(StrEnum):
     RIGHT_CORNER = "right corner"
     OFFSET = "offset"
     SETBACK = "setback"
+    LEANING_PART = "leaning part"
     LOCAL_BULGE = "local bulge"
 
 
@@ -72,8 +75,8 @@ class FaceMovement:
     facade, zone : wall
     kind : its family
     left, right, low, high : extent, along the facade and in height [m]
-    amount, sigma : outwards: of the top over the base, of the middle over the chord, of the end or corner over the
-        rest, of the right over the left side, of the upper over the lower part [m]
+    amount, sigma : outwards: of the top over the base, of the middle over the chord, of the end, the corner or the
+        top of a part over the rest, of the right over the left side, of the upper over the lower part [m]
     probability : that as much is found anywhere in a wall that has not moved
     """
 
@@ -108,6 +111,7 @@ class FaceMovement:
             "right corner": f"its right corner, {where}, leans {way} by {size} {over}",
             "offset": f"its right part, {where}, {stands} the left",
             "setback": f"from {self.low:.2f} m up it {stands} what is below: slid, or built so",
+            "leaning part": f"its part {where} leans {way} as one by {size} {over} ({angle:.2f}°), parted by a joint",
             "local bulge": f"it {bulges} {where} and {self.low:.2f} to {self.high:.2f} m up",
         }[self.kind]
 
@@ -289,28 +293,20 @@ def _planes(face: _Face) -> list[NDArray[np.intp]]:
 def _wall(name: str, zone: str | None, face: _Face, alpha: float, tilt: float) -> WallFace:
     freedom = max(_PER_STONE * len(face.codes), 1.0)
     limit = critical(alpha / 2.0, 3 * len(face.codes), freedom)
-    away, away_sigma, scatter = _beside(face)
-    turned, turned_sigma = _turned(face)
-    odd = [
-        OddStone(
-            face.codes[i],
-            face.lines[i],
-            "proud" if away[i] > 0.0 else "sunk",
-            float(away[i]),
-            float(away_sigma[i]),
-        )
-        for i in np.flatnonzero(np.abs(away) > limit * away_sigma).tolist()
-    ]
-    for i in np.flatnonzero((np.abs(turned) > limit * turned_sigma).any(axis=1)).tolist():
-        k = int((np.abs(turned[i]) / turned_sigma[i]).argmax())
-        odd.append(
-            OddStone(
-                face.codes[i], face.lines[i], "turned", float(abs(turned[i, k])), float(turned_sigma[i, k])
-            )
-        )
-    sound = np.flatnonzero(~np.isin(face.codes, [one.code for one in odd if one.sort != "turned"]))
-    kept = face.of(sound)
-    movements, lower = _movements(kept, scatter, alpha / 2.0, freedom, tilt)
+    movements: list[Found] = []
+    odd: list[OddStone] = []
+    for _ in range(_ROUNDS):
+        # what the wall has taken is taken out: a stone beside a crack is no odd one
+        moved = sum((one.amount * _field(one.shape, face) for one in movements), np.zeros(len(face.codes)))
+        away, away_sigma, scatter = _beside(replace(face, out=face.out - moved))
+        crossing = _crossing(face, movements, away, limit * away_sigma)
+        before, odd = odd, _odd(face, limit, (np.where(crossing, 0.0, away), away_sigma), _turned(face))
+        strange = np.isin(face.codes, [one.code for one in odd if one.sort != "turned"]) | crossing
+        sound = np.flatnonzero(~strange)
+        kept = face.of(sound)
+        movements, lower = _movements(kept, scatter, alpha / 2.0, freedom, tilt)
+        if not movements or len(movements) >= MOST or [o.code for o in odd] == [o.code for o in before]:
+            break
     if len(movements) >= MOST:  # as many shapes as are looked for leave some still: these faces make no plane
         movements, lower = [], None
     told = tuple(_told(name, zone, kept, one) for one in movements)
@@ -329,6 +325,44 @@ def _wall(name: str, zone: str | None, face: _Face, alpha: float, tilt: float) -
         lower,
         (limit + LIKELY) * float(np.median(away_sigma)) if len(away) else None,
     )
+
+
+def _crossing(face: _Face, movements: Sequence[Found], away: Array, limit: Array) -> NDArray[np.bool_]:
+    """Return the stones beside the joint of a part that moved with its other side: cracks zigzag around stones."""
+    crossing = np.zeros(len(face.codes), dtype=bool)
+    for one in movements:
+        if one.shape.name not in ("leaning part", "offset"):
+            continue
+        inside = _field(one.shape, face) != 0.0
+        for edge in one.shape.places[:2]:
+            beside = np.abs(face.along - edge) <= _BESIDE * face.size
+            if one.shape.name == "offset":
+                change = np.where(inside, one.amount, -one.amount)
+            else:
+                share = (face.up - one.shape.places[2]) / (one.shape.places[3] - one.shape.places[2])
+                change = np.where(inside, one.amount, -one.amount) * share
+            crossing |= beside & (np.abs(away) > limit) & (np.abs(away + change) <= limit)
+    return crossing
+
+
+def _odd(face: _Face, limit: float, beside: tuple[Array, Array], turns: tuple[Array, Array]) -> list[OddStone]:
+    """Return the stones that depart from the plane of their neighbours, or are turned against them, beyond a limit."""
+    (away, away_sigma), (turned, turned_sigma) = beside, turns
+    odd = [
+        OddStone(
+            face.codes[i],
+            face.lines[i],
+            "proud" if away[i] > 0.0 else "sunk",
+            float(away[i]),
+            float(away_sigma[i]),
+        )
+        for i in np.flatnonzero(np.abs(away) > limit * away_sigma).tolist()
+    ]
+    for i in np.flatnonzero((np.abs(turned) > limit * turned_sigma).any(axis=1)).tolist():
+        k = int((np.abs(turned[i]) / turned_sigma[i]).argmax())
+        amount, sigma = float(abs(turned[i, k])), float(turned_sigma[i, k])
+        odd.append(OddStone(face.codes[i], face.lines[i], "turned", amount, sigma))
+    return odd
 
 
 def _beside(face: _Face) -> tuple[Array, Array, float]:
@@ -451,6 +485,14 @@ def _shapes(face: _Face) -> Iterator[Shape]:
             named.append(("left end", (left, s)) if s - left < right - s else ("right end", (s, right)))
             if tall > face.size:
                 named += [("left corner", (left, s, low, high)), ("right corner", (s, right, low, high))]
+        if tall > face.size:
+            joints = [left, *inner.tolist(), right]
+            named += [
+                ("leaning part", (start, stop, low, high))
+                for i, start in enumerate(joints)
+                for stop in joints[i + 1 :]
+                if (start, stop) != (left, right) and stop - start > face.size
+            ]
     if tall > 2.0 * face.size and long > 2.0 * face.size:
         for radius in (0.25 * min(long, tall), 0.5 * min(long, tall)):
             if radius >= 1.5 * face.size:
@@ -493,6 +535,8 @@ def _field(shape: Shape, face: _Face) -> Array:
     elif shape.name == "local bulge":
         away = np.minimum(np.hypot(s - at[0], z - at[1]) / at[2], 1.0)
         values = np.cos(0.5 * math.pi * away) ** 2
+    elif shape.name == "leaning part":
+        values = ((s >= at[0]) & (s <= at[1])) * (z - at[2]) / (at[3] - at[2])
     else:
         share = (at[1] - s) if shape.name.startswith("left") else (s - at[0])
         values = np.maximum(share, 0.0) / (at[1] - at[0])
@@ -512,7 +556,7 @@ def _sharpener(face: _Face) -> Callable[[Sample, Found], Found]:
             "left end": (1,),
             "left corner": (1,),
         }
-        free |= {"right end": (0,), "right corner": (0,)}
+        free |= {"right end": (0,), "right corner": (0,), "leaning part": (0, 1)}
         if found.shape.name not in free:
             return found
         best, gain, step = found.shape, _gain(sample, found.field), 0.5 * face.size
@@ -536,7 +580,11 @@ def _sharpener(face: _Face) -> Callable[[Sample, Found], Found]:
 def _is_sound(shape: Shape, face: _Face) -> bool:
     at = shape.places
     widest = max(float(np.ptp(face.along)), float(np.ptp(face.up)))
-    if shape.name == "local bulge" and not 1.5 * face.size <= at[2] <= widest:
+    if shape.name == "local bulge":
+        inside = face.along.min() <= at[0] <= face.along.max() and face.up.min() <= at[1] <= face.up.max()
+        if not (inside and 1.5 * face.size <= at[2] <= widest):
+            return False
+    if shape.name == "leaning part" and at[1] - at[0] < face.size:
         return False
     if shape.name.split()[0] in ("left", "right") and at[1] - at[0] < face.size:
         return False
@@ -561,13 +609,14 @@ def _told(name: str, zone: str | None, face: _Face, one: Found) -> FaceMovement:
     left, right = float(face.along.min()), float(face.along.max())
     low, high = float(face.up.min()), float(face.up.max())
     if one.shape.name == "local bulge":
-        left, right, low, high = at[0] - at[2], at[0] + at[2], at[1] - at[2], at[1] + at[2]
+        left, right = max(left, at[0] - at[2]), min(right, at[0] + at[2])
+        low, high = max(low, at[1] - at[2]), min(high, at[1] + at[2])
     elif one.shape.name == "offset":
         left = at[0]
     elif one.shape.name == "setback":
         low = at[0]
     elif one.shape.name not in ("lean", "bulge", "bow"):
-        left, right = at[0], at[1]
+        left, right = max(left, at[0]), min(right, at[1])
     return FaceMovement(
         name, zone, FaceKind(one.shape.name), left, right, low, high, one.amount, one.sigma, one.probability
     )
