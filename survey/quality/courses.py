@@ -19,7 +19,7 @@ from survey.arrays import Array, Ints
 from survey.quality.bed_fit import BedCorners, BedScatter, fit_bed, pool, scatter_of
 from survey.quality.facades import Facade, WallPlane
 from survey.quality.precision import StoneQuality
-from survey.quality.wedges import Side, arch_stones, lies_along, sides_of
+from survey.quality.wedges import Side, lies_along, sides_of, spanning_stones
 
 __all__ = [
     "ENOUGH",
@@ -36,6 +36,7 @@ ENOUGH = 5
 
 _BEVEL = 0.10  # longest lower side that is a bevel if it rises [m]
 _RISES = 4.0  # standard deviations by which its upper end lies higher
+_ARRIS = 0.25  # of the longest side of a stone: shorter ones beside a cut are its arris
 _LEVEL = math.tan(math.radians(30.0))  # largest slope of a bed; steeper lower sides are worn or bevelled
 
 
@@ -195,14 +196,17 @@ def lower_corners(outline: Array, frame: WallPlane, arches: Side | None = None) 
     ----------
     outline : (nv, 3) counter-clockwise seen from outside [m]
     frame : elevation of the facade
-    arches : sides of arch stones; what is cut to one of them is no bed
+    arches : sides of arch stones and others that are no bed of the course; what is cut to one of them is none
     """
     flat = frame.flatten(outline)
     run = np.roll(flat, -1, axis=0) - flat
     # counter-clockwise, the lower sides run to the right
     bedded = (run[:, 0] > 0.0) & (np.abs(run[:, 1]) <= _LEVEL * run[:, 0])
     if arches is not None:
-        bedded &= ~lies_along(flat, run, arches)
+        cut = (run[:, 0] > 0.0) & lies_along(flat, run, arches)
+        length = np.linalg.norm(run, axis=1)
+        # beside a cut a short side is its arris
+        bedded &= ~cut & (not cut.any() or length >= _ARRIS * length.max())
     return sorted({k for i in np.flatnonzero(bedded).tolist() for k in (i, (i + 1) % len(flat))})
 
 
@@ -214,17 +218,28 @@ def _tilt(facade: Facade, tilts: Sequence[Array]) -> float:
 
 
 def _courses(stones: Sequence[StoneQuality], facade: Facade, frame_sigma: float) -> list[_Course]:
-    """Return the lower corners of a facade, by zone and course; arch stones have none."""
+    """Return the lower corners of a facade, by zone and course; arch stones and lintels have none."""
     groups: dict[tuple[str, int], list[StoneQuality]] = {}
     sides = sides_of(stones, facade)
-    arch = arch_stones(stones, sides)
+    spanning = spanning_stones(stones, sides)
     for i in facade.members.tolist():
         course = stones[i].course
-        if course is not None and i not in arch:
+        if course is not None and i not in spanning:
             groups.setdefault((stones[i].zone or "", course), []).append(stones[i])
-    arches = sides.of(arch)
-    courses = [_course(groups[key], facade, frame_sigma, arches) for key in sorted(groups)]
+    courses = []
+    for zone, course in sorted(groups):
+        # what stands on a stone of its own course or of a higher one does not stand on the course below
+        same = {
+            i
+            for i in facade.members.tolist()
+            if (stones[i].zone or "") == zone and _at_least(stones[i].course, course)
+        }
+        courses.append(_course(groups[zone, course], facade, frame_sigma, sides.of(spanning | same)))
     return [one for one in courses if one is not None]
+
+
+def _at_least(course: int | None, other: int) -> bool:
+    return course is not None and course >= other
 
 
 def _bedded(along: Array, height: Array, sigma: Array) -> Ints:

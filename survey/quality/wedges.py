@@ -15,10 +15,11 @@ from survey.arrays import Array
 from survey.quality.facades import Facade, upright_frame
 from survey.quality.precision import StoneQuality
 
-__all__ = ["Side", "SideConvergence", "arch_stones", "lies_along", "sides_of", "sloped_side", "wedges"]
+__all__ = ["Side", "SideConvergence", "lies_along", "sides_of", "sloped_side", "spanning_stones", "wedges"]
 
 
 _ARCH = ("voussoir", "keystone")
+_SPANNING = (*_ARCH, "lintel")
 _REACH = 3.0  # of the stone's larger dimension: distance within which its neighbours in the arch are
 _BULGE = 0.02  # least rise over the chord of the neighbours, over their distance, that shows the extrados
 _LEVEL = 0.5  # sine of a radius' rise below which it does not show which end is up
@@ -27,7 +28,9 @@ _JOINT = 0.05  # widest joint between two stones that touch [m]
 _ALONG = math.radians(15.0)  # largest angle between two sides of a joint
 _OVERLAP = 0.6  # of the longer of two sides of a radial joint: their common length, at least
 _CONVERGES = math.radians(2.0)  # least angle between the joints of an arch stone: stones are cut to 1° or 2°
-_FAN = math.radians(20.0)  # least angle that the joints of an arch turn by: a flat arch's turn by 30° and more
+_FAN = math.radians(
+    20.0
+)  # least angle that the joints of an arch turn by: a flat arch's turn by 30° and more
 _FEWEST = 3  # least number of stones in such a fan
 _SOME = 0.25  # of the shorter of two sides: common length beyond which one lies along the other
 
@@ -104,8 +107,8 @@ def sides_of(stones: Sequence[StoneQuality], facade: Facade) -> Side:
     return Side(index[sound], start[sound], run[sound])
 
 
-def arch_stones(stones: Sequence[StoneQuality], sides: Side) -> frozenset[int]:
-    """Return the indices of the stones that make arches: by their kinds, or by joints that fan out.
+def spanning_stones(stones: Sequence[StoneQuality], sides: Side) -> frozenset[int]:
+    """Return the indices of the stones that span an opening: by their kinds, or by joints that fan out.
 
     A stone of an arch has two joints, which converge towards the intrados; its neighbours in the arch have one of them
     each, and converge on the same side. Three stones and more whose joints turn by 20° in all are an arch, whatever
@@ -116,7 +119,7 @@ def arch_stones(stones: Sequence[StoneQuality], sides: Side) -> frozenset[int]:
     stones : of the survey
     sides : of the stones of one facade
     """
-    named = {int(i) for i in np.unique(sides.stone) if stones[i].kind in _ARCH}
+    named = {int(i) for i in np.unique(sides.stone) if stones[i].kind in _SPANNING}
     joints = _radial_joints(sides)
     angles: dict[int, float] = {}
     radial: set[int] = set()
@@ -130,7 +133,8 @@ def arch_stones(stones: Sequence[StoneQuality], sides: Side) -> frozenset[int]:
     fans: set[int] = set()
     for group in _connected(angles, links):
         if len(group) >= _FEWEST and sum(angles[i] for i in group) >= _FAN:
-            fans |= group
+            ends = np.isin(joints.stone, list(group)) & np.isin(joints.side, list(radial))
+            fans |= group | set(joints.neighbour[ends].tolist())
     return frozenset(named | fans)
 
 
@@ -172,7 +176,11 @@ class _Joints(NamedTuple):
 def _radial_joints(sides: Side) -> _Joints:
     """Return the joints between sides that are nearly as long as each other and lie along each other."""
     middle, length = sides.start + 0.5 * sides.run, sides.length
-    pairs = cKDTree(middle).query_pairs(4.0 * _JOINT, output_type="ndarray") if len(middle) else np.zeros((0, 2), int)
+    pairs = (
+        cKDTree(middle).query_pairs(4.0 * _JOINT, output_type="ndarray")
+        if len(middle)
+        else np.zeros((0, 2), int)
+    )
     a, b = pairs[:, 0], pairs[:, 1]
     way = sides.run[a] / length[a][:, None]
     gap = middle[b] - middle[a]
@@ -191,7 +199,7 @@ def _radial_joints(sides: Side) -> _Joints:
 
 
 def _fan(sides: Side, joints: _Joints, stone: int, sigma: float) -> tuple[float, tuple[int, int]] | None:
-    """Return the angle between the two longest joints of a stone that face apart [rad], and the rows of their sides.
+    """Return the angle between the two joints of a stone that converge most [rad], and the rows of their sides.
 
     None stands for an angle that is not significant.
     """
@@ -200,19 +208,16 @@ def _fan(sides: Side, joints: _Joints, stone: int, sigma: float) -> tuple[float,
         return None
     run, length = sides.run[rows], sides.length[rows]
     turn = np.arctan2(run[:, 1], run[:, 0])
-    best: tuple[float, float, tuple[int, int]] | None = None
+    best: tuple[float, tuple[int, int]] | None = None
     for i in range(len(rows)):
         for k in range(i):
             # opposite sides of a counter-clockwise outline run in opposite ways
-            angle = abs((turn[i] - turn[k]) % (2.0 * math.pi) - math.pi)
-            size = float(min(length[i], length[k]))
-            if angle <= math.pi / 4.0 and (best is None or size > best[0]):
-                best = size, angle, (int(rows[i]), int(rows[k]))
-    if best is None:
-        return None
-    size, angle, ends = best
-    # the angle of two sides has four corners' errors across them
-    return (angle, ends) if angle > max(_CONVERGES, 3.0 * 2.0 * sigma / size) else None
+            angle = float(abs((turn[i] - turn[k]) % (2.0 * math.pi) - math.pi))
+            # two corners at either end of both
+            certain = angle > max(_CONVERGES, 3.0 * 2.0 * sigma / float(min(length[i], length[k])))
+            if certain and angle <= math.pi / 4.0 and (best is None or angle > best[0]):
+                best = angle, (int(rows[i]), int(rows[k]))
+    return best
 
 
 def _connected(members: Collection[int], links: Sequence[tuple[int, int]]) -> Iterator[set[int]]:

@@ -345,7 +345,9 @@ def _crossing(face: _Face, movements: Sequence[Found], away: Array, limit: Array
     return crossing
 
 
-def _odd(face: _Face, limit: float, beside: tuple[Array, Array], turns: tuple[Array, Array]) -> list[OddStone]:
+def _odd(
+    face: _Face, limit: float, beside: tuple[Array, Array], turns: tuple[Array, Array]
+) -> list[OddStone]:
     """Return the stones that depart from the plane of their neighbours, or are turned against them, beyond a limit."""
     (away, away_sigma), (turned, turned_sigma) = beside, turns
     odd = [

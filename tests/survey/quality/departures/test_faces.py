@@ -67,6 +67,9 @@ def test_a_rotated_facade_leans(amount: float) -> None:
         (lambda s, c: 0.03 * max(2.2 - s, 0) / 2.2 * up(c), "left corner", 0.03, "its left corner"),
         (lambda s, c: 0.03 * max(s - 3.5, 0) / 2.2, "right end", 0.03, "its right end"),
         (lambda s, c: 0.03 * max(2.2 - s, 0) / 2.2, "left end", 0.03, "its left end"),
+        (lambda s, c: 0.03 * (s < 2.0) * up(c), "leaning part", 0.03, "leans outwards as one"),
+        (lambda s, c: -0.03 * (s > 4.1) * up(c), "leaning part", -0.03, "leans inwards as one"),
+        (lambda s, c: 0.03 * (2.0 < s < 4.0) * up(c), "leaning part", 0.03, "leans outwards as one"),
         (
             lambda s, c: 0.03 * math.cos(min(math.hypot(s - 2, 0.3 * (c - 4)) / 1.2, 1) * math.pi / 2) ** 2,
             "local bulge",
@@ -81,6 +84,23 @@ def test_every_shape_has_its_name(out: Shift, kind: str, amount: float, words: s
     assert one.amount == pytest.approx(amount, abs=0.005)
     assert words in one.text
     assert one.probability < 1e-6
+
+
+def test_stones_at_the_crack_of_a_leaning_part_are_not_odd() -> None:
+    """The crack goes around the stones, to the right in one course and to the left in the next."""
+    face = face_of(
+        wall(15, out=lambda s, c: 0.025 * (s < 2.0 + 0.3 * (-1) ** c) * up(c), faces=0.001, sigma=0.001)
+    )
+    (one,) = face.movements
+    assert one.kind == "leaning part"
+    assert abs(one.amount - 0.025) < 3.0 * one.sigma < 0.003
+    assert face.odd == ()
+
+
+def test_a_bulge_beside_an_edge_ends_where_the_wall_ends() -> None:
+    (one,) = face_of(wall(16, out=lambda s, c: 0.04 * math.exp(-(s**2 + (0.3 * c - 2.4) ** 2)))).movements[:1]
+    assert -3.0 <= one.left < one.right <= 3.0
+    assert 0.0 <= one.low < one.high <= 2.4
 
 
 @pytest.mark.parametrize(("amount", "sort"), [(0.03, "proud"), (-0.03, "sunk"), (0.25, "proud")])
