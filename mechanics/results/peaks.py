@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mechanics.arrays import Array, Bools
-from mechanics.carried import Carried, Carrier, Rows
+from mechanics.carried import Carried, Carrier
 from mechanics.contact.contacts import material_points
 from mechanics.dynamics.observers.equilibrium import displacement, seen_from_supports
 from mechanics.dynamics.step import Step
@@ -34,7 +34,9 @@ class PeakTracker(Carrier):
     model, start : the scene, and its stones before they carry load, from where displacements count
     """
 
-    CARRIED = ("_displacement", "_opening", "_pressure", "_reaction", "_relative", "_series", "_sliding")
+    CARRIED = (
+        "_displacement", "_opening", "_pressure", "_relative", "_series", "_shear", "_sliding", "_vertical",
+    )  # fmt: skip
     REBUILT = ("_joints", "_least", "_model", "_moves", "_sign", "_start")
 
     def __init__(self, model: Model, start: State) -> None:
@@ -47,7 +49,8 @@ class PeakTracker(Carrier):
         self._least = SLIVER * largest_faces(model)
         self._sign = np.zeros(count)
         self._sign[model.fixed] = 1.0
-        self._reaction: Rows[tuple[float, Array]] = Rows()
+        # reactions of the supports, of no step so far
+        self._vertical = self._shear = -np.inf, start.time, np.nan
         self._joints: StartCorners | None = None
         self._series = Recorder(model, start) if model.scene.series else None
 
@@ -81,7 +84,7 @@ class PeakTracker(Carrier):
         )
         keep_largest(pairs, pressure, after.time, self._pressure)
         sign = self._sign[contacts.bodies[:, 1]] - self._sign[contacts.bodies[:, 0]]
-        self._reaction.append((after.time, sign @ step.force))
+        self._react(after.time, sign @ step.force)
         if self._series is not None:
             self._series(step, opening, sliding)
 
@@ -101,7 +104,6 @@ class PeakTracker(Carrier):
         ):
             rows = whole if record is self._pressure else np.arange(len(joints))
             keep_largest(joints.bodies[rows], values[rows], time, record)
-        vertical, shear = self._reactions()
         seen = seen_from_supports(model, self._start, end)
         return Peaks(
             displacement=_known(self._displacement, self._moves),
@@ -111,26 +113,28 @@ class PeakTracker(Carrier):
             sliding=self._sliding,
             pressure=self._pressure,
             **_stresses(frames),
-            reaction=vertical,
-            shear=shear,
+            reaction=Peak(*self._vertical),
+            shear=Peak(*self._shear),
         )
 
     def series(self) -> Series | None:
         """Return the time series of the chosen stones; None where none is chosen."""
         return None if self._series is None else self._series.series()
 
-    def _reactions(self) -> tuple[Peak, Peak]:
-        """Return the largest support reaction against gravity, and across it (along z without gravity)."""
-        found = []
-        for time, force in self._reaction:
-            gravity = self._model.gravity(time)
-            size = float(np.linalg.norm(gravity))
-            up = -gravity / size if size > 0 else np.array([0.0, 0.0, 1.0])
-            along = float(force @ up)
-            found.append((along, float(np.linalg.norm(force - along * up)), time))
-        vertical, across = max(found, key=lambda one: one[0]), max(found, key=lambda one: one[1])
-        last = found[-1]
-        return Peak(vertical[0], vertical[2], last[0]), Peak(across[1], across[2], last[1])
+    def _react(self, time: float, force: Array) -> None:
+        """Account for the reaction of the supports (3,) [N], against gravity (z without it) and across."""
+        gravity = self._model.gravity(time)
+        size = float(np.linalg.norm(gravity))
+        up = -gravity / size if size > 0 else np.array([0.0, 0.0, 1.0])
+        along = float(force @ up)
+        self._vertical = _larger(self._vertical, along, time)
+        self._shear = _larger(self._shear, float(np.linalg.norm(force - along * up)), time)
+
+
+def _larger(peak: tuple[float, float, float], value: float, time: float) -> tuple[float, float, float]:
+    """Return value, time and last value of a peak after a further value."""
+    largest, when, _ = peak
+    return (value, time, value) if value > largest else (largest, when, value)
 
 
 def _stresses(frames: Sequence[Frame]) -> dict[str, Largest]:

@@ -169,6 +169,7 @@ def laid(depths, normal=(0.0, -1.0, 0.0), behind=()):
             normal=np.array(normal),
             solid_vertices=np.array(corners) @ turn,
             area=0.18,
+            kind="ashlar",
         )
         stones.append(SimpleNamespace(record=record))
     return stones
@@ -183,6 +184,13 @@ def test_stones_thinner_than_their_wall_are_told(normal):
     assert "propose a core" in said
     assert depth_warnings(laid([0.45, 0.5, 0.48], normal)) == []
     assert depth_warnings(laid([0.3] * 5, normal)) == []
+
+
+def test_a_slab_of_ground_makes_no_wall_as_deep():
+    stones = laid([0.3, 0.3, 4.0])
+    assert depth_warnings(stones)
+    stones[2].record.kind = "support"
+    assert depth_warnings(stones) == []
 
 
 def test_a_core_or_a_second_leaf_fills_what_lies_behind_thin_stones():
