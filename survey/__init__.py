@@ -6,7 +6,8 @@ clouds        point clouds with outlines, and masks → records
 registration  survey frames and photographs → site frame
 orientation   photographs → orientation, and points from marks on them
 faces         points → plane → outlined face
-extrusion     face and depth → solid block
+extrusion     face and depth → solid block; the chain from records to stones
+statistics    robust scale and roots, on which all others stand
 geometry      closed solids: cutting, convex parts, adjacency, repair
 simplify      solid block → hexahedron, wedge or prism
 joints        blocks a joint apart → stones that share contact planes

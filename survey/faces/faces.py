@@ -9,6 +9,7 @@ from moma.errors import GeometryError
 from survey.arrays import Array
 from survey.faces.outline import OutlineMeasures, level_direction, measure_outline, outline_polygon
 from survey.faces.planes import FaceFit, fit_plane, with_shared_errors
+from survey.faces.roughness import rough_sigmas
 from survey.faces.shapes import FaceShape, judge_shape
 from survey.geometry.solids import area_vector
 from survey.records.survey import BlockRecord
@@ -106,10 +107,10 @@ def _measured_face(record: BlockRecord, observer: Array | None) -> Face:
     if len(record.vertices) < 3:
         raise GeometryError(f"it has {len(record.vertices)} corners", remedy="measure 3 corners or more")
     measured = np.concatenate([record.points.reshape(-1, 3), record.vertices])
-    sigma = record.sigma if record.sigmas is None else record.sigmas
+    sigma = rough_sigmas(record)
     fit = fit_plane(measured, sigma, _outside(record.vertices) if observer is None else observer)
     if record.joint is not None:
-        fit = with_shared_errors(fit, measured, record.point_and_vertex_sigmas, record.joint)
+        fit = with_shared_errors(fit, measured, sigma, record.joint, record.roughness)
     corners = record.vertices - np.outer(fit.residuals[len(record.points) :], fit.normal)
     shape = judge_shape(fit, measured, sigma)
     return face_on(

@@ -198,7 +198,9 @@ def _extent(xyz: Array) -> tuple[float, float]:
     return float(extents[0]), float(extents[1])
 
 
-def with_shared_errors(fit: FaceFit, points: Array, sigma: Array, joint: Array) -> FaceFit:
+def with_shared_errors(
+    fit: FaceFit, points: Array, sigma: Array, joint: Array, roughness: float = 0.0
+) -> FaceFit:
     """Return a fit whose covariance counts the errors that its points share.
 
     The plane stays. Its axes and its centre are chosen anew, so that its tilts and its height there are
@@ -209,6 +211,7 @@ def with_shared_errors(fit: FaceFit, points: Array, sigma: Array, joint: Array) 
     fit : of the points
     points, sigma : (n, 3) and (n,) as for `fit_plane` [m]
     joint : (9n²,) covariance of their coordinates, by rows [m²]
+    roughness : standard deviation of the surface about its plane, which `joint` does not count [m]
     """
     used = np.setdiff1d(np.arange(len(points)), fit.rejected)
     rows = np.column_stack([(points[used] - fit.centroid) @ fit.axes.T, np.ones(len(used))])
@@ -216,7 +219,7 @@ def with_shared_errors(fit: FaceFit, points: Array, sigma: Array, joint: Array) 
     gain = np.linalg.solve(rows.T @ (weights[:, None] * rows), rows.T * weights)
     count = len(points)
     heights = np.einsum("a,iajb,b->ij", fit.normal, joint.reshape(count, 3, count, 3), fit.normal)
-    covariance = gain @ heights[np.ix_(used, used)] @ gain.T
+    covariance = gain @ (heights[np.ix_(used, used)] + roughness**2 * np.eye(len(used))) @ gain.T
     tilts, turn = np.linalg.eigh(covariance[:2, :2])
     tilts = np.maximum(tilts, 1e-18)
     across = turn.T @ covariance[:2, 2]

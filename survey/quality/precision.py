@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 
 from survey.arrays import Array, Ints
 from survey.extrusion.extrusion import SurveyedBlock
+from survey.faces.roughness import SIGNIFICANT, TOLERANCE
 
 __all__ = ["Histogram", "StoneQuality", "SurveyQuality", "appraise", "judge_survey"]
 
 
-_SIGNIFICANT = 3.0  # standard deviations beyond which sigma0 differs from 1 not by chance
-_TOLERANCE = 0.1  # relative error below which a stated sigma is right, since nobody states it better
 _NOTHING = "no stone has points of its own on its face: nothing was measured that could be judged"
 _REACH, _BIN = 5.0, 0.25  # of the histogram [standard deviations]; the end bins hold all beyond
 
@@ -52,6 +51,7 @@ class StoneQuality:
     standardised : residuals of the accepted points and corners over their own standard deviation [-]
     remarks : changes that made its outline a polygon, in words
     evidence : of each point, then of each corner, how it was located on photographs; () if they were measured in space
+    roughness : standard deviation of its face about a plane, with which it was fitted beside `sigma` [m]
     """
 
     code: str
@@ -88,6 +88,7 @@ class StoneQuality:
     standardised: NDArray[np.float32]
     remarks: tuple[str, ...] = ()
     evidence: tuple[Mapping[str, object], ...] = ()
+    roughness: float = 0.0
 
     @property
     def measured(self) -> bool:
@@ -188,6 +189,7 @@ def appraise(block: SurveyedBlock) -> StoneQuality:
         standardised=_standardised(block) if measured else np.empty(0, np.float32),
         remarks=face.remarks,
         evidence=record.evidence,
+        roughness=record.roughness,
     )
 
 
@@ -226,7 +228,10 @@ def judge_survey(stones: Sequence[StoneQuality]) -> SurveyQuality:
     redundancy = sum(one.redundancy for one in own)
     sigma0 = math.sqrt(squares / redundancy) if redundancy else None
     error = 1.0 / math.sqrt(2.0 * redundancy) if redundancy else None
-    sigma = math.sqrt(sum(one.sigma**2 for one in own) / len(own)) if own else math.nan
+    sigma, rough = (
+        math.sqrt(sum(one**2 for one in ones) / len(own)) if own else math.nan
+        for ones in ([one.sigma for one in own], [one.roughness for one in own])
+    )
     counts = [one.redundancy + 3 for one in own]
     total = sum(n * one.rms**2 for n, one in zip(counts, own, strict=True))
     residuals = np.concatenate([one.standardised for one in own]) if own else np.empty(0, np.float32)
@@ -239,7 +244,7 @@ def judge_survey(stones: Sequence[StoneQuality]) -> SurveyQuality:
         sigma0=sigma0,
         sigma0_sigma=error,
         sigma=sigma,
-        verdict=_verdict(sigma0, error, sigma) if own or not stones else _NOTHING,
+        verdict=_verdict(sigma0, error, sigma, rough) if own or not stones else _NOTHING,
         rms=math.sqrt(total / sum(counts)) if own else math.nan,
         residuals=_histogram(residuals),
         kinds=_count(one.kind for one in stones),
@@ -249,11 +254,17 @@ def judge_survey(stones: Sequence[StoneQuality]) -> SurveyQuality:
     )
 
 
-def _verdict(sigma0: float | None, error: float | None, sigma: float) -> str:
+def _verdict(sigma0: float | None, error: float | None, sigma: float, rough: float) -> str:
     if sigma0 is None or error is None:
         return "no face was measured by more than three points: nothing says how precise they are"
+    if rough > 0.0:
+        return (
+            f"the stated sigma is too small, or the faces are rough: the points scatter {rough * 1e3:.2g} mm about "
+            f"their planes beyond the {sigma * 1e3:.2g} mm stated, which counts as roughness; "
+            f"with both they scatter {sigma0:.2f} ± {error:.2f} times as far"
+        )
     found = f"the points scatter {sigma0:.2f} ± {error:.2f} times as far as stated"
-    if abs(sigma0 - 1.0) <= max(_TOLERANCE, _SIGNIFICANT * error):
+    if abs(sigma0 - 1.0) <= max(TOLERANCE, SIGNIFICANT * error):
         return f"the stated sigma is right: {found}"
     better = f"{sigma0 * sigma * 1e3:.2g} mm would be right instead of {sigma * 1e3:.2g} mm"
     if sigma0 > 1.0:

@@ -234,6 +234,7 @@ class SurveyHead:
     extrusion : of stones without an extrusion of their own
     orientation : result of the orientation of the photographs that stones were marked on; None: none were
     surfaces : that stones marked on one photograph lie on
+    roughness : standard deviation of faces about their planes [m]; None: as far as all faces show it
     """
 
     name: str
@@ -246,6 +247,7 @@ class SurveyHead:
     extrusion: Extrusion = Extrusion()
     orientation: str | None = None
     surfaces: tuple[SurfaceRule, ...] = ()
+    roughness: float | None = None
 
     def viewpoint(self, station: str | None) -> Array | None:
         """Return the viewpoint of a stone, (3,) [m]: its own station, then the observer, then the only station.
@@ -298,6 +300,7 @@ class BlockRecord:
         [m²]; None: their errors are independent
     evidence : of each point, then of each corner, how it was located, in plain values; () if they were measured in
         space
+    roughness : standard deviation of its face about a plane, beyond the precision of its points [m]
     """
 
     code: str
@@ -324,11 +327,16 @@ class BlockRecord:
     seen_from: Array | None = None
     joint: Array | None = None
     evidence: tuple[Mapping[str, object], ...] = ()
+    roughness: float = 0.0
 
     def lateral_sigmas(self, normal: Array) -> Array:
-        """Return the standard deviation of each corner along any direction square to a unit vector, (nv,) [m]."""
+        """Return the standard deviation of each corner along any direction square to a unit vector, (nv,) [m].
+
+        A scatter beyond the stated one is of the measurement, in all directions, unless rays of photographs tell
+        that it is across the face.
+        """
         if self.joint is None:
-            return self.vertex_sigmas
+            return np.hypot(self.vertex_sigmas, self.roughness)
         count = len(self.points) + len(self.vertices)
         blocks = np.einsum("iaib->iab", self.joint.reshape(count, 3, count, 3))[len(self.points) :]
         across = np.trace(blocks, axis1=1, axis2=2) - np.einsum("a,iab,b->i", normal, blocks, normal)

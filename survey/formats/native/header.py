@@ -60,6 +60,7 @@ class HeadReader:
         self._canons: dict[str, Canon] = {}
         self._extrusion: Extrusion | None = None
         self._orientation: str | None = None
+        self._roughness: float | None = None
         self._surfaces: dict[str, SurfaceRule] = {}
         self._places: dict[str, str] = {}  # of entries that are checked once all lines are read
         self.takers: dict[str, Callable[[Cursor, int], None]] = {
@@ -75,6 +76,7 @@ class HeadReader:
             "extrude": self._take_extrusion,
             "orientation": self._take_orientation,
             "surface": self._take_surface,
+            "roughness": self._take_roughness,
         }
 
     def finish(self, name: str, path: str) -> SurveyHead:
@@ -101,6 +103,7 @@ class HeadReader:
             extrusion=self._extrusion or Extrusion(),
             orientation=self._orientation,
             surfaces=tuple(self._surfaces.values()),
+            roughness=self._roughness,
         )
 
     # --- lines ---
@@ -125,6 +128,11 @@ class HeadReader:
         cursor.check_first(self.sigma, "sigma")
         self.sigma = cursor.length("sigma")
         cursor.end("write: sigma 0.003")
+
+    def _take_roughness(self, cursor: Cursor, line: int) -> None:
+        cursor.check_first(self._roughness, "roughness")
+        self._roughness = 0.0 if cursor.peek() == "0" and cursor.word() else cursor.length("roughness")
+        cursor.end("write: roughness 0.001")
 
     def _take_control(self, cursor: Cursor, line: int) -> None:
         remedy = "write: control NAME X Y Z [sigma S] site X Y Z [sigma S]"

@@ -14,6 +14,7 @@ of a line or after a blank begins a comment, except in TEXT; blank lines are fre
             | "depth" ( KIND | "*" ) [ "course" N [ "-" N ] ] [ "zone" NAME ] D [ "sigma" S ] "source" TEXT
             | "canon" KIND LENGTH HEIGHT "sigma" S "source" TEXT
             | "extrude" [ "along" DX DY DZ ] [ "tail" T ]
+            | "roughness" ( S | "0" )                       (* of faces about their planes *)
             | "orientation" TEXT                            (* result of moma orient *)
             | "surface" NAME ( "plane" | "cylinder" ) [ "sigma" S ] ;
     stone   = "stone" CODE KIND [ "course" N ] [ "zone" NAME ] , { item } , "end" ;

@@ -93,6 +93,8 @@ def _head_lines(head: SurveyHead) -> Iterator[str]:
         yield f"canon {one.kind} {size} source {_text(one.source)}"
     if head.orientation is not None:
         yield f"orientation {_text(head.orientation)}"
+    if head.roughness is not None:
+        yield f"roughness {_number(head.roughness) if head.roughness else 0}"
     for surface in head.surfaces:
         scatter = "" if surface.sigma is None else f" sigma {_number(surface.sigma)}"
         yield f"surface {_name(surface.name)} {surface.kind}{scatter}"

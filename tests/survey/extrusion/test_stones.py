@@ -8,6 +8,7 @@ import pytest
 
 from moma.errors import GeometryError, SurveyError
 from survey.extrusion.extrusion import SurveyedBlock
+from survey.extrusion.stones import _SAMPLE, survey_stones
 from survey.formats.reading import open_survey
 from survey.records.survey import (
     BlockRecord,
@@ -22,7 +23,6 @@ from survey.records.survey import (
     SurveyHead,
     SurveyStream,
 )
-from survey.stones import survey_stones
 
 RULES = (DepthRule(None, 0.4, 0.05, "thickness", 2),)
 OBSERVER = Station("observer", np.array([2.0, -9.0, 1.5]), 3)
@@ -283,17 +283,22 @@ def test_stones_are_handed_on_and_not_kept(kind):
 
 
 def test_stones_come_while_the_file_is_being_read():
+    """With a stated roughness one by one; without, as soon as the first of them have shown it."""
     taken = []
 
-    def items():
-        for k in range(3):
+    def items(count):
+        for k in range(count):
             taken.append(k)
             yield stone(f"W{k}", 0.7 * k)
 
-    stones = survey_stones(survey(items())).stones
+    stated = survey(items(3))
+    stones = survey_stones(replace(stated, head=replace(stated.head, roughness=0.0))).stones
     assert taken == []
     next(stones)
     assert taken == [0]
+    taken.clear()
+    next(survey_stones(survey(items(_SAMPLE + 9))).stones)
+    assert len(taken) == _SAMPLE
 
 
 def test_a_file_of_two_frames_is_read_whole(tmp_path):

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from survey.extrusion.depth import depth_for
 from survey.extrusion.extrusion import SurveyedBlock, extrude
 from survey.extrusion.imported_solids import block_of_solid
 from survey.faces.faces import Face, Provenance, face_on, outline_face
+from survey.faces.roughness import estimate_roughness
 from survey.faces.shapes import FaceShape, ShapeKind
 from survey.records.review import Doubtful
 from survey.records.snapping import Snapping
@@ -18,6 +20,10 @@ from survey.registration.photographed_stones import LiftedFace, lift_faces
 from survey.registration.site_frame import SiteTransform, fit_similarity, record_to_site, to_site
 
 __all__ = ["SurveyedStream", "survey_stones"]
+
+_SAMPLE = (
+    300  # first stones of a survey, from whose faces its roughness is estimated: known to a few per cent
+)
 
 
 @dataclass(frozen=True)
@@ -84,11 +90,10 @@ def _stones(
         from survey.orientation.stones.marked_stones import located_stones
 
         blocks = located_stones(blocks, stream.head)
-    for item in blocks:
-        if isinstance(item, Reject):
-            yield item
+    for placed in _with_roughness(_placed(blocks, transform), head):
+        if isinstance(placed, Reject):
+            yield placed
             continue
-        placed = item if transform is None else record_to_site(item, transform)
         if isinstance(placed, BlockRecord) and placed.photograph is not None:
             on_photographs.append(placed)
             continue
@@ -100,6 +105,32 @@ def _stones(
         yield (
             _reject(record, head, lifted) if isinstance(lifted, MomaError) else _behind(record, head, lifted)
         )
+
+
+def _placed(
+    items: Iterator[BlockRecord | SolidRecord | Reject], transform: SiteTransform | None
+) -> Iterator[BlockRecord | SolidRecord | Reject]:
+    for item in items:
+        yield item if isinstance(item, Reject) or transform is None else record_to_site(item, transform)
+
+
+def _with_roughness(
+    items: Iterator[BlockRecord | SolidRecord | Reject], head: SurveyHead
+) -> Iterator[BlockRecord | SolidRecord | Reject]:
+    """Give stones the roughness of their survey: as stated, or as the faces of its first stones show it."""
+    rough, first = head.roughness, list[BlockRecord | SolidRecord | Reject]()
+    if rough is None:
+        sample: list[BlockRecord] = []
+        for item in items:
+            first.append(item)
+            if isinstance(item, BlockRecord) and item.photograph is None:
+                sample.append(item)
+                if len(sample) == _SAMPLE:
+                    break
+        rough = estimate_roughness(sample)
+    for item in chain(first, items):
+        measured = isinstance(item, BlockRecord) and item.photograph is None
+        yield replace(item, roughness=rough) if measured and rough > 0.0 else item
 
 
 def _made(item: BlockRecord | SolidRecord, head: SurveyHead) -> SurveyedBlock | Reject:

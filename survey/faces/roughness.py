@@ -1,0 +1,116 @@
+"""Roughness of stone: scatter of points about their planes beyond the precision with which they were measured.
+
+Marks on photographs are good to a tenth of a millimetre, and stone is rough by one or more. With the precision of the
+marks alone a robust fit takes most of the stone for blunders. So one variance, of all faces together, is added to that
+of every point before planes are fitted: the one with which the points scatter as normal errors do. It is estimated
+from faces without outliers, and without what a curved face explains, so that a round tower is not a rough one.
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from moma.errors import GeometryError
+from survey.arrays import Array
+from survey.faces.planes import FaceFit, fit_plane
+from survey.records.survey import BlockRecord
+from survey.statistics.roots import root_of
+from survey.statistics.scale import spread
+
+__all__ = ["SIGNIFICANT", "TOLERANCE", "estimate_roughness", "rough_sigmas"]
+
+SIGNIFICANT = 3.0
+"""Standard deviations beyond which a scatter differs from the stated one not by chance."""
+
+TOLERANCE = 0.1
+"""Relative error below which a stated standard deviation is right, since nobody states it better."""
+
+_FEWEST = 30  # degrees of freedom from which a scatter is known to a fifth
+_CLIPPED = 1.4  # standard deviation of a clipped scatter over that of all of n normal values
+_CURVED = 9  # least points of a face from which its curvature is told from its roughness: 6 unknowns
+
+
+def rough_sigmas(record: BlockRecord) -> Array:
+    """Return the standard deviation of each point and corner of a stone across its face, (n,) [m]."""
+    return np.hypot(record.point_and_vertex_sigmas, record.roughness)
+
+
+def estimate_roughness(records: Sequence[BlockRecord]) -> float:
+    """Return the roughness that the faces of a survey share [m]; 0 if they scatter as stated, or too few tell.
+
+    Parameters
+    ----------
+    records : stones measured in space
+    """
+    places = [
+        (
+            np.concatenate([one.points.reshape(-1, 3), one.vertices]),
+            one.point_and_vertex_sigmas,
+            one.seen_from,
+        )
+        for one in records
+        if len(one.points) + len(one.vertices) > 3
+    ]
+    fits = _fits(places, 0.0)
+    freedom = sum(len(points) - 3 for points, *_ in places)
+    if freedom < _FEWEST or not fits:
+        return 0.0
+    least = 1.0 + max(TOLERANCE, SIGNIFICANT * _CLIPPED / math.sqrt(2.0 * freedom))
+    if _ratio(fits) <= least:
+        return 0.0
+    residuals = np.concatenate([fit.residuals for fit in fits])
+    rough = root_of(lambda size: _ratio(_fits(places, size)) - 1.0, spread(residuals))
+    return min(rough, _without_curvature(places, rough))
+
+
+Measured = tuple[Array, Array, Array | None]
+
+
+def _fits(places: Sequence[Measured], rough: float) -> list[FaceFit]:
+    """Return the planes of faces with some roughness, of those that have one."""
+    found = []
+    for points, sigma, observer in places:
+        try:
+            found.append(fit_plane(points, np.hypot(sigma, rough), observer))
+        except GeometryError:
+            continue  # it is refused, and told, when its stone is made
+    return found
+
+
+def _ratio(fits: Sequence[FaceFit]) -> float:
+    """Return the scatter of all points over their standard deviation, outliers among them or not."""
+    every = np.concatenate([fit.standardised for fit in fits])
+    return spread(every[np.isfinite(every)])
+
+
+def _without_curvature(places: Sequence[Measured], rough: float) -> float:
+    """Return the roughness about quadrics, of the faces with enough points; infinite where there are too few."""
+    squares: list[Array] = []
+    variances: list[Array] = []
+    freedom = 0
+    for points, sigma, observer in places:
+        try:
+            fit = fit_plane(points, np.hypot(sigma, rough), observer)
+        except GeometryError:
+            continue
+        kept = np.setdiff1d(np.arange(len(points)), fit.rejected)
+        if len(kept) < _CURVED:
+            continue
+        u, v = ((points[kept] - fit.centroid) @ fit.axes.T).T
+        design = np.column_stack([np.ones(len(kept)), u, v, u * u, u * v, v * v])
+        root = 1.0 / np.hypot(sigma[kept], rough)
+        solved = np.linalg.lstsq(root[:, None] * design, root * fit.residuals[kept], rcond=None)[0]
+        squares.append((fit.residuals[kept] - design @ solved) ** 2)
+        variances.append(sigma[kept] ** 2)
+        freedom += len(kept) - 6
+    if freedom < _FEWEST:
+        return math.inf
+    square, variance = np.concatenate(squares), np.concatenate(variances)
+
+    def excess(size: float) -> float:
+        return float((square / (variance + size**2)).sum()) / freedom - 1.0
+
+    if excess(rough) > -SIGNIFICANT * math.sqrt(2.0 / freedom):
+        return math.inf
+    return root_of(excess, rough)
