@@ -32,11 +32,11 @@ from pipelines.ingest.ingest import ingest
 from pipelines.samples.buildings.openings import ArchShape
 from pipelines.samples.buildings.walls import wall
 from survey.extrusion.extrusion import SurveyedBlock
-from survey.extrusion.stones import survey_stones
 from survey.formats.reading import open_survey
 from survey.joints.close import close_joints
 from survey.joints.settings import JointSettings
 from survey.records.survey import BlockRecord
+from survey.registration.stones import survey_stones
 from survey.simplify.simplify import simplify
 
 __all__ = ["closed", "main", "measured", "write"]

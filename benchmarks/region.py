@@ -23,11 +23,11 @@ from pipelines.samples.buildings.openings import ArchShape
 from pipelines.samples.buildings.vaults import semicircular_arch
 from pipelines.samples.buildings.walls import wall
 from survey.extrusion.extrusion import SurveyedBlock
-from survey.extrusion.stones import survey_stones
 from survey.formats.reading import open_survey
 from survey.geometry.solids import Solid
 from survey.joints.close import close_joints
 from survey.joints.report import StoneJoint
+from survey.registration.stones import survey_stones
 
 __all__ = ["main"]
 

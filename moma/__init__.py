@@ -49,8 +49,8 @@ if TYPE_CHECKING:
     from pipelines.run.run import run_scene
     from pipelines.scene.file import read_scene
     from survey.clouds.settings import CloudOptions, MaskOptions
-    from survey.extrusion.stones import survey_stones
     from survey.formats.reading import ReadingOptions, open_survey
+    from survey.registration.stones import survey_stones
 
 __all__ = [
     "Block",
@@ -108,7 +108,7 @@ _HOMES = {
     "run_scene": "pipelines.run.run",
     "simulate": "mechanics.simulate",
     "simulate_stages": "mechanics.simulate",
-    "survey_stones": "survey.extrusion.stones",
+    "survey_stones": "survey.registration.stones",
     "trace": "archmodel.describe.trace",
 }
 

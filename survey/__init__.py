@@ -3,10 +3,10 @@
 formats       readers of survey files → records
 records       content of a survey file
 clouds        point clouds with outlines, and masks → records
-registration  survey frames and photographs → site frame
+registration  survey frames and photographs → site frame; records → stones in it
 orientation   photographs → orientation, and points from marks on them
 faces         points → plane → outlined face
-extrusion     face and depth → solid block; the chain from records to stones
+extrusion     face and depth → solid block
 statistics    robust scale and roots, on which all others stand
 geometry      closed solids: cutting, convex parts, adjacency, repair
 simplify      solid block → hexahedron, wedge or prism

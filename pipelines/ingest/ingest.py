@@ -31,9 +31,9 @@ from pipelines.ingest.relate import KnownSolids, relate
 from pipelines.ingest.report import IngestReport, Tally
 from pipelines.ingest.spool import Spool
 from survey.extrusion.extrusion import SurveyedBlock
-from survey.extrusion.stones import survey_stones
 from survey.formats.reading import ReadingOptions
 from survey.records.survey import Reject
+from survey.registration.stones import survey_stones
 
 __all__ = ["ingest"]
 

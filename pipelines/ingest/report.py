@@ -11,13 +11,13 @@ import numpy as np
 from mechanics.arrays import Array
 from pipelines.ingest.records import frame_record
 from survey.extrusion.extrusion import SurveyedBlock
-from survey.extrusion.stones import SurveyedStream
 from survey.formats.options import ReadingOptions
 from survey.geometry.convexity import is_convex
 from survey.quality.plausible import LENGTH, doubt_of, lies_on_its_side
 from survey.records.review import Doubtful
 from survey.records.snapping import Snapping
 from survey.records.survey import Reject
+from survey.registration.stones import SurveyedStream
 
 __all__ = ["FileReport", "IngestReport", "Refusal", "SolidsReport", "Tally"]
 

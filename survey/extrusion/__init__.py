@@ -1,5 +1,5 @@
-"""The hidden side of a stone: depth rules and extrusion along the normal; the chain from records to stones.
+"""The hidden side of a stone: depth rules and extrusion along the normal.
 
 Public: `depth_for`, `Depth` (depth); `extrude`, `prism`, `SurveyedBlock` (extrusion); `block_of_solid`
-(imported_solids); `survey_stones`, `SurveyedStream` (stones).
+(imported_solids).
 """

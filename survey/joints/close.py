@@ -77,7 +77,7 @@ def close_joints(
     Examples
     --------
     >>> from survey.formats.reading import open_survey
-    >>> from survey.extrusion.stones import survey_stones
+    >>> from survey.registration.stones import survey_stones
     >>> survey = open_survey("data/samples/window/window.moma", "moma")
     >>> closed = close_joints([stone for stone in survey_stones(survey).stones if stone.course == 1])
     >>> len(closed.solids), len(closed.report.joints), len(closed.report.gaps)

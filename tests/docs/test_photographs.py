@@ -11,10 +11,10 @@ from pipelines.reports.photographs.project import read_project
 from pipelines.samples.buildings.window import make_window
 from pipelines.samples.measure import inset
 from pipelines.samples.photographs import true_cameras
-from survey.extrusion.stones import survey_stones
 from survey.formats.reading import open_survey
 from survey.orientation.bundle.orient import orient
 from survey.orientation.formats.control import read_control
+from survey.registration.stones import survey_stones
 from tests.docs.pages import blocks, ran
 
 PAGE = "docs/howto/photographs.md"

@@ -14,7 +14,6 @@ from moma.errors import UsageError
 from pipelines.ingest.outlined import open_source
 from pipelines.ingest.reading_options import Source, survey_sources
 from survey.extrusion.extrusion import SurveyedBlock
-from survey.extrusion.stones import survey_stones
 from survey.formats.options import ReadingOptions
 from survey.quality.canon import Deviation, KindStandard, deviations, standards
 from survey.quality.contradictions import Contradiction, contradictions
@@ -31,6 +30,7 @@ from survey.quality.precision import StoneQuality, SurveyQuality, appraise, judg
 from survey.quality.remeasure import Remeasure, ShortList, list_remeasures, short_list
 from survey.records.survey import Canon, DepthRule, Reject, SurveyHead
 from survey.registration.site_frame import SiteTransform
+from survey.registration.stones import survey_stones
 
 __all__ = ["CHANCES", "SurveyFile", "SurveyStudy", "study_surveys"]
 

@@ -11,10 +11,10 @@ from archmodel.query.api import find
 from archmodel.store.stones import load_stones
 from pipelines.ingest.ingest import ingest
 from pipelines.ingest.records import stone_record, surveyed_block
-from survey.extrusion.stones import survey_stones
 from survey.faces.faces import Provenance
 from survey.formats.reading import open_survey
 from survey.records.survey import Reject
+from survey.registration.stones import survey_stones
 
 HEAD = """\
 moma-survey 1

@@ -14,9 +14,9 @@ from survey.clouds.placing import place_outlines
 from survey.clouds.points.chunks import Chunk, PointCloud
 from survey.clouds.settings import CloudOptions
 from survey.clouds.wall import Wall, read_wall
-from survey.extrusion.stones import survey_stones
 from survey.faces.faces import outline_face
 from survey.records.survey import Reject
+from survey.registration.stones import survey_stones
 from tests.survey.clouds import scans
 
 

@@ -10,8 +10,8 @@ from moma.errors import UsageError
 from survey.clouds.masks import open_masks
 from survey.clouds.settings import MaskOptions
 from survey.clouds.wall import read_wall
-from survey.extrusion.stones import survey_stones
 from survey.records.survey import Reject
+from survey.registration.stones import survey_stones
 from tests.survey.clouds import scans
 from tests.survey.clouds.test_outlines import TALL, WIDTH, WORLD, coco, label_image
 

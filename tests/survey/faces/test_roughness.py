@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from survey.extrusion.stones import survey_stones
 from survey.faces.faces import outline_face
 from survey.faces.roughness import estimate_roughness
 from survey.records.survey import BlockRecord, DepthRule, Station, SurveyHead, SurveyStream
+from survey.registration.stones import survey_stones
 
 OBSERVER = np.array([5.0, -20.0, 1.0])
 

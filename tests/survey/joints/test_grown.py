@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from moma.errors import GeometryError
 from survey.clouds.masks import open_masks
 from survey.clouds.settings import MaskOptions
-from survey.extrusion.stones import survey_stones
 from survey.geometry.solids import volume_of
 from survey.joints.close import close_joints
 from survey.joints.grown.chains import is_simple
@@ -19,6 +18,7 @@ from survey.joints.grown.leaf import find_leaves
 from survey.joints.grown.medial_lines import medial_lines
 from survey.joints.grown.partition import partition
 from survey.joints.settings import JointMode, JointSettings
+from survey.registration.stones import survey_stones
 
 MORTAR = JointSettings(mode=JointMode.MORTAR)
 

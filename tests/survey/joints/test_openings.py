@@ -7,10 +7,10 @@ import pytest
 
 from survey.clouds.masks import open_masks
 from survey.clouds.settings import MaskOptions
-from survey.extrusion.stones import survey_stones
 from survey.geometry.solids import volume_of
 from survey.joints.close import close_joints
 from survey.joints.settings import JointMode, JointSettings
+from survey.registration.stones import survey_stones
 from tests.paths import ROOT
 
 SHARED = ROOT.parent / "shared"

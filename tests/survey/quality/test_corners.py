@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from survey.extrusion.stones import survey_stones
 from survey.formats.reading import read_survey
 from survey.quality.corners import SeenFace, Sign, misplaced_corners
 from survey.quality.precision import StoneQuality, appraise
 from survey.records.survey import BlockRecord, Reject, SurveyStream
+from survey.registration.stones import survey_stones
 from tests.survey.quality.plain_stones import polygon_stone, rectangle
 
 WINDOW = Path("data/samples/window/window.moma")

@@ -17,13 +17,13 @@ from pipelines.ingest.ingest import ingest
 from pipelines.run.check import check_scene
 from survey.extrusion.depth import depth_for
 from survey.extrusion.extrusion import SurveyedBlock, extrude
-from survey.extrusion.stones import survey_stones
 from survey.faces.faces import outline_face
 from survey.formats.native.reader import read_moma, write_moma
 from survey.formats.reading import open_survey
 from survey.geometry.watertight import check_watertight
 from survey.joints.close import close_joints
 from survey.records.survey import ControlPoint, Survey
+from survey.registration.stones import survey_stones
 from tests.paths import ROOT
 
 SAMPLE = ROOT / "data" / "samples" / "window" / "window.moma"

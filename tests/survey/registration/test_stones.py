@@ -8,7 +8,6 @@ import pytest
 
 from moma.errors import GeometryError, SurveyError
 from survey.extrusion.extrusion import SurveyedBlock
-from survey.extrusion.stones import _SAMPLE, survey_stones
 from survey.formats.reading import open_survey
 from survey.records.survey import (
     BlockRecord,
@@ -23,6 +22,7 @@ from survey.records.survey import (
     SurveyHead,
     SurveyStream,
 )
+from survey.registration.stones import _SAMPLE, survey_stones
 
 RULES = (DepthRule(None, 0.4, 0.05, "thickness", 2),)
 OBSERVER = Station("observer", np.array([2.0, -9.0, 1.5]), 3)
