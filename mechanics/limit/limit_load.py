@@ -25,14 +25,22 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
-from scipy.sparse import bsr_array, csc_array
+from scipy.sparse import bsr_array, csc_array, dia_array
 
 from mechanics.arrays import Array, Bools
 from mechanics.limit.assembly import RigidAssembly, Strength
 from mechanics.limit.live_loads import LiveLoad
 from mechanics.limit.programme import Optimum, Programme
 
-__all__ = ["Flow", "LimitLoad", "Mechanism", "limit_load", "mechanism", "without_friction_across"]
+__all__ = [
+    "Flow",
+    "LimitLoad",
+    "Mechanism",
+    "limit_load",
+    "lines_of_sliding",
+    "mechanism",
+    "without_friction_across",
+]
 
 # slope of the fictitious strength over that of the programme before, and over the friction in the end [-]
 _FLATTER, _DILATANCY = 0.3, 1e-3
@@ -52,6 +60,8 @@ _MOST = 40
 _BEYOND = 1e-2
 # share of the friction across the line of sliding that stays, without which nothing would hold stones there [-]
 _ACROSS = 1e-3
+# squared sine of the angle between planes of joints up to which they are one plane: 2.6° [-]
+_PLANE = 2e-3
 # velocity over the largest below which a contact stays closed [-]
 _STILL = 1e-4
 
@@ -136,43 +146,85 @@ def limit_load(
     SolverError : Clarabel is not installed, or came to no answer
     """
     programme = Programme(on, live(on), str(live))
-    if bound is None:
-        found = programme.solve(on.strength)
-        bound = LimitLoad(
-            flow=Flow.ASSOCIATIVE,
-            load=str(live),
-            multiplier=found.multiplier,
-            force=found.force,
-            mechanism=mechanism(on, found.velocity),
-            programmes=1,
-            converged=True,
-            beyond=_beyond(on, found.force),
-        )
+    bound = bound or _bound(on, programme, str(live))
     if flow is Flow.ASSOCIATIVE or not np.isfinite(bound.multiplier):
         return replace(bound, flow=flow)
     return _candidate(on, programme, bound)
 
 
+def _bound(on: RigidAssembly, programme: Programme, name: str) -> LimitLoad:
+    """Return the limit load of associative friction."""
+    found = programme.solve(on.strength)
+    return LimitLoad(
+        flow=Flow.ASSOCIATIVE,
+        load=name,
+        multiplier=found.multiplier,
+        force=found.force,
+        mechanism=mechanism(on, found.velocity),
+        programmes=1,
+        converged=True,
+        beyond=_beyond(on, found.force),
+    )
+
+
 def without_friction_across(on: RigidAssembly, live: LiveLoad, found: LimitLoad) -> LimitLoad | None:
     """Return the limit load where joints that slide rub along their slip alone; None where none slides.
 
-    Limit equilibrium, as rock engineers compute a wedge on two planes, has no friction across the line of sliding.
+    Limit equilibrium, as rock engineers compute a wedge on two planes, has no friction across the line of sliding, and
+    is a balance of forces alone. So stones that bear on two planes, and move along their line rather than across it,
+    take moments without limit.
 
     Parameters
     ----------
     on, live : the stones and the load
     found : of Coulomb's friction, so that joints slide without opening; its mechanism has the directions of slip
     """
-    slides = np.flatnonzero(found.mechanism.sliding)
+    velocity = found.mechanism.velocity
+    slip = (on.lift.T @ velocity[on.free].ravel()).reshape(-1, 3)[:, 1:]
+    line = lines_of_sliding(on, found)
+    wedges = np.flatnonzero(line.any(axis=1))
+    steady = found.mechanism.speed <= _STILL
+    for side in (0, 1):
+        body, other = on.contacts.bodies[:, side], on.contacts.bodies[:, 1 - side]
+        here = np.isin(body, wedges) & steady[other]
+        slip[here] = np.einsum("cij,cj->ci", on.contacts.frame[here, 1:], line[body[here]])
+    slides = np.flatnonzero(np.linalg.norm(slip, axis=1) > _STILL)
     if not len(slides):
         return None
-    slip = (on.lift.T @ found.mechanism.velocity[on.free].ravel()).reshape(-1, 3)[slides, 1:]
-    along = slip / np.linalg.norm(slip, axis=1)[:, None]
+    along = slip[slides] / np.linalg.norm(slip[slides], axis=1)[:, None]
     rubs = np.tile(np.eye(3), (len(on.contacts), 1, 1))
     rubs[slides, 1:, 1:] *= _ACROSS
     rubs[slides, 1:, 1:] += (1.0 - _ACROSS) * np.einsum("ci,cj->cij", along, along)
     projection = bsr_array((rubs, np.arange(len(rubs)), np.arange(len(rubs) + 1)))
-    return limit_load(replace(on, lift=csc_array(on.lift @ projection)), live)
+    counts = np.ones((len(on.free), 6))
+    counts[np.isin(on.free, wedges), 3:] = 0.0
+    balance = counts.ravel()
+    lift = csc_array(dia_array((balance[None], 0), shape=(len(balance),) * 2) @ on.lift @ projection)
+    there = replace(on, lift=lift, dead=balance * on.dead)
+    return _bound(there, Programme(there, balance * live(on), str(live)), str(live))
+
+
+def lines_of_sliding(on: RigidAssembly, found: LimitLoad) -> Array:
+    """Return the line (nb, 3) along which each stone slides on two planes that stay, the way it goes; zero: none.
+
+    The planes are those of joints that bear at the limit. A mechanism may turn the stone as well.
+    """
+    moves = found.mechanism.speed > _STILL
+    line = np.zeros((len(moves), 3))
+    bodies = on.contacts.bodies
+    bears = found.force[:, 0] > _STILL * found.force[:, 0].max(initial=0.0)
+    stands = bears & (moves[bodies].sum(axis=1) == 1)
+    for body in np.unique(bodies[stands]):
+        if not moves[body]:
+            continue
+        normals = on.contacts.frame[stands & (bodies == body).any(axis=1), 0]
+        size, axes = np.linalg.svd(normals.T @ normals)[1:]
+        velocity = found.mechanism.velocity[body, :3]
+        way = float(velocity @ axes[2])
+        two = size[1] > _PLANE * size[0] > size[2]
+        if two and 2.0 * way * way > float(velocity @ velocity):
+            line[body] = np.sign(way) * axes[2]
+    return line
 
 
 def mechanism(

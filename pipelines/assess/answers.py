@@ -18,6 +18,7 @@ from mechanics.limit.limit_load import (
     LimitLoad,
     Mechanism,
     limit_load,
+    lines_of_sliding,
     mechanism,
     without_friction_across,
 )
@@ -227,15 +228,15 @@ def _load(
 
 
 def _without_friction_across(on: RigidAssembly, live: LiveLoad, found: LimitLoad) -> float | None:
-    """Return λ without friction across the line of sliding [-]; None where stones turn, or it is the same.
+    """Return λ without friction across the line of sliding [-]; None where it is the same.
 
-    Zero where the stones do not stand without it.
+    None, too, where stones turn that no two planes guide along a line. Zero where the stones do not stand without it.
     """
     motion = found.mechanism
     if not np.isfinite(found.multiplier) or not motion.speed.any() or len(on.free) > _SOUGHT:
         return None
     turning = 0.5 * on.model.surfaces.size * np.linalg.norm(motion.velocity[:, 3:], axis=1)
-    if turning.max() > _TURNS * motion.speed.max():
+    if turning.max() > _TURNS * motion.speed.max() and not lines_of_sliding(on, found).any():
         return None
     other = without_friction_across(on, live, found)
     if other is None or np.isinf(other.multiplier):

@@ -1,14 +1,23 @@
 """Limit of stones that slide in a trough without friction across the line of sliding: limit equilibrium of wedges."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from mechanics.limit.assembly import assembly
+from mechanics.limit.held import held_limit
 from mechanics.limit.limit_load import Flow, limit_load, without_friction_across
 from mechanics.limit.live_loads import Acceleration
 from mechanics.scene.scene import Fidelity
 from mechanics.scene.shapes import prism
 from tests.mechanics.shapes import brick, ground, scene
+from tests.validation.one_answer.scenes import (
+    FLAT_AND_STEEP,
+    least_angle,
+    limit_along_the_line,
+    wedge_on_two_planes,
+)
 
 ALONG = Acceleration((0.0, 1.0, 0.0))
 FRICTION = 0.4
@@ -48,6 +57,42 @@ def test_a_wedge_slides_at_the_load_of_limit_equilibrium(dips):
     assert found is not None
     assert found.multiplier == pytest.approx(expected, rel=2e-3)
     assert bound.multiplier > 1.03 * expected
+
+
+@pytest.mark.parametrize(
+    "planes",
+    [
+        FLAT_AND_STEEP,
+        *(
+            pytest.param(one, marks=pytest.mark.slow)
+            for one in (((40, 130), (60, 220)), ((50, 100), (65, 200)))
+        ),
+    ],
+)
+def test_a_plunging_wedge_slides_at_the_load_of_limit_equilibrium(planes):
+    """Friction across the line of sliding bears more, by the rule of runs, and is left out of this limit."""
+    share = 0.06
+    expected, along = limit_along_the_line(planes, least_angle(planes) * (1 + share))
+    on, live = assembly(wedge_on_two_planes(share, True, planes=planes)), Acceleration(tuple(along))
+    bound = limit_load(on, live)
+    held = held_limit(on, live, bound)
+    limit = replace(bound, flow=Flow.COULOMB, multiplier=held.held, mechanism=held.mechanism)
+    found = without_friction_across(on, live, limit)
+    assert found.multiplier == pytest.approx(expected, rel=2e-3)
+    assert held.held > 1.01 * expected
+
+
+def test_a_steep_wedge_that_limit_equilibrium_lets_slide_is_held_by_friction_across_its_line():
+    """Planes of 35 and 85° hold at 32°, where limit equilibrium without friction across asks for 32.69°."""
+    assert least_angle(FLAT_AND_STEEP) == pytest.approx(32.69, abs=5e-3)
+    share = 32.0 / 32.69 - 1.0
+    on = assembly(wedge_on_two_planes(share, tetrahedron=True, planes=FLAT_AND_STEEP))
+    live = Acceleration(tuple(limit_along_the_line(FLAT_AND_STEEP, 32.0)[1]))
+    bound = limit_load(on, live)
+    held = held_limit(on, live, bound)
+    assert held.held > 0.0
+    limit = replace(bound, flow=Flow.COULOMB, multiplier=held.held, mechanism=held.mechanism)
+    assert np.isnan(without_friction_across(on, live, limit).multiplier)
 
 
 def test_a_block_on_one_plane_has_no_friction_across_its_way():

@@ -53,19 +53,48 @@ def _polyhedron(code, planes, fidelity=Fidelity.RIGID):
     return Block(code, corners, tuple(faces), LIMESTONE, fidelity)
 
 
-def wedge_on_two_planes(share, tetrahedron=False, law=None):
-    """A wedge between two fixed slabs, its friction angle `share` above the limit [-]."""
-    first, second = _plane(40, 130), _plane(60, 220)
+def least_angle(planes):
+    """Friction angle [°] at which a wedge on two planes begins to slide, with friction along their line alone.
+
+    With the normals n, the line a and N₁ n₁ + N₂ n₂ - T a = W: tan φ = T / (N₁ + N₂).
+    """
+    first, second = (_plane(*one) for one in planes)
+    one, other, shear = np.linalg.solve(
+        np.column_stack([first, second, -_line(first, second)]), [0.0, 0.0, 1.0]
+    )
+    return float(np.degrees(np.arctan(shear / (one + other))))
+
+
+def limit_along_the_line(planes, angle):
+    """λ of a horizontal push along the line of two planes at a friction angle [°], and its direction (3,)."""
+    first, second = (_plane(*one) for one in planes)
+    line = _line(first, second)
+    along = line * [1.0, 1.0, 0.0] / np.hypot(*line[:2])
+    balance = np.linalg.inv(np.column_stack([first, second, -line]))
+    margin = np.array([1.0, 1.0, 0.0]) * np.tan(np.radians(angle)) - [0.0, 0.0, 1.0]
+    return float(margin @ balance[:, 2] / (margin @ balance @ along)), along
+
+
+def _line(first, second):
+    """Direction (3,) in which two planes meet, downwards."""
     line = np.cross(first, second)
-    line *= -np.sign(line[2]) / np.linalg.norm(line)
-    origin = np.zeros(3)
+    return line * -np.sign(line[2]) / np.linalg.norm(line)
+
+
+FLAT_AND_STEEP = ((35.0, 130.0), (85.0, 225.0))
+"""Dip and dip direction [°] of two planes that wedge a stone between them as it is pressed across their line."""
+
+
+def wedge_on_two_planes(share, tetrahedron=False, law=None, planes=((40.0, 130.0), (60.0, 220.0))):
+    """A wedge between two fixed slabs, its friction angle `share` above that of limit equilibrium [-]."""
+    first, second = (_plane(*one) for one in planes)
+    line, origin = _line(first, second), np.zeros(3)
     sides = [(-first, origin), (-second, origin)]
     if tetrahedron:
         out = np.array([line[0], line[1], 0.0]) / np.hypot(*line[:2])
         ends = [((0, 0, 1), origin), (out + np.array([0, 0, 0.15]), 4 * line)]
     else:
-        up = np.array([0, 0, 1.0]) - line * line[2]
-        up /= np.linalg.norm(up)
+        up = (first + second) / np.linalg.norm(first + second)
         ends = [(up, up), (line, 1.5 * line), (-line, -1.5 * line)]
     slabs = []
     for code, normal, other in (("A", first, second), ("B", second, first)):
@@ -73,7 +102,7 @@ def wedge_on_two_planes(share, tetrahedron=False, law=None):
         free *= np.sign(free @ other)
         limits = [(normal, origin), (-normal, -normal), (line, 8 * line), (-line, -8 * line)]
         slabs.append(_polyhedron(code, [*limits, (-free, origin), (free, 8 * free)], Fidelity.FIXED))
-    friction = np.tan(np.radians(WEDGE * (1 + share)))
+    friction = np.tan(np.radians(least_angle(planes) * (1 + share)))
     return scene([*slabs, _polyhedron("wedge", [*sides, *ends])], friction, duration=1.0, law=law)
 
 
@@ -266,6 +295,8 @@ SCENES = {
           for n, part in ((2, 0.96), (2, 1.04), (4, 0.97), (4, 1.03))),
         *(_named(f"arch of {n}, {t:g}", truth, arch, n, t)
           for n, t, truth in ((15, 0.14, STANDS), (15, 0.08, FALLS), (31, 0.125, STANDS), (31, 0.09, FALLS))),
+        # friction across the line holds down to 0.96 of the angle of limit equilibrium
+        *_either("steep tetrahedron", wedge_on_two_planes, (-0.08, -0.055, 0.012, 0.03), True, None, FLAT_AND_STEEP),
     )
 }  # fmt: skip
 """All of them by name."""
