@@ -23,7 +23,7 @@ from mechanics.scene.scene import Block, LawRule, Part, Scene, Start
 from mechanics.simulate import simulate
 from moma.errors import SceneError
 
-__all__ = ["Standing", "admits_rest", "at_instant", "self_stress_alone_holds", "stands"]
+__all__ = ["Standing", "at_instant", "self_stress_alone_holds", "stands"]
 
 # gap over the width up to which a joint is closed where stones rest: a run leaves 1e-8, and a block falls by more [-]
 _SHUT = 1e-5
@@ -108,16 +108,6 @@ class Standing:
     farthest: float = 0.0
 
 
-def admits_rest(scene: Scene) -> bool:
-    """Return whether some forces within the strength of rigid joints balance the dead load, whatever brings them about.
-
-    Raises
-    ------
-    SceneError, SolverError : see `assembly` and `Programme`
-    """
-    return _balances(assembly(at_instant(scene)))
-
-
 def self_stress_alone_holds(scene: Scene) -> bool:
     """Return whether forces between rigid joints could hold stones as they are drawn, but no load brings them about.
 
@@ -126,7 +116,7 @@ def self_stress_alone_holds(scene: Scene) -> bool:
 
     Raises
     ------
-    SceneError, SolverError : as `admits_rest`
+    SceneError, SolverError : see `assembly` and `Programme`
     """
     on = assembly(at_instant(scene))
     closed = CLOSED_BIAS * float(np.linalg.norm(on.model.gravity(0.0))) * scene.time.step**2

@@ -18,7 +18,6 @@ __all__ = ["corner_warnings", "depth_warnings", "impossible_values", "unusual_va
 
 _SHOWN = 6  # most findings of one sort that are named
 _HEADERS = 0.1  # share of a façade's area whose stones reach through the leaf, as headers do, at least [-]
-_SUPPORT = "support"  # kind of stones that stand for the ground
 _THIN = 0.8  # depth over that of the leaf below which a stone leaves a void behind it: backs are hewn to a tenth [-]
 _BEHIND = 0.01  # by which a stone must reach farther back to lie behind another: a joint [m]
 _SQUARE = 10.0  # angle of faces that belong to one façade [°]
@@ -55,10 +54,10 @@ def corner_warnings(models: Sequence[StoneModel]) -> list[str]:
 def depth_warnings(models: Sequence[StoneModel]) -> list[str]:
     """List the stones of each façade that are thinner than its leaf, with nothing behind them.
 
-    The leaf is as thick as the stones that reach through it: those of the deepest tenth of the façade's area. Supports,
-    as a slab of ground, belong to no façade.
+    The leaf is as thick as the stones that reach through it: those of the deepest tenth of the façade's area. Fixed
+    stones, as a slab of ground, belong to no façade.
     """
-    records = [one.record for one in models if one.record.kind != _SUPPORT]
+    records = [one.record for one in models if one.listed is not Fidelity.FIXED]
     facing = np.array([one.normal for one in records]).reshape(-1, 3)
     upright = np.abs(facing[:, 2]) <= np.sin(np.radians(_SQUARE))
     turn = np.degrees(np.arctan2(facing[:, 1], facing[:, 0]))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mechanics.limit.assembly import Strength, assembly
-from mechanics.limit.dead_load import admits_rest, at_instant, stands
+from mechanics.limit.dead_load import at_instant, stands
 from mechanics.limit.live_loads import levers
 from mechanics.scene.loads.forces import StoneForce
 from mechanics.scene.loads.gravity import TiltingTable
@@ -84,7 +84,6 @@ def test_loads_that_grow_are_taken_in_the_end_or_at_an_instant():
     # friction 0.6 of 9.8 kN
     assert not stands(assembly(at_instant(one))).outcome.rests
     assert stands(assembly(at_instant(one, 0.5))).outcome.rests
-    assert not admits_rest(one)
 
 
 def test_supports_that_have_moved_are_refused_by_name():

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from mechanics.scene.scene import Fidelity
 from moma.errors import SceneError
 from pipelines.ingest.ingest import ingest
 from pipelines.reports.survey.report import report_surveys
@@ -169,9 +170,8 @@ def laid(depths, normal=(0.0, -1.0, 0.0), behind=()):
             normal=np.array(normal),
             solid_vertices=np.array(corners) @ turn,
             area=0.18,
-            kind="ashlar",
         )
-        stones.append(SimpleNamespace(record=record))
+        stones.append(SimpleNamespace(record=record, listed=None))
     return stones
 
 
@@ -189,7 +189,7 @@ def test_stones_thinner_than_their_wall_are_told(normal):
 def test_a_slab_of_ground_makes_no_wall_as_deep():
     stones = laid([0.3, 0.3, 4.0])
     assert depth_warnings(stones)
-    stones[2].record.kind = "support"
+    stones[2].listed = Fidelity.FIXED
     assert depth_warnings(stones) == []
 
 
