@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from tests.costs import guards, is_dear, listed
+from tests.costs import COLLECTED, entries, guards, is_dear
 from tests.kernel_locks import compile_once
 from tests.postgresql import Server, Unavailable, running_server
 
@@ -53,13 +53,14 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Begin with the files that take longest; mark dear tests as guards or slow, with slow ones also properties."""
     items.sort(key=lambda item: [not item.nodeid.startswith(folder) for folder in FIRST])
-    dear = listed()
+    dear, spared = entries()
+    config.stash[COLLECTED] = frozenset(item.nodeid for item in items)
     for item in items:
         free = config.stash[FREE] and getattr(getattr(item, "obj", None), "is_hypothesis_test", False)
         costly = is_dear(item.nodeid, dear)
-        if costly and guards(item.nodeid):
+        if costly and guards(item.nodeid, spared):
             item.add_marker("guard")
-        if free or (costly and not guards(item.nodeid)):
+        if free or (costly and not guards(item.nodeid, spared)):
             item.add_marker("slow")
 
 

@@ -56,10 +56,10 @@ class Number:
     place: tuple[int, int]
 
 
-def numbers() -> list[Number]:
-    """Return all numbers, module by module."""
+def numbers(package: str = PACKAGE) -> list[Number]:
+    """Return all numbers of a package, module by module."""
     found = []
-    for path in sorted((ROOT / PACKAGE.replace(".", "/")).rglob("*.py")):
+    for path in sorted((ROOT / package.replace(".", "/")).rglob("*.py")):
         module = ".".join(path.relative_to(ROOT).with_suffix("").parts)
         for name, tree in _assigned(ast.parse(path.read_text(encoding="utf-8"))):
             known = [one for one in _literals(tree) if one.value not in (0, 1)]

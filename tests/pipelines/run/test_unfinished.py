@@ -89,6 +89,10 @@ def bits(folder):
     return files | {key: value for key, value in summary.items() if key not in own}
 
 
+def run_summary(folder):
+    return json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+
+
 def differing(one, other):
     one, other = bits(one), bits(other)
     return [name for name in one | other if one.get(name) != other.get(name)]
@@ -362,9 +366,15 @@ def test_a_run_that_could_not_be_stored_is_stored_by_resuming_it(tmp_path, own_u
         patch.setattr(record_module, "store_run", locked)
         with pytest.raises(DatabaseError, match="could not be stored"):
             run_scene(scene, own_url, out)
-    kept = differing(out, out)
+    (newest, *_), steps = reversed(names(out)), run_summary(out)["steps"]
+    complete = run_summary(out)["outcome"]
     done = run_scene(scene, own_url, out, resume=True)
-    assert (kept, done.run) == ([], 1)
+    last = int(newest.partition("-")[2].partition(".")[0])
+    # the run is stored from its last checkpoint on, not begun again
+    assert done.summary["resumed"] == [{"step": last, "changed": []}]
+    assert 0 < last < steps == done.summary["steps"]
+    assert (done.run, done.summary["outcome"]) == (1, complete)
+    assert not (out / "unfinished").exists()
 
 
 def test_a_run_without_a_checkpoint_leaves_nothing(tmp_path, own_url):
