@@ -14,7 +14,7 @@ from archmodel.query.tokens import Token, complaint
 from archmodel.tables.base import Base
 from archmodel.tables.entities import Entity
 from archmodel.tables.knowledge import Material, MaterialProperty, Phase
-from archmodel.tables.runs import EntityResult, Run
+from archmodel.tables.runs import STUDIED, EntityResult, Run
 from archmodel.tables.surveys import Measurement, Simplification, Survey
 
 __all__ = ["MAX_FUNCTIONS", "MAX_RUNS", "Context", "Scope", "StructureScope"]
@@ -180,7 +180,11 @@ class Scope:
     def _latest_run(self) -> ColumnElement[int]:
         """Return the number of the latest run that holds the entity: one step in the primary key."""
         result = self.context.alias(EntityResult)
-        latest = select(func.max(result.c.run_id)).where(result.c.entity_id == self.entity.c.id)
+        # a study has shares of its stones, not motions
+        studies = select(Run.id).where(Run.outcome == STUDIED)
+        latest = select(func.max(result.c.run_id)).where(
+            result.c.entity_id == self.entity.c.id, result.c.run_id.not_in(studies)
+        )
         return latest.correlate(self.entity).scalar_subquery()
 
     def _join(

@@ -23,6 +23,10 @@ __all__ = [
 
 
 STONE_VALUES: Mapping[str, tuple[str, str]] = {
+    "variance_share": (
+        "-",
+        "share of the variance of a study that the best measurement of the stone takes away",
+    ),
     "von_mises_p99": ("Pa", "Von Mises stress that 1 % of its volume exceeds"),
     "principal_tension": ("Pa", "largest principal stress, positive in tension"),
     "principal_compression": ("Pa", "smallest principal stress, negative in compression"),
@@ -236,7 +240,7 @@ class RunRecord:
     ----------
     scene : its name
     scene_text : the scene file as it was run
-    outcome : equilibrium, settled, moving, collapsed, undecided, interrupted, assessed or pushed
+    outcome : equilibrium, settled, moving, collapsed, undecided, interrupted, assessed, pushed or studied
     summary : the contents of summary.json
     versions : of the programs and libraries, by name; at least of "moma"
     results : one per stone of the scene

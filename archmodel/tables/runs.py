@@ -7,10 +7,22 @@ from archmodel.tables.base import JSON_TYPE, Base, attribute
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Entry
 
-__all__ = ["FIDELITIES", "CellResult", "ContactPoint", "EntityResult", "JointResult", "MechanismStone", "Run"]
+__all__ = [
+    "FIDELITIES",
+    "STUDIED",
+    "CellResult",
+    "ContactPoint",
+    "EntityResult",
+    "JointResult",
+    "MechanismStone",
+    "Run",
+]
 
 FIDELITIES = ("fixed", "rigid", "deformable")
 """Ways to model a stone in a run."""
+
+STUDIED = "studied"
+"""Outcome of a study, whose results of stones are shares of the variance, not motions."""
 
 
 class Run(Base):
@@ -20,7 +32,7 @@ class Run(Base):
     ----------
     scene, scene_text : the scene's name, and its file as it was run: all settings
     outcome : equilibrium, settled, moving, collapsed, undecided or interrupted; assessed: limit loads, pushed: a
-        loading test, both without steps
+        loading test, studied: a probability, all without steps
     steps, contacts : how many
     simulated, wall : simulated time and time of work [s]
     natural_map, penetration, balance, reaction, energy : the error measures of docs/theory.md §4 [-]

@@ -20,16 +20,17 @@ from mechanics.arrays import Array, Ints
 from mechanics.contact.contacts import Contacts, gaps, take
 from mechanics.contact.shared_area import SLACK
 from mechanics.delassus.rigid import RigidDelassus
-from mechanics.dynamics.contact_search import Detection, contacts_as_drawn, detection
+from mechanics.dynamics.contact_search import contacts_as_drawn, detection
 from mechanics.limit.joints import Joints, StressBlocks, find_joints, stress_blocks
 from mechanics.model.model import Model, build_model
 from mechanics.problem.forms import SparseForm
 from mechanics.scene.laws.law import STATE, Approach
+from mechanics.scene.laws.table import LawTable
 from mechanics.scene.scene import Scene
 from mechanics.scene.state import State
 from moma.errors import SceneError
 
-__all__ = ["CLOSED", "RigidAssembly", "Strength", "assembly"]
+__all__ = ["CLOSED", "RigidAssembly", "Strength", "assembly", "joint_strength"]
 
 
 CLOSED = SLACK  # gap up to which a joint counts as closed, over the width of the smaller stone [-]
@@ -156,16 +157,15 @@ def assembly(scene: Scene, widest: float = CLOSED) -> RigidAssembly:
         operator=found.operator,
         lift=form.lift,
         dead=_dead(model, state, free),
-        strength=_strength(found),
+        strength=joint_strength(model, found.contacts, model.laws),
         joints=joints,
         crushing=stress_blocks(joints, np.array([np.inf if one is None else one for one in crushes])),
         widest=float(gap[closed].max()),
     )
 
 
-def _strength(found: Detection) -> Strength:
-    """Return the strength of closed joints, as their laws state it for a step of one second: N for N s."""
-    model, contacts = found.model, found.contacts
+def joint_strength(model: Model, contacts: Contacts, laws: LawTable) -> Strength:
+    """Return the strength of closed joints, as laws state it for a step of one second: N for N s."""
     none = np.zeros(len(contacts))
     approach = Approach(
         gap=none,
@@ -181,7 +181,7 @@ def _strength(found: Detection) -> Strength:
         first=np.ones(len(contacts), dtype=bool),
         state=np.zeros((len(contacts), STATE)),
     )
-    terms = model.laws.terms(found.law, approach)
+    terms = laws.terms(laws.of(contacts.bodies), approach)
     return Strength(terms.friction, terms.cohesion, terms.adhesion)
 
 

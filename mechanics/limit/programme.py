@@ -21,8 +21,8 @@ __all__ = ["Ending", "Optimum", "Programme"]
 
 # friction from which a contact has a cone [-]
 _SMOOTH = 1e-9
-# tolerances asked of Clarabel [-]
-_GAP, _FEASIBLE = 1e-9, 1e-9
+# tolerance asked of Clarabel, of gap and feasibility [-]
+_TOLERANCE = 1e-9
 # that of a programme that is one of many on the way, solved without scaling and refinement: in half the time
 _ROUGH = 1e-6
 
@@ -86,14 +86,17 @@ class Programme:
     on : the assembly
     live : (6 n,) load at λ = 1 [N, N m]; None: there is no λ
     name : of the load, in errors
+    tolerance : of gap and feasibility; velocities that are to be derivatives need less than λ does [-]
 
     Raises
     ------
     SolverError : the live load is zero
     """
 
-    def __init__(self, on: RigidAssembly, live: Array | None, name: str) -> None:
-        self._on, self._name = on, name
+    def __init__(
+        self, on: RigidAssembly, live: Array | None, name: str, tolerance: float = _TOLERANCE
+    ) -> None:
+        self._on, self._name, self._tolerance = on, name, tolerance
         load = np.zeros_like(on.dead) if live is None else live
         if live is not None and not load.any():
             raise SolverError("the live load is zero", where=name, remedy="give one that acts on stones")
@@ -208,8 +211,8 @@ class Programme:
         settings = clarabel.DefaultSettings()
         settings.verbose, settings.max_threads = False, 1
         settings.equilibrate_enable = settings.iterative_refinement_enable = not rough
-        settings.tol_gap_abs = settings.tol_gap_rel = _ROUGH if rough else _GAP
-        settings.tol_feas = _ROUGH if rough else _FEASIBLE
+        tolerance = _ROUGH if rough else self._tolerance
+        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = tolerance
         quadratic = csc_array(diags_array(np.zeros(len(objective)) if squares is None else squares))
         answer = clarabel.DefaultSolver(
             quadratic,

@@ -18,7 +18,7 @@ from mechanics.limit.assembly import RigidAssembly
 from mechanics.limit.limit_load import Mechanism, mechanism
 from mechanics.limit.programme import Programme
 
-__all__ = ["GeometricSafety", "geometric_safety"]
+__all__ = ["GeometricSafety", "geometric_safety", "shrunk"]
 
 
 # share of the width of joints to which its least value is found [-]
@@ -49,20 +49,22 @@ class GeometricSafety:
         return float("inf") if self.share == 0.0 else 1.0 / self.share
 
 
-def geometric_safety(on: RigidAssembly) -> GeometricSafety:
+def geometric_safety(on: RigidAssembly, widest: float = 1.0) -> GeometricSafety:
     """Return the geometric factor of safety of an assembly under its dead load.
+
+    With a `widest` share beyond 1, joints of stones that fall are widened until they would stand.
 
     Raises
     ------
     SolverError : Clarabel is not installed, or came to no answer
     """
-    force, fallen = _stands(on, 1.0)
+    force, fallen = _stands(on, widest)
     if fallen is not None:
         return GeometricSafety(float("nan"), force, fallen)
     at_points, fallen = _stands(on, 0.0)
     if fallen is None:
         return GeometricSafety(0.0, at_points, mechanism(on, np.zeros((len(on.free), 6))))
-    low, high = 0.0, 1.0
+    low, high = 0.0, widest
     while high - low > _NEAR * high:
         share = 0.5 * (low + high)
         at_share, falls = _stands(on, share)
@@ -75,11 +77,11 @@ def geometric_safety(on: RigidAssembly) -> GeometricSafety:
 
 def _stands(on: RigidAssembly, share: float) -> tuple[Array, Mechanism | None]:
     """Return forces that balance the dead load with joints of a share of their widths; else how the stones fall."""
-    found = Programme(_shrunk(on, share), None, "geometric safety").shortfall(on.strength)
+    found = Programme(shrunk(on, share), None, "geometric safety").shortfall(on.strength)
     return found.force, mechanism(on, found.velocity) if found.multiplier > _LACKING else None
 
 
-def _shrunk(on: RigidAssembly, share: float) -> RigidAssembly:
+def shrunk(on: RigidAssembly, share: float) -> RigidAssembly:
     """Return the assembly with the points of each joint drawn towards its centroid; points without a joint stay."""
     joints, contacts = on.joints, on.contacts
     shift = (share - 1.0) * (joints.point - joints.section.centroid[joints.joint])

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from moma.cli.assess import assess, compare, diagnose, pushover
+from moma.cli.assess import assess, compare, diagnose, pushover, study
 from moma.cli.console import PlainCommand, PlainGroup, open_streams
 from moma.cli.database import export, import_, migrate, serve, view
 from moma.cli.entities import query, schema, show
@@ -78,6 +78,7 @@ _COMMANDS = (
     pushover,
     compare,
     diagnose,
+    study,
     trade,
     geology,
     runs,

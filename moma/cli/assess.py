@@ -1,17 +1,19 @@
-"""Commands that ask how far a scene is from falling, and what explains the movement that was measured."""
+"""Commands that ask how far a scene is from falling, how probable it is, and what explains its measured movement."""
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from moma.cli.console import reporting, say
 from moma.cli.options import DEFAULT_DB, AcceptUnsound, Db, Json, Out, Overwrite, SceneArgument, Verbose
 from moma.cli.progress import progress_bars
+from moma.errors import UsageError
 
-__all__ = ["assess", "compare", "diagnose", "pushover"]
+__all__ = ["assess", "compare", "diagnose", "pushover", "study"]
 
 
 @contextmanager
@@ -171,3 +173,62 @@ def diagnose(
     with progress_bars() as listener, _going_on(folder):
         done = diagnosed(file, db, folder, listener, jobs, accept_unsound, overwrite=overwrite)
     print(as_json(done.summary) if json else "\n".join(diagnosis_lines(done, verbose)))
+
+
+@reporting
+def study(
+    file: Annotated[
+        Path,
+        typer.Argument(metavar="STUDY.toml", help="File with [study], [[inputs]] and [[quantities]]."),
+    ],
+    workers: Annotated[
+        int, typer.Option("--workers", metavar="N", min=1, help="Samples at a time, each in a process.")
+    ] = 1,
+    part: Annotated[
+        str | None,
+        typer.Option(
+            "--part",
+            metavar="K/N",
+            help="Take the K-th of N parts of the samples alone, for arrays of jobs that share the folder; "
+            "the same command without it writes the results.",
+        ),
+    ] = None,
+    resume: Annotated[
+        bool,
+        typer.Option("--resume", help="Go on with the stones as they were, whatever the database holds now."),
+    ] = False,
+    out: Out = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Use the folder of another study; its samples stay there.")
+    ] = False,
+    db: Db = DEFAULT_DB,
+    json: Json = False,
+    verbose: Verbose = False,
+) -> None:
+    """Find how probable it is that a scene falls, as much of it is not known, and what to measure next."""
+    from moma.cli.text.formats import as_json
+    from moma.cli.text.studies import part_line, study_lines
+    from pipelines.assess.study.study import run_study
+
+    folder = out or Path("out") / f"{file.stem}-study"
+    with progress_bars() as listener:
+        try:
+            done = run_study(file, db, folder, listener, workers, _part(part), resume, overwrite)
+        except KeyboardInterrupt:
+            say(f"stopped; its samples are kept in {folder}, and the same command goes on from there")
+            raise
+    if json:
+        print(as_json(dict(done.summary)))
+    else:
+        print("\n".join(study_lines(done, verbose)) if done.run is not None else part_line(done))
+
+
+def _part(words: str | None) -> Any:
+    from pipelines.assess.study.sampling import Part
+
+    if words is None:
+        return Part()
+    found = re.fullmatch(r"([0-9]{1,7})/([0-9]{1,7})", words)
+    if found is None or not 1 <= int(found[1]) <= int(found[2]):
+        raise UsageError(f"no part: {words!r}", where="--part", remedy="give K/N, as 7/200, K from 1 to N")
+    return Part(int(found[1]), int(found[2]))

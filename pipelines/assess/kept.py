@@ -43,7 +43,7 @@ class Kept:
     def get(self, decides: Sequence[str]) -> Any:
         """Return the answer to what these texts decide; None if it is not kept, or damaged."""
         try:
-            return self._revived(json.loads(self._file(decides).read_text(encoding="utf-8")))
+            return self.revived(json.loads(self._file(decides).read_text(encoding="utf-8")))
         except (OSError, ValueError, LookupError, TypeError):
             return None
 
@@ -57,13 +57,13 @@ class Kept:
         with storing(
             str(self._place), "what was found before is kept, and the same command goes on from there"
         ):
-            write_whole(self._file(decides), json.dumps(self._plain(answer)).encode())
+            write_whole(self._file(decides), json.dumps(self.plain(answer)).encode())
 
     def _file(self, decides: Sequence[str]) -> Path:
         digest = hashlib.sha256(json.dumps([self._versions, *decides]).encode())
         return self._place / f"{digest.hexdigest()[:32]}.json"
 
-    def _plain(self, value: Any) -> Any:
+    def plain(self, value: Any) -> Any:
         """Return a value as JSON has it: plain ones as they are, others as a list of their kind and their content."""
         if isinstance(value, np.generic):
             value = value.item()
@@ -72,28 +72,29 @@ class Kept:
         if isinstance(value, np.ndarray):
             return ["array", value.dtype.str, value.shape, value.ravel().tolist()]
         if is_dataclass(value) and type(value).__name__ in self._records:
-            parts = {one.name: self._plain(getattr(value, one.name)) for one in fields(value)}
+            parts = {one.name: self.plain(getattr(value, one.name)) for one in fields(value)}
             return ["record", type(value).__name__, parts]
         if isinstance(value, Mapping):
-            return ["mapping", {key: self._plain(one) for key, one in value.items()}]
+            return ["mapping", {key: self.plain(one) for key, one in value.items()}]
         if isinstance(value, list | tuple):
-            return [type(value).__name__, [self._plain(one) for one in value]]
+            return [type(value).__name__, [self.plain(one) for one in value]]
         raise TypeError(f"a {type(value).__name__} cannot be kept")
 
-    def _revived(self, value: Any) -> Any:
+    def revived(self, value: Any) -> Any:
+        """Return the value that `plain` made plain."""
         if not isinstance(value, list):
             return value
         match value:
             case ["array", kind, shape, numbers]:
                 return np.array(numbers, dtype=kind).reshape(shape)
             case ["record", name, parts]:
-                return self._records[name](**{key: self._revived(one) for key, one in parts.items()})
+                return self._records[name](**{key: self.revived(one) for key, one in parts.items()})
             case ["mapping", parts]:
-                return {key: self._revived(one) for key, one in parts.items()}
+                return {key: self.revived(one) for key, one in parts.items()}
             case ["tuple", parts]:
-                return tuple(self._revived(one) for one in parts)
+                return tuple(self.revived(one) for one in parts)
             case ["list", parts]:
-                return [self._revived(one) for one in parts]
+                return [self.revived(one) for one in parts]
         raise ValueError(f"no answer: {value!r}")
 
 

@@ -26,11 +26,19 @@ from pipelines.scene.stages import ACTS_IN, StandingStones, standing_stones
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.solids import Solid
 from survey.geometry.stone_parts import stone_parts
-from survey.joints.close import close_joints
+from survey.joints.close import ClosedStones, close_joints
 from survey.joints.report import ClosingReport
 from survey.simplify.simplify import BlockyStone
 
-__all__ = ["Assembly", "assemble", "assemble_stones", "local_origin", "stone_about", "wishes_of"]
+__all__ = [
+    "Assembly",
+    "assemble",
+    "assemble_stones",
+    "closed_stones",
+    "local_origin",
+    "stone_about",
+    "wishes_of",
+]
 
 _FAR = 10_000.0
 """Largest coordinates that are exact enough without a shift [m]."""
@@ -92,11 +100,29 @@ def assemble(scene: SceneFile, session: Session) -> Assembly:
     return assemble_stones(scene, models, select_groups(scene, session, models))
 
 
-def assemble_stones(scene: SceneFile, models: tuple[StoneModel, ...], groups: Groups) -> Assembly:
-    """Build the scene, as `assemble`, from stones already selected, without the database."""
+def closed_stones(
+    scene: SceneFile, models: Sequence[StoneModel]
+) -> tuple[tuple[SurveyedBlock, ...], ClosedStones]:
+    """Return the surveyed stones about the origin of their scene, and the same with closed joints."""
     origin = local_origin([model.record for model in models])
-    stones = [surveyed_block(stone_about(model.record, origin)) for model in models]
-    closed = close_joints(stones, scene.joints)
+    stones = tuple(surveyed_block(stone_about(model.record, origin)) for model in models)
+    return stones, close_joints(stones, scene.joints)
+
+
+def assemble_stones(
+    scene: SceneFile,
+    models: tuple[StoneModel, ...],
+    groups: Groups,
+    shapes: tuple[Sequence[SurveyedBlock], ClosedStones] | None = None,
+) -> Assembly:
+    """Build the scene, as `assemble`, from stones already selected, without the database.
+
+    Parameters
+    ----------
+    shapes : of `closed_stones`, where they are known
+    """
+    origin = local_origin([model.record for model in models])
+    stones, closed = closed_stones(scene, models) if shapes is None else shapes
     codes = [model.record.code for model in models]
     chosen = modelled(codes, neighbours(closed.report.joints), wishes_of(scene, models, groups))
     meshes = _meshes(scene, groups)

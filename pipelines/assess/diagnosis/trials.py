@@ -3,24 +3,17 @@
 `Runner` is all that a cluster has to serve: scenes are self-contained texts, and may be run in any order.
 """
 
-import ctypes
-import multiprocessing
-import os
-import signal
-import sys
-import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from multiprocessing.connection import Connection, wait
-from typing import Any
 
 from archmodel.database.session import open_database
 from mechanics.results.result import Outcome
 from mechanics.simulate import simulate, simulate_stages
 from moma.errors import MomaError
 from pipelines.assess.motions import Motions, stone_motions
+from pipelines.assess.workers.pool import Lost, workers
 from pipelines.run.assemble import assemble
 from pipelines.scene.file import parse_scene
 
@@ -95,112 +88,16 @@ def runner(jobs: int) -> Iterator[Runner]:
 
     The processes end with the with-block, however it ends, and with this process if it is killed.
     """
-    if jobs == 1:
-        yield lambda trials: map(run_trial, trials)
-        return
-    workers: list[_Worker] = []
-
-    def run(trials: Sequence[Trial]) -> Iterator[Tried]:
-        while len(workers) < min(jobs, len(trials)):
-            workers.append(_Worker())
-        answers: dict[int, Tried] = {}
-        asked, running, told = 0, dict[int, _Worker](), 0
-        while told < len(trials):
-            idle = [one for one in workers if one not in running.values()]
-            for worker in idle[: len(trials) - asked]:
-                worker.ask(trials[asked])
-                running[asked] = worker
-                asked += 1
-            ready = wait([one.channel for one in running.values()])
-            for number, worker in [item for item in running.items() if item[1].channel in ready]:
-                answers[number] = worker.answer()
-                del running[number]
-            while told in answers:
-                yield answers.pop(told)
-                told += 1
-
-    try:
-        yield run
-    finally:
-        for worker in workers:
-            worker.end()
+    with workers(jobs, run_trial) as answers:
+        yield lambda trials: _in_order(answers(trials))
 
 
-class _Worker:
-    """A process that runs one scene at a time; where it has ended, the next scene starts another."""
-
-    def __init__(self) -> None:
-        self._start()
-
-    def _start(self) -> None:
-        context = multiprocessing.get_context("spawn")
-        self.channel, there = context.Pipe()
-        self._process = context.Process(target=_serve, args=(there, os.getpid()), daemon=True)
-        self._process.start()
-        there.close()
-
-    def ask(self, trial: Trial) -> None:
-        """Hand a scene to the process."""
-        try:
-            self.channel.send(trial)
-        except OSError:
-            self.end()
-            self._start()
-            self.channel.send(trial)
-
-    def answer(self) -> Tried:
-        """Return its answer, which is there, or the reason why the process has ended without one."""
-        try:
-            answer = self.channel.recv()
-        except (EOFError, OSError):
-            self._process.join()
-            code = self._process.exitcode or 0
-            how = (
-                f"was killed by signal {-code}, maybe for its memory"
-                if code < 0
-                else f"ended with code {code}"
-            )
-            return Tried(None, f"the process of its run {how}", 0.0)
-        if isinstance(answer, Exception):
-            raise answer
-        assert isinstance(answer, Tried)
-        return answer
-
-    def end(self) -> None:
-        """Kill the process, even within a long step."""
-        self._process.kill()
-        self._process.join()
-        self.channel.close()
-
-
-def _serve(channel: "Connection[Any, Any]", parent: int) -> None:
-    """Run the scenes that come, until the parent has ended."""
-    _end_with_parent(parent)
-    while True:
-        try:
-            trial = channel.recv()
-        except (EOFError, OSError):
-            return
-        try:
-            answer: Tried | Exception = run_trial(trial)
-        except Exception as error:
-            answer = error
-        channel.send(answer)
-
-
-def _end_with_parent(parent: int) -> None:
-    """End this process as soon as its parent has ended, for whatever reason; signals are for the parent alone."""
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.SIG_IGN)
-    if sys.platform.startswith("linux"):
-        # the operating system does so at once, even within a long kernel, for which the thread below would wait
-        ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
-        if os.getppid() != parent:
-            os._exit(1)
-    if (process := multiprocessing.parent_process()) is not None:
-        threading.Thread(target=_await, args=(process,), daemon=True).start()
-
-
-def _await(parent: "multiprocessing.process.BaseProcess") -> None:
-    parent.join()
-    os._exit(1)
+def _in_order(answers: Iterable[tuple[int, Tried | Lost]]) -> Iterator[Tried]:
+    """Yield numbered answers in the order of their numbers, each as soon as it may be."""
+    waiting: dict[int, Tried] = {}
+    due = 0
+    for number, answer in answers:
+        waiting[number] = Tried(None, answer.reason, 0.0) if isinstance(answer, Lost) else answer
+        while due in waiting:
+            yield waiting.pop(due)
+            due += 1

@@ -1,0 +1,268 @@
+"""Estimates of a study by its method: moments, probability of failure, shares of the variance, fragility curve."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mechanics.arrays import Array
+from moma.errors import SceneError
+from pipelines.assess.study.methods.counting import (
+    Estimate,
+    Probability,
+    controlled,
+    fragility,
+    mean_of,
+    probability,
+)
+from pipelines.assess.study.methods.design_points import Design, design_points
+from pipelines.assess.study.methods.failure import Failure
+from pipelines.assess.study.methods.first_order import FirstOrder, first_order
+from pipelines.assess.study.methods.importance import importance
+from pipelines.assess.study.methods.plans import latin_hypercube, monte_carlo
+from pipelines.assess.study.methods.sobol import Indices, sobol
+from pipelines.assess.study.methods.subset import Subset, subset
+from pipelines.assess.study.problem import Problem
+from pipelines.assess.study.quantities import quantity_name
+from pipelines.assess.study.sampling import Sampler
+from pipelines.assess.study.settings import Method, StudyTable
+from pipelines.assess.workers.store import Sample
+
+__all__ = ["Estimates", "estimated", "failure_of"]
+
+_CURVE = 21  # levels of a fragility curve that are not given
+_FEW = 3
+"""Samples for each unknown from which a regression tells shares of the variance."""
+
+
+@dataclass(frozen=True)
+class Estimates:
+    """Estimates of a study.
+
+    Attributes
+    ----------
+    points, values : of independent samples: (m, n), and (m,) of each quantity by name, NaN where there is none
+    samples : the same, with their reasons
+    means : of each quantity
+    probability : of failure; None where it is not asked for
+    fragility : probability of failure at levels of the first quantity
+    linear : first-order prediction; None where there is no gradient
+    designs : design points, the most probable first
+    subset : of subset simulation
+    indices : of Sobol'
+    squares : (n,) squares of the gradient that tells shares of the variance, by unknown
+    gradient : (n,) the gradient; None where only shares of inputs are known
+    """
+
+    points: Array
+    values: dict[str, Array]
+    samples: list[Sample]
+    means: dict[str, Estimate]
+    probability: Probability | None = None
+    fragility: list[tuple[float, Probability]] = field(default_factory=list)
+    linear: FirstOrder | None = None
+    designs: tuple[Design, ...] = ()
+    subset: Subset | None = None
+    indices: Indices | None = None
+    gradient: Array | None = None
+
+
+def failure_of(problem: Problem) -> Failure | None:
+    """Return when the first quantity fails; None where the study does not say."""
+    table = problem.quantities[0]
+    if table.fails_above is not None:
+        return Failure(quantity_name(table), table.fails_above, True)
+    if table.fails_below is not None:
+        return Failure(quantity_name(table), table.fails_below)
+    return Failure(quantity_name(table), 0.5) if table.type == "outcome" else None
+
+
+def estimated(study: StudyTable, problem: Problem, sampler: Sampler) -> Estimates:
+    """Return the estimates of a study by its method.
+
+    Raises
+    ------
+    SceneError : the method has nothing to go by
+    IncompleteError : samples of other parts are not there yet
+    """
+    name, failure = quantity_name(problem.quantities[0]), failure_of(problem)
+    linear = first_order(sampler, name, problem.dimension) if problem.differentiable else None
+    match study.method:
+        case Method.MONTE_CARLO:
+            plan = monte_carlo(study.samples, problem.dimension, study.seed)
+            return _counted(study, problem, plan, sampler, linear, failure)
+        case Method.LATIN_HYPERCUBE:
+            plan = latin_hypercube(study.samples, problem.dimension, study.seed)
+            return _counted(study, problem, plan, sampler, linear, failure)
+        case Method.SOBOL:
+            return _sobol(study, problem, sampler, linear)
+        case Method.FIRST_ORDER:
+            return _first_order(problem, name, linear, failure)
+        case Method.FORM:
+            return _form(study, problem, sampler, linear, failure)
+        case Method.SUBSET:
+            return _subset(study, problem, sampler, linear, failure)
+
+
+def _counted(
+    study: StudyTable,
+    problem: Problem,
+    points: Array,
+    sampler: Sampler,
+    linear: FirstOrder | None,
+    failure: Failure | None,
+) -> Estimates:
+    """Return the estimates from samples of equal weight."""
+    samples = sampler.divided(points)
+    values = _values(problem, samples)
+    first = quantity_name(problem.quantities[0])
+    means = {}
+    for name, numbers in values.items():
+        if linear is not None and name == first:
+            predicted = linear.predicted(points)
+            means[name] = controlled(numbers, predicted, linear.mean, study.confidence)
+        elif name != first and linear is None:
+            means[name] = mean_of(numbers, study.confidence)
+        else:
+            means[name] = mean_of(numbers, study.confidence)
+    table = problem.quantities[0]
+    levels = table.levels or _levels(values[first])
+    above = table.fails_above is not None
+    return Estimates(
+        points,
+        values,
+        samples,
+        means,
+        None if failure is None else probability(failure.states(samples), study.confidence),
+        fragility(values[first], levels, above, study.confidence),
+        linear,
+        gradient=linear.gradient if linear is not None else _regressed(points, values[first]),
+    )
+
+
+def _values(problem: Problem, samples: list[Sample]) -> dict[str, Array]:
+    names = [quantity_name(table) for table in problem.quantities]
+    return {
+        name: np.array([sample.values.get(name, np.nan) if sample.done else np.nan for sample in samples])
+        for name in names
+    }
+
+
+def _levels(values: Array) -> tuple[float, ...]:
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return ()
+    return tuple(np.linspace(known.min(), known.max(), _CURVE).tolist())
+
+
+def _regressed(points: Array, values: Array) -> Array | None:
+    """Return the gradient (n,) of a linear regression; None where there are too few samples."""
+    known = np.isfinite(values)
+    if int(known.sum()) < _FEW * (points.shape[1] + 1):
+        return None
+    design = np.column_stack([np.ones(int(known.sum())), points[known]])
+    found, *_ = np.linalg.lstsq(design, values[known], rcond=None)
+    slopes: Array = found[1:]
+    return slopes
+
+
+def _first_order(
+    problem: Problem, name: str, linear: FirstOrder | None, failure: Failure | None
+) -> Estimates:
+    if linear is None:
+        raise SceneError(f"{name} has no gradient at the mean", remedy="give method = 'monte_carlo'")
+    mean = Estimate(linear.mean, linear.sigma, float("nan"), float("nan"), 1)
+    found = None
+    if failure is not None and linear.sigma > 0.0:
+        from scipy.stats import norm
+
+        share = float(norm.cdf(failure.sign * (failure.level - linear.mean) / linear.sigma))
+        # a prediction has no interval: only samples tell how good it is
+        found = Probability(share, share, 0.0, 1.0, 0, 0, 0, float("nan"))
+    return Estimates(
+        np.zeros((0, problem.dimension)),
+        {},
+        [],
+        {name: mean},
+        found,
+        [],
+        linear,
+        gradient=linear.gradient,
+    )
+
+
+def _form(
+    study: StudyTable,
+    problem: Problem,
+    sampler: Sampler,
+    linear: FirstOrder | None,
+    failure: Failure | None,
+) -> Estimates:
+    assert failure is not None
+    designs = design_points(sampler, failure, problem.dimension, _starts(problem))
+    if not designs:
+        raise SceneError(
+            f"{failure.quantity} has no gradient from which a design point follows",
+            remedy="give method = 'subset'",
+        )
+    found = importance(sampler.divided, failure, designs, study.samples, study.seed, study.confidence)
+    name = failure.quantity
+    means = {} if linear is None else {name: Estimate(linear.mean, linear.sigma, np.nan, np.nan, 1)}
+    # that of the quantity itself, not of g
+    gradient = failure.sign * designs[0].gradient
+    return Estimates(
+        np.zeros((0, problem.dimension)), {}, [], means, found, [], linear, designs, gradient=gradient
+    )
+
+
+def _starts(problem: Problem) -> list[int]:
+    """Return the unknowns along which further design points are sought: what stones have in common."""
+    return [number for number, unknown in enumerate(problem.unknowns.each) if unknown.part == "common"]
+
+
+def _subset(
+    study: StudyTable,
+    problem: Problem,
+    sampler: Sampler,
+    linear: FirstOrder | None,
+    failure: Failure | None,
+) -> Estimates:
+    assert failure is not None
+    found = subset(sampler, failure, problem.dimension, study.samples, study.seed, study.confidence)
+    return Estimates(
+        np.zeros((0, problem.dimension)),
+        {},
+        [],
+        {},
+        found.probability,
+        [],
+        linear,
+        subset=found,
+        gradient=None if linear is None else linear.gradient,
+    )
+
+
+def _sobol(study: StudyTable, problem: Problem, sampler: Sampler, linear: FirstOrder | None) -> Estimates:
+    name = quantity_name(problem.quantities[0])
+    groups = [
+        [place for place, unknown in enumerate(problem.unknowns.each) if unknown.input == number]
+        for number in range(len(problem.inputs))
+    ]
+    if len(problem.unknowns.correlated):
+        raise SceneError(
+            "Sobol' indices need independent inputs",
+            remedy="leave out [[correlations]], or use another method",
+        )
+    found = sobol(
+        sampler.divided, name, problem.dimension, groups, study.samples, study.seed, study.confidence
+    )
+    return Estimates(
+        np.zeros((0, problem.dimension)),
+        {name: found.values},
+        [],
+        {name: mean_of(found.values, study.confidence)},
+        None,
+        [],
+        linear,
+        indices=found,
+        gradient=None if linear is None else linear.gradient,
+    )

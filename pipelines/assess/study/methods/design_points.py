@@ -1,0 +1,140 @@
+"""Design points: the most probable points of failure, by the iteration of Hasofer, Lind, Rackwitz and Fiessler.
+
+Where stones may fall in several ways there are several. The search begins at the mean first, and then from points along
+each of the largest unknowns.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import norm
+
+from mechanics.arrays import Array
+from pipelines.assess.study.methods.failure import Evaluate, Failure
+
+__all__ = ["Design", "design_point", "design_points"]
+
+_STILL = 1e-3
+"""Change of the point at which it stands, and g over its change along one unit, at which it is zero [-].
+
+P changes by β times as much, less than a hundredth.
+"""
+_MOST = 30  # samples of a search
+_STARTS = 8
+"""Unknowns along which further searches begin, at most."""
+_OUT = 3.0  # distance of their starts from the mean [-]
+_DISTINCT = 0.1
+"""Distance from which two design points are two [-]."""
+_RELEVANT = 2.0
+"""Excess of β over the least up to which a design point counts: beyond, P is less than a hundredth of the largest."""
+
+
+@dataclass(frozen=True)
+class Design:
+    """Design point.
+
+    Attributes
+    ----------
+    point : (n,) in standard normal space
+    gradient : (n,) of g there
+    converged : g is zero there, and its gradient points to the mean
+    evaluations : samples of the search
+    index : β, negative where the mean fails
+    """
+
+    point: Array
+    gradient: Array
+    converged: bool
+    evaluations: int
+    index: float
+
+    @property
+    def probability(self) -> float:
+        """Φ(-β)."""
+        return float(norm.sf(self.index))
+
+    @property
+    def shares(self) -> Array:
+        """Squares (n,) of the direction cosines: by how much each unknown decides."""
+        squares: Array = self.gradient**2
+        return squares / (float(squares.sum()) or 1.0)
+
+
+def design_point(evaluate: Evaluate, failure: Failure, start: Array) -> Design | None:
+    """Return the design point that a search from a start (n,) comes to; None where there is no gradient."""
+    point, previous = start.copy(), None
+    last: tuple[Array, Array, float] | None = None
+    used, scale = 0, 1.0
+    while used < _MOST:
+        (sample,) = evaluate(point[None], gradient=True)
+        used += 1
+        state, gradient = failure.state(sample), failure.gradient(sample)
+        if gradient is None or not np.isfinite(state):
+            if previous is None:
+                return None
+            # half of the way back to where there was one
+            point = 0.5 * (point + previous)
+            continue
+        slope = float(np.linalg.norm(gradient))
+        if last is not None:
+            # the iteration swings where the limit state is curved: shorter steps where g has not come down
+            worse = abs(state) / slope > 0.9 * abs(last[2]) / float(np.linalg.norm(last[1]))
+            swings = float((point - last[0]) @ (_next(*last) - last[0])) > 0.0 and worse
+            scale = max(0.5 * scale, 0.05) if swings else min(1.5 * scale, 1.0)
+        last = (point, gradient, state)
+        goal = _next(point, gradient, state)
+        if float(np.linalg.norm(goal - point)) < _STILL * max(1.0, float(np.linalg.norm(goal))):
+            return _designed(goal, gradient, True, used)
+        previous, point = point, point + scale * (goal - point)
+    assert last is not None
+    return _designed(last[0], last[1], False, used)
+
+
+def design_points(
+    evaluate: Evaluate, failure: Failure, dimension: int, along: Sequence[int] = ()
+) -> tuple[Design, ...]:
+    """Return the design points that matter, the most probable first; none where there is no gradient.
+
+    Parameters
+    ----------
+    along : unknowns along which further searches begin, on either side of the mean
+    """
+    first = design_point(evaluate, failure, np.zeros(dimension))
+    if first is None:
+        return ()
+    found = [first]
+    for start in _starts(along, dimension):
+        other = design_point(evaluate, failure, start)
+        if other is None or not other.converged:
+            continue
+        apart = [float(np.linalg.norm(other.point - known.point)) for known in found]
+        if min(apart) > _DISTINCT * max(1.0, other.index):
+            found.append(other)
+    found.sort(key=lambda design: design.index)
+    return tuple(design for design in found if design.index <= found[0].index + _RELEVANT)
+
+
+def _starts(along: Sequence[int], dimension: int) -> Sequence[Array]:
+    """Return points along the axes of some unknowns."""
+    if dimension < 2:
+        return []
+    starts = []
+    for number in along[:_STARTS]:
+        for sign in (-1.0, 1.0):
+            start = np.zeros(dimension)
+            start[number] = sign * _OUT
+            starts.append(start)
+    return starts
+
+
+def _next(point: Array, gradient: Array, state: float) -> Array:
+    goal: Array = (float(gradient @ point) - state) / float(gradient @ gradient) * gradient
+    return goal
+
+
+def _designed(point: Array, gradient: Array, converged: bool, used: int) -> Design:
+    # the mean fails where g falls towards it
+    outwards = -float(gradient @ point) >= 0.0
+    index = float(np.linalg.norm(point)) * (1.0 if outwards else -1.0)
+    return Design(point, gradient, converged, used, index)

@@ -1,0 +1,130 @@
+"""Samples of a study by worker processes: looked up in the store first, taken where there is none."""
+
+import hashlib
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from mechanics.arrays import Array
+from mechanics.dynamics.progress import Listener, Progress
+from pipelines.assess.study.prepare import problem_of
+from pipelines.assess.workers.pool import Lost
+from pipelines.assess.workers.store import Sample, SampleStore, Snapshot
+
+__all__ = ["ATTEMPTS", "IncompleteError", "Part", "Sampler", "Task", "take"]
+
+ATTEMPTS = 4
+"""Processes that a sample may lose: a sample that kills its process each time must end."""
+
+
+class IncompleteError(Exception):
+    """Raised where a batch has samples of other parts that are not there yet."""
+
+    def __init__(self, done: int, missing: int) -> None:
+        super().__init__(f"{missing} samples are not there yet")
+        self.done, self.missing = done, missing
+
+
+@dataclass(frozen=True)
+class Part:
+    """Part of the samples that a job takes: those whose number is `number` - 1 modulo `count`."""
+
+    number: int = 1
+    count: int = 1
+
+
+@dataclass(frozen=True)
+class Task:
+    """Sample that a worker takes.
+
+    Attributes
+    ----------
+    snapshot : of the study
+    point : (n,), which follows from the seed and the sample's number
+    gradient : wanted
+    """
+
+    snapshot: Snapshot
+    point: Array
+    gradient: bool
+
+
+def take(task: Task) -> Sample:
+    """Take a sample and record it; return the record where there is one."""
+    store = SampleStore(task.snapshot)
+    known = store.get(task.point, task.gradient)
+    if known is not None:
+        return known
+    sample = problem_of(task.snapshot).sample(task.point, task.gradient)
+    store.put(sample)
+    return sample
+
+
+@dataclass
+class Sampler:
+    """Function of points whose samples are taken by workers.
+
+    Attributes
+    ----------
+    snapshot : of the study
+    run : works on tasks, and yields their numbers and answers
+    part : of large batches that this process takes
+    progress : called at every sample
+    taken, cpu : samples taken here, and their processor time [s]
+    faults : reasons of the samples without an answer, with how many have each
+    """
+
+    snapshot: Snapshot
+    run: Callable[[Sequence[Any]], Iterator[tuple[int, Any]]]
+    part: Part
+    progress: Listener
+    taken: int = 0
+    cpu: float = 0.0
+    faults: dict[str, int] = field(default_factory=dict)
+
+    def __call__(self, points: Array, gradient: bool = False) -> list[Sample]:
+        """Return the samples at points (m, n) in their order, all taken here."""
+        return self._taken(points, gradient, Part())
+
+    def divided(self, points: Array, gradient: bool = False) -> list[Sample]:
+        """Return the samples at points (m, n) of a plan in their order, of which each part takes its own.
+
+        Raises
+        ------
+        IncompleteError : samples of other parts are not there yet
+        """
+        return self._taken(points, gradient, self.part)
+
+    def _taken(self, points: Array, gradient: bool, part: Part) -> list[Sample]:
+        store, count = SampleStore(self.snapshot), len(points)
+        found = [store.get(point, gradient) for point in points]
+        todo = [number for number, sample in enumerate(found) if sample is None]
+        todo = [number for number in todo if number % part.count == part.number - 1]
+        tasks = [Task(self.snapshot, points[number], gradient) for number in todo]
+        done = count - sum(sample is None for sample in found)
+        for place, answer in self.run(tasks):
+            number = todo[place]
+            if isinstance(answer, Lost):
+                answer = Sample(points[number], {}, "lost", answer.reason)
+                store.put(answer)
+            found[number] = answer
+            self.taken, self.cpu, done = self.taken + 1, self.cpu + answer.cpu, done + 1
+            self.progress(Progress("assess", done, count, "samples"))
+        answers = [sample for sample in found if sample is not None]
+        if len(answers) < count:
+            raise IncompleteError(len(answers), count - len(answers))
+        for sample in answers:
+            if not sample.done:
+                reason = f"{sample.state}: {sample.reason}"
+                self.faults[reason] = self.faults.get(reason, 0) + 1
+        return answers
+
+    def digest_of(self, samples: Sequence[Sample]) -> str:
+        """Return a digest of the values of samples, whoever took them."""
+        digest = hashlib.sha256()
+        for sample in samples:
+            digest.update(np.ascontiguousarray(sample.point).tobytes())
+            digest.update(repr(sorted(sample.values.items())).encode() + sample.state.encode())
+        return digest.hexdigest()

@@ -1,0 +1,177 @@
+"""A study of a scene: what is not known goes in, the probability of failure and what to measure next come out."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from archmodel.database.session import open_database
+from archmodel.store.run_record import RunRecord, StoneResult
+from archmodel.tables.entries import latest_entry
+from mechanics.dynamics.progress import Listener, Progress, silent
+from mechanics.scene.scene import Fidelity
+from moma.errors import SceneError, UsageError
+from pipelines.assess.study.estimates import estimated
+from pipelines.assess.study.file import StudyFile, read_study
+from pipelines.assess.study.prepare import problem_of, snapshot_content
+from pipelines.assess.study.problem import Problem
+from pipelines.assess.study.results import summary_of, write_results
+from pipelines.assess.study.sampling import ATTEMPTS, IncompleteError, Part, Sampler, take
+from pipelines.assess.workers.pool import workers
+from pipelines.assess.workers.store import Snapshot
+from pipelines.results.folder import locked
+from pipelines.run.record import store_record, versions
+
+__all__ = ["Study", "run_study"]
+
+_SNAPSHOTS = "snapshot-*.json"
+
+
+@dataclass(frozen=True)
+class Study:
+    """Result of a study.
+
+    Attributes
+    ----------
+    folder : of the files
+    summary : contents of study.json; of a part, how many of its samples are there
+    complete : all samples that it needs are there
+    run : its number in the database; None where it is not complete
+    """
+
+    folder: Path
+    summary: Mapping[str, Any]
+    complete: bool
+    run: int | None = None
+
+
+def run_study(
+    path: str | Path,
+    url: str,
+    folder: str | Path,
+    progress: Listener = silent,
+    count: int = 1,
+    part: Part | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+) -> Study:
+    """Carry what is not known of a scene to its quantities; keep each sample, and go on from those that are there.
+
+    Parameters
+    ----------
+    path : study file
+    url : of the database
+    folder : of the study
+    progress : called at every sample
+    count : worker processes
+    part : of the samples that this call takes; the results are written by a call for all
+    resume : go on with the snapshot of the folder, whatever the database holds now
+    overwrite : take the folder of another study
+
+    Raises
+    ------
+    UsageError : the folder holds other files, or another study
+    SceneError : with file and line, at the first mistake; the scene does not stand at the mean of all inputs
+    DatabaseError : the database cannot be read or written
+    """
+    folder, file, part = Path(folder), read_study(path), part or Part()
+    progress(Progress("blocks", 0, None, "reading the stones"))
+    with open_database(url, create=False) as database, database.session(read_only=True) as session:
+        as_of = latest_entry(session)
+        content = None if resume else snapshot_content(file, session)
+    snapshot = _snapshot(folder, content, overwrite)
+    problem = problem_of(snapshot)
+    with workers(count, take, ATTEMPTS) as run:
+        sampler = Sampler(snapshot, run, part, progress)
+        _refuse_fallen(file, problem, sampler)
+        try:
+            estimates = estimated(file.study, problem, sampler)
+        except IncompleteError as error:
+            told = {"part": part.number, "parts": part.count, "done": error.done, "missing": error.missing}
+            return Study(folder, told, False)
+    if part.count > 1:
+        told = {"part": part.number, "parts": part.count, "done": len(estimates.points), "missing": 0}
+        return Study(folder, told, True)
+    summary = summary_of(file, problem, estimates, sampler, snapshot)
+    progress(Progress("write", 0, 1, "pictures"))
+    with locked(_made(folder / ".writing")):
+        write_results(folder, summary, problem, estimates)
+    with open_database(url, create=False) as database:
+        number = store_record(database, folder, _record(file, problem, summary, as_of))
+    progress(Progress("write", 1, 1))
+    return Study(folder, summary, True, number)
+
+
+def _made(folder: Path) -> Path:
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def _snapshot(folder: Path, content: dict[str, Any] | None, overwrite: bool) -> Snapshot:
+    """Return the snapshot of a folder: the one that is there, or a new one of a content."""
+    place = str(folder)
+    if folder.exists() and not folder.is_dir():
+        raise UsageError("is not a folder", where=place, remedy="name another folder")
+    found = sorted(folder.glob(_SNAPSHOTS)) if folder.is_dir() else []
+    if folder.is_dir() and not found and any(folder.iterdir()):
+        raise UsageError("holds files that no study wrote", where=place, remedy="name another folder")
+    if content is None:
+        if len(found) != 1:
+            raise UsageError(
+                f"holds {len(found)} unfinished studies", where=place, remedy="leave out --resume"
+            )
+        return Snapshot(folder, hashlib.sha256(found[0].read_bytes()).hexdigest())
+    raw = json.dumps(content, sort_keys=True, ensure_ascii=False).encode()
+    made = Snapshot(folder, hashlib.sha256(raw).hexdigest())
+    if found and made.path not in found and not overwrite:
+        raise UsageError(
+            "holds a study of another scene, other stones or other inputs",
+            where=place,
+            remedy="name another folder, go on with that study by --resume, or keep both by --overwrite",
+        )
+    return Snapshot.write(folder, content)
+
+
+def _refuse_fallen(file: StudyFile, problem: Problem, sampler: Sampler) -> None:
+    """Refuse a scene that does not stand at the mean of all inputs, before anything else runs."""
+    (middle,) = sampler(np.zeros((1, problem.dimension)))
+    where = file.document.where("study", "scene")
+    if not middle.done:
+        what = f"the scene has no answer at the mean of all inputs: {middle.reason}"
+        raise SceneError(what, where=where, remedy="mend the scene, or the means of its inputs")
+    for table, value in zip(problem.quantities, middle.values.values(), strict=True):
+        if table.type in ("bound", "candidate", "held", "factor", "outcome") and value <= 0.0:
+            raise SceneError(
+                "the scene does not stand at the mean of all inputs",
+                where=where,
+                remedy="see with moma assess how it falls, and mend the scene or the means of its inputs",
+            )
+
+
+def _record(file: StudyFile, problem: Problem, summary: Mapping[str, Any], as_of: int | None) -> RunRecord:
+    fixed = {model.record.code for model in problem.models if model.listed is Fidelity.FIXED}
+    shares = summary["shares"]["by_stone"]
+    return RunRecord(
+        scene=file.scene.name,
+        scene_text=file.text,
+        outcome="studied",
+        summary=summary,
+        versions=versions(),
+        results=tuple(
+            StoneResult(
+                code,
+                str(Fidelity.FIXED if code in fixed else Fidelity.RIGID),
+                None,
+                None,
+                0.0,
+                None,
+                {"variance_share": share},
+            )
+            for code, share in shares.items()
+        ),
+        as_of=as_of,
+    )

@@ -1,0 +1,110 @@
+"""report.html of a study: probability with both bounds, what decides, what to measure next, what was certain."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from pipelines.reports.html import percent, picture, scientific, write_page
+
+__all__ = ["write_study"]
+
+_CAPTIONS = {
+    "histogram": "Samples of the quantity, and the share of them that is below each value.",
+    "fragility": "Probability of failure at each level, with its interval.",
+    "tornado": "Share of the variance by what the stones have in common, and by the scatter of each.",
+    "elevation": "Variance that the best measurement of each stone would take away.",
+}
+_FEW = 20  # actions that the page shows
+
+
+def write_study(path: Path, summary: Mapping[str, Any], pictures: Sequence[str]) -> None:
+    """Write the page and embed pictures of its folder.
+
+    Parameters
+    ----------
+    path : report.html
+    summary : as in study.json
+    pictures : names of PNG files beside it
+    """
+    write_page(
+        path,
+        "study.html",
+        None,
+        name=summary["scene"],
+        lead=f"{summary['headline']}.",
+        cautions=summary["cautions"],
+        warnings=(),
+        version=summary["versions"]["moma"],
+        versions=summary["versions"],
+        numbers=_numbers(summary),
+        shares=[(name, percent(share)) for name, share in _sorted(summary["shares"]["by_input"])],
+        designs=[_design(number, one) for number, one in enumerate(summary["designs"], start=1)],
+        sobol=[
+            (
+                row["input"],
+                f"{row['first']:.4f} ({row['first_interval'][0]:.3f} to {row['first_interval'][1]:.3f})",
+                f"{row['total']:.4f} ({row['total_interval'][0]:.3f} to {row['total_interval'][1]:.3f})",
+            )
+            for row in summary["sobol"]
+        ],
+        actions=[(one["text"], percent(one["share"])) for one in summary["actions"][:_FEW]],
+        certain=summary["certain"],
+        figures=[picture(path.parent / name, _CAPTIONS[Path(name).stem]) for name in pictures],
+    )
+
+
+def _numbers(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
+    failure, study = summary["failure"], summary["study"]
+    rows = [("Method", study["method"]), ("Unknowns", str(summary["unknowns"]))]
+    if failure is not None:
+        rows += [
+            (
+                "Fails",
+                f"{summary['quantity']} {'above' if failure['above'] else 'below'} {failure['level']:g}",
+            ),
+            ("Probability of failure", scientific(failure["probability"])),
+            ("… if all samples without an answer fall", scientific(failure["probability_upper"])),
+            (
+                f"Interval of {100 * study['confidence']:g} %",
+                f"{scientific(failure['low'])} to {scientific(failure['high'])}",
+            ),
+            (
+                "Reliability index β",
+                f"{failure['index']:.3f} ({failure['index_low']:.3f} to {failure['index_high']:.3f})",
+            ),
+            (
+                "Samples",
+                f"{failure['count']}, of which {failure['failing']} fail and {failure['unknown']} have no answer",
+            ),
+        ]
+    for name, mean in summary["means"].items():
+        rows.append((f"Mean of {name}", _interval(mean)))
+        if mean["sigma"] is not None:
+            rows.append((f"Standard deviation of {name}", f"{mean['sigma']:.4g}"))
+    linear = summary["linear"]
+    if linear is not None:
+        rows.append(
+            ("First order at the mean", f"{linear['mean']:.4g}, standard deviation {linear['sigma']:.4g}")
+        )
+    return rows
+
+
+def _interval(mean: Mapping[str, Any]) -> str:
+    if mean["low"] is None or mean["high"] is None:
+        return f"{mean['value']:.5g}, by first order"
+    return f"{mean['value']:.5g} ({mean['low']:.5g} to {mean['high']:.5g})"
+
+
+def _sorted(shares: Mapping[str, float]) -> list[tuple[str, float]]:
+    return sorted(shares.items(), key=lambda row: -row[1])
+
+
+def _design(number: int, design: Mapping[str, Any]) -> tuple[str, str, str, str]:
+    stands = "" if design["converged"] else " NOT CONVERGED"
+    values = ", ".join(f"{row['label']} {row['value']:.4g}" for row in design["unknowns"][:4])
+    return (
+        str(number),
+        f"{design['index']:.3f}{stands}",
+        scientific(design["probability"]),
+        values,
+    )

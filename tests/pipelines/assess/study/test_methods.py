@@ -1,0 +1,193 @@
+"""Methods against closed forms, and the coverage of their intervals."""
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from pipelines.assess.study.inputs.distributions import Distribution
+from pipelines.assess.study.methods.counting import controlled, mean_of, probability
+from pipelines.assess.study.methods.design_points import design_points
+from pipelines.assess.study.methods.failure import Failure
+from pipelines.assess.study.methods.first_order import first_order
+from pipelines.assess.study.methods.importance import importance
+from pipelines.assess.study.methods.plans import latin_hypercube, monte_carlo
+from pipelines.assess.study.methods.sobol import sobol
+from pipelines.assess.study.methods.subset import subset
+from pipelines.assess.study.settings import Shape
+from pipelines.assess.workers.store import Sample
+
+FAILS = Failure("q", 0.0)
+COVERED = 90
+"""Of 100 repetitions: a perfect interval of 95 % reaches 90 with a probability of .989."""
+
+
+class Function:
+    """Samples of a function of points, and how many were taken."""
+
+    def __init__(self, function, gradient=None):
+        self.function, self.slope, self.taken = function, gradient, 0
+
+    def __call__(self, points, gradient=False):
+        self.taken += len(points)
+        return [
+            Sample(
+                point,
+                {"q": float(self.function(point))},
+                gradient=self.slope(point) if gradient and self.slope else None,
+            )
+            for point in points
+        ]
+
+
+def least_thickness(sigma, dimension=1):
+    """t/R ~ N(.12, σ) less the least thickness of an arch of 21 voussoirs, .10670."""
+    slope = np.zeros(dimension)
+    slope[0] = sigma
+    return Function(lambda u: 0.12 + sigma * u[0] - 0.10670, lambda u: slope)
+
+
+@pytest.mark.parametrize(("sigma", "exact", "index"), [(0.005, 3.907e-3, 2.660), (0.003, 4.639e-6, 4.433)])
+def test_form_and_importance_sampling_of_a_linear_limit_state(sigma, exact, index):
+    samples = least_thickness(sigma, 20)
+    (design,) = design_points(samples, FAILS, 20)
+    assert samples.taken <= 5
+    assert design.index == pytest.approx(index, abs=1e-3)
+    found = importance(samples, FAILS, [design], 1000, 1, 0.95)
+    assert samples.taken <= 1200
+    assert found.cov <= 0.10
+    assert found.low < exact < found.high
+
+
+def test_subset_simulation_reaches_small_probabilities():
+    samples = least_thickness(0.003, 5)
+    found = subset(samples, FAILS, 5, 1000, 1, 0.95)
+    assert found.complete
+    assert samples.taken <= 6000
+    assert found.probability.low < 4.639e-6 < found.probability.high
+
+
+def repeated(made):
+    """Return how many of 100 repetitions hold."""
+    return sum(made(seed) for seed in range(100))
+
+
+def test_intervals_of_counted_probabilities_cover():
+    exact = float(norm.cdf(-1.0))
+
+    def covers(seed):
+        found = probability(monte_carlo(60, 1, seed)[:, 0] + 1.0, 0.95)
+        return found.low <= exact <= found.high
+
+    assert repeated(covers) >= COVERED
+
+
+def test_intervals_of_means_and_control_variates_cover_and_are_narrower():
+    widths = []
+
+    def covers(seed):
+        points = monte_carlo(40, 2, seed)
+        values = points[:, 0] + 0.1 * (points[:, 1] ** 2 - 1.0)
+        plain, found = mean_of(values, 0.95), controlled(values, points[:, 0], 0.0, 0.95)
+        widths.append((found.high - found.low) / (plain.high - plain.low))
+        return found.low <= 0.0 <= found.high
+
+    assert repeated(covers) >= COVERED
+    assert np.mean(widths) < 0.3
+
+
+def test_intervals_of_latin_hypercubes_cover():
+    exact = float(norm.cdf(-1.5))
+
+    def covers(seed):
+        found = probability(latin_hypercube(80, 3, seed).sum(axis=1) / np.sqrt(3.0) + 1.5, 0.95)
+        return found.low <= exact <= found.high
+
+    assert repeated(covers) >= COVERED
+
+
+def test_intervals_of_importance_sampling_cover():
+    def covers(seed):
+        samples = least_thickness(0.005, 10)
+        designs = design_points(samples, FAILS, 10)
+        found = importance(samples, FAILS, designs, 200, seed, 0.95)
+        return found.low <= 3.907e-3 <= found.high
+
+    assert repeated(covers) >= COVERED
+
+
+def test_intervals_of_subset_simulation_cover():
+    exact = float(norm.cdf(-3.0))
+
+    def covers(seed):
+        samples = Function(lambda u: 3.0 - u.sum() / 2.0)
+        found = subset(samples, FAILS, 4, 300, seed, 0.95).probability
+        return found.low <= exact <= found.high
+
+    assert repeated(covers) >= COVERED
+
+
+def ishigami(point):
+    x = np.pi * (2.0 * norm.cdf(point) - 1.0)
+    return np.sin(x[0]) + 7.0 * np.sin(x[1]) ** 2 + 0.1 * x[2] ** 4 * np.sin(x[0])
+
+
+def test_indices_of_ishigami():
+    found = sobol(Function(ishigami), "q", 3, [[0], [1], [2]], 4096, 1, 0.95)
+    assert found.first == pytest.approx([0.3139, 0.4424, 0.0], abs=0.02)
+    assert found.total == pytest.approx([0.5576, 0.4424, 0.2437], abs=0.02)
+
+
+def test_intervals_of_indices_cover():
+    exact = np.array([0.8, 0.2])
+
+    def covers(seed):
+        samples = Function(lambda u: 2.0 * u[0] + u[1])
+        found = sobol(samples, "q", 2, [[0], [1]], 64, seed, 0.95)
+        ends = found.total_interval
+        return ends[0, 0] <= exact[0] <= ends[0, 1]
+
+    assert repeated(covers) >= COVERED
+
+
+def test_a_slender_block_is_linear_and_breadth_decides():
+    """λ = b/h, b N(.3, .01), h N(3, .02): mean .100004, COV .0340, shares .961 and .039."""
+
+    def limit(u):
+        return (0.3 + 0.01 * u[0]) / (3.0 + 0.02 * u[1])
+
+    def slope(u):
+        height = 3.0 + 0.02 * u[1]
+        return np.array([0.01 / height, -0.02 * limit(u) / height])
+
+    found = first_order(Function(limit, slope), "q", 2)
+    assert found.linear
+    assert found.mean == pytest.approx(0.1)
+    assert found.sigma / found.mean == pytest.approx(0.0340, rel=0.01)
+    assert found.shares == pytest.approx([0.961, 0.039], abs=1e-3)
+    values = np.array([limit(u) for u in latin_hypercube(2000, 2, 1)])
+    assert values.mean() == pytest.approx(0.100004, abs=5e-5)
+    assert values.std() / values.mean() == pytest.approx(found.sigma / found.mean, rel=0.01)
+
+
+def test_first_order_at_a_kink_is_not_linear():
+    limit = Function(lambda u: min(0.35 + 0.03 * u[0], 0.36 + 0.02 * u[1]), lambda u: np.array([0.03, 0.0]))
+    found = first_order(limit, "q", 2)
+    assert not found.linear
+
+
+@pytest.mark.parametrize("shape", list(Shape))
+def test_slopes_of_distributions_are_those_of_their_values(shape):
+    made = Distribution(shape, mean=2.0, sigma=0.3, low=1.0, high=3.0, mode=1.4)
+    for z in (-2.0, -0.4, 0.0, 1.1, 2.5):
+        difference = (made.value(z + 1e-5) - made.value(z - 1e-5)) / 2e-5
+        assert made.slope(z) == pytest.approx(difference, rel=1e-5)
+
+
+def test_four_rectangles_are_narrower_than_a_normal():
+    """Supplement 1 to the GUM, 9.2.3: ± 3.88 of the sum of four, against ± 3.92 by propagation."""
+    made = Distribution(Shape.UNIFORM, low=-np.sqrt(3.0), high=np.sqrt(3.0))
+    points = latin_hypercube(20_000, 4, 1)
+    total = (np.sqrt(3.0) * (2.0 * norm.cdf(points) - 1.0)).sum(axis=1)
+    assert made.value(points[0, 0]) == pytest.approx(np.sqrt(3.0) * (2.0 * norm.cdf(points[0, 0]) - 1.0))
+    assert 0.5 * float(np.ptp(np.quantile(total, [0.025, 0.975]))) == pytest.approx(3.88, abs=0.04)
+    assert 1.96 * total.std() == pytest.approx(3.92, abs=0.04)

@@ -1,0 +1,137 @@
+"""Studies of a block that slides at λ = μ or topples at λ = d/h, whichever is less."""
+
+import json
+
+import numpy as np
+import pytest
+
+from moma.errors import SceneError, UsageError
+from pipelines.assess.study.file import read_study
+from pipelines.assess.study.sampling import Part
+from pipelines.assess.study.study import run_study
+from tests.pipelines.assess.study.surveys import BOUND, DEEP, FRICTIONAL, block_survey, study_file
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("block")
+    return folder, block_survey(folder)
+
+
+def test_the_block_has_two_ways_to_fail_and_first_order_is_flagged(place, tmp_path):
+    """P(min(μ, d/h) < .30) with μ N(.35, .03), d/h N(.36, .02): 1 - Φ(1.6667) Φ(3) = 4.908e-2."""
+    folder, url = place
+    path = study_file(folder, "form", FRICTIONAL, DEEP, BOUND, samples=60)
+    done = run_study(path, url, tmp_path / "out")
+    failure, designs = done.summary["failure"], done.summary["designs"]
+    assert [round(design["index"], 3) for design in designs] == [1.667, 3.0]
+    assert failure["low"] < 4.908e-2 < failure["high"]
+    assert any("first order is not good enough" in text for text in done.summary["cautions"])
+    assert {"report.html", "study.json", "elevation.png", "tornado.png"} <= {
+        file.name for file in (tmp_path / "out").iterdir()
+    }
+    assert json.loads((tmp_path / "out" / "study.json").read_text())["headline"].startswith("P(bound")
+
+
+def test_parts_resumption_and_one_process_give_the_same_bits(place, tmp_path):
+    folder, url = place
+    path = study_file(folder, "monte_carlo", FRICTIONAL, DEEP, BOUND, samples=9)
+    whole = run_study(path, url, tmp_path / "whole")
+    for number in (2, 3):
+        part = run_study(path, url, tmp_path / "parts", part=Part(number, 3))
+        assert not part.complete
+    gathered = run_study(path, url, tmp_path / "parts")
+    assert gathered.summary["samples"]["digest"] == whole.summary["samples"]["digest"]
+    # the third of the samples that had no record, of nine
+    assert gathered.summary["samples"]["taken"] == 3
+    again = run_study(path, url, tmp_path / "parts", resume=True)
+    assert again.summary["samples"]["taken"] == 0
+    assert again.summary["failure"] == whole.summary["failure"]
+
+
+def test_samples_that_fail_bound_the_probability_on_both_sides(place, tmp_path):
+    """Friction of N(.35, .3) is negative in an eighth of all samples, which no law takes."""
+    folder, url = place
+    path = study_file(folder, "monte_carlo", FRICTIONAL.replace("0.03", "0.3"), BOUND, samples=24)
+    done = run_study(path, url, tmp_path / "out")
+    failure = done.summary["failure"]
+    assert failure["unknown"] > 0
+    assert failure["probability_upper"] - failure["probability"] == pytest.approx(failure["unknown"] / 24)
+    # as friction below zero holds nothing, the truth is Φ(-.05/.3)
+    assert failure["low"] < 0.4338 < failure["high"]
+    assert any("friction" in reason for reason in done.summary["faults"])
+
+
+def test_another_study_in_the_folder_is_refused(place, tmp_path):
+    folder, url = place
+    run_study(study_file(folder, "first_order", FRICTIONAL, BOUND), url, tmp_path / "out")
+    other = study_file(folder, "first_order", DEEP, BOUND)
+    with pytest.raises(UsageError, match="another scene, other stones or other inputs"):
+        run_study(other, url, tmp_path / "out")
+
+
+def test_the_gradient_is_that_of_differences(place, tmp_path):
+    """Friction decides at μ = .33 < d/h, and depth where friction is out of the way."""
+    folder, url = place
+    path = study_file(folder, "first_order", FRICTIONAL + "mean = 0.33\n", DEEP, BOUND)
+    linear = run_study(path, url, tmp_path / "slides").summary
+    assert linear["linear"]["sigma"] == pytest.approx(0.03, rel=1e-6)
+    assert linear["actions"][0]["text"].startswith("sliding tests")
+    path = study_file(folder, "first_order", FRICTIONAL + "mean = 0.6\n", DEEP, BOUND)
+    tips = run_study(path, url, tmp_path / "tips").summary
+    assert tips["linear"]["sigma"] == pytest.approx(0.02, rel=1e-5)
+    assert tips["actions"][0]["text"] == "core through BLOCK: its depth"
+    assert tips["shares"]["by_stone"] == pytest.approx({"GROUND": 0.0, "BLOCK": 1.0})
+
+
+@pytest.mark.parametrize(
+    ("tables", "what"),
+    [
+        ((FRICTIONAL.replace("0.03", "-0.03"), BOUND), "sigma = -0.03 is out of range"),
+        ((FRICTIONAL, BOUND.replace("bound", "bond")), "type = 'bond' is unknown"),
+        ((FRICTIONAL, BOUND.replace("horizontal y", "sideways")), "no such load: 'sideways'"),
+        (
+            (FRICTIONAL, DEEP, BOUND, '[[correlations]]\ninputs = ["friction", "depht"]\nvalue = 0.5\n'),
+            "no such input",
+        ),
+        (
+            (FRICTIONAL, DEEP, BOUND, '[[correlations]]\ninputs = ["friction", "depth"]\nvalue = 1.0\n'),
+            "not positive",
+        ),
+        (
+            (
+                FRICTIONAL,
+                DEEP,
+                '[[inputs]]\ntype = "density"\ncov = 0.1\n',
+                BOUND,
+                '[[correlations]]\ninputs = ["friction", "depth", "density"]\n'
+                "matrix = [1, 0.9, -0.9, 0.9, 1, 0.9, -0.9, 0.9, 1]\n",
+            ),
+            "not positive definite",
+        ),
+        ((BOUND,), "no input"),
+        (('[[inputs]]\ntype = "friction"\n', BOUND), "friction is certain"),
+        (('[[inputs]]\ntype = "cohesion"\nsigma = 1.0\n', BOUND), "no joint has the key 'shear'"),
+        (
+            ('[[inputs]]\ntype = "friction"\ndistribution = "uniform"\nlow = 0.5\nhigh = 0.3\n', BOUND),
+            "low = 0.5",
+        ),
+    ],
+)
+def test_mistakes_are_refused_with_their_line_before_anything_runs(place, tables, what):
+    folder, _ = place
+    with pytest.raises(SceneError, match=what) as refused:
+        read_study(study_file(folder, "monte_carlo", *tables))
+    assert "study.toml:" in (refused.value.where or "")
+
+
+def test_a_scene_that_does_not_stand_at_its_mean_is_refused(place, tmp_path):
+    """Gravity that pulls sideways by more than friction holds."""
+    folder, url = place
+    scene = (folder / "block.toml").read_text() + "[gravity]\ndirection = [0.0, 1.0, -1.0]\n"
+    (folder / "leaning.toml").write_text(scene, encoding="utf-8")
+    path = study_file(folder, "monte_carlo", FRICTIONAL, BOUND)
+    path.write_text(path.read_text().replace("block.toml", "leaning.toml"), encoding="utf-8")
+    with pytest.raises(SceneError, match="does not stand at the mean"):
+        run_study(path, url, tmp_path / "out")
+    assert not np.any([file.suffix == ".html" for file in (tmp_path / "out").iterdir()])
