@@ -57,7 +57,8 @@ def open_streams() -> None:
         elif isinstance(stream, io.TextIOWrapper):
             stream.flush()
             bytes_ = io.BufferedWriter(_Pipe(stream.fileno(), "wb", closefd=False))
-            line = stream.line_buffering
+            # what goes on is read in a file, too, while it goes on
+            line = stream.line_buffering or name == "stderr"
             setattr(sys, name, io.TextIOWrapper(bytes_, stream.encoding, _CLOSEST, line_buffering=line))
 
 

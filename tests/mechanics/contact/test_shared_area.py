@@ -139,3 +139,17 @@ def test_a_pair_without_an_area_acts_once_its_stones_lie_in_each_other_by_the_sl
     assert deep.any()
     assert set(np.flatnonzero(deep)) <= set(acting.tolist())
     assert depth[deep] == pytest.approx(SLACK * 0.3)
+
+
+@pytest.mark.parametrize(("way", "sunk", "left"), [(0.05, 1e-4, 1e-4), (0.001, 2.5e-4, SLACK * 0.3)])
+def test_a_pair_bears_from_where_flat_faces_lie_and_keeps_its_recess_where_they_lean(way, sunk, left):
+    """What lies deeper over the width of the overlap than faces that lie flat is an edge, not a face."""
+    model, start, now = shifted_over(way, sunk)
+    find = detector(model)
+    before = recess_at(find, start)
+    contacts = find(now, np.zeros(len(model.mass)))
+    depth = before.after(contacts, now, model.surfaces.size).of(contacts)
+    pair = [[model.scene.blocks[body].code for body in bodies] for bodies in contacts.bodies]
+    diagonal = np.array([set(one) == {"00", "11"} for one in pair])
+    assert diagonal.any()
+    assert depth[diagonal] == pytest.approx(left, rel=1e-6)

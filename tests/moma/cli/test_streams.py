@@ -124,3 +124,13 @@ def test_streams_of_other_kinds_stay(monkeypatch):
     monkeypatch.setattr(sys, "stdout", page)
     open_streams()
     assert sys.stdout is page
+
+
+def test_a_line_of_progress_stands_in_a_file_before_the_command_ends(tmp_path):
+    path = tmp_path / "log"
+    program = (
+        "from moma.cli.console import open_streams, say; from pathlib import Path; open_streams(); "
+        f"say('step 3'); assert Path({str(path)!r}).read_text() == 'moma: step 3\\n'"
+    )
+    with path.open("w") as log:
+        subprocess.run([sys.executable, "-c", program], stderr=log, cwd=ROOT, check=True)

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from mechanics.dynamics.outcome import Outcome
+from mechanics.dynamics.verdicts.doubt import UnsolvedSteps
+from mechanics.model.model import build_model
 from mechanics.scene.loads.load import Course, Loads, Pose
 from mechanics.scene.scene import SolverSettings
 from mechanics.simulate import simulate
@@ -85,3 +87,16 @@ def test_stones_that_contradict_each_other_are_given_up_and_named():
     assert result.steps == 20
     assert result.reason.startswith("the run was given up, as 20 of 20 steps were not solved")
     assert "contacts of the stones " in result.reason
+
+
+@pytest.mark.parametrize(
+    ("count", "steps", "total", "hopeless"),
+    [(20, 20, 1.0, True), (19, 19, 1.0, False), (20, 21, 1.0, False), (20, 20, 0.4, False)],
+)
+def test_a_run_is_given_up_where_no_step_at_all_was_solved_and_errors_may_be_its_motion(
+    count, steps, total, hopeless
+):
+    """Of a fastest motion of 1 m/s, errors of half as much may be the cause."""
+    doubt = UnsolvedSteps(build_model(scene(ground()))[0])
+    doubt.count, doubt.steps, doubt.total = count, steps, total
+    assert doubt.hopeless(1.0) is hopeless
