@@ -1,9 +1,9 @@
-"""Limit loads beside the dynamics: `python -m benchmarks.limit [--only W06 …] [--json | --write]`.
+"""Limit loads beside what is published: `python -m benchmarks.limit [--only W06 …] [--runs] [--json | --write]`.
 
-Walls and façades whose limit loads are published: bound and candidate with their times, the loads that the dynamics
-hold and lose from rest around the candidate, and how alike the mechanism of the candidate is to the collapse of the
-dynamics. What was measured is kept, a file a case, and not measured again. `--write` renews the tables of
-docs/accuracy.md.
+Walls and façades whose limit loads are published: the limit by the rule of runs, the bound above it and the candidates
+of cone programmes, with their times. `--runs` also lets loads about the limit act for hundreds of steps, and compares
+the mechanism with the collapse. What was measured is kept, a file a case, and not measured again. `--write` renews the
+tables of docs/accuracy.md.
 """
 
 import json
@@ -32,7 +32,8 @@ from benchmarks.report import (
 )
 from mechanics.limit.assembly import RigidAssembly, assembly
 from mechanics.limit.confirm import confirm, likeness
-from mechanics.limit.limit_load import Flow, limit_load
+from mechanics.limit.held import HeldLimit, held_limit
+from mechanics.limit.limit_load import Flow, LimitLoad, limit_load
 from mechanics.limit.live_loads import Acceleration
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene
@@ -43,18 +44,19 @@ from moma.errors import UsageError
 __all__ = ["FACADES", "FRICTION", "WALLS", "LimitCase", "facade", "facade_case", "main", "measured"]
 
 _PAGE = ROOT / "docs" / "accuracy.md"
-_RUNS = 8  # of the dynamics around a candidate, at most
+_RUNS = 8  # of the dynamics about a limit, at most
 _LOADS = columns(
     "case case | stones stones :d | contacts contacts :d | asked_bound bound, published :.5g | "
-    "bound bound :.5f | asked_candidate candidate, published :.3g | candidate candidate :.4f | "
-    "highest other forces hold :.4f | held dynamics hold :.4f | lost dynamics lose :.4f | "
-    "verdict within 3 %"
+    "bound bound :.5f | asked_candidate lowest published :.3g | limit held :.4f | limit_lost lost :.4f | "
+    "lowest lowest candidate :.4f | candidate highest candidate :.4f | problems problems :d | "
+    "limit_s limit, CPU s :.2f | programmes programmes :d | "
+    "bound_s bound, CPU s :.2f | candidate_s candidates, CPU s :.2f"
 )
 _MOTIONS = columns(
-    "case case | cosine cosine of mechanism and collapse :.2f | "
-    "mechanism mass that moves: mechanism :.0% | collapse collapse :.0% | common common :.0% | "
-    "programmes programmes :d | bound_s bound, CPU s :.2f | candidate_s candidate, CPU s :.2f | "
-    "runs runs :d | unsolved steps not solved :d | dynamics_s runs, CPU s :.0f"
+    "case case | limit held :.4f | held runs hold :.4f | lost runs lose :.4f | verdict within 3 % | "
+    "cosine cosine of mechanism and collapse :.2f | mechanism mass that moves: mechanism :.0% | "
+    "collapse collapse :.0% | common common :.0% | runs runs :d | unsolved steps not solved :d | "
+    "dynamics_s runs, CPU s :.0f"
 )
 
 FRICTION = 0.65
@@ -228,6 +230,7 @@ def main() -> None:
     parser = options_of("limit", __doc__)
     parser.add_argument("--out", type=Path, default=Path("out/limit"), help="folder of what was measured")
     parser.add_argument("--only", nargs="+", default=[*WALLS, *FACADES], help="names of cases")
+    parser.add_argument("--runs", action="store_true", help="let loads about the limit act for long")
     parser.add_argument("--write", action="store_true", help="put the tables into docs/accuracy.md")
     options = parser.parse_args()
     for name in options.only:
@@ -235,48 +238,48 @@ def main() -> None:
             known = "; ".join([*WALLS, *FACADES])
             raise UsageError(f"no such case: {name!r}", where="--only", remedy=f"give some of {known}")
     under = commit()  # of the code as it was read, whatever changes while it runs
-    rows = [_kept(options.out, name, under) for name in options.only]
-    show(rows, _LOADS, _MOTIONS, as_json=options.json)
+    rows = [_kept(options.out, name, under, options.runs) for name in options.only]
+    show(rows, _LOADS, *([_MOTIONS] if options.runs else []), as_json=options.json)
     if options.write:
         write_between("limit", _page(rows), _PAGE)
 
 
 def _page(rows: Sequence[Row]) -> list[str]:
-    """Return the tables of docs/accuracy.md, walls and façades apart."""
+    """Return the tables of docs/accuracy.md: loads of walls and of façades, and of both what runs say."""
     machines = ", ".join(dict.fromkeys(row["machine"] for row in rows))
     commits = ", ".join(dict.fromkeys(row["commit"] for row in rows))
     lines = [f"Measured at {commits} on {machines}, one thread, beside other jobs."]
-    for cases in (WALLS, FACADES):
-        some = [row for row in rows if row["case"] in cases]
-        for table in (_LOADS, _MOTIONS):
-            lines += ["", *table_lines(some, table)] if some else []
+    tables = [([row for row in rows if row["case"] in cases], _LOADS) for cases in (WALLS, FACADES)]
+    for some, table in [*tables, ([row for row in rows if "runs" in row], _MOTIONS)]:
+        lines += ["", *table_lines(some, table)] if some else []
     return lines
 
 
-def _kept(folder: Path, name: str, under: str) -> Row:
-    """Return what was measured of a case; measure it if nothing was."""
+def _kept(folder: Path, name: str, under: str, runs: bool) -> Row:
+    """Return what was measured of a case; measure it if nothing was, or its runs are asked for and were not made."""
     path = folder / f"{name.replace(' ', '').replace(',', '-')}.json"
-    if not path.exists():
+    kept: Row = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    if not kept or (runs and "runs" not in kept):
         progress(f"limit: {name}")
-        measured("warm-up", _WARM)
-        row = measured(name, WALLS[name] if name in WALLS else FACADES[name]) | {"commit": under}
+        measured("warm-up", _WARM, runs)
+        case = WALLS[name] if name in WALLS else FACADES[name]
+        kept = dict(measured(name, case, runs)) | {"commit": under}
         folder.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(row, indent=1, ensure_ascii=False), encoding="utf-8")
-    kept: Row = json.loads(path.read_text(encoding="utf-8"))
+        path.write_text(json.dumps(kept, indent=1, ensure_ascii=False), encoding="utf-8")
     return kept
 
 
-def measured(name: str, case: LimitCase) -> Row:
+def measured(name: str, case: LimitCase, runs: bool = False) -> Row:
     """Measure a case: loads [-], shares of the mass that moves [-], and seconds of processor time."""
     on = case.assembly()
-    begin = time.process_time()
+    clock = [time.process_time()]
     bound = limit_load(on, case.live)
-    bounded = time.process_time()
+    clock.append(time.process_time())
+    limit = held_limit(on, case.live, bound)
+    clock.append(time.process_time())
     found = limit_load(on, case.live, Flow.COULOMB, bound)
-    iterated = time.process_time()
-    around = confirm(on, case.live, found.multiplier, _RUNS)
-    done = time.process_time()
-    fallen = around.collapse
+    clock.append(time.process_time())
+    bound_s, limit_s, candidate_s = np.diff(clock).tolist()
     return {
         "case": name,
         "stones": len(on.free),
@@ -284,23 +287,37 @@ def measured(name: str, case: LimitCase) -> Row:
         "asked_bound": case.bound,
         "bound": bound.multiplier,
         "asked_candidate": case.candidate,
+        "limit": limit.held,
+        "limit_lost": limit.lost,
+        "problems": limit.problems,
         "candidate": found.multiplier,
         "converged": found.converged,
         "beyond": found.beyond,
         "lowest": found.lowest.multiplier,
         "programmes": found.programmes,
+        **(_run(on, case, limit, bound) if runs else {}),
+        "bound_s": bound_s,
+        "limit_s": limit_s,
+        "candidate_s": candidate_s,
+        "machine": machine(),
+        "versions": environment("clarabel", "numpy", "numba"),
+    }
+
+
+def _run(on: RigidAssembly, case: LimitCase, limit: HeldLimit, bound: LimitLoad) -> Row:
+    """Let loads about the limit act for long, and compare the mechanism with the collapse."""
+    begin = time.process_time()
+    around = confirm(on, case.live, limit.held, bound.multiplier, _RUNS)
+    fallen, mechanism = around.collapse, limit.mechanism or bound.mechanism
+    return {
         "held": around.held or None,
-        "lost": None if fallen is None else around.lost,
-        "verdict": "yes" if around.agrees(found.multiplier) else "no",
+        "lost": around.lost,
+        "verdict": "yes" if around.agrees(limit.held) else "no",
         "runs": len(around.trials),
         "outcomes": [f"{trial.multiplier:.4f} {trial.outcome}" for trial in around.trials],
         "unsolved": sum(trial.unsolved for trial in around.trials),
-        **({} if fallen is None else asdict(likeness(on, found.mechanism, fallen.displacement))),
-        "bound_s": bounded - begin,
-        "candidate_s": iterated - bounded,
-        "dynamics_s": done - iterated,
-        "machine": machine(),
-        "versions": environment("clarabel", "numpy", "numba"),
+        **({} if fallen is None else asdict(likeness(on, mechanism, fallen.displacement))),
+        "dynamics_s": time.process_time() - begin,
     }
 
 

@@ -11,9 +11,12 @@ else the stones begin to fall with velocities v, and the balance of power
 
 says with the dissipation D at which load the same mechanism would stop: λ - v·M v / (h q·v). The search goes down to
 such estimates, which are borne as a rule, and up by steps until a bracket is left to be halved.
+
+Only whole multiples of a thousandth of the bound are tried. So the answer is the same to the last digit however stones
+are turned and numbered, unless one of these loads lies within rounding of the limit.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,8 +33,8 @@ from mechanics.solvers.second_order.newton import Newton
 
 __all__ = ["WIDTH", "HeldLimit", "held_limit"]
 
-WIDTH = 2e-3
-"""Width of the bracket over its upper end [-]: friction without dilatancy decides no limit more closely."""
+WIDTH = 1e-3
+"""Width of the bracket over the bound [-]: friction without dilatancy decides no limit more closely."""
 
 # velocity of a contact over the largest u_free from which it moves: steps solved to their tolerance leave up to a
 # third of it [-]
@@ -41,8 +44,8 @@ _LIMITS, _ITERATIONS = (Newton.tolerance, Newton.velocity_tolerance), 1500
 # step up from a load that is borne, over it, doubled each time that it is borne: with Coulomb's friction stones bear up
 # to 2 % more than the load at which their mechanism would stop [-]
 _UP = 0.02
-# parts of the last bracket next to its upper end in which no load is tried [-]
-_EDGE = 0.5
+# loads that are tried up to the bound
+_LOADS = round(1.0 / WIDTH)
 # first load that is tried where the bound is endless, and how often it is doubled before nothing limits it
 _FIRST, _DOUBLED = 1.0, 10
 
@@ -64,6 +67,26 @@ class HeldLimit:
     lost: float
     force: Array
     mechanism: Mechanism | None
+    problems: int
+
+
+@dataclass(frozen=True)
+class _Bracket:
+    """Loads between which the limit lies, as multiples of a unit.
+
+    Attributes
+    ----------
+    low, high : of what is held, and of what is lost
+    unit : of both; infinite where nothing limits the load [-]
+    best, worst : the steps under both; no worst one where only the bound says that it is lost
+    problems : contact problems that were solved
+    """
+
+    low: int
+    high: int
+    unit: float
+    best: "_Trial"
+    worst: "_Trial | None"
     problems: int
 
 
@@ -96,24 +119,45 @@ def held_limit(on: RigidAssembly, live: LiveLoad, bound: LimitLoad) -> HeldLimit
     """
     steps = _Steps(on, live)
     nothing = steps(0.0)
-    if np.isnan(bound.multiplier) or not nothing.holds:
+    if not bound.multiplier > 0.0 or not nothing.holds:
         return HeldLimit(0.0, 0.0, nothing.force, _falling(on, nothing), 1)
-    low, high, best, worst = 0.0, bound.multiplier, nothing, None
-    load = _FIRST if np.isinf(high) else (1.0 - WIDTH / 2) * high
-    problems, up = 1, _UP
-    while high - low > WIDTH * high or np.isinf(high):
+    begun = _Bracket(0, _LOADS, bound.multiplier * WIDTH, nothing, None, 1)
+    found = _searched(steps, _limited(steps, begun) if np.isinf(bound.multiplier) else begun)
+    worst = None if found.worst is None else _falling(on, found.worst)
+    return HeldLimit(found.low * found.unit, found.high * found.unit, found.best.force, worst, found.problems)
+
+
+def _limited(steps: "_Steps", bracket: "_Bracket") -> "_Bracket":
+    """Return the bracket below the first load that falls, doubled again and again; an endless one if none does."""
+    best, low, problems = bracket.best, 0, bracket.problems
+    for doubled in range(_DOUBLED + 1):
+        load = _FIRST * 2.0**doubled
         trial = steps(load)
         problems += 1
+        if not trial.holds:
+            return _Bracket(low, _LOADS, load * WIDTH, best, trial, problems)
+        best, low = trial, _LOADS // 2
+    return replace(bracket, low=_LOADS, best=best, problems=problems)
+
+
+def _searched(steps: "_Steps", bracket: "_Bracket") -> "_Bracket":
+    """Return the bracket of neighbouring loads, next to the bound first."""
+    low, high, unit = bracket.low, bracket.high, bracket.unit
+    best, worst, problems, up = bracket.best, bracket.worst, bracket.problems, _UP
+    load = high - 1 if worst is None else int(worst.stops / unit)
+    while high - low > 1:
+        load = min(max(load, low + 1), high - 1)
+        trial = steps(load * unit)
+        problems += 1
+        middle = (load + high) // 2 if trial.holds else (low + load) // 2
         if trial.holds:
             low, best = load, trial
-            if np.isinf(high) and load >= _FIRST * 2.0**_DOUBLED:
-                return HeldLimit(np.inf, np.inf, best.force, None, problems)
-            load, up = 2.0 * load if np.isinf(high) else min((1.0 + up) * low, 0.5 * (low + high)), 2.0 * up
+            load, up = min(int((1.0 + up) * low), middle), 2.0 * up
         else:
             high, worst = load, trial
-            load = trial.stops if trial.stops > low else 0.5 * (low + high)
-            load = min(load, high - _EDGE * min(high - low, WIDTH * high))
-    return HeldLimit(low, high, best.force, None if worst is None else _falling(on, worst), problems)
+            # next to the limit an estimate differs with the numbering, which the answer must not
+            load = int(trial.stops / unit) if low == 0 < trial.stops else middle
+    return _Bracket(low, high, unit, best, worst, problems)
 
 
 def _falling(on: RigidAssembly, trial: _Trial) -> Mechanism:

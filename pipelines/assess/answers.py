@@ -216,7 +216,7 @@ def _load(
             told["outcome"] = "limited"
     if isinstance(live, Acceleration) and np.isfinite(limit.multiplier):
         code = None if question.code is None or site is None else (question.code, site)
-        told["kinematics"], checked = _kinematics(on, live, _checked_limit(limit, candidate), code)
+        told["kinematics"], checked = _kinematics(on, live, _checked_limit(limit, lost, candidate), code)
         if checked:
             told["code"] = checked
     curve = _led(live, limit, told, leading) if question.pushover else None
@@ -271,9 +271,9 @@ def _limit(
     return limit, found.lost, _BY_RUNS
 
 
-def _checked_limit(limit: LimitLoad, candidate: LimitLoad | None) -> LimitLoad:
+def _checked_limit(limit: LimitLoad, lost: float, candidate: LimitLoad | None) -> LimitLoad:
     """Return the load that a code checks: on the safe side, and by the mechanism of a programme where there is one."""
-    if candidate is None or candidate.lowest.multiplier > (1.0 + WIDTH) * limit.multiplier:
+    if candidate is None or candidate.lowest.multiplier > (1.0 + WIDTH) * lost:
         return limit
     return candidate.lowest
 

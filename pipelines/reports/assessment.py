@@ -48,8 +48,8 @@ def write_assessment(path: Path, summary: Mapping[str, Any], model: Model | None
         "assessment.html",
         model,
         name=summary["scene"],
-        lead=f"{summary['headline']}. {summary['free']} stones that may move, {summary['contacts']} contact points, "
-        f"weight {1e-3 * summary['weight']:.2f} kN.",
+        lead=f"{_lead(summary)}{summary['headline']}. {summary['free']} stones that may move, "
+        f"{summary['contacts']} contact points, weight {1e-3 * summary['weight']:.2f} kN.",
         cautions=summary["cautions"],
         inputs=input_rows(summary),
         governs=_governs(summary),
@@ -62,6 +62,18 @@ def write_assessment(path: Path, summary: Mapping[str, Any], model: Model | None
         check_head=_CHECKS,
         parts=[_part(path.parent, number, one) for number, one in enumerate(loads, start=1)],
     )
+
+
+def _lead(summary: Mapping[str, Any]) -> str:
+    """Return the push that governs in a sentence: its direction, capacity and demand; nothing of other questions."""
+    one, axes = summary["loads"][summary["governs"]], axes_of(summary["wall"])
+    if "direction" not in one or "tilt" not in one or not one.get("limit"):
+        return ""
+    text = f"Pushed {direction_text(axes, one['direction'])}, the stones hold {100 * one['limit']:.4g} % of their "
+    text += f"weight, {kilonewtons(one['limit'] * summary['weight'])}"
+    if one["limit_lost"] is not None:
+        text += f", and fall at {100 * one['limit_lost']:.4g} %"
+    return f"{text}. Capacity against demand: {_demand(one)}. "
 
 
 def _governs(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -120,7 +132,10 @@ def _sure(found: Mapping[str, Any] | None) -> str:
         for what, change in changes
         if change is not None
     )
-    return f"the bound {told}, to first order; all else is taken as certain"
+    return (
+        f"the bound {told}, to first order, by its mechanism; the limit itself was not sought anew, and all else is "
+        "taken as certain"
+    )
 
 
 def _row(one: Mapping[str, Any]) -> tuple[str, ...]:

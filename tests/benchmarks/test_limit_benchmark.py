@@ -17,11 +17,12 @@ def measured(monkeypatch, capsys, folder, *more):
     return capsys.readouterr().out
 
 
-def test_a_facade_without_returns_tips_as_its_candidate_says(monkeypatch, capsys, tmp_path):
-    (row,) = json.loads(measured(monkeypatch, capsys, tmp_path / "kept", "--json"))
+def test_a_facade_without_returns_tips_as_its_limit_says(monkeypatch, capsys, tmp_path):
+    (row,) = json.loads(measured(monkeypatch, capsys, tmp_path / "kept", "--runs", "--json"))
     # a wall of 0.04 m, 6 courses of 0.028 m high
     assert row["candidate"] == pytest.approx(0.04 / 0.168, rel=1e-3)
-    assert row["held"] <= row["candidate"] * (1 + 1e-12) < row["lost"]
+    assert row["limit"] <= row["candidate"] * (1 + 1e-12) < 1.002 * row["limit_lost"]
+    assert row["held"] <= row["candidate"] * (1 + 1e-12) < 1.002 * row["lost"]
     assert row["verdict"] == "yes"
     assert row["cosine"] > 0.99
     assert row["common"] == 1.0
@@ -31,7 +32,7 @@ def test_a_facade_without_returns_tips_as_its_candidate_says(monkeypatch, capsys
     page = tmp_path / "page.md"
     page.write_text("before\n<!-- limit -->\n<!-- /limit -->\nafter\n", encoding="utf-8")
     monkeypatch.setattr(benchmark, "_PAGE", page)
-    assert "0.2500" in measured(monkeypatch, capsys, tmp_path / "kept", "--write")
+    assert "0.2500" in measured(monkeypatch, capsys, tmp_path / "kept", "--runs", "--write")
     written = page.read_text(encoding="utf-8")
     assert row["commit"] in written
     assert written.count(f"| {NAME}") == 2

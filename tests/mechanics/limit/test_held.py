@@ -27,7 +27,7 @@ def limit_of(on, live=ALONG):
 
 def within(found, value):
     """Hold a bracket of the asked width around a value; a bound is known to 10⁻⁶ of itself."""
-    assert found.lost - found.held <= WIDTH * found.lost
+    assert found.lost - found.held == pytest.approx(WIDTH * found.lost)
     assert found.held <= value * (1 + 1e-5)
     assert found.lost >= value * (1 - 1e-5)
 
