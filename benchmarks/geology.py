@@ -42,7 +42,7 @@ from pipelines.geology.file import read_geology
 from pipelines.geology.observe import WHOLE, Instants, read_rows
 from pipelines.geology.run import run_geology
 
-__all__ = ["main"]
+__all__ = ["main", "pushing", "read_run"]
 
 _SCENES = ROOT / "data" / "samples" / "geology"
 _PAGE = ROOT / "docs" / "geology.md"
@@ -186,7 +186,7 @@ def main() -> None:
         for seed in options.seeds[:_GRANULAR_SEEDS]:
             for case in (case for case in cases if case.group in options.only):
                 _make_case(out, case, seed)
-    runs = [_read(path.parent) for path in sorted(out.glob("f*-*-*-*/summary.json"))] if paper else []
+    runs = [read_run(path.parent) for path in sorted(out.glob("f*-*-*-*/summary.json"))] if paper else []
     grains = {case.name: _read_case(out, case) for case in cases}
     if options.json:
         every = [*runs, *(run | {"name": name} for name, group in grains.items() for run in group)]
@@ -244,7 +244,8 @@ def _make(out: Path, kind: str, gamma: float, seed: int, sweeps: int, threads: i
     run_geology(scene, kind, out / name, resume=True)
 
 
-def _read(folder: Path) -> dict[str, Any]:
+def read_run(folder: Path) -> dict[str, Any]:
+    """Return what a finished run left: summary, rows of the cells, and what its name tells."""
     kind, gamma, seed, sweeps = folder.name.rsplit("-", 3)
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     cells = {name: read_rows(folder / file) for name, file in summary["cells"].items()}
@@ -260,7 +261,7 @@ def _read(folder: Path) -> dict[str, Any]:
     }
 
 
-def _pushing(run: Mapping[str, Any]) -> float:
+def pushing(run: Mapping[str, Any]) -> float:
     """Return the mean pressure of W1 in the second phase by the reactions r + hγ, without the pulls [Pa]."""
     folder, cohesion = run["folder"], run["summary"]["cohesion"]
     with np.load(folder.parent / ".samples" / f"{run['summary']['sample']}.npz") as sample:
@@ -300,7 +301,7 @@ def _fault_rows(runs: Sequence[Mapping[str, Any]]) -> list[Row]:
         run["seed"]: _late(run["cells"]["W1"], "p", 0.25)
         for run in _chosen(runs, kind="fault", gamma=0.0, sweeps=_SWEEPS)
     }
-    pushed = {run["seed"]: _pushing(run) for run in _chosen(runs, kind="fault", gamma=0.0, sweeps=_SWEEPS)}
+    pushed = {run["seed"]: pushing(run) for run in _chosen(runs, kind="fault", gamma=0.0, sweeps=_SWEEPS)}
     for gamma in _GAMMA:
         group = _chosen(runs, kind="fault", gamma=gamma, sweeps=_SWEEPS)
         if not group:
@@ -318,7 +319,7 @@ def _fault_rows(runs: Sequence[Mapping[str, Any]]) -> list[Row]:
                 "pressure": spread((1e-3 * p for p in pressure), 1),
                 "over": spread(over, 2),
                 "pushed": spread(
-                    (_pushing(run) / pushed[run["seed"]] for run in group if run["seed"] in pushed),
+                    (pushing(run) / pushed[run["seed"]] for run in group if run["seed"] in pushed),
                     2,
                 ),
                 "lambda_x": spread((cell["lambda_x"][-1] for cell in cells), 2),

@@ -65,6 +65,7 @@ def geology(
     lines = [
         *(f"caution: {caution}" for caution in summary["cautions"]),
         f"{summary['scene']}: {summary['disks']} disks, {summary['steps']} steps",
+        *([f"  {summary['note']}"] if summary["note"] else ()),
         f"  {summary['headline']}",
         *(
             f"  {name}: {'unknown' if value is None else f'{value:.4g}'}"

@@ -42,7 +42,16 @@ _TABLES: Mapping[str, type[Any]] = {
     "solver": Sweeping,
     "output": GeologyOutput,
 }
-_TITLE = (Key("name", ValueKind.TEXT, "Title; by default the name of the file.", "", None),)
+_TITLE = (
+    Key("name", ValueKind.TEXT, "Title; by default the name of the file.", "", None),
+    Key(
+        "note",
+        ValueKind.TEXT,
+        "What a reader of the results has to know first, as a choice that was made.",
+        "",
+        "",
+    ),
+)
 _CELL = (
     Key("name", ValueKind.TEXT, "Name of the cell.", "", REQUIRED),
     Key("centre", ValueKind.NUMBERS, "x and y at the start.", "m", REQUIRED),
@@ -61,6 +70,7 @@ class GeologyScene:
     document : file and lines, for error messages
     text : the file, as it is kept with the run
     name : title
+    note : what a reader of the results has to know first; "": nothing
     kind : of `EXPERIMENTS`
     cells : followed through the run
     layers : of other materials than `[sample]` and `[contact]` say, from below; () if there are none
@@ -69,6 +79,7 @@ class GeologyScene:
     document: TomlDocument
     text: str
     name: str
+    note: str
     kind: str
     sample: SampleSettings
     contact: DiskContact
@@ -114,12 +125,13 @@ def parse_geology(text: str, path: str, kind: str) -> GeologyScene:
             document.fail(f"unknown table [{name}]", name, remedy=other)
     if kind not in given:
         document.fail(f"no table [{kind}]", remedy=_START)
-    title = check_table(document, ("scene",), _table(document, given, "scene"), _TITLE)["name"]
+    title = check_table(document, ("scene",), _table(document, given, "scene"), _TITLE)
     tables = {name: _built(document, given, name, owner) for name, owner in _TABLES.items()}
     scene = GeologyScene(
         document=document,
         text=text,
-        name=str(title or Path(path).stem),
+        name=str(title["name"] or Path(path).stem),
+        note=str(title["note"]),
         kind=kind,
         experiment=cast(Experiment, _built(document, given, kind, EXPERIMENTS[kind])),
         cells=_cells(document, given.get("cells", [])),

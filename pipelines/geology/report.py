@@ -57,7 +57,7 @@ def write_report(
         model,
         name=summary["scene"],
         lead=f"{summary['disks']} disks, {summary['steps']} steps, {summary['time']['simulated']:g} s of a "
-        f"{summary['kind']} scene. {_OUTCOMES[summary['outcome']]}",
+        f"{summary['kind']} scene. {_OUTCOMES[summary['outcome']]} {summary['note']}".strip(),
         cautions=summary["cautions"],
         warnings=summary["warnings"],
         version=summary["version"],

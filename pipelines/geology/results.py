@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from mechanics.arrays import Array
+from mechanics.planar.measures.blocks import blocks_of
 from mechanics.planar.measures.cells import members
 from mechanics.planar.model import PlanarState, build_planar_model
 from mechanics.planar.result import PlanarResult
@@ -92,9 +93,14 @@ def quality_of(scene: GeologyScene, sample: PreparedSample, result: PlanarResult
 
 def _pulls(scene: GeologyScene) -> str:
     """Return the pull γ of the contacts in words; of layers, the least and the largest."""
-    own = scene.contact.cohesion
-    pulls = [own if one.cohesion is None else one.cohesion for one in scene.layers] or [own]
+    pulls = _cohesions(scene)
     return f"{min(pulls):g}" if min(pulls) == max(pulls) else f"{min(pulls):g} to {max(pulls):g}"
+
+
+def _cohesions(scene: GeologyScene) -> list[float]:
+    """Return the pull of the contacts within each layer [N]."""
+    own = scene.contact.cohesion
+    return [own if one.cohesion is None else one.cohesion for one in scene.layers] or [own]
 
 
 def write_results(
@@ -120,6 +126,7 @@ def write_results(
     measures = scene.experiment.measures(sample.centre, sample.radius, instants, rows[WHOLE])
     summary: dict[str, Any] = {
         "scene": scene.name,
+        "note": scene.note,
         "kind": scene.kind,
         **quality,
         "outcome": str(result.outcome),
@@ -130,6 +137,7 @@ def write_results(
         "time": {"simulated": result.time, "wall": sum(result.wall_time.values()), **result.wall_time},
         "energy": result.errors.energy,
         "cells": cells,
+        "blocks": _blocks(scene, sample, instants),
         "fabric": {name: _fabric(columns) for name, columns in rows.items()},
         "measures": {name: value if np.isfinite(value) else None for name, value in measures.items()},
         "versions": dict(versions()),
@@ -160,6 +168,25 @@ def _write_columns(path: Path, columns: Mapping[str, Array]) -> None:
         writer = csv.writer(file)
         writer.writerow(columns)
         writer.writerows(zip(*(map(repr, column.tolist()) for column in columns.values()), strict=True))
+
+
+def _blocks(scene: GeologyScene, sample: PreparedSample, instants: Instants) -> list[dict[str, float]]:
+    """Return the blocks of a cohesive sample at each instant; none of one without cohesion."""
+    if not any(pull > 0 for pull in _cohesions(scene)):
+        return []
+    reach, rows = scene.contact.cohesion_range * scene.sample.smallest, []
+    for fields in instants:
+        place = fields.position[: len(sample.radius), :2]
+        blocks = blocks_of(sample.centre, place, sample.radius, reach)
+        rows.append(
+            {
+                "time": fields.time,
+                "detached": len(blocks.detached),
+                "detached_disks": blocks.detached_disks,
+                "largest_share": blocks.largest_share,
+            }
+        )
+    return rows
 
 
 def _fabric(columns: Mapping[str, Array]) -> dict[str, float | None]:

@@ -2,7 +2,7 @@
 
 Public: `Tessellation` (tessellation); `Cell`, `layer_members`, `members`, `shape_of` (cells); `moments`,
 `Stress`, `mean_stress` (stress); `Fabric`, `fabric_of` (fabric); `DiskDeformation`, `deformation` (strain); `profile`,
-`slope` (surface); `ShearLimits`, `shear_limits`, `crest_radius` (limits); `sides_of` (outline); `Trishear`,
-`trishear_fit` (trishear); `TrishearGain`, `trishear_gain` (trishear_gain); `critical_slope` (taper); `Thrusts`,
-`thrusts_of` (thrusts).
+`slope` (surface); `Blocks`, `blocks_of` (blocks); `ShearLimits`, `shear_limits`, `crest_radius` (limits); `sides_of`
+(outline); `Trishear`, `trishear_fit` (trishear); `TrishearGain`, `trishear_gain` (trishear_gain); `critical_slope`
+(taper); `Thrusts`, `thrusts_of` (thrusts).
 """

@@ -318,6 +318,40 @@ def test_a_run_says_first_how_far_it_can_be_trusted(tmp_path):
     assert "<th>W1</th>" in page
 
 
+def test_a_note_of_the_scene_stands_in_the_first_lines_of_print_and_report(tmp_path):
+    text = SMALL.replace("[sample]", 'note = "Half of the lengths."\n[sample]', 1)
+    (tmp_path / "fault.toml").write_text(text, encoding="utf-8")
+    lines = prints("geology", "fault", tmp_path / "fault.toml", "--out", tmp_path / "out").splitlines()
+    assert lines[2] == "  Half of the lengths."
+    page = (tmp_path / "out/report.html").read_text(encoding="utf-8")
+    assert page.index("Half of the lengths.") < page.index("What was measured")
+
+
+def test_the_shipped_faults_note_which_of_two_readings_they_are():
+    for name, other in (
+        ("fault", "fault-doubled"),
+        ("fault-doubled", "fault"),
+        ("fault-tenth", "fault-doubled"),
+    ):
+        assert f"{other}.toml is the other reading" in read_geology(SAMPLES / f"{name}.toml", "fault").note
+
+
+def test_a_cohesive_run_tells_its_blocks_at_each_instant(tmp_path):
+    text = SMALL.replace("[time]", "[contact]\ncohesion = 1e4\n[time]")
+    (tmp_path / "fault.toml").write_text(text, encoding="utf-8")
+    rows = run_geology(tmp_path / "fault.toml", "fault", tmp_path / "out").summary["blocks"]
+    assert [row["time"] for row in rows] == pytest.approx([0.15, 0.3])
+    assert all(0.5 < row["largest_share"] <= 1.0 for row in rows)
+    assert all(5 * row["detached"] <= row["detached_disks"] for row in rows)
+    without = run_geology(_written(tmp_path / "without.toml", SMALL), "fault", tmp_path / "without").summary
+    assert without["blocks"] == []
+
+
+def _written(path, text):
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
 DEPOSIT = """
 [sample]
 smallest = 0.2

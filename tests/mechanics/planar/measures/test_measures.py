@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from mechanics.planar.measures.blocks import blocks_of
 from mechanics.planar.measures.cells import Cell, members, shape_of
 from mechanics.planar.measures.fabric import fabric_of
 from mechanics.planar.measures.limits import crest_radius, shear_limits
@@ -189,3 +190,38 @@ def test_a_motion_without_a_zone_has_no_limits_and_a_level_surface_no_radius():
     x = np.linspace(0.0, 10.0, 40)
     assert crest_radius(x, 0.01 * np.random.default_rng(1).normal(size=40)) == np.inf
     assert np.isnan(crest_radius(x[:3], x[:3]))
+
+
+def bed(width=12, height=6):
+    """Square packing of disks of radius 1/2, rows from below."""
+    return np.array([(x, y) for y in range(height) for x in range(width)], dtype=float)
+
+
+def test_a_block_that_slid_off_and_lies_on_others_has_come_off():
+    """Contacts that formed anew do not join it to what it lies on."""
+    start = bed()
+    corner = (start[:, 0] > 8.5) & (start[:, 1] > 3.5)
+    found = blocks_of(start, start + np.where(corner[:, None], [1.0, 0.0], 0.0), np.full(72, 0.5), 0.02)
+    assert found.size.tolist() == [66, 6]
+    assert found.detached_disks == 6
+    assert found.largest_share == pytest.approx(66 / 72)
+    assert (found.label == 1).tolist() == corner.tolist()
+
+
+def test_a_gap_counts_only_beyond_the_range_of_the_cohesion():
+    start = bed()
+    upper = start[:, 1] > 2.5
+    raised = start + np.where(upper[:, None], [0.0, 0.02], 0.0)
+    assert blocks_of(start, raised, np.full(72, 0.5), 0.03).size.tolist() == [72]
+    assert blocks_of(start, raised, np.full(72, 0.5), 0.01).size.tolist() == [36, 36]
+
+
+def test_debris_what_is_covered_and_what_stands_on_the_base_have_not_come_off():
+    start = bed()
+    debris = (start[:, 1] > 4.5) & (start[:, 0] > 8.5)
+    # three slabs of two rows; three disks fly off the upper one
+    apart = start + np.array([0.0, 0.1]) * np.floor(start[:, 1:] / 2.0)
+    apart[debris] += 0.5
+    found = blocks_of(start, apart, np.full(72, 0.5), 0.02)
+    assert found.size.tolist() == [24, 24, 21, 3]
+    assert found.detached.tolist() == [2]
