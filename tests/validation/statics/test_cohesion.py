@@ -12,11 +12,20 @@ from mechanics.scene.laws.mortar import MortarJoint
 from mechanics.scene.loads.forces import StoneForce
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.time_series import History
-from mechanics.scene.scene import ContactSettings, Fidelity, LawRule, Placement, Scene, TimeSettings
+from mechanics.scene.scene import (
+    ContactSettings,
+    Fidelity,
+    LawRule,
+    Placement,
+    Scene,
+    SolverSettings,
+    TimeSettings,
+)
 from mechanics.stones.materials import Material
 from tests.validation.scenes import G, box, ground, tilted_gravity
 
 STEP = 1e-3
+SLIDING_STEP = 2e-3
 
 
 def started(blocks, contact, loads=None, gravity=(0.0, 0.0, -G), theta=0.5, step=STEP):
@@ -62,7 +71,7 @@ def test_a_block_on_mortar_is_pulled_off_and_sheared_off_at_its_strength(
         ContactSettings(MortarJoint(0.5, 1e4, 5e3), placement=placement, spacing=0.3),
         Loads(forces=(StoneForce(frozenset({"block"}), force, arm),)),
         theta=theta,
-        step=2e-3,
+        step=SLIDING_STEP,
     )
     assert broken_at(simulation, 250) is None
     assert broken_at(simulation, 400) is not None
@@ -73,7 +82,11 @@ def test_a_block_on_mortar_is_pulled_off_and_sheared_off_at_its_strength(
     assert (after.internal[:, BOND] < 0).all()
     total = after.force.sum(axis=0)
     if direction[0]:
-        np.testing.assert_allclose(total, [-9810.0, 0.0, 19620.0], atol=1e-4 * 9810)
+        # velocities are solved to a share of the fastest; ten times the force that stops so much of them in one step
+        fastest = np.abs(simulation.state.velocity).max() + G * SLIDING_STEP
+        solved = 2000.0 * SolverSettings().velocity_tolerance * fastest / SLIDING_STEP
+        assert solved < 2e-4 * 9810
+        np.testing.assert_allclose(total, [-9810.0, 0.0, 19620.0], atol=10 * solved)
     else:
         np.testing.assert_allclose(total, np.zeros(3), atol=1e-6)
 
