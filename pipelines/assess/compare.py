@@ -33,7 +33,7 @@ from pipelines.run.soundness import problems_of, refuse_unsound
 from pipelines.scene.file import read_scene
 from pipelines.scene.selection import StoneModel, select_groups, select_stones
 from pipelines.scene.stages import refuse_stages
-from survey.quality.courses import measure_courses
+from survey.quality.departures.beds import measure_beds
 from survey.quality.facades import Facade, find_facades
 from survey.quality.movement import (
     CourseMovement,
@@ -120,7 +120,7 @@ def compare(
         result = simulate(assembly.scene, progress, lambda: False, built)
         stones, facades = measured_stones(models)
         moved = stone_motions(result.bodies, assembly.origin).displacement
-        courses = compare_courses(measure_courses(stones, facades), moved)
+        courses = compare_courses(measure_beds(stones, facades)[0], moved)
         plumb = compare_plumb(stones, facades, moved, battered)
         progress(Progress("write", 0, 1, "pictures"))
         summary = _summary(result, assembly, courses, plumb, battered)

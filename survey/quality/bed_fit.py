@@ -15,8 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from survey.arrays import Array
+from survey.statistics.roots import root_of
+from survey.statistics.scale import spread
 
-__all__ = ["BedCorners", "BedScatter", "fit_bed", "pool", "scatter_of"]
+__all__ = ["BedCorners", "BedScatter", "corner_roughness", "fit_bed", "pool", "scatter_of"]
 
 Rows = NDArray[np.intp]
 
@@ -59,12 +61,12 @@ class BedScatter:
     ----------
     tau : standard deviation of a stone's bed about the line [m]
     kappa : scatter of the corners of one stone over their measured precision, at least 1 [-]
-    freedom : stones minus parameters, the degrees of freedom of tau
+    freedom : degrees of freedom of tau; of a course by itself, stones minus parameters
     """
 
     tau: float
     kappa: float
-    freedom: int
+    freedom: float
 
 
 def scatter_of(bed: BedCorners, parameters: int) -> BedScatter:
@@ -91,6 +93,19 @@ def pool(scatters: Sequence[BedScatter]) -> BedScatter | None:
     tau = math.sqrt(sum(one.freedom * one.tau**2 for one in scatters) / freedom)
     kappa = math.sqrt(sum(one.freedom * one.kappa**2 for one in scatters) / freedom)
     return BedScatter(tau, kappa, freedom)
+
+
+def corner_roughness(beds: Sequence[BedCorners]) -> float:
+    """Return κ of a wall: from the slopes of stones against those beside them, which a movement turns alike."""
+    ratios = [np.zeros(0)]
+    for bed in beds:
+        first = np.array([np.flatnonzero(bed.stone == k)[[0, -1]] for k in range(bed.count)])
+        pairs = first[first[:, 0] != first[:, 1]]
+        step = bed.height[pairs[:, 1]] - bed.height[pairs[:, 0]]
+        variance = (bed.sigma[pairs] ** 2).sum(axis=1)
+        ratios.append(np.diff(step) / np.sqrt(variance[1:] + variance[:-1]))
+    every = np.concatenate(ratios)
+    return max(1.0, spread(every)) if len(every) >= _FREEDOM else 1.0
 
 
 def fit_bed(bed: BedCorners, scatter: BedScatter, parameters: int) -> tuple[Array, Array]:
@@ -131,15 +146,6 @@ def _paule_mandel(rows: Array, variances: Array) -> float:
         residuals: Array = rows @ np.append(-_solve(rows, weights), 1.0)
         return float(np.sum(weights * residuals**2)) - redundancy
 
-    if redundancy <= 0 or excess(0.0) <= 0.0:
+    if redundancy <= 0:
         return 0.0
-    high = float(np.ptp(rows[:, -1])) ** 2 + float(variances.max())
-    while excess(high) > 0.0:
-        high *= 4.0
-    low = 0.0
-    for _ in range(60):
-        middle = (low + high) / 2.0
-        low, high = (middle, high) if excess(middle) > 0.0 else (low, middle)
-        if high - low < 1e-6 * high:
-            break
-    return math.sqrt(high)
+    return math.sqrt(root_of(excess, float(np.ptp(rows[:, -1])) ** 2 + float(variances.max())))

@@ -4,19 +4,20 @@ The bed line of a course is fitted to the lower corners of its stones: z against
 facade. The corners of one stone are not independent, since its bed lies a little high or low as a whole; least squares
 that ignored this would be overconfident by up to √2. So the beds' own scatter is estimated with the line
 (`survey.quality.bed_fit`). Slope and sag have a probability by Student's t and the number of stones, not of corners.
-Courses of fewer than five stones borrow the scatter of the others. Whether a wall has moved is told by its courses
+Courses of fewer than five stones borrow the scatter of the others. Once the movements of a wall are known, all its
+lines take the scatter that they leave (`with_scatter`). Whether a wall has moved is told by its courses
 together (`survey.quality.departures.beds`).
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import stdtr
 
 from survey.arrays import Array, Ints
-from survey.quality.bed_fit import BedCorners, BedScatter, fit_bed, pool, scatter_of
+from survey.quality.bed_fit import BedCorners, BedScatter, corner_roughness, fit_bed, pool, scatter_of
 from survey.quality.facades import Facade, WallPlane
 from survey.quality.precision import StoneQuality
 from survey.quality.wedges import Side, lies_along, sides_of, spanning_stones
@@ -28,6 +29,7 @@ __all__ = [
     "course_heights",
     "lower_corners",
     "measure_courses",
+    "with_scatter",
 ]
 
 
@@ -69,7 +71,7 @@ class CourseLine:
     rms : of the deviations [m]
     scatter : τ, standard deviation of a stone's bed about the line [m]
     roughness : κ, scatter of the corners of one stone over their measured precision [-]
-    evidence : source of τ and κ: "own", "other courses", or "none" if both are unknown
+    evidence : source of τ and κ: "wall", "own", "other courses", or "none" if both are unknown
     """
 
     facade: str
@@ -171,6 +173,30 @@ def measure_courses(
     return tuple(_line(one, own.get(k), pooled) for k, one in enumerate(courses))
 
 
+def with_scatter(
+    lines: Sequence[CourseLine], scatters: Mapping[tuple[str, str | None], tuple[float, float]]
+) -> tuple[CourseLine, ...]:
+    """Fit bed lines anew with the scatter of their walls, which no movement of a course makes larger.
+
+    Parameters
+    ----------
+    lines : of all walls
+    scatters : τ [m] and its degrees of freedom, by facade and zone; a wall without any keeps its lines
+    """
+    courses = [_course_of(line) for line in lines]
+    walls = {
+        wall: corner_roughness([one.bed for one in courses if (one.facade, one.zone) == wall])
+        for wall in scatters
+    }
+    fitted = []
+    for line, course in zip(lines, courses, strict=True):
+        wall = line.facade, line.zone
+        tau, freedom = scatters.get(wall, (0.0, 0.0))
+        known = freedom > 0.0
+        fitted.append(_line(course, BedScatter(tau, walls[wall], freedom), None, "wall") if known else line)
+    return tuple(fitted)
+
+
 def course_heights(lines: Sequence[CourseLine]) -> tuple[CourseHeight, ...]:
     """Return the height of every course whose next one lies above part of it."""
     found = []
@@ -219,13 +245,13 @@ def _tilt(facade: Facade, tilts: Sequence[Array]) -> float:
 
 def _courses(stones: Sequence[StoneQuality], facade: Facade, frame_sigma: float) -> list[_Course]:
     """Return the lower corners of a facade, by zone and course; arch stones and lintels have none."""
-    groups: dict[tuple[str, int], list[StoneQuality]] = {}
+    groups: dict[tuple[str, int], dict[int, StoneQuality]] = {}
     sides = sides_of(stones, facade)
     spanning = spanning_stones(stones, sides)
     for i in facade.members.tolist():
         course = stones[i].course
         if course is not None and i not in spanning:
-            groups.setdefault((stones[i].zone or "", course), []).append(stones[i])
+            groups.setdefault((stones[i].zone or "", course), {})[i] = stones[i]
     courses = []
     for zone, course in sorted(groups):
         # what stands on a stone of its own course or of a higher one does not stand on the course below
@@ -250,13 +276,13 @@ def _bedded(along: Array, height: Array, sigma: Array) -> Ints:
 
 
 def _course(
-    stones: Sequence[StoneQuality], facade: Facade, frame_sigma: float, arches: Side
+    stones: Mapping[int, StoneQuality], facade: Facade, frame_sigma: float, others: Side
 ) -> _Course | None:
     codes: list[str] = []
     parts: list[Array] = []
     left_out = 0
-    for stone in stones:
-        lower = lower_corners(stone.outline, facade.frame, arches)
+    for i, stone in stones.items():
+        lower = lower_corners(stone.outline, facade.frame, others.without(i))
         known = np.isfinite(stone.corner_sigma[:, 2])
         sound = [k for k in lower if k not in stone.worn_corners and known[k]]
         places, sigma = stone.outline[sound], stone.corner_sigma[sound, 2]
@@ -271,18 +297,32 @@ def _course(
     order = np.argsort(table[:, 0], kind="stable")
     names = [codes[i] for i in order.tolist()]
     number = {code: k for k, code in enumerate(dict.fromkeys(names))}
-    course = stones[0].course
+    first = next(iter(stones.values()))
+    course = first.course
     assert course is not None
     numbers = np.array([number[code] for code in names], dtype=np.intp)
     along, sigma, *_, height = (np.ascontiguousarray(column) for column in table[order].T)
     bed = BedCorners(numbers, along, height, sigma)
     places = table[order, 2:]
-    return _Course(facade.name, stones[0].zone, course, tuple(names), places, left_out, bed, frame_sigma)
+    return _Course(facade.name, first.zone, course, tuple(names), places, left_out, bed, frame_sigma)
 
 
-def _line(course: _Course, own: BedScatter | None, pooled: BedScatter | None) -> CourseLine:
+def _course_of(line: CourseLine) -> _Course:
+    """Return the corners of a line."""
+    number = {code: k for k, code in enumerate(dict.fromkeys(line.codes))}
+    stone = np.array([number[code] for code in line.codes], dtype=np.intp)
+    bed = BedCorners(stone, line.along, line.height, line.sigma)
+    return _Course(
+        line.facade, line.zone, line.course, line.codes, line.places, line.left_out, bed, line.frame_sigma
+    )
+
+
+def _line(
+    course: _Course, own: BedScatter | None, pooled: BedScatter | None, evidence: str | None = None
+) -> CourseLine:
     bed = course.bed
-    evidence = "own" if own else "other courses" if pooled else "none"
+    known = evidence is not None
+    evidence = evidence or ("own" if own else "other courses" if pooled else "none")
     scatter = own or pooled or BedScatter(0.0, 1.0, 0)
     sloped = bed.along[-1] > bed.along[0]
     values, covariance = fit_bed(bed, scatter, 2 if sloped else 1)
@@ -290,7 +330,8 @@ def _line(course: _Course, own: BedScatter | None, pooled: BedScatter | None) ->
     if not sloped:
         covariance = np.array([[covariance[0, 0], 0.0], [0.0, math.nan]])
     deviations = bed.height - values[0] - (slope or 0.0) * (bed.along - bed.middle)
-    sag = _sag(bed) if own and sloped else (None, None, None)
+    curved = own is not None and sloped and bed.count >= ENOUGH
+    sag = _sag(bed, own if known else None) if curved else (None, None, None)
     return CourseLine(
         facade=course.facade,
         zone=course.zone,
@@ -321,16 +362,16 @@ def _line(course: _Course, own: BedScatter | None, pooled: BedScatter | None) ->
     )
 
 
-def _sag(bed: BedCorners) -> tuple[float, float, float | None]:
+def _sag(bed: BedCorners, scatter: BedScatter | None) -> tuple[float, float, float | None]:
     """Return the height of mid-span above the chord of the best parabola, -c (L/2)², its sigma and probability."""
-    scatter = scatter_of(bed, 3)
+    scatter = scatter or scatter_of(bed, 3)
     values, covariance = fit_bed(bed, scatter, 3)
     lever = -(((bed.along[-1] - bed.along[0]) / 2.0) ** 2)
     sag, sigma = float(lever * values[2]), float(-lever * math.sqrt(covariance[2, 2]))
     return sag, sigma, _chance(sag, sigma, scatter.freedom)
 
 
-def _chance(value: float, sigma: float, freedom: int) -> float | None:
+def _chance(value: float, sigma: float, freedom: float) -> float | None:
     """Return the two-sided probability of Student's t."""
     return float(2.0 * stdtr(freedom, -abs(value) / sigma)) if freedom > 0 else None
 

@@ -5,20 +5,20 @@ height of each course, the position of each wall and, if asked, its lean are fre
 free ones the residuals P C^(-1/2) (z - w), with the simulated displacement w, have n entries and n - f degrees of
 freedom.
 
-The covariance C of beds is σ² of each corner, τ² common to the corners of a stone, and the tolerance of level. τ is
-estimated once, from the steps of the bed at head joints: a movement that is continuous there leaves them as they were,
-and the few joints at which a wall has cracked are outliers. So τ depends on no hypothesis, and all χ² are comparable.
+The covariance C of beds is κ²σ² of each corner, τ² common to the corners of a stone, and the tolerance of level. τ is
+that of the verdict on movement (`survey.quality.departures.beds`): what the shapes that the wall shows by itself leave.
+So τ depends on no hypothesis, and all χ² are comparable.
 """
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
 from survey.arrays import Array
-from survey.quality.courses import ENOUGH, CourseLine, measure_courses
+from survey.quality.courses import ENOUGH, CourseLine
+from survey.quality.departures.beds import measure_beds
 from survey.quality.facades import Facade
 from survey.quality.precision import StoneQuality
 
@@ -26,12 +26,6 @@ __all__ = ["AS_PLANNED", "Built", "Deformation", "DeformationGroup", "measure_de
 
 Displacement = Callable[[str, Array], Array]
 """Displacement (n, 3) of points (n, 3) of the stone of a code [m]."""
-
-_NEAR = 0.06  # largest distance of two corners at one head joint: an open joint with worn arrises [m]
-_MEDIAN = 0.6745  # of the absolute value of a standard normal variable
-_OUTLIER = 2.5  # standard deviations beyond which a step is a crack
-_KEPT = 0.9113  # variance of a standard normal variable within that limit
-_FEWEST = 5  # steps from which a scatter is estimated
 
 
 @dataclass(frozen=True)
@@ -103,13 +97,13 @@ class Deformation:
     Attributes
     ----------
     groups : beds, then walls
-    scatter : τ of the beds of each facade [m]
-    steps : number of steps at head joints from which it is known
+    scatter : τ of the beds of each facade and zone, as the verdict on movement has it [m]
+    freedom : its degrees of freedom, of all walls together
     """
 
     groups: tuple[DeformationGroup, ...]
-    scatter: Mapping[str, float]
-    steps: int
+    scatter: Mapping[tuple[str, str | None], float]
+    freedom: float
 
     @property
     def dof(self) -> int:
@@ -136,59 +130,24 @@ def measure_deformation(
     built : tolerances
     undetermined : codes of stones whose beds do not tell how they were laid: on older work that had moved
     """
-    lines = [line for line in measure_courses(stones, facades) if line.slope is not None]
-    scatter, steps = {}, 0
-    for name in dict.fromkeys(line.facade for line in lines):
-        scatter[name], count = _scatter([line for line in lines if line.facade == name])
-        steps += count
-    beds = (_bed(line, scatter[line.facade], built.level, undetermined) for line in lines)
+    every, walls_beds = measure_beds(stones, facades)
+    lines = [line for line in every if line.slope is not None]
+    beds = (_bed(line, built.level, undetermined) for line in lines)
     walls = (one for facade in facades for one in _walls(stones, facade, built))
-    return Deformation((*(one for one in beds if one is not None), *walls), scatter, steps)
+    scatter = {(one.facade, one.zone or None): one.scatter for one in walls_beds}
+    freedom = sum(one.freedom for one in walls_beds)
+    return Deformation((*(one for one in beds if one is not None), *walls), scatter, freedom)
 
 
-def _scatter(lines: Iterable[CourseLine]) -> tuple[float, int]:
-    """Return τ from the steps at head joints, and the number of steps; without cracks."""
-    steps, variances = [], []
-    for line in lines:
-        for i, k in pairwise(range(len(line.codes))):
-            if line.codes[i] != line.codes[k] and line.along[k] - line.along[i] < _NEAR:
-                steps.append(float(line.height[k] - line.height[i]))
-                variances.append(float(line.sigma[i] ** 2 + line.sigma[k] ** 2))
-    step, measured = np.abs(steps), np.array(variances)
-    if len(step) < _FEWEST:
-        return 0.0, 0
-    first = _root(lambda square: float(np.median(step / np.sqrt(measured + 2.0 * square))) - _MEDIAN)
-    kept = step <= _OUTLIER * np.sqrt(measured + 2.0 * first)
-    count = int(kept.sum())
-    square = _root(
-        lambda square: float((step[kept] ** 2 / (measured[kept] + 2.0 * square)).sum()) - _KEPT * count
-    )
-    return math.sqrt(square), count
-
-
-def _root(excess: Callable[[float], float]) -> float:
-    """Return the argument at which a falling function is zero; 0 if it is never positive."""
-    if excess(0.0) <= 0.0:
-        return 0.0
-    low, high = 0.0, 1e-6
-    while excess(high) > 0.0:
-        high *= 4.0
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if excess(middle) > 0.0 else (low, middle)
-    return high
-
-
-def _bed(
-    line: CourseLine, scatter: float, level: float, undetermined: frozenset[str]
-) -> DeformationGroup | None:
+def _bed(line: CourseLine, level: float, undetermined: frozenset[str]) -> DeformationGroup | None:
     rows = [k for k, code in enumerate(line.codes) if code not in undetermined]
     if len(rows) < 2:
         return None
     codes, along = tuple(line.codes[k] for k in rows), line.along[rows]
     same = np.array([[a == b for b in codes] for a in codes])
     middle = along - along.mean()
-    covariance = np.diag(line.sigma[rows] ** 2) + scatter**2 * same + level**2 * np.outer(middle, middle)
+    measured = np.diag((line.roughness * line.sigma[rows]) ** 2)
+    covariance = measured + line.scatter**2 * same + level**2 * np.outer(middle, middle)
     return DeformationGroup(
         line.facade,
         line.zone or None,

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from survey.arrays import Array
-from survey.quality.bed_fit import BedCorners, BedScatter, fit_bed, scatter_of
+from survey.quality.bed_fit import BedCorners, BedScatter, fit_bed
 from survey.quality.courses import ENOUGH, CourseLine
 from survey.quality.facades import Facade
 from survey.quality.precision import StoneQuality
@@ -110,8 +110,8 @@ def compare_courses(lines: Sequence[CourseLine], displacement: Displacement) -> 
     Notes
     -----
     The residuals z - w - level of the corners, with the simulated vertical displacement w, have the covariance
-    κ² σ² + τ² 1 1ᵀ of each stone (`survey.quality.bed_fit`). τ is the scatter about the best parabola, of the measured
-    heights or of the residuals: the smaller, as what is left of a movement makes either too large, never too small.
+    κ² σ² + τ² 1 1ᵀ of each stone (`survey.quality.bed_fit`). τ and κ are those of the lines: with the lines of
+    `survey.quality.departures.beds.measure_beds` those of the verdict on movement, which no simulation changes.
     """
     return tuple(_course(line, displacement) for line in lines if line.slope is not None)
 
@@ -123,7 +123,7 @@ def _course(line: CourseLine, displacement: Displacement) -> CourseMovement:
     moved = np.zeros(len(stone))
     for code, rows in _rows(line.codes).items():
         moved[rows] = displacement(code, line.places[rows])[:, 2]
-    scatter = _scatter(line, measured, moved)
+    scatter = BedScatter(line.scatter, line.roughness, 0)
     simulated = BedCorners(stone, line.along, moved, line.sigma)
     slope = fit_bed(simulated, scatter, 2)[0][1]
     lever = -((line.span / 2.0) ** 2)
@@ -140,14 +140,6 @@ def _course(line: CourseLine, displacement: Displacement) -> CourseMovement:
     sigma = line.slope_sigma
     assert sigma is not None
     return CourseMovement(line, moved, float(slope), sigma, sag, line.sag_sigma, misfit, stones)
-
-
-def _scatter(line: CourseLine, measured: BedCorners, moved: Array) -> BedScatter:
-    """Return the scatter of the beds of a course; that of other courses where it has too few stones."""
-    if measured.count < ENOUGH:
-        return BedScatter(line.scatter, line.roughness, 0)
-    rest = BedCorners(measured.stone, measured.along, measured.height - moved, measured.sigma)
-    return min((scatter_of(one, 3) for one in (measured, rest)), key=lambda one: one.tau)
 
 
 def _rows(codes: Sequence[str]) -> dict[str, list[int]]:

@@ -90,6 +90,11 @@ class Side(NamedTuple):
         """Length of each [m]."""
         return np.asarray(np.linalg.norm(self.run, axis=1))
 
+    def without(self, stone: int) -> "Side":
+        """Return the sides of all stones but one."""
+        kept = self.stone != stone
+        return Side(self.stone[kept], self.start[kept], self.run[kept])
+
     def of(self, stones: Collection[int]) -> "Side":
         """Return the sides of some stones."""
         chosen = np.isin(self.stone, list(stones))

@@ -14,7 +14,7 @@ from pipelines.assess.diagnosis.file import DiagnosisFile
 from pipelines.assess.diagnosis.measurements import Measurements
 from pipelines.assess.diagnosis.ranking import Ranked, Ranking
 from pipelines.assess.motions import Motions
-from survey.quality.courses import measure_courses
+from survey.quality.departures.beds import measure_beds
 from survey.quality.movement import CourseMovement, compare_courses
 
 __all__ = ["Dating", "Share", "date_movement"]
@@ -100,7 +100,7 @@ def _share(found: Measurements, phase: str, whole: Motions) -> Share:
 def _evidence(
     file: DiagnosisFile, found: Measurements, whole: Motions, shares: tuple[Share, ...]
 ) -> Iterator[str]:
-    lines = compare_courses(measure_courses(found.stones, found.facades), whole.displacement)
+    lines = compare_courses(measure_beds(found.stones, found.facades)[0], whole.displacement)
     for index, share in enumerate(shares):
         own = [line for line in lines if found.phases[line.line.codes[0]] == share.phase]
         if share.value is None:

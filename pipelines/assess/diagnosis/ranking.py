@@ -123,7 +123,7 @@ class Ranking:
 
 
 def rank(
-    name: str, stood: tuple[str, ...], unknowns: Sequence[Unknown], found: Fit, dof: int, steps: int
+    name: str, stood: tuple[str, ...], unknowns: Sequence[Unknown], found: Fit, dof: int, freedom: float
 ) -> Ranked:
     """Return a hypothesis with its measures.
 
@@ -133,14 +133,14 @@ def rank(
     unknowns : of the hypothesis
     found : its best amplitudes
     dof : of the measurements, before amplitudes are estimated
-    steps : number of steps at head joints from which the scatter of beds is known; 0: it is taken as exact
+    freedom : degrees of freedom of the scatter of beds; 0: it is taken as exact
     """
     count = len(unknowns)
     left = max(dof - count, 1)
     if not len(found.residuals):
         return Ranked(name, stood, found, left, 0.0, math.inf, (), (f"not run: {found.trouble}",))
     ratio = found.chi2 / left
-    probability = float(fdtrc(left, steps or 1e9, ratio))
+    probability = float(fdtrc(left, freedom or 1e9, ratio))
     aicc = found.chi2 + 2.0 * count + 2.0 * count * (count + 1) / max(dof - count - 1, 1)
     own = tuple(estimates(unknowns, found, left))
     tied = tuple(_tied(unknowns, found))

@@ -21,7 +21,7 @@ from pipelines.results.summary import as_json
 from pipelines.results.table_csv import inert
 from pipelines.run.record import versions
 from pipelines.toml.writer import toml_text
-from survey.quality.courses import measure_courses
+from survey.quality.departures.beds import measure_beds
 from survey.quality.movement import CourseMovement, compare_courses
 
 __all__ = ["INDEX", "write_best", "write_diagnosis"]
@@ -55,7 +55,7 @@ def write_diagnosis(
     """
     best = done.ranking.hypotheses[0]
     motions = done.motions[best.name, best.stood]
-    courses = compare_courses(measure_courses(found.stones, found.facades), motions.displacement)
+    courses = compare_courses(measure_beds(found.stones, found.facades)[0], motions.displacement)
     _write_hypotheses(folder / "hypotheses.csv", done)
     _write_stones(folder / "stones.csv", courses)
     _draw(folder, courses)
@@ -93,8 +93,10 @@ def _summary(file: DiagnosisFile, found: Measurements, done: Fitted, dating: Dat
         ],
         "hypotheses": [_told(one, ranking.hypotheses[0]) for one in (*ranking.hypotheses, ranking.still)],
         "not_told_apart": [one.title for one in ranking.rivals],
-        "scatter": {name: {"beds": value} for name, value in deformation.scatter.items()},
-        "steps": deformation.steps,
+        "scatter": {
+            " ".join(filter(None, wall)): {"beds": value} for wall, value in deformation.scatter.items()
+        },
+        "freedom": deformation.freedom,
         "groups": _groups(found, done),
         "runs": done.runs,
         "cpu": done.cpu,

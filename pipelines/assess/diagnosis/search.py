@@ -265,7 +265,7 @@ def fit_cases(
     ranked, motions = list[Ranked](), {}
     for k, case in enumerate(cases):
         unknowns = case.hypothesis.unknowns
-        one = rank(case.hypothesis.name, case.stood, unknowns, fits[k], deformation.dof, deformation.steps)
+        one = rank(case.hypothesis.name, case.stood, unknowns, fits[k], deformation.dof, deformation.freedom)
         last = known[k, fits[k].amplitudes]
         if last.motions is not None and last.fault:
             one = replace(one, remarks=(*one.remarks, last.fault))
@@ -293,7 +293,7 @@ def fit_cases(
     still = Fit((), residuals, np.zeros((0, 0)), (), 0)
     ranking = Ranking(
         tuple(sorted(ranked, key=lambda one: one.aicc)),
-        rank(STILL, (), (), still, deformation.dof, deformation.steps),
+        rank(STILL, (), (), still, deformation.dof, deformation.freedom),
     )
     return Fitted(ranking, motions, len(known), sum(one.cpu for one in known.values()))
 

@@ -18,7 +18,8 @@ from survey.formats.options import ReadingOptions
 from survey.quality.canon import Deviation, KindStandard, deviations, standards
 from survey.quality.contradictions import Contradiction, contradictions
 from survey.quality.corners import SeenFace, misplaced_corners
-from survey.quality.courses import CourseHeight, CourseLine, course_heights, measure_courses
+from survey.quality.courses import CourseHeight, CourseLine, course_heights, measure_courses, with_scatter
+from survey.quality.departures.beds import CHANCE as BED_CHANCE
 from survey.quality.departures.beds import WallBeds, find_bed_movements
 from survey.quality.departures.depths import DoubtfulDepth, doubtful_depths
 from survey.quality.departures.faces import WallFace, find_face_departures
@@ -34,7 +35,7 @@ from survey.registration.stones import survey_stones
 
 __all__ = ["CHANCES", "SurveyFile", "SurveyStudy", "study_surveys"]
 
-CHANCES = {"beds": 0.003, "faces": 0.003, "depths": 0.001}
+CHANCES = {"beds": BED_CHANCE, "faces": 0.003, "depths": 0.001}
 """Probability that a survey without fault or movement is given a finding of each sort."""
 
 _SOME_DEPTH = DepthRule(None, 0.3, None, "\0")  # no file can give this source
@@ -195,6 +196,8 @@ def _judge(
     tilts = [one.transform.covariance[3:6, 3:6] for one in files if one.transform is not None]
     lines = measure_courses(stones, facades, tilts)
     beds, faces = _movements(stones, facades, lines, tilts)
+    # one scatter of beds in the table of courses and in the verdict on movement
+    lines = with_scatter(lines, {(one.facade, one.zone): (one.scatter, one.freedom) for one in beds})
     rules = [rule for file in files for rule in file.head.depth_rules]
     depths = doubtful_depths(stones, facades, rules, CHANCES["depths"])
     seen = [_seen(one) for one in stones if one.measured]

@@ -11,7 +11,7 @@ so that no movement hides itself as scatter; then from what the movements leave,
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -19,18 +19,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from survey.arrays import Array
-from survey.quality.courses import CourseLine
+from survey.quality.courses import CourseLine, measure_courses, with_scatter
 from survey.quality.departures.shapes import LIKELY, Found, Run, Sample, Shape, critical, fit_shapes, powers
+from survey.quality.facades import Facade
+from survey.quality.precision import StoneQuality
+from survey.statistics.roots import root_of
+from survey.statistics.scale import OUTLIER, WITHIN, scatter_beyond
 
-__all__ = ["BedKind", "BedMovement", "OddBed", "WallBeds", "find_bed_movements"]
+__all__ = ["CHANCE", "BedKind", "BedMovement", "OddBed", "WallBeds", "find_bed_movements", "measure_beds"]
+
+CHANCE = 0.003
+"""Probability that the beds of a survey without any movement are given one."""
+
 
 _PLACES = 24  # most places of a wall at which a step is looked for
 _CLOSE = 0.5  # of the median length of a stone: distance of two such places
 _REACH = 1.2  # of the median length of a stone: distance from the step at which a course may be broken
 _FEWEST = 3  # stones on either side of a step or an edge; fewer are odd stones, not a part of the wall
-_MEDIAN = 0.6745  # of the absolute value of a standard normal variable
-_OUTLIER = 2.5  # standard deviations beyond which a difference is a crack
-_KEPT = 0.9113  # variance of a standard normal variable within that limit
 _PER_DIFFERENCE = (
     0.45  # degrees of freedom that a difference of neighbours gives: each stone is in two of them
 )
@@ -268,6 +273,21 @@ def find_bed_movements(
     return tuple(found)
 
 
+def measure_beds(
+    stones: Sequence[StoneQuality], facades: Iterable[Facade], tilts: Sequence[Array] = ()
+) -> tuple[tuple[CourseLine, ...], tuple[WallBeds, ...]]:
+    """Return the bed lines of a survey and the movements of its walls, both with one scatter of beds.
+
+    Parameters
+    ----------
+    stones, facades, tilts : as of `measure_courses`
+    """
+    lines = measure_courses(stones, facades, tilts)
+    lengths, rows = {one.code: one.length for one in stones}, {one.code: one.line for one in stones}
+    walls = find_bed_movements(lines, lengths, CHANCE, rows)
+    return with_scatter(lines, {(one.facade, one.zone): (one.scatter, one.freedom) for one in walls}), walls
+
+
 def _beds(lines: Sequence[CourseLine]) -> _Beds:
     codes: list[str] = []
     table: list[tuple[int, float, float, float]] = []
@@ -299,33 +319,9 @@ def _scatter(walls: Sequence[_Beds]) -> tuple[float, float, int]:
                 step = (step - np.median(step)) * math.sqrt(len(step) / (len(step) - 1.0))
             differences.append(step)
             variances.append(beds.measured[own][1:] + beds.measured[own][:-1])
-    step = np.abs(np.concatenate([np.zeros(0), *differences]))
-    measured = np.concatenate([np.zeros(0), *variances])
-    if len(step) == 0:
-        return 0.0, 0.0, 0
-
-    def spread(square: float) -> float:
-        return float(np.median(step / np.sqrt(measured + 2.0 * square))) - _MEDIAN
-
-    first = _root(spread, float(step.max()) ** 2)
-    kept = step <= _OUTLIER * np.sqrt(measured + 2.0 * first)
-    count = int(kept.sum())
-    square = _root(
-        lambda one: float((step[kept] ** 2 / (measured[kept] + 2.0 * one)).sum()) - _KEPT * count,
-        float(step.max()) ** 2,
-    )
-    return math.sqrt(square), max(_PER_DIFFERENCE * count, 1.0), count
-
-
-def _root(excess: Callable[[float], float], high: float) -> float:
-    """Return the argument at which a falling function is zero; 0 if it is never positive."""
-    if excess(0.0) <= 0.0:
-        return 0.0
-    low = 0.0
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if excess(middle) > 0.0 else (low, middle)
-    return high
+    step = np.concatenate([np.zeros(0), *differences])
+    tau, count = scatter_beyond(step, np.concatenate([np.zeros(0), *variances]), 2.0)
+    return tau, max(_PER_DIFFERENCE * count, 1.0) if count else 0.0, count
 
 
 def _wall(
@@ -392,14 +388,14 @@ def _left(
     rest = rest - means[sample.group]
     if free < _ENOUGH:
         return tau, freedom
-    kept = (np.abs(rest) <= _OUTLIER * np.sqrt(share * sample.variance)) & (share > 0.0)
+    kept = (np.abs(rest) <= OUTLIER * np.sqrt(share * sample.variance)) & (share > 0.0)
 
     def excess(square: float) -> float:
-        return float((rest[kept] ** 2 / (share[kept] * (measured[kept] + square))).sum()) - _KEPT * int(
+        return float((rest[kept] ** 2 / (share[kept] * (measured[kept] + square))).sum()) - WITHIN * int(
             kept.sum()
         )
 
-    square = _root(excess, float(np.ptp(rest)) ** 2)
+    square = root_of(excess, float(np.ptp(rest)) ** 2)
     return math.sqrt(square), max(_PER_RESIDUAL * free, 1.0)
 
 

@@ -4,12 +4,23 @@ import math
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from survey.quality.courses import measure_courses
-from survey.quality.departures.beds import BedMovement, WallBeds, _age, _beds, _scatter, find_bed_movements
+from survey.quality.deformation import measure_deformation
+from survey.quality.departures.beds import (
+    BedMovement,
+    WallBeds,
+    _age,
+    _beds,
+    _scatter,
+    find_bed_movements,
+    measure_beds,
+)
 from survey.quality.departures.shapes import Found, Shape
+from survey.quality.movement import compare_courses
 from survey.quality.precision import StoneQuality
-from tests.survey.quality.departures.walls_by_hand import wall
+from tests.survey.quality.departures.walls_by_hand import Shift, wall
 from tests.survey.quality.plain_stones import facades_of, polygon_stone
 
 MIDDLE = 2.875  # of a wall of 6 m in running bond, between its first and last stone [m]
@@ -240,3 +251,33 @@ def test_the_scatter_of_neighbours_is_without_the_slope_of_their_course() -> Non
 
 def test_no_stone_of_a_steep_bed_is_odd() -> None:
     assert beds_of(wall(20, lambda s, c: 0.06 * s)).odd == ()
+
+
+@pytest.mark.parametrize(
+    "lift",
+    [
+        lambda s, c: 0.0,
+        lambda s, c: -0.02 if s > 3.4 and c <= 6 else 0.0,
+        lambda s, c: -0.02 * (1 - (s / 2.9 - 1) ** 2),
+    ],
+    ids=["rest", "pier", "sag"],
+)
+def test_all_tell_one_scatter_and_one_misfit(lift: Shift) -> None:
+    """The table of courses, the comparison, the diagnosis and the verdict on movement; the truth is 1 mm."""
+    stones = wall(2, lift, beds=0.001, sigma=0.001)
+    facades = facades_of(stones)
+    lines, (beds,) = measure_beds(stones, facades)
+    deformation = measure_deformation(stones, facades)
+    assert beds.scatter == pytest.approx(0.001, rel=0.25)
+    assert {line.scatter for line in lines} == {beds.scatter} == set(deformation.scatter.values())
+
+    def still(code: str, places: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.zeros_like(places)
+
+    compared = sum(one.misfit.still for one in compare_courses(lines, still))
+    groups = [one for one in deformation.groups if one.quantity == "beds"]
+    diagnosed = sum(float(one.residuals(still) @ one.residuals(still)) for one in groups)
+    assert compared == pytest.approx(diagnosed, rel=1e-9)
+    moved = bool(beds.movements)
+    dof = sum(one.dof for one in groups)
+    assert (compared > 5.0 * dof) if moved else (abs(compared - dof) < 4.0 * math.sqrt(2.0 * dof))
