@@ -13,6 +13,7 @@ from survey.clouds.outlines.reading import PICTURES, Drawing
 from survey.clouds.placing import PlacedOutline
 from survey.geometry.polygons import ring_area
 from survey.records.review import Doubtful
+from survey.statistics.scale import deviation
 
 __all__ = ["drawn_doubts", "flat_doubts", "measured_doubts"]
 
@@ -71,7 +72,7 @@ def _shape_doubts(
     areas = np.array([abs(ring_area(ring)) for ring in rings])
     logs = np.log(np.maximum(areas, 1e-12))
     middle = float(np.median(logs))
-    spread = max(1.4826 * float(np.median(np.abs(logs - middle))), _SPREAD)
+    spread = max(deviation(logs, middle), _SPREAD)
     for one, ring, area, log in zip(outlines, rings, areas, logs, strict=True):
         for reason, text in one.doubts:
             yield Doubtful(one.code, reason, text, one.where)

@@ -15,6 +15,7 @@ from survey.arrays import Array, Bools, Ints
 from survey.geometry.adjacency import SolidArrays
 from survey.joints.facing import FacePlanes, FacingFaces
 from survey.joints.settings import JointSettings
+from survey.statistics.scale import deviation
 
 __all__ = ["fit_bent_bed"]
 
@@ -236,7 +237,7 @@ def _fitted(solids: SolidArrays, sound: Bools, bed: _Bed, posts: Array, number: 
         fitted = np.linalg.lstsq(design * root[:, None], local[:, 2] * root, rcond=None)[0]
         solution = fitted.astype(np.float64)
         residual = np.abs(local[:, 2] - design @ solution)
-        spread = max(1.4826 * float(np.median(residual)), 1e-4)
+        spread = max(deviation(residual, 0.0), 1e-4)
         robust = np.minimum(1.0, 1.5 * spread / np.maximum(residual, 1e-300))
         weight = np.where(sound[corner], robust, _WORN)
     return _Chain(posts, solution[:-2], float(solution[-2]), residual[sound[corner]], number)

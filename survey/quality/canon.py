@@ -9,6 +9,7 @@ import numpy as np
 from survey.arrays import Array
 from survey.quality.precision import StoneQuality
 from survey.records.survey import Canon
+from survey.statistics.scale import deviation
 
 __all__ = ["ENOUGH", "Deviation", "KindStandard", "deviations", "standards"]
 
@@ -17,7 +18,6 @@ ENOUGH = 5
 """Least number of stones of a kind for a median and its scatter."""
 
 _EXACT = 1e-6  # metres: lower limit of the standard deviation of a dimension
-_CONSISTENT = 1.4826  # standard deviation over median absolute deviation, of a normal distribution [-]
 
 
 @dataclass(frozen=True)
@@ -126,5 +126,5 @@ def _median(kind: str, stones: Sequence[StoneQuality]) -> KindStandard:
 def _centre(values: Array, precision: float) -> tuple[float, float]:
     """Return the median, and the robust standard deviation beyond the precision."""
     middle = float(np.median(values))
-    spread = _CONSISTENT * float(np.median(np.abs(values - middle)))
+    spread = deviation(values, middle)
     return middle, math.sqrt(max(spread**2 - precision**2, 0.0))

@@ -16,6 +16,7 @@ from survey.arrays import Array, Bools
 from survey.geometry.polygons import ring_area
 from survey.quality.canon import ENOUGH
 from survey.quality.facades import find_facades
+from survey.statistics.scale import deviation
 
 __all__ = ["Misplaced", "SeenFace", "Sign", "misplaced_corners"]
 
@@ -25,7 +26,6 @@ _SPIKE = 30.0  # angle that no dressed stone of four corners or more has [degree
 _ASKEW = 15.0  # least departure of an angle from those of its kind [degrees]: 8 cm on a side of 30 cm
 _LARGER = 0.25  # least departure of a size from that of its kind, over the median [-]
 _ODD = 6.0  # robust standard deviations from the median of the kind: quarries do not cut normal distributions
-_CONSISTENT = 1.4826  # standard deviation over median absolute deviation, of a normal distribution [-]
 _CUT = 0.08  # length of a side up to which it may be that of a corner broken off [m]
 _ALONE = 0.05  # distance of the middle of a side from all other faces [m]: no joint is so wide
 _ALIKE = 0.5  # of the departure of one stone: that of another which is odd in the same way [-]
@@ -179,7 +179,7 @@ def _least_askew(faces: Sequence[SeenFace]) -> float:
     if len(worst) < ENOUGH:
         return 90.0 - _SPIKE
     usual = np.median(worst)
-    return float(usual + max(_ASKEW, _ODD * _CONSISTENT * np.median(np.abs(np.array(worst) - usual))))
+    return float(usual + max(_ASKEW, _ODD * deviation(np.array(worst), float(usual))))
 
 
 def _sound_corners(face: SeenFace) -> Bools:
@@ -248,7 +248,7 @@ def _odd_sizes(faces: Sequence[SeenFace]) -> Iterator[Misplaced]:
 def _outliers(values: Array, least: float) -> Bools:
     """Find the values (n,) that lie alone, far from the median and by at least `least` from it."""
     off = values - np.median(values)
-    far = np.abs(off) > max(least, _ODD * _CONSISTENT * float(np.median(np.abs(off))))
+    far = np.abs(off) > max(least, _ODD * deviation(off, 0.0))
     alike = np.array([(off * np.sign(one) > _ALIKE * abs(one)).sum() - 1 for one in off])
     out: Bools = far & (alike < _COMPANY)
     return out

@@ -183,8 +183,7 @@ def _plane(positions: Array, sigmas: Array, towards: Array | None) -> FaceFit:
     if free < 2 or inner.max() * (free - 1) / left <= stdtrit(free - 1, 1.0 - 0.5e-3 / len(positions)) ** 2:
         return plain
     # the median residual, with its correction for few points (Rousseeuw & Leroy 1987)
-    rough = np.median(np.abs(fit_plane(positions, None, towards).residuals))
-    scatter = 1.4826 * (1.0 + 5.0 / free) * float(rough)
+    scatter = (1.0 + 5.0 / free) * deviation(fit_plane(positions, None, towards).residuals, 0.0)
     return fit_plane(positions, np.maximum(sigmas, scatter), towards)
 
 

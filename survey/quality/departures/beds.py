@@ -20,7 +20,19 @@ from numpy.typing import NDArray
 
 from survey.arrays import Array
 from survey.quality.courses import CourseLine, measure_courses, with_scatter
-from survey.quality.departures.shapes import LIKELY, Found, Run, Sample, Shape, critical, fit_shapes, powers
+from survey.quality.departures.shapes import (
+    FINEST,
+    LEAST,
+    LIKELY,
+    Found,
+    Run,
+    Sample,
+    Shape,
+    critical,
+    fit_shapes,
+    millimetres,
+    powers,
+)
 from survey.quality.facades import Facade
 from survey.quality.precision import StoneQuality
 from survey.statistics.roots import root_of
@@ -99,7 +111,7 @@ class BedMovement:
     @property
     def text(self) -> str:
         """The movement in a sentence."""
-        size = f"{abs(self.amount) * 1e3:.1f} ± {self.sigma * 1e3:.1f} mm"
+        size = millimetres(self.amount, self.sigma)
         down = self.amount < 0.0
         where = f"from {self.left:z.2f} to {self.right:z.2f} m"
         what = {
@@ -176,7 +188,7 @@ class OddBed:
     @property
     def text(self) -> str:
         """The departure in words."""
-        size = f"{abs(self.amount) * 1e3:.0f} ± {self.sigma * 1e3:.0f} mm"
+        size = millimetres(self.amount, self.sigma, 0)
         return f"its bed lies {size} {'above' if self.amount > 0.0 else 'below'} those of its neighbours"
 
 
@@ -298,7 +310,7 @@ def _beds(lines: Sequence[CourseLine]) -> _Beds:
         own = sorted(corners, key=lambda code: float(line.along[corners[code]].mean()))
         for code in own:
             places = corners[code]
-            variance = float((line.sigma[places] ** 2).sum()) / len(places) ** 2
+            variance = max(float((line.sigma[places] ** 2).sum()) / len(places) ** 2, FINEST**2)
             codes.append(code)
             table.append((k, float(line.along[places].mean()), float(line.height[places].mean()), variance))
     course, along, height, measured = (np.array(column) for column in zip(*table, strict=True))
@@ -426,7 +438,7 @@ def _odd_beds(
             if len({gap > 0.0 for gap, _ in gaps}) == 1:
                 gap, both = min(gaps, key=lambda one: abs(one[0]) / math.sqrt(one[1]))
                 amount[own[i]], sigma[own[i]] = gap, math.sqrt(both)
-    strange = np.flatnonzero(np.abs(amount) > limit * sigma)
+    strange = np.flatnonzero(np.abs(amount) > np.maximum(limit * sigma, LEAST))
     found = []
     for i in strange.tolist():
         near = (np.abs(beds.along - beds.along[i]) < 0.75 * lengths.get(beds.codes[i], 0.5)) & (

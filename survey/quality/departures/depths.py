@@ -17,13 +17,13 @@ from survey.quality.departures.shapes import critical
 from survey.quality.facades import Facade
 from survey.quality.precision import StoneQuality
 from survey.records.survey import DepthRule
+from survey.statistics.scale import deviation
 
 __all__ = ["DoubtfulDepth", "doubtful_depths"]
 
 _ENOUGH = 5  # least number of stones for a median and its scatter
 _LEAST = 0.12  # scatter of depths that needs no reason, over the depth [-]
 _WITHOUT = 0.25  # standard deviation of a rule that states none, over its depth [-]
-_CONSISTENT = 1.4826  # standard deviation over median absolute deviation, of a normal distribution [-]
 _BESIDE = 8  # neighbours with which a stone is compared
 _PARALLEL = 20.0  # largest angle of two opposite faces [degrees]
 _THICKEST = 6.0  # largest thickness of a wall whose two faces are set against each other [m]
@@ -133,7 +133,7 @@ def _among(
 ) -> Iterator[DoubtfulDepth]:
     logs = np.log([stones[i].depth or math.nan for i in beside])
     middle = float(np.median(logs))
-    spread = max(_CONSISTENT * float(np.median(np.abs(logs - middle))), _LEAST)
+    spread = max(deviation(logs, middle), _LEAST)
     for i in own:
         yield from _doubt(
             stones[i],

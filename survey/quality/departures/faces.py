@@ -21,9 +21,22 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from survey.arrays import Array
-from survey.quality.departures.shapes import LIKELY, MOST, Found, Sample, Shape, critical, fit_shapes, powers
+from survey.quality.departures.shapes import (
+    FINEST,
+    LEAST,
+    LIKELY,
+    MOST,
+    Found,
+    Sample,
+    Shape,
+    critical,
+    fit_shapes,
+    millimetres,
+    powers,
+)
 from survey.quality.facades import Facade
 from survey.quality.precision import StoneQuality
+from survey.statistics.scale import spread
 
 __all__ = ["FaceKind", "FaceMovement", "OddStone", "WallFace", "find_face_departures"]
 
@@ -33,10 +46,7 @@ _NEAR = 10  # neighbours with which a stone is compared
 _FEW = 5  # least number of neighbours of a plane
 _REACH = 6.0  # of the median size of a stone: distance of neighbours
 _TURNED = 12.0  # largest angle of a face to its wall [degrees]: splayed jambs are not of the wall
-_CONSISTENT = 1.4826  # standard deviation over median absolute deviation, of a normal distribution [-]
 _BISQUARE = 4.685  # limit of Tukey's weights [standard deviations]
-_OUTLIER = 2.5  # standard deviations beyond which a stone does not count for the scatter
-_KEPT = 0.9113  # variance of a standard normal variable within that limit
 _PER_STONE = 0.7  # degrees of freedom that a stone gives the scatter: neighbours are in each other's planes
 _PROJECTING = frozenset({"cornice", "coping", "corbel", "sill", "base", "capital", "slab", "boss"})
 _RANKS = {
@@ -94,7 +104,7 @@ class FaceMovement:
     @property
     def text(self) -> str:
         """The movement in a sentence."""
-        size = f"{abs(self.amount) * 1e3:.1f} ± {self.sigma * 1e3:.1f} mm"
+        size = millimetres(self.amount, self.sigma)
         way = "outwards" if self.amount > 0.0 else "inwards"
         over = f"over {self.high - self.low:.2f} m"
         stands = f"stands {size} {'forward of' if self.amount > 0.0 else 'behind'}"
@@ -139,7 +149,7 @@ class OddStone:
         if self.sort == "turned":
             size = f"{math.degrees(self.amount):.1f} ± {math.degrees(self.sigma):.1f}°"
             return f"its face is turned by {size} against those around it"
-        return f"it stands {self.sort} by {abs(self.amount) * 1e3:.0f} ± {self.sigma * 1e3:.0f} mm of those around it"
+        return f"it stands {self.sort} by {millimetres(self.amount, self.sigma, 0)} of those around it"
 
 
 @dataclass(frozen=True)
@@ -261,7 +271,7 @@ def _faces(stones: Sequence[StoneQuality], facade: Facade) -> Iterator[tuple[str
 def _offset_sigma(stone: StoneQuality) -> float:
     """Return the standard deviation of a face's place; points that were left out by chance make it too small."""
     left_out = len(stone.blunders) + len(stone.worn)
-    return max(stone.offset_sigma, 1e-6) * (1.0 + 2.0 * left_out / max(stone.points, 1))
+    return max(stone.offset_sigma, FINEST) * (1.0 + 2.0 * left_out / max(stone.points, 1))
 
 
 def _planes(face: _Face) -> list[NDArray[np.intp]]:
@@ -358,7 +368,7 @@ def _odd(
             float(away[i]),
             float(away_sigma[i]),
         )
-        for i in np.flatnonzero(np.abs(away) > limit * away_sigma).tolist()
+        for i in np.flatnonzero(np.abs(away) > np.maximum(limit * away_sigma, LEAST)).tolist()
     ]
     for i in np.flatnonzero((np.abs(turned) > limit * turned_sigma).any(axis=1)).tolist():
         k = int((np.abs(turned[i]) / turned_sigma[i]).argmax())
@@ -381,7 +391,7 @@ def _beside(face: _Face) -> tuple[Array, Array, float]:
     scatter = 0.0
     # the first weights know no plane, only the median of the neighbours: one odd stone would turn a plane
     first = values - np.median(values, axis=1)[:, None]
-    weights = _bisquare(np.abs(first) / max(_spread(first[~far]), 1e-9), far)
+    weights = _bisquare(np.abs(first) / max(spread(first[~far]), 1e-9), far)
     for _ in range(4):
         variance = face.sigma**2 + scatter**2
         normal = np.einsum("nki,nk,nkj->nij", rows, weights / variance[index], rows)
@@ -393,7 +403,7 @@ def _beside(face: _Face) -> tuple[Array, Array, float]:
         inverse = np.linalg.inv(normal)
         predicted = inverse[:, 0, 0]
         share = 1.0 + predicted / variance  # variance of the departure over that of a face
-        found = _spread(away / np.sqrt(share))
+        found = spread(away / np.sqrt(share))
         scatter = math.sqrt(max(found**2 - float(np.median(face.sigma**2)), 0.0))
         weights = _bisquare(np.abs(rest) / np.sqrt(face.sigma[index] ** 2 + scatter**2), far)
     sigma = np.sqrt(face.sigma**2 + scatter**2 + predicted)
@@ -415,13 +425,6 @@ def _nearest(places: Array, count: int) -> tuple[Array, NDArray[np.intp]]:
     return np.asarray(distance), np.asarray(index)
 
 
-def _spread(values: Array) -> float:
-    """Return the standard deviation of values about 0: from a median, then from those within 2.5 of it."""
-    first = _CONSISTENT * float(np.median(np.abs(values)))
-    kept = values[np.abs(values) <= _OUTLIER * first]
-    return math.sqrt(float((kept**2).mean()) / _KEPT) if len(kept) else first
-
-
 def _turned(face: _Face) -> tuple[Array, Array]:
     """Return the turn of each face about the upright and the level axis against its neighbours, and its σ [rad]."""
     count = len(face.codes)
@@ -436,7 +439,7 @@ def _turned(face: _Face) -> tuple[Array, Array]:
     sigma = np.full(turned.shape, np.inf)
     for k in range(2):
         if known.any():
-            excess = max(_spread(turned[known, k] / (grown * measured[known])), 1.0)
+            excess = max(spread(turned[known, k] / (grown * measured[known])), 1.0)
             sigma[:, k] = grown * excess * measured
     return turned, sigma
 

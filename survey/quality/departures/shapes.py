@@ -21,7 +21,26 @@ from scipy.special import stdtr, stdtrit
 
 from survey.arrays import Array
 
-__all__ = ["LIKELY", "MOST", "Found", "Run", "Sample", "Shape", "critical", "fit_shapes", "powers"]
+__all__ = [
+    "FINEST",
+    "LEAST",
+    "LIKELY",
+    "MOST",
+    "Found",
+    "Run",
+    "Sample",
+    "Shape",
+    "critical",
+    "fit_shapes",
+    "millimetres",
+    "powers",
+]
+
+FINEST = 1e-4
+"""Standard deviation that no bed and no face is known better than [m]: a tenth of a millimetre."""
+
+LEAST = 1e-3
+"""Least movement or departure worth telling [m]: a millimetre, in which masons and surveyors count."""
 
 LIKELY = 1.645
 """Standard deviations by which a movement that is found in 95 of 100 surveys exceeds the critical value."""
@@ -134,6 +153,12 @@ class _Moments:
         return squares, values, tilt, np.maximum(shares - whole, 0.0), count
 
 
+def millimetres(amount: float, sigma: float, digits: int = 1) -> str:
+    """Return an amount [m] and its σ in words; a σ that would be rounded to nothing is one of the last digit."""
+    last = 10.0**-digits
+    return f"{abs(amount) * 1e3:.{digits}f} ± {max(sigma * 1e3, last):.{digits}f} mm"
+
+
 def critical(alpha: float, tests: int, freedom: float) -> float:
     """Return the value of |t| that chance exceeds in any of some tests with probability α at most (Bonferroni)."""
     return float(-stdtrit(freedom, alpha / (2.0 * max(tests, 1))))
@@ -170,7 +195,7 @@ def fit_shapes(
         if not found:
             tests = int(trials.tells.sum())
             limit = critical(alpha, tests, sample.freedom)
-        enough = _LEAST * max((abs(one.amount) for one in found), default=0.0)
+        enough = max(LEAST, _LEAST * max((abs(one.amount) for one in found), default=0.0))
         score = np.where(np.abs(trials.amount) < enough, 0.0, trials.score)
         if float(score.max(initial=0.0)) <= limit**2:
             break
@@ -189,7 +214,7 @@ def fit_shapes(
     while found:
         judged = [_judged(sample, found, k, fields, tests) for k in range(len(found))]
         most = max(abs(one.amount) for one in judged)
-        weak = [one for one in judged if abs(one.amount) <= max(limit * one.sigma, _LEAST * most)]
+        weak = [one for one in judged if abs(one.amount) <= max(limit * one.sigma, LEAST, _LEAST * most)]
         if not weak:
             return judged, limit
         least = min(weak, key=lambda one: abs(one.amount) / one.sigma)

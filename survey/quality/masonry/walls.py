@@ -40,6 +40,7 @@ from survey.quality.masonry.index import (
     mechanical_ranges,
 )
 from survey.quality.masonry.trace import minimum_traces, section_trace
+from survey.statistics.scale import deviation
 
 __all__ = ["MasonryQuality", "WallStone", "judge_masonry"]
 
@@ -211,7 +212,7 @@ def _typical(traces: Array, sigma: float) -> tuple[float, float] | tuple[None, N
     if len(traces) < 3:
         return None, None
     middle = float(np.median(traces))
-    spread = 1.4826 * float(np.median(np.abs(traces - middle)))
+    spread = deviation(traces, middle)
     return middle, math.hypot(1.2533 * spread / math.sqrt(len(traces)), math.sqrt(10.0) * sigma)
 
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from survey.arrays import Array
 from survey.extrusion.depth import Depth
+from survey.statistics.scale import deviation
 from survey.unseen.missing.gaps import CourseGap
 from survey.unseen.missing.settings import MissingSettings
 from survey.unseen.missing.sides import Elevation, FlatStone
@@ -163,7 +164,7 @@ def depth_of_kind(
     depths = np.array([block.depth.value for block in blocks])
     known = [block.depth.sigma for block in blocks if block.depth.sigma is not None]
     value = float(np.median(depths))
-    spread = 1.4826 * float(np.median(np.abs(depths - value)))
+    spread = deviation(depths, value)
     sigma = math.hypot(spread, float(np.median(known))) if known else None
     return Depth(value, sigma, text, "kind", 0)
 

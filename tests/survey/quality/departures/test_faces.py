@@ -239,3 +239,16 @@ def test_toothed_faces_are_not_given_movements() -> None:
         face = face_of(wall(14, out=lambda s, c: -0.08 * (int(s / 0.5) % 2), faces=faces, sigma=0.0005))
         assert face.movements == ()
         assert face.excluded is None or face.excluded > 0.05
+
+
+def test_less_than_a_millimetre_is_not_told_and_no_sigma_is_nothing() -> None:
+    """Of exact faces, as programs make them."""
+    exact = {"faces": 0.0, "sigma": 0.0}
+    tiny = face_of(
+        wall(17, out=lambda s, c: 0.0005 * up(c) + 0.0004 * (c == 4 and abs(s - 2.75) < 0.1), **exact)
+    )  # type: ignore[arg-type]
+    assert (tiny.movements, tiny.odd) == ((), ())
+    (lean,) = face_of(wall(17, out=lambda s, c: 0.0262 * up(c), **exact)).movements  # type: ignore[arg-type]
+    assert "± 0.1 mm over" in lean.text
+    (odd,) = face_of(wall(17, out=lambda s, c: 0.01 * (c == 4 and abs(s - 2.75) < 0.1), **exact)).odd  # type: ignore[arg-type]
+    assert "proud by 10 ± 1 mm" in odd.text
