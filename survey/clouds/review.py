@@ -11,7 +11,7 @@ from survey.clouds.extras import optional
 from survey.clouds.outlines.outline import Outline
 from survey.clouds.outlines.reading import PICTURES, Drawing
 from survey.clouds.placing import PlacedOutline
-from survey.geometry.polygons import ring_area
+from survey.geometry.polygons import ring_area, seamless
 from survey.records.review import Doubtful
 from survey.statistics.scale import deviation
 
@@ -20,6 +20,7 @@ __all__ = ["drawn_doubts", "flat_doubts", "measured_doubts"]
 _OVERLAP = 0.05  # part of the smaller stone's area that two outlines may share: jitter of neighbours
 _WITHIN = 0.5  # of an outline's area in a larger one, above which it lies within this
 _FRAMED = 3  # outlines that a frame holds at least
+_JOINT = 0.05  # widest joint between two outlines [m]
 _THICK = 0.02  # by which boxes of outlines are widened: neighbours do not lie in one plane [m]
 _SOLID = (
     0.80  # area over that of the convex hull below which an outline leaks: a stone with a deep notch has more
@@ -55,6 +56,7 @@ def flat_doubts(outlines: Sequence[Outline], rings: Sequence[Array], drawing: Dr
         return  # a pixel is of one stone
     low, high = (np.array([end(ring, axis=0) for ring in rings]) for end in (np.min, np.max))
     pairs = _near_pairs(low, high)
+    yield from _seams(outlines, rings, low, high)
     try:
         yield from _overlaps(outlines, pairs, [rings[i] for i, _ in pairs], [rings[j] for _, j in pairs])
     except UsageError as error:  # shapely is missing, which the reader of these outlines does without
@@ -84,6 +86,21 @@ def _shape_doubts(
         if (solid := area / max(_hull_area(ring), 1e-12)) < _SOLID:
             text = f"it fills {solid:.0%} of its convex hull: a mask may leak into a joint or a neighbour"
             yield Doubtful(one.code, "leak", text, one.where)
+
+
+def _seams(
+    outlines: Sequence[Outline], rings: Sequence[Array], low: Array, high: Array
+) -> Iterator[Doubtful]:
+    """Yield pairs of outlines without a joint between them, where others have one."""
+    upright = [ring if ring_area(ring) > 0.0 else ring[::-1] for ring in rings]
+    near = _near_pairs(low - 0.5 * _JOINT, high + 0.5 * _JOINT)
+    for pair in seamless(upright, [(int(i), int(j)) for i, j in near]):
+        other = outlines[pair.second]
+        text = (
+            f"no joint parts it from {other.code} ({pair.gap * 1e3:.0f} mm; others are {pair.usual * 1e3:.0f} mm "
+            "wide): one stone drawn as two?"
+        )
+        yield Doubtful(outlines[pair.first].code, "no joint", text, outlines[pair.first].where)
 
 
 def measured_doubts(one: PlacedOutline, plane: Array, numbers: Array) -> Iterator[Doubtful]:

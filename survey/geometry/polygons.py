@@ -1,10 +1,72 @@
-"""Plane polygons: area, and places within."""
+"""Plane polygons: area, places within, and neighbours without a joint between them."""
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from survey.arrays import Array, Bools
+from survey.statistics.scale import deviation
 
-__all__ = ["inside", "ring_area"]
+__all__ = ["Seamless", "inside", "ring_area", "seamless"]
+
+_WIDEST = 0.05  # gap between two stones that is a joint [m]
+_PARALLEL = math.cos(math.radians(10.0))  # of the angle between the two sides of a joint
+_ALONG = 0.5  # of the shorter of two sides: their common length, at least
+_FEWEST = 8  # joints from which a usual one is known
+_NONE = 0.25  # of the usual joint: a gap below is none
+_CLEAR = 4.0  # robust standard deviations by which it differs from the usual one
+
+
+class Seamless(NamedTuple):
+    """Two polygons that touch where others have a joint.
+
+    Attributes
+    ----------
+    first, second : their numbers
+    gap, usual : between them, and between others [m]
+    """
+
+    first: int
+    second: int
+    gap: float
+    usual: float
+
+
+def seamless(rings: Sequence[Array], pairs: Iterable[tuple[int, int]]) -> list[Seamless]:
+    """Return the pairs that have no joint between them, in a wall whose joints are wider.
+
+    Parameters
+    ----------
+    rings : (n, 2) corners of polygons, counter-clockwise [m]
+    pairs : of neighbours, by number
+    """
+    gaps = [(i, j, gap) for i, j in pairs if (gap := _gap(rings[i], rings[j])) is not None]
+    if len(gaps) < _FEWEST:
+        return []
+    widths = np.array([gap for *_, gap in gaps])
+    usual = float(np.median(widths))
+    limit = min(_NONE * usual, usual - _CLEAR * deviation(widths, usual))
+    return [Seamless(i, j, max(gap, 0.0), usual) for i, j, gap in gaps if abs(gap) < limit]
+
+
+def _gap(one: Array, other: Array) -> float | None:
+    """Return the width of the longest joint between two polygons [m]; None if they have none."""
+    runs = [np.roll(ring, -1, axis=0) - ring for ring in (one, other)]
+    lengths = [np.maximum(np.linalg.norm(run, axis=1), 1e-300) for run in runs]
+    ways = runs[0] / lengths[0][:, None]
+    facing = -(ways @ (runs[1] / lengths[1][:, None]).T) >= _PARALLEL
+    best: tuple[float, float] | None = None
+    for a, b in zip(*np.nonzero(facing), strict=True):
+        ends = np.array([other[b], other[b] + runs[1][b]]) - one[a]
+        along, across = ends @ ways[a], ends @ np.array([ways[a][1], -ways[a][0]])
+        common = min(float(along.max()), float(lengths[0][a])) - max(float(along.min()), 0.0)
+        width = float(across.mean())
+        enough = common >= _ALONG * min(lengths[0][a], lengths[1][b])
+        if enough and abs(width) <= _WIDEST and (best is None or common > best[0]):
+            best = common, width
+    return None if best is None else best[1]
 
 
 def ring_area(ring: Array) -> float:

@@ -13,7 +13,7 @@ from enum import StrEnum
 import numpy as np
 
 from survey.arrays import Array, Bools
-from survey.geometry.polygons import ring_area
+from survey.geometry.polygons import ring_area, seamless
 from survey.quality.canon import ENOUGH
 from survey.quality.facades import find_facades
 from survey.statistics.scale import deviation
@@ -21,6 +21,7 @@ from survey.statistics.scale import deviation
 __all__ = ["Misplaced", "SeenFace", "Sign", "misplaced_corners"]
 
 _DEEP = 0.03  # thickness of the overlap of two faces [m]: two usual joints, more than rough edges interlock
+_JOINT = 0.05  # distance of the boxes of two faces that have a joint [m]
 _BESIDE = 0.25  # distance of two faces, one in front of the other, beyond which they do not collide [m]
 _SPIKE = 30.0  # angle that no dressed stone of four corners or more has [degrees]
 _ASKEW = 15.0  # least departure of an angle from those of its kind [degrees]: 8 cm on a side of 30 cm
@@ -38,6 +39,7 @@ class Sign(StrEnum):
     OVERLAP = "overlap"
     ANGLE = "angle"
     SIZE = "size"
+    SEAM = "seam"
 
 
 @dataclass(frozen=True)
@@ -107,7 +109,7 @@ def misplaced_corners(faces: Sequence[SeenFace]) -> tuple[Misplaced, ...]:
         members = [faces[i] for i in facade.members.tolist()]
         flat = [facade.frame.flatten(one.outline) for one in members]
         away = (middles[facade.members] - facade.frame.origin) @ facade.frame.axes[2]
-        found += [*_overlaps(members, flat, away), *_odd_angles(members, flat, askew)]
+        found += [*_overlaps(members, flat, away), *_odd_angles(members, flat, askew), *_seams(members, flat)]
     order = list(Sign)
     return tuple(sorted(found, key=lambda one: (order.index(one.sign), -one.severity, one.code)))
 
@@ -125,15 +127,26 @@ def _overlaps(members: Sequence[SeenFace], flat: Sequence[Array], away: Array) -
                 yield Misplaced(one.code, one.line, Sign.OVERLAP, depth, text)
 
 
-def _near(flat: Sequence[Array]) -> Iterator[tuple[int, int]]:
-    """Yield the pairs of polygons whose boxes overlap deeply."""
+def _seams(members: Sequence[SeenFace], flat: Sequence[Array]) -> Iterator[Misplaced]:
+    """Yield the first of two stones without a joint between them, where others have one."""
+    for pair in seamless(flat, _near(flat, -_JOINT)):
+        one, other = members[pair.first], members[pair.second]
+        text = (
+            f"no joint parts it from {other.code} ({pair.gap * 1e3:.0f} mm; others are {pair.usual * 1e3:.0f} mm "
+            "wide): one stone drawn as two?"
+        )
+        yield Misplaced(one.code, one.line, Sign.SEAM, pair.usual - pair.gap, text)
+
+
+def _near(flat: Sequence[Array], deep: float = _DEEP) -> Iterator[tuple[int, int]]:
+    """Yield the pairs of polygons whose boxes overlap by a depth [m]; of a negative one, that are no farther apart."""
     low, high = np.array([one.min(axis=0) for one in flat]), np.array([one.max(axis=0) for one in flat])
     order = np.argsort(low[:, 0], kind="stable")
     starts = low[order, 0]
     for place, i in enumerate(order.tolist()):
-        later = order[place + 1 : int(np.searchsorted(starts, high[i, 0] - _DEEP))]
+        later = order[place + 1 : int(np.searchsorted(starts, high[i, 0] - deep))]
         common = np.minimum(high[later], high[i]) - np.maximum(low[later], low[i])
-        yield from ((i, j) for j in later[common.min(axis=1, initial=np.inf) > _DEEP].tolist())
+        yield from ((i, j) for j in later[common.min(axis=1, initial=np.inf) > deep].tolist())
 
 
 def _common(one: Array, other: Array) -> Array:

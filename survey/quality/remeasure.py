@@ -6,7 +6,7 @@ counted.
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from enum import IntEnum
 
@@ -59,6 +59,7 @@ _SHAPE_ACTIONS = {
 }
 
 _CORNER_ACTIONS = {
+    Sign.SEAM: "look whether there is a joint, and draw one stone or the joint",
     Sign.OVERLAP: "measure the corners of both again: one was measured on the other stone, or mistyped",
     Sign.ANGLE: "measure this corner again, unless the stone is cut so",
     Sign.SIZE: "measure its corners again, unless the stone is of that size",
@@ -76,11 +77,12 @@ class Urgency(IntEnum):
     ANGLE = 6
     SIZE = 7
     KIND = 8
-    TILT = 9
-    SHAPE = 10
-    SCATTER = 11
-    SMOOTH = 12
-    EDGE = 13
+    TWICE = 9
+    TILT = 10
+    SHAPE = 11
+    SCATTER = 12
+    SMOOTH = 13
+    EDGE = 14
 
 
 _WRONG = frozenset(
@@ -93,8 +95,16 @@ _WRONG = frozenset(
         Urgency.ANGLE,
         Urgency.SIZE,
         Urgency.KIND,
+        Urgency.TWICE,
     }
 )
+
+_URGENCIES = {
+    Sign.OVERLAP: Urgency.OVERLAP,
+    Sign.ANGLE: Urgency.ANGLE,
+    Sign.SIZE: Urgency.SIZE,
+    Sign.SEAM: Urgency.TWICE,
+}
 
 _ALWAYS: Mapping[Urgency, str] = {
     Urgency.MISSING: "whether the wall stands, which has a hole there",
@@ -121,6 +131,7 @@ _WEAK: Mapping[Urgency, tuple[str, str]] = {
     Urgency.SCATTER: ("points that scatter more than the others", "measure on the dressed margin"),
     Urgency.SMOOTH: ("points that scatter too little to have been measured", "see how they were made"),
     Urgency.KIND: ("proportions that are not those of the kind", "see on site what kinds they are"),
+    Urgency.TWICE: ("drawn or named twice", "see how outlines are drawn"),
     Urgency.EDGE: ("broken or cut edges", "these are left out as they should be"),
 }
 
@@ -184,7 +195,8 @@ def list_remeasures(
     misplaced : signs of corners out of place; the size of a stone of the wrong kind is none
     depths : depths that contradict other evidence
     """
-    found = [_missing(one) for one in rejects]
+    made = {one.code for one in stones}
+    found = [_missing(one, made) for one in rejects]
     scale = quality.sigma0 or 1.0
     for stone in stones:
         found += _reasons(stone, scale, _UNLIKELY / len(stones))
@@ -201,9 +213,7 @@ def list_remeasures(
     ]
     of_wrong_kind = {one.code for one in contradictions}
     found += [
-        Remeasure(
-            one.code, one.line, Urgency[one.sign.name], one.severity, one.text, _CORNER_ACTIONS[one.sign]
-        )
+        Remeasure(one.code, one.line, _URGENCIES[one.sign], one.severity, one.text, _CORNER_ACTIONS[one.sign])
         for one in misplaced
         if one.sign is not Sign.SIZE or one.code not in of_wrong_kind
     ]
@@ -269,12 +279,14 @@ def _left(urgency: Urgency, count: int, stones: int, common: bool) -> str:
     return f"{subject}: {weak}; no verdict depends on {'them' if count > 1 else 'it'}"
 
 
-def _missing(reject: Reject) -> Remeasure:
+def _missing(reject: Reject, made: Set[str]) -> Remeasure:
+    """Return why a stone could not be made; where another has its code the wall has no hole there."""
     line = reject.spans[0].start if reject.spans else 0
     action = reject.error.remedy or "measure the stone again"
     where = "" if reject.error.where is None else f" ({reject.error.where})"
     reason = f"could not be made: {reject.error.what}{where}"
-    return Remeasure(reject.code, line, Urgency.MISSING, 0.0, reason, action)
+    urgency = Urgency.TWICE if reject.code in made else Urgency.MISSING
+    return Remeasure(reject.code, line, urgency, 0.0, reason, action)
 
 
 def _reasons(stone: StoneQuality, scale: float, chance: float) -> Iterator[Remeasure]:

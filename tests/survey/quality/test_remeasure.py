@@ -6,6 +6,7 @@ from scipy.stats import chi2
 
 from moma.errors import SurveyError
 from survey.quality.contradictions import Contradiction
+from survey.quality.corners import SeenFace, Sign, misplaced_corners
 from survey.quality.departures.depths import DoubtfulDepth
 from survey.quality.precision import StoneQuality, judge_survey
 from survey.quality.remeasure import Remeasure, Urgency, list_remeasures, short_list
@@ -110,8 +111,8 @@ def reason(code: str | None, urgency: Urgency, severity: float = 1.0, line: int 
 def test_every_class_of_reason_has_its_place() -> None:
     """What decides whether the wall stands, what cannot be right, what is weak: in this order."""
     assert [one.name for one in sorted(Urgency)] == [
-        "MISSING", "DEPTH", "OVERLAP", "UNCHECKED", "BLUNDERS", "ANGLE", "SIZE", "KIND", "TILT", "SHAPE",
-        "SCATTER", "SMOOTH", "EDGE",
+        "MISSING", "DEPTH", "OVERLAP", "UNCHECKED", "BLUNDERS", "ANGLE", "SIZE", "KIND", "TWICE", "TILT",
+        "SHAPE", "SCATTER", "SMOOTH", "EDGE",
     ]  # fmt: skip
 
 
@@ -222,3 +223,31 @@ def test_one_of_a_thousand_sound_surveys_has_a_stone_listed_for_its_scatter() ->
         for factor, listed_ in ((0.99, 0), (1.01, 1)):
             one = rectangle("X", "header", 0, 0, 0.4, 0.3, sigma0=factor * max(limit, 1.5))
             assert len(list_remeasures([*sound, one], (), (), quality)) == listed_
+
+
+def test_a_reject_whose_code_was_taken_is_no_hole_in_the_wall() -> None:
+    stone = rectangle("A", "ashlar", 0.0, 0.0, 0.5, 0.3)
+    error = SurveyError("code 'A' is given twice", where="wall.gpkg, outline 7", remedy="keep one")
+    twice, missing = Reject("A", error), Reject("B", error)
+    found = list_remeasures([stone], [twice, missing], (), judge_survey([stone]))
+    assert [(one.code, one.urgency) for one in found if one.urgency in (Urgency.TWICE, Urgency.MISSING)] == [
+        ("B", Urgency.MISSING),
+        ("A", Urgency.TWICE),
+    ]
+    changes = {one.code: one.changes for one in short_list(found, 3).rows}
+    assert "hole" in str(changes["B"])
+    assert changes["A"] is None
+
+
+def test_two_stones_without_a_joint_are_questioned() -> None:
+    stones = [
+        rectangle(f"{c}-{k}", "ashlar", 0.5 * k, 0.3 * c, 0.5 if (c, k) == (1, 3) else 0.49, 0.29)
+        for c in range(3)
+        for k in range(8)
+    ]
+    seen = [SeenFace(s.code, s.kind, 1, s.normal, s.outline, (), s.area, s.length, s.height) for s in stones]
+    (one,) = (found for found in misplaced_corners(seen) if found.sign is Sign.SEAM)
+    assert one.code == "1-3"
+    assert "no joint parts it from 1-4 (0 mm; others are 10 mm wide)" in one.text
+    (row,) = list_remeasures(stones, (), (), judge_survey(stones), [one])[:1]
+    assert row.urgency is Urgency.TWICE
