@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 
 from mechanics.dynamics.outcome import Outcome
+from mechanics.dynamics.simulation import Simulation
 from mechanics.dynamics.verdicts.doubt import UnsolvedSteps
+from mechanics.dynamics.verdicts.lasting import balance_of
+from mechanics.dynamics.verdicts.watch import Watch
 from mechanics.model.model import build_model
 from mechanics.scene.loads.load import Course, Loads, Pose
 from mechanics.scene.scene import SolverSettings
@@ -100,3 +103,28 @@ def test_a_run_is_given_up_where_no_step_at_all_was_solved_and_errors_may_be_its
     doubt = UnsolvedSteps(build_model(scene(ground()))[0])
     doubt.count, doubt.steps, doubt.total = count, steps, total
     assert doubt.hopeless(1.0) is hopeless
+
+
+@pytest.mark.parametrize(
+    ("speed", "errors", "outcomes"),
+    [(0.0, 0.0, "moving collapsed"), (0.05, 0.0, "moving moving"), (0.0, 1e3, "moving moving")],
+)
+def test_what_lies_lower_when_the_time_is_over_has_collapsed(speed, errors, outcomes):
+    """A block lies a metre below where it began, as a watch sees it that did not see it fall; a record goes on.
+
+    Not so what slides there, or may have come there by the errors of steps that were not solved [m/s].
+    """
+    stone = brick("a", (0, 0, 0), (0.5, 0.5, 0.5), velocity=(speed, 0, 0, 0, 0, 0))
+    one = scene(ground(), stone, friction=0.0, step=1e-3, duration=8e-3)
+    one = replace(one, loads=Loads(motions=(Jerk(0.0, 0.3, 5.0),)))
+    model, state = build_model(one)
+    higher = state.centre.copy()
+    higher[1, 2] += 1.0
+    watch = Watch(model, replace(state, centre=higher))
+    watch._unsolved.total = errors
+    simulation = Simulation(model, state)
+    seen = []
+    for _ in range(one.time.steps):
+        step = simulation.step()
+        seen.append(str(watch(step, balance_of(model, step))))
+    assert seen[-2:] == outcomes.split()
