@@ -78,6 +78,20 @@ def test_mortar_that_the_dead_load_breaks_holds_nothing():
     assert strong.broken == ()
 
 
+def test_mortar_that_breaks_without_parting_holds_nothing_either():
+    """A cube hangs at a wall by half its weight, and drops onto the ground along it: away from it, it slides at .5."""
+    weight = 2000.0 * 9.81 * 0.4
+    wall = brick("wall", (0.4, -1.0, 0.0), (1.4, 1.0, 2.0), Fidelity.FIXED)
+    cube = brick("cube", (0.0, 0.0, 2e-4), (0.4, 0.4, 0.4002))
+    one = scene(ground(), wall, cube, friction=0.5, step=5e-3, duration=1.0)
+    rule = LawRule(frozenset({"cube"}), frozenset({"wall"}), MortarJoint(0.5, 0.5 * weight, 0.5 * weight))
+    standing = stands(assembly(replace(one, contact=replace(one.contact, rules=(rule,)))))
+    assert standing.broken == (("wall", "cube"),)
+    assert limit_load(standing.rest, Acceleration((-1.0, 0.0, 0.0))).multiplier == pytest.approx(
+        0.5, rel=1e-3
+    )
+
+
 def test_a_broken_bond_leaves_friction_springs_and_the_strength_to_compression():
     law = ElasticJoint(0.7, 1e9, 4e8, tension=1e4, shear=2e4, compressive_strength=1e6)
     bare = without_bond(law)
