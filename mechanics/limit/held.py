@@ -122,9 +122,9 @@ def held_limit(on: RigidAssembly, live: LiveLoad, bound: LimitLoad) -> HeldLimit
     if not bound.multiplier > 0.0 or not nothing.holds:
         return HeldLimit(0.0, 0.0, nothing.force, _falling(on, nothing), 1)
     begun = _Bracket(0, _LOADS, bound.multiplier * WIDTH, nothing, None, 1)
-    found = _searched(steps, _limited(steps, begun) if np.isinf(bound.multiplier) else begun)
-    worst = None if found.worst is None else _falling(on, found.worst)
-    return HeldLimit(found.low * found.unit, found.high * found.unit, found.best.force, worst, found.problems)
+    last = _searched(steps, _limited(steps, begun) if np.isinf(bound.multiplier) else begun)
+    worst = None if last.worst is None else _falling(on, last.worst)
+    return HeldLimit(last.low * last.unit, last.high * last.unit, last.best.force, worst, last.problems)
 
 
 def _limited(steps: "_Steps", bracket: "_Bracket") -> "_Bracket":
