@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from moma.errors import UsageError
+from moma.tables.columns import UNITS, length_unit
 from survey.formats.options import ReadingOptions
 from survey.formats.reading import ENDINGS, format_of, solid_files, with_header
-from survey.formats.tables.columns import UNITS, length_unit
 from survey.formats.tables.kinds import read_kinds
 
 __all__ = ["UNITS", "Source", "format_of_all", "reading_options", "survey_sources"]

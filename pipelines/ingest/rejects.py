@@ -12,9 +12,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from moma.errors import UsageError
+from moma.tables.rows import is_workbook, open_rows
+from moma.tables.text_lines import TextLines
 from survey.formats.reading import ENDINGS, SOLIDS
-from survey.formats.tables.rows import is_workbook, open_rows
-from survey.formats.text_lines import TextLines
 from survey.records.survey import Reject
 
 __all__ = ["MARK", "check_targets", "default_path", "rejects_text"]

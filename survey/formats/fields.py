@@ -1,10 +1,10 @@
-"""Strict parsing of numbers and names, shared by all formats."""
+"""Strict parsing of numbers and names, shared by all formats; numbers are those of `moma.tables`."""
 
-import math
 import re
 import unicodedata
 
 from moma.errors import SurveyError
+from moma.tables.numbers import FARTHEST, parse_length, parse_number, shown, unreadable
 
 __all__ = [
     "CODE",
@@ -25,32 +25,6 @@ _NOT_IN_CODES = re.compile(r"[^\w.+/:-]+")
 
 KIND = re.compile(r"[a-z][a-z0-9_-]{0,31}")
 """Pattern of the name of a kind of stone."""
-
-FARTHEST = 1e8
-"""Largest coordinate: no site frame reaches farther, and sums of squares stay finite [m]."""
-
-_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
-
-
-def parse_number(text: str, what: str, where: str, far: float = FARTHEST) -> float:
-    """Read one finite decimal number, no larger than `far`; `what` names it in the error."""
-    if _NUMBER.fullmatch(text) is None:
-        raise SurveyError(f"{what} is {shown(text)}, not a number", where=where, remedy="write e.g. 12.345")
-    value = float(text)
-    if not math.isfinite(value) or abs(value) > far:
-        unit = " m" if far == FARTHEST else ""
-        raise SurveyError(
-            f"{what} is {shown(text)}, beyond {far:g}{unit}", where=where, remedy="coordinates are in metres"
-        )
-    return value
-
-
-def parse_length(text: str, what: str, where: str) -> float:
-    """Read one number that must be positive."""
-    value = parse_number(text, what, where)
-    if value <= 0.0:
-        raise SurveyError(f"{what} is {shown(text)}", where=where, remedy="it must be greater than 0")
-    return value
 
 
 def parse_course(text: str, where: str) -> int:
@@ -80,14 +54,3 @@ def code_of(name: str) -> str:
     words = (_NOT_IN_CODES.sub("", one) for one in unicodedata.normalize("NFC", name).split())
     code = "_".join(one for one in words if one).lstrip("_.+/:-")
     return code if CODE.fullmatch(code) else ""
-
-
-def shown(text: str) -> str:
-    """Quote a text, cut to fit on a line."""
-    return repr(text if len(text) <= 40 else text[:37] + "…")
-
-
-def unreadable(path: object, error: Exception, remedy: str = "give an existing file") -> SurveyError:
-    """Make the error of a file that the operating system cannot read."""
-    reason = getattr(error, "strerror", None) or error
-    return SurveyError(f"cannot be read: {reason}", where=str(path), remedy=remedy)

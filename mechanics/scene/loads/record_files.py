@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +30,13 @@ _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 _UNIT = re.compile(
     r"\[\s*([^\]]+?)\s*\]|\(\s*([^)]+?)\s*\)|\bin\s+(\S+)|\bunits?\s*[:=]\s*(\S+)", re.IGNORECASE
 )
+_OTHERS = (
+    *("velocity", "velocities", "vel", "v", "geschwindigkeit", "vitesse", "velocità", "velocidad"),
+    *("displacement", "displacements", "disp", "dis", "d", "verschiebung", "weg", "déplacement"),
+    *("spostamento", "desplazamiento"),
+)
+_OTHER_UNIT = r"(mm|cm|dm|m|km|in|ft)(\s*/\s*s|\s*s\^?-1)?"  # of velocities and displacements
+_LARGEST = 4.5 * UNITS["g"]  # above every ground acceleration ever recorded (4.1 g, Iwate-Miyagi 2008) [m/s²]
 _SQUARE = 0.02  # cosine from which two components are not square to each other
 
 
@@ -66,6 +74,18 @@ def read_accelerograms(
     path: str | Path, unit: str | None = None, dt: float | None = None
 ) -> tuple[Accelerogram, ...]:
     """Read all components of a file; see `read_accelerogram`."""
+    found = _records(path, unit, dt)
+    peak = max((float(np.abs(one.acceleration).max()) for one in found), default=0.0)
+    if peak > _LARGEST:
+        raise SceneError(
+            f"a peak of {peak / UNITS['g']:.3g} g, more than was ever recorded",
+            where=str(path),
+            remedy="correct the unit (cm/s2?), or name the columns; if it is meant, write smaller values and a factor",
+        )
+    return found
+
+
+def _records(path: str | Path, unit: str | None, dt: float | None) -> tuple[Accelerogram, ...]:
     if is_waveform(path):
         return read_waveforms(path, _size(path, unit, None))
     start = "\n".join(
@@ -132,10 +152,13 @@ def _of_table(path: str | Path, unit: str | None, dt: float | None) -> tuple[Acc
     """Read a table of one to four columns: times [s] if it has any, then up to three components."""
     if unit is not None and unit_of(unit) is None:
         raise SceneError(f"unknown unit {unit!r}", where=str(path), remedy=f"give {', '.join(UNITS)}")
-    table = read_table(path, "time, acceleration")
+    table = _accelerations(path, read_table(path, "time, acceleration"))
     count = table.rows.shape[1]
     if count > 4:
-        fail_at(path, int(table.lines[0]), f"{count} columns", "give time, and one to three accelerations")
+        what = f"{count} columns"
+        fail_at(
+            path, int(table.lines[0]), what, "give time, and one to three accelerations, or name the columns"
+        )
     size = _size(path, unit, table)
     timed = _has_times(table, dt)
     if timed:
@@ -162,6 +185,26 @@ def _of_table(path: str | Path, unit: str | None, dt: float | None) -> tuple[Acc
     )
 
 
+def _accelerations(path: str | Path, table: Table) -> Table:
+    """Return a table without its columns that are named as velocities or displacements, or state such a unit."""
+    kept = [k for k, name in enumerate(table.names) if k == 0 or not _is_other(name)]
+    if len(kept) == len(table.names):
+        return table
+    if len(kept) == 1 and _bare(table.names[0]) in _TIMES:
+        what = f"no acceleration among {', '.join(table.names)}"
+        fail_at(path, int(table.lines[0]) - 1, what, "give a column of accelerations")
+    return replace(table, names=tuple(table.names[k] for k in kept), rows=table.rows[:, kept])
+
+
+def _is_other(name: str) -> bool:
+    """Return whether a column is named as a velocity or displacement, or states a unit of another quantity."""
+    unit = _unit_in(name)
+    words = _bare(name).split()
+    return any(word in _OTHERS for word in words) or (
+        unit is not None and re.fullmatch(_OTHER_UNIT, unit.replace("sec", "s")) is not None
+    )
+
+
 def _has_times(table: Table, dt: float | None) -> bool:
     """Return whether the first column is times: by its name, or because it rises in equal steps."""
     if table.names:
@@ -184,7 +227,8 @@ def _step(path: str | Path, table: Table, given: float | None) -> float:
     dt = float((time[-1] - time[0]) / (len(time) - 1))
     uneven = np.flatnonzero(~(np.abs(time - time[0] - dt * np.arange(len(time))) < _UNEVEN * dt))
     if len(uneven):
-        at = int(uneven[0])
+        steps = np.diff(time)
+        at = int(np.abs(steps - np.median(steps)).argmax()) + 1  # where the step differs most
         what = f"time {time[at]:g} s is not at equal steps of {dt:g} s"
         fail_at(path, int(table.lines[at]), what, "resample the record")
     if given is not None and abs(given - dt) > 1e-3 * dt:

@@ -1,13 +1,15 @@
 """Outlines in plain JSON or CSV: corners in metres of the wall's plane, to the right and upwards."""
 
-import csv
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from moma.errors import SurveyError
+from moma.tables import table as tables
+from moma.tables.columns import length_scale, unit_of
+from moma.tables.numbers import is_number
 from survey.arrays import Array
 from survey.clouds.outlines.outline import FIELDS, Outline, attributes_of, made_code
 
@@ -83,7 +85,7 @@ def read_table(path: Path, chosen: Mapping[str, str]) -> tuple[Outline, ...]:
 
     Parameters
     ----------
-    path : CSV with commas or semicolons, and a header
+    path : text or a workbook, with names of columns, which may state a unit of length
     chosen : names of columns that the user has given, by meaning
 
     Raises
@@ -91,30 +93,39 @@ def read_table(path: Path, chosen: Mapping[str, str]) -> tuple[Outline, ...]:
     SurveyError
         naming the line that is wrong
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, ValueError) as error:
-        raise SurveyError(f"cannot be read: {error}", where=str(path), remedy="save it as UTF-8") from error
-    semicolons = ";" in text.split("\n", 1)[0]
-    rows = csv.DictReader(text.splitlines(), delimiter=";" if semicolons else ",")
-    names = {name.strip().lower(): name for name in rows.fieldnames or ()}
-    across = next((names[one] for one in _ACROSS if one in names), None)
-    upward = next((names[one] for one in _UPWARD if one in names), None)
-    code = chosen.get("code") or next((names[one] for one in FIELDS["code"] if one in names), None)
+    table = tables.read_table(path, _is_row, _CSV)
+    header = table.titles[-1] if table.titles else tables.TableRow(1, ())
+    titles = [unit_of(one)[0] for one in header.cells]
+    places = {name.lower(): k for k, name in reversed(list(enumerate(titles)))}
+    across, upward, code = (
+        next((places[one] for one in alike if one in places), None) for alike in _corners(chosen)
+    )
     if across is None or upward is None or code is None:
-        raise SurveyError(f"columns {', '.join(names) or 'none'}", where=f"{path}:1", remedy=_CSV)
+        names = ", ".join(header.cells or table.rows[0].cells)
+        raise SurveyError(f"columns {names}", where=table.where(header.line), remedy=_CSV)
+    scales = [length_scale(one, table.where(header.line)) or 1.0 for one in header.cells]
     corners: dict[str, list[list[float]]] = {}
     first: dict[str, tuple[int, dict[str, Any]]] = {}
-    for line, row in enumerate(rows, start=2):
-        try:
-            place = [float(str(row[name]).replace(",", ".")) for name in (across, upward)]
-        except ValueError as error:
-            raise SurveyError("a coordinate is no number", where=f"{path}:{line}", remedy=_CSV) from error
-        name = str(row[code]).strip()
+    for row in table.rows:
+        cells = [*row.cells, *[""] * (len(titles) - len(row.cells))]
+        place = [scales[k] * table.number(cells[k], titles[k], row.line) for k in (across, upward)]
+        name = table.name(row, code, "the stone of a corner")
         corners.setdefault(name, []).append(place)
-        others = {key: value for key, value in row.items() if key not in (across, upward, None) and value}
-        first.setdefault(name, (line, others))
+        others: dict[str, Any] = {}
+        for k, (title, cell) in enumerate(zip(titles, cells, strict=False)):
+            if title and cell and k not in (across, upward):
+                others[title] = cell if scales[k] == 1.0 else scales[k] * table.number(cell, title, row.line)
+        first.setdefault(name, (row.line, others))
     return tuple(_of_rows(path, corners, first, chosen))
+
+
+def _corners(chosen: Mapping[str, str]) -> tuple[Sequence[str], ...]:
+    """Return the names of the columns of a corner: across, upward, and the stone."""
+    return _ACROSS, _UPWARD, (chosen["code"].lower(),) if "code" in chosen else FIELDS["code"]
+
+
+def _is_row(cells: Sequence[str], commas: bool) -> bool:
+    return sum(is_number(one, commas) for one in cells) >= len("xy")
 
 
 def _of_rows(

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from moma.errors import SurveyError
+from moma.tables.rows import ListRows, cell_text
 from survey.formats.fields import unreadable
 from survey.formats.options import ReadingOptions
 from survey.formats.tables.columns import kind_of_column
 from survey.formats.tables.reader import open_table
-from survey.formats.tables.rows import ListRows, cell_text
 from survey.formats.tables.wkt import ring_of
 from survey.records.survey import SurveyStream
 

@@ -11,10 +11,10 @@ passed over; lines without coordinates too.
 import re
 from pathlib import Path
 
+from moma.tables.text_lines import TextLines
 from survey.formats.fields import code_of, shown
 from survey.formats.options import ReadingOptions
 from survey.formats.tables.reader import PointCollector
-from survey.formats.text_lines import TextLines
 from survey.records.survey import SurveyStream
 
 __all__ = ["open_gsi"]

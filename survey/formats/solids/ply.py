@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from moma.errors import SurveyError
+from moma.tables.text_lines import TextLines
 from survey.formats.fields import parse_number, shown, unreadable
 from survey.formats.solids.bodies import RawBody, check_coordinates
-from survey.formats.text_lines import TextLines
 
 __all__ = ["ply_bodies"]
 

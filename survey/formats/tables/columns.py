@@ -7,28 +7,21 @@ pandas write their index so.
 
 import difflib
 import re
-import unicodedata
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from moma.errors import SurveyError, UsageError
+from moma.tables.columns import COORDINATES, POINT, SIGMA, length_scale, plain, spellings, unit_of
 from survey.formats.fields import shown
 
 __all__ = [
     "ALIASES",
-    "UNITS",
     "ColumnMap",
     "Columns",
     "find_columns",
     "kind_of_column",
-    "length_unit",
-    "plain",
     "read_map",
-    "unit_of",
 ]
-
-UNITS: Mapping[str, float] = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "in": 0.0254}
-"""Units of length [m]."""
 
 ALIASES: Mapping[str, Sequence[str]] = {
     # English; German; French; Italian; Spanish
@@ -51,27 +44,8 @@ ALIASES: Mapping[str, Sequence[str]] = {
         *("role", "point type", "point role", "point kind", "Rolle", "Punktart", "Punkttyp", "Punktrolle"),
         *("rôle", "type de point", "ruolo", "tipo punto", "tipo di punto", "rol", "papel", "tipo de punto"),
     ),
-    "x": (
-        *("x", "easting", "east", "e", "coord x", "x coord", "x coordinate", "pos x", "point x"),
-        *("Rechts", "Rechtswert", "Ost", "Ostwert", "rw", "x Koordinate", "x Wert", "y Rechts"),
-        *("est", "coordonnée x", "abscisse", "coordinata x", "este", "coordenada x"),
-    ),
-    "y": (
-        *("y", "northing", "north", "n", "coord y", "y coord", "y coordinate", "pos y", "point y"),
-        *("Hoch", "Hochwert", "Nord", "Nordwert", "hw", "y Koordinate", "y Wert", "x Hoch"),
-        *("coordonnée y", "ordonnée", "coordinata y", "norte", "coordenada y"),
-    ),
-    "z": (
-        *("z", "elevation", "elev", "height", "h", "coord z", "z coord", "z coordinate", "pos z"),
-        *("Höhe", "z Koordinate", "z Wert", "Punkthöhe", "altitude", "alt", "hauteur", "coordonnée z"),
-        *("quota", "altezza", "coordinata z", "cota", "altura", "elevación", "coordenada z", "point z"),
-    ),
-    "sigma": (
-        *("sigma", "σ", "std", "std dev", "stdev", "standard deviation", "accuracy", "precision"),
-        *("Genauigkeit", "Standardabweichung", "mittlerer Fehler", "Punktfehler", "mittlerer Punktfehler"),
-        *("écart type", "précision", "scarto tipo", "deviazione standard", "precisione"),
-        *("desviación estándar", "desviación típica", "precisión"),
-    ),
+    **COORDINATES,
+    "sigma": SIGMA,
     "depth": (
         *("depth", "stone depth", "block depth", "Tiefe", "Steintiefe", "Einbindetiefe"),
         *("profondeur", "profondità", "profundidad"),
@@ -93,13 +67,7 @@ ALIASES: Mapping[str, Sequence[str]] = {
         *("station", "setup", "instrument station", "Standpunkt", "Stationierung"),
         *("stazione", "estación"),
     ),
-    "name": (
-        *("point", "point number", "point no", "point id", "point name", "pid", "pt", "pt id", "vertex id"),
-        *("Punkt", "Punktnummer", "Punkt Nr", "PktNr", "Pkt", "Pkt Nr", "PNr", "Punkt ID", "Punktname"),
-        *("numéro de point", "n° point", "numero punto", "n punto", "punto", "id punto"),
-        *("número de punto", "nombre del punto", "nome punto", "no", "nr", "num", "number"),
-        *("Nummer", "numéro", "numero", "número", "id"),
-    ),
+    "name": POINT,
     "description": (
         *("description", "desc", "point code", "feature code", "code", "Beschreibung", "Punktcode", "text"),
         *("codice", "descrizione", "código", "descripción", "codigo punto"),
@@ -120,15 +88,7 @@ ALIASES: Mapping[str, Sequence[str]] = {
 
 _FALLBACK = ("name", "description")  # of the stone, if it has no column of its own: `ID`, `Nr`, `Code`
 _LENGTHS = ("x", "y", "z", "sigma", "depth", "depth_sigma")
-_UNIT = re.compile(
-    r"(?P<name>.*?)(?:\s*[\[(]\s*(?P<a>[^\])]*?)\s*[\])]|\s+in\s+(?P<b>[a-z]+)|[_/](?P<c>mm|cm|dm|m|ft|in))",
-    re.IGNORECASE,
-)
 _BRACKETS = re.compile(r"[\[(][^\])]*[\])]")
-_WORDS = {"metre": "m", "metres": "m", "meter": "m", "meters": "m", "millimeter": "mm", "centimeter": "cm"} | {
-    "millimetre": "mm", "millimetres": "mm", "centimetre": "cm", "feet": "ft", "foot": "ft", "inch": "in",
-    "inches": "in", '"': "in", "'": "ft",
-}  # fmt: skip
 _MISSPELT = (
     *("course", "depth", "depth sigma", "depth source", "sigma", "station", "Tiefe", "Schicht", "profondeur"),
     *("profondità", "profundidad", "assise", "filare", "hilada"),
@@ -204,47 +164,11 @@ def read_map(text: str | None) -> ColumnMap:
     return ColumnMap(names, frozenset(ignored))
 
 
-def plain(name: str) -> str:
-    """Return a name without case, accents, blanks and punctuation, by which names are compared."""
-    folded = unicodedata.normalize("NFKD", name.casefold())
-    return "".join(one for one in folded if one.isalnum())
-
-
-def length_unit(text: str) -> str | None:
-    """Return the name in `UNITS` of a unit of length, however it is spelt; None if it is not known."""
-    bare = unicodedata.normalize("NFKC", text).strip().rstrip(".").casefold()
-    word = _WORDS.get(bare, bare)
-    return word if word in UNITS else None
-
-
-def unit_of(name: str) -> tuple[str, str | None]:
-    """Split the name of a column into the name itself and its unit, None if it has none.
-
-    Examples
-    --------
-    >>> unit_of("Rechts [mm]"), unit_of("depth_cm"), unit_of("Höhe")
-    (('Rechts', 'mm'), ('depth', 'cm'), ('Höhe', None))
-    """
-    found = _UNIT.fullmatch(name.strip())
-    if found is None:
-        return name.strip(), None
-    unit = found["a"] or found["b"] or found["c"] or ""
-    known = length_unit(unit)
-    return (found["name"].strip(), known) if known is not None else (name.strip(), None)
-
-
-def _spellings(name: str) -> Iterable[str]:
-    yield plain(name)
-    for umlaut, letters in (("ä", "ae"), ("ö", "oe"), ("ü", "ue")):
-        if umlaut in name.casefold():
-            yield plain(name.casefold().replace(umlaut, letters))
-
-
 _KNOWN: Mapping[str, str] = {
     spelling: what
     for what, names in reversed(list(ALIASES.items()))
     for one in (*names, what)
-    for spelling in _spellings(one)
+    for spelling in spellings(one)
 }
 
 
@@ -320,15 +244,8 @@ def _take(
     what: str, k: int, names: Sequence[str], at: dict[str, int], scales: dict[str, float], where: str
 ) -> None:
     at[what] = k
-    unit = unit_of(names[k])[1]
-    if unit is not None and what in _LENGTHS:
-        scales[what] = UNITS[unit]
-    elif what in _LENGTHS and (found := re.search(r"\[\s*([^\]]+?)\s*\]", names[k])):
-        raise SurveyError(
-            f"column {shown(names[k])} is in {shown(found[1])}, which is not a unit of length",
-            where=where,
-            remedy=f"units are {', '.join(UNITS)}",
-        )
+    if what in _LENGTHS and (scale := length_scale(names[k], where)) is not None:
+        scales[what] = scale
 
 
 def _fall_back(at: dict[str, int], codes: bool) -> list[int]:

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from moma.errors import UsageError
+from moma.tables.columns import plain
+from moma.tables.rows import open_rows
 from survey.formats.fields import KIND, shown
-from survey.formats.tables.columns import plain
-from survey.formats.tables.rows import open_rows
 
 __all__ = ["KINDS", "kind_of", "meant", "read_kinds"]
 

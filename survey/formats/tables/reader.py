@@ -19,14 +19,16 @@ from typing import Any
 import numpy as np
 
 from moma.errors import SurveyError
+from moma.tables.columns import plain
+from moma.tables.decimals import Decimals
+from moma.tables.numbers import EMPTY
+from moma.tables.rows import DATE_REMEDY, ListRows, Row, TextRows, open_rows
 from survey.formats.fields import CODE, KIND, code_of, parse_course, shown
 from survey.formats.options import ReadingOptions, whole
 from survey.formats.tables.code_template import ROLES, STATION, CodeFields, CodeTemplate
-from survey.formats.tables.columns import ColumnMap, Columns, find_columns, kind_of_column, plain, read_map
-from survey.formats.tables.decimals import Decimals
+from survey.formats.tables.columns import ColumnMap, Columns, find_columns, kind_of_column, read_map
 from survey.formats.tables.kinds import kind_of, meant
 from survey.formats.tables.point_table import PointTable, TableStone, check_station
-from survey.formats.tables.rows import ListRows, Row, TextRows, open_rows
 from survey.formats.tables.wkt import outline_of
 from survey.records.survey import Station, Survey, SurveyHead, SurveyStream
 
@@ -63,7 +65,11 @@ _TITLES = 30  # rows before the names of the columns
 _LISTED = 12  # unknown kinds in a message
 _CACHED = 4096  # identities
 _LONGEST_NAME = 64
+_UNKNOWN = EMPTY | {""}
 _NOTHING = float("nan")
+_ROLE_WORDS = frozenset(
+    one for one in ROLES if len(one) > 1 or one in "vp"
+)  # other letters may number points
 
 AnyRows = TextRows | ListRows
 
@@ -192,11 +198,35 @@ def _find_header(
                 continue
             if given.numbered and _is_data(rows, names, columns, number):
                 return k, replace(columns, notes=())
-            return k + 1, columns
+            return k + 1, _with_roles(rows, ahead[k + 1 :], columns, given)
     rows.delimiter = stated
     if best is None:
         raise rows.fail(rows.end, "the table is empty: no column 'block'", "begin it with e.g. block,x,y,z")
     raise best[1]
+
+
+def _with_roles(
+    rows: AnyRows, ahead: Sequence[tuple[int, Any]], columns: Columns, given: ColumnMap
+) -> Columns:
+    """Return the columns with the one whose values are all roles of points as the role, whatever its name."""
+    if {"role", "description"} & set(columns.at):
+        return columns
+    free = [k for k, _ in columns.notes] + (
+        [columns.at["name"]] if "name" in columns.at.keys() - given.names else []
+    )
+    texts: dict[int, set[str]] = {k: set() for k in free}
+    for number, row in ahead:
+        try:
+            values = rows.cells(row, number)
+        except SurveyError:  # told when the row is read
+            continue
+        for k in free:
+            texts[k].add(values[k].casefold() if k < len(values) else "")
+    roles = [k for k, found in texts.items() if found and found <= _ROLE_WORDS]
+    if len(roles) != 1:
+        return columns
+    at = {what: k for what, k in columns.at.items() if k != roles[0]} | {"role": roles[0]}
+    return replace(columns, at=at, notes=tuple(one for one in columns.notes if one[0] != roles[0]))
 
 
 def _is_data(rows: AnyRows, names: Sequence[str], columns: Columns, number: int) -> bool:
@@ -539,6 +569,8 @@ class _RowReader:
         cells = {one: values[self._columns.at[one]] for one in self._by}
         role = "vertex"
         block, kind, course, zone = cells.get("block", ""), cells.get("kind"), None, None
+        if "block" in cells and self._rows.is_date(block, number, self._columns.at["block"]):
+            raise self._fail(number, f"the name of a stone is a date, {block}", DATE_REMEDY)
         if "description" in cells:
             found = self.collector.fields(cells["description"], number)
             block, kind = block or found.block, kind or found.kind
@@ -569,7 +601,7 @@ class _RowReader:
             self.collector.add_station(one.code, place, number)
             return
         sigma = _NOTHING
-        if self._sigma_at is not None and (text := values[self._sigma_at]):
+        if self._sigma_at is not None and (text := values[self._sigma_at]).lower() not in _UNKNOWN:
             sigma = self._decimals.length(text, "sigma", number, self._scale["sigma"])
         stone = self._stone_of(one, values, number)
         stone.add_place(one.role == "vertex", place, sigma, name)
@@ -578,7 +610,7 @@ class _RowReader:
     def _add_outline(self, one: _Identity, values: Sequence[str], number: int, count: int) -> None:
         corners = self._options.scale * outline_of(values[self._outline_at or 0], f"{self._path}:{number}")
         sigma = _NOTHING
-        if self._sigma_at is not None and (text := values[self._sigma_at]):
+        if self._sigma_at is not None and (text := values[self._sigma_at]).lower() not in _UNKNOWN:
             sigma = self._decimals.length(text, "sigma", number, self._scale["sigma"])
         if one.code in self._table.stones:
             before = self._table.stones[one.code].line
@@ -598,7 +630,7 @@ class _RowReader:
         if stone.agreed is one and not self._of_stones and not self._notes:
             return stone
         for name, k in self._of_stones:
-            if values[k]:
+            if values[k].lower() not in _UNKNOWN:
                 self._set(stone, name, values[k], number)
         for k, key in self._notes:
             if values[k]:

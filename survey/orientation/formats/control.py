@@ -1,26 +1,34 @@
-"""Files of control points as the Damped Bundle Adjustment Toolbox reads them, and their place in a network.
+"""Tables of control points, and their place in a network.
 
-One point per line, its values separated by commas, semicolons or tabs: number, name, X, Y, Z and, if the place is not
-fixed, its standard deviations (one, or three) or its covariance (nine, row by row). The name may be left out. Lines
-that begin with # are comments.
+One point per row: with names of columns in any order and unit, also as a comment, or without names as the Damped Bundle
+Adjustment Toolbox reads them: number, name, X, Y, Z and, if the place is not fixed, its standard deviations (one, or
+three) or its covariance (nine, row by row). The name may be left out.
 """
 
-import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from moma.errors import SurveyError
+from moma.tables.columns import COORDINATES, POINT, SIGMA, length_scale
+from moma.tables.numbers import EMPTY, is_number
+from moma.tables.table import Table, TableRow, read_table
 from survey.arrays import Array
-from survey.formats.fields import parse_number, shown
-from survey.formats.text_lines import TextLines
+from survey.formats.fields import shown
 from survey.orientation.network import Control, Network, listed
 
 __all__ = ["ControlRow", "read_control", "with_control", "write_control"]
 
-_BETWEEN = re.compile(r"[,;\t]")
+_COLUMNS: Mapping[str, Sequence[str]] = {
+    **COORDINATES,
+    "number": POINT,
+    "name": ("name", "label", "description", "desc", "code", "type", "Bezeichnung", "nom", "nome", "nombre"),
+    "sigma": SIGMA,
+    **{f"s{a}": (f"s{a}", *(f"{one} {a}" for one in SIGMA), *(f"{a} {one}" for one in SIGMA)) for a in "xyz"},
+}
+_REMEDY = "write: number, name, X, Y, Z, and deviations: none, one, three, or nine covariances, with commas"
 _FAR = 10.0  # mean offset between two lists of the same points over its spread, from which it is a shift of the origin
 
 
@@ -45,18 +53,22 @@ class ControlRow:
 
 
 def read_control(path: Path) -> tuple[ControlRow, ...]:
-    """Read a file of control points.
+    """Read a table of control points.
 
     Raises
     ------
     SurveyError
-        naming file and line, if a line is wrong, or a number is there twice
+        naming file and line, if a row is wrong, or a number is there twice
     """
-    lines = TextLines(path)
+    table = read_table(path, _is_row, _REMEDY)
+    table.check_titles(_REMEDY)
+    header, places = table.columns(_COLUMNS, least=3)
+    if header is not None:
+        _check_header(table, header, places)
     rows: dict[str, ControlRow] = {}
-    for number, line in lines.rows():
-        where = f"{lines.path}:{number}"
-        row = _row([one.strip() for one in _BETWEEN.split(line)], where)
+    for line in table.rows:
+        where = table.where(line.line)
+        row = _by_place(table, line) if header is None else _by_name(table, line, header, places)
         if row.number in rows:
             raise SurveyError(
                 f"point {row.number} is there twice, first at {rows[row.number].where}",
@@ -64,26 +76,89 @@ def read_control(path: Path) -> tuple[ControlRow, ...]:
                 remedy="keep one",
             )
         rows[row.number] = row
-    if not rows:
-        raise SurveyError(
-            "the file has no control points", where=lines.path, remedy="give one point per line"
-        )
     return tuple(rows.values())
 
 
-def _row(words: list[str], where: str) -> ControlRow:
-    labelled = len(words) in (5, 6, 8, 14)
-    if not (labelled or len(words) in (4, 7, 13)):
-        raise SurveyError(
-            f"a control point of {len(words)} values",
-            where=where,
-            remedy="write: number, name, X, Y, Z, and deviations: none, one, three, or nine covariances, with commas",
+def _is_row(cells: Sequence[str], commas: bool) -> bool:
+    return sum(is_number(one, commas) for one in cells[1:]) >= len("xyz")
+
+
+def _check_header(table: Table, header: TableRow, places: dict[str, int]) -> None:
+    """Refuse names without a coordinate; the names, or else the first other column, are numbers if none are."""
+    if "number" not in places:
+        taken = set(places.values())
+        places["number"] = (
+            places.pop("name")
+            if "name" in places
+            else next(k for k in range(len(taken) + 1) if k not in taken)
         )
-    if not words[0]:
-        raise SurveyError("a control point without a number", where=where, remedy="write its number first")
+    missing = [one for one in "xyz" if one not in places]
+    if missing:
+        raise SurveyError(
+            f"no column {missing[0]} among {', '.join(header.cells)[:200]}",
+            where=table.where(header.line),
+            remedy="name the columns, e.g.: number, name, x, y, z, sigma",
+        )
+
+
+def _by_name(table: Table, row: TableRow, header: TableRow, places: Mapping[str, int]) -> ControlRow:
+    """Read a row by the names of the columns; those behind a comment that names them are deviations."""
+    where = table.where(row.line)
+    commented = header in table.comments
+
+    def length(column: int, what: str) -> float:
+        name = header.cells[min(column, len(header.cells) - 1)]
+        return (length_scale(name, where) or 1.0) * table.number(row.cells[column], what, row.line)
+
+    last = max(places.values())
+    if last >= len(row.cells) and max(places[one] for one in "xyz") >= len(row.cells):
+        what = f"a control point of {len(row.cells)} values"
+        raise SurveyError(what, where=where, remedy=f"the columns are {', '.join(header.cells)[:200]}")
+    known = {
+        what: k
+        for what, k in places.items()
+        if k < len(row.cells) and row.cells[k].lower() not in ("", *EMPTY)
+    }
+    rest = [
+        k for k in range(len(row.cells)) if k not in places.values() and is_number(row.cells[k], table.commas)
+    ]
+    if rest and not commented:
+        name = header.cells[rest[0]] if rest[0] < len(header.cells) else ""
+        raise SurveyError(
+            f"column {shown(name)} is not known",
+            where=table.where(header.line),
+            remedy="name it sigma, or sx, sy and sz, if it holds standard deviations; otherwise take it out",
+        )
+    columns = [known[one] for one in ("sx", "sy", "sz") if one in known] or [
+        known[one] for one in ("sigma",) if one in known
+    ]
+    return ControlRow(
+        table.name(row, places["number"], "the number of a control point"),
+        row.cells[known["name"]] if "name" in known else "",
+        np.array([length(places[one], f"coordinate {one}") for one in "xyz"]),
+        _covariance([length(k, "a standard deviation") for k in columns or rest], where),
+        where,
+    )
+
+
+def _by_place(table: Table, row: TableRow) -> ControlRow:
+    """Read a row by the order of its values."""
+    where, count = table.where(row.line), len(row.cells)
+    labelled = count in (5, 6, 8, 14)
+    if not (labelled or count in (4, 7, 13)):
+        raise SurveyError(f"a control point of {count} values", where=where, remedy=_REMEDY)
+    number = table.name(row, 0, "the number of a control point")
     first = 2 if labelled else 1
-    values = [parse_number(word, "a coordinate", where) for word in words[first:]]
-    place, rest = np.array(values[:3]), np.array(values[3:])
+    values = [table.number(one, "a coordinate", row.line) for one in row.cells[first:]]
+    label = row.cells[1] if labelled else ""
+    return ControlRow(number, label, np.array(values[:3]), _covariance(values[3:], where), where)
+
+
+def _covariance(values: Sequence[float], where: str) -> Array:
+    """Return the covariance (3, 3) of a place from no, one or three deviations, or nine covariances."""
+    rest = np.array(values)
+    if len(rest) not in (0, 1, 3, 9):
+        raise SurveyError(f"{len(rest)} standard deviations", where=where, remedy=_REMEDY)
     if len(rest) <= 3:
         if (rest < 0.0).any():
             raise SurveyError(
@@ -95,16 +170,15 @@ def _row(words: list[str], where: str) -> ControlRow:
                 where=where,
                 remedy="give all of them, or none for a fixed point",
             )
-        covariance = np.diag(np.broadcast_to(rest, 3).astype(float) ** 2) if len(rest) else np.zeros((3, 3))
-    else:
-        covariance = rest.reshape(3, 3)
-        if not np.allclose(covariance, covariance.T) or np.linalg.eigvalsh(covariance).min() <= 0.0:
-            raise SurveyError(
-                "its covariance is not symmetric and positive",
-                where=where,
-                remedy="give nine values row by row",
-            )
-    return ControlRow(words[0], words[1].strip('"') if labelled else "", place, covariance, where)
+        return np.diag(np.broadcast_to(rest, 3).astype(float) ** 2) if len(rest) else np.zeros((3, 3))
+    covariance = rest.reshape(3, 3)
+    if not np.allclose(covariance, covariance.T) or np.linalg.eigvalsh(covariance).min() <= 0.0:
+        raise SurveyError(
+            "its covariance is not symmetric and positive",
+            where=where,
+            remedy="give nine values row by row",
+        )
+    return covariance
 
 
 def with_control(

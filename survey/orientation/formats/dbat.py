@@ -22,9 +22,9 @@ from xml.sax.saxutils import escape
 import numpy as np
 
 from moma.errors import SurveyError
+from moma.tables.rows import TextRows
 from survey.arrays import Array
 from survey.formats.fields import parse_number, shown
-from survey.formats.text_lines import TextLines
 from survey.orientation.formats.control import ControlRow, with_control, write_control
 from survey.orientation.formats.marks import MarkRow, network_of
 from survey.orientation.formats.xml_lines import Element, read_xml
@@ -183,11 +183,12 @@ def _table(file: Element, base: Path, needed: tuple[str, ...]) -> list[Mapping[s
         raise file.fail(
             f"the format {file.attributes['format']!r} has no {missing[0]}", f"it needs {', '.join(needed)}"
         )
-    lines = TextLines(base / file.text.strip())
+    rows = TextRows(base / file.text.strip())
+    rows.delimiter = ","
     out = list[Mapping[str, object]]()
-    for line, text in lines.rows():
-        words = [one.strip() for one in text.split(",")]
-        where = f"{lines.path}:{line}"
+    for line, text in rows:
+        words = rows.cells(text, line)
+        where = f"{rows.path}:{line}"
         if len(words) != len(columns):
             raise SurveyError(
                 f"a row of {len(words)} values", where=where, remedy=f"its columns are {', '.join(columns)}"

@@ -1,25 +1,36 @@
-"""Marks on photographs as plain text, one per line: photograph, point, x, y, and its standard deviation if it has one.
+"""Marks on photographs as tables: photograph, point, x, y, and the standard deviation of a mark if it has one.
 
-Values are separated by commas, semicolons, tabs or blanks; places are in pixels, to the right and down from the
-upper left corner. Lines that begin with # are comments. The Damped Bundle Adjustment Toolbox reads the same columns.
+Columns stand in this order unless they are named; places are in pixels, to the right and down from the upper left
+corner. Lines that begin with # are comments. The Damped Bundle Adjustment Toolbox reads the same columns.
 """
 
-import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from moma.errors import SurveyError
+from moma.tables.columns import POINT, SIGMA, length_scale
+from moma.tables.numbers import is_number
+from moma.tables.table import Table, read_table
 from survey.arrays import Array
-from survey.formats.fields import parse_length, parse_number
-from survey.formats.text_lines import TextLines
 from survey.orientation.network import Camera, Network, Photo, listed
 
 __all__ = ["MarkRow", "marks_of_points", "network_of", "numbered", "read_marks", "write_marks"]
 
-_BETWEEN = re.compile(r"\s*[,;\t]\s*|\s+")
+_COLUMNS: Mapping[str, Sequence[str]] = {
+    "photograph": (
+        *("photograph", "photo", "image", "img", "picture", "file", "camera", "Bild", "Foto", "Aufnahme"),
+        *("cliché", "immagine", "fotografia", "imagen", "fotografía"),
+    ),
+    "point": (*POINT, "mark", "marker", "target", "gcp", "name"),
+    "x": ("x", "u", "column", "col", "x px", "px", "pixel x", "Spalte"),
+    "y": ("y", "v", "row", "line", "y px", "py", "pixel y", "Zeile"),
+    "sigma": SIGMA,
+}
+_PLACES = {one: k for k, one in enumerate(_COLUMNS)}
+_REMEDY = "write: photograph, point, x, y, sigma if it has one"
 
 
 @dataclass(frozen=True)
@@ -50,33 +61,46 @@ def read_marks(path: Path) -> tuple[MarkRow, ...]:
     SurveyError
         naming file and line, if a line is wrong, or a point is marked twice on a photograph
     """
-    lines = TextLines(path)
-    rows = tuple(_rows(lines))
-    if not rows:
-        raise SurveyError("the file has no marks", where=lines.path, remedy="write: photograph, point, x, y")
-    return rows
+    table = read_table(path, _is_row, _REMEDY)
+    table.check_titles(_REMEDY)
+    header, places = table.columns(_COLUMNS, least=3)
+    if header is not None:
+        where = table.where(header.line)
+        missing = [one for one in _PLACES if one not in places and one != "sigma"]
+        if missing:
+            what = f"no column {missing[0]} among {', '.join(header.cells)[:200]}"
+            raise SurveyError(what, where=where, remedy=_REMEDY)
+        if any(length_scale(header.cells[places[one]].replace("[px]", ""), where) for one in "xy"):
+            raise SurveyError("marks in a unit of length", where=where, remedy="give marks in pixels")
+    return tuple(_rows(table, places or _PLACES, len(header.cells) if header in table.titles else 0))
 
 
-def _rows(lines: TextLines) -> Iterator[MarkRow]:
+def _is_row(cells: Sequence[str], commas: bool) -> bool:
+    """Return whether a line has two names and two numbers, in any order of its columns."""
+    return len(cells) >= 4 and sum(is_number(one, commas) for one in cells) >= 2
+
+
+def _rows(table: Table, places: Mapping[str, int], count: int) -> Iterator[MarkRow]:
+    """Yield the marks; `count` is the number of named columns, 0 where they are not named."""
     seen: dict[tuple[str, str], int] = {}
-    for number, line in lines.rows():
-        where = f"{lines.path}:{number}"
-        words = _BETWEEN.split(line.strip())
-        if len(words) not in (4, 5):
+    for row in table.rows:
+        if len(row.cells) <= max(places[one] for one in "xy") or len(row.cells) > (count or len(_PLACES)):
+            what = f"a mark of {len(row.cells)} values"
+            raise SurveyError(what, where=table.where(row.line), remedy=_REMEDY)
+        photo = table.name(row, places["photograph"], "the photograph of a mark")
+        point = table.name(row, places["point"], "the point of a mark")
+        x, y = (table.number(row.cells[places[one]], one, row.line) for one in "xy")
+        at = places.get("sigma", len(row.cells))
+        sigma = None
+        if at < len(row.cells) and row.cells[at]:
+            sigma = table.decimals.length(row.cells[at], "sigma", row.line)
+        if (first := seen.setdefault((photo, point), row.line)) != row.line:
             raise SurveyError(
-                f"a mark of {len(words)} values",
-                where=where,
-                remedy="write: photograph, point, x, y, sigma if it has one",
-            )
-        x, y = (parse_number(word, name, where) for word, name in zip(words[2:4], "xy", strict=True))
-        sigma = parse_length(words[4], "sigma", where) if len(words) == 5 else None
-        if (first := seen.setdefault((words[0], words[1]), number)) != number:
-            raise SurveyError(
-                f"point {words[1]} is marked twice on photograph {words[0]}, first in line {first}",
-                where=where,
+                f"point {point} is marked twice on photograph {photo}, first in line {first}",
+                where=table.where(row.line),
                 remedy="keep one",
             )
-        yield MarkRow(words[0], words[1], x, y, sigma, number)
+        yield MarkRow(photo, point, x, y, sigma, row.line)
 
 
 def network_of(

@@ -48,7 +48,7 @@ def test_a_table_has_a_row_for_each_corner(tmp_path):
         ("8b", 0.25, 4),
     ]
     path.write_text(TABLE.replace("0,22", "a"), encoding="utf-8")
-    with pytest.raises(SurveyError, match=r"stones\.csv:5: a coordinate is no number"):
+    with pytest.raises(SurveyError, match=r"stones\.csv:5: x is 'a', not a number"):
         read_outlines(path)
     path.write_text("a,b\n1,2\n", encoding="utf-8")
     with pytest.raises(SurveyError, match="columns a, b; give a header with code, x and y"):

@@ -3,9 +3,10 @@
 import io
 import zipfile
 from collections.abc import Mapping, Sequence
+from datetime import date
 from xml.sax.saxutils import escape
 
-Cell = str | float | None
+Cell = str | float | date | None
 Sheets = Mapping[str, Sequence[Sequence[Cell]]]
 
 _MAIN = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
@@ -14,9 +15,11 @@ _PACKAGE = "http://schemas.openxmlformats.org/package/2006"
 _KIND = "application/vnd.openxmlformats-officedocument.spreadsheetml"
 
 
-def xlsx(sheets: Sheets) -> bytes:
-    """Return an XLSX with inline texts."""
+def xlsx(sheets: Sheets, merged: Sequence[str] = ()) -> bytes:
+    """Return an XLSX with inline texts; `merged` are ranges of all sheets, such as A2:A5."""
     names = list(sheets)
+    cells = "".join(f'<mergeCell ref="{one}"/>' for one in merged)
+    joined = f'<mergeCells count="{len(merged)}">{cells}</mergeCells>' if merged else ""
     parts = {
         "[Content_Types].xml": f'<Types xmlns="{_PACKAGE}/content-types">'
         '<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
@@ -48,7 +51,7 @@ def xlsx(sheets: Sheets) -> bytes:
             for i, row in enumerate(rows, 1)
         )
         parts[f"xl/worksheets/sheet{k}.xml"] = (
-            f'<worksheet xmlns="{_MAIN}"><sheetData>{body}</sheetData></worksheet>'
+            f'<worksheet xmlns="{_MAIN}"><sheetData>{body}</sheetData>{joined}</worksheet>'
         )
     return _zip(parts)
 
@@ -58,6 +61,8 @@ def _cell(place: str, value: Cell) -> str:
         return ""
     if isinstance(value, str):
         return f'<c r="{place}" t="inlineStr"><is><t>{escape(value)}</t></is></c>'
+    if isinstance(value, date):
+        return f'<c r="{place}" t="d"><v>{value.isoformat()}</v></c>'
     return f'<c r="{place}"><v>{value!r}</v></c>'
 
 

@@ -124,8 +124,8 @@ def test_a_table_needs_no_header_and_may_round_its_times(tmp_path):
         ("0.0,1.0\nagain,1\n", 2, "'again' is not a number"),
         ("0,1,2,3,4\n1,1,2,3,4\n", 1, "5 columns; give time, and one to three"),
         ("0.0,1.0\n0.1\n", 2, "1 columns"),
-        ("0.0,1\n0.1,1\n0.3,1\n0.4,1\n", 2, "time 0.1 s is not at equal steps of 0.133333 s; resample"),
-        ("0.1,1\n0.1,1\n0.1,1\n", 1, "time 0.1 s is not at equal steps of 0 s"),
+        ("0.0,1\n0.1,1\n0.3,1\n0.4,1\n", 3, "time 0.3 s is not at equal steps of 0.133333 s; resample"),
+        ("0.1,1\n0.1,1\n0.1,1\n", 2, "time 0.1 s is not at equal steps of 0 s"),
         ("0.0,1\n0.1,inf\n", 2, "'inf' is not a number"),
     ],
 )

@@ -195,7 +195,7 @@ def test_tables_of_three_components(tmp_path, head, timed):
             {"unit": "cm/s2"},
             "the file states 'g', but unit = 'cm/s2'",
         ),
-        (table([TIMES, VALUES, VALUES]), {"unit": "g", "axis": "z"}, "2 components"),
+        (table([TIMES, VALUES, VALUES]), {"unit": "m/s2", "axis": "z"}, "2 components"),
         (table([TIMES, VALUES], ",", ","), {"unit": "g"}, "not at equal steps"),
         ("0;1\n1;2;3\n", {"unit": "g"}, ":2: 3 columns"),
         ("0;a\n1;2\n", {"unit": "g"}, ":1: 'a' is not a number"),

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from moma.errors import SurveyError, UsageError
+from moma.tables.columns import unit_of
 from survey.formats.options import ReadingOptions
 from survey.formats.reading import open_survey
-from survey.formats.tables.columns import ALIASES, find_columns, read_map, unit_of
+from survey.formats.tables.columns import ALIASES, find_columns, read_map
 from survey.formats.tables.kinds import kind_of, read_kinds
 from survey.records.survey import BlockRecord, Reject
 from tests.survey.formats.workbooks import ods, xlsx

@@ -93,10 +93,10 @@ def test_control_points_of_another_project(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("P1 7 12.0", "a mark of 3 values"),
-        ("P1 7 12.0 x", "'x', not a number"),
-        ("P1 7 12.0 13.0 0", "it must be greater than 0"),
-        ("P1;6;1;2", "marked twice on photograph P1, first in line 2"),
+        ("P1, 7, 12.0", "a mark of 3 values"),
+        ("P1, 7, 12.0, x", "'x', not a number"),
+        ("P1, 7, 12.0, 13.0, 0", "it must be greater than 0"),
+        ("P1,6,1,2", "marked twice on photograph P1, first in line 2"),
     ],
 )
 def test_marks(tmp_path, text, message):

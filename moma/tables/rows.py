@@ -11,18 +11,22 @@ import io
 import math
 import re
 from collections.abc import Iterator, Sequence
+from datetime import date
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from moma.errors import SurveyError, UsageError
-from survey.formats.fields import shown, unreadable
-from survey.formats.text_lines import TextLines
+from moma.tables.numbers import shown, unreadable
+from moma.tables.text_lines import TextLines
 
-__all__ = ["ListRows", "Row", "TextRows", "cell_text", "is_workbook", "open_rows"]
+__all__ = ["DATE_REMEDY", "ListRows", "Row", "TextRows", "cell_text", "is_workbook", "open_rows"]
 
 Row = str | Sequence[str]
 """A line of text that is not yet split, or the cells of a sheet."""
+
+DATE_REMEDY = "format the column as text and write the names again: spreadsheets take 1-1 for a date"
+"""Remedy for a date where names stand."""
 
 _DELIMITERS = (";", "\t", ",", "|")
 _BLANKS = ""
@@ -33,6 +37,8 @@ _WHOLE_FIELD = re.compile(r'(^|[,;\t|])[ ]*"(?:[^"]|"")*"')
 _OPEN_FIELD = re.compile(r'(?:^|[,;\t|])[ ]*"')
 _LONGEST_FIELD = 40  # lines of a quoted field
 _SEPARATORS = " \t,;|"
+_MONTH = r"(jan|feb|mar|mär|apr|may|mai|jun|jul|aug|sep|oct|okt|nov|dec|dez)[a-z]*\.?"
+_DATE = re.compile(rf"\d{{1,2}}[-. ]+{_MONTH}([-. ]+\d{{2,4}})?|{_MONTH}[-. ]+\d{{1,4}}", re.IGNORECASE)
 
 
 class TextRows:
@@ -44,6 +50,7 @@ class TextRows:
     end : number of the last line
     delimiter : one character; empty: any blanks; None: not yet known
     remarks : none
+    comments : line and text of the comments before the first row, once that has been read
     """
 
     any_mark = False
@@ -53,12 +60,15 @@ class TextRows:
         self._lines = TextLines(path)
         self.path, self.end, self.fail = self._lines.path, self._lines.end, self._lines.fail
         self.delimiter: str | None = None
+        self.comments: list[tuple[int, str]] = []
         self._stated_on = 0
         for number, line in self._lines:
             text = line.strip()
             if (found := _STATED.match(text)) and not text[found.end() :].strip(_SEPARATORS):
                 self.delimiter, self._stated_on = found[1], number
-            if text and not text.startswith("#"):
+            if text.startswith("#"):
+                self.comments.append((number, text.lstrip("# ")))
+            elif text:
                 break
 
     def __iter__(self) -> Iterator[tuple[int, str]]:
@@ -117,6 +127,10 @@ class TextRows:
         """Split a row that has wrong quotes, to find the stone that it names."""
         return [one.strip() for one in row.replace('"', "").split(self.delimiter or None)]
 
+    def is_date(self, text: str, line: int, column: int) -> bool:
+        """Return whether a field is a date as spreadsheets write it for 1-1: 1-Jan, 01. Jan, Jan 01."""
+        return _DATE.fullmatch(text) is not None
+
     def lines_of(self, row: str) -> int:
         """Return the number of lines that a row takes up."""
         return row.count("\n") + 1 if "\n" in row else 1
@@ -127,7 +141,7 @@ class TextRows:
             return (self.delimiter,)
         bare = re.sub(r'"[^"]*"', "", row)
         found = sorted((one for one in _DELIMITERS if one in bare), key=bare.count, reverse=True)
-        return (*found, _BLANKS)
+        return found if set(found) - {","} else (*found, _BLANKS)
 
 
 class ListRows:
@@ -138,15 +152,21 @@ class ListRows:
     path : of the file
     rows : number, from 1, and cells of each; that of the names of columns may be 0
     remarks : on how they were read
+    dates : row, from 1, and column, from 0, of cells that hold a date
     """
 
     any_mark = True
     delimiter: str | None = ";"  # of the rows, when they are written as text
 
     def __init__(
-        self, path: str, rows: Sequence[tuple[int, list[str]]], remarks: tuple[str, ...] = ()
+        self,
+        path: str,
+        rows: Sequence[tuple[int, list[str]]],
+        remarks: tuple[str, ...] = (),
+        dates: frozenset[tuple[int, int]] = frozenset(),
     ) -> None:
-        self.path, self._rows, self.remarks = path, rows, remarks
+        self.path, self._rows, self.remarks, self._dates = path, rows, remarks, dates
+        self.comments: list[tuple[int, str]] = []
         self.end = max(1, rows[-1][0]) if rows else 1
 
     def __iter__(self) -> Iterator[tuple[int, Sequence[str]]]:
@@ -162,6 +182,10 @@ class ListRows:
     def rough_cells(self, row: Sequence[str]) -> list[str]:
         """Return the cells."""
         return list(row)
+
+    def is_date(self, text: str, line: int, column: int) -> bool:
+        """Return whether a cell is a date."""
+        return (line, column) in self._dates
 
     def lines_of(self, row: Sequence[str]) -> int:
         """Return 1."""
@@ -187,10 +211,9 @@ def _sheet_rows(path: Path, sheet: str | None) -> ListRows:
             raise UsageError(
                 f"no sheet {shown(sheet)}", where=str(path), remedy=f"sheets: {', '.join(names)}"
             )
-        tables = {
-            one: _filled(book.get_sheet_by_name(one).to_python(skip_empty_area=False))
-            for one in ([sheet] if sheet is not None else names)
-        }
+        sheets = {one: book.get_sheet_by_name(one) for one in ([sheet] if sheet is not None else names)}
+        cells = {one: _spread(content) for one, content in sheets.items()}
+        tables = {one: _filled(rows) for one, (rows, _) in cells.items()}
     except (CalamineError, OSError, ValueError) as error:
         raise SurveyError(
             f"looks like a workbook, but cannot be read: {str(error)[:120]}".replace("\n", " "),
@@ -207,7 +230,29 @@ def _sheet_rows(path: Path, sheet: str | None) -> ListRows:
             remedy="name one with --sheet",
         )
     name = full[0] if full else names[0]
-    return ListRows(str(path), tables[name], (f"read from sheet {name!r} of a workbook",))
+    rows, merged = cells.get(name, ([], 0))
+    remarks = [f"read from sheet {name!r} of a workbook"]
+    if merged:
+        remarks.append(f"{merged} merged cells hold for all of their rows")
+    dates = frozenset(
+        (number, column)
+        for number, row in enumerate(rows, start=1)
+        for column, cell in enumerate(row)
+        if isinstance(cell, date)
+    )
+    return ListRows(str(path), tables[name], tuple(remarks), dates)
+
+
+def _spread(sheet: Any) -> tuple[list[list[Any]], int]:
+    """Return the cells of a sheet, those merged downwards filled, and the number of such merged cells."""
+    rows = [list(row) for row in sheet.to_python(skip_empty_area=False)]
+    merged = 0
+    for (top, first), (bottom, _) in getattr(sheet, "merged_cell_ranges", None) or ():
+        if bottom > top and top < len(rows) and first < len(rows[top]) and rows[top][first] not in ("", None):
+            merged += 1
+            for row in rows[top + 1 : bottom + 1]:
+                row[first] = rows[top][first]
+    return rows, merged
 
 
 def _is_open(text: str) -> bool:

@@ -5,7 +5,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from moma.errors import SurveyError
-from survey.formats.text_lines import TextLines
+from moma.tables.text_lines import TextLines
 
 
 def lines(path: Path, data: bytes) -> tuple[list[str], str, int]:

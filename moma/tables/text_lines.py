@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from moma.errors import SurveyError
-from survey.formats.fields import unreadable
+from moma.tables.numbers import unreadable
 
 __all__ = ["TextLines"]
 

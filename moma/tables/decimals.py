@@ -3,7 +3,7 @@
 import re
 
 from moma.errors import SurveyError
-from survey.formats.fields import FARTHEST, parse_length, parse_number, shown
+from moma.tables.numbers import FARTHEST, parse_length, parse_number, shown
 
 __all__ = ["Decimals"]
 

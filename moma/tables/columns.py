@@ -1,0 +1,174 @@
+"""Names of columns of tables: how they are compared, coordinates in five languages, and units in names.
+
+Names are compared without case, accents, blanks and punctuation. A unit may follow in brackets, after ``in``, or after
+an underscore: ``x [mm]``, ``Tiefe (cm)``, ``Höhe in m``, ``x_mm``.
+"""
+
+import re
+import unicodedata
+from collections.abc import Iterable, Mapping, Sequence
+
+from moma.errors import SurveyError
+from moma.tables.numbers import shown
+
+__all__ = [
+    "COORDINATES",
+    "POINT",
+    "SIGMA",
+    "UNITS",
+    "length_scale",
+    "length_unit",
+    "places_of",
+    "plain",
+    "spellings",
+    "unit_of",
+]
+
+UNITS: Mapping[str, float] = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "in": 0.0254} | {
+    "us-ft": 1200.0 / 3937.0,
+}
+"""Units of length [m]."""
+
+COORDINATES: Mapping[str, Sequence[str]] = {
+    # English; German; French; Italian; Spanish
+    "x": (
+        *("x", "easting", "east", "e", "coord x", "x coord", "x coordinate", "pos x", "point x"),
+        *("Rechts", "Rechtswert", "Ost", "Ostwert", "rw", "x Koordinate", "x Wert", "y Rechts"),
+        *("est", "coordonnée x", "abscisse", "coordinata x", "este", "coordenada x"),
+    ),
+    "y": (
+        *("y", "northing", "north", "n", "coord y", "y coord", "y coordinate", "pos y", "point y"),
+        *("Hoch", "Hochwert", "Nord", "Nordwert", "hw", "y Koordinate", "y Wert", "x Hoch"),
+        *("coordonnée y", "ordonnée", "coordinata y", "norte", "coordenada y"),
+    ),
+    "z": (
+        *("z", "elevation", "elev", "height", "h", "coord z", "z coord", "z coordinate", "pos z"),
+        *("Höhe", "z Koordinate", "z Wert", "Punkthöhe", "altitude", "alt", "hauteur", "coordonnée z"),
+        *("quota", "altezza", "coordinata z", "cota", "altura", "elevación", "coordenada z", "point z"),
+    ),
+}
+"""Names of columns of coordinates by axis; in doubt the first."""
+
+SIGMA: Sequence[str] = (
+    *("sigma", "σ", "std", "std dev", "stdev", "standard deviation", "accuracy", "precision"),
+    *("Genauigkeit", "Standardabweichung", "mittlerer Fehler", "Punktfehler", "mittlerer Punktfehler"),
+    *("écart type", "précision", "scarto tipo", "deviazione standard", "precisione"),
+    *("desviación estándar", "desviación típica", "precisión"),
+)
+"""Names of columns of standard deviations."""
+
+POINT: Sequence[str] = (
+    *("point", "point number", "point no", "point id", "point name", "pid", "pt", "pt id", "vertex id"),
+    *("Punkt", "Punktnummer", "Punkt Nr", "PktNr", "Pkt", "Pkt Nr", "PNr", "Punkt ID", "Punktname"),
+    *("numéro de point", "n° point", "numero punto", "n punto", "punto", "id punto"),
+    *("número de punto", "nombre del punto", "nome punto", "no", "nr", "num", "number"),
+    *("Nummer", "numéro", "numero", "número", "id"),
+)
+"""Names of columns of numbers or names of points."""
+
+_UNIT = re.compile(
+    r"(?P<name>.*?)(?:\s*[\[(]\s*(?P<a>[^\])]*?)\s*[\])]|\s+in\s+(?P<b>[a-z]+)|[_/](?P<c>mm|cm|dm|m|ft|in))",
+    re.IGNORECASE,
+)
+_BRACKETS = re.compile(r"[\[(][^\])]*[\])]")
+_WORDS = {"metre": "m", "metres": "m", "meter": "m", "meters": "m", "millimeter": "mm", "centimeter": "cm"} | {
+    "millimetre": "mm", "millimetres": "mm", "centimetre": "cm", "feet": "ft", "foot": "ft", "inch": "in",
+    "inches": "in", '"': "in", "'": "ft", "us survey feet": "us-ft", "us survey foot": "us-ft", "ftus": "us-ft",
+    "us ft": "us-ft", "sft": "us-ft", "us feet": "us-ft", "usft": "us-ft",
+}  # fmt: skip
+
+
+def plain(name: str) -> str:
+    """Return a name without case, accents, blanks and punctuation, by which names are compared."""
+    folded = unicodedata.normalize("NFKD", name.casefold())
+    return "".join(one for one in folded if one.isalnum())
+
+
+def length_unit(text: str) -> str | None:
+    """Return the name in `UNITS` of a unit of length, however it is spelt; None if it is not known."""
+    bare = unicodedata.normalize("NFKC", text).strip().rstrip(".").casefold()
+    word = _WORDS.get(bare, bare)
+    return word if word in UNITS else None
+
+
+def unit_of(name: str) -> tuple[str, str | None]:
+    """Split the name of a column into the name itself and its unit, None if it has none.
+
+    Examples
+    --------
+    >>> unit_of("Rechts [mm]"), unit_of("depth_cm"), unit_of("Höhe")
+    (('Rechts', 'mm'), ('depth', 'cm'), ('Höhe', None))
+    """
+    found = _UNIT.fullmatch(name.strip())
+    if found is None:
+        return name.strip(), None
+    unit = found["a"] or found["b"] or found["c"] or ""
+    known = length_unit(unit)
+    return (found["name"].strip(), known) if known is not None else (name.strip(), None)
+
+
+def spellings(name: str) -> Iterable[str]:
+    """Yield the plain forms of a name, with umlauts as one letter and as two."""
+    yield plain(name)
+    for umlaut, letters in (("ä", "ae"), ("ö", "oe"), ("ü", "ue")):
+        if umlaut in name.casefold():
+            yield plain(name.casefold().replace(umlaut, letters))
+
+
+def length_scale(name: str, where: str) -> float | None:
+    """Return the length of the unit in the name of a column [m]; None if it states none.
+
+    Raises
+    ------
+    SurveyError
+        if it states another unit
+    """
+    unit = unit_of(name)[1]
+    if unit is not None:
+        return UNITS[unit]
+    if stated := re.search(r"\[\s*([^\]]+?)\s*\]", name):
+        raise SurveyError(
+            f"column {shown(name)} is in {shown(stated[1])}, which is not a unit of length",
+            where=where,
+            remedy=f"units are {', '.join(UNITS)}",
+        )
+    return None
+
+
+def places_of(
+    names: Sequence[str], wanted: Mapping[str, Sequence[str]], where: str, remedy: str = "leave one out"
+) -> dict[str, int]:
+    """Return the place, from 0, of each wanted column that a header names.
+
+    Parameters
+    ----------
+    names : of the columns, in order
+    wanted : names of columns by what they are
+    where : place of the header, for errors
+
+    Raises
+    ------
+    SurveyError
+        if two columns are one thing
+
+    Examples
+    --------
+    >>> places_of(["Pkt", "Hochwert [m]", "Rechtswert [m]", "Höhe"], COORDINATES, "points.csv:1")
+    {'y': 1, 'x': 2, 'z': 3}
+    """
+    known = {
+        spelling: what for what, alike in wanted.items() for name in alike for spelling in spellings(name)
+    }
+    places: dict[str, int] = {}
+    for k, name in enumerate(names):
+        what = known.get(plain(_BRACKETS.sub("", unit_of(name)[0]))) or known.get(plain(name))
+        if what is None:
+            continue
+        if what in places:
+            raise SurveyError(
+                f"columns {shown(names[places[what]])} and {shown(name)} are both {what}",
+                where=where,
+                remedy=remedy,
+            )
+        places[what] = k
+    return places
