@@ -43,6 +43,9 @@ def test_a_stone_that_comes_back_keeps_the_peak_of_its_way(thrown):
     assert peaks.opening.partner.tolist() == [1, 0]
     assert peaks.opening.time == pytest.approx(0.5 / G, abs=2 * STEP)
     assert thrown.joints.opening[0] < 0.02 * rise
+    # it falls back in 2v/g, and stops in one step: 0.5 m/s · 250 kg / 1 ms, against a weight of 2.45 kN
+    assert peaks.pressure.time == pytest.approx(2 * 0.5 / G, abs=2 * STEP)
+    assert (peaks.pressure.value > 10 * thrown.joints.pressure_max[0]).all()
 
 
 def test_the_peak_is_found_between_the_frames(thrown):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mechanics.limit.kinematic import Kinematics
+from pipelines.assess.codes import check as check_module
 from pipelines.assess.codes.check import check_code, floor_acceleration, floor_displacement, floor_spectrum
 from pipelines.scene.site import Site
 
@@ -106,3 +107,19 @@ def test_the_displacement_at_a_height_is_no_less_than_at_resonance_for_longer_pe
     assert floor_displacement(HIGH, 0.44, 8.0, G, RULES) == pytest.approx(least)
     assert floor_displacement(HIGH, 0.6, 8.0, G, RULES) == pytest.approx(least)
     assert floor_displacement(HIGH, 0.4, 8.0, G, RULES) < least < floor_displacement(HIGH, 3.0, 8.0, G, RULES)
+
+
+def test_above_the_ground_the_secant_is_that_of_the_floor(tmp_path, monkeypatch):
+    """Another secant and period there: ds* = 0.3 du*, Ts = 3 π √(ds*/as*)."""
+    text = (check_module._FOLDER / "ntc2008.toml").read_text(encoding="utf-8")
+    ground, floor = text.split("[above]")
+    floor = floor.replace("secant = 0.4", "secant = 0.3").replace("period = 2.0", "period = 3.0")
+    (tmp_path / "ntc2008.toml").write_text(f"{ground}[above]{floor}", encoding="utf-8")
+    monkeypatch.setattr(check_module, "_FOLDER", tmp_path)
+    at = 0.3 * 0.4 * CAPACITY
+    slowed = 0.1 * G * (1.0 - at / CAPACITY)
+    share = 3.0 * np.pi * np.sqrt(at / slowed) / 0.4
+    spectral = 0.15 * G * 2.5 * 0.35 / 0.4 * (0.4 / (2 * np.pi)) ** 2
+    demand = spectral * 0.5 * 9 / 7 * share**2 / np.sqrt((1 - share) ** 2 + 0.02 * share)
+    found = named(check_code("ntc2008", HIGH, overturning()), "nonlinear, above the ground")
+    assert found.demand == pytest.approx(demand)

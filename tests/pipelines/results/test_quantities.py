@@ -182,3 +182,14 @@ def test_a_stone_that_turns_about_its_middle_has_not_moved_as_a_whole():
     found = quantities(replace(result, bodies=(result.bodies[0], turned, result.bodies[2])))
     assert found.stones["B"].displacement == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
     assert found.displacement > 0.5
+
+
+def test_reactions_that_push_and_pull_differ_by_the_sum_of_their_sizes():
+    """|1 − 3| + |−2 + 4| = 4 of 3 + 4 = 7, although the references add up to −1."""
+    one = quantities(stack())
+    found = replace(one, support_reactions={"A": 1.0, "B": -2.0})
+    reference = replace(one, support_reactions={"A": 3.0, "B": -4.0})
+    assert differences(found, reference)["support_reactions"] == pytest.approx(4.0 / 7.0)
+    # a support that a run does not have bears nothing there
+    alone = replace(one, support_reactions={"A": 3.0})
+    assert differences(alone, reference)["support_reactions"] == pytest.approx(4.0 / 7.0)

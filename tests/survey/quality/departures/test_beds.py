@@ -12,6 +12,7 @@ from survey.quality.departures.beds import (
     BedMovement,
     WallBeds,
     _age,
+    _Beds,
     _beds,
     _scatter,
     find_bed_movements,
@@ -247,6 +248,20 @@ def test_the_scatter_of_neighbours_is_without_the_slope_of_their_course() -> Non
         for stones in (wall(19), wall(19, lambda s, c: 0.03 * s))
     )
     assert sloping == pytest.approx(level, rel=0.1)
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.02, -0.3])
+def test_the_scatter_of_differences_about_their_median(slope: float) -> None:
+    """Steps of ±2, ±1 mm in turn about a slope: by Gauss' law of |step|/√2, widened by √(n/(n − 1)) for the slope."""
+    steps = 1e-3 * np.tile([2.0, -1.0, 1.0, -2.0], 5)
+    along = np.arange(len(steps) + 1, dtype=float)
+    height = np.concatenate([[0.0], np.cumsum(steps)]) + slope * along
+    course, measured = np.zeros(len(height), dtype=np.intp), np.full(len(height), 1e-10)
+    beds = _Beds(tuple(map(str, course)), course, (1,), along, height, measured, 0.0)
+    tau, _, count = _scatter([beds])
+    wider = len(steps) / (len(steps) - 1.0)
+    assert count == len(steps)
+    assert tau == pytest.approx(math.sqrt(2.5e-6 * wider / (2.0 * 0.9113) - 1e-10), rel=1e-6)
 
 
 def test_no_stone_of_a_steep_bed_is_odd() -> None:
