@@ -16,6 +16,8 @@ _PARALLEL = math.cos(math.radians(10.0))  # of the angle between the two sides o
 _ALONG = 0.5  # of the shorter of two sides: their common length, at least
 _FEWEST = 8  # joints from which a usual one is known
 _NONE = 0.25  # of the usual joint: a gap below is none
+_SNAPPED = 0.1  # of the usual joint: distance of two corners that are one
+_RARE = 0.05  # part of all joints: more that touch are a habit
 _CLEAR = 4.0  # robust standard deviations by which it differs from the usual one
 
 
@@ -42,22 +44,31 @@ def seamless(rings: Sequence[Array], pairs: Iterable[tuple[int, int]]) -> list[S
     rings : (n, 2) corners of polygons, counter-clockwise [m]
     pairs : of neighbours, by number
     """
-    gaps = [(i, j, gap) for i, j in pairs if (gap := _gap(rings[i], rings[j])) is not None]
+    gaps = [(i, j, *gap) for i, j in pairs if (gap := _gap(rings[i], rings[j])) is not None]
     if len(gaps) < _FEWEST:
         return []
-    widths = np.array([gap for *_, gap in gaps])
+    widths = np.array([width for *_, width, _ in gaps])
     usual = float(np.median(widths))
     limit = min(_NONE * usual, usual - _CLEAR * deviation(widths, usual))
-    return [Seamless(i, j, max(gap, 0.0), usual) for i, j, gap in gaps if abs(gap) < limit]
+    found = [
+        Seamless(i, j, max(width, 0.0), usual)
+        for i, j, width, ends in gaps
+        if abs(width) < limit or ends < _SNAPPED * usual
+    ]
+    # where many touch it is how the wall is built or drawn
+    return found if len(found) <= max(1.0, _RARE * len(gaps)) else []
 
 
-def _gap(one: Array, other: Array) -> float | None:
-    """Return the width of the longest joint between two polygons [m]; None if they have none."""
+def _gap(one: Array, other: Array) -> tuple[float, float] | None:
+    """Return the width of the longest joint between two polygons, and the distance of the ends of its sides [m].
+
+    None stands for two that have no joint.
+    """
     runs = [np.roll(ring, -1, axis=0) - ring for ring in (one, other)]
     lengths = [np.maximum(np.linalg.norm(run, axis=1), 1e-300) for run in runs]
     ways = runs[0] / lengths[0][:, None]
     facing = -(ways @ (runs[1] / lengths[1][:, None]).T) >= _PARALLEL
-    best: tuple[float, float] | None = None
+    best: tuple[float, float, float] | None = None
     for a, b in zip(*np.nonzero(facing), strict=True):
         ends = np.array([other[b], other[b] + runs[1][b]]) - one[a]
         along, across = ends @ ways[a], ends @ np.array([ways[a][1], -ways[a][0]])
@@ -65,8 +76,9 @@ def _gap(one: Array, other: Array) -> float | None:
         width = float(across.mean())
         enough = common >= _ALONG * min(lengths[0][a], lengths[1][b])
         if enough and abs(width) <= _WIDEST and (best is None or common > best[0]):
-            best = common, width
-    return None if best is None else best[1]
+            apart = ends[::-1] - np.array([np.zeros(2), runs[0][a]])
+            best = common, width, float(np.linalg.norm(apart, axis=1).max())
+    return None if best is None else best[1:]
 
 
 def ring_area(ring: Array) -> float:

@@ -44,3 +44,9 @@ def test_the_widths_are_told() -> None:
     rings = wall(0.01, 1, noise=0.0)
     (pair,) = seamless(rings, combinations(range(len(rings)), 2))
     assert (pair.gap, pair.usual) == pytest.approx((0.0, 0.01), abs=1e-9)
+
+
+def test_sides_with_the_same_corners_are_named_in_a_drawing_as_coarse_as_its_joints() -> None:
+    rings = wall(0.01, noise=0.006)
+    rings[11][[1, 2]] = rings[12][[0, 3]]
+    assert found(rings) == [(11, 12)]
