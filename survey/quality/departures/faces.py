@@ -199,6 +199,7 @@ class _Face:
     turn: Array = field(repr=False)
     turn_sigma: Array = field(repr=False)
     size: float = 0.5
+    bottom: float = 0.0
 
     def of(self, kept: NDArray[np.intp]) -> "_Face":
         """Return some of the faces."""
@@ -260,6 +261,7 @@ def _faces(stones: Sequence[StoneQuality], facade: Facade) -> Iterator[tuple[str
             turn,
             np.radians(np.array([one.tilt_sigma for one in own])),
             float(np.median([math.sqrt(one.area) for one in own])),
+            min(float(one.outline[:, 2].min()) for one in own),
         )
         if straight.sum() < _WALL:
             continue
@@ -493,7 +495,8 @@ def _shapes(face: _Face) -> Iterator[Shape]:
         if tall > face.size:
             joints = [left, *inner.tolist(), right]
             named += [
-                ("leaning part", (start, stop, low, high))
+                # it turns about its foot, which lies below the middle of its lowest stones
+                ("leaning part", (start, stop, face.bottom, high))
                 for i, start in enumerate(joints)
                 for stop in joints[i + 1 :]
                 if (start, stop) != (left, right) and stop - start > face.size
@@ -620,6 +623,8 @@ def _told(name: str, zone: str | None, face: _Face, one: Found) -> FaceMovement:
         left = at[0]
     elif one.shape.name == "setback":
         low = at[0]
+    elif one.shape.name == "leaning part":
+        left, right, low = max(left, at[0]), min(right, at[1]), at[2]
     elif one.shape.name not in ("lean", "bulge", "bow"):
         left, right = max(left, at[0]), min(right, at[1])
     return FaceMovement(

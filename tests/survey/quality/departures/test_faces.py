@@ -28,6 +28,11 @@ def up(course: int) -> float:
     return (course - 1) * 0.3 / HEIGHT
 
 
+def foot(course: int) -> float:
+    """Height of the middle of a course above the foot of the wall, over that of the highest [-]."""
+    return (course - 0.5) * 0.3 / (HEIGHT + 0.15)
+
+
 def test_a_wall_at_rest_is_plumb_and_plane() -> None:
     stones = wall(1)
     face = face_of(stones)
@@ -67,9 +72,9 @@ def test_a_rotated_facade_leans(amount: float) -> None:
         (lambda s, c: 0.03 * max(2.2 - s, 0) / 2.2 * up(c), "left corner", 0.03, "its left corner"),
         (lambda s, c: 0.03 * max(s - 3.5, 0) / 2.2, "right end", 0.03, "its right end"),
         (lambda s, c: 0.03 * max(2.2 - s, 0) / 2.2, "left end", 0.03, "its left end"),
-        (lambda s, c: 0.03 * (s < 2.0) * up(c), "leaning part", 0.03, "leans outwards as one"),
-        (lambda s, c: -0.03 * (s > 4.1) * up(c), "leaning part", -0.03, "leans inwards as one"),
-        (lambda s, c: 0.03 * (2.0 < s < 4.0) * up(c), "leaning part", 0.03, "leans outwards as one"),
+        (lambda s, c: 0.03 * (s < 2.0) * foot(c), "leaning part", 0.03, "leans outwards as one"),
+        (lambda s, c: -0.03 * (s > 4.1) * foot(c), "leaning part", -0.03, "leans inwards as one"),
+        (lambda s, c: 0.03 * (2.0 < s < 4.0) * foot(c), "leaning part", 0.03, "leans outwards as one"),
         (
             lambda s, c: 0.03 * math.cos(min(math.hypot(s - 2, 0.3 * (c - 4)) / 1.2, 1) * math.pi / 2) ** 2,
             "local bulge",
@@ -89,7 +94,7 @@ def test_every_shape_has_its_name(out: Shift, kind: str, amount: float, words: s
 def test_stones_at_the_crack_of_a_leaning_part_are_not_odd() -> None:
     """The crack goes around the stones, to the right in one course and to the left in the next."""
     face = face_of(
-        wall(15, out=lambda s, c: 0.025 * (s < 2.0 + 0.3 * (-1) ** c) * up(c), faces=0.001, sigma=0.001)
+        wall(15, out=lambda s, c: 0.025 * (s < 2.0 + 0.3 * (-1) ** c) * foot(c), faces=0.001, sigma=0.001)
     )
     (one,) = face.movements
     assert one.kind == "leaning part"
