@@ -82,7 +82,7 @@ def sample(
     kind: Annotated[
         str,
         typer.Argument(
-            help="arch, corner, facings, ribvault, tower, vault, wall, window, rubble-wall or granite-wall."
+            help="arch, block, corner, facings, ribvault, tower, vault, wall, window, rubble-wall or granite-wall."
         ),
     ],
     moved: Annotated[

@@ -10,6 +10,7 @@ import numpy as np
 from mechanics.dynamics.progress import Listener, silent
 from moma.errors import UsageError
 from pipelines.samples.building import SyntheticBuilding
+from pipelines.samples.buildings.block import block_on_ground
 from pipelines.samples.buildings.facings import two_facings
 from pipelines.samples.buildings.openings import ArchShape
 from pipelines.samples.buildings.quoins import corner
@@ -339,6 +340,7 @@ def _moved(title: str, cause: Cause, fixed: str = "course = 1", core: bool = Fal
 SAMPLES: Mapping[str, Recipe] = MappingProxyType(
     {
         "arch": _built("Semicircular arch", "kind = springer", semicircular_arch),
+        "block": _built("Block on the ground", "course = 1", block_on_ground),
         "corner": _built("Corner of two walls, bonded by quoins", "course = 1", corner),
         "facings": _built(
             "Wall of two facings with a core", "course = 1", lambda: two_facings(4.0, 8).building, core=True

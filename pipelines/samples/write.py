@@ -7,6 +7,7 @@ from pathlib import Path
 
 from mechanics.dynamics.progress import Listener, silent
 from moma.errors import UsageError, storing
+from pipelines.samples.buildings.study_files import STUDIES, study_text
 from pipelines.samples.causes import PULSE, Cause
 from pipelines.samples.granite_wall import GRANITE_SCENE, GRANITE_WALL, MEASURED, units, units_text
 from pipelines.samples.photographs import PHOTOGRAPHED, PICTURES, render_photographs, write_photographs
@@ -213,12 +214,15 @@ def write_sample(
     survey, scene, truth = folder / f"{kind}.moma", folder / f"{kind}.toml", folder / "truth.json"
     diagnosis = None if cause is None else folder / "diagnosis.toml"
     # before a simulation that takes minutes
-    _must_be_new(survey, truth, scene, *([] if diagnosis is None else [diagnosis]))
+    studied = [folder / "study.toml"] if kind in STUDIES and not scan else []
+    _must_be_new(survey, truth, scene, *studied, *([] if diagnosis is None else [diagnosis]))
     sample = recipe.make(progress)
     knowledge = folder / "knowledge.toml" if sample.knowledge else None
     solids = folder / "solids.obj" if sample.modelled else None
     commands = tuple(_commands(recipe, survey, solids, knowledge, scene, diagnosis))
     texts = {truth: sample.truth, scene: _scene(recipe, commands)}
+    if kind in STUDIES and not scan:
+        texts[folder / "study.toml"] = study_text(kind, str(folder))
     if diagnosis is not None and cause is not None:
         texts[diagnosis] = _diagnosis(kind, recipe.fixed, cause, commands)
     if knowledge is not None:

@@ -41,7 +41,7 @@ def test_the_help_names_the_samples_and_the_causes_of_movement():
 def test_samples_and_options_that_there_are_not_are_refused(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert (
-        "the samples are arch, corner, facings, ribvault, tower, vault, wall, window, rubble-wall"
+        "the samples are arch, block, corner, facings, ribvault, tower, vault, wall, window, rubble-wall"
         in fails(2, "sample", "castle")
     )
     said = fails(2, "sample", "facings", "--moved", "thrust")
