@@ -97,9 +97,9 @@ def run_with_number(context: Context, token: Token, number: str) -> int:
     Parameters
     ----------
     token : where it is written
-    number : as it is written
+    number : as it is written; that of a study may follow its name, as in study3
     """
-    runs = _runs(context)
+    runs, number = _runs(context), number.removeprefix("study")
     # No int() of what is no number, and no number that is longer than any run's.
     found = int(number) if number.isascii() and number.isdigit() and len(number) < 11 else -1
     if found not in runs:

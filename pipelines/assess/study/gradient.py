@@ -8,8 +8,9 @@ Densities, strengths and directions of joints and loads change p, q, μ, k and s
 and q through the chain that a run takes, so these are differences of assemblies, without a programme. Frames of
 contacts may turn in their plane from one assembly to the next: forces are carried over in world axes.
 
-As a stone moves its neighbours alone, stones that are far apart in the wall are moved together, and each change belongs
-to the nearest of them.
+A stone that moves takes its neighbours along by all of its movement, and others of its course by a hundredth at most.
+So of many stones those that are far apart are moved together, and each change belongs to the nearest of them. Few are
+moved one by one.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -26,9 +27,15 @@ from pipelines.assess.study.quantities import Limited
 
 __all__ = ["Changed", "Dual", "by_density", "by_strength", "difference", "dual", "together"]
 
-_REACH = 4
-"""Joints between a stone that moves and the farthest whose shape changes with it: in the window bay it is 3."""
-_STRAY = 1e-6  # share of the changes that may lie beyond the reach of all stones that move [-]
+_FEW = 60
+"""Unknowns of single stones up to which each is moved alone, as exactly as rounding allows."""
+_REACH = 2
+"""Joints within which stones move by more than a hundredth of the movement of a stone: in the window bay."""
+_STRAY = 0.05
+"""Share of the changes that may lie beyond the reach of all stones that move together [-].
+
+It bounds the error of their derivatives; a share of the variance is wrong by twice as much.
+"""
 
 
 @dataclass(frozen=True)
@@ -126,7 +133,8 @@ def together(
     """
     derivatives = np.full(len(sources), np.nan)
     distance = _distances(at.limited.on)
-    for batch in _batches(sources, distance):
+    few = sum(len(bodies) == 1 for bodies in sources) <= _FEW
+    for batch in [[number] for number in range(len(sources))] if few else _batches(sources, distance):
         shares = _shared(at, batch, sources, steps, changed, distance) if len(batch) > 1 else None
         for place, number in enumerate(batch):
             if shares is not None:
@@ -147,13 +155,14 @@ def _shared(
     distance: Array,
 ) -> Array | None:
     """Return the derivatives (k,) by unknowns whose stones move together; None where they cannot be told apart."""
-    ends = [_power(at, changed({number: sign * steps[number] for number in batch})) for sign in (1.0, -1.0)]
-    if ends[0] is None or ends[1] is None:
-        return None
     on = at.limited.on
+    end = _power(at, changed({number: steps[number] for number in batch}))
+    start = _power(at, (on, at.limited.live))
+    if end is None or start is None:
+        return None
     rows = np.array([distance[list(sources[number])].min(axis=0) for number in batch])
     nearest, far = rows.argmin(axis=0), rows.min(axis=0)
-    by_body, by_contact = ends[0][0] - ends[1][0], ends[0][1] - ends[1][1]
+    by_body, by_contact = end[0] - start[0], end[1] - start[1]
     pair = on.contacts.bodies
     first = far[pair[:, 0]] <= far[pair[:, 1]]
     owner = np.where(first, nearest[pair[:, 0]], nearest[pair[:, 1]])
@@ -163,7 +172,7 @@ def _shared(
         return None
     total = np.bincount(nearest[on.free], by_body, len(batch))
     total += np.bincount(owner, by_contact, len(batch))
-    shares: Array = total / (2.0 * np.array([steps[number] for number in batch]))
+    shares: Array = total / np.array([steps[number] for number in batch])
     return shares
 
 

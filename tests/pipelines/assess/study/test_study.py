@@ -5,6 +5,8 @@ import json
 import numpy as np
 import pytest
 
+from archmodel.database.session import open_database
+from archmodel.query.api import find_rows
 from moma.errors import SceneError, UsageError
 from pipelines.assess.study.file import read_study
 from pipelines.assess.study.sampling import Part
@@ -135,3 +137,15 @@ def test_a_scene_that_does_not_stand_at_its_mean_is_refused(place, tmp_path):
     with pytest.raises(SceneError, match="does not stand at the mean"):
         run_study(path, url, tmp_path / "out")
     assert not np.any([file.suffix == ".html" for file in (tmp_path / "out").iterdir()])
+
+
+def test_shares_of_stones_are_asked_for_in_the_database(place, tmp_path):
+    folder, url = place
+    path = study_file(folder, "first_order", FRICTIONAL + "mean = 0.6\n", DEEP, BOUND)
+    done = run_study(path, url, tmp_path / "out")
+    with open_database(url, create=False) as database, database.session(read_only=True) as session:
+        rows = find_rows(session, "ashlar", [f"variance_share@study{done.run} > 0.5"], columns=("code",))
+        assert [row["code"] for row in rows] == ["BLOCK"]
+        # its motions are not those of a run
+        (row,) = find_rows(session, "ashlar", ["code = 'BLOCK'"], columns=("code", "displacement_max"))
+        assert row["displacement_max"] is None
