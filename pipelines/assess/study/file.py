@@ -194,11 +194,9 @@ def _quantities(
         document.fail("no quantity", "quantities", remedy="write [[quantities]] above each that is asked for")
     first = found[0]
     needs = method in (Method.FORM, Method.FIRST_ORDER)
-    if needs and first.type not in (QuantityType.BOUND, QuantityType.FACTOR):
+    if needs and first.type is not QuantityType.BOUND:
         what = f"{method} needs a gradient, and {first.type} has none"
-        document.fail(
-            what, "study", "method", remedy="ask for a bound or factor first, or give method = 'subset'"
-        )
+        document.fail(what, "study", "method", remedy="ask for a bound first, or give method = 'subset'")
     fails = first.fails_below is not None or first.fails_above is not None
     if method in (Method.FORM, Method.SUBSET) and not fails:
         what = f"{method} needs to know when the first quantity fails"

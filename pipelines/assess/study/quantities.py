@@ -27,6 +27,9 @@ __all__ = ["Limited", "UndecidedError", "bound", "evaluate", "live_load", "quant
 _EXACT = 1e-12
 """Tolerance of programmes whose velocities are derivatives: at 10⁻⁹ those of six walls are wrong by 6·10⁻⁴ [-]."""
 
+_WIDEST = 2.0
+"""Share of their width to which joints of stones that fall are widened, so that factors are known down to a half [-]."""
+
 _AGGREGATES = {"sum": np.sum, "mean": np.mean, "min": np.min, "max": np.max}
 
 
@@ -106,7 +109,7 @@ def evaluate(
                 continue
         on = on or assembly(at_instant(assembled.scene))
         if table.type is QuantityType.FACTOR:
-            factor = geometric_safety(on).factor
+            factor = geometric_safety(on, _WIDEST).factor
             values[name] = 0.0 if np.isnan(factor) else factor
             continue
         live = live_load(table, turn)
@@ -150,7 +153,7 @@ def _run(assembled: Assembly) -> tuple[float, Mapping[str, Any]]:
     result = simulate(assembled.scene)
     if not result.outcome.decided:
         raise UndecidedError(f"its run is {result.outcome}")
-    return float(result.outcome.rests), summarise(result)
+    return float(result.outcome.rests), summarise(result, version="", seconds={})
 
 
 def _looked_up(summary: Mapping[str, Any], key: str | None) -> float:
