@@ -28,7 +28,7 @@ _EXACT = 1e-12
 """Tolerance of programmes whose velocities are derivatives: at 10⁻⁹ those of six walls are wrong by 6·10⁻⁴ [-]."""
 
 _WIDEST = 2.0
-"""Share of their width to which joints of stones that fall are widened, so that factors are known down to a half [-]."""
+"""Share of their width to which joints of stones that fall are widened: factors are known down to a half [-]."""
 
 _AGGREGATES = {"sum": np.sum, "mean": np.mean, "min": np.min, "max": np.max}
 
