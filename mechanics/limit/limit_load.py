@@ -207,7 +207,8 @@ def without_friction_across(on: RigidAssembly, live: LiveLoad, found: LimitLoad)
 def lines_of_sliding(on: RigidAssembly, found: LimitLoad) -> Array:
     """Return the line (nb, 3) along which each stone slides on two planes that stay, the way it goes; zero: none.
 
-    The planes are those of joints that bear at the limit. A mechanism may turn the stone as well.
+    The planes are those of joints that bear at the limit. A mechanism may turn the stone as well. Zero for all where
+    some stone that moves has no such line: a vault that opens is no wedge.
     """
     moves = found.mechanism.speed > _STILL
     line = np.zeros((len(moves), 3))
@@ -224,7 +225,7 @@ def lines_of_sliding(on: RigidAssembly, found: LimitLoad) -> Array:
         two = size[1] > _PLANE * size[0] > size[2]
         if two and 2.0 * way * way > float(velocity @ velocity):
             line[body] = np.sign(way) * axes[2]
-    return line
+    return line if line[moves].any(axis=1).all() else np.zeros_like(line)
 
 
 def mechanism(

@@ -7,7 +7,7 @@ import pytest
 
 from mechanics.limit.assembly import assembly
 from mechanics.limit.held import held_limit
-from mechanics.limit.limit_load import Flow, limit_load, without_friction_across
+from mechanics.limit.limit_load import Flow, limit_load, lines_of_sliding, without_friction_across
 from mechanics.limit.live_loads import Acceleration
 from mechanics.scene.scene import Fidelity
 from mechanics.scene.shapes import prism
@@ -76,7 +76,9 @@ def test_a_plunging_wedge_slides_at_the_load_of_limit_equilibrium(planes):
     on, live = assembly(wedge_on_two_planes(share, True, planes=planes)), Acceleration(tuple(along))
     bound = limit_load(on, live)
     held = held_limit(on, live, bound)
-    limit = replace(bound, flow=Flow.COULOMB, multiplier=held.held, mechanism=held.mechanism)
+    limit = replace(
+        bound, flow=Flow.COULOMB, multiplier=held.held, force=held.force, mechanism=held.mechanism
+    )
     found = without_friction_across(on, live, limit)
     assert found.multiplier == pytest.approx(expected, rel=2e-3)
     assert held.held > 1.01 * expected
@@ -91,7 +93,9 @@ def test_a_steep_wedge_that_limit_equilibrium_lets_slide_is_held_by_friction_acr
     bound = limit_load(on, live)
     held = held_limit(on, live, bound)
     assert held.held > 0.0
-    limit = replace(bound, flow=Flow.COULOMB, multiplier=held.held, mechanism=held.mechanism)
+    limit = replace(
+        bound, flow=Flow.COULOMB, multiplier=held.held, force=held.force, mechanism=held.mechanism
+    )
     assert np.isnan(without_friction_across(on, live, limit).multiplier)
 
 
@@ -106,3 +110,16 @@ def test_what_tips_does_not_slide():
     on = assembly(scene(ground(), brick("a", (0, 0, 0), (1, 0.2, 1)), friction=FRICTION))
     found = without_friction_across(on, ALONG, limit_load(on, ALONG, Flow.COULOMB))
     assert found is None or found.multiplier == pytest.approx(0.2, rel=1e-3)
+
+
+def test_a_stone_between_two_planes_has_no_line_where_another_stone_moves_that_has_none():
+    on = assembly(wedge_on_two_planes(0.06, True, planes=FLAT_AND_STEEP))
+    live = Acceleration(tuple(limit_along_the_line(FLAT_AND_STEEP, 34.0)[1]))
+    held = held_limit(on, live, bound := limit_load(on, live))
+    limit = replace(bound, force=held.force, mechanism=held.mechanism)
+    line = lines_of_sliding(on, limit)
+    assert line.any(axis=1).tolist() == [False, False, True]
+    speed = held.mechanism.speed.copy()
+    speed[0] = 0.5
+    other = replace(limit, mechanism=replace(held.mechanism, speed=speed))
+    assert not lines_of_sliding(on, other).any()
