@@ -12,7 +12,7 @@ from moma.cli.database import export, import_, migrate, serve, view
 from moma.cli.entities import query, schema, show
 from moma.cli.geology import geology
 from moma.cli.knowledge import record
-from moma.cli.proposals import propose
+from moma.cli.proposals import outlines, propose
 from moma.cli.relations import load_path, relate
 from moma.cli.runs import report, runs
 from moma.cli.scenes import check, run, trade
@@ -62,6 +62,7 @@ def _common(
 _COMMANDS = (
     sample,
     cloud,
+    outlines,
     orient,
     ingest,
     survey_report,

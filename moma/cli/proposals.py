@@ -1,20 +1,22 @@
-"""Command that proposes unseen stones."""
+"""Commands that propose stones: unseen ones, and outlines from a picture."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
 from enum import StrEnum
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from moma.cli.console import reporting, say
 from moma.cli.options import DEFAULT_DB, Db, Json, Verbose
+from moma.cli.progress import progress_bars
 from moma.errors import UsageError
 
 if TYPE_CHECKING:
     from pipelines.propose.propose import ProposalReport
 
-__all__ = ["CoreShape", "Subject", "propose"]
+__all__ = ["CoreShape", "MasonryKind", "Subject", "outlines", "propose"]
 
 
 class Subject(StrEnum):
@@ -143,3 +145,101 @@ def _summary(report: "ProposalReport", record: bool) -> str:
         return f"{text}; nothing is recorded: give --record" if not record else text
     text += f"; recorded as entry {report.entry}"
     return text if report.related is None else f"{text}, relations recomputed as entry {report.related}"
+
+
+class MasonryKind(StrEnum):
+    """Kinds of masonry in a picture."""
+
+    AUTO = "auto"
+    ASHLAR = "ashlar"
+    COURSED = "coursed"
+    BRICK = "brick"
+    RUBBLE = "rubble"
+
+
+@reporting
+def outlines(
+    picture: Annotated[
+        Path, typer.Argument(metavar="PICTURE", help="Orthophoto: PNG, JPEG, TIFF; wall.png of moma cloud.")
+    ],
+    pixel: Annotated[
+        float | None,
+        typer.Option("--pixel", metavar="T", help="Side of a pixel in metres, without a world file."),
+    ] = None,
+    size: Annotated[
+        str | None,
+        typer.Option(
+            "--size", metavar="WxH", help="Width and height of the picture in metres, e.g. 4.8x3.9."
+        ),
+    ] = None,
+    mask: Annotated[
+        Path | None,
+        typer.Option(
+            "--mask", metavar="FILE", help="Picture of the same size, white where there is no wall."
+        ),
+    ] = None,
+    depth_map: Annotated[
+        Path | None,
+        typer.Option(
+            "--depth-map",
+            metavar="FILE",
+            help="Depth map of moma cloud; default: the one beside its wall.png.",
+        ),
+    ] = None,
+    joint: Annotated[
+        float | None,
+        typer.Option("--joint", metavar="T", help="Width of the joints in metres; default: by itself."),
+    ] = None,
+    masonry: Annotated[MasonryKind, typer.Option(help="Kind of masonry.")] = MasonryKind.AUTO,
+    review: Annotated[
+        Path | None,
+        typer.Option(
+            "--review",
+            metavar="FILE",
+            help="Open these outlines instead, and mark what the picture contradicts.",
+        ),
+    ] = None,
+    corrected: Annotated[
+        Path | None,
+        typer.Option("--corrected", metavar="FILE", help="Take back what the page saved."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="Folder for the files; default: out/outlines-PICTURE."),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Propose the outlines of stones from a picture, with a page to correct them."""
+    from moma.cli.text.formats import as_json
+    from pipelines.ingest.outlined import size_of
+    from pipelines.propose.outlines.draw import OutlineRequest, draw_outlines
+
+    request = OutlineRequest(
+        picture,
+        pixel,
+        None if size is None else size_of(size),
+        mask,
+        depth_map,
+        joint,
+        masonry.value,
+        review,
+        corrected,
+    )
+    folder = out or Path("out") / f"outlines-{picture.stem}"
+    with progress_bars() as listener:
+        drawn = draw_outlines(request, folder, listener)
+    for doubt in drawn.doubts:
+        say(f"warning: {doubt}")
+    kinds = ", ".join(f"{count} {kind}" for kind, count in drawn.kinds.items())
+    courses = f" in {drawn.courses} courses" if drawn.courses else ""
+    lines = [
+        f"{picture}: nothing is proposed"
+        if drawn.refused
+        else f"{picture}: {drawn.stones} stones{courses} ({kinds})",
+        f"  {drawn.masonry}, joints {drawn.joint * 1e3:.0f} mm, openings: {drawn.openings}, doubtful: {drawn.doubtful}",
+        *([f"  by hand: {drawn.corrected}, superseded: {len(drawn.superseded)}"] if corrected else []),
+        *(f"  {path}" for path in drawn.files),
+    ]
+    print(as_json(asdict(drawn)) if json else "\n".join(lines))
+    if drawn.refused:
+        raise typer.Exit(1)

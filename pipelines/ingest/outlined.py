@@ -26,6 +26,7 @@ __all__ = [
     "outline_rejects",
     "outline_rejects_path",
     "read_files",
+    "size_of",
     "write_review",
 ]
 
@@ -203,7 +204,7 @@ def mask_options(
     default = MaskOptions()
     return MaskOptions(
         **_shared(base),
-        size=None if size is None else _size(size),
+        size=None if size is None else size_of(size),
         depth=depth,
         wall=None if wall is None else read_wall(wall),
         layer=layer,
@@ -219,7 +220,14 @@ def _check_lengths(*given: tuple[str, float | None, float, float]) -> None:
             raise UsageError(what, where=name, remedy=remedy)
 
 
-def _size(text: str) -> tuple[float, float]:
+def size_of(text: str) -> tuple[float, float]:
+    """Read width and height [m], e.g. "1.0x1.2".
+
+    Raises
+    ------
+    UsageError
+        if it is written otherwise
+    """
     found = _SIZE.fullmatch(text.strip().lower().removesuffix("m").strip())
     if found is not None:
         width, height = (float(one.replace(",", ".")) for one in found.groups())

@@ -56,6 +56,7 @@ _INDEXES = (
     "diagnosis.json",
     "orientation.json",
     "pushover.json",
+    "outlines.json",
 )  # their "files" list the files that MOMA wrote
 _LEFT = {
     UNFINISHED: (RUN_INDEX, "run"),

@@ -1,0 +1,113 @@
+"""Stones as features: what each outline says of itself, whoever drew it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from moma.errors import SurveyError
+from survey.arrays import Array
+from survey.clouds.outlines.outline import Outline
+from survey.clouds.outlines.reading import read_outlines
+from survey.clouds.pictures.proposal import Proposal
+from survey.clouds.world import PixelPlace
+from survey.geometry.polygons import ring_area
+
+__all__ = ["CORRECTED", "PROPOSED", "Feature", "corrected_features", "proposed_features", "reviewed_features"]
+
+PROPOSED, CORRECTED = "proposed from image", "corrected by hand"
+"""Evidence of an outline."""
+
+
+@dataclass(frozen=True)
+class Feature:
+    """An outline and its attributes.
+
+    Attributes
+    ----------
+    code : of the stone
+    ring : (n, 2) corners in the wall's plane, counter-clockwise [m]
+    said : other attributes, as they are written
+    """
+
+    code: str
+    ring: Array
+    said: Mapping[str, Any] = field(default_factory=dict)
+
+
+def proposed_features(proposal: Proposal) -> list[Feature]:
+    """Return the stones of a proposal."""
+    return [
+        Feature(
+            one.named.code,
+            one.ring,
+            {
+                "kind": one.named.kind,
+                **({} if one.named.course is None else {"course": one.named.course}),
+                "place": one.named.place,
+                "score": round(one.score, 3),
+                "sigma": round(one.sigma, 5),
+                "evidence": PROPOSED,
+                **({"cut": "by the edge of the picture"} if one.cut else {}),
+            },
+        )
+        for one in proposal.stones
+    ]
+
+
+def reviewed_features(path: Path, places: PixelPlace) -> list[Feature]:
+    """Return the outlines that another program or a person made, in the plane of a picture.
+
+    Parameters
+    ----------
+    path : COCO's JSON, a label picture, or any file of outlines
+    places : of the picture; outlines in pixels are placed by it
+
+    Raises
+    ------
+    UsageError, SurveyError
+        if it cannot be read, or its outlines lie in space
+    """
+    drawing = read_outlines(path)
+    out = []
+    for one in drawing.outlines:
+        if one.corners.shape[1] != 2:
+            raise SurveyError(
+                "the outline lies in space", where=one.where, remedy="draw it in the wall's plane"
+            )
+        ring = places.place(one.corners) if drawing.pixels else one.corners
+        out.append(Feature(one.code, _turned(ring), _said(one) | {"evidence": f"outline of {path.name}"}))
+    return out
+
+
+def corrected_features(path: Path) -> list[Feature]:
+    """Return the stones that the page saved.
+
+    Raises
+    ------
+    UsageError, SurveyError
+        if it cannot be read, or two stones have one code
+    """
+    out: dict[str, Feature] = {}
+    for one in read_outlines(path).outlines:
+        if one.code in out:
+            remedy = "give each stone a code of its own"
+            raise SurveyError(f"a second stone {one.code}", where=one.where, remedy=remedy)
+        out[one.code] = Feature(one.code, _turned(one.corners), _said(one))
+    return list(out.values())
+
+
+def _turned(ring: Array) -> Array:
+    return ring if ring_area(ring) > 0.0 else np.ascontiguousarray(ring[::-1])
+
+
+def _said(one: Outline) -> dict[str, Any]:
+    """Return the attributes of an outline under the names that are written."""
+    said = one.said
+    known = {
+        "kind": said.kind, "course": said.course, "zone": said.zone, "depth": said.depth,
+        "depth_sigma": said.depth_sigma, "score": said.score, "sigma": said.sigma,
+    }  # fmt: skip
+    return {name: value for name, value in known.items() if value is not None} | dict(said.notes)

@@ -1,0 +1,117 @@
+"""Closed regions between joints, and the borders that they share."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from moma.errors import UsageError
+from survey.arrays import Array, Bools, Ints
+from survey.clouds.extras import optional
+from survey.clouds.pictures.joints import WIDTH, Field, Strength
+
+__all__ = ["Borders", "borders_of", "closed_regions", "typical_strength"]
+
+_WEAK = 0.3  # strength over that of a joint below which there is stone
+_APART = 2.0 * WIDTH  # distance between the middles of two regions [px]
+
+
+@dataclass(frozen=True)
+class Borders:
+    """Borders between regions.
+
+    Attributes
+    ----------
+    pairs : (n, 2) numbers of the regions, the smaller first
+    lengths : (n,) pixels along each
+    sums : (n, k + 1) sums of what is measured along each, and the number of its pixels that part columns
+    """
+
+    pairs: Ints
+    lengths: Array
+    sums: Array
+
+
+def typical_strength(strength: Strength) -> float:
+    """Return the strength of a usual joint: the median of the crests that exceed the stone by far.
+
+    Crests are pixels that no neighbour across exceeds; grain has many weak ones, joints few strong ones. The
+    two classes are parted where the variance between them is largest (Otsu 1979).
+    """
+    evidence = strength.evidence
+    inner = evidence[1:-1, 1:-1]
+    across = (inner >= evidence[1:-1, :-2]) & (inner > evidence[1:-1, 2:])
+    down = (inner >= evidence[:-2, 1:-1]) & (inner > evidence[2:, 1:-1])
+    crest = inner[(across | down) & (inner > 0.0)]
+    if len(crest) < 10:
+        return 1.0
+    values = np.sort(np.sqrt(crest[:: max(1, len(crest) // 200_000)]).astype(np.float64))
+    sums, count = np.cumsum(values), np.arange(1, len(values) + 1)
+    low, high = sums / count, (sums[-1] - sums) / np.maximum(len(values) - count, 1)
+    between = count * (len(values) - count) * (low - high) ** 2
+    return float(np.median(values[int(np.argmax(between)) :]) ** 2)
+
+
+def closed_regions(evidence: Field, typical: float, void: Bools) -> Ints:
+    """Part a picture into regions along the crests of its joints.
+
+    Regions grow from the places farthest from all joints, so that gaps of joints narrower than the stone are
+    closed. They are too many: what no joint parts is joined later.
+
+    Parameters
+    ----------
+    evidence : (h, w) strength of joints
+    typical : strength of a usual one
+    void : (h, w) where there is no wall
+
+    Returns
+    -------
+    (h, w) numbers of the regions from 1; 0 where there is no wall
+    """
+    from scipy.ndimage import distance_transform_edt, gaussian_filter, label, maximum_filter
+
+    free = (evidence < _WEAK * typical) & ~void
+    far = gaussian_filter(distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1].astype(np.float32), 0.5 * WIDTH)
+    peaks = (far == maximum_filter(far, size=2 * round(_APART) + 1)) & (far > 1.0) & ~void
+    seeds, _ = label(peaks, structure=np.ones((3, 3)))
+    height = evidence / typical - 0.02 * far / max(float(far.max()), 1.0)
+    return np.asarray(_watershed(height, seeds, ~void), dtype=np.int64)
+
+
+def _watershed(height: Field, seeds: Ints, wall: Bools) -> Ints:
+    try:
+        segmentation = optional("skimage.segmentation", "outlines from pictures")
+    except UsageError as error:
+        raise UsageError(
+            "outlines from pictures need the package scikit-image, which is not installed",
+            remedy="pip install 'moma-masonry[outlines]'",
+        ) from error
+    out: Ints = segmentation.watershed(height, seeds, mask=wall)
+    return out
+
+
+def borders_of(regions: Ints, measures: NDArray[np.float32]) -> Borders:
+    """Measure the borders between regions.
+
+    Parameters
+    ----------
+    regions : (h, w) numbers; 0 is no region
+    measures : (k, h, w) what is summed along borders; of two pixels on both sides the larger counts
+    """
+    pairs, values = [], []
+    whole, but_last, but_first = slice(None), slice(None, -1), slice(1, None)
+    for first, second, columns in (
+        ((whole, but_last), (whole, but_first), 1.0),
+        ((but_last, whole), (but_first, whole), 0.0),
+    ):
+        a, b = regions[first], regions[second]
+        at = (a != b) & (a > 0) & (b > 0)
+        pairs.append(np.sort(np.column_stack([a[at], b[at]]), axis=1))
+        here = np.maximum(measures[:, *first][:, at], measures[:, *second][:, at]).T
+        values.append(np.column_stack([here, np.full(len(here), columns, dtype=np.float32)]))
+    every, found = np.concatenate(pairs), np.concatenate(values)
+    base = int(regions.max()) + 1
+    keys, where = np.unique(every[:, 0] * base + every[:, 1], return_inverse=True)
+    lengths = np.bincount(where, minlength=len(keys)).astype(np.float64)
+    sums = np.column_stack([np.bincount(where, column, len(keys)) for column in found.T])
+    return Borders(np.column_stack([keys // base, keys % base]), lengths, sums)

@@ -1,0 +1,79 @@
+"""Resolution of the work: that at which joints are as wide as the filters for them."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from survey.clouds.pictures.channels import channels_of
+from survey.clouds.pictures.joints import WIDTH, Field, combined, grain_and_contrast
+
+__all__ = ["joint_width", "resized", "resized_field"]
+
+_WIDTHS = (2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)  # widths of joints that are tried [px]
+_SAMPLE = 512  # side of the parts of a picture that they are tried on [px]
+_BEST = 3  # of five parts whose contrasts count: the others may show a door, a scaffold or a bush
+_GOOD = 0.7  # of the best contrast over grain, from which a finer resolution is preferred: it has the better edges
+
+
+def joint_width(pixels: NDArray[np.uint8], depth: Field | None = None) -> tuple[float, float]:
+    """Find the width of the joints of a picture by their contrast over grain at many resolutions.
+
+    Parameters
+    ----------
+    pixels : (h, w, 3)
+    depth : (h, w) distance before the wall's plane [m]; None without a depth map
+
+    Returns
+    -------
+    width [px], and the contrast of joints over grain at it
+    """
+    parts = list(_parts(pixels.shape))
+    found = []
+    for one in _WIDTHS:
+        if min(pixels.shape[:2]) * WIDTH / one < 40:
+            break
+        ratios = []
+        for part in parts:
+            heights = None if depth is None else resized_field(depth[part], one / WIDTH)
+            channels, _, _ = channels_of(resized(pixels[part], one / WIDTH), heights)
+            grain, contrast = grain_and_contrast(combined(channels))
+            ratios.append(contrast / grain)
+        found.append((one, float(np.mean(sorted(ratios)[-_BEST:]))))
+    if not found:
+        return WIDTH, 0.0
+    best = max(ratio for _, ratio in found)
+    return next((one, ratio) for one, ratio in found if ratio >= _GOOD * best)
+
+
+def _parts(shape: tuple[int, ...]) -> Iterator[tuple[slice, slice]]:
+    """Yield parts of a picture: the middle, and the corners if they are others."""
+    height, width = shape[:2]
+    rows, columns = max(0, height - _SAMPLE), max(0, width - _SAMPLE)
+    places = {(rows // 2, columns // 2), (0, 0), (0, columns), (rows, 0), (rows, columns)}
+    for top, start in sorted(places):
+        yield slice(top, top + _SAMPLE), slice(start, start + _SAMPLE)
+
+
+def resized(pixels: NDArray[np.uint8], factor: float) -> NDArray[np.uint8]:
+    """Return a picture (h, w, 3) whose pixels are `factor` times as large, as means of those within."""
+    from PIL import Image
+
+    shape = _shape(pixels.shape, factor)
+    filter = Image.Resampling.BOX if factor >= 1.0 else Image.Resampling.BICUBIC
+    return np.asarray(Image.fromarray(pixels).resize(shape, filter))
+
+
+def resized_field(field: Field, factor: float) -> Field:
+    """Return a field (h, w) whose pixels are `factor` times as large; NaN where a pixel has one."""
+    from PIL import Image
+
+    shape = _shape(field.shape, factor)
+    filter = Image.Resampling.BOX if factor >= 1.0 else Image.Resampling.BILINEAR
+    return np.asarray(
+        Image.fromarray(field.astype(np.float32), mode=None).resize(shape, filter), dtype=np.float32
+    )
+
+
+def _shape(shape: tuple[int, ...], factor: float) -> tuple[int, int]:
+    return max(1, round(shape[1] / factor)), max(1, round(shape[0] / factor))

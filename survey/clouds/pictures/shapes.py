@@ -1,0 +1,144 @@
+"""Stones without their mortar: masks, outlines with straight sides, and how sure their corners are."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from survey.arrays import Array, Bools, Ints
+from survey.clouds.outlines.tracing import few_corners, trace
+from survey.clouds.pictures.joints import WIDTH, Field
+from survey.geometry.polygons import ring_area
+
+__all__ = ["Shape", "outline_shapes", "without_mortar"]
+
+_STRAIGHT = 1.0  # distance of a traced boundary from the sides of its outline [px of the work]
+_FEWEST = 4  # corners of an outline that has none to spare
+_BEVEL = 1.5  # length of a side that cuts a corner off, over the width of a joint
+_SQUARE = 0.6  # sine of the angle between the sides beside it: 37°
+_LEAST = 1.5  # width of a stone over that of a joint
+_SEEN = 0.25  # contrast of mortar over the scatter of the wall from which its edge can be seen
+_PIXEL = (
+    0.45  # standard deviation of a corner where two straight sides meet [px of the work]: of rendered walls
+)
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Outline of a region.
+
+    Attributes
+    ----------
+    number : of the region
+    ring : (n, 2) column and row of its corners [px of the work]
+    sigma : standard deviation of a corner [px of the work]
+    """
+
+    number: int
+    ring: Array
+    sigma: float
+
+
+def without_mortar(regions: Ints, image: Field, reach: float) -> Bools:
+    """Return where (h, w) there is stone: what within a region is nearer to its inside than to its joints.
+
+    Parameters
+    ----------
+    regions : (h, w) numbers; 0 is no region
+    image : (h, w) in which joints are high
+    reach : farthest distance of mortar from the middle of a joint, over the width of a joint
+    """
+    from scipy.ndimage import distance_transform_edt, gaussian_filter, maximum_filter
+
+    border = np.zeros(regions.shape, dtype=np.bool_)
+    for axis in (0, 1):
+        change = np.diff(regions, axis=axis) != 0
+        border[tuple(slice(None, -1) if k == axis else slice(None) for k in (0, 1))] |= change
+        border[tuple(slice(1, None) if k == axis else slice(None) for k in (0, 1))] |= change
+    far = distance_transform_edt(~border)
+    inside = (far > 1.3 * WIDTH) & (regions > 0)
+    smooth = gaussian_filter(image, 0.6)
+    stone = _spread(smooth, inside, 4.0 * WIDTH)
+    joint = _spread(maximum_filter(smooth, 3), border & (regions > 0), 2.5 * WIDTH)
+    contrast = joint - stone
+    mortar = (smooth - stone > 0.5 * contrast) & (contrast > _SEEN) & (far <= reach * WIDTH)
+    return np.asarray((regions > 0) & ~border & ~mortar, dtype=np.bool_)
+
+
+def _spread(image: Field, where: Bools, reach: float) -> Field:
+    """Return the mean of a picture over the pixels around that are chosen."""
+    from scipy.ndimage import gaussian_filter
+
+    chosen = where.astype(np.float32)
+    middle = float(image[where].mean()) if where.any() else 0.0
+    weight = gaussian_filter(chosen, reach) + np.float32(1e-4)
+    out: Field = (
+        gaussian_filter(np.where(where, image, 0.0).astype(np.float32), reach) + 1e-4 * middle
+    ) / weight
+    return out
+
+
+def outline_shapes(regions: Ints, stone: Bools) -> list[Shape]:
+    """Trace the stone of each region with straight sides.
+
+    Parameters
+    ----------
+    regions : (h, w) numbers
+    stone : (h, w) where there is stone
+    """
+    from scipy.ndimage import binary_fill_holes, binary_opening, find_objects
+
+    out = []
+    for number, box in enumerate(find_objects(regions), start=1):
+        if box is None:
+            continue
+        mask: NDArray[np.bool_] = np.pad((regions[box] == number) & stone[box], 1)
+        mask = binary_fill_holes(binary_opening(mask, np.ones((3, 3))))
+        if not mask.any() or np.sqrt(mask.sum()) < _LEAST * WIDTH:
+            continue
+        dense, _, _ = trace(mask)
+        if len(dense) < 3:
+            continue
+        ring = _sharp(few_corners(dense, _STRAIGHT))
+        if abs(ring_area(ring)) < (_LEAST * WIDTH) ** 2:
+            continue
+        sigma = float(np.hypot(_PIXEL, _scatter(dense, ring)))
+        out.append(Shape(number, ring + np.array([box[1].start - 1, box[0].start - 1]), sigma))
+    return out
+
+
+def _sharp(ring: Array) -> Array:
+    """Return an outline whose corners are not cut off: short sides between long ones about square to each other."""
+    k = 0
+    while k < len(ring) > _FEWEST:
+        before, start, stop, after = (ring[(k + n) % len(ring)] for n in (-1, 0, 1, 2))
+        one, other = start - before, after - stop
+        lengths = np.linalg.norm(one), np.linalg.norm(other)
+        turn = float(one[0] * other[1] - one[1] * other[0]) / max(float(lengths[0] * lengths[1]), 1e-12)
+        short = float(np.linalg.norm(stop - start))
+        if short > _BEVEL * WIDTH or min(lengths) < 2.0 * short or abs(turn) < _SQUARE:
+            k += 1
+            continue
+        along = float((stop - start)[0] * other[1] - (stop - start)[1] * other[0]) / (
+            turn * lengths[0] * lengths[1]
+        )
+        meet = start + along * one
+        if not 0.0 <= along * lengths[0] <= _BEVEL * WIDTH:
+            k += 1
+            continue
+        ring = ring.copy()
+        ring[k] = meet
+        ring = np.delete(ring, (k + 1) % len(ring), axis=0)
+        k = max(0, k - 1)
+    return ring
+
+
+def _scatter(dense: Array, ring: Array) -> float:
+    """Return the root mean square of the distances of a traced boundary from an outline [px]."""
+    start, side = ring, np.roll(ring, -1, axis=0) - ring
+    length = np.maximum((side**2).sum(axis=1), 1e-12)
+    sparse = dense[:: max(1, len(dense) // 200)]
+    apart = sparse[:, None] - start[None]
+    along = np.clip((apart * side).sum(axis=2) / length, 0.0, 1.0)
+    off = np.linalg.norm(apart - along[..., None] * side, axis=2).min(axis=1)
+    return float(np.sqrt((off**2).mean()))

@@ -1,0 +1,152 @@
+"""Joints that are missing between strong ones: straight lines across a region, from one of its borders to the other.
+
+A joint that a stain or flush mortar hides is too weak to part regions, but the mean along a line across the
+whole stone, one that a head
+joint would follow from bed to bed, may still stand out. Such a line is proposed if its probability, by the
+same weights as of all borders, is high.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from survey.arrays import Array, Bools, Ints
+from survey.clouds.pictures.joints import WIDTH, Field, Strength
+
+__all__ = ["MISSING_WEIGHTS", "best_line", "beyond", "line_features", "propose_missing"]
+
+MISSING_WEIGHTS = (-8.76, 1.6, -5.96, -0.2, -8.25, 3.73)
+"""Weights of: constant, strength, gaps, prominence, how much fuller the whole is, size."""
+
+_ACROSS = 0.6  # part of the height of a region that a line crosses at least
+_LEAN = 4  # pixels by which the ends of a line lean to either side
+_CLEAR = 2.0  # distance from the ends of a region over the width of a joint
+_STRONGEST, _GAP = 1.5, 0.25  # as along borders
+_ROUNDS = 6  # lines across one region at most
+
+
+@dataclass(frozen=True)
+class _Line:
+    """A line across a region: mean strength, share of gaps, strength over that of the lines beside it, place [px].
+
+    Attributes
+    ----------
+    strength : mean along it, over that of a usual joint
+    gaps : share of it without a joint
+    prominence : logarithm of its strength over the median of all lines across
+    middle, lean : column of its middle, and by how many its ends lie to either side
+    """
+
+    strength: float
+    gaps: float
+    prominence: float
+    middle: int
+    lean: int
+
+
+def propose_missing(
+    regions: Ints, strength: Strength, typical: float, hidden: Bools, least: float = 0.5
+) -> Ints:
+    """Part regions where a straight joint across them is likely.
+
+    Parameters
+    ----------
+    regions : (h, w) numbers; those that are joined have one
+    strength : of joints
+    typical : of a usual joint
+    hidden : (h, w) where joints cannot be seen
+    least : probability from which a line is proposed
+
+    Returns
+    -------
+    (h, w) numbers, of new regions above all others
+    """
+    from scipy.ndimage import find_objects
+
+    out = regions.copy()
+    following = int(out.max()) + 1
+    waiting = [(k, box, 0) for k, box in enumerate(find_objects(out), start=1) if box is not None]
+    fields = {1: strength.upright, 0: strength.level}
+    while waiting:
+        number, box, depth = waiting.pop()
+        if depth >= _ROUNDS:
+            continue
+        mask = out[box] == number
+        best: tuple[float, Bools] | None = None
+        for axis, field in fields.items():
+            ratio = np.minimum(field[box] / typical, _STRONGEST)
+            turned = (ratio, mask, hidden[box]) if axis else (ratio.T, mask.T, hidden[box].T)
+            line = best_line(*turned)
+            if line is None:
+                continue
+            after = beyond(turned[1].shape, line) & turned[1]
+            chance = _probability(turned[1], after, line)
+            if chance >= least and (best is None or chance > best[0]):
+                best = chance, after if axis else after.T
+        if best is None:
+            continue
+        out[box][best[1]] = following
+        waiting += [(number, box, depth + 1), (following, box, depth + 1)]
+        following += 1
+    return out
+
+
+def best_line(ratio: Field, mask: Bools, hidden: Bools) -> _Line | None:
+    """Return the strongest line from top to bottom of a region; None where it is too narrow."""
+    from scipy.ndimage import binary_erosion, maximum_filter1d
+
+    rows, columns = mask.shape
+    clear = round(_CLEAR * WIDTH)
+    if columns < 2 * clear + 3 or rows < WIDTH:
+        return None
+    wide = maximum_filter1d(ratio, 3, axis=1)
+    # the joints at the sides of a region are no joints within it
+    seen = binary_erosion(mask, np.ones((1, 2 * clear + 1))) & ~hidden
+    best: _Line | None = None
+    along = np.linspace(-1.0, 1.0, rows)
+    for lean in range(-_LEAN, _LEAN + 1, 2):
+        at = np.clip(np.arange(columns)[None] + np.round(lean * along).astype(int)[:, None], 0, columns - 1)
+        values = np.take_along_axis(wide, at, axis=1)
+        inside = np.take_along_axis(seen, at, axis=1)
+        count = inside.sum(axis=0)
+        mean = (values * inside).sum(axis=0) / np.maximum(count, 1)
+        mean[count < _ACROSS * rows] = 0.0
+        middle = int(np.argmax(mean))
+        if best is None or mean[middle] > best.strength:
+            lack = ((values < _GAP) & inside)[:, middle].sum() / max(int(count[middle]), 1)
+            usual = float(np.median(mean[count >= _ACROSS * rows])) if mean[middle] > 0.0 else 1.0
+            prominence = float(np.log((mean[middle] + 0.02) / (usual + 0.02)))
+            best = _Line(float(mean[middle]), float(lack), prominence, middle, lean)
+    return best
+
+
+def beyond(shape: tuple[int, ...], line: _Line) -> Bools:
+    """Return which pixels lie to the right of a line."""
+    rows, columns = shape
+    place = line.middle + np.round(line.lean * np.linspace(-1.0, 1.0, rows)).astype(int)
+    return np.arange(columns)[None] > place[:, None]
+
+
+def _probability(whole: Bools, after: Bools, line: _Line) -> float:
+    """Return the probability of a line."""
+    before = whole & ~after
+    first, second = float(before.sum()), float(after.sum())
+    if min(first, second) < (_CLEAR * WIDTH) ** 2:
+        return 0.0
+    value = float(line_features(whole, after, line) @ np.array(MISSING_WEIGHTS))
+    return float(1.0 / (1.0 + np.exp(-np.clip(value, -30.0, 30.0))))
+
+
+def line_features(whole: Bools, after: Bools, line: _Line) -> Array:
+    """Return the features (6,) of a line across a region, whose part to its right is given."""
+    before = whole & ~after
+    first, second, total = (float(one.sum()) for one in (before, after, whole))
+    fill = (first * first / _box_area(before) + second * second / _box_area(after)) / total
+    size = np.log(min(np.sqrt(min(first, second)) / WIDTH, 20.0))
+    return np.array([1.0, line.strength, line.gaps, line.prominence, total / _box_area(whole) - fill, size])
+
+
+def _box_area(mask: Bools) -> float:
+    rows: Array = np.flatnonzero(mask.any(axis=1))
+    columns: Array = np.flatnonzero(mask.any(axis=0))
+    return float((rows[-1] - rows[0] + 1) * (columns[-1] - columns[0] + 1))
