@@ -20,7 +20,7 @@ from moma.tables.rows import DATE_REMEDY, ListRows, Row, TextRows, open_rows
 __all__ = ["Table", "TableRow", "read_table"]
 
 _SAMPLE = 50  # lines by which the separator is found
-_SEPARATORS = (";", "\t", "|", ",")
+_SEPARATORS: tuple[str, ...] = (";", "\t", "|", ",")
 _BLANKS = ""
 _LONGEST_HEAD = 100  # lines before the first row
 _TWO_PARTS = re.compile(r'"?[+-]?\d+,\d+"?')
@@ -159,8 +159,8 @@ def read_table(
     """
     source = open_rows(path, sheet)
     if isinstance(source, TextRows) and source.delimiter is None:
-        lines = [(number, str(row)) for number, row in islice(source, _LONGEST_HEAD + _SAMPLE)]
-        lines = [(number, _bare(row, comments)) for number, row in lines]
+        head = islice(source, _LONGEST_HEAD + _SAMPLE)
+        lines: list[tuple[int, Row]] = [(number, _bare(row, comments)) for number, row in head]
         source.delimiter = _separator(source, lines, is_row)
     commas = source.delimiter != ","
     rows = [TableRow(number, _trimmed(source, _bare(row, comments), number)) for number, row in source]
@@ -170,12 +170,12 @@ def read_table(
         text = shown(" ".join(rows[0].cells)) if rows else "the file"
         what = f"{text} is not a row of this table" if rows else "the file has no rows"
         raise SurveyError(what, where=f"{source.path}:{line}", remedy=remedy)
-    comments = tuple(
+    remarks = tuple(
         TableRow(number, tuple(one.strip() for one in text.split(source.delimiter or None)))
         for number, text in source.comments
     )
     decimals = Decimals(source.path, commas, source.any_mark)
-    return Table(source.path, tuple(rows[first:]), tuple(rows[:first]), comments, commas, decimals, source)
+    return Table(source.path, tuple(rows[first:]), tuple(rows[:first]), remarks, commas, decimals, source)
 
 
 def _bare(row: Row, comments: bool) -> Row:
@@ -208,8 +208,8 @@ def _separator(source: TextRows, lines: Sequence[tuple[int, Row]], is_row: IsRow
                     numbers += sum(is_number(cell, one != ",") for cell in cells) / len(cells)
         scores[one] = rows, numbers
     most = max(rows for rows, _ in scores.values())
-    clear = (one for one in (";", "\t", "|") if one in scores and scores[one][0] == most)
-    best = next(clear, None) or max(scores, key=lambda one: scores[one])
+    clear = (one for one in _SEPARATORS[:-1] if one in scores and scores[one][0] == most)
+    best: str = next(clear, None) or max(scores, key=lambda one: scores[one])
     pairs = [str(line).strip().strip('"') for _, line in lines if _TWO_PARTS.fullmatch(str(line).strip())]
     if best == "," and len(pairs) >= scores[","][0] and _repeats([one.partition(",")[0] for one in pairs]):
         return _BLANKS
