@@ -155,7 +155,6 @@ def _searched(steps: "_Steps", bracket: "_Bracket") -> "_Bracket":
             load, up = min(int((1.0 + up) * low), middle), 2.0 * up
         else:
             high, worst = load, trial
-            # on the safe side: next to the limit some loads fall below others that hold
             stops = int(trial.stops / unit)
             load = stops if stops > low else middle
     return _Bracket(low, high, unit, best, worst, problems)
