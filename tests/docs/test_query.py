@@ -179,5 +179,5 @@ def test_the_python_of_the_page_runs(
         pass
     names: dict[str, object] = {}
     exec(program, names)
-    assert names["rows"] == [{"code": "W01-01", "von_mises_max@2": None}]
+    assert names["rows"] == [{"code": "W01-01", "von_mises_p99@2": None}]
     assert [stone.code for stone in names["stones"]] == []  # type: ignore[attr-defined]
