@@ -2,6 +2,7 @@
 
 from archmodel.tables.entries import Entry
 from archmodel.tables.knowledge import (
+    Decision,
     DepthEvidence,
     MadeOf,
     MasonMark,
@@ -23,12 +24,14 @@ def statement_values(statement: Statement) -> Values:
     -------
     dict
         material, phase, sign, place, type, severity, at [m], value, sigma [m] or key, as its kind has them; then
-        text, document (code), locator, observed_on
+        by (author, where that is not who recorded it), certainty, text, document (code), locator, observed_on
     """
     document = statement.document
-    seen = statement.observed_on
+    seen, author = statement.observed_on, statement.author
     values = {
         **_own(statement),
+        "by": author if author != statement.entry.author else None,
+        "certainty": statement.certainty,
         "text": statement.text,
         "document": None if document is None else document.code,
         "locator": statement.locator,
@@ -65,5 +68,8 @@ def _own(statement: Statement) -> Values:
             return {"value": value, "sigma": sigma}
         case Note(key=key):
             return {"key": key}
+        case Decision(about=about, chosen=chosen):
+            choice = {} if chosen is None else {**_own(chosen), "of": chosen.author}
+            return {"about": about, **choice}
         case _:
             return {}

@@ -1,7 +1,8 @@
 """Statements about entities and structures: material, phase, marks, observations, depth, documents, notes.
 
 One thing said of many subjects is one statement about each. Of what a subject can have but one (`SINGLE`), a new
-statement supersedes the one before; the others add up. What is said already, word for word, is not said again.
+statement supersedes the one before of the same author, a depth that of any author, as the solid follows it; the
+others add up. What an author says already, word for word, is not said again.
 """
 
 from collections.abc import Mapping, Sequence
@@ -9,7 +10,7 @@ from dataclasses import dataclass
 from datetime import date
 
 from sqlalchemy import insert, select
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import Session, aliased
 
 from archmodel.assertions.validation import (
     checked_choice,
@@ -42,6 +43,7 @@ __all__ = [
     "PLAIN",
     "SINGLE",
     "Remark",
+    "remark_row",
     "say_depth",
     "say_made_of",
     "say_mason_mark",
@@ -49,10 +51,11 @@ __all__ = [
     "say_observation",
     "say_of_phase",
     "say_reference",
+    "without_replaced",
 ]
 
 SINGLE: tuple[type[Statement], ...] = (MadeOf, OfPhase, DepthEvidence)
-"""Statements of which a subject has at most one that is held."""
+"""Statements of which an author has at most one about a subject."""
 
 
 @dataclass(frozen=True)
@@ -64,12 +67,16 @@ class Remark:
     text : in words
     document, locator : code of the document that says so, and where in it
     observed_on : date on which it was seen
+    stated_on : date of the opinion; None: that of the recording
+    certainty : how sure the author is, from 0 to 1
     """
 
     text: str | None = None
     document: str | None = None
     locator: str | None = None
     observed_on: date | None = None
+    stated_on: date | None = None
+    certainty: float | None = None
 
 
 PLAIN = Remark()
@@ -169,6 +176,31 @@ def say_note(session: Session, entry: Entry, about: Subjects, key: str, remark: 
     return _say(session, entry, Note, about, {"key": checked_label("key", key)}, remark)
 
 
+def without_replaced(session: Session, cls: type[Statement], about: Subjects, author: str | None) -> Subjects:
+    """Leave out the subjects of which an author has replaced a statement of this kind by a later one."""
+    later = aliased(Statement)
+
+    def replaced(owner: str, numbers: Sequence[int]) -> set[int]:
+        column = getattr(Statement, owner)
+        found: set[int] = set()
+        for batch in batches(numbers):
+            rows = (
+                select(column)
+                .join(later, later.supersedes_id == Statement.id)
+                .where(column.in_(batch), Statement.kind == cls.__kind__, Statement.author == author)
+                .where(later.superseded_id.is_(None))
+            )
+            found.update(session.scalars(rows))
+        return found
+
+    entities = replaced("entity_id", about.entities)
+    structures = replaced("structure_id", about.structures)
+    return Subjects(
+        tuple(number for number in about.entities if number not in entities),
+        tuple(number for number in about.structures if number not in structures),
+    )
+
+
 def _say(
     session: Session,
     entry: Entry,
@@ -178,11 +210,12 @@ def _say(
     remark: Remark,
 ) -> RowCounts:
     """Store one statement about each subject that lacks it."""
-    full = {**values, **_remark_row(session, remark)}
+    full = {**values, **remark_row(session, remark), "author": entry.author}
+    stated_on = remark.stated_on or entry.recorded_at.date()
     outcome = NOTHING
     for owner, numbers in (("entity_id", about.entities), ("structure_id", about.structures)):
         for batch in batches(numbers):
-            outcome += _say_of_batch(session, entry, cls, owner, batch, full)
+            outcome += _say_of_batch(session, entry, cls, owner, batch, full, stated_on)
     return outcome
 
 
@@ -193,6 +226,7 @@ def _say_of_batch(
     owner: str,
     numbers: Sequence[int],
     values: Mapping[str, object],
+    stated_on: date,
 ) -> RowCounts:
     session.flush()
     table = table_of(Statement)
@@ -204,13 +238,13 @@ def _say_of_batch(
     for row in session.execute(held).mappings():
         if all(row[name] == value for name, value in values.items()):
             same.add(row[owner])
-        elif cls in SINGLE:
+        elif cls is DepthEvidence or (cls in SINGLE and row["author"] == values["author"]):
             others[row[owner]] = row["id"]
     if others:
         end_rows(session, entry, Statement, list(others.values()))
     rows = [
         {"kind": cls.__kind__, "entry_id": entry.id, owner: number, "supersedes_id": others.get(number)}
-        | dict(values)
+        | {"stated_on": stated_on, **values}
         for number in numbers
         if number not in same
     ]
@@ -219,7 +253,8 @@ def _say_of_batch(
     return RowCounts(new=len(rows) - len(others), replaced=len(others), unchanged=len(same))
 
 
-def _remark_row(session: Session, remark: Remark) -> dict[str, object]:
+def remark_row(session: Session, remark: Remark) -> dict[str, object]:
+    """Return the columns of the details of a statement."""
     document = remark.document
     if remark.locator is not None and document is None:
         raise UsageError(f"the locator {remark.locator[:40]!r} is in no document", remedy="name the document")
@@ -228,6 +263,7 @@ def _remark_row(session: Session, remark: Remark) -> dict[str, object]:
         "document_id": None if document is None else held_named(session, Document, document).id,
         "locator": checked_text("locator", remark.locator),
         "observed_on": remark.observed_on,
+        "certainty": checked_number("certainty", remark.certainty, "-", at_least=0.0, at_most=1.0),
     }
 
 

@@ -52,6 +52,7 @@ def checked_number(
     above: float | None = None,
     at_least: float | None = None,
     below: float | None = None,
+    at_most: float | None = None,
 ) -> float | None:
     """Check a finite number within bounds; None stays None."""
     if value is None:
@@ -62,6 +63,7 @@ def checked_number(
         f"above {above}": finite and (above is None or value > above),
         f"at least {at_least}": finite and (at_least is None or value >= at_least),
         f"below {below}": finite and (below is None or value < below),
+        f"at most {at_most}": finite and (at_most is None or value <= at_most),
     }
     if not all(bounds.values()):
         asked = [text for text in bounds if not text.endswith("None")]

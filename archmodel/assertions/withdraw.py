@@ -1,15 +1,20 @@
-"""Withdrawal of statements about entities and structures, found by their content."""
+"""Withdrawal of statements about entities and structures, found by their content.
+
+An author withdraws statements of their own where there are any, else those of others. What a withdrawn statement
+superseded holds again, as its author said it.
+"""
 
 from collections.abc import Mapping, Sequence
 
-from sqlalchemy import select
+from sqlalchemy import insert, select
 from sqlalchemy.orm import Session
 
-from archmodel.assertions.plain_values import statement_values
+from archmodel.assertions.opinions import says
+from archmodel.assertions.statements import SINGLE
 from archmodel.assertions.validation import checked_choice
 from archmodel.store.bulk import batches
 from archmodel.store.find_by_code import Subjects
-from archmodel.store.revisions import NOTHING, RowCounts, end_rows
+from archmodel.store.revisions import NOTHING, RowCounts, end_rows, table_of
 from archmodel.tables.entries import Entry
 from archmodel.tables.knowledge import DepthEvidence, Statement
 from archmodel.tables.relations import INVERSE, RELATIONS, SYMMETRIC, Membership, Relation
@@ -24,31 +29,57 @@ def withdraw_statements(
     cls: type[Statement],
     about: Subjects,
     match: Mapping[str, object] | None = None,
+    since: int = 0,
 ) -> RowCounts:
     """Withdraw the statements of a kind about some subjects.
 
     Parameters
     ----------
-    match : only those that say this, by the names of ``wording.statement_values``; all of the kind if empty
+    match : only those that say this, by the names of ``plain_values.statement_values`` or ``author``; all of the kind
+        if empty
+    since : only those that came with a later entry than this one
 
     Raises
     ------
     UsageError
-        if no such thing was ever said, or it is a depth
+        if no such thing was ever said, it is a depth, or several other authors said it of one subject that can
+        have but one
     """
     if cls is DepthEvidence:
         raise UsageError("a depth cannot be withdrawn", remedy="record the depth that holds instead")
-    outcome, held = NOTHING, []
+    outcome = NOTHING
+    held: list[Statement] = []
     for owner, numbers in ((cls.entity_id, about.entities), (cls.structure_id, about.structures)):
         for batch in batches(numbers):
             for one in session.scalars(select(cls).where(owner.in_(batch))):
-                if not _says(one, match or {}):
+                if not says(one, match or {}):
                     continue
-                if one.superseded_id is None:
-                    held.append(one.id)
+                if one.superseded_id is None and one.entry_id > since:
+                    held.append(one)
                 else:
                     outcome += RowCounts(unchanged=1)
-    return _ended(session, entry, Statement, held, outcome, cls.__kind__)
+    mine = [one for one in held if one.author == entry.author]
+    ended = mine or held
+    voices = {one.author for one in ended}
+    if cls in SINGLE and len(voices) > 1:
+        names = ", ".join(sorted(name or "an unnamed author" for name in voices))
+        remedy = 'name the author: match = { author = "…" }'
+        raise UsageError(f"{cls.__kind__} was said by several other authors: {names}", remedy=remedy)
+    counts = _ended(session, entry, Statement, [one.id for one in ended], outcome, cls.__kind__)
+    _say_again(session, entry, [one.supersedes_id for one in ended if one.supersedes_id is not None])
+    return counts
+
+
+def _say_again(session: Session, entry: Entry, numbers: Sequence[int]) -> None:
+    """Copy superseded statements to rows that are held, with author and date of the opinion as they were."""
+    table = table_of(Statement)
+    for batch in batches(numbers):
+        rows = session.execute(select(table).where(table.c.id.in_(batch))).mappings()
+        again = [{**row, "entry_id": entry.id, "superseded_id": None} for row in rows]
+        for one in again:
+            del one["id"]
+        if again:
+            session.execute(insert(table), again)
 
 
 def withdraw_members(session: Session, entry: Entry, about: Subjects) -> RowCounts:
@@ -91,11 +122,6 @@ def withdraw_relations(
             else:
                 outcome += RowCounts(unchanged=1)
     return _ended(session, entry, Relation, held, outcome, f"declared relation {kind}")
-
-
-def _says(statement: Statement, match: Mapping[str, object]) -> bool:
-    said = statement_values(statement)
-    return all(said.get(name) == value for name, value in match.items())
 
 
 def _ended(

@@ -7,9 +7,10 @@ from sqlalchemy import or_, select
 from sqlalchemy.orm import Session, joinedload
 
 from archmodel.assertions.plain_values import entry_values
-from archmodel.describe.as_of import entity_at, structures_named, version_at
+from archmodel.database.as_known import as_known
 from archmodel.describe.knowledge import knowledge, memberships, owners_of, owners_of_structure
-from archmodel.store.find_by_code import check_entry, no_such_code
+from archmodel.describe.rows import entity_row, structures_named
+from archmodel.store.find_by_code import no_such_code
 from archmodel.tables.entities import Entity, canon_of, kind_named, own_attributes
 from archmodel.tables.entries import held_at
 from archmodel.tables.hierarchy import definition_of, kind_chain, kind_of
@@ -51,26 +52,39 @@ def describe(session: Session, code: str, at: int | None = None) -> dict[str, ob
     refuse_unknown_kinds(session, Entity, Structure)
     if not code.isprintable():
         raise no_such_code(session, code, Entity.code, Structure.code)
-    check_entry(session, at)
+    if at is not None:
+        return _described_at(session, code, at)
     number = session.scalar(select(Entity.id).where(Entity.code == code))
     if number is not None:
-        return _entity(session, number, code, at)
+        return _entity(session, number)
     structures = structures_named(session, code)
     if not structures:
         raise no_such_code(session, code, Entity.code, Structure.code)
-    # a code that was given up can have been given to another structure since
-    then = [one for one in structures if at is None or version_at(session, one, at).entry_id <= at]
-    return _structure(session, (then or structures)[0], at)
+    return _structure(session, structures[0])
 
 
-def _entity(session: Session, number: int, code: str, at: int | None) -> Values:
-    row = entity_at(session, number, at)
-    if row is None:
-        raise UsageError(f"{code} was not known at entry {at}", remedy="ask for a later one")
+def _described_at(session: Session, code: str, at: int) -> Values:
+    """Describe a stone or structure as it was known when an entry had just been made."""
+    number = session.scalar(select(Entity.id).where(Entity.code == code))
+    structures = structures_named(session, code)
+    if number is None and not structures:
+        raise no_such_code(session, code, Entity.code, Structure.code)
+    with as_known(session, at) as then:
+        if number is not None and then.get(Entity, number) is not None:
+            return _entity(then, number)
+        # a code that was given up can have been given to another structure since
+        for one in structures:
+            if number is None and (held := then.get(Structure, one.id)) is not None:
+                return _structure(then, held)
+    raise UsageError(f"{code} was not known at entry {at}", remedy="ask for a later one")
+
+
+def _entity(session: Session, number: int) -> Values:
+    row = entity_row(session, number)
     cls = kind_named(row["kind"])
-    measured = _measurement(session, number, at)
-    members = memberships(session, number, at)
-    results = _results(session, number, at)
+    measured = _measurement(session, number)
+    members = memberships(session, number)
+    results = _results(session, number)
     return {
         "code": row["code"],
         "kind": row["kind"],
@@ -89,32 +103,29 @@ def _entity(session: Session, number: int, code: str, at: int | None) -> Values:
             "source": row["depth_source"],
             "origin": row["depth_origin"],
         },
-        "structures": [_membership(session, one, at) for one in members],
-        "relations": _relations(session, number, at),
-        "knowledge": knowledge(session, "entity_id", number, owners_of(session, members, at), at),
+        "structures": [_membership(session, one) for one in members],
+        "relations": _relations(session, number),
+        "knowledge": knowledge(session, "entity_id", number, owners_of(session, members)),
         "survey": None if measured is None else _survey(measured),
         "measured": None if measured is None else _measured(measured),
         "notes": {} if measured is None else dict(measured.notes),
         "runs": [_result(result) for result in results],
         "joints": _joints(session, number, results[0].run_id) if results else [],
-        "corrections": _corrections(session, number, at),
+        "corrections": _corrections(session, number),
     }
 
 
-def _structure(session: Session, held: Structure, at: int | None) -> Values:
-    number, row = held.id, version_at(session, held, at)
-    if at is not None and row.entry_id > at:
-        raise UsageError(f"{held.code} was not known at entry {at}", remedy="ask for a later one")
-    owners = owners_of_structure(session, row.parent_id, at)
-    parts = select(Structure.code).where(Structure.parent_id == number, held_at(Structure, at))
+def _structure(session: Session, row: Structure) -> Values:
+    number = row.id
+    owners = owners_of_structure(session, row.parent_id)
+    parts = select(Structure.code).where(Structure.parent_id == number, held_at(Structure))
     members = (
         select(Entity.code)
         .join(Membership, Membership.entity_id == Entity.id)
-        .where(Membership.structure_id == number, held_at(Membership, at))
+        .where(Membership.structure_id == number, held_at(Membership))
         .order_by(Membership.rank.is_(None), Membership.rank, Membership.id)
     )
-    ended = row.superseded_by if held.superseded_id is not None else None
-    withdrawn = ended is not None and (at is None or ended.id <= at)
+    ended = row.superseded_by
     return {
         "code": row.code,
         "kind": row.kind,
@@ -125,9 +136,9 @@ def _structure(session: Session, held: Structure, at: int | None) -> Values:
         "part_of": [owner.structure.code for owner in owners],
         "parts": sorted(session.scalars(parts)),
         "members": list(session.scalars(members)),
-        "knowledge": knowledge(session, "structure_id", number, owners, at),
+        "knowledge": knowledge(session, "structure_id", number, owners),
         "recorded": entry_values(row.entry),
-        "withdrawn": entry_values(ended) if withdrawn and ended is not None else None,
+        "withdrawn": None if ended is None else entry_values(ended),
     }
 
 
@@ -142,15 +153,15 @@ def _own(cls: type[Entity], row: Values) -> Values:
     }
 
 
-def _measurement(session: Session, number: int, at: int | None) -> Measurement | None:
+def _measurement(session: Session, number: int) -> Measurement | None:
     return session.scalar(
         select(Measurement)
-        .where(Measurement.entity_id == number, held_at(Measurement, at))
+        .where(Measurement.entity_id == number, held_at(Measurement))
         .options(joinedload(Measurement.survey).joinedload(Survey.entry))
     )
 
 
-def _results(session: Session, number: int, at: int | None) -> list[EntityResult]:
+def _results(session: Session, number: int) -> list[EntityResult]:
     """List the results of runs, latest first."""
     statement = (
         select(EntityResult)
@@ -159,34 +170,33 @@ def _results(session: Session, number: int, at: int | None) -> list[EntityResult
         .options(joinedload(EntityResult.run).joinedload(Run.entry))
         .order_by(EntityResult.run_id.desc())
     )
-    return list(session.scalars(statement if at is None else statement.where(Run.entry_id <= at)))
+    return list(session.scalars(statement))
 
 
-def _membership(session: Session, one: Membership, at: int | None) -> Values:
+def _membership(session: Session, one: Membership) -> Values:
     """Describe membership in a structure, and the structures that contain it."""
-    structure = version_at(session, one.structure, at)
+    structure = one.structure
     return {
         "code": structure.code,
         "kind": structure.kind,
         "title": structure.title,
         "rank": one.rank,
-        "part_of": [owner.structure.code for owner in owners_of_structure(session, structure.parent_id, at)],
+        "part_of": [owner.structure.code for owner in owners_of_structure(session, structure.parent_id)],
         "declared": one.declared,
         "entry": one.entry_id,
     }
 
 
-def _corrections(session: Session, number: int, at: int | None) -> list[Values]:
+def _corrections(session: Session, number: int) -> list[Values]:
     statement = (
         select(Correction)
         .where(Correction.entity_id == number)
         .options(joinedload(Correction.entry))
         .order_by(Correction.id)
     )
-    made = session.scalars(statement if at is None else statement.where(Correction.entry_id <= at))
     return [
         {"attribute": one.attribute, "before": one.before, "after": one.after} | entry_values(one.entry)
-        for one in made
+        for one in session.scalars(statement)
     ]
 
 
@@ -250,7 +260,7 @@ def _result(result: EntityResult) -> dict[str, object]:
     }
 
 
-def _relations(session: Session, entity: int, at: int | None) -> dict[str, list[Values]]:
+def _relations(session: Session, entity: int) -> dict[str, list[Values]]:
     """List the relations of an entity by kind as seen from it: rests on, supports, beside, …
 
     Returns
@@ -260,7 +270,7 @@ def _relations(session: Session, entity: int, at: int | None) -> dict[str, list[
     """
     statement = (
         select(Relation)
-        .where(or_(Relation.subject_id == entity, Relation.object_id == entity), held_at(Relation, at))
+        .where(or_(Relation.subject_id == entity, Relation.object_id == entity), held_at(Relation))
         .options(joinedload(Relation.subject), joinedload(Relation.object))
         .order_by(Relation.id)
     )

@@ -5,15 +5,16 @@ and so can the whole description as it was when any entry had just been made (`k
 """
 
 from collections.abc import Callable, Hashable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from sqlalchemy import or_, select
 from sqlalchemy.orm import Session, joinedload
 
 from archmodel.assertions.plain_values import entry_values, statement_values
-from archmodel.describe.as_of import entity_at, structures_named
 from archmodel.describe.entity import describe
+from archmodel.describe.knowledge import ancestors
+from archmodel.describe.rows import first_values, structures_named
 from archmodel.store.find_by_code import no_such_code
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Entry, Recorded
@@ -67,8 +68,8 @@ def history(session: Session, code: str) -> tuple[Event, ...]:
     refuse_unknown_kinds(session, Entity, Structure)
     number = session.scalar(select(Entity.id).where(Entity.code == code)) if code.isprintable() else None
     if number is not None:
-        events = [*_of_entity(session, number), *_statements(session, "entity_id", number)]
-        return _ordered(events)
+        own = [*_of_entity(session, number), *_statements(session, "entity_id", number)]
+        return _ordered([*own, *_inherited(session, number)])
     structures = structures_named(session, code) if code.isprintable() else []
     if not structures:
         raise no_such_code(session, code, Entity.code, Structure.code)
@@ -105,8 +106,7 @@ def _event(entry: Entry, event: str, what: str, says: Values, before: Values | N
 def _of_entity(session: Session, number: int) -> Iterator[Event]:
     """Collect its record, measurements, corrections, structures, relations and runs."""
     entity = session.get_one(Entity, number)
-    first = entity_at(session, number, entity.entry_id) or {}
-    told = {name: first[name] for name in ("code", "kind", "course", "zone", "depth")}
+    told = first_values(session, number, "code", "kind", "course", "zone", "depth")
     yield _event(entity.entry, "recorded", "entity", told)
     measured = select(Measurement).where(Measurement.entity_id == number).order_by(Measurement.id)
     yield from _chain(session.scalars(measured).all(), "measurement", _measurement, lambda one: one.entity_id)
@@ -178,6 +178,17 @@ def _of_structure(session: Session, held: Structure) -> Iterator[Event]:
     yield from _statements(session, "structure_id", held.id)
     if held.superseded_by is not None:
         yield _event(held.superseded_by, "withdrawn", "structure", before or {})
+
+
+def _inherited(session: Session, number: int) -> Iterator[Event]:
+    """Collect what was stated of the structures of which it is or was a member, and of those that contain them."""
+    members = select(Membership.structure_id).where(Membership.entity_id == number).distinct()
+    structures: dict[int, str] = {}
+    for first in session.scalars(members):
+        structures |= ancestors(session, first)
+    for structure, code in structures.items():
+        for event in _statements(session, "structure_id", structure):
+            yield replace(event, says={**event.says, "said_of": code})
 
 
 def _statements(session: Session, column: str, number: int) -> Iterator[Event]:

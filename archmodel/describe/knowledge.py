@@ -4,17 +4,17 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import select
-from sqlalchemy.orm import Session, joinedload
+from sqlalchemy import inspect, select
+from sqlalchemy.orm import Session, aliased, joinedload
 
 from archmodel.assertions.plain_values import entry_values, statement_values
-from archmodel.describe.as_of import version_at
 from archmodel.tables.entries import held_at
-from archmodel.tables.knowledge import MadeOf, Material, MaterialProperty, OfPhase, Phase, Statement
+from archmodel.tables.knowledge import Decision, MadeOf, Material, MaterialProperty, OfPhase, Phase, Statement
+from archmodel.tables.opinions import DISPUTABLE, OpinionRule, preference, rule_of
 from archmodel.tables.relations import Membership
 from archmodel.tables.structures import Structure
 
-__all__ = ["Owner", "knowledge", "memberships", "owners_of", "owners_of_structure"]
+__all__ = ["Owner", "ancestors", "knowledge", "memberships", "owners_of", "owners_of_structure"]
 
 Values = dict[str, object]
 
@@ -34,70 +34,72 @@ class Owner:
 
     Attributes
     ----------
-    structure : as it was at the entry asked for
-    number : that statements refer to
+    structure : the structure
     distance : 1 for a structure of which it is a member, 2 for what that is a part of
     """
 
     structure: Structure
-    number: int
     distance: int
 
 
-def memberships(session: Session, entity: int, at: int | None) -> list[Membership]:
+def memberships(session: Session, entity: int) -> list[Membership]:
     """Select the memberships of an entity."""
     statement = (
         select(Membership)
-        .where(Membership.entity_id == entity, held_at(Membership, at))
+        .where(Membership.entity_id == entity, held_at(Membership))
         .options(joinedload(Membership.structure), joinedload(Membership.entry))
         .order_by(Membership.id)
     )
     return list(session.scalars(statement))
 
 
-def owners_of(session: Session, members: Iterable[Membership], at: int | None) -> list[Owner]:
+def owners_of(session: Session, members: Iterable[Membership]) -> list[Owner]:
     """List the structures to which a stone belongs, nearest first, each once."""
     owners: dict[int, Owner] = {}
     for membership in members:
-        _ascend(session, membership.structure_id, 1, at, owners)
+        _ascend(session, membership.structure_id, 1, owners)
     return sorted(owners.values(), key=lambda one: one.distance)
 
 
-def owners_of_structure(session: Session, parent: int | None, at: int | None) -> list[Owner]:
+def owners_of_structure(session: Session, parent: int | None) -> list[Owner]:
     """List the structures of which a structure is a part, nearest first."""
     owners: dict[int, Owner] = {}
-    _ascend(session, parent, 1, at, owners)
+    _ascend(session, parent, 1, owners)
     return list(owners.values())
 
 
-def _ascend(
-    session: Session, number: int | None, distance: int, at: int | None, owners: dict[int, Owner]
-) -> None:
+def _ascend(session: Session, number: int | None, distance: int, owners: dict[int, Owner]) -> None:
     """Add a structure and the structures that contain it; entries at no greater distance stay."""
     while number is not None and (number not in owners or owners[number].distance > distance):
-        structure = version_at(session, session.get_one(Structure, number), at)
-        owners[number] = Owner(structure, number, distance)
+        structure = session.get_one(Structure, number)
+        owners[number] = Owner(structure, distance)
         number, distance = structure.parent_id, distance + 1
 
 
-def knowledge(session: Session, column: str, number: int, owners: Sequence[Owner], at: int | None) -> Values:
+def ancestors(session: Session, number: int) -> dict[int, str]:
+    """Return the codes of a structure and of those that contain it, by number."""
+    owners: dict[int, Owner] = {}
+    _ascend(session, number, 1, owners)
+    return {key: owner.structure.code for key, owner in owners.items()}
+
+
+def knowledge(session: Session, column: str, number: int, owners: Sequence[Owner]) -> Values:
     """Describe material, phase, marks, observations and so on of one entity or structure.
 
     Parameters
     ----------
     column : "entity_id" or "structure_id"
     number : its own
-    owners : the structures that it belongs to; what is said of those says so (`phase_or_material_of`)
-    at : number of the entry at which it is asked for; None: now
+    owners : the structures that it belongs to; a statement about one of those names it
     """
-    own = _statements(session, column, [number], at)
-    inherited = _statements(session, "structure_id", [owner.number for owner in owners], at)
-    far = {owner.number: owner for owner in owners}
+    own = _statements(session, column, [number])
+    inherited = _statements(session, "structure_id", [owner.structure.id for owner in owners])
+    far = {owner.structure.id: owner for owner in owners}
     ranked = [(0, one) for one in own]
     ranked += sorted(((far[_of(one)].distance, one) for one in inherited), key=lambda pair: pair[0])
     told: Values = {
-        "material": _nearest(session, ranked, MadeOf, far, at),
-        "phase": _nearest(session, ranked, OfPhase, far, at),
+        "material": _holding(session, ranked, MadeOf, far),
+        "phase": _holding(session, ranked, OfPhase, far),
     }
     for name, kind in _LISTS.items():
         told[name] = [_told(one, far) for _, one in ranked if one.kind == kind]
@@ -108,12 +110,12 @@ def _of(statement: Statement) -> int:
     return statement.structure_id or 0
 
 
-def _statements(session: Session, column: str, numbers: Sequence[int], at: int | None) -> list[Statement]:
+def _statements(session: Session, column: str, numbers: Sequence[int]) -> list[Statement]:
     if not numbers:
         return []
     statement = (
         select(Statement)
-        .where(getattr(Statement, column).in_(numbers), held_at(Statement, at))
+        .where(getattr(Statement, column).in_(numbers), held_at(Statement))
         .options(joinedload(Statement.document), joinedload(Statement.entry))
         .order_by(Statement.id)
     )
@@ -129,35 +131,63 @@ def _told(statement: Statement, far: Mapping[int, Owner]) -> Values:
     return values | entry_values(statement.entry)
 
 
-def _nearest(
+def _holding(
     session: Session,
     ranked: Sequence[tuple[int, Statement]],
     cls: type[MadeOf] | type[OfPhase],
     far: Mapping[int, Owner],
-    at: int | None,
 ) -> Values | None:
-    """Return the nearest statements: its own, or those of the nearest structure."""
-    said: Any = next((one for _, one in ranked if isinstance(one, cls)), None)
-    if said is None:
+    """Describe the opinion that holds, of its own or of the nearest structure, and those beside it."""
+    opinions = [(distance, one) for distance, one in ranked if isinstance(one, cls)]
+    if not opinions:
         return None
-    of_material = isinstance(said, MadeOf)
-    about = _material(session, said.material, at) if of_material else _phase(session, said.phase, at)
+    nearest = [one for distance, one in opinions if distance == opinions[0][0]]
+    table, decisions = aliased(Statement), aliased(Statement)
+    rule = rule_of(session, cls.__kind__)
+    order = preference(rule, inspect(table).selectable, inspect(decisions).selectable)
+    first = select(table.id).where(table.id.in_([one.id for one in nearest])).order_by(*order).limit(1)
+    number = session.scalar(first)
+    said: Any = next(one for one in nearest if one.id == number)
+    about = _material(session, said.material) if isinstance(said, MadeOf) else _phase(said.phase)
     rest = {name: value for name, value in _told(said, far).items() if name not in ("material", "phase")}
-    return about | rest
+    others = [_opinion(one, far) for one in nearest if one is not said]
+    if not others:
+        return about | rest
+    column = DISPUTABLE[cls.__kind__]
+    disputed = any(getattr(one, column) != getattr(said, column) for one in nearest)
+    return about | rest | {"disputed": disputed, "rule": _rule(session, said, rule), "others": others}
 
 
-def _material(session: Session, row: Material | None, at: int | None) -> Values:
+def _opinion(statement: Statement, far: Mapping[int, Owner]) -> Values:
+    """Describe an opinion beside the one that holds, with its author and date."""
+    seen = statement.stated_on
+    author = {"author": statement.author, "stated_on": None if seen is None else seen.isoformat()}
+    return _told(statement, far) | author
+
+
+def _rule(session: Session, said: Statement, rule: OpinionRule) -> str:
+    """Return in words why an opinion holds: a decision, or the rule."""
+    decision = session.scalar(select(Decision).where(Decision.chosen_id == said.id, held_at(Decision)))
+    if decision is not None:
+        return f"decided by {decision.author or 'an unnamed author'} in entry {decision.entry_id}"
+    return {
+        "latest": "the latest opinion holds",
+        "certainty": "the most certain opinion holds",
+        "author": f"the authors count in the order {', '.join(rule.authors)}",
+    }[rule.rule]
+
+
+def _material(session: Session, row: Material | None) -> Values:
     if row is None:
         return {}
-    held = version_at(session, row, at)
     properties = session.scalars(
         select(MaterialProperty)
-        .where(MaterialProperty.material_id == row.id, held_at(MaterialProperty, at))
+        .where(MaterialProperty.material_id == row.id, held_at(MaterialProperty))
         .order_by(MaterialProperty.id)
     )
     return {
-        "name": held.name,
-        "description": held.description,
+        "name": row.name,
+        "description": row.description,
         "properties": {
             one.name: {"value": one.value, "sigma": one.sigma, "unit": one.unit, "source": one.source}
             for one in properties
@@ -165,13 +195,7 @@ def _material(session: Session, row: Material | None, at: int | None) -> Values:
     }
 
 
-def _phase(session: Session, row: Phase | None, at: int | None) -> Values:
+def _phase(row: Phase | None) -> Values:
     if row is None:
         return {}
-    held = version_at(session, row, at)
-    return {
-        "name": held.name,
-        "begins": held.begins,
-        "ends": held.ends,
-        "description": held.description,
-    }
+    return {"name": row.name, "begins": row.begins, "ends": row.ends, "description": row.description}

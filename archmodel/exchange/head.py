@@ -15,6 +15,7 @@ from archmodel.tables.layout import SCHEMA_VERSION
 from moma.errors import ExchangeError
 
 __all__ = [
+    "ADDED",
     "FORMAT",
     "FORMAT_VERSION",
     "HEAD",
@@ -38,6 +39,9 @@ READ = (1, SCHEMA_VERSION)
 
 SINCE: Mapping[int, Mapping[str, Mapping[str, Any]]] = {1: {"measurement": {"evidence": []}}}
 """Values that rows of older documents lack and must have, by version and table; what may be null is null."""
+
+ADDED: Mapping[int, frozenset[str]] = {1: frozenset({"opinion_rule"})}
+"""Tables that older documents do not have, by version."""
 
 UNITS = {
     "length": "m",

@@ -1,7 +1,7 @@
 """Import: a JSON document read row by row into an empty database, all of it or nothing."""
 
 import gzip
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -9,11 +9,12 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from archmodel.database.session import Database
-from archmodel.exchange.head import HEAD, SINCE, TABLES, check_head
+from archmodel.exchange.head import ADDED, HEAD, SINCE, TABLES, check_head
 from archmodel.exchange.json_stream import JsonText
 from archmodel.exchange.rows import Row, RowReader, nearest
 from archmodel.exchange.sections import Section, sections
 from archmodel.exchange.store import SectionStore
+from archmodel.migrations.versions.v2_quality_and_evidence import credit_statements
 from archmodel.tables.registered import RegisteredKind, declare_registered, release_registered
 from moma.errors import DatabaseError, ExchangeError
 
@@ -58,7 +59,11 @@ def _read_building(session: Session, stream: BinaryIO, name: str) -> dict[str, i
     text = JsonText(stream, name)
     try:
         version = _read_head(text, name)
-        counts = _read_tables(session, text, name, SINCE.get(version, {}))
+        added = ADDED.get(version, frozenset())
+        counts = _read_tables(session, text, name, SINCE.get(version, {}), added)
+        if added:
+            session.flush()
+            credit_statements(session.connection())
         text.take("}")
         text.take("")
     except BaseException:
@@ -106,19 +111,25 @@ def _key(text: JsonText, before: dict[str, Any], known: Sequence[str]) -> str:
 
 
 def _read_tables(
-    session: Session, text: JsonText, name: str, absent: Mapping[str, Mapping[str, Any]]
+    session: Session,
+    text: JsonText,
+    name: str,
+    absent: Mapping[str, Mapping[str, Any]],
+    added: Collection[str],
 ) -> dict[str, int]:
     """Read the sections, whose order is fixed so that references can be checked at once.
 
     Parameters
     ----------
     absent : values that rows of an older document lack, by section
+    added : sections that an older document lacks
     """
-    known = [section.name for section in sections()]
+    expected = [section for section in sections() if section.name not in added]
+    known = [section.name for section in expected]
     counts: dict[str, int] = {}
     kinds: set[str] = set()
     text.take("{")
-    for section in sections():
+    for section in expected:
         if text.peek() == "}":
             raise ExchangeError(
                 "is missing", where=f"{name} $.{TABLES}.{section.name}", remedy="write [] if it is empty"
@@ -128,7 +139,7 @@ def _read_tables(
             text.refuse(f"found section {key}, expected {section.name}", f"the order is {', '.join(known)}")
         reader = RowReader(section, name, kinds, absent.get(section.name))
         counts[key] = _read_section(session, section, text, reader, name)
-        if section is not sections()[-1] and text.peek() != "}":
+        if section is not expected[-1] and text.peek() != "}":
             text.take(",")
     if text.take(",", "}") == ",":
         _key(text, counts, known)  # which is unknown, or comes twice

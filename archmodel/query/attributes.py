@@ -8,8 +8,11 @@ from sqlalchemy import Boolean, ColumnElement, func
 from sqlalchemy.orm import Session
 
 from archmodel.query.columns import (
+    Test,
     Value,
+    any_mark,
     count,
+    different_marks,
     documents,
     of_entity,
     of_marks,
@@ -48,6 +51,8 @@ class Attribute:
     of_run : a run computed it, so that ``name@12`` asks for that of run 12
     words : all texts that it can be; None if it can be any
     is_truth : it is true or false
+    order : years by which texts are compared with < and >; None where they have no order
+    several : test of any of several values that it can have; None where it has one
     """
 
     name: str
@@ -57,6 +62,8 @@ class Attribute:
     of_run: bool = False
     words: tuple[str, ...] | None = None
     is_truth: bool = False
+    order: Value | None = None
+    several: Callable[[Scope, Test], ColumnElement[bool]] | None = None
 
     @property
     def is_number(self) -> bool:
@@ -96,7 +103,19 @@ _MEASURED = (
 )
 
 _KNOWN = (
-    Attribute("phase", None, "name of the phase that it is of", lambda scope, run: scope.phase().c.name),
+    Attribute(
+        "phase",
+        None,
+        "name of the phase that it is of; < and > compare the years in which phases begin",
+        lambda scope, run: scope.phase().c.name,
+        order=lambda scope, run: func.coalesce(scope.phase().c.begins, scope.phase().c.ends),
+    ),
+    Attribute(
+        "phase_author",
+        None,
+        "author of the opinion on its phase that holds",
+        lambda scope, run: scope.opinions("of_phase").holding("author"),
+    ),
     Attribute(
         "phase_begins",
         "year",
@@ -105,15 +124,22 @@ _KNOWN = (
     ),
     Attribute("phase_ends", "year", "of that phase, at the latest", lambda scope, run: scope.phase().c.ends),
     Attribute("material", None, "name of its material", lambda scope, run: scope.material().c.name),
+    Attribute(
+        "material_author",
+        None,
+        "author of the opinion on its material that holds",
+        lambda scope, run: scope.opinions("made_of").holding("author"),
+    ),
     Attribute("density", "kg/m³", "of its material", of_material("density")),
     Attribute("tensile_strength", "Pa", "of its material", of_material("tensile_strength")),
     Attribute("compressive_strength", "Pa", "of its material", of_material("compressive_strength")),
-    Attribute("marks", "-", "mason marks on it", of_marks(count)),
+    Attribute("marks", "-", "mason marks on it", of_marks(different_marks)),
     Attribute(
         "mark",
         None,
-        "name of its mason mark; of several, the first by the alphabet",
+        "name of its mason mark, the first by the alphabet; a comparison is true of any of several",
         of_marks(lambda said: func.min(said.c.sign)),
+        several=any_mark,
     ),
     Attribute("observations", "-", "observations of damage and change", of_observations(count)),
     Attribute(

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
-from sqlalchemy import ColumnElement, FromClause, distinct, func, select
+from sqlalchemy import ColumnElement, FromClause, distinct, func, literal, select
 
 from archmodel.query.inherited import held, observations_of, statements_of
 from archmodel.query.scope import Scope
@@ -13,8 +13,11 @@ from archmodel.tables.structures import Structure
 
 __all__ = [
     "DOCUMENTING",
+    "Test",
     "Value",
+    "any_mark",
     "count",
+    "different_marks",
     "documents",
     "of_entity",
     "of_marks",
@@ -31,7 +34,9 @@ __all__ = [
 
 Value = Callable[[Scope, int | None], ColumnElement[Any]]
 
-DOCUMENTING = ("made_of", "of_phase", "mason_mark", "observation", "depth", "reference", "note")
+Test = Callable[[ColumnElement[Any]], ColumnElement[bool]]
+
+DOCUMENTING = ("made_of", "of_phase", "mason_mark", "observation", "depth", "reference", "note", "decision")
 """Kinds of statements that can name a document: all."""
 
 
@@ -98,6 +103,20 @@ def of_relations(what: Callable[[FromClause], ColumnElement[Any]], *sides: str, 
 def count(rows: FromClause) -> ColumnElement[int]:
     """Return the SQL count of rows."""
     return func.count(rows.c.id)
+
+
+def different_marks(said: FromClause) -> ColumnElement[Any]:
+    """Count marks by sign and place: what two authors see is one mark."""
+    return func.count(distinct(said.c.sign + literal("\n") + func.coalesce(said.c.place, "")))
+
+
+def any_mark(scope: Scope, test: Test) -> ColumnElement[bool]:
+    """Test for a mason mark of the entity whose sign passes."""
+    said = scope.context.alias(Statement)
+    marks = select(said.c.id).where(
+        said.c.entity_id == scope.entity.c.id, said.c.kind == "mason_mark", held(said), test(said.c.sign)
+    )
+    return marks.correlate(scope.entity).exists()
 
 
 def of_marks(what: Callable[[FromClause], ColumnElement[Any]]) -> Value:

@@ -13,6 +13,7 @@ from sqlalchemy import Boolean, ColumnElement, Double, Integer, and_, func, lite
 from sqlalchemy.orm import Session
 
 from archmodel.query.attributes import ATTRIBUTES, Attribute, attributes_of
+from archmodel.query.columns import Test
 from archmodel.query.functions.registry import FUNCTIONS, STRUCTURE_FUNCTIONS, Function
 from archmodel.query.grammar import (
     All,
@@ -28,7 +29,7 @@ from archmodel.query.grammar import (
     Not,
     parse,
 )
-from archmodel.query.names import meant, run_with_number
+from archmodel.query.names import meant, phase_begins, run_with_number
 from archmodel.query.scope import Context, Scope, StructureScope
 from archmodel.query.tokens import Token, complaint
 from archmodel.tables.entities import Entity, kind_named
@@ -128,21 +129,50 @@ def condition_in(scope: Where, node: Node) -> ColumnElement[bool]:
                 what = f"{attribute.name} is true or false, like is for texts"
                 raise complaint(name, what, f"write {attribute.name} = true")
             # With an escape character of our own: databases differ in the one that they assume.
-            return column.ilike(pattern.text.replace("~", "~~"), escape="~")
+            return _tested(
+                scope, attribute, column, lambda text: text.ilike(pattern.text.replace("~", "~~"), escape="~")
+            )
         case IsIn(name, values):
             attribute, column = _column(scope, name)
             if attribute.name == "kind":
                 return column.in_(_kinds(scope, *values))
-            return column.in_([_constant(scope, attribute, value) for value in values])
+            constants = [_constant(scope, attribute, value) for value in values]
+            return _tested(scope, attribute, column, lambda one: one.in_(constants))
         case Comparison(name, sign, value):
             attribute, column = _column(scope, name)
             if attribute.name == "kind":
                 return _of_kind(scope, column, sign, value)
-            compared: ColumnElement[bool] = _OPERATORS[sign](column, _operand(scope, attribute, value))
+            if sign not in ("=", "!=") and not attribute.is_number:
+                return _ordered(scope, name, attribute, sign, value)
+            operand = _operand(scope, attribute, value)
+            if attribute.several is not None:
+                same = _tested(scope, attribute, column, lambda one: one == operand)
+                return same if sign == "=" else and_(column.is_not(None), not_(same))
+            compared: ColumnElement[bool] = _OPERATORS[sign](column, operand)
             return compared
         case AmountComparison(left, sign, right):
             computed: ColumnElement[bool] = _OPERATORS[sign](_amount(scope, left), _amount(scope, right))
             return computed
+
+
+def _tested(
+    scope: Where, attribute: Attribute, column: ColumnElement[Any], test: Test
+) -> ColumnElement[bool]:
+    """Return a test of an attribute; of any of its values where it can have several."""
+    if attribute.several is None or isinstance(scope, StructureScope):
+        return test(column)
+    return attribute.several(scope, test)
+
+
+def _ordered(scope: Where, name: Token, attribute: Attribute, sign: str, value: Token) -> ColumnElement[bool]:
+    """Return a comparison by order of what is no number: phases have the order of their years."""
+    if attribute.order is None or isinstance(scope, StructureScope):
+        what = f"{attribute.name} is {_type_of(attribute)}, which has no order"
+        raise complaint(name, what, "write =, != or like")
+    compared: ColumnElement[bool] = _OPERATORS[sign](
+        attribute.order(scope, None), phase_begins(scope.context, value)
+    )
+    return compared
 
 
 def _amount(scope: Where, amount: Amount) -> ColumnElement[Any]:

@@ -1,17 +1,23 @@
 """Statements that hold for an entity: its own, or inherited from the structures of which it is a member.
 
 Statements about a structure hold for its members and for the members of its parts, unless the entity, or a structure
-nearer to it, has a statement of its own.
+nearer to it, has a statement of its own. Of several at the same distance the one holds that
+`archmodel.tables.opinions.preference` puts first.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 from sqlalchemy import (
     CTE,
     ColumnElement,
     CompoundSelect,
     FromClause,
+    Select,
     and_,
+    case,
+    distinct,
     func,
     literal,
     not_,
@@ -22,15 +28,16 @@ from sqlalchemy import (
 
 from archmodel.tables.base import Base
 from archmodel.tables.knowledge import Statement
+from archmodel.tables.opinions import DISPUTABLE, OpinionRule, preference
 from archmodel.tables.relations import Membership
 from archmodel.tables.structures import Structure
 
 __all__ = [
     "Alias",
+    "Opinions",
     "entities_with_statement",
     "held",
     "observations_of",
-    "phase_or_material_of",
     "statements_of",
     "statements_of_structures",
 ]
@@ -40,8 +47,6 @@ MAX_LEVELS = 40
 
 Alias = Callable[[type[Base]], FromClause]
 """A new alias of the table of a class, see ``scope.Context.alias``."""
-
-_SUBJECT = {"of_phase": "phase_id", "made_of": "material_id"}
 
 
 def held(rows: FromClause) -> ColumnElement[bool]:
@@ -72,36 +77,73 @@ def statements_of_structures(alias: Alias, *kinds: str) -> CTE:
     )
 
 
-def phase_or_material_of(
-    alias: Alias, entity: FromClause, kind: str, of_structures: CTE
-) -> ColumnElement[int]:
-    """Return the number of the phase or material of an entity; the latest statement decides.
+@dataclass(frozen=True)
+class Opinions:
+    """Opinions of a kind about an entity, of which one holds.
 
-    Parameters
+    Attributes
     ----------
-    kind : of statement: of_phase or made_of
-    of_structures : `statements_of_structures` of that kind
+    alias : of tables
+    entity : the table of entities
+    rule : for this kind of statements
+    of_structures : `statements_of_structures` of this kind
     """
-    own, inherited, member = alias(Statement), alias(Statement), alias(Membership)
-    subject = _SUBJECT[kind]
-    by_itself = (
-        select(own.c[subject])
-        .where(own.c.entity_id == entity.c.id, own.c.kind == kind, held(own))
-        .order_by(own.c.id.desc())
-        .limit(1)
-    )
-    by_structure = (
-        select(inherited.c[subject])
-        .select_from(member)
-        .join(of_structures, of_structures.c.structure_id == member.c.structure_id)
-        .join(inherited, inherited.c.id == of_structures.c.statement_id)
-        .where(member.c.entity_id == entity.c.id, held(member))
-        .order_by(of_structures.c.distance, inherited.c.id.desc())
-        .limit(1)
-    )
-    return func.coalesce(
-        by_itself.correlate(entity).scalar_subquery(), by_structure.correlate(entity).scalar_subquery()
-    )
+
+    alias: Alias
+    entity: FromClause
+    rule: OpinionRule
+    of_structures: CTE
+
+    def holding(self, column: str) -> ColumnElement[Any]:
+        """Return a column of the statement that holds: its own opinions come before those of its structures."""
+        own, (inherited, joined) = self.alias(Statement), self._inherited()
+        by_itself = self._own(select(own.c[column]), own).order_by(*self._preference(own)).limit(1)
+        by_structure = (
+            joined(select(inherited.c[column]))
+            .order_by(self.of_structures.c.distance, *self._preference(inherited))
+            .limit(1)
+        )
+        # by number of rows and not by coalesce: a column of the statement that holds may be null
+        return case(
+            (self._own(select(own.c.id), own).correlate(self.entity).exists(), self._of_entity(by_itself)),
+            else_=self._of_entity(by_structure),
+        )
+
+    def disputed(self) -> ColumnElement[bool]:
+        """Return whether the opinions that come first by distance differ."""
+        subject = DISPUTABLE[self.rule.about]
+        own, (inherited, joined) = self.alias(Statement), self._inherited()
+        _, of_nearest = self._inherited()
+        of_itself = self._own(select(func.count(distinct(own.c[subject]))), own)
+        least = of_nearest(select(func.min(self.of_structures.c.distance)))
+        of_structures = joined(select(func.count(distinct(inherited.c[subject])))).where(
+            self.of_structures.c.distance == self._of_entity(least)
+        )
+        number = self._of_entity(of_itself)
+        return case((number > 0, number > 1), else_=self._of_entity(of_structures) > 1)
+
+    def _own(self, statement: Select[Any], own: FromClause) -> Select[Any]:
+        return statement.where(own.c.entity_id == self.entity.c.id, own.c.kind == self.rule.about, held(own))
+
+    def _inherited(self) -> tuple[FromClause, Callable[[Select[Any]], Select[Any]]]:
+        """Return an alias of statements, and what joins it to the structures of the entity."""
+        inherited, member = self.alias(Statement), self.alias(Membership)
+
+        def joined(statement: Select[Any]) -> Select[Any]:
+            return (
+                statement.select_from(member)
+                .join(self.of_structures, self.of_structures.c.structure_id == member.c.structure_id)
+                .join(inherited, inherited.c.id == self.of_structures.c.statement_id)
+                .where(member.c.entity_id == self.entity.c.id, held(member))
+            )
+
+        return inherited, joined
+
+    def _preference(self, opinions: FromClause) -> Sequence[ColumnElement[Any]]:
+        return preference(self.rule, opinions, self.alias(Statement))
+
+    def _of_entity(self, statement: Select[Any]) -> ColumnElement[Any]:
+        return statement.correlate(self.entity).scalar_subquery()
 
 
 def statements_of(

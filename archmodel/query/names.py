@@ -9,15 +9,17 @@ from archmodel.query.scope import MAX_RUNS, Context
 from archmodel.query.tokens import Token, complaint
 from archmodel.store.find_by_code import no_such_code
 from archmodel.tables.entities import Entity
-from archmodel.tables.knowledge import Document, MasonMark
+from archmodel.tables.knowledge import Document, MasonMark, Phase, Statement
 from archmodel.tables.runs import Run
 from archmodel.tables.structures import Structure
 from moma.errors import QueryError
 
 __all__ = [
+    "author_named",
     "document_named",
     "mark_named",
     "meant",
+    "phase_begins",
     "refuse_unknown_run",
     "run_with_number",
     "stone_named",
@@ -77,6 +79,33 @@ def mark_named(context: Context, sign: Token) -> str:
         what = f"there is no mason mark {sign.text[:40]!r} in the database"
         raise complaint(sign, what, meant(sign.text, signs, "the marks"))
     return sign.text
+
+
+def author_named(context: Context, author: Token) -> str:
+    """Return the name of an author of statements that are held; an error if there is none."""
+    known = select(Statement.author).where(Statement.superseded_id.is_(None)).distinct()
+    names = context.once("authors", lambda: sorted(filter(None, context.session.scalars(known))))
+    if author.text not in names:
+        what = f"nothing that is held was stated by {author.text[:40]!r}"
+        raise complaint(author, what, meant(author.text, names, "the authors"))
+    return author.text
+
+
+def phase_begins(context: Context, phase: Token) -> int:
+    """Return the first year of a phase; an error if there is no such phase, or its years are not known."""
+    known = select(Phase.name, Phase.begins, Phase.ends).where(Phase.superseded_id.is_(None))
+    phases: dict[str, tuple[int | None, int | None]] = context.once(
+        "phases", lambda: {row.name: (row.begins, row.ends) for row in context.session.execute(known)}
+    )
+    if phase.text not in phases:
+        what = f"there is no phase {phase.text[:40]!r} in the database"
+        raise complaint(phase, what, meant(phase.text, sorted(phases), "the phases"))
+    begins, ends = phases[phase.text]
+    year = ends if begins is None else begins
+    if year is None:
+        what = f"the years of the phase {phase.text[:40]!r} are not known, and phases are ordered by them"
+        raise complaint(phase, what, "state begins or ends in [[phase]]")
+    return year
 
 
 def document_named(context: Context, code: Token) -> int:

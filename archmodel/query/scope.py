@@ -9,11 +9,12 @@ from typing import Any, TypeVar
 from sqlalchemy import CTE, ColumnElement, FromClause, Select, and_, func, select
 from sqlalchemy.orm import Session
 
-from archmodel.query.inherited import held, phase_or_material_of, statements_of_structures
+from archmodel.query.inherited import Opinions, held, statements_of_structures
 from archmodel.query.tokens import Token, complaint
 from archmodel.tables.base import Base
 from archmodel.tables.entities import Entity
 from archmodel.tables.knowledge import Material, MaterialProperty, Phase
+from archmodel.tables.opinions import rule_of
 from archmodel.tables.runs import STUDIED, EntityResult, Run
 from archmodel.tables.surveys import Measurement, Simplification, Survey
 
@@ -154,18 +155,20 @@ class Scope:
             lambda rows: and_(rows.c.entity_id == self.entity.c.id, rows.c.run_id == result.c.run_id),
         )
 
+    def opinions(self, about: str) -> Opinions:
+        """Return the opinions of a kind about the entity."""
+        context = self.context
+        rule = context.once(("rule", about), lambda: rule_of(context.session, about))
+        return Opinions(context.alias, self.entity, rule, context.statements_of_structures(about))
+
     def phase(self) -> FromClause:
         """Join the phase of the entity."""
-        number = phase_or_material_of(
-            self.context.alias, self.entity, "of_phase", self.context.statements_of_structures("of_phase")
-        )
+        number = self.opinions("of_phase").holding("phase_id")
         return self._join("phase", Phase, lambda rows: rows.c.id == number)
 
     def material(self) -> FromClause:
         """Join the material of the entity."""
-        number = phase_or_material_of(
-            self.context.alias, self.entity, "made_of", self.context.statements_of_structures("made_of")
-        )
+        number = self.opinions("made_of").holding("material_id")
         return self._join("material", Material, lambda rows: rows.c.id == number)
 
     def material_property(self, name: str) -> FromClause:

@@ -1,8 +1,9 @@
 """Knowledge besides the geometry: materials, phases, documents, and statements about entities and structures.
 
 A statement is one fact that somebody records of one entity or structure, on stated grounds: its material, its phase,
-a mason mark, erosion, a depth, a document. Statements are never changed; a better one supersedes them
-(`supersedes_id`), or they are withdrawn (`superseded_id` without a successor).
+a mason mark, erosion, a depth, a document. Statements are never changed; a better one of the same author supersedes
+them (`supersedes_id`), or they are withdrawn (`superseded_id` without a successor). Statements of different authors
+stand side by side; `archmodel.tables.opinions` says which of them holds.
 """
 
 from datetime import date
@@ -18,6 +19,7 @@ from archmodel.tables.structures import Structure
 __all__ = [
     "OBSERVATIONS",
     "Correction",
+    "Decision",
     "DepthEvidence",
     "Document",
     "MadeOf",
@@ -149,6 +151,9 @@ class Statement(Recorded, Base):
     text : in words; None if the rest says enough
     document, locator : the document that says so, and where in it (page, number of the figure)
     observed_on : date on which it was seen; None if not known
+    author : whose opinion it is; None for a program, or if not known
+    stated_on : date of the opinion: its own, that of its record, or that of the recording
+    certainty : how sure the author is, from 0 to 1; None if not stated
     supersedes : the statement that it replaces
     """
 
@@ -171,6 +176,9 @@ class Statement(Recorded, Base):
     document_id: Mapped[int | None] = mapped_column(ForeignKey("document.id"))
     locator: Mapped[str | None]
     observed_on: Mapped[date | None] = mapped_column(Date)
+    author: Mapped[str | None]
+    stated_on: Mapped[date | None] = mapped_column(Date)
+    certainty: Mapped[float | None]
     supersedes_id: Mapped[int | None] = mapped_column(ForeignKey("statement.id"))
 
     entity: Mapped[Entity | None] = relationship()
@@ -274,6 +282,26 @@ class Note(Statement):
     __kind__ = "note"
 
     key: Mapped[str | None]
+
+
+class Decision(Statement):
+    """Choice among the statements of several authors about the subject.
+
+    Attributes
+    ----------
+    about : kind of the statements, e.g. "of_phase"
+    chosen : the one that holds, as long as its author holds it
+    """
+
+    __kind__ = "decision"
+
+    about: Mapped[str | None]
+    chosen_id: Mapped[int | None] = mapped_column(ForeignKey("statement.id"))
+
+    chosen: Mapped[Statement | None] = relationship(foreign_keys=[chosen_id], remote_side="Statement.id")
+
+
+Index("ix_statement_chosen", Decision.chosen_id, sqlite_where=Decision.chosen_id.is_not(None))
 
 
 class Correction(Base):

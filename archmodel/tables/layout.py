@@ -6,6 +6,7 @@ from archmodel.tables import (
     entities,  # noqa: F401
     entries,  # noqa: F401
     knowledge,  # noqa: F401
+    opinions,  # noqa: F401
     registered,  # noqa: F401
     relations,  # noqa: F401
     runs,  # noqa: F401

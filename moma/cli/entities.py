@@ -32,6 +32,7 @@ def query(
         ),
     ] = None,
     run: RunNumber = None,
+    at: At = None,
     columns: Columns = None,
     format: Annotated[ListFormat | None, typer.Option(help="Format of the list; default: table.")] = None,
     flat: Annotated[
@@ -43,6 +44,7 @@ def query(
 ) -> None:
     """List the entities of a kind that satisfy conditions."""
     with short_lived():
+        from archmodel.database.as_known import as_known, entry_named
         from archmodel.database.session import open_database
         from moma.cli.text.query import Question, answer
 
@@ -54,7 +56,9 @@ def query(
         names = None if columns is None else [name.strip() for name in columns.split(",")]
         question = Question(kind, tuple(where or ()), run, names, everything=verbose, flat=flat)
         with open_database(db, create=False) as database, database.session(read_only=True) as session:
-            text, note = answer(session, question, str(wanted))
+            entry = None if at is None else entry_named(session, at)
+            with as_known(session, entry) as then:
+                text, note = answer(then, question, str(wanted))
         if text:
             print(text)
         if note:
@@ -113,6 +117,7 @@ def show(
     """Show one stone or structure: kind, knowledge, measurements and results."""
     from dataclasses import asdict
 
+    from archmodel.database.as_known import entry_named
     from archmodel.database.session import open_database
     from archmodel.describe import history as past
     from archmodel.describe.entity import describe
@@ -126,5 +131,5 @@ def show(
             events = [asdict(event) for event in past.history(session, code)]
             print(as_json(events) if json else history_lines(code, events))
             return
-        description = describe(session, code, at) if at is not None else describe(session, code)
+        description = describe(session, code, None if at is None else entry_named(session, at))
     print(as_json(description) if json else entity_lines(description))

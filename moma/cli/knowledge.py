@@ -9,7 +9,22 @@ import typer
 from moma.cli.console import reporting
 from moma.cli.options import DEFAULT_DB, Db, Json, Verbose
 
-__all__ = ["record"]
+__all__ = ["entries", "record"]
+
+
+@reporting
+def entries(db: Db = DEFAULT_DB, json: Json = False, verbose: Verbose = False) -> None:
+    """List the acts of recording: number, time, author and grounds; `--at` takes their numbers."""
+    from archmodel.database.session import open_database
+    from archmodel.describe.entries import list_entries
+    from moma.cli.text.formats import as_json, as_table
+
+    with open_database(db, create=False) as database, database.session(read_only=True) as session:
+        rows = list_entries(session)
+    if json:
+        print(as_json(rows))
+    elif rows:
+        print(as_table(dict.fromkeys(rows[0]), rows))
 
 
 @reporting

@@ -195,7 +195,12 @@ Kind = Annotated[
     str | None, typer.Option("--kind", metavar="KIND", help="Kind of stones without one; default: ashlar.")
 ]
 At = Annotated[
-    int | None, typer.Option("--at", metavar="ENTRY", help="Show what was known when this entry was made.")
+    str | None,
+    typer.Option(
+        "--at",
+        metavar="WHEN",
+        help="As it was known when an entry was made, by its number, or at the end of a day: 2024-03-15.",
+    ),
 ]
 Sigma = Annotated[
     float | None,

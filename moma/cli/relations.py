@@ -75,12 +75,13 @@ def load_path(
     verbose: Verbose = False,
 ) -> None:
     """Show all stones that carry a stone, directly or through others; with --up, all that it carries."""
+    from archmodel.database.as_known import entry_named
     from archmodel.database.session import open_database
     from archmodel.relations.graph import load_path as follow
     from moma.cli.text.formats import as_json, as_table, some
 
     with open_database(db, create=False) as database, database.session(read_only=True) as session:
-        path = follow(session, code, up=up, as_of=at)
+        path = follow(session, code, up=up, as_of=None if at is None else entry_named(session, at))
     if json:
         print(as_json(asdict(path)))
         return

@@ -4,21 +4,22 @@ from collections.abc import Mapping
 
 from archmodel.assertions.declare import DOCUMENT_TYPES
 from archmodel.tables.knowledge import OBSERVATIONS
+from archmodel.tables.opinions import DISPUTABLE, RULES
 from archmodel.tables.relations import RELATIONS
 from pipelines.toml.schema import Key, ValueKind
 
 __all__ = ["ABOUT", "ARRAYS", "ATTRIBUTE", "CITED", "PROPERTY", "RECORD", "WHO", "WITHDRAWN"]
 
 WITHDRAWN = (
-    "made_of", "of_phase", "mark", "observation", "reference", "note", "relation", "member", "material", "property",
-    "phase", "document", "structure", "hypothesis",
+    "made_of", "of_phase", "decision", "mark", "observation", "reference", "note", "relation", "member", "material",
+    "property", "phase", "document", "structure", "hypothesis",
 )  # fmt: skip
 """Records that can be withdrawn; a depth is replaced by another one, a registered kind stays."""
 
 RECORD = (
     Key("author", ValueKind.TEXT, "Author of the statements; `--author` takes precedence.", default=None),
     Key("source", ValueKind.TEXT, "Grounds; default: the name of the file.", default=None),
-    Key("date", ValueKind.DATE, "Date of all observations without one.", default=None),
+    Key("date", ValueKind.DATE, "Date of all statements without one.", default=None),
 )
 
 WHO = (
@@ -38,7 +39,15 @@ CITED = (
     Key("text", ValueKind.TEXT, "In words.", default=None),
     Key("document", ValueKind.TEXT, "Code of the document that states it.", default=None),
     Key("locator", ValueKind.TEXT, "Where in the document: page, number of the figure.", default=None),
-    Key("date", ValueKind.DATE, "Date of the observation.", default=None),
+    Key("date", ValueKind.DATE, "Date of the observation or opinion.", default=None),
+    Key(
+        "certainty",
+        ValueKind.NUMBER,
+        "How sure the author is, from 0 to 1.",
+        default=None,
+        at_least=0,
+        at_most=1,
+    ),
 )
 """Keys of every statement for its evidence."""
 
@@ -170,6 +179,25 @@ _OBSERVATION = (
     *_SAID,
 )
 
+_OPINIONS = Key("about", ValueKind.TEXT, "Kind of the opinions.", choices=tuple(DISPUTABLE))
+
+_DECISION = (
+    _OPINIONS,
+    Key(
+        "match",
+        ValueKind.TABLE,
+        'The opinion that holds, by its author or value: `{ author = "A. Mason" }`, `{ phase = "2" }`.',
+    ),
+    *_SAID,
+)
+
+_RULE = (
+    _OPINIONS,
+    Key("rule", ValueKind.TEXT, "The one that holds, where none is decided.", choices=RULES),
+    Key("authors", ValueKind.TEXTS, "In the order in which they count, for `author`.", default=()),
+    *WHO,
+)
+
 _WITHDRAW = (
     Key("what", ValueKind.TEXT, "What is withdrawn.", choices=WITHDRAWN),
     Key(
@@ -206,5 +234,7 @@ ARRAYS: Mapping[str, tuple[Key, ...]] = {
     "observation": _OBSERVATION,
     "reference": _SAID,
     "note": (Key("key", ValueKind.TEXT, "Subject of the note, e.g. `edge`."), *_SAID),
+    "rule": _RULE,
+    "decision": _DECISION,
 }
 """Keys of every array of tables, in the order of recording."""

@@ -16,7 +16,7 @@ from archmodel.tables.knowledge import Correction
 from moma.errors import UsageError
 from pipelines.ingest.relate import relate
 from pipelines.record.file import RecordFile, Table, read_record
-from pipelines.record.tables import record_table
+from pipelines.record.tables import STATED, record_table
 
 __all__ = ["FileRecorded", "RecordReport", "record"]
 
@@ -32,7 +32,8 @@ class FileRecorded:
     path : the file
     tables : outcome of its tables, by name of the array
     entries : numbers of its acts of recording; empty if nothing in it was new
-    recorded_before : number of the first entry of a file with the same contents; None if there was none
+    recorded_before : number of the first entry of a file with the same contents; None if there was none. Such a file
+        states again what was withdrawn since, and nothing else
     """
 
     path: str
@@ -99,17 +100,26 @@ def record(
 def _record_file(session: Session, file: RecordFile, author: str | None) -> FileRecorded:
     path = file.document.path
     same = select(Entry.id).where(Entry.settings["sha256"].as_string() == file.sha256).order_by(Entry.id)
-    if (before := session.scalar(same.limit(1))) is not None:
-        return FileRecorded(path, {}, recorded_before=before)
+    before = session.scalar(same.limit(1))
     entries, changes = _Entries(session, file, author), dict[int, int]()
     tables: dict[str, RowCounts] = {}
     for table in file.tables:
+        if before is not None and not _stated_again(table):
+            continue
         entry = entries.of(table)
-        outcome = record_table(session, entry, file, table)
+        outcome = record_table(session, entry, file, table, before)
         tables[table.name] = tables.get(table.name, NOTHING) + outcome
         changes[entry.id] = changes.get(entry.id, 0) + outcome.changes
     entries.drop(number for number, count in changes.items() if not count)
-    return FileRecorded(path, tables, tuple(number for number, count in changes.items() if count))
+    made = tuple(number for number, count in changes.items() if count)
+    return FileRecorded(path, tables if before is None or made else {}, made, before)
+
+
+def _stated_again(table: Table) -> bool:
+    """Return whether a file that was recorded before states this again where it is held no longer."""
+    if table.name == "withdraw":
+        return table.values["what"] in STATED
+    return table.name in STATED and table.name != "decision"
 
 
 def _relate_corrected(session: Session, entries: Sequence[int]) -> int | None:

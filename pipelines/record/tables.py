@@ -11,6 +11,7 @@ from sqlalchemy.orm import Session
 from archmodel.assertions.arrange import declare_members, declare_relation, declare_structure
 from archmodel.assertions.correct import correct
 from archmodel.assertions.declare import PropertyValue, declare_document, declare_material, declare_phase
+from archmodel.assertions.opinions import decide, set_rule
 from archmodel.assertions.register_kind import register_kind
 from archmodel.assertions.statements import (
     Remark,
@@ -20,6 +21,7 @@ from archmodel.assertions.statements import (
     say_observation,
     say_of_phase,
     say_reference,
+    without_replaced,
 )
 from archmodel.assertions.withdraw import withdraw_members, withdraw_relations, withdraw_statements
 from archmodel.query.api import find
@@ -28,6 +30,7 @@ from archmodel.store.hypotheses import withdraw_hypotheses
 from archmodel.store.revisions import NOTHING, RowCounts, withdraw
 from archmodel.tables.entries import Entry
 from archmodel.tables.knowledge import (
+    Decision,
     Document,
     MadeOf,
     MasonMark,
@@ -45,18 +48,20 @@ from moma.errors import UsageError
 from pipelines.record.depth import record_depth
 from pipelines.record.file import RecordFile, Table
 
-__all__ = ["record_table"]
+__all__ = ["STATED", "record_table"]
 
 _CODE = re.compile(r"[\w.:/+-]+")  # a text without blanks or comparison is a code
 
-_STATEMENTS: Mapping[str, type[Statement]] = {
+STATED: Mapping[str, type[Statement]] = {
     "made_of": MadeOf,
     "of_phase": OfPhase,
     "mark": MasonMark,
     "observation": Observation,
     "reference": Reference,
     "note": Note,
+    "decision": Decision,
 }
+"""Kinds of statements by the names of their tables."""
 
 _NAMED: Mapping[str, type[Any]] = {
     "material": Material,
@@ -75,20 +80,35 @@ class _Work:
     entry: Entry
     file: RecordFile
     table: Table
+    before: int | None
 
     def __getitem__(self, key: str) -> Any:
         return self.table.values[key]
 
     def remark(self) -> Remark:
         """Return the evidence of a statement; an observation without a date has that of the file."""
-        seen = self["date"]
+        seen, of_file = self["date"], self.file.record["date"]
         if seen is None and self.table.name == "observation":
-            seen = self.file.record["date"]
-        return Remark(self["text"], self["document"], self["locator"], seen)
+            seen = of_file
+        return Remark(
+            self["text"],
+            self["document"],
+            self["locator"],
+            seen,
+            stated_on=self["date"] or of_file,
+            certainty=self["certainty"],
+        )
 
 
-def record_table(session: Session, entry: Entry, file: RecordFile, table: Table) -> RowCounts:
+def record_table(
+    session: Session, entry: Entry, file: RecordFile, table: Table, before: int | None = None
+) -> RowCounts:
     """Record one table within an entry.
+
+    Parameters
+    ----------
+    before : number of the entry with which the same file was recorded; then only statements and their withdrawals
+        count, and those that their authors replaced since stay replaced
 
     Raises
     ------
@@ -96,7 +116,7 @@ def record_table(session: Session, entry: Entry, file: RecordFile, table: Table)
         at the line of the mistake
     """
     with file.at(*table.path):
-        return _RECORDERS[table.name](_Work(session, entry, file, table))
+        return _RECORDERS[table.name](_Work(session, entry, file, table, before))
 
 
 def _kind(work: _Work) -> RowCounts:
@@ -168,8 +188,12 @@ def _depth(work: _Work) -> RowCounts:
 def _statement(work: _Work) -> RowCounts:
     """Record a statement about stones and structures."""
     session, entry, remark = work.session, work.entry, work.remark()
-    about = _named_subjects(session, work.file, work.table)
+    about = _named_subjects(session, work.file, work.table, none=work.before is not None)
+    if work.before is not None:
+        about = without_replaced(session, STATED[work.table.name], about, entry.author)
     match work.table.name:
+        case "decision":
+            return decide(session, entry, work["about"], about, work["match"], remark)
         case "made_of":
             return say_made_of(session, entry, about, work["material"], remark)
         case "of_phase":
@@ -210,10 +234,16 @@ def _withdraw(work: _Work) -> RowCounts:
     if what == "hypothesis":
         named = _named_stones(work.session, work.file, work.table)
         return withdraw_hypotheses(work.session, work.entry, named.values())
-    about = _named_subjects(work.session, work.file, work.table)
+    about = _named_subjects(work.session, work.file, work.table, none=work.before is not None)
     if what == "member":
         return withdraw_members(work.session, work.entry, about)
-    return withdraw_statements(work.session, work.entry, _STATEMENTS[what], about, work["match"])
+    return withdraw_statements(
+        work.session, work.entry, STATED[what], about, work["match"], since=work.before or 0
+    )
+
+
+def _rule(work: _Work) -> RowCounts:
+    return set_rule(work.session, work.entry, work["about"], work["rule"], work["authors"])
 
 
 def _withdraw_named(work: _Work, what: str) -> RowCounts:
@@ -243,6 +273,7 @@ def _withdraw_named(work: _Work, what: str) -> RowCounts:
 _RECORDERS: Mapping[str, Callable[[_Work], RowCounts]] = {
     "kind": _kind,
     "withdraw": _withdraw,
+    "rule": _rule,
     "correction": _correction,
     "material": _material,
     "phase": _phase,
@@ -250,12 +281,16 @@ _RECORDERS: Mapping[str, Callable[[_Work], RowCounts]] = {
     "structure": _structure,
     "relation": _relation,
     "depth": _depth,
-    **dict.fromkeys(_STATEMENTS, _statement),
+    **dict.fromkeys(STATED, _statement),
 }
 
 
-def _named_stones(session: Session, file: RecordFile, table: Table, key: str = "stones") -> dict[str, int]:
+def _named_stones(
+    session: Session, file: RecordFile, table: Table, key: str = "stones", none: bool = False
+) -> dict[str, int]:
     """Find the numbers, by code, of the stones that a key names, each once, in the order of the list.
+
+    An expression names at least one, unless `none` is allowed.
 
     Raises
     ------
@@ -272,26 +307,26 @@ def _named_stones(session: Session, file: RecordFile, table: Table, key: str = "
                 found[item] = known[item]
                 continue
             matching = find(session, "entity", [item])
-            if not matching:
+            if not matching and not none:
                 raise UsageError(f"no stone satisfies {item!r}", remedy="try it with: moma query")
             found.update((one.code, one.id) for one in matching)
     return found
 
 
-def _named_subjects(session: Session, file: RecordFile, table: Table) -> Subjects:
-    """Find the stones and structures of a table, at least one.
+def _named_subjects(session: Session, file: RecordFile, table: Table, none: bool = False) -> Subjects:
+    """Find the stones and structures of a table, at least one unless `none` is allowed.
 
     Raises
     ------
     UsageError
         at the key, if it names none
     """
-    stones = _named_stones(session, file, table)
+    stones = _named_stones(session, file, table, none=none)
     with file.at(*table.path, "structures"):
         structures = subjects(session, structures=table.values["structures"])
     about = Subjects(tuple(stones.values()), structures.structures)
     with file.at(*table.path):
-        if not len(about):
+        if not len(about) and not none:
             remedy = "give stones = […] or structures = […]"
             raise UsageError(f"[[{table.name}]] has no subject", remedy=remedy)
     return about

@@ -1,7 +1,7 @@
-"""Version 2: quality of masonry, joint and evidence of measurements, spread and anisotropy of cells of disks.
+"""Version 2: quality of masonry, joint and evidence of measurements, cells of disks, opinions of several authors.
 
-Programs between both versions made databases that have some of these columns and say that they are of version 1; what
-they have stays.
+Statements of phase and material that those of other authors superseded are held again beside them. Programs between
+both versions made databases that have some of these columns and say that they are of version 1; what they have stays.
 """
 
 from collections.abc import Iterator, Mapping
@@ -11,8 +11,14 @@ from sqlalchemy import (
     JSON,
     Column,
     Connection,
+    Date,
     Double,
+    ForeignKey,
+    Index,
+    Integer,
     LargeBinary,
+    MetaData,
+    Table,
     func,
     inspect,
     select,
@@ -22,13 +28,21 @@ from sqlalchemy import (
 )
 from sqlalchemy.sql.expression import column
 
-from archmodel.migrations.layouts.version1 import metadata
+from archmodel.migrations.layouts.version1 import TEXT, metadata
 
-__all__ = ["depends_on", "down_revision", "downgrade", "losses", "revision", "upgrade"]
+__all__ = ["credit_statements", "depends_on", "down_revision", "downgrade", "losses", "revision", "upgrade"]
 
 revision = "0002"
 down_revision = "0001"
 depends_on = None
+
+_HELD = "statement.kind IN ('of_phase', 'made_of') AND statement.superseded_id IS NULL"
+_NEWER = (
+    "SELECT {} FROM statement AS n WHERE n.kind = statement.kind AND n.superseded_id IS NULL AND n.id > statement.id "
+    "AND COALESCE(n.entity_id, 0) = COALESCE(statement.entity_id, 0) "
+    "AND COALESCE(n.structure_id, 0) = COALESCE(statement.structure_id, 0)"
+)
+"""Statements that later ones about the same subject stand beside."""
 
 _QUALITY = [f"mqi_{way}_{end}" for way in ("vertical", "in_plane", "out_of_plane") for end in ("low", "high")]
 
@@ -40,7 +54,30 @@ def _added() -> Mapping[str, tuple[Column[object], ...]]:
         "entity": tuple(Column(name, Double) for name in ("minimum_trace", "section_trace", *_QUALITY)),
         "measurement": (Column("joint", LargeBinary), evidence),
         "cell_result": tuple(Column(name, Double) for name in ("spread_x", "spread_y", "a")),
+        "statement": (
+            Column("author", TEXT),
+            Column("stated_on", Date),
+            Column("certainty", Double),
+            Column("about", TEXT),
+        ),
     }
+
+
+def _rules() -> Table:
+    """Return the new table, beside those that it refers to."""
+    layout = MetaData()
+    metadata.tables["entry"].to_metadata(layout)
+    return Table(
+        "opinion_rule",
+        layout,
+        Column("id", Integer, primary_key=True),
+        Column("about", TEXT, nullable=False),
+        Column("rule", TEXT, nullable=False),
+        Column("authors", JSON, nullable=False),
+        Column("entry_id", Integer, ForeignKey("entry.id"), nullable=False),
+        Column("superseded_id", Integer, ForeignKey("entry.id")),
+        Index("ix_opinion_rule_about", "about", unique=True, sqlite_where=text("superseded_id IS NULL")),
+    )
 
 
 def upgrade() -> None:
@@ -53,23 +90,96 @@ def upgrade() -> None:
                 op.add_column(name, one)
     if connection.dialect.name == "postgresql":
         connection.execute(text("ALTER TABLE measurement ALTER COLUMN evidence DROP DEFAULT"))
+    if not inspect(connection).has_table("opinion_rule"):
+        where = " WHERE chosen_id IS NOT NULL" if connection.dialect.name == "sqlite" else ""
+        for sql in (
+            "ALTER TABLE statement ADD COLUMN chosen_id INTEGER REFERENCES statement (id)",
+            f"CREATE INDEX ix_statement_chosen ON statement (chosen_id){where}",
+        ):
+            connection.execute(text(sql))
+        _rules().create(connection)
+    credit_statements(connection)
     connection.execute(update(metadata.tables["moma_schema"]).values(version=2))
 
 
 def downgrade() -> None:
-    """Drop the columns."""
+    """Drop the columns and the table; of several opinions the latest stays."""
+    connection = op.get_bind()
+    for sql in (
+        "DELETE FROM statement WHERE kind = 'decision'",
+        f"UPDATE statement SET superseded_id = ({_NEWER.format('MAX(n.entry_id)')}) "
+        f"WHERE {_HELD} AND EXISTS ({_NEWER.format('1')})",
+        "DROP TABLE opinion_rule",
+        "DROP INDEX ix_statement_chosen",
+    ):
+        connection.execute(text(sql))
+    with op.batch_alter_table("statement") as batch:
+        batch.drop_column("chosen_id")
     for name, columns in _added().items():
         for one in columns:
             op.drop_column(name, one.name)
     op.get_bind().execute(update(metadata.tables["moma_schema"]).values(version=1))
 
 
+def credit_statements(connection: Connection) -> None:
+    """Give statements the author and date of their entries, and hold what only other authors' superseded.
+
+    Statements of documents of version 1 are credited by it too.
+    """
+    connection.execute(
+        text(
+            "UPDATE statement SET author = (SELECT author FROM entry WHERE entry.id = statement.entry_id), "
+            "stated_on = (SELECT date(recorded_at) FROM entry WHERE entry.id = statement.entry_id) "
+            "WHERE stated_on IS NULL"
+        )
+    )
+    rows = connection.execute(
+        text(
+            "SELECT id, kind, entity_id, structure_id, author, entry_id, superseded_id, supersedes_id "
+            "FROM statement WHERE kind IN ('of_phase', 'made_of') ORDER BY id"
+        )
+    ).all()
+    followed = {row.supersedes_id for row in rows}
+    last: dict[tuple[object, ...], int] = {}
+    chain: dict[int, list[int | None]] = {}  # superseded_id and supersedes_id
+    for row in rows:
+        key = (row.kind, row.entity_id, row.structure_id, row.author)
+        before = last.get(key)
+        if before is not None:
+            chain[before][0] = row.entry_id
+        chain[row.id] = [None if row.id in followed else row.superseded_id, before]
+        withdrawn = row.superseded_id is not None and row.id not in followed
+        last[key] = row.id
+        if withdrawn:
+            del last[key]
+    changed = [
+        {"key": row.id, "superseded": chain[row.id][0], "supersedes": chain[row.id][1]}
+        for row in rows
+        if chain[row.id] != [row.superseded_id, row.supersedes_id]
+    ]
+    if changed:
+        sql = "UPDATE statement SET superseded_id = :superseded, supersedes_id = :supersedes WHERE id = :key"
+        connection.execute(text(sql), changed)
+
+
 def losses(connection: Connection) -> Iterator[str]:
     """Yield what version 1 cannot hold."""
     for name, columns in _added().items():
         for one in columns:
+            if one.name in ("author", "stated_on", "about"):
+                continue
             values = select(func.count()).select_from(table(name)).where(column(one.name).is_not(None))
             if not one.nullable:
                 values = values.where(text(f"CAST({one.name} AS TEXT) <> '[]'"))
             if count := connection.scalar(values):
                 yield f"{one.name} of {count} rows of {name}"
+    for what, sql in (
+        ("decisions", "SELECT COUNT(*) FROM statement WHERE kind = 'decision'"),
+        ("rules of opinions", "SELECT COUNT(*) FROM opinion_rule"),
+        (
+            "opinions beside later ones",
+            f"SELECT COUNT(*) FROM statement WHERE {_HELD} AND EXISTS ({_NEWER.format('1')})",
+        ),
+    ):
+        if count := connection.scalar(text(sql)):
+            yield f"{count} {what}"

@@ -1,25 +1,50 @@
 """Query functions on knowledge: marks, observations, documents, corrections, mechanisms, kinds, proportions."""
 
-from sqlalchemy import FromClause, case, exists, func, null, select
+from collections.abc import Mapping
+
+from sqlalchemy import FromClause, case, exists, func, null, or_, select
 
 from archmodel.query.attributes import attributes_of
 from archmodel.query.columns import DOCUMENTING
 from archmodel.query.functions.usages import Ask, Condition, tokens
 from archmodel.query.grammar import Call, parse
 from archmodel.query.inherited import entities_with_statement, held
-from archmodel.query.names import document_named, mark_named, meant
+from archmodel.query.names import author_named, document_named, mark_named, meant
 from archmodel.query.scope import Scope, StructureScope
 from archmodel.query.tokens import Token, complaint
 from archmodel.tables.entities import Entity, canon_of, kind_named
+from archmodel.tables.entries import Entry
 from archmodel.tables.hierarchy import kinds_below, kinds_in
 from archmodel.tables.knowledge import OBSERVATIONS, Correction, Statement
+from archmodel.tables.opinions import DISPUTABLE
 from archmodel.tables.runs import MechanismStone
 from archmodel.tables.structures import structure_kind_named
 from moma.errors import QueryError, UsageError
 
-__all__ = ["canonical", "corrected", "documented", "has_mark", "in_mechanism", "is_a", "observed"]
+__all__ = [
+    "by",
+    "canonical",
+    "corrected",
+    "disputed",
+    "documented",
+    "has_mark",
+    "in_mechanism",
+    "is_a",
+    "observed",
+]
 
 MAX_SEVERITY = 4
+
+OPINIONS: Mapping[str, str] = {
+    "phase": "of_phase",
+    "material": "made_of",
+    "mark": "mason_mark",
+    "observation": "observation",
+    "depth": "depth",
+    "document": "reference",
+    "note": "note",
+}
+"""Kinds of statements by the names that users write."""
 
 
 def has_mark(scope: Scope, call: Call, ask: Ask) -> Condition:
@@ -78,10 +103,45 @@ def documented(scope: Scope, call: Call, ask: Ask) -> Condition:
     )
 
 
+def by(scope: Scope, call: Call, ask: Ask) -> Condition:
+    """Test for statements of an author about the stone, or its structures, that are held."""
+    values = tokens(call, 1, 2)
+    kinds = tuple(OPINIONS.values())
+    if len(values) == 2:
+        kinds = (_opinion(values[1], OPINIONS),)
+    author = author_named(scope.context, values[0])
+
+    def conditions(said: FromClause) -> list[Condition]:
+        return [said.c.author == author]
+
+    context = scope.context
+    of_structures = context.statements_of_structures(*kinds)
+    return scope.entity.c.id.in_(entities_with_statement(context.alias, of_structures, conditions, *kinds))
+
+
+def disputed(scope: Scope, call: Call, ask: Ask) -> Condition:
+    """Test for opinions that differ: of the stone itself or, if it has none, of its nearest structures."""
+    values = tokens(call, 0, 1)
+    named = {name: kind for name, kind in OPINIONS.items() if kind in DISPUTABLE}
+    kinds = [_opinion(values[0], named)] if values else list(named.values())
+    return or_(*(scope.opinions(kind).disputed() for kind in kinds))
+
+
+def _opinion(token: Token, named: Mapping[str, str]) -> str:
+    if (kind := named.get(token.text.lower())) is None:
+        remedy = meant(token.text, named, "they")
+        raise complaint(token, f"there are no opinions on {token.text[:40]!r}", remedy)
+    return kind
+
+
 def corrected(scope: Scope, call: Call, ask: Ask) -> Condition:
-    """Test for corrections of its attributes."""
-    rows = scope.context.alias(Correction)
-    conditions: list[Condition] = [rows.c.entity_id == scope.entity.c.id]
+    """Test for corrections of its attributes by a person; what was measured again is none."""
+    rows, entries = scope.context.alias(Correction), scope.context.alias(Entry)
+    conditions: list[Condition] = [
+        rows.c.entity_id == scope.entity.c.id,
+        entries.c.id == rows.c.entry_id,
+        entries.c.action == "correction",
+    ]
     for token in tokens(call, 0, 1):
         known = attributes_of(scope.context.session)
         if (name := token.text.lower()) not in known:

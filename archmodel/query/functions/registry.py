@@ -45,6 +45,8 @@ _SQL: Mapping[str, Sql] = {
     "has_mark": told.has_mark,
     "observed": told.observed,
     "documented": told.documented,
+    "by": told.by,
+    "disputed": told.disputed,
     "corrected": told.corrected,
     "in_mechanism": told.in_mechanism,
     "is_a": told.is_a,

@@ -62,9 +62,20 @@ USAGES: Mapping[str, Usages] = {
         ("documented()", "a document, drawing or photograph treats it, or is named as evidence"),
         ("documented(CODE)", "the document of that code does"),
     ),
+    "by": (
+        ("by(AUTHOR)", "that author states something of it, or of its structures"),
+        (
+            "by(AUTHOR, phase)",
+            "that author states its phase; or material, mark, observation, depth, document, note",
+        ),
+    ),
+    "disputed": (
+        ("disputed()", "opinions on its phase or its material differ"),
+        ("disputed(phase)", "opinions on its phase differ; or material"),
+    ),
     "corrected": (
-        ("corrected()", "an attribute of it was corrected"),
-        ("corrected(attribute)", "that attribute of it was corrected"),
+        ("corrected()", "a person corrected an attribute of it"),
+        ("corrected(attribute)", "a person corrected that attribute"),
     ),
     "in_mechanism": (
         ("in_mechanism()", "it moves in a mechanism of the latest assessment"),

@@ -90,6 +90,9 @@ def _named(one: Values) -> dict[str, Any]:
         sigma = "" if value["sigma"] is None else f" ± {value['sigma']:.4g}"
         unit = "" if value["unit"] == "-" else f" {value['unit']}"
         shown[name] = f"{value['value']:.4g}{sigma}{unit} ({value['source']})"
+    if one.get("others"):
+        shown["disputed" if one["disputed"] else "agreed"] = one["rule"]
+        shown["beside it"] = [_statement(other) for other in one["others"]]
     return shown | {"evidence": _cited(one), "recorded": _by(one)}
 
 
@@ -104,7 +107,7 @@ def _statement(one: Values) -> str:
     return f"{', '.join(part for part in parts if part)} [{_by(one)}]"
 
 
-_PROVENANCE = ("entry", "action", "author", "source", "recorded_at")
+_PROVENANCE = ("entry", "action", "author", "source", "recorded_at", "stated_on")
 
 
 def _cited(one: Values) -> str:

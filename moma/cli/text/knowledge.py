@@ -14,15 +14,19 @@ def record_lines(report: "RecordReport", verbose: bool) -> list[str]:
     lines = []
     would = " (dry run: nothing was kept)" if report.dry_run else ""
     for file in report.files:
+        before = ""
         if file.recorded_before is not None:
-            lines.append(f"{file.path}: recorded before, as entry {file.recorded_before}; nothing changed")
+            before = f"recorded before, as entry {file.recorded_before}; "
+        if before and not file.entries:
+            lines.append(f"{file.path}: {before}nothing changed")
             continue
         if not file.entries:
             lines.append(f"{file.path}: all of it was known; nothing changed")
             continue
         numbers = ", ".join(map(str, file.entries))
         noun = "entry" if len(file.entries) == 1 else "entries"
-        lines.append(f"{file.path}: {_counts(file.outcome)}, as {noun} {numbers}{would}")
+        again = "what was withdrawn since is stated again: " if before else ""
+        lines.append(f"{file.path}: {before}{again}{_counts(file.outcome)}, as {noun} {numbers}{would}")
         if verbose or report.dry_run:
             lines += [f"  {name}: {_counts(outcome)}" for name, outcome in file.tables.items()]
     if report.related is not None:

@@ -45,18 +45,41 @@ def answer(session: "Session", question: Question, format: str) -> tuple[str, st
         faces = find_faces(session, *asked)
         from archmodel.query.geojson import feature_collection, flattened  # and with it numpy
 
-        return as_geojson(feature_collection(flattened(faces) if question.flat else faces)), ""
+        doubts = _disputes(session, question, names)
+        return as_geojson(feature_collection(flattened(faces) if question.flat else faces)), doubts
     rows = find_rows(session, *asked)
+    doubts = _disputes(session, question, names)
     if format == "json":
-        return as_json(rows), ""
+        return as_json(rows), doubts
     if format == "csv":
-        return as_csv(names, rows), ""
+        return as_csv(names, rows), doubts
     if not rows:
         return "", f"no {question.kind} found" + "".join(f", where {one}" for one in question.where)
     if not question.everything and question.columns is None:
         names = shown_columns(names, rows, asked_columns(question.where, session, question.kind))
     units = {name: known[name.partition("@")[0]].unit for name in names}
-    return as_table(units, rows), f"{len(rows)} found"
+    return as_table(units, rows), "; ".join(filter(None, (f"{len(rows)} found", doubts)))
+
+
+def _disputes(session: "Session", question: Question, names: Sequence[str]) -> str:
+    """Say of how many entities the answer rests on an opinion beside which there is another one."""
+    asked = {*names, *asked_columns(question.where, session, question.kind)}
+    notes = []
+    for subject, resting in RESTS_ON.items():
+        if not asked.isdisjoint(resting):
+            where = (*question.where, f"disputed({subject})")
+            rows = find_rows(session, question.kind, where, question.run, ["code"])
+            if rows:
+                some = f"{rows[0]['code']}{', …' if len(rows) > 1 else ''}"
+                notes.append(f"the {subject} of {len(rows)} is disputed ({some})")
+    return "; ".join(notes)
+
+
+RESTS_ON = {
+    "phase": ("phase", "phase_author", "phase_begins", "phase_ends"),
+    "material": ("material", "material_author", "density", "tensile_strength", "compressive_strength"),
+}
+"""Attributes that rest on an opinion."""
 
 
 def _names(session: "Session", question: Question, known: Mapping[str, Attribute], format: str) -> list[str]:
