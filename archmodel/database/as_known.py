@@ -51,7 +51,7 @@ def entry_named(session: Session, text: str) -> int:
         day = None
     if day is None or (text.isdigit() and int(text) < 1000):
         remedy = f"give an entry up to {latest_entry(session)} (moma entries), or a date as 2024-03-15"
-        raise UsageError(f"there is no entry {text[:40]!r}", where="--at", remedy=remedy)
+        raise UsageError(f"there is no entry {text[:40]}", where="--at", remedy=remedy)
     until = datetime.combine(day + timedelta(days=1), time(), UTC)
     number = session.scalar(select(func.max(Entry.id)).where(Entry.recorded_at < until))
     if number is None:

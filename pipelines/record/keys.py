@@ -224,6 +224,7 @@ ARRAYS: Mapping[str, tuple[Key, ...]] = {
     "structure": _STRUCTURE,
     "relation": _RELATION,
     "depth": _DEPTH,
+    "rule": _RULE,
     "made_of": (Key("material", ValueKind.TEXT, "Name of the material."), *_SAID),
     "of_phase": (Key("phase", ValueKind.TEXT, "Name of the phase."), *_SAID),
     "mark": (
@@ -234,7 +235,6 @@ ARRAYS: Mapping[str, tuple[Key, ...]] = {
     "observation": _OBSERVATION,
     "reference": _SAID,
     "note": (Key("key", ValueKind.TEXT, "Subject of the note, e.g. `edge`."), *_SAID),
-    "rule": _RULE,
     "decision": _DECISION,
 }
 """Keys of every array of tables, in the order of recording."""
