@@ -140,7 +140,7 @@ def corrected(scope: Scope, call: Call, ask: Ask) -> Condition:
     conditions: list[Condition] = [
         rows.c.entity_id == scope.entity.c.id,
         entries.c.id == rows.c.entry_id,
-        entries.c.action == "correction",
+        entries.c.action.in_(("correction", "declaration")),
     ]
     for token in tokens(call, 0, 1):
         known = attributes_of(scope.context.session)
