@@ -184,11 +184,13 @@ def without_friction_across(on: RigidAssembly, live: LiveLoad, found: LimitLoad)
     line = lines_of_sliding(on, found)
     wedges = np.flatnonzero(line.any(axis=1))
     steady = found.mechanism.speed <= _STILL
+    sliding = found.mechanism.sliding.copy()
     for side in (0, 1):
         body, other = on.contacts.bodies[:, side], on.contacts.bodies[:, 1 - side]
         here = np.isin(body, wedges) & steady[other]
         slip[here] = np.einsum("cij,cj->ci", on.contacts.frame[here, 1:], line[body[here]])
-    slides = np.flatnonzero(np.linalg.norm(slip, axis=1) > _STILL)
+        sliding |= here
+    slides = np.flatnonzero(sliding & (np.linalg.norm(slip, axis=1) > 0.0))
     if not len(slides):
         return None
     along = slip[slides] / np.linalg.norm(slip[slides], axis=1)[:, None]
