@@ -74,3 +74,11 @@ def test_a_cloud_that_is_not_understood_is_refused(tmp_path, text, message):
     with pytest.raises(SurveyError) as caught:
         read(tmp_path, text)
     assert message in str(caught.value)
+
+
+def test_a_later_piece_of_another_width_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("survey.clouds.points.text._LINES", 3)
+    path = tmp_path / "cloud.txt"
+    path.write_text(rows("{x} {y} {z} 7") + "1 23 4\n", encoding="utf-8")
+    with pytest.raises(SurveyError, match=r":4: '1 23 4' is not a point like the others"):
+        list(open_text(path).chunks(np.zeros(3), False))

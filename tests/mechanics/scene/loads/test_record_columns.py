@@ -55,3 +55,10 @@ def test_a_gap_is_at_its_line(tmp_path):
     path.write_text("".join(lines[:12] + lines[15:]))
     with pytest.raises(SceneError, match=r"a\.txt:13: time 0\.14 s is not at equal steps"):
         read_accelerogram(path)
+
+
+def test_blanks_separate_numbers_with_decimal_commas(tmp_path):
+    path = tmp_path / "a.txt"
+    lines = [f"{t:.2f} {a:.3f}".replace(".", ",") for t, a in zip(TIMES, VALUES, strict=True)]
+    path.write_text("\n".join(lines))
+    np.testing.assert_allclose(read_accelerogram(path, "m/s2").acceleration, VALUES, atol=6e-4)
