@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from time import process_time
 from typing import Any
 
@@ -81,11 +81,11 @@ class Problem:
     def _evaluated(self, point: Array, gradient: bool) -> tuple[dict[str, float], Array | None]:
         values = self.unknowns.values(point)
         realised = self._realised(values)
-        assembled = self._assembled(realised)
+        assembled = cache(lambda: self._assembled(realised))
         found, limited = evaluate(self.quantities, assembled, realised.models, realised.turn)
         if not gradient or limited is None:
             return found, None
-        return found, self.unknowns.gradient(point, self.by_values(values, limited, assembled))
+        return found, self.unknowns.gradient(point, self.by_values(values, limited, assembled()))
 
     def _realised(self, values: Array) -> Realised:
         valued = list(zip(self.unknowns.each, values.tolist(), strict=True))

@@ -1,6 +1,6 @@
 """Quantities of a sample: limit loads, geometric factor, outcome and summary of a run, aggregates of stones."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,6 +18,7 @@ from mechanics.simulate import simulate
 from moma.errors import SceneError, SolverError
 from pipelines.assess.questions import LoadQuestion, parse_question
 from pipelines.assess.study.settings import QuantityTable, QuantityType
+from pipelines.ingest.records import surveyed_block
 from pipelines.results.summary import summarise
 from pipelines.run.assemble import Assembly
 from pipelines.scene.selection import StoneModel
@@ -84,7 +85,10 @@ def live_load(table: QuantityTable, turn: float = 0.0) -> LiveLoad:
 
 
 def evaluate(
-    tables: Sequence[QuantityTable], assembled: Assembly, models: Sequence[StoneModel], turn: float
+    tables: Sequence[QuantityTable],
+    assembled: Callable[[], Assembly],
+    models: Sequence[StoneModel],
+    turn: float,
 ) -> tuple[dict[str, float], Limited | None]:
     """Return the quantities of a scene by name, and the bound of the first if it is one.
 
@@ -104,10 +108,10 @@ def evaluate(
                 values[name] = _aggregate(table, models)
                 continue
             case QuantityType.OUTCOME | QuantityType.SUMMARY:
-                run = run or _run(assembled)
+                run = run or _run(assembled())
                 values[name] = run[0] if table.type is QuantityType.OUTCOME else _looked_up(run[1], table.key)
                 continue
-        on = on or assembly(at_instant(assembled.scene))
+        on = on or assembly(at_instant(assembled().scene))
         if table.type is QuantityType.FACTOR:
             factor = geometric_safety(on, _WIDEST).factor
             values[name] = 0.0 if np.isnan(factor) else factor
@@ -168,5 +172,20 @@ def _looked_up(summary: Mapping[str, Any], key: str | None) -> float:
 
 
 def _aggregate(table: QuantityTable, models: Sequence[StoneModel]) -> float:
-    numbers = [float(getattr(model.record, table.key or "")) for model in models]
+    codes = set(table.stones)
+    numbers = [
+        _measured(model, table.key or "") for model in models if not codes or model.record.code in codes
+    ]
     return float(_AGGREGATES[table.of](numbers))
+
+
+def _measured(model: StoneModel, key: str) -> float:
+    """Return a number of a stone as its measurements give it now."""
+    block = surveyed_block(model.record)
+    match key:
+        case "offset" | "rms":
+            return float(getattr(block.face.fit, key))
+        case "depth":
+            return block.depth.value
+        case _:
+            return float(getattr(block.face.measures, key))

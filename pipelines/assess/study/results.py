@@ -52,6 +52,7 @@ def summary_of(
         "study": asdict(file.study),
         "unknowns": problem.dimension,
         "quantity": quantity_name(problem.quantities[0]),
+        "bound": problem.differentiable,
         "means": {name: _plain(asdict(mean)) for name, mean in found.means.items()},
         "quantiles": {
             name: dict(zip(map(str, _SHARES), quantiles(values, _SHARES), strict=True))
@@ -252,6 +253,8 @@ def _headline(summary: Mapping[str, Any]) -> str:
             f" ({failure['low']:.3g} to {failure['high']:.3g}), β = {failure['index']:.3g}"
             f" ({failure['index_low']:.3g} to {failure['index_high']:.3g})"
         )
+        if summary["bound"] and not failure["above"]:
+            said += "; P AT LEAST, as stones hold no more than the bound"
     if summary["actions"]:
         action = summary["actions"][0]
         said += f"; measure next: {action['text']}, which takes away {100 * action['share']:.0f} % of the variance"

@@ -1,6 +1,7 @@
 """Samples of a study by worker processes: looked up in the store first, taken where there is none."""
 
 import hashlib
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -14,6 +15,8 @@ from pipelines.assess.workers.pool import Lost
 from pipelines.assess.workers.store import Sample, SampleStore, Snapshot
 
 __all__ = ["ATTEMPTS", "IncompleteError", "Part", "Sampler", "Task", "take"]
+
+_NUMBER = re.compile(r"[+-]?[0-9.]+(e[+-]?[0-9]+)?")
 
 ATTEMPTS = 4
 """Processes that a sample may lose: a sample that kills its process each time must end."""
@@ -73,7 +76,7 @@ class Sampler:
     part : of large batches that this process takes
     progress : called at every sample
     taken, cpu : samples taken here, and their processor time [s]
-    faults : reasons of the samples without an answer, with how many have each
+    faults : of the samples without an answer, by the kind of their reason: the first, and how many
     """
 
     snapshot: Snapshot
@@ -82,7 +85,7 @@ class Sampler:
     progress: Listener
     taken: int = 0
     cpu: float = 0.0
-    faults: dict[str, int] = field(default_factory=dict)
+    faults: dict[str, tuple[str, int]] = field(default_factory=dict)
 
     def __call__(self, points: Array, gradient: bool = False) -> list[Sample]:
         """Return the samples at points (m, n) in their order, all taken here."""
@@ -117,8 +120,10 @@ class Sampler:
             raise IncompleteError(len(answers), count - len(answers))
         for sample in answers:
             if not sample.done:
-                reason = f"{sample.state}: {sample.reason}"
-                self.faults[reason] = self.faults.get(reason, 0) + 1
+                # reasons that differ in their numbers alone are one
+                kind = _NUMBER.sub("#", f"{sample.state}: {sample.reason}")
+                first, many = self.faults.get(kind, (f"{sample.state}: {sample.reason}", 0))
+                self.faults[kind] = (first, many + 1)
         return answers
 
     def digest_of(self, samples: Sequence[Sample]) -> str:

@@ -184,7 +184,7 @@ class QuantityTable:
         str | None, Setting("Key of the summary, with dots; or attribute of stones, such as depth or area.")
     ] = None
     of: Annotated[str, Setting("sum, mean, min or max, of an aggregate.")] = "mean"
-    stones: Annotated[Texts, Setting("Codes or expressions of the stones of an aggregate; none: all.")] = ()
+    stones: Annotated[Texts, Setting("Codes of the stones of an aggregate; none: all.")] = ()
     fails_below: Annotated[float | None, Setting("It fails where the quantity is less.")] = None
     fails_above: Annotated[float | None, Setting("It fails where the quantity is more.")] = None
     levels: Annotated[
