@@ -77,7 +77,7 @@ def summary_of(
         },
         "actions": [asdict(action) for action in measures[:_MOST]],
         "certain": certain(problem),
-        "faults": dict(sorted(sampler.faults.items())),
+        "faults": [{"reason": first, "count": many} for first, many in sampler.faults.values()],
         "samples": {"taken": sampler.taken, "cpu": sampler.cpu, "digest": sampler.digest_of(found.samples)},
         "snapshot": snapshot.hash,
         "versions": dict(versions()),
@@ -202,10 +202,11 @@ def _cautions(problem: Problem, found: Estimates, summary: Mapping[str, Any]) ->
             f"first order is not good enough: along {linear['along'] or 'the gradient'} the quantity departs from it "
             f"{size} (limit {100 * NOT_LINEAR:.0f} %); several mechanisms may govern"
         )
-    for reason, count in summary["faults"].items():
-        told.append(
-            f"{count} samples without an answer, {reason}; they bound the probability from both sides"
-        )
+    told += [
+        f"{fault['count']} samples have no answer, as the first: {fault['reason']}; they bound the probability from both "
+        "sides"
+        for fault in summary["faults"]
+    ]
     if found.subset is not None and not found.subset.complete:
         told.append("subset simulation did not reach failure: its probability is an upper bound")
     if any(not design.converged for design in found.designs):
