@@ -14,11 +14,11 @@ from tests.mechanics.shapes import brick, ground, scene
 
 
 def blocks(velocity, speed=(0.0, 1.0, 1.0)):
-    """Return the blocks of three stones, the ground and two at x = 0 and 1 m whose sizes are 1 m."""
+    """Return the blocks of three stones, the ground and two at x = 0 and 1 m whose sizes are 2 m."""
     on = SimpleNamespace(
         state=SimpleNamespace(centre=np.array([[0.0, 0, -1], [0, 0, 0], [1, 0, 0]])),
         model=SimpleNamespace(
-            fixed=np.array([True, False, False]), mass=np.ones(3), surfaces=SimpleNamespace(size=np.ones(3))
+            fixed=np.array([True, False, False]), mass=np.ones(3), surfaces=SimpleNamespace(size=np.full(3, 2.0))
         ),
         contacts=SimpleNamespace(bodies=np.array([[1, 0], [2, 0], [1, 2]])),
     )
@@ -34,8 +34,8 @@ STILL = (0.0,) * 6
     [
         ((0, 0, 1.0, 0, -1.0, 0), [-1, 0, 0]),  # as the first carries it: ω × 1 m along x
         ((0, 0, 1.0, 0, 0, 0), [-1, 0, 1]),  # its centre alone
-        ((0, 0, 1.0, 0, -1.0015, 0), [-1, 0, 0]),  # its corner 0.75 mm/s off
-        ((0, 0, 1.0, 0, -1.0025, 0), [-1, 0, 1]),  # its corner 1.25 mm/s off
+        ((0, 0, 1.0, 0, -1.00075, 0), [-1, 0, 0]),  # its corner 0.75 mm/s off
+        ((0, 0, 1.0, 0, -1.00125, 0), [-1, 0, 1]),  # its corner 1.25 mm/s off
         ((0, 0, 1.0015, 0, -1.0, 0), [-1, 0, 1]),
     ],
 )
