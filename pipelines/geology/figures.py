@@ -146,7 +146,7 @@ def _velocities(axes: "Axes", fields: Fields, radius: Array, layer: Ints) -> str
     )
     largest = float(np.hypot(velocity[:, 0], velocity[:, 1]).max())
     key = float(f"{largest or 1.0:.1g}")
-    axes.quiverkey(arrows, 0.92, 1.05, key, f"{key:g} m/s", fontproperties={"size": 7})
+    axes.quiverkey(arrows, 0.92, 1.05, key, f"{key:g} m/s", labelpos="W", fontproperties={"size": 7})
     return "Velocities"
 
 
@@ -304,7 +304,7 @@ def draw_shapes(
     quality : a line about overlaps and residuals
     """
     wide = _WIDE / max(len(instants), 4)
-    figure = new_sheet((wide * len(instants), 0.4 + wide * len(followed)))
+    figure = new_sheet((wide * len(instants), 1.0 + wide * len(followed)))
     panels = figure.subplots(len(followed), len(instants), squeeze=False)
     for row, (name, group) in zip(panels, followed.items(), strict=True):
         places = [fields.position[group, :2] for fields in instants]
