@@ -325,13 +325,21 @@ def _fault_rows(runs: Sequence[Mapping[str, Any]]) -> list[Row]:
                 "lambda_x": spread((cell["lambda_x"][-1] for cell in cells), 2),
                 "lambda_y": spread((cell["lambda_y"][-1] for cell in cells), 2),
                 "front": spread((one["front ahead of the tip [m]"] for one in measures), 1),
-                "angle": spread((one["trishear: apical angle [°]"] for one in measures), 0),
-                "ratio": spread((one["trishear: propagation to slip [-]"] for one in measures), 2),
+                "angle": _determined(measures, "trishear: apical angle [°]", 0),
+                "ratio": _determined(measures, "trishear: propagation to slip [-]", 2),
                 "residual": spread((one["trishear: residual over slip [-]"] for one in measures), 3),
                 "eta": float(np.median([summary["natural_map"]["median"] for summary in summaries])),
             }
         )
     return rows
+
+
+def _determined(measures: Sequence[Mapping[str, float]], name: str, digits: int) -> str:
+    """Return mean ± standard deviation over the runs whose motion determines a measure, and how many these are."""
+    found = [one[name] for one in measures if one.get(name) is not None]
+    if not found:
+        return "not determined"
+    return spread(found, digits) + (f" ({len(found)} seeds)" if len(found) < len(measures) else "")
 
 
 def _draw(runs: Sequence[Mapping[str, Any]], path: Path) -> None:

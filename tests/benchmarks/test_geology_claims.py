@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks import geology
 from benchmarks.claims import Run, verdict_of
 from benchmarks.claims_fault import FAULT
 from benchmarks.claims_fold import FOLD
@@ -181,3 +182,9 @@ def test_seeds_without_all_cohesions_are_left_out_and_numbers_have_deviations():
 def test_every_claim_has_a_name_of_its_own_words_and_a_criterion():
     assert len(CLAIMS) == len(FOLD) + len(FAULT)
     assert all(claim.words and claim.criterion for claim in CLAIMS.values())
+
+
+def test_a_measure_that_some_motions_do_not_determine_says_of_how_many_seeds_it_is():
+    runs = [{"P/S": 0.5}, {"P/S": 0.7}, {}]
+    assert geology._determined(runs, "P/S", 1) == "0.6 ± 0.1 (2 seeds)"
+    assert geology._determined([{}], "P/S", 1) == "not determined"
