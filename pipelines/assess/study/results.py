@@ -203,8 +203,8 @@ def _cautions(problem: Problem, found: Estimates, summary: Mapping[str, Any]) ->
             f"{size} (limit {100 * NOT_LINEAR:.0f} %); several mechanisms may govern"
         )
     told += [
-        f"{fault['count']} samples have no answer, as the first: {fault['reason']}; they bound the probability from both "
-        "sides"
+        f"{fault['count']} samples have no answer, as the first: {fault['reason']}; they bound the probability from "
+        "both sides"
         for fault in summary["faults"]
     ]
     if found.subset is not None and not found.subset.complete:
