@@ -133,7 +133,7 @@ FOLD: tuple[Claim, ...] = (
         "fold",
         "emergence",
         "lower layers emerge at the surface",
-        "share of disks of layers 1 to 8 at the surface between wall and front grows",
+        "of the disks that end between wall and front, the share of layers 1 to 8 among those at the surface grows",
         _emerged,
         digits=3,
     ),

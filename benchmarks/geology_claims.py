@@ -202,7 +202,7 @@ def _fold_numbers(
         if common.sum() > 2
         else float("nan"),
         "band": float(shear.max() / np.median(shear)) if len(shear) > 2 else float("nan"),
-        "emerged before": _emerged(sample, sample.centre, np.ones(len(radius), dtype=bool)),
+        "emerged before": _emerged(sample, sample.centre, within),
         "emerged": _emerged(sample, place, within),
     }
 
@@ -216,7 +216,7 @@ def _by_part(number: Array, values: Array, chosen: Bools) -> Array:
 
 
 def _emerged(sample: PreparedSample, place: Array, within: Bools) -> float:
-    """Return the share of the surface's disks that are of the eight lower layers."""
+    """Return the share of the surface's disks, of those within a zone, that are of the eight lower layers."""
     tops = place[:, 1] + sample.radius
     free = within & (profile(place, sample.radius, place[:, 0]) <= tops + 1e-9 * sample.radius)
     return float((sample.layer[free] < 8).mean()) if free.any() else float("nan")
