@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from archmodel.tables.layout import SCHEMA_VERSION
 from tests.paths import ROOT
 from tests.postgresql import Server
 
@@ -76,4 +77,4 @@ def test_the_commands_for_postgresql(folder: Path, postgresql: Server) -> None:
 def test_the_commands_for_versions(folder: Path) -> None:
     run(commands("SQLite")[0], folder)
     (migrate,) = commands("Versions")
-    assert "has version 1 already" in run(migrate, folder)
+    assert f"has version {SCHEMA_VERSION} already" in run(migrate, folder)
