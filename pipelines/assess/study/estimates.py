@@ -161,8 +161,7 @@ def _regressed(points: Array, values: Array) -> Array | None:
         return None
     design = np.column_stack([np.ones(int(known.sum())), points[known]])
     found, *_ = np.linalg.lstsq(design, values[known], rcond=None)
-    slopes: Array = found[1:]
-    return slopes
+    return found[1:].astype(np.float64)
 
 
 def _first_order(

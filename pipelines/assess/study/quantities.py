@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from statistics import fmean
 from typing import Any
 
 import numpy as np
@@ -31,7 +32,12 @@ _EXACT = 1e-12
 _WIDEST = 2.0
 """Share of their width to which joints of stones that fall are widened: factors are known down to a half [-]."""
 
-_AGGREGATES = {"sum": np.sum, "mean": np.mean, "min": np.min, "max": np.max}
+_AGGREGATES: Mapping[str, Callable[[list[float]], float]] = {
+    "sum": sum,
+    "mean": fmean,
+    "min": min,
+    "max": max,
+}
 
 
 class UndecidedError(SceneError):

@@ -19,8 +19,9 @@ from pipelines.assess.study.estimates import estimated
 from pipelines.assess.study.file import StudyFile, read_study
 from pipelines.assess.study.prepare import problem_of, snapshot_content
 from pipelines.assess.study.problem import Problem
-from pipelines.assess.study.results import summary_of, write_results
+from pipelines.assess.study.results import write_results
 from pipelines.assess.study.sampling import ATTEMPTS, IncompleteError, Part, Sampler, take
+from pipelines.assess.study.summary import summary_of
 from pipelines.assess.workers.pool import workers
 from pipelines.assess.workers.store import Snapshot
 from pipelines.results.folder import locked

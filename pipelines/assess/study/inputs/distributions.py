@@ -133,5 +133,4 @@ def correlation_root(matrix: Array) -> Array:
             f"the matrix of correlations is not positive definite: its least eigenvalue is {least:.3g}",
             remedy="give smaller correlations, or make inputs that are the same one input",
         )
-    root: Array = np.linalg.cholesky(matrix)
-    return root
+    return np.linalg.cholesky(matrix).astype(np.float64)

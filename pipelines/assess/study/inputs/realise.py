@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -104,8 +105,8 @@ def law_value(scene: SceneFile, table: InputTable) -> float | None:
     laws = [scene.contact.law, *(rule.law for rule in scene.laws)]
     keys = LAW_KEYS[table.type]
     chosen = laws if table.law is None else laws[table.law : table.law + 1]
-    found = {getattr(law, keys[0], None) for law in chosen} - {None}
-    return float(found.pop()) if len(found) == 1 else None
+    found = {float(value) for law in chosen if (value := getattr(law, keys[0], None)) is not None}
+    return found.pop() if len(found) == 1 else None
 
 
 def records_of(scene: SceneFile, folder: str) -> list[Path]:
@@ -127,10 +128,10 @@ def _change_laws(
             old = getattr(law, key, None)
             if old is not None:
                 for _, value in values:
-                    written[key] = _changed(table.acts, old, value)
+                    written[key] = _changed(table.acts, value, old)
 
 
-def _changed(acts: Acts, old: float, value: float) -> float:
+def _changed(acts: Acts, value: float, old: float) -> float:
     match acts:
         case Acts.VALUE:
             return value
@@ -151,10 +152,9 @@ def _change_stones(
         acts = unknown.acts
         if scatters:
             acts, value = (Acts.FACTOR, 1.0 + value) if acts is Acts.FACTOR else (Acts.CHANGE, value)
+        new = partial(_changed, acts, value)
         for code in unknown.stones:
-            by_code[code] = change(
-                by_code[code], lambda old, acts=acts, value=value: _changed(acts, old, value)
-            )
+            by_code[code] = change(by_code[code], new)
 
 
 def _material_changer(name: str) -> Callable[[StoneModel, Callable[[float], float]], StoneModel]:
@@ -162,7 +162,8 @@ def _material_changer(name: str) -> Callable[[StoneModel, Callable[[float], floa
         old = getattr(model.material, name)
         if old is None:
             raise SceneError(f"{model.record.code}: its material states no {name}", remedy="state one")
-        return replace(model, material=replace(model.material, **{name: new(old)}))
+        changed: dict[str, Any] = {name: new(old)}
+        return replace(model, material=replace(model.material, **changed))
 
     return change
 

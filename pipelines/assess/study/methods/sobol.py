@@ -1,7 +1,8 @@
 """Sobol' indices: shares of the variance by groups of unknowns, alone and with all interactions."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from scipy.stats import norm, qmc, sobol_indices
@@ -66,7 +67,11 @@ def sobol(
     values = np.array([sample.values.get(quantity, np.nan) for sample in found]).reshape(len(sets), count)
     known = np.isfinite(values).all(axis=0)
     clear = values[:, known]
-    answers = {"f_A": clear[0][None], "f_B": clear[1][None], "f_AB": clear[2:, None, :]}
+    answers: Mapping[Literal["f_A", "f_B", "f_AB"], Array] = {
+        "f_A": clear[0][None],
+        "f_B": clear[1][None],
+        "f_AB": clear[2:, None, :],
+    }
     indices = sobol_indices(func=answers, n=clear.shape[1])
     ends = _intervals(clear, confidence, seed)
     return Indices(

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
-from mechanics.arrays import Array
+from mechanics.arrays import Array, Bools, Ints
 from pipelines.assess.study.methods.counting import Probability
 from pipelines.assess.study.methods.failure import Evaluate, Failure
 
@@ -51,7 +51,7 @@ def subset(
     states = failure.states(evaluate(points))
     used, missing, share, variance = count, int(np.isnan(states).sum()), 1.0, 0.0
     levels: list[float] = []
-    chains = np.arange(count)
+    chains: Ints = np.arange(count)
     for level in range(_LEVELS):
         order = np.argsort(np.where(np.isnan(states), np.inf, states), kind="stable")
         threshold = float(states[order[kept - 1]])
@@ -84,7 +84,7 @@ def _grown(
     count: int,
     threshold: float,
     seed: list[int],
-) -> tuple[Array, Array, Array, int]:
+) -> tuple[Array, Array, Ints, int]:
     """Return the points (count, n) of the next level, g, the number of the chain of each, and moves without answer."""
     chain = np.arange(len(points))
     every, known, chains, missing = [points], [states], [chain], 0
@@ -104,7 +104,7 @@ def _grown(
     return np.concatenate(every), np.concatenate(known), np.concatenate(chains), missing
 
 
-def _variance(inside: Array, chains: Array, level: int) -> float:
+def _variance(inside: Bools, chains: Ints, level: int) -> float:
     """Return the squared coefficient of variation of the share that is inside.
 
     Points of a chain are correlated, and chains are not: so it comes from the sums over chains.
