@@ -23,7 +23,7 @@ def spread(folder, url, tables, samples, name):
 
 @pytest.mark.slow
 def test_depths_taken_as_independent_make_a_wall_look_safer(tmp_path):
-    """Of a leaf of four courses, h = 1 m: λ = .4, COV .075 by one depth; a depth of each averages out over 18 stones."""
+    """Of four courses, h = 1 m: λ = .4, COV .075 by one depth; a depth of each averages out over 18 stones."""
     url = leaf_survey(tmp_path, courses=4)
     shared = spread(tmp_path, url, SHARED, 40, "shared")
     each = spread(tmp_path, url, EACH, 40, "each")
