@@ -21,6 +21,7 @@ from pipelines.assess.study.prepare import problem_of, snapshot_content
 from pipelines.assess.study.problem import Problem
 from pipelines.assess.study.results import write_results
 from pipelines.assess.study.sampling import ATTEMPTS, IncompleteError, Part, Sampler, take
+from pipelines.assess.study.settings import Method
 from pipelines.assess.study.summary import summary_of
 from pipelines.assess.workers.pool import workers
 from pipelines.assess.workers.store import Snapshot
@@ -80,6 +81,12 @@ def run_study(
     DatabaseError : the database cannot be read or written
     """
     folder, file, part = Path(folder), read_study(path), part or Part()
+    if part.count > 1 and file.study.method is Method.SUBSET:
+        raise UsageError(
+            "subset simulation has no parts: each level begins from all samples of the one before",
+            where="--part",
+            remedy="leave out --part, and give --workers",
+        )
     progress(Progress("blocks", 0, None, "reading the stones"))
     with open_database(url, create=False) as database, database.session(read_only=True) as session:
         as_of = latest_entry(session)

@@ -37,12 +37,12 @@ def test_positions_of_planes_scatter_as_the_survey_predicts(tmp_path):
     url = block_survey(tmp_path)
     points = '[[inputs]]\ntype = "point"\nstones = ["BLOCK"]\n'
     offset = '[[quantities]]\ntype = "aggregate"\nkey = "offset"\nstones = ["BLOCK"]\n'
-    path = study_file(tmp_path, "latin_hypercube", points, offset, samples=200)
+    path = study_file(tmp_path, "latin_hypercube", points, offset, samples=100)
     done = run_study(path, url, tmp_path / "out")
     with open_database(url, create=False) as database, database.session(read_only=True) as session:
         (stone,) = load_stones(session, find(session, "ashlar", ["code = 'BLOCK'"]))
     tilts, height = stone.covariance.diagonal()[:2], stone.covariance[2, 2]
     predicted = np.sqrt(height + tilts @ (stone.axes @ stone.centroid) ** 2)
     sigma = done.summary["means"]["aggregate offset"]["sigma"]
-    # the standard error of a standard deviation of 200 samples is 5 %
-    assert sigma == pytest.approx(predicted, rel=0.15)
+    # the standard error of a standard deviation of 100 samples is 7 %
+    assert sigma == pytest.approx(predicted, rel=0.2)
