@@ -18,8 +18,11 @@ __all__ = ["ATTEMPTS", "IncompleteError", "Part", "Sampler", "Task", "take"]
 
 _NUMBER = re.compile(r"[+-]?[0-9.]+(e[+-]?[0-9]+)?")
 
-ATTEMPTS = 4
-"""Processes that a sample may lose: a sample that kills its process each time must end."""
+ATTEMPTS = 11
+"""Processes that a sample may lose, one more than the kills that a study must survive.
+
+A sample that kills its process each time, as it needs more memory than there is, must end.
+"""
 
 
 class IncompleteError(Exception):
