@@ -18,7 +18,9 @@ def blocks(velocity, speed=(0.0, 1.0, 1.0)):
     on = SimpleNamespace(
         state=SimpleNamespace(centre=np.array([[0.0, 0, -1], [0, 0, 0], [1, 0, 0]])),
         model=SimpleNamespace(
-            fixed=np.array([True, False, False]), mass=np.ones(3), surfaces=SimpleNamespace(size=np.full(3, 2.0))
+            fixed=np.array([True, False, False]),
+            mass=np.ones(3),
+            surfaces=SimpleNamespace(size=np.full(3, 2.0)),
         ),
         contacts=SimpleNamespace(bodies=np.array([[1, 0], [2, 0], [1, 2]])),
     )
