@@ -28,7 +28,7 @@ from benchmarks.report import (
     table_lines,
     write_between,
 )
-from mechanics.arrays import Array, Bools
+from mechanics.arrays import Array, Bools, Ints
 from mechanics.planar.measures.blocks import blocks_of
 from mechanics.planar.measures.surface import profile
 from pipelines.geology.experiments.fault import Fault
@@ -207,7 +207,7 @@ def _fold_numbers(
     }
 
 
-def _by_part(number: Array, values: Array, chosen: Bools) -> Array:
+def _by_part(number: Ints, values: Array, chosen: Bools) -> Array:
     """Return the mean of the chosen values in each part; nan where fewer than three disks have one."""
     size = int(number.max()) + 1
     count = np.bincount(number[chosen], minlength=size)

@@ -17,6 +17,7 @@ from survey.arrays import Array
 from survey.faces.planes import FaceFit, fit_plane
 from survey.records.survey import Photograph
 from survey.registration.homography import Homography, fit_homography
+from survey.statistics.scale import deviation
 
 __all__ = ["OFF_SQUARE", "MarkedWall", "wall_of_marks"]
 
@@ -175,9 +176,9 @@ def _tied(photograph: Photograph, viewpoint: Array | None, observer: Array | Non
 def _plane(positions: Array, sigmas: Array, towards: Array | None) -> FaceFit:
     """Fit the plane of the marks, which scatter like the stones that they are on, not only by measurement."""
     free = len(positions) - 3
-    deviation = max(_deviation(positions), 1e-12)
-    plain = fit_plane(positions, np.maximum(sigmas, deviation), towards)
-    inner = (plain.residuals / deviation) ** 2
+    least_squares = max(_deviation(positions), 1e-12)
+    plain = fit_plane(positions, np.maximum(sigmas, least_squares), towards)
+    inner = (plain.residuals / least_squares) ** 2
     # Student's test of the farthest mark against the scatter of the others
     left = max(free - float(inner.max()), 1e-9)
     if free < 2 or inner.max() * (free - 1) / left <= stdtrit(free - 1, 1.0 - 0.5e-3 / len(positions)) ** 2:

@@ -129,8 +129,10 @@ def _with_roughness(
                     break
         rough = estimate_roughness(sample)
     for item in chain(first, items):
-        measured = isinstance(item, BlockRecord) and item.photograph is None
-        yield replace(item, roughness=rough) if measured and rough > 0.0 else item
+        if isinstance(item, BlockRecord) and item.photograph is None and rough > 0.0:
+            yield replace(item, roughness=rough)
+        else:
+            yield item
 
 
 def _made(item: BlockRecord | SolidRecord, head: SurveyHead) -> SurveyedBlock | Reject:

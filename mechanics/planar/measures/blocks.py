@@ -7,7 +7,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from mechanics.arrays import Array, Ints
+from mechanics.arrays import Array, Bools, Ints
 from mechanics.planar.measures.surface import profile
 
 __all__ = ["Blocks", "blocks_of"]
@@ -83,7 +83,7 @@ def blocks_of(start: Array, now: Array, radius: Array, reach: float) -> Blocks:
     return Blocks(label, size, off[size[off] >= _SEVERAL])
 
 
-def _holds(pairs: Ints, place: Array, radius: Array, reach: float) -> Array:
+def _holds(pairs: Ints, place: Array, radius: Array, reach: float) -> Bools:
     first, second = pairs.T
     gap = np.linalg.norm(place[first] - place[second], axis=1) - radius[first] - radius[second]
     return np.asarray(gap <= reach)

@@ -418,3 +418,16 @@ def test_a_blunder_among_points_measured_on_the_face_is_left_out_and_told() -> N
     lifted = lift(replace(stone(wall, 14, rng, 0.0), points=points, sigma=0.02), tied, faces)
     assert "corrected by 8 points measured on it, 1 of them left out" in lifted.text
     assert np.abs((lifted.outline - wall.corners[14]) @ wall.normal).max() < 0.01
+
+
+def test_one_mark_off_the_plane_of_the_others_does_not_turn_it() -> None:
+    rng = np.random.default_rng(0)
+    across, off, up = rng.uniform(0.0, 5.0, 30), rng.normal(0.0, 0.002, 30), rng.uniform(0.0, 5.0, 30)
+    off[3] += 0.5
+    marks = tuple(
+        PhotoMark((x, z), np.array([x, y, z]), 1e-3, 10 + i)
+        for i, (x, y, z) in enumerate(zip(across, off, up, strict=True))
+    )
+    tied = wall_of_marks(Photograph("P1", 0.01, marks, None, 9), None, np.array([2.5, 20.0, 2.5]))
+    tilt = np.degrees(np.arccos(abs(tied.fit.normal[1])))
+    assert tilt < 0.1  # by least squares of all marks 1.0°
