@@ -231,7 +231,7 @@ def _starts(length: int, step: int, spare: int) -> list[int]:
 
 @dataclass(frozen=True)
 class Fields:
-    """What is measured of a part of a picture, at the resolution of the work.
+    """Measurements of a part of a picture, at the resolution of the work.
 
     Attributes
     ----------

@@ -6,6 +6,7 @@ joint would follow from bed to bed, may still stand out. Such a line is proposed
 same weights as of all borders, is high.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,7 @@ import numpy as np
 from survey.arrays import Array, Bools, Ints
 from survey.clouds.pictures.joints import WIDTH, Field, Strength
 
-__all__ = ["MISSING_WEIGHTS", "best_line", "beyond", "line_features", "propose_missing"]
+__all__ = ["MISSING_WEIGHTS", "Line", "line_features", "lines_across", "propose_missing"]
 
 MISSING_WEIGHTS = (-8.76, 1.6, -5.96, -0.2, -8.25, 3.73)
 """Weights of: constant, strength, gaps, prominence, how much fuller the whole is, size."""
@@ -26,7 +27,7 @@ _ROUNDS = 6  # lines across one region at most
 
 
 @dataclass(frozen=True)
-class _Line:
+class Line:
     """A line across a region: mean strength, share of gaps, strength over that of the lines beside it, place [px].
 
     Attributes
@@ -66,32 +67,56 @@ def propose_missing(
     out = regions.copy()
     following = int(out.max()) + 1
     waiting = [(k, box, 0) for k, box in enumerate(find_objects(out), start=1) if box is not None]
-    fields = {1: strength.upright, 0: strength.level}
     while waiting:
         number, box, depth = waiting.pop()
-        if depth >= _ROUNDS:
-            continue
-        mask = out[box] == number
         best: tuple[float, Bools] | None = None
-        for axis, field in fields.items():
-            ratio = np.minimum(field[box] / typical, _STRONGEST)
-            turned = (ratio, mask, hidden[box]) if axis else (ratio.T, mask.T, hidden[box].T)
-            line = best_line(*turned)
-            if line is None:
-                continue
-            after = beyond(turned[1].shape, line) & turned[1]
-            chance = _probability(turned[1], after, line)
+        for axis, whole, after, line in _lines(out, number, box, strength, typical, hidden):
+            chance = _probability(whole, after, line)
             if chance >= least and (best is None or chance > best[0]):
                 best = chance, after if axis else after.T
         if best is None:
             continue
         out[box][best[1]] = following
-        waiting += [(number, box, depth + 1), (following, box, depth + 1)]
+        if depth + 1 < _ROUNDS:
+            waiting += [(number, box, depth + 1), (following, box, depth + 1)]
         following += 1
     return out
 
 
-def best_line(ratio: Field, mask: Bools, hidden: Bools) -> _Line | None:
+def lines_across(
+    regions: Ints, strength: Strength, typical: float, hidden: Bools
+) -> Iterator[tuple[tuple[slice, slice], int, Bools, Bools, Line]]:
+    """Yield the best lines across all regions: the box of the region, the axis, and both as `_lines` does.
+
+    Parameters
+    ----------
+    regions, strength, typical, hidden : as for `propose_missing`
+    """
+    from scipy.ndimage import find_objects
+
+    for number, box in enumerate(find_objects(regions), start=1):
+        if box is not None:
+            for axis, whole, after, line in _lines(regions, number, box, strength, typical, hidden):
+                yield box, axis, whole, after, line
+
+
+def _lines(
+    regions: Ints, number: int, box: tuple[slice, slice], strength: Strength, typical: float, hidden: Bools
+) -> Iterator[tuple[int, Bools, Bools, Line]]:
+    """Yield the axis, the region, the part beyond and the line: upright (1) and level (0, transposed)."""
+    mask = regions[box] == number
+    for axis, field in ((1, strength.upright), (0, strength.level)):
+        ratio, whole, veil = np.minimum(field[box] / typical, _STRONGEST), mask, hidden[box]
+        if axis == 0:
+            ratio, whole, veil = ratio.T, whole.T, veil.T
+        line = _best_line(ratio, whole, veil)
+        if line is not None and line.strength > 0.0:
+            after = _beyond(whole.shape, line) & whole
+            if min(after.sum(), (whole & ~after).sum()) >= (_CLEAR * WIDTH) ** 2:
+                yield axis, whole, after, line
+
+
+def _best_line(ratio: Field, mask: Bools, hidden: Bools) -> Line | None:
     """Return the strongest line from top to bottom of a region; None where it is too narrow."""
     from scipy.ndimage import binary_erosion, maximum_filter1d
 
@@ -102,7 +127,7 @@ def best_line(ratio: Field, mask: Bools, hidden: Bools) -> _Line | None:
     wide = maximum_filter1d(ratio, 3, axis=1)
     # the joints at the sides of a region are no joints within it
     seen = binary_erosion(mask, np.ones((1, 2 * clear + 1))) & ~hidden
-    best: _Line | None = None
+    best: Line | None = None
     along = np.linspace(-1.0, 1.0, rows)
     for lean in range(-_LEAN, _LEAN + 1, 2):
         at = np.clip(np.arange(columns)[None] + np.round(lean * along).astype(int)[:, None], 0, columns - 1)
@@ -116,28 +141,24 @@ def best_line(ratio: Field, mask: Bools, hidden: Bools) -> _Line | None:
             lack = ((values < _GAP) & inside)[:, middle].sum() / max(int(count[middle]), 1)
             usual = float(np.median(mean[count >= _ACROSS * rows])) if mean[middle] > 0.0 else 1.0
             prominence = float(np.log((mean[middle] + 0.02) / (usual + 0.02)))
-            best = _Line(float(mean[middle]), float(lack), prominence, middle, lean)
+            best = Line(float(mean[middle]), float(lack), prominence, middle, lean)
     return best
 
 
-def beyond(shape: tuple[int, ...], line: _Line) -> Bools:
+def _beyond(shape: tuple[int, ...], line: Line) -> Bools:
     """Return which pixels lie to the right of a line."""
     rows, columns = shape
     place = line.middle + np.round(line.lean * np.linspace(-1.0, 1.0, rows)).astype(int)
     return np.arange(columns)[None] > place[:, None]
 
 
-def _probability(whole: Bools, after: Bools, line: _Line) -> float:
+def _probability(whole: Bools, after: Bools, line: Line) -> float:
     """Return the probability of a line."""
-    before = whole & ~after
-    first, second = float(before.sum()), float(after.sum())
-    if min(first, second) < (_CLEAR * WIDTH) ** 2:
-        return 0.0
     value = float(line_features(whole, after, line) @ np.array(MISSING_WEIGHTS))
     return float(1.0 / (1.0 + np.exp(-np.clip(value, -30.0, 30.0))))
 
 
-def line_features(whole: Bools, after: Bools, line: _Line) -> Array:
+def line_features(whole: Bools, after: Bools, line: Line) -> Array:
     """Return the features (6,) of a line across a region, whose part to its right is given."""
     before = whole & ~after
     first, second, total = (float(one.sum()) for one in (before, after, whole))
