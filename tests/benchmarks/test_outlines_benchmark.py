@@ -1,4 +1,4 @@
-"""The benchmark of outlines: its measures, on pictures whose answer is known, and boxes of photographs where they are."""
+"""The benchmark of outlines: its measures on pictures whose answer is known, and boxes of photographs."""
 
 import numpy as np
 import pytest
