@@ -29,7 +29,7 @@ __all__ = [
     "propose_outlines",
 ]
 
-_REACH = {"coursed": 1.3, "rubble": 6.0}  # farthest mortar from the middle of a joint, over its width
+_REACH = {"coursed": 1.0, "rubble": 6.0}  # farthest mortar from the middle of a joint, over its width
 _HIDDEN = 0.6  # part of a stone that something covers from which it is not proposed
 _SAME = 0.3  # part of the smaller outline that two tiles share from which it is the same stone
 _COURSED = 0.86  # part of the strong joints that are level or upright, from which there are courses

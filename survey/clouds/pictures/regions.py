@@ -71,7 +71,7 @@ def closed_regions(evidence: Field, typical: float, void: Bools) -> Ints:
     from scipy.ndimage import distance_transform_edt, gaussian_filter, label, maximum_filter
 
     free = (evidence < _WEAK * typical) & ~void
-    far = gaussian_filter(distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1].astype(np.float32), 0.5 * WIDTH)
+    far = gaussian_filter(distance_transform_edt(free).astype(np.float32), 0.5 * WIDTH)
     peaks = (far == maximum_filter(far, size=2 * round(_APART) + 1)) & (far > 1.0) & ~void
     seeds, _ = label(peaks, structure=np.ones((3, 3)))
     height = evidence / typical - 0.02 * far / max(float(far.max()), 1.0)

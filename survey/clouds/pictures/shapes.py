@@ -12,7 +12,7 @@ from survey.geometry.polygons import ring_area
 
 __all__ = ["Shape", "outline_shapes", "without_mortar"]
 
-_STRAIGHT = 1.0  # distance of a traced boundary from the sides of its outline [px of the work]
+_STRAIGHT = 1.5  # distance of a traced boundary from the sides of its outline [px of the work]
 _FEWEST = 4  # corners of an outline that has none to spare
 _BEVEL = 1.5  # length of a side that cuts a corner off, over the width of a joint
 _SQUARE = 0.6  # sine of the angle between the sides beside it: 37°

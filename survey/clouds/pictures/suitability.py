@@ -15,6 +15,7 @@ _SMALLEST = 96  # pixels of the shorter side: fewer hold no two courses whose jo
 _FAINT = 0.35  # contrast of joints over grain below which none stands out
 _TILTED = 2.0  # angle of the beds from level [degrees]: a surveyed wall leans less, its beds sag less
 _CONVERGING = 3.0  # change of the direction of beds or head joints over the picture [degrees]
+_CERTAIN = 4.0  # standard errors beyond which a change of direction is none by chance
 _FEWEST = 4  # stones from which a wall can be judged
 _UNSURE = 0.5  # mean score below which stones are more likely false
 _SOFT = 0.10  # detail of a pixel over that of two in a sharp picture; a blur of two pixels leaves a tenth
@@ -134,4 +135,8 @@ def _directions(rings: Sequence[Array], upright: bool) -> tuple[float, float]:
     for _ in range(10):  # least absolute deviations: sides of arches and repairs have other directions
         found = np.linalg.lstsq(terms * scale[:, None], angle[use] * scale, rcond=None)[0]
         scale = np.sqrt(weight[use] / np.maximum(np.abs(angle[use] - terms @ found), 0.2))
-    return float(found[0]), float(np.abs(found[1:]).max())
+    spread = 1.4826 * float(np.median(np.abs(angle[use] - terms @ found)))
+    share = weight[use] / weight[use].mean()
+    error = spread * np.sqrt(np.diag(np.linalg.pinv((terms * share[:, None]).T @ terms)))
+    change = np.where(np.abs(found) > _CERTAIN * error, np.abs(found), 0.0)
+    return float(found[0]), float(change[1:].max())
