@@ -1,5 +1,6 @@
 """Storing and loading of surveyed stones."""
 
+import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -63,13 +64,18 @@ def store_survey(
     Raises
     ------
     DatabaseError
-        if the file was taken in before, or a code is there already or twice in the file, or looks like another
+        if the file was taken in before and is not measured `again`; or a code is there already or twice in the file,
+        or looks like another
     SurveyError, GeometryError
         if a stone cannot be stored, at its ``file:line``
     """
     with session.begin_nested():
-        _refuse_again(session, source_path, sha256)
+        known_file = survey_with_hash(session, sha256)
+        if known_file is not None and not again:
+            raise _taken_in(known_file, source_path)
         entry = new_entry(session, "ingest", storable(source_path))
+        if known_file is not None:  # another reading of the same bytes, whose digest is unique
+            sha256 = hashlib.sha256(f"{entry.id}: {sha256}".encode()).hexdigest()
         survey = Survey(
             name=storable(name),
             path=storable(source_path),
@@ -99,6 +105,8 @@ def store_survey(
             remedy = "give it at least one stone record"
             raise DatabaseError("the survey has no stones", where=source_path, remedy=remedy)
         new = range(start, start + len(lines) - len(measured_again))
+        if known_file is not None:
+            _refuse_others(new, known_file, source_path)
         return StoredSurvey(survey.id, survey.entry_id, new, tuple(measured_again))
 
 
@@ -124,13 +132,22 @@ def load_stones(session: Session, entities: Iterable[Entity]) -> list[StoneRecor
     return [found[number] for number in wanted]
 
 
-def _refuse_again(session: Session, source_path: str, sha256: str) -> None:
-    """Refuse a file that was taken in before."""
-    if (known := survey_with_hash(session, sha256)) is not None:
-        what = f"this file is in the database already, as survey {known.name!r} from {known.path}"
-        raise DatabaseError(
-            what, where=source_path, remedy="there is nothing to do, or use another database (--db)"
+def _taken_in(known: Survey, source_path: str) -> DatabaseError:
+    what = f"this file is in the database already, as survey {known.name!r} from {known.path}"
+    remedy = (
+        "there is nothing to do; to read it with other options, give --again too, or another database (--db)"
+    )
+    return DatabaseError(what, where=source_path, remedy=remedy)
+
+
+def _refuse_others(new: range, known: Survey, source_path: str) -> None:
+    """Refuse stones of the same file under other codes, which would be there twice."""
+    if len(new):
+        what = (
+            f"{len(new)} stones have codes that the survey {known.name!r} of the same file did not give them"
         )
+        remedy = "give the options that made the codes then, or another database (--db)"
+        raise DatabaseError(what, where=source_path, remedy=remedy)
 
 
 def _known_codes(session: Session, batch: Sequence[StoneRecord]) -> dict[str, tuple[int, str]]:

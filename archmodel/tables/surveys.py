@@ -17,7 +17,7 @@ class Survey(Base):
     ----------
     name : given by the surveyor
     path : of the file, as the user wrote it
-    sha256 : of the file's bytes, in hexadecimal; a file is taken in once
+    sha256 : of the file's bytes, in hexadecimal; of a file read again with other options, of its entry and these
     entry : the act of recording that took it in
     stations : where instruments and observers stood, by name, (x, y, z) [m]
     frame : how the survey was carried into the frame of the site, with its precision; None if it was there

@@ -567,9 +567,10 @@ def _check_fitting(
         if given is not None and name != "solids":
             raise UsageError(f"{option} with format {name}", remedy="it is for --format solids")
     for option, text in tables.items():
-        if text is not None and name in ("moma", "solids", "cloud", "masks"):
+        unfit = ("moma", "solids") if option == "--kinds" else ("moma", "solids", "cloud", "masks")
+        if text is not None and name in unfit:
             raise UsageError(f"{option} with format {name}", remedy="it is for tables and lists of points")
-    if unit is not None and name in ("moma", "cloud", "masks"):
+    if unit is not None and name in ("moma", "cloud"):
         raise UsageError(f"--unit with format {name}", remedy="its lengths are metres")
 
 

@@ -66,7 +66,7 @@ def ingest(
     keep_going : ingest the good stones of each file, and write the others with the reasons to a file of rejects: the
         given one, for a single survey file, or, if True, ``NAME.rejects.SUFFIX`` beside each survey file
     again : stones that are in the database already were measured again: their old measurements are kept as superseded;
-        otherwise they are an error
+        otherwise they are an error; also the same file, read with other options
     rules : which solids are of which kind
 
     Raises
@@ -152,7 +152,6 @@ def _check_codes(tallies: Sequence[Tally], spools: Sequence[Spool]) -> None:
 
 
 _LISTS = ("csv", "pnezd", "penzd", "gsi")
-_TABLES = (*_LISTS, "jobxml", "landxml", "geojson")
 
 
 def _listed_stations(tally: Tally, options: ReadingOptions | None) -> list[int]:
@@ -180,7 +179,7 @@ def _measure(
         made = (
             one
             if isinstance(one, Reject)
-            else _of_known_kind(apply_rules(one, rules), head.path, kinds, format in _TABLES)
+            else _of_known_kind(apply_rules(one, rules), head.path, kinds, format not in ("moma", "solids"))
         )
         if not isinstance(made, Reject):
             tally.count(made)
@@ -194,9 +193,8 @@ def _measure(
         first = f"; the first: {tally.refused[0].error}" if tally.refused else ""
         what = f"none of its {len(tally.refused)} stones can be ingested{first}"
         raise SurveyError(what, where=str(path), remedy="correct the file")
-    if format in _TABLES and (question := tally.unit_question()) is not None:
-        what, _, remedy = question.partition(": ")
-        raise SurveyError(what, where=str(path), remedy=f"{remedy}, or --unit m if they are that large")
+    if format != "moma" and (question := next(tally.questions(), None)) is not None:
+        raise SurveyError(question.what, where=str(path), remedy=question.remedy)
     return tally
 
 
@@ -230,7 +228,7 @@ def _kept(stones: Iterator[StoneRecord], session: Session, solids: KnownSolids) 
         yield stone
 
 
-def _of_known_kind(block: SurveyedBlock, path: str, known: set[str], tables: bool) -> SurveyedBlock | Reject:
+def _of_known_kind(block: SurveyedBlock, path: str, known: set[str], worded: bool) -> SurveyedBlock | Reject:
     """Return the stone, or a reject if the hierarchy has no such kind; `known` collects kinds found there."""
     if block.kind in known:
         return block
@@ -240,7 +238,7 @@ def _of_known_kind(block: SurveyedBlock, path: str, known: set[str], tables: boo
         record = block.face.record
         where = f"{path}:{record.line}: stone {block.code}"
         remedy = error.remedy
-        if tables:
+        if worded:
             remedy = f'{remedy} Or say what it stands for, e.g. --kinds "{block.kind}=ashlar"'
         return Reject(block.code, SurveyError(error.what, where=where, remedy=remedy), record.spans)
     known.add(block.kind)

@@ -161,7 +161,7 @@ def cloud_options(
     )
     default = CloudOptions()
     return CloudOptions(
-        **_shared(base),
+        **_shared(base) | {"unit": 1.0},  # lengths of clouds are metres
         outlines=outlines,
         wall=None if wall is None else read_wall(wall),
         layer=layer,
@@ -201,9 +201,11 @@ def mask_options(
     if depth is not None and not 0.0 < depth < 10.0:
         raise UsageError(f"is {depth:g} m", where="--depth", remedy="give it in metres, e.g. 0.2")
     _check_lengths(("--outline-sigma", outline_sigma, *_SIGMAS))
+    if size is not None and base.unit is not None:
+        raise UsageError("--unit beside --size", remedy="leave --unit out: --size states metres")
     default = MaskOptions()
     return MaskOptions(
-        **_shared(base),
+        **_shared(base) | ({} if size is None else {"unit": 1.0}),
         size=None if size is None else size_of(size),
         depth=depth,
         wall=None if wall is None else read_wall(wall),
@@ -238,5 +240,5 @@ def size_of(text: str) -> tuple[float, float]:
 
 
 def _shared(base: ReadingOptions) -> dict[str, Any]:
-    """Return the options of all formats; lengths of outlines are metres, so that nobody is asked for a unit."""
-    return {one.name: getattr(base, one.name) for one in fields(ReadingOptions)} | {"unit": 1.0}
+    """Return the options of all formats."""
+    return {one.name: getattr(base, one.name) for one in fields(ReadingOptions)}

@@ -19,7 +19,7 @@ from survey.records.snapping import Snapping
 from survey.records.survey import Reject
 from survey.registration.stones import SurveyedStream
 
-__all__ = ["FileReport", "IngestReport", "Refusal", "SolidsReport", "Tally"]
+__all__ = ["FileReport", "IngestReport", "Question", "Refusal", "SolidsReport", "Tally"]
 
 
 _LEAST_DECIMALS = 3  # of rounded coordinates [m]; with fewer they are whole centimetres by design
@@ -32,6 +32,20 @@ class Refusal:
 
     code: str | None
     reason: str
+
+
+@dataclass(frozen=True)
+class Question:
+    """Doubt about a file as a whole.
+
+    Attributes
+    ----------
+    what : in words
+    remedy : the options of which one answers it
+    """
+
+    what: str
+    remedy: str
 
 
 @dataclass(frozen=True)
@@ -186,24 +200,20 @@ class Tally:
             remarks=self.changed,
             doubts=self.doubts,
             reading=self.stream.remarks,
-            questions=tuple(self._questions()),
+            questions=tuple(f"{one.what}: {one.remedy}" for one in self.questions()),
             review=self.stream.review,
         )
 
-    def unit_question(self) -> str | None:
-        """Ask for the unit if most stones are of an impossible size; None if they are not, or it was given."""
+    def questions(self) -> Iterator[Question]:
+        """Ask for the unit if most stones are of an impossible size, and for the axis if they lie on their side."""
         (unit, count), *_ = [*self.units.most_common(1), ("", 0)]
         total = self.stones.total()
-        if not unit or 2 * count <= total or self.options.unit is not None:
-            return None
-        return f"{count} of {total} stones have the size of stones in {unit}, not metres: give --unit {unit}"
-
-    def _questions(self) -> Iterator[str]:
-        """Ask for the unit, and for the axis if the stones lie on their side."""
-        if (question := self.unit_question()) is not None:
-            yield question
+        if unit and 2 * count > total and self.options.unit is None:
+            what = f"{count} of {total} stones have the size of stones in {unit}, not metres"
+            yield Question(what, f"give --unit {unit}, or --unit m if they are that large")
         if self.boxes and self.options.up is None and lies_on_its_side(np.array(self.boxes)):
-            yield "few stones stand on others along z, but some do along y: if y points upwards, give --up y"
+            what = "few stones stand on others along z, but some do along y"
+            yield Question(what, "give --up y if y points upwards, or --up z if they lie as they should")
 
 
 def _has_decimals(places: Array, count: int) -> bool:

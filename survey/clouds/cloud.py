@@ -72,6 +72,7 @@ def open_cloud(
         chosen=options.chosen,
         sigma=options.outline_sigma,
         smooth=options.smooth,
+        kinds=options.kinds,
     )
     if drawing.pixels:
         remedy = "put its world file beside the picture (.pgw, .tfw), as moma cloud writes it"

@@ -11,7 +11,8 @@ from survey.arrays import Array
 from survey.clouds.cloud import first_codes, viewed
 from survey.clouds.outlines.outline import Outline
 from survey.clouds.outlines.reading import Drawing, read_outlines
-from survey.clouds.review import flat_doubts
+from survey.clouds.placing import levelled, place_outlines
+from survey.clouds.review import drawn_doubts, flat_doubts
 from survey.clouds.settings import MaskOptions
 from survey.clouds.wall import Wall
 from survey.clouds.world import PixelPlace
@@ -22,6 +23,7 @@ from survey.records.survey import (
     BlockRecord,
     DepthRule,
     Reject,
+    SurveyHead,
     SurveyStream,
 )
 
@@ -32,6 +34,7 @@ _TWICE = 1.5  # standard deviations between two corners that are one
 _NEAREST = 0.001  # and metres
 _OVER = 0.005  # metres by which an outline may reach beyond the stated size before it is doubtful
 _UPRIGHT = Wall(np.zeros(3), np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]))
+_AGREE = 0.5  # cosine between the normals of outlines that one viewer sees
 _SOURCE = "stated for all outlines"
 
 
@@ -53,18 +56,24 @@ def open_masks(path: Path, options: MaskOptions) -> SurveyStream:
         if the picture cannot be read, or its scale is not known
     """
     drawing = read_outlines(
-        path, layer=options.layer, chosen=options.chosen, sigma=options.outline_sigma, smooth=options.smooth
+        path,
+        layer=options.layer,
+        chosen=options.chosen,
+        sigma=options.outline_sigma,
+        smooth=options.smooth,
+        unit=options.unit,
+        kinds=options.kinds,
     )
-    _check_flat(drawing)
+    drawing = replace(drawing, outlines=levelled(drawing.outlines))
+    if any(one.corners.shape[1] == 3 for one in drawing.outlines):
+        return _spatial(drawing, options)
     places, stretched = _places(drawing, options)
     outlines = drawing.outlines
     if places is not None:
         outlines = tuple(replace(one, corners=places.place(one.corners)) for one in outlines)
     pixel = places.pixel if places is not None else drawing.pixel
     wall = options.wall or _UPRIGHT
-    head = options.head_for(path)
-    if options.depth is not None:
-        head = replace(head, depth_rules=(*head.depth_rules, DepthRule(None, options.depth, None, _SOURCE)))
+    head = _with_depth(options, path)
     middle = wall.origin + np.mean([one.corners.mean(axis=0) for one in outlines], axis=0) @ wall.axes[:2]
     head = viewed(head, wall, middle)
     review = [
@@ -82,14 +91,42 @@ def open_masks(path: Path, options: MaskOptions) -> SurveyStream:
     )
 
 
-def _check_flat(drawing: Drawing) -> None:
-    """Refuse outlines in space, which have no depth to be given by a wall."""
-    for one in drawing.outlines:
-        if one.corners.shape[1] != 2:
-            remedy = (
-                "give the cloud that it was drawn over, with --cloud; or draw it in the plane of the wall"
-            )
-            raise SurveyError("the outline lies in space", where=one.where, remedy=remedy)
+def _spatial(drawing: Drawing, options: MaskOptions) -> SurveyStream:
+    """Make faces of outlines in space, e.g. of 3D polylines in the plane of a wall."""
+    for option, given in (("--size", options.size), ("--wall", options.wall)):
+        if given is not None:
+            what = f"{option} with outlines that lie in space"
+            raise UsageError(what, where=str(drawing.path), remedy=f"leave {option} out")
+    outlines = [
+        replace(one, corners=np.column_stack([one.corners, np.zeros(len(one.corners))]))
+        if one.corners.shape[1] == 2
+        else one
+        for one in drawing.outlines
+    ]
+    head = _with_depth(options, drawing.path)
+    placed = place_outlines(outlines, None, head.stations)
+    if not head.stations:
+        normal = np.mean([one.axes[2] for one in placed], axis=0)
+        against = next((one for one in placed if one.axes[2] @ normal < _AGREE), None)
+        if against is not None:
+            remedy = "draw all counter-clockwise as seen from outside, or give stations in a file: --header"
+            what = "the outline runs around another side than the others, and no station tells from where it is seen"
+            raise SurveyError(what, where=against.outline.where, remedy=remedy)
+        origin = np.mean([one.origin for one in placed], axis=0)
+        head = viewed(
+            head, Wall(origin, np.array([*placed[0].axes[:2], normal / np.linalg.norm(normal)])), origin
+        )
+    how = f"outline drawn to {options.outline_sigma * 1e3:.1f} mm"
+    stones = list(_stones(outlines, None, options.outline_sigma, how, None, options))
+    return SurveyStream(head, iter(stones), review=tuple(drawn_doubts(placed, drawing)))
+
+
+def _with_depth(options: MaskOptions, path: Path) -> SurveyHead:
+    """Return the head of a survey, with the depth that is stated for all stones."""
+    head = options.head_for(path)
+    if options.depth is None:
+        return head
+    return replace(head, depth_rules=(*head.depth_rules, DepthRule(None, options.depth, None, _SOURCE)))
 
 
 def _beyond(outlines: Sequence[Outline], frame: Array | None) -> list[Doubtful]:
@@ -120,7 +157,7 @@ def _places(drawing: Drawing, options: MaskOptions) -> tuple[PixelPlace | None, 
         return None, []
     if drawing.size is None:
         what = "the file does not say how large its picture is"
-        remedy = "give width and height of the image in the JSON"
+        remedy = "put the picture beside it, or give width and height of the image in the JSON"
         raise UsageError(what, where=str(drawing.path), remedy=remedy)
     (columns, rows), (width, height) = drawing.size, options.size
     across, up = width / columns, height / rows
@@ -132,8 +169,8 @@ def _places(drawing: Drawing, options: MaskOptions) -> tuple[PixelPlace | None, 
 
 
 def _stones(
-    outlines: tuple[Outline, ...],
-    wall: Wall,
+    outlines: Sequence[Outline],
+    wall: Wall | None,
     sigma: float,
     how: str,
     frame: Array | None,
@@ -159,7 +196,7 @@ def _stones(
             code=one.code,
             kind=said.kind or options.kind,
             course=said.course,
-            vertices=_in_space(corners, wall),
+            vertices=corners if wall is None else wall.origin + corners @ wall.axes[:2],
             points=np.empty((0, 3)),
             sigma=max(sigma, said.sigma or 0.0),
             depth=said.depth,
@@ -173,11 +210,6 @@ def _stones(
 
 
 def _distinct(corners: Array, nearest: float) -> Array:
-    """Return corners (n, 2) without those that are as good as the one before them: a worn corner has two."""
+    """Return corners (n, 2) or (n, 3) without those that are as good as the one before them: a worn corner has two."""
     kept = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1) >= nearest
     return corners[kept] if np.count_nonzero(kept) >= 3 else corners
-
-
-def _in_space(corners: Array, wall: Wall) -> Array:
-    out: Array = wall.origin + corners @ wall.axes[:2]
-    return out

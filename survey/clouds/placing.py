@@ -1,7 +1,7 @@
 """Outlines in space: the plane of each, and the line of sight along which points are looked for."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,7 +13,10 @@ from survey.geometry.polygons import ring_area
 from survey.geometry.solids import area_vector
 from survey.records.survey import Station
 
-__all__ = ["PlacedOutline", "facing_station", "place_outlines"]
+__all__ = ["PlacedOutline", "facing_station", "levelled", "place_outlines"]
+
+_LEVEL = 1e-6  # difference of heights of corners that have one elevation [m]
+_UPRIGHT = 0.5  # upward component of its normal below which a wall is upright
 
 
 @dataclass(frozen=True)
@@ -63,12 +66,24 @@ def place_outlines(
     SurveyError
         if an outline has no area
     """
+    if wall is not None and abs(float(wall.axes[2, 2])) < _UPRIGHT:
+        outlines = levelled(outlines)
     flat = next((one for one in outlines if one.corners.shape[1] == 2), None)
     if flat is not None and wall is None:
         remedy = 'give the frame of the wall: --wall FILE.toml, or two points on its foot: --wall "X,Y X,Y"'
         raise UsageError("the outlines lie in a plane, without heights", where=flat.where, remedy=remedy)
     return tuple(
         _on_wall(one, wall) if wall is not None and one.corners.shape[1] == 2 else _in_space(one, stations)
+        for one in outlines
+    )
+
+
+def levelled(outlines: Sequence[Outline]) -> tuple[Outline, ...]:
+    """Return outlines of which those at one elevation, as 2D polylines have it, lie in the plane of the drawing."""
+    return tuple(
+        replace(one, corners=one.corners[:, :2])
+        if one.corners.shape[1] == 3 and np.ptp(one.corners[:, 2]) <= _LEVEL
+        else one
         for one in outlines
     )
 

@@ -71,6 +71,8 @@ def _shape_doubts(
         area = "" if drawing.pixel is None else f", {1e4 * drawing.smallest * drawing.pixel**2:.2g} cm²"
         text = f"{drawing.specks} pieces are too small for a stone (under {drawing.smallest} pixels{area}) and left out"
         yield Doubtful("", "specks", text, str(drawing.path))
+    for reason, text in drawing.left:
+        yield Doubtful("", reason, text, str(drawing.path))
     areas = np.array([abs(ring_area(ring)) for ring in rings])
     logs = np.log(np.maximum(areas, 1e-12))
     middle = float(np.median(logs))

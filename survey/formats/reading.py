@@ -67,12 +67,14 @@ _LISTS = (
     "give --format pnezd (northing first), penzd (easting first), or csv for a table with names of columns"
 )
 _DRAWN = "export closed solids as OBJ or STL, or outlines with z as GeoJSON"
+_CLOUD = "give it with --cloud, and outlines of stones with --outlines"
+_OUTLINED = "give outlines in the plane of a wall with --outlines and --depth, or with --cloud"
 WAYS_OUT: Mapping[str, str] = {
     **dict.fromkeys((".txt", ".asc", ".dat", ".pnt", ".pts", ".xyz", ".tab", ".prn", ".coo"), _LISTS),
-    **dict.fromkeys((".dxf", ".dwg", ".dgn", ".3dm", ".skp", ".blend", ".ifc", ".step", ".stp", ".igs"), _DRAWN),
+    **dict.fromkeys((".dwg", ".dgn", ".3dm", ".skp", ".blend", ".ifc", ".step", ".stp", ".igs"), _DRAWN),
     **dict.fromkeys((".fbx", ".glb", ".gltf", ".dae", ".3ds", ".off", ".wrl", ".vtk", ".vtu"), _DRAWN),
-    **dict.fromkeys((".gpkg", ".shp", ".kml", ".gml", ".fgb"), "export the layer as GeoJSON with z, in metres"),
-    **dict.fromkeys((".las", ".laz", ".e57", ".ptx"), "give it with --cloud, and outlines of stones with --outlines"),
+    **dict.fromkeys((".dxf", ".gpkg", ".shp", ".kml", ".gml", ".fgb"), _OUTLINED),
+    **dict.fromkeys((".las", ".laz", ".e57", ".ptx", ".pcd"), _CLOUD),
     **dict.fromkeys((".raw", ".fld", ".idx", ".job", ".sdr", ".are", ".cor", ".m5", ".rw5"),
                     "export the coordinates with their codes as a point list (CSV), GSI, LandXML or JobXML"),
     **dict.fromkeys((".pdf", ".docx", ".doc", ".numbers"), "export the table itself as CSV or XLSX"),

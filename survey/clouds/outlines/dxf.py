@@ -1,115 +1,160 @@
-"""Outlines in DXF drawings: closed polylines, whose codes are texts inside them or their layers; read with ezdxf."""
+"""Outlines in DXF drawings: closed curves, whose codes are texts or labels inside them, or their layers."""
 
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from moma.errors import SurveyError
 from survey.arrays import Array
 from survey.clouds.extras import optional
-from survey.clouds.outlines.outline import Attributes, Outline, made_code
+from survey.clouds.outlines.dxf_entities import Curve, DrawnText, Entities, entities_of
+from survey.clouds.outlines.outline import Outline, attributes_of, made_code
 from survey.geometry.polygons import inside
 from survey.geometry.solids import area_vector
 
 __all__ = ["read_dxf"]
 
-_CLOSE = 0.002  # distance of the ends of a polyline that counts as closed, of its longest side
-_SAGITTA = 0.001  # by which arcs may differ from their chords [drawing units]
-_UNITS = {1: 0.0254, 2: 0.3048, 4: 0.001, 5: 0.01, 6: 1.0, 14: 0.1}  # $INSUNITS: length of a unit [m]
+_FOOT, _SURVEY_FOOT = 0.3048, 1200.0 / 3937.0  # [m]
+_UNITS = {
+    1: _FOOT / 12.0, 2: _FOOT, 4: 0.001, 5: 0.01, 6: 1.0, 7: 1000.0, 9: _FOOT / 12e3, 10: 3.0 * _FOOT,
+    14: 0.1, 15: 10.0, 16: 100.0, 21: _SURVEY_FOOT, 22: _SURVEY_FOOT / 12.0, 23: 3.0 * _SURVEY_FOOT,
+}  # fmt: skip
+"""$INSUNITS: length of a unit [m]."""
+_FRAMED = 3  # texts of other outlines within an outline that is no stone
 
 
-def read_dxf(path: Path, layer: str | None, chosen: Mapping[str, str]) -> tuple[Outline, ...]:
-    """Read the closed polylines of a drawing.
+def read_dxf(
+    path: Path, layer: str | None, chosen: Mapping[str, str], unit: float | None = None
+) -> tuple[tuple[Outline, ...], tuple[tuple[str, str], ...]]:
+    """Read the closed curves of a drawing: polylines, splines, circles, ellipses and hatches, also in blocks.
 
-    The code of a stone is the text that lies inside its outline; without texts, the layer where every stone has one of
-    its own; otherwise its number. Lengths are in the drawing's unit, if it states one, else in metres.
+    The code of a stone is the text or label that lies inside its outline; without texts, the layer where every stone
+    has one of its own; otherwise its number. Lengths are in the drawing's unit, if it states one, else in metres.
 
     Parameters
     ----------
     path : the file
-    layer : on which outlines lie; None: all
-    chosen : {"code": "layer"} or {"code": "text"}, to choose one
+    layer : on which outlines lie; None: all that are shown
+    chosen : {"code": "layer"} or {"code": "text"}, to choose one, or the tag of an attribute by meaning
+    unit : length of the drawing's unit [m]; None: as it states
+
+    Returns
+    -------
+    outlines, and what was left out: (reason, text)
 
     Raises
     ------
     UsageError
         if ezdxf is not installed
     SurveyError
-        if it is not a drawing, or has no closed polyline
+        if it is not a drawing, has no closed curve, or states a unit that is not known
     """
     ezdxf = optional("ezdxf", "DXF files")
     try:
         drawing = ezdxf.readfile(path)
+        found = entities_of(drawing, layer)
     except Exception as error:  # ezdxf raises OSError or its own classes
         what = f"cannot be read as DXF: {' '.join(str(error).split())[:120]}"
         raise SurveyError(what, where=str(path), remedy="save it as DXF R2000 or later") from error
-    unit = _UNITS.get(int(drawing.header.get("$INSUNITS", 0)), 1.0)
-    rings, texts, open_lines = [], [], 0
-    for entity in drawing.modelspace():
-        kind = entity.dxftype()
-        if kind in ("TEXT", "MTEXT"):
-            place = entity.dxf.insert
-            text = entity.plain_text() if kind == "MTEXT" else entity.dxf.text
-            texts.append((np.array([place.x, place.y, place.z]) * unit, " ".join(text.split())))
-        if kind in ("LWPOLYLINE", "POLYLINE") and layer in (None, entity.dxf.layer):
-            corners = _corners(entity) * unit
-            if _is_closed(entity, corners):
-                rings.append((corners, entity.dxf.layer, entity.dxf.handle))
-            else:
-                open_lines += 1
-    if not rings:
-        what = f"no closed polyline{'' if layer is None else f' on layer {layer}'}, {open_lines} open ones"
-        raise SurveyError(what, where=str(path), remedy="draw each stone as a closed polyline")
-    rings = [(_flat(ring), layer_, handle) for ring, layer_, handle in rings]
-    return tuple(_coded(rings, texts, chosen.get("code"), path))
+    code = int(drawing.header.get("$INSUNITS", 0))
+    if unit is None and code and code not in _UNITS:
+        raise SurveyError(
+            f"its unit has the number {code} ($INSUNITS), which is none of masonry",
+            where=str(path),
+            remedy="state the unit of its lengths, e.g. --unit m",
+        )
+    scale = unit or _UNITS.get(code, 1.0)
+    if not found.curves:
+        raise _empty(path, layer, found)
+    curves = [replace(one, ring=_flat(one.ring * scale)) for one in found.curves]
+    texts = [replace(one, places=tuple(scale * place for place in one.places)) for one in found.texts]
+    return tuple(_coded(curves, texts, chosen, path)), tuple(_left_out(found))
 
 
-def _corners(entity: Any) -> Array:
-    """Return the corners (n, 3) of a polyline, arcs by chords."""
-    if entity.dxftype() == "POLYLINE" and entity.is_3d_polyline:
-        return np.array([tuple(one.dxf.location) for one in entity.vertices], dtype=np.float64)
-    if entity.has_arc:
-        from ezdxf.path import make_path
-
-        return np.array([tuple(one) for one in make_path(entity).flattening(_SAGITTA)], dtype=np.float64)
-    if entity.dxftype() == "LWPOLYLINE":
-        return np.array([tuple(one) for one in entity.vertices_in_wcs()], dtype=np.float64)
-    return np.array([tuple(one) for one in entity.points_in_wcs()], dtype=np.float64)
+def _empty(path: Path, layer: str | None, found: Entities) -> SurveyError:
+    what = f"no closed curve{'' if layer is None else f' on layer {layer}'}"
+    if found.left:
+        what += f", but {_listed(found.left)}"
+    remedy = "draw each stone as a closed polyline"
+    if found.hidden:
+        what += f"; {_listed(found.hidden)} on layers that are frozen or off"
+        remedy = f"show the layer, or name it, e.g. --layer {next(iter(found.hidden))}"
+    return SurveyError(what, where=str(path), remedy=remedy)
 
 
-def _is_closed(entity: Any, corners: Array) -> bool:
-    if len(corners) < 3:
-        return False
-    closed = entity.closed if entity.dxftype() == "LWPOLYLINE" else entity.is_closed
-    return bool(closed) or float(np.linalg.norm(corners[0] - corners[-1])) <= _CLOSE * float(
-        np.ptp(corners, axis=0).max()
-    )
+def _left_out(found: Entities) -> Iterator[tuple[str, str]]:
+    if found.left:
+        yield "left out", f"{_listed(found.left)}: neither closed curves nor texts"
+    if found.hidden:
+        yield "hidden", f"outlines on layers that are frozen or off are left out: {_listed(found.hidden)}"
+
+
+def _listed(counts: Counter[str]) -> str:
+    return ", ".join(f"{count} {name}" for name, count in sorted(counts.items()))
 
 
 def _flat(ring: Array) -> Array:
-    """Drop a last corner that repeats the first, and heights that are all zero."""
-    if len(ring) > 3 and np.linalg.norm(ring[0] - ring[-1]) <= _CLOSE * np.ptp(ring, axis=0).max():
-        ring = ring[:-1]
+    """Drop heights that are all zero."""
     return ring[:, :2] if not ring[:, 2].any() else ring
 
 
 def _coded(
-    rings: list[tuple[Array, str, str]], texts: list[tuple[Array, str]], chosen: str | None, path: Path
+    curves: Sequence[Curve], texts: Sequence[DrawnText], chosen: Mapping[str, str], path: Path
 ) -> Iterator[Outline]:
-    layers = [layer for _, layer, _ in rings]
-    by_layer = chosen == "layer" or (chosen is None and not texts and len(set(layers)) == len(layers) > 1)
-    for number, (ring, layer, handle) in enumerate(rings, start=1):
-        within = [text for place, text in texts if _is_inside(place, ring)]
-        said, doubts = Attributes(notes={"layer": layer} if layer != "0" else {}), []
-        name = layer if by_layer else within[0] if within else f"S{number}"
-        if not by_layer and len(within) > 1:
-            doubts.append(("texts", f"{len(within)} texts inside: {', '.join(within[:4])}"))
-        where = f"{path}, polyline {handle} on layer {layer}"
-        code = made_code(name) or f"S{number}"
-        yield Outline(number, code, ring, replace(said, code=code), where, tuple(doubts))
+    layers = [one.layer for one in curves]
+    wanted = chosen.get("code")
+    by_layer = wanted == "layer" or (wanted is None and not texts and len(set(layers)) == len(layers) > 1)
+    tags = {meaning: name for meaning, name in chosen.items() if name not in ("layer", "text")}
+    areas = [float(np.linalg.norm(area_vector(_in_space(one.ring)))) for one in curves]
+    smallest = sorted(range(len(curves)), key=lambda k: areas[k])
+    own: dict[int, list[DrawnText]] = {}
+    around: Counter[int] = Counter()
+    for text in texts:
+        holders = next((h for place in text.places if (h := _holders(place, curves, smallest))), [])
+        if holders:
+            own.setdefault(holders[0], []).append(text)
+            around.update(holders[1:])
+    for k, curve in enumerate(curves):
+        where = f"{path}, {curve.where}"
+        if around[k] >= _FRAMED:
+            _refuse_frame(curve, around[k], [curves[i].layer for i in own if i != k], where)
+        yield _outline(k + 1, curve, own.get(k, []), by_layer, tags, where)
+
+
+def _refuse_frame(curve: Curve, count: int, layers: Sequence[str], where: str) -> None:
+    usual = Counter(layers).most_common(1)[0][0]
+    remedy = (
+        f"leave it out with --layer {usual}"
+        if usual != curve.layer
+        else "put it on another layer, and name that of the stones with --layer"
+    )
+    raise SurveyError(f"the outline holds {count} texts of other outlines", where=where, remedy=remedy)
+
+
+def _outline(
+    number: int, curve: Curve, texts: Sequence[DrawnText], by_layer: bool, tags: Mapping[str, str], where: str
+) -> Outline:
+    values = {tag: text for one in texts for tag, text in one.values.items()}
+    said = attributes_of(values, {m: name for m, name in tags.items() if name in values}, where)
+    names = [one.text or said.code or next(iter(one.values.values()), "") for one in texts]
+    name = curve.layer if by_layer else names[0] if names else f"S{number}"
+    doubts = []
+    if not by_layer and len(names) > 1:
+        doubts.append(("texts", f"{len(names)} texts inside: {', '.join(names[:4])}"))
+    code = made_code(name) or f"S{number}"
+    notes = dict(said.notes) | ({"layer": curve.layer} if curve.layer != "0" else {})
+    return Outline(number, code, curve.ring, replace(said, code=code, notes=notes), where, tuple(doubts))
+
+
+def _holders(place: Array, curves: Sequence[Curve], smallest: Sequence[int]) -> list[int]:
+    return [k for k in smallest if _is_inside(place, curves[k].ring)]
+
+
+def _in_space(ring: Array) -> Array:
+    return ring if ring.shape[1] == 3 else np.column_stack([ring, np.zeros(len(ring))])
 
 
 def _is_inside(place: Array, ring: Array) -> bool:

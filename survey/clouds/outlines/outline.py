@@ -10,7 +10,6 @@ import numpy as np
 
 from moma.errors import SurveyError, UsageError
 from survey.arrays import Array
-from survey.formats.fields import KIND
 
 __all__ = ["FIELDS", "Attributes", "Outline", "attributes_of", "distinct", "field_map", "made_code"]
 
@@ -45,7 +44,8 @@ class Attributes:
     Attributes
     ----------
     code : as written; None if there is none
-    kind, course, zone : of the stone; None if not stated
+    kind : as written, until `read_outlines` knows it; None if not stated
+    course, zone : of the stone; None if not stated
     depth, depth_sigma : measured on the stone [m]; None if not stated
     sigma : standard deviation of a coordinate of the outline [m]; None if not stated
     score : confidence of the program that drew it, from 0 to 1; None if not stated
@@ -132,7 +132,7 @@ def attributes_of(values: Mapping[str, Any], chosen: Mapping[str, str], where: s
     depth = _number(found, "depth", where)
     return Attributes(
         code=found.get("code"),
-        kind=_kind(found.get("kind"), where),
+        kind=found.get("kind"),
         course=_course(found.get("course"), where),
         zone=found.get("zone"),
         depth=None if depth is None else _positive(depth, "depth", where),
@@ -220,16 +220,6 @@ def _course(text: str | None, where: str) -> int | None:
         remedy = "count courses from the ground: 1, 2, …; or name another attribute with --fields"
         raise SurveyError(f"course {text!r} is not a whole number", where=where, remedy=remedy)
     return int(value)
-
-
-def _kind(text: str | None, where: str) -> str | None:
-    if text is None:
-        return None
-    kind = re.sub(r"\s+", "_", text.lower())
-    if KIND.fullmatch(kind) is None:
-        remedy = "kinds are words like ashlar, see moma schema; or name another attribute with --fields"
-        raise SurveyError(f"kind is {text!r}", where=where, remedy=remedy)
-    return kind
 
 
 def distinct(outlines: Sequence[Outline]) -> Iterator[tuple[Outline, Outline | None]]:

@@ -80,13 +80,14 @@ def _entries(path: Path, content: list[Any], chosen: Mapping[str, str]) -> Itera
         yield Outline(number, _code(said.code, number), _open(ring), said, where)
 
 
-def read_table(path: Path, chosen: Mapping[str, str]) -> tuple[Outline, ...]:
+def read_table(path: Path, chosen: Mapping[str, str], unit: float | None = None) -> tuple[Outline, ...]:
     """Read a table with a row for each corner.
 
     Parameters
     ----------
     path : text or a workbook, with names of columns, which may state a unit of length
     chosen : names of columns that the user has given, by meaning
+    unit : length of the unit of corners, where columns state none [m]; None: metres
 
     Raises
     ------
@@ -104,11 +105,12 @@ def read_table(path: Path, chosen: Mapping[str, str]) -> tuple[Outline, ...]:
         names = ", ".join(header.cells or table.rows[0].cells)
         raise SurveyError(f"columns {names}", where=table.where(header.line), remedy=_CSV)
     scales = [length_scale(one, table.where(header.line)) or 1.0 for one in header.cells]
+    sides = [length_scale(one, table.where(header.line)) or unit or 1.0 for one in header.cells]
     corners: dict[str, list[list[float]]] = {}
     first: dict[str, tuple[int, dict[str, Any]]] = {}
     for row in table.rows:
         cells = [*row.cells, *[""] * (len(titles) - len(row.cells))]
-        place = [scales[k] * table.number(cells[k], titles[k], row.line) for k in (across, upward)]
+        place = [sides[k] * table.number(cells[k], titles[k], row.line) for k in (across, upward)]
         name = table.name(row, code, "the stone of a corner")
         corners.setdefault(name, []).append(place)
         others: dict[str, Any] = {}

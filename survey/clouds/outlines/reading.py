@@ -8,6 +8,7 @@ import numpy as np
 
 from moma.errors import SurveyError, UsageError
 from survey.arrays import Array
+from survey.clouds.outlines.annotations import is_annotated, read_annotations
 from survey.clouds.outlines.coco import is_coco, load_json, read_coco
 from survey.clouds.outlines.dxf import read_dxf
 from survey.clouds.outlines.labels import outlines_of, read_labels
@@ -16,6 +17,8 @@ from survey.clouds.outlines.plain import is_plain, read_plain_json, read_table
 from survey.clouds.outlines.tracing import few_corners
 from survey.clouds.outlines.vector import read_vector
 from survey.clouds.world import PixelPlace
+from survey.formats.fields import KIND
+from survey.formats.tables.kinds import kind_of
 
 __all__ = ["PICTURES", "Drawing", "read_outlines"]
 
@@ -41,6 +44,7 @@ class Drawing:
     size : columns and rows of the picture; None without one
     specks : pieces of a picture that were too small for a stone
     smallest : pieces of fewer pixels are specks
+    left : what the file has besides, and was not read: (reason, text)
     """
 
     path: Path
@@ -50,6 +54,7 @@ class Drawing:
     size: tuple[int, int] | None = None
     specks: int = 0
     smallest: int = 0
+    left: tuple[tuple[str, str], ...] = ()
 
 
 def read_outlines(
@@ -59,16 +64,21 @@ def read_outlines(
     chosen: Mapping[str, str] | None = None,
     sigma: float = 0.005,
     smooth: float = 1.5,
+    unit: float | None = None,
+    kinds: Mapping[str, str] | None = None,
 ) -> Drawing:
     """Read outlines of stones.
 
     Parameters
     ----------
-    path : GeoPackage, GeoJSON, Shapefile, DXF, a picture of labels, COCO's JSON, plain JSON or CSV
-    layer : of a file with several; of a picture of classes, the number or colour of the stones
+    path : GeoPackage, GeoJSON, Shapefile, DXF, a picture of labels, JSON of COCO, labelme or VIA, plain JSON or CSV
+    layer : of a file with several; of a picture of classes, the number or colour of the stones; of annotations with
+        several labels, that of the stones
     chosen : names of attributes that the user has given, by meaning
     sigma : standard deviation of a drawn corner [m], to which curves are described by straight sides
     smooth : largest distance of the boundary of a mask from the sides of its outline [px]
+    unit : length of the unit of coordinates [m]; None: as the file states, else metres
+    kinds : kinds of stones by their abbreviation in lower case
 
     Raises
     ------
@@ -79,20 +89,23 @@ def read_outlines(
     """
     if not path.is_file():
         raise UsageError("no such file", where=str(path), remedy="name a file of outlines with --outlines")
-    drawing = _read(path, layer, chosen or {}, smooth)
+    drawing = _read(path, layer, chosen or {}, smooth, unit)
     if not drawing.outlines:
         raise SurveyError("has no outlines", where=str(path), remedy="draw each stone as a polygon")
     if drawing.pixel is None and not drawing.pixels:
         drawing = replace(drawing, outlines=tuple(_sparse(one, _LIKELY * sigma) for one in drawing.outlines))
     for one in drawing.outlines:
         _check(one)
-    return drawing
+    return replace(drawing, outlines=tuple(_of_kind(one, kinds or {}) for one in drawing.outlines))
 
 
-def _read(path: Path, layer: str | None, chosen: Mapping[str, str], smooth: float) -> Drawing:
+def _read(
+    path: Path, layer: str | None, chosen: Mapping[str, str], smooth: float, unit: float | None
+) -> Drawing:
     ending = path.suffix.lower()
     if ending == ".dxf":
-        return Drawing(path, read_dxf(path, layer, chosen))
+        outlines, left = read_dxf(path, layer, chosen, unit)
+        return Drawing(path, outlines, left=left)
     if ending in PICTURES:
         labels = read_labels(path, layer)
         size = labels.numbers.shape[1], labels.numbers.shape[0]
@@ -100,18 +113,40 @@ def _read(path: Path, layer: str | None, chosen: Mapping[str, str], smooth: floa
         return replace(placed, specks=labels.specks, smallest=labels.smallest)
     if ending == ".json" and is_coco(content := load_json(path)):
         return _placed(path, *read_coco(path, content, smooth, chosen))
+    if ending == ".json" and is_annotated(content):
+        return _placed(path, *read_annotations(path, content, smooth, chosen, layer))
     if ending == ".json" and is_plain(content):
-        return Drawing(path, read_plain_json(path, content, chosen))
+        return _scaled(Drawing(path, read_plain_json(path, content, chosen)), unit)
     if ending == ".csv":
-        return Drawing(path, read_table(path, chosen))
+        return Drawing(path, read_table(path, chosen, unit))
     if ending in _VECTORS:
-        return Drawing(path, read_vector(path, layer, chosen))
+        return _scaled(Drawing(path, read_vector(path, layer, chosen)), unit)
     known = ", ".join((*_VECTORS, ".dxf", ".csv", *PICTURES))
     raise UsageError(
         f"unknown ending {ending!r}",
         where=str(path),
-        remedy=f"outlines are read from {known} and COCO's .json",
+        remedy=f"outlines are read from {known} and the .json of COCO, labelme and VIA",
     )
+
+
+def _scaled(drawing: Drawing, unit: float | None) -> Drawing:
+    """Return outlines in metres."""
+    if unit is None or unit == 1.0:
+        return drawing
+    return replace(
+        drawing, outlines=tuple(replace(one, corners=unit * one.corners) for one in drawing.outlines)
+    )
+
+
+def _of_kind(outline: Outline, kinds: Mapping[str, str]) -> Outline:
+    """Return an outline whose kind is that of the word or abbreviation in the file."""
+    if (text := outline.said.kind) is None:
+        return outline
+    kind = kind_of(text, kinds)
+    if KIND.fullmatch(kind) is None:
+        remedy = "kinds are words like ashlar, see moma schema; or name another attribute with --fields"
+        raise SurveyError(f"kind is {text!r}", where=outline.where, remedy=remedy)
+    return replace(outline, said=replace(outline.said, kind=kind))
 
 
 def _placed(

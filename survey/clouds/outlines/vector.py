@@ -13,6 +13,7 @@ from survey.clouds.outlines.outline import Attributes, Outline, attributes_of, m
 
 __all__ = ["read_vector"]
 
+_DEGREES = 1e-3  # extent of the largest outline below which coordinates are degrees: no stone is 1 mm wide
 _SMALL = 0.02  # share of the area of the largest part up to which other parts are specks [-]
 
 
@@ -30,7 +31,7 @@ def read_vector(path: Path, layer: str | None, chosen: Mapping[str, str]) -> tup
     UsageError
         if pyogrio or shapely is not installed, or there are several layers
     SurveyError
-        if the file cannot be read, or a feature is no polygon
+        if the file cannot be read, holds longitudes and latitudes, or a feature is no polygon
     """
     pyogrio = optional("pyogrio", f"{path.suffix} files")
     shapely = optional("shapely", f"{path.suffix} files")
@@ -51,6 +52,7 @@ def read_vector(path: Path, layer: str | None, chosen: Mapping[str, str]) -> tup
         raise SurveyError(what, where=str(path), remedy="export it again, e.g. as GeoPackage") from error
     names = [str(name) for name in meta["fields"]]
     shapes = shapely.from_wkb(geometries, on_invalid="ignore")
+    _check_degrees(path, shapely.bounds(shapes))
     out = []
     for k, shape in enumerate(shapes):
         where = f"{path}, feature {int(fids[k])}"
@@ -59,6 +61,20 @@ def read_vector(path: Path, layer: str | None, chosen: Mapping[str, str]) -> tup
         )
         out.append(_outline(k + 1, int(fids[k]), shape, said, where))
     return tuple(out)
+
+
+def _check_degrees(path: Path, bounds: Array) -> None:
+    """Refuse longitudes and latitudes, in which all outlines are specks far from zero."""
+    found = bounds[np.isfinite(bounds).all(axis=1)]
+    if not len(found) or np.abs(found[:, [0, 2]]).max() > 180.0 or np.abs(found[:, [1, 3]]).max() > 90.0:
+        return
+    extent = float((found[:, 2:] - found[:, :2]).max())
+    if extent < _DEGREES and np.abs(found).max() > 1.0:
+        raise SurveyError(
+            f"its coordinates are longitudes and latitudes: the largest outline is {extent:.1g} wide",
+            where=str(path),
+            remedy="export it in a projected system in metres (in QGIS: Export, Save Features As, CRS)",
+        )
 
 
 def _outline(number: int, fid: int, shape: Any, said: Attributes, where: str) -> Outline:

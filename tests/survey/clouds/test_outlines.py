@@ -152,7 +152,7 @@ def test_dxf_without_closed_lines_is_told(tmp_path):
     made = ezdxf.new()
     made.modelspace().add_lwpolyline([(0, 0), (1, 0), (1, 1)])
     made.saveas(tmp_path / "a.dxf")
-    with pytest.raises(SurveyError, match="no closed polyline, 1 open ones"):
+    with pytest.raises(SurveyError, match="no closed curve, but 1 open LWPOLYLINE"):
         read_outlines(tmp_path / "a.dxf")
 
 

@@ -1,0 +1,211 @@
+"""Outlines that people draw on a picture with labelme or with the VGG Image Annotator (VIA), in their JSON.
+
+Both count pixels from the upper left corner of the picture, x to the right and y downwards. Labels that differ are the
+codes of stones; labels that repeat are classes.
+"""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from moma.errors import SurveyError, UsageError
+from survey.arrays import Array
+from survey.clouds.outlines.outline import Attributes, Outline, attributes_of, made_code
+from survey.clouds.outlines.tracing import few_corners
+from survey.clouds.world import PixelPlace, world_of
+from survey.formats.tables.kinds import KINDS, kind_of
+
+__all__ = ["is_annotated", "read_annotations"]
+
+_ARC = 32  # corners of a circle or an ellipse, which are then described by fewer
+_DENSE = 12  # corners beyond which an outline was drawn as a curve
+_REMEDY = "draw each stone as a polygon, or export COCO"
+
+
+@dataclass(frozen=True)
+class _Shape:
+    ring: Array  # (n, 2) [px] from the corner of the picture
+    values: Mapping[str, Any]
+    where: str
+
+
+def is_annotated(content: object) -> bool:
+    """Return whether JSON is of labelme or of VIA."""
+    return _is_labelme(content) or _via_images(content) is not None
+
+
+def _is_labelme(content: object) -> bool:
+    return isinstance(content, Mapping) and isinstance(content.get("shapes"), list)
+
+
+def _via_images(content: object) -> list[Mapping[str, Any]] | None:
+    """Return the pictures of VIA's annotations, or of its project; None if it is neither."""
+    if not isinstance(content, Mapping):
+        return None
+    images = content.get("_via_img_metadata", content)
+    found = list(images.values()) if isinstance(images, Mapping) else []
+    fits = bool(found) and all(
+        isinstance(one, Mapping) and {"filename", "regions"} <= set(one) for one in found
+    )
+    return found if fits else None
+
+
+def read_annotations(
+    path: Path, content: Any, tolerance: float, chosen: Mapping[str, str], label: str | None = None
+) -> tuple[tuple[Outline, ...], PixelPlace | None, tuple[int, int] | None]:
+    """Read the outlines of one picture.
+
+    Parameters
+    ----------
+    path : the file
+    content : its JSON, for which `is_annotated` holds
+    tolerance : largest distance of a curve from the sides of its outline [px]
+    chosen : names of attributes that the user has given, by meaning
+    label : of the stones, where there are several classes; None: all
+
+    Returns
+    -------
+    outlines in pixels, the place of the picture's pixels if a world file lies beside the JSON, and its width and
+    height if the file or the picture beside it says
+
+    Raises
+    ------
+    UsageError
+        if there are several pictures, or several classes of which none is chosen
+    SurveyError
+        naming the shape that is wrong
+    """
+    size: tuple[int, int] | None = None
+    if _is_labelme(content):
+        name = Path(str(content.get("imagePath") or path.name).replace("\\", "/")).name
+        if content.get("imageWidth") and content.get("imageHeight"):
+            size = int(content["imageWidth"]), int(content["imageHeight"])
+        shapes = list(_of_labelme(path, content["shapes"]))
+    else:
+        images = [one for one in _via_images(content) or () if one["regions"]]
+        if len(images) > 1:
+            names = ", ".join(str(one["filename"]) for one in images[:5])
+            raise UsageError(
+                f"outlines on {len(images)} pictures: {names}",
+                where=str(path),
+                remedy="give a file for each picture",
+            )
+        name = Path(str(images[0]["filename"]).replace("\\", "/")).name if images else path.name
+        shapes = list(_of_via(path, images[0]["regions"] if images else ()))
+    outlines = tuple(_outlines(path, shapes, tolerance, chosen, label))
+    places = world_of(path.with_name(name)) or world_of(path)
+    return outlines, places, size or _size_of(path.with_name(name))
+
+
+def _size_of(picture: Path) -> tuple[int, int] | None:
+    """Return the width and height of a picture; None if there is none."""
+    from PIL import Image
+
+    try:
+        with Image.open(picture) as found:
+            return int(found.size[0]), int(found.size[1])
+    except OSError:
+        return None
+
+
+def _outlines(
+    path: Path, shapes: list[_Shape], tolerance: float, chosen: Mapping[str, str], label: str | None
+) -> Iterator[Outline]:
+    found = [(one, attributes_of(one.values, chosen, one.where)) for one in shapes]
+    counts = Counter(said.code for _, said in found)
+    classes = max(counts.values(), default=0) > 1
+    if classes:
+        found = _of_class(path, found, counts, label)
+    for number, (one, said) in enumerate(found, start=1):
+        code = f"S{number:03d}" if classes else made_code(said.code or "") or f"S{number:03d}"
+        if classes:
+            kind = said.kind or (said.code if said.code and kind_of(said.code, {}) in KINDS else None)
+            notes = dict(said.notes) | ({"label": said.code} if said.code else {})
+            said = replace(said, code=code, kind=kind, notes=notes)
+        # both count from the corner of the first pixel, not from its middle
+        ring = one.ring - 0.5
+        corners = few_corners(ring, tolerance) if len(ring) > _DENSE else ring
+        yield Outline(number, f"S{int(code):03d}" if code.isdigit() else code, corners, said, one.where)
+
+
+def _of_class(
+    path: Path, found: list[tuple[_Shape, Attributes]], counts: Counter[str | None], label: str | None
+) -> list[tuple[_Shape, Attributes]]:
+    """Return the shapes of the class of stones."""
+    names = {str(one): count for one, count in counts.items()}
+    listed = ", ".join(f"{name} ({count})" for name, count in names.items())
+    if label is not None and label not in names:
+        raise UsageError(f"no label {label!r}", where=str(path), remedy=f"labels are: {listed}")
+    if label is not None:
+        return [one for one in found if str(one[1].code) == label]
+    if len(names) > 1 and not all(kind_of(one, {}) in KINDS for one in names):
+        remedy = f"name that of the stones, e.g. --layer {max(names, key=names.__getitem__)}"
+        raise UsageError(f"{len(names)} labels: {listed}", where=str(path), remedy=remedy)
+    return found
+
+
+def _of_labelme(path: Path, shapes: list[Any]) -> Iterator[_Shape]:
+    for number, one in enumerate(shapes, start=1):
+        where = f"{path}, shape {number}"
+        try:
+            kind, points = str(one.get("shape_type", "polygon")), np.array(one["points"], dtype=np.float64)
+            label = str(one.get("label") or "")
+        except (AttributeError, KeyError, TypeError, ValueError) as error:
+            raise SurveyError("a shape without points", where=where, remedy=_REMEDY) from error
+        flags = {name: str(value) for name, value in (one.get("flags") or {}).items()}
+        values = flags | ({"label": label} if label else {})
+        if kind == "rectangle" and points.shape == (2, 2):
+            yield _Shape(_box(*points[0], *points[1]), values, where)
+        elif kind == "circle" and points.shape == (2, 2):
+            radius = float(np.linalg.norm(points[1] - points[0]))
+            yield _Shape(_ellipse(*points[0], radius, radius), values, where)
+        elif kind == "polygon" and points.ndim == 2 and points.shape[1:] == (2,) and len(points) >= 3:
+            yield _Shape(points, values, where)
+        else:
+            raise SurveyError(f"a shape of type {kind!r} is no outline", where=where, remedy=_REMEDY)
+
+
+def _of_via(path: Path, regions: Any) -> Iterator[_Shape]:
+    listed = list(regions.values()) if isinstance(regions, Mapping) else list(regions)
+    for number, one in enumerate(listed, start=1):
+        where = f"{path}, region {number}"
+        try:
+            shape, said = one["shape_attributes"], one.get("region_attributes") or {}
+            yield _Shape(
+                _via_ring(shape), {k: v for k, v in said.items() if isinstance(v, str | int | float)}, where
+            )
+        except (AttributeError, KeyError, TypeError, ValueError) as error:
+            raise SurveyError("a region that is no outline", where=where, remedy=_REMEDY) from error
+
+
+def _via_ring(shape: Mapping[str, Any]) -> Array:
+    kind = shape["name"]
+    if kind == "rect":
+        x, y = float(shape["x"]), float(shape["y"])
+        return _box(x, y, x + float(shape["width"]), y + float(shape["height"]))
+    if kind in ("circle", "ellipse"):
+        across, up = (shape["r"],) * 2 if kind == "circle" else (shape["rx"], shape["ry"])
+        return _ellipse(float(shape["cx"]), float(shape["cy"]), float(across), float(up))
+    if kind not in ("polygon", "polyline"):
+        raise ValueError(kind)
+    ring = np.column_stack([shape["all_points_x"], shape["all_points_y"]]).astype(np.float64)
+    if len(ring) > 1 and np.array_equal(ring[0], ring[-1]):
+        ring = ring[:-1]
+    elif kind == "polyline":
+        raise ValueError("open")
+    if len(ring) < 3:
+        raise ValueError(len(ring))
+    return ring
+
+
+def _box(left: float, top: float, right: float, bottom: float) -> Array:
+    return np.array([(left, top), (right, top), (right, bottom), (left, bottom)])
+
+
+def _ellipse(x: float, y: float, across: float, up: float) -> Array:
+    turn = np.linspace(0.0, 2.0 * np.pi, _ARC, endpoint=False)
+    return np.column_stack([x + across * np.cos(turn), y + up * np.sin(turn)])

@@ -1,0 +1,196 @@
+"""Entities of a DXF drawing: closed curves, texts, and what neither is, each with its layer; blocks are resolved."""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from survey.arrays import Array
+
+__all__ = ["Curve", "DrawnText", "Entities", "entities_of"]
+
+_CLOSE = 0.002  # distance of the ends of a curve that counts as closed, of its longest side
+_SAGITTA = 0.001  # by which arcs may differ from their chords [drawing units]
+_DEEPEST = 16  # blocks within blocks
+_CURVES = ("LWPOLYLINE", "POLYLINE", "SPLINE", "CIRCLE", "ELLIPSE")
+_SILENT = ("POINT", "ATTDEF", "VIEWPORT", "XLINE", "RAY")  # of which nobody makes a stone
+_SAME = 0.02  # difference of two boxes that are of one stone, of their size
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A closed curve.
+
+    Attributes
+    ----------
+    ring : (n, 3) corners in drawing units, not closed
+    layer : its layer; in a block on layer 0, that of the insert
+    where : kind, handle and layer, for messages
+    """
+
+    ring: Array
+    layer: str
+    where: str
+
+
+@dataclass(frozen=True)
+class DrawnText:
+    """A text, or the attributes of an inserted label.
+
+    Attributes
+    ----------
+    places : where it may stand, in order of preference, each (3,) in drawing units
+    text : it, or ""
+    values : attributes by tag
+    """
+
+    places: tuple[Array, ...]
+    text: str
+    values: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass
+class Entities:
+    """What a drawing shows.
+
+    Attributes
+    ----------
+    curves : closed curves
+    texts : texts and labels
+    left : number of other entities by kind
+    hidden : number of closed curves by layer that is frozen or off
+    """
+
+    curves: list[Curve] = field(default_factory=list)
+    texts: list[DrawnText] = field(default_factory=list)
+    left: Counter[str] = field(default_factory=Counter)
+    hidden: Counter[str] = field(default_factory=Counter)
+
+
+def entities_of(drawing: Any, layer: str | None) -> Entities:
+    """Sort the entities of the model space.
+
+    Parameters
+    ----------
+    drawing : of ezdxf
+    layer : on which outlines lie, which may be hidden; None: all that are shown
+    """
+    found = Entities()
+    hidden = {one.dxf.name.lower() for one in drawing.layers if one.is_frozen() or one.is_off()}
+    hatches = list[Curve]()
+    for entity, on in _resolved(drawing.modelspace(), None, found, 0):
+        kind = entity.dxftype()
+        if kind in ("TEXT", "MTEXT"):
+            found.texts.append(_text(entity))
+            continue
+        if kind in _SILENT or (layer is not None and on.lower() != layer.lower()):
+            continue
+        where = f"{kind} {entity.dxf.handle or 'of a block'} on layer {on}"
+        rings = _rings(entity)
+        if not rings:
+            found.left[f"open {kind}" if kind in _CURVES else kind] += 1
+        elif layer is None and (on.lower() in hidden or entity.dxf.get("invisible", 0)):
+            found.hidden[on] += len(rings)
+        else:
+            (hatches if kind == "HATCH" else found.curves).extend(Curve(ring, on, where) for ring in rings)
+    boxes = [_box(one.ring) for one in found.curves]
+    # the filling of an outline is not a second stone
+    found.curves += [one for one in hatches if not any(_alike(_box(one.ring), box) for box in boxes)]
+    return found
+
+
+def _resolved(entities: Any, layer: str | None, found: Entities, depth: int) -> Iterator[tuple[Any, str]]:
+    """Yield entities with their layers, those of blocks at their places; labels become texts."""
+    for entity in entities:
+        own = str(entity.dxf.get("layer", "0"))
+        on = layer if layer is not None and own == "0" else own
+        if entity.dxftype() != "INSERT":
+            yield entity, on
+            continue
+        if any(one.dxf.text.strip() for one in entity.attribs):
+            found.texts.append(_label(entity))
+        if depth == _DEEPEST:
+            found.left["INSERT"] += 1
+            continue
+        for one in entity.multi_insert() if entity.mcount > 1 else (entity,):
+            yield from _resolved(one.virtual_entities(), on, found, depth + 1)
+
+
+def _text(entity: Any) -> DrawnText:
+    text = entity.plain_text() if entity.dxftype() == "MTEXT" else entity.dxf.text
+    return DrawnText((_place(entity.dxf.insert),), " ".join(text.split()))
+
+
+def _label(insert: Any) -> DrawnText:
+    """Return the attributes of an inserted label, which may stand beside the stone that it was inserted in."""
+    values = {one.dxf.tag: " ".join(one.dxf.text.split()) for one in insert.attribs if one.dxf.text.strip()}
+    places = (*(_place(one.dxf.insert) for one in insert.attribs), _place(insert.dxf.insert))
+    return DrawnText(places, "", values)
+
+
+def _place(point: Any) -> Array:
+    return np.array([point.x, point.y, point.z])
+
+
+def _rings(entity: Any) -> list[Array]:
+    """Return the closed curves (n, 3) of an entity, none if it has no such."""
+    kind = entity.dxftype()
+    if kind == "HATCH":
+        from ezdxf.path import from_hatch
+
+        paths = (np.array([tuple(one) for one in path.flattening(_SAGITTA)]) for path in from_hatch(entity))
+        rings = [_opened(one) for one in paths if len(one) > 3]
+        boxes = [_box(one) for one in rings]
+        # a boundary within another of the same hatch is a hole
+        return [
+            ring for ring, box in zip(rings, boxes, strict=True) if not any(_within(box, o) for o in boxes)
+        ]
+    if kind not in _CURVES or (kind == "POLYLINE" and not (entity.is_2d_polyline or entity.is_3d_polyline)):
+        return []
+    corners = _corners(entity)
+    return [_opened(corners)] if len(corners) >= 3 and _is_closed(entity, corners) else []
+
+
+def _corners(entity: Any) -> Array:
+    """Return the corners (n, 3) of a curve, arcs by chords."""
+    kind = entity.dxftype()
+    if kind == "POLYLINE" and entity.is_3d_polyline:
+        return np.array([tuple(one.dxf.location) for one in entity.vertices], dtype=np.float64)
+    if kind in ("LWPOLYLINE", "POLYLINE") and not entity.has_arc:
+        points = entity.vertices_in_wcs() if kind == "LWPOLYLINE" else entity.points_in_wcs()
+        return np.array([tuple(one) for one in points], dtype=np.float64)
+    from ezdxf.path import make_path
+
+    return np.array([tuple(one) for one in make_path(entity).flattening(_SAGITTA)], dtype=np.float64)
+
+
+def _is_closed(entity: Any, corners: Array) -> bool:
+    kind = entity.dxftype()
+    closed = kind == "CIRCLE" or (
+        entity.is_closed if kind == "POLYLINE" else kind in ("LWPOLYLINE", "SPLINE") and entity.closed
+    )
+    return bool(closed) or _meets(corners)
+
+
+def _meets(corners: Array) -> bool:
+    return float(np.linalg.norm(corners[0] - corners[-1])) <= _CLOSE * float(np.ptp(corners, axis=0).max())
+
+
+def _opened(ring: Array) -> Array:
+    """Drop a last corner that repeats the first."""
+    return ring[:-1] if len(ring) > 3 and _meets(ring) else ring
+
+
+def _box(ring: Array) -> Array:
+    return np.concatenate([ring.min(axis=0)[:2], ring.max(axis=0)[:2]])
+
+
+def _alike(one: Array, other: Array) -> bool:
+    size = float((other[2:] - other[:2]).max())
+    return bool(np.abs(one - other).max() <= _SAME * size)
+
+
+def _within(one: Array, other: Array) -> bool:
+    return bool((one[:2] > other[:2]).all() and (one[2:] < other[2:]).all())
