@@ -17,7 +17,6 @@ from mechanics.dynamics.verdicts.watch import MOVED
 from mechanics.limit.assembly import CLOSED, RigidAssembly, assembly
 from mechanics.limit.programme import Ending, Programme
 from mechanics.results.result import Result
-from mechanics.scene.laws.table import without_bond
 from mechanics.scene.loads.load import Force, Loads
 from mechanics.scene.scene import Block, LawRule, Part, Scene, Start
 from mechanics.simulate import simulate
@@ -175,7 +174,7 @@ def _at_rest(
     for (a, b), parted in broken.items():
         law = laws.laws[int(laws.of(np.array([[a, b]]))[0])]
         first, second = (frozenset([scene.blocks[body].code]) for body in (a, b))
-        rules.append(LawRule(first, second, without_bond(law, parted)))
+        rules.append(LawRule(first, second, law.without_bond(parted)))
     moves = (leaves or any(broken.values())) and not laws.sprung
     blocks = (
         _moved(block, body.reference, body.position)

@@ -22,8 +22,6 @@ from mechanics.dynamics.step import Step
 from mechanics.limit.pushover import SPEED
 from mechanics.model.model import Model, build_model
 from mechanics.scene.jaws import JawPath
-from mechanics.scene.laws.cohesive_zone import CohesiveZone
-from mechanics.scene.laws.elastic_joint import ElasticJoint
 from mechanics.scene.rig import BEAM, JAWS, Rig, rigged
 from mechanics.scene.scene import Scene, TimeSettings
 from mechanics.scene.state import State
@@ -277,8 +275,7 @@ def _loaded(model: Model, rig: Rig) -> Model:
 def softening_step(scene: Scene) -> float:
     """Return the longest step that resolves the softening of all bonds, from 2 G/c; infinite where none soften [m]."""
     laws = (scene.contact.law, *(rule.law for rule in scene.contact.rules))
-    ways = [law.softening for law in laws if isinstance(law, CohesiveZone | ElasticJoint)]
-    return min(ways, default=np.inf) / _SOFTENING_STEPS
+    return min(law.softening for law in laws) / _SOFTENING_STEPS
 
 
 def _restless(model: Model, begin: State, now: State) -> SolverError:

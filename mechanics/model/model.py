@@ -17,7 +17,6 @@ from mechanics.model.deformable import Deformable
 from mechanics.model.rigid import RigidInertia
 from mechanics.model.stone_groups import ElasticStones, elastic_stones
 from mechanics.model.stone_meshes import StoneWorkshop
-from mechanics.scene.laws.elastic_joint import ElasticJoint
 from mechanics.scene.laws.table import LawTable, law_table
 from mechanics.scene.loads.load import Force, Motion
 from mechanics.scene.scene import Block, Fidelity, LawRule, Part, Scene
@@ -102,7 +101,7 @@ class Model:
     @cached_property
     def lag(self) -> float:
         """Longest time τ in which dashpots of joints and of deformable stones let springs take over [s]."""
-        joints = (law.damping_time for law in self.laws.laws if isinstance(law, ElasticJoint))
+        joints = (law.damping_time for law in self.laws.laws)
         stones = (
             block.material.stiffness_damping
             for block in self.scene.blocks

@@ -14,7 +14,6 @@ from mechanics.results.contact_result import JointResult
 from mechanics.results.joints import SLIVER
 from mechanics.results.result import Result
 from mechanics.results.stages import StageResult
-from mechanics.scene.laws.elastic_joint import ElasticJoint
 from mechanics.scene.scene import Fidelity
 from pipelines.results.peaks import peak_records, realisations, rocking_stones
 from pipelines.results.quantities import quantities
@@ -235,6 +234,6 @@ def _rigid(result: Result, bodies: Ints, stiff: Bools) -> Bools:
     rigid = np.asarray(stiff[bodies].all(axis=1))
     table = laws_between(result.scene)
     if table.sprung:
-        springs = np.array([isinstance(law, ElasticJoint) for law in table.laws])
+        springs = np.array([law.sprung for law in table.laws])
         rigid &= ~springs[table.of(bodies)]
     return rigid

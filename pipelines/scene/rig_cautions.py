@@ -5,7 +5,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from mechanics.limit.loading_test import softening_step
-from mechanics.scene.laws.elastic_joint import ElasticJoint
 from mechanics.scene.laws.law import Law
 from mechanics.scene.rig import Rig
 from mechanics.scene.scene import Scene
@@ -58,7 +57,7 @@ def _is_dry(law: Law) -> bool:
 
 def _stiff_joints(stones: Scene) -> Iterator[str]:
     for law in _laws(stones):
-        stiffness = law.normal_stiffness if isinstance(law, ElasticJoint) else None
+        stiffness = law.normal_stiffness
         if _is_dry(law) and stiffness is not None and stiffness > _STIFF_DRY:
             yield (
                 f"dry joints of {1e-9 * stiffness:.3g} GPa/m: in first loading 5.9 to 12.9 GPa/m were measured "

@@ -8,15 +8,15 @@ import numpy as np
 from mechanics.arrays import Array
 from mechanics.scene.laws.bonds import BROKEN, bonded, with_bonds
 from mechanics.scene.laws.dry_joint import DryJoint, Friction, at_limit, slid
-from mechanics.scene.laws.law import BOND, OPENING, REST, SLIDING, SLIP, Approach, Terms
-from mechanics.scene.laws.mortar import held_tension
+from mechanics.scene.laws.law import BOND, OPENING, REST, SLIDING, SLIP, Approach, Joint, Law, Terms
+from mechanics.scene.laws.mortar import MortarJoint, held_tension
 from mechanics.stones.settings import Setting, check_settings
 
 __all__ = ["CohesiveZone"]
 
 
 @dataclass(frozen=True)
-class CohesiveZone:
+class CohesiveZone(Joint):
     """A bond whose intact fraction β falls linearly as it opens and slides; broken, a dry joint.
 
         β = 1 - δ_N/δ_f,N - δ_T/δ_f,T,   δ_f = 2 G/σ0,   r_N ≥ -h A β σ_N,   ‖r_T‖ ≤ h A β σ_T + μ r_N
@@ -54,6 +54,15 @@ class CohesiveZone:
     def held(self) -> float:
         """Tension that a whole bond holds [Pa]."""
         return held_tension(self.friction, self.tension, self.shear)
+
+    @property
+    def bonded(self) -> bool:
+        """True: stones that meet at the start are bonded."""
+        return True
+
+    def without_bond(self, parted: bool) -> Law:
+        """Return mortar without strength, which fills the gap of a joint that bears, or a dry joint."""
+        return self._dry if parted else MortarJoint(self.friction, 0.0, 0.0)
 
     @property
     def _dry(self) -> DryJoint:

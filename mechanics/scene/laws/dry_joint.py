@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 
 from mechanics.arrays import Array, Bools
-from mechanics.scene.laws.law import REST, SLIDING, Approach, Terms
+from mechanics.scene.laws.law import REST, SLIDING, Approach, Joint, Terms
 from mechanics.stones.settings import Setting, check_settings
 from moma.errors import SceneError
 
@@ -56,7 +56,7 @@ def slid(contacts: Approach, terms: Terms, impulse: Array, velocity: Array) -> B
 
 
 @dataclass(frozen=True)
-class DryJoint:
+class DryJoint(Joint):
     """Unilateral contact without cohesion. Without restitution a stone lands inelastically, in time with the gap."""
 
     friction: Friction = 0.6
@@ -74,11 +74,6 @@ class DryJoint:
                 where="dry joint",
                 remedy=f"give from 0 up to the static friction, {self.friction:g}",
             )
-
-    @property
-    def reach(self) -> float:
-        """Zero: no force acts across a gap [m]."""
-        return 0.0
 
     def terms(self, contacts: Approach) -> Terms:
         """Return Signorini as a shift, with dynamic friction for contacts that slid in the last step."""

@@ -21,6 +21,7 @@ from mechanics.scene.laws.law import (
     SLIP,
     SPRING,
     Approach,
+    Joint,
     Law,
     Springs,
     Terms,
@@ -55,7 +56,7 @@ class _Springs:
 
 
 @dataclass(frozen=True)
-class ElasticJoint:
+class ElasticJoint(Joint):
     """Springs k_N and k_T per area of joint, with dashpots c = τk beside them, that open, slide, break and crush.
 
     With x the gap, or the stretch of the spring along the joint, and both sides of the mean over the step that the
@@ -178,6 +179,20 @@ class ElasticJoint:
     def softening(self) -> float:
         """Shortest displacement over which a bond is lost, 2 G/c; infinite where none softens [m]."""
         return self._zone.softening if self.softens else np.inf
+
+    @property
+    def sprung(self) -> bool:
+        """True: joints yield."""
+        return True
+
+    @property
+    def crushes(self) -> bool:
+        """True where the joint has a compressive strength."""
+        return self.compressive_strength is not None
+
+    def without_bond(self, parted: bool) -> Law:
+        """Return the same springs without strength: they stay in a joint that bears."""
+        return replace(self, tension=0.0, shear=0.0, energy_tension=0.0, energy_shear=0.0)
 
     @property
     def bonded(self) -> bool:

@@ -4,11 +4,14 @@ Once per step each law states all its contacts in the common form of all solvers
 
     0 ≤ u_N + bias ⊥ r̃_N ≥ 0,   ‖r_T‖ ≤ μ r̃_N + k,   and r_T opposes u_T, at the limit, while sliding
 
-A new law is one class with the members of `Law`.
+A new law is one class with the members of `Law`; what it does not say it inherits from `Joint`.
 """
 
+import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, cast
+
+import numpy as np
 
 from mechanics.arrays import Array, Bools, Ints
 
@@ -23,6 +26,7 @@ __all__ = [
     "SPRING",
     "STATE",
     "Approach",
+    "Joint",
     "Law",
     "Springs",
     "Terms",
@@ -114,16 +118,72 @@ class Terms:
     springs: Springs | None = None
 
 
-class Law(Protocol):
+class Joint(Protocol):
+    """Members of a law of joints without bond and springs; laws inherit them and say what they have."""
+
+    @property
+    def bonded(self) -> bool:
+        """True where it bonds stones that meet as the run, or a stage of building, begins."""
+        return False
+
+    @property
+    def sprung(self) -> bool:
+        """True where contacts yield by springs."""
+        return False
+
+    @property
+    def crushes(self) -> bool:
+        """True where a pressure is the most that contacts bear."""
+        return False
+
+    @property
+    def by_thickness(self) -> bool:
+        """True where the thickness of the mortar in a joint counts."""
+        return False
+
+    @property
+    def thickness(self) -> float | None:
+        """Thickness of mortar in joints whose own is not known; None if that is not known either [m]."""
+        return None
+
+    @property
+    def damping_time(self) -> float:
+        """Time in which dashpots let springs take over [s]."""
+        return 0.0
+
+    @property
+    def normal_stiffness(self) -> float | None:
+        """Stiffness across the joint, per area; None where it has none, or not one for all joints [Pa/m]."""
+        return None
+
+    @property
+    def softening(self) -> float:
+        """Shortest displacement over which a bond is lost; infinite where none softens [m]."""
+        return math.inf
+
+    @property
+    def reach(self) -> float:
+        """Gap up to which the law acts, so that contacts are watched beyond the alert distance [m]."""
+        return 0.0
+
+    def crushing(self, contacts: Approach, impulse: Array | None = None) -> Bools:
+        """Return the contacts (n,) whose pressure exceeds the strength of the joint in a step with r̃ (n, d) [N s].
+
+        Before its solution is known, those that are at their strength and close further are.
+        """
+        return np.zeros(len(contacts.gap), dtype=bool)
+
+    def without_bond(self, parted: bool) -> "Law":
+        """Return the law of a joint whose bond has broken; one that has `parted` has lost its mortar too."""
+        return cast("Law", self)
+
+
+class Law(Joint, Protocol):
     """A contact law: a frozen dataclass of its parameters, checked on construction (SceneError)."""
 
     @property
     def friction(self) -> float:
         """Coulomb's μ of a contact that sticks [-]."""
-
-    @property
-    def reach(self) -> float:
-        """Gap up to which the law acts, so that contacts are watched beyond the alert distance [m]; mostly 0."""
 
     def terms(self, contacts: Approach) -> Terms:
         """State the law for one step."""

@@ -7,14 +7,14 @@ import numpy as np
 
 from mechanics.arrays import Array
 from mechanics.scene.laws.dry_joint import DryJoint, Friction
-from mechanics.scene.laws.law import Approach, Terms
+from mechanics.scene.laws.law import Approach, Joint, Terms
 from mechanics.stones.settings import Setting, check_settings
 
 __all__ = ["LennardJones"]
 
 
 @dataclass(frozen=True)
-class LennardJones:
+class LennardJones(Joint):
     """Constant attraction γ while the gap is within d_w; a dry joint beyond.
 
     r̃_N = r_N + hγ: in an open contact r̃_N = 0, and the full attraction acts; in a closed one r̃_N is the pressure, on

@@ -1,6 +1,6 @@
 """Brittle mortar: cohesion as a shift of the normal impulse (Acary et al. 1999)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from mechanics.arrays import Array
 from mechanics.scene.laws.bonds import BROKEN, bonded, with_bonds
 from mechanics.scene.laws.dry_joint import DryJoint, DynamicFriction, Friction, at_limit, slid
-from mechanics.scene.laws.law import BOND, REST, SLIDING, SLIP, Approach, Terms
+from mechanics.scene.laws.law import BOND, REST, SLIDING, SLIP, Approach, Joint, Law, Terms
 from mechanics.stones.settings import Setting, check_settings
 from moma.errors import SceneError
 
@@ -47,7 +47,7 @@ shear strength, of 50000 Pa or more to hold all of it, or tension = 0 for a dry 
 
 
 @dataclass(frozen=True)
-class MortarJoint:
+class MortarJoint(Joint):
     """A bond r_N ≥ -h c_n A, ‖r_T‖ ≤ h c_t A + μ r_N that breaks once and for all, then a dry joint.
 
     With r̃_N = r_N + h c_n A these are r̃_N ≥ 0 and ‖r_T‖ ≤ μ r̃_N + h A (c_t - μ c_n). A is the tributary area of the
@@ -66,9 +66,13 @@ class MortarJoint:
         _ = self._dry  # checks the dynamic friction
 
     @property
-    def reach(self) -> float:
-        """Zero: an intact bond does not open, a broken one carries no tension [m]."""
-        return 0.0
+    def bonded(self) -> bool:
+        """True: stones that meet at the start are bonded."""
+        return True
+
+    def without_bond(self, parted: bool) -> Law:
+        """Return mortar without strength, which fills the gap of a joint that bears, or a dry joint."""
+        return self._dry if parted else replace(self, tension=0.0, shear=0.0)
 
     @property
     def _dry(self) -> DryJoint:

@@ -1,19 +1,15 @@
 """Table of the laws between bodies, and all laws of a step as one shift and cone."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from mechanics.arrays import Array, Bools, Ints
-from mechanics.scene.laws.cohesive_zone import CohesiveZone
-from mechanics.scene.laws.dry_joint import DryJoint
-from mechanics.scene.laws.elastic_joint import ElasticJoint
 from mechanics.scene.laws.law import Approach, Law, Springs, Terms
-from mechanics.scene.laws.mortar import MortarJoint
 
-__all__ = ["LawTable", "law_table", "without_bond"]
+__all__ = ["LawTable", "law_table"]
 
 _PER_CONTACT = ("gap", "speed", "slide", "area", "size", "compliance", "state", "pair", "first")
 _IF_KNOWN = ("thickness", "crushing")
@@ -38,19 +34,19 @@ class LawTable:
     @property
     def sprung(self) -> bool:
         """True where a law has springs, so that joints yield."""
-        return any(isinstance(law, ElasticJoint) for law in self.laws)
+        return any(law.sprung for law in self.laws)
 
     @property
     def crushes(self) -> bool:
         """True where joints have a compressive strength."""
-        return any(isinstance(law, ElasticJoint) and law.compressive_strength for law in self.laws)
+        return any(law.crushes for law in self.laws)
 
     def thickness(self, law: Ints, bodies: Ints) -> Array | None:
         """Return the thickness of mortar (nc,) between bodies (nc, 2), zero where no law needs it; None: anywhere [m].
 
         Not a number where it is needed, but not known.
         """
-        own = [one if isinstance(one, ElasticJoint) and one.by_thickness else None for one in self.laws]
+        own = [one if one.by_thickness else None for one in self.laws]
         if not any(own):
             return None
         otherwise = np.array([0.0 if one is None else one.thickness or np.nan for one in own])[law]
@@ -70,23 +66,16 @@ class LawTable:
         return pairs, np.array([self.beds[one, other] for one, other in pairs.tolist()])
 
     def crushing(self, law: Ints, contacts: Approach, impulse: Array | None = None) -> Bools:
-        """Return the contacts (nc,) whose joints crush in a step with r̃, as `ElasticJoint.crushing` does."""
+        """Return the contacts (nc,) whose joints crush in a step with r̃, as `Law.crushing` does."""
         crushing = np.zeros(len(law), dtype=bool)
         for index, rows in _groups(law):
-            one = self.laws[index]
-            if isinstance(one, ElasticJoint):
-                crushing[rows] = one.crushing(
-                    _some(contacts, rows), None if impulse is None else impulse[rows]
-                )
+            part = None if impulse is None else impulse[rows]
+            crushing[rows] = self.laws[index].crushing(_some(contacts, rows), part)
         return crushing
 
     def makes_bonds(self, law: Ints) -> Bools:
         """Return the contacts (n,) whose law bonds stones that meet at the start."""
-        bonds = [
-            one.bonded if isinstance(one, ElasticJoint) else isinstance(one, MortarJoint | CohesiveZone)
-            for one in self.laws
-        ]
-        return np.array(bonds)[law]
+        return np.array([one.bonded for one in self.laws])[law]
 
     def of(self, bodies: Ints) -> Ints:
         """Return the index of the law of each contact between bodies (nc, 2); of two rules, the later holds."""
@@ -118,23 +107,6 @@ class LawTable:
         for index, rows in _groups(law):
             state[rows] = self.laws[index].after(_some(contacts, rows), impulse[rows], velocity[rows])
         return state
-
-
-def without_bond(law: Law, parted: bool = False) -> Law:
-    """Return the law of a joint whose bond has broken.
-
-    Mortar remains in a joint that bears: the gap that it filled counts as closed. One that has `parted` is a dry joint.
-    """
-    match law:
-        case ElasticJoint():
-            return replace(law, tension=0.0, shear=0.0, energy_tension=0.0, energy_shear=0.0)
-        case MortarJoint() if not parted:
-            return replace(law, tension=0.0, shear=0.0)
-        case MortarJoint():
-            return DryJoint(law.friction, law.dynamic_friction)
-        case CohesiveZone():
-            return MortarJoint(law.friction, 0.0, 0.0) if not parted else DryJoint(law.friction)
-    return law
 
 
 def law_table(

@@ -13,7 +13,6 @@ from mechanics.limit.live_loads import Acceleration
 from mechanics.scene.laws.cohesive_zone import CohesiveZone
 from mechanics.scene.laws.elastic_joint import ElasticJoint
 from mechanics.scene.laws.mortar import MortarJoint
-from mechanics.scene.laws.table import without_bond
 from mechanics.scene.scene import Fidelity, LawRule
 from tests.mechanics.shapes import brick, ground, scene
 
@@ -94,13 +93,13 @@ def test_mortar_that_breaks_without_parting_holds_nothing_either():
 
 def test_a_broken_bond_leaves_friction_springs_and_the_strength_to_compression():
     law = ElasticJoint(0.7, 1e9, 4e8, tension=1e4, shear=2e4, compressive_strength=1e6)
-    bare = without_bond(law)
+    bare = law.without_bond(False)
     assert (bare.tension, bare.shear, bare.normal_stiffness, bare.compressive_strength) == (0, 0, 1e9, 1e6)
-    assert without_bond(MortarJoint(0.6, 1e4, 2e4)) == MortarJoint(0.6, 0.0, 0.0)
+    assert MortarJoint(0.6, 1e4, 2e4).without_bond(False) == MortarJoint(0.6, 0.0, 0.0)
     zone = CohesiveZone(0.6, 1e4, 2e4, 10.0, 10.0)
     for one in (MortarJoint(0.6, 1e4, 2e4), zone):
-        assert without_bond(one, parted=True).friction == 0.6
-        assert not hasattr(without_bond(one, parted=True), "tension")
+        assert one.without_bond(True).friction == 0.6
+        assert not hasattr(one.without_bond(True), "tension")
 
 
 def test_what_time_cuts_short_is_not_decided():
