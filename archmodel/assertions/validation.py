@@ -2,6 +2,7 @@
 
 import difflib
 import math
+import unicodedata
 from collections.abc import Iterable
 
 from moma.errors import UsageError
@@ -23,10 +24,13 @@ MAX_WHOLE = 2**31 - 1
 
 
 def checked_text(name: str, value: str | None) -> str | None:
-    """Check a text in words, of several lines perhaps, and strip outer space; None stays None."""
+    """Check a text in words, of several lines perhaps, and strip outer space; None stays None.
+
+    Its letters get their composed form (NFC), so that ü typed as one character or as two is one letter.
+    """
     if value is None:
         return None
-    text = value.strip()
+    text = unicodedata.normalize("NFC", value.strip())
     if not text or any(not one.isprintable() and one not in "\n\t" for one in text):
         what = f"{name} {value[:40]!a} has no visible character, or some that cannot be typed"
         raise UsageError(what, remedy="write a text")
@@ -37,7 +41,8 @@ def checked_text(name: str, value: str | None) -> str | None:
 
 
 def checked_label(name: str, value: str) -> str:
-    """Check a code or a name: one line, at most 200 characters."""
+    """Check a code or a name: one line, at most 200 characters; its letters get their composed form (NFC)."""
+    value = unicodedata.normalize("NFC", value)
     if not value.strip() or value != value.strip() or not value.isprintable() or len(value) > 200:
         remedy = "write up to 200 characters in one line, without blanks at the ends"
         raise UsageError(f"{name} {value[:40]!a} is not a name", remedy=remedy)

@@ -1,6 +1,7 @@
 """Description of one entity or structure, now or at an earlier entry."""
 
 import math
+import unicodedata
 from typing import Any
 
 from sqlalchemy import or_, select
@@ -50,6 +51,7 @@ def describe(session: Session, code: str, at: int | None = None) -> dict[str, ob
         if there is no such stone or structure, or was not; names the nearest codes
     """
     refuse_unknown_kinds(session, Entity, Structure)
+    code = unicodedata.normalize("NFC", code)
     if not code.isprintable():
         raise no_such_code(session, code, Entity.code, Structure.code)
     if at is not None:

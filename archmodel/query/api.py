@@ -1,6 +1,6 @@
 """Queries of the database: entities by kind and condition, their attributes and their faces."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,11 +12,12 @@ from archmodel.query.attributes import ATTRIBUTES, Attribute, attributes_of
 from archmodel.query.compile import column_named, condition, condition_in
 from archmodel.query.grammar import attributes_in, parse
 from archmodel.query.names import refuse_unknown_run
-from archmodel.query.scope import Context, Scope
+from archmodel.query.scope import Context, Scope, StructureScope
+from archmodel.query.structures import STRUCTURE_ATTRIBUTES
 from archmodel.tables.entities import Entity, kind_named
-from archmodel.tables.hierarchy import kinds_below
-from archmodel.tables.registered import refuse_unknown_kinds
-from archmodel.tables.structures import structure_kinds
+from archmodel.tables.hierarchy import kind_among, kinds_below
+from archmodel.tables.registered import all_kinds, refuse_unknown_kinds
+from archmodel.tables.structures import Structure, structure_kinds
 from moma.errors import DatabaseError, QueryError, UsageError
 
 __all__ = [
@@ -62,12 +63,12 @@ def attributes(session: Session | None = None, kind: str | None = None) -> tuple
     Parameters
     ----------
     session : of a database whose registered kinds count too
-    kind : the attributes that entities of this kind and its subkinds have of their own come last; None: only
-        those of every entity
+    kind : the attributes that entities of this kind and its subkinds have of their own come last; of a kind of
+        structure, those of structures; None: only those of every entity
     """
     if kind is None:
         return tuple(ATTRIBUTES.values())
-    return tuple(attributes_of(session, kind_named(kind)).values())
+    return tuple(_known(session, kind).values())
 
 
 def find(session: Session, kind: str, where: Sequence[str] = (), run: int | None = None) -> list[Entity]:
@@ -101,13 +102,16 @@ def find_rows(
     columns: Sequence[str] | None = None,
     limit: int | None = None,
 ) -> list[dict[str, object]]:
-    """Return attributes of entities by name, as rows; the fast way to a table. Arguments as of `find`.
+    """Return attributes of entities, or of structures, as rows; the fast way to a table. Arguments as of `find`.
 
     Parameters
     ----------
+    kind : of entities or of structures
     columns : names of the attributes that are wanted, also ``von_mises_max@12``; None: those of ``attributes``
     limit : most rows; None: all
     """
+    if _is_of_structures(kind):
+        return _find_structures(session, kind, where, columns, limit)
     names = list(ATTRIBUTES) if columns is None else columns
     found = _select(session, kind, where, run, lambda scope: _columns(scope, names), limit)
     return [dict(zip(names, row, strict=True)) for row in found]
@@ -134,7 +138,7 @@ def find_faces(
 
 def asked_columns(where: Sequence[str], session: Session | None = None, kind: str = "entity") -> list[str]:
     """List the attributes that expressions name, without those of other entities: ``depth``, ``von_mises_max@12``."""
-    known = attributes_of(session, kind_named(kind))
+    known = _known(session, kind)
     expressions = [where] if isinstance(where, str) else where
     named = [token.text.lower() for one in expressions for token in attributes_in(parse(one))]
     return [name for name in dict.fromkeys(named) if name.partition("@")[0] in known]
@@ -164,16 +168,58 @@ def rows_of(entities: Iterable[Entity]) -> list[dict[str, object]]:
     return [found[entity.code] for entity in wanted]
 
 
+def _known(session: Session | None, kind: str) -> Mapping[str, Attribute]:
+    """Return the attributes of a kind of entities or of structures, by name."""
+    return STRUCTURE_ATTRIBUTES if _is_of_structures(kind) else attributes_of(session, kind_named(kind))
+
+
+def _is_of_structures(kind: str) -> bool:
+    """Return whether a kind is one of structures.
+
+    Raises
+    ------
+    UsageError
+        if there is no such kind of entities or of structures
+    """
+    return issubclass(kind_among(all_kinds(), kind, "kind of stone or structure"), Structure)
+
+
+def _find_structures(
+    session: Session, kind: str, where: Sequence[str], columns: Sequence[str] | None, limit: int | None
+) -> list[dict[str, object]]:
+    """Return attributes of the structures of a kind, as `find_rows` does."""
+    context = Context(session)
+    scope = StructureScope(context, context.alias(Structure))
+    conditions = [condition_in(scope, parse(one)) for one in _listed(where)]
+    refuse_unknown_kinds(session, Structure)
+    names = list(STRUCTURE_ATTRIBUTES) if columns is None else columns
+    wanted = [column_named(scope, name).label(f"column_{number}") for number, name in enumerate(names)]
+    below = list(kinds_below(kind_among(structure_kinds(), kind)))
+    rows = scope.structure
+    statement = (
+        select(*wanted)
+        .select_from(rows)
+        .where(rows.c.superseded_id.is_(None), rows.c.kind.in_(below), *conditions)
+        .order_by(rows.c.id)
+        .limit(limit)
+    )
+    return [dict(zip(names, row, strict=True)) for row in session.execute(statement)]
+
+
+def _listed(where: Sequence[str]) -> Sequence[str]:
+    """Return the expressions of a query, of which there are not too many."""
+    expressions = [where] if isinstance(where, str) else where
+    if len(expressions) > MAX_EXPRESSIONS:
+        what = f"{len(expressions)} expressions, at most {MAX_EXPRESSIONS}"
+        raise QueryError(what, where="--where", remedy="join some of them by and")
+    return expressions
+
+
 def _asked(
     session: Session, where: Sequence[str], run: int | None
 ) -> tuple[Scope, list[ColumnElement[bool]]]:
     """Return the scope of a query and its conditions; refuse kinds that this program does not know."""
-    expressions = [where] if isinstance(where, str) else where
-    if len(expressions) > MAX_EXPRESSIONS:
-        remedy = "join some of them by and"
-        raise QueryError(
-            f"{len(expressions)} expressions, at most {MAX_EXPRESSIONS}", where="--where", remedy=remedy
-        )
+    expressions = _listed(where)
     scope = Scope(Context(session, run))
     refuse_unknown_run(scope.context)
     conditions = [condition_in(scope, parse(expression)) for expression in expressions]

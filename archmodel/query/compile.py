@@ -31,13 +31,14 @@ from archmodel.query.grammar import (
 )
 from archmodel.query.names import meant, phase_begins, run_with_number
 from archmodel.query.scope import Context, Scope, StructureScope
+from archmodel.query.structures import STRUCTURE_ATTRIBUTES
 from archmodel.query.tokens import Token, complaint
 from archmodel.tables.entities import Entity, kind_named
 from archmodel.tables.hierarchy import names_below
 from archmodel.tables.structures import structure_kind_named
 from moma.errors import UsageError
 
-__all__ = ["STRUCTURE_ATTRIBUTES", "column_named", "condition", "condition_in"]
+__all__ = ["column_named", "condition", "condition_in"]
 
 LARGEST = 2**31 - 1
 """Whole numbers up to this one are compared as such; larger ones as floating-point numbers."""
@@ -52,25 +53,6 @@ _OPERATORS: Mapping[str, Callable[[Any, Any], Any]] = {
     ">": operator.gt,
     ">=": operator.ge,
 }
-
-
-def _of_structure(name: str) -> Any:
-    return lambda scope, run: scope.structure.c[name]
-
-
-STRUCTURE_ATTRIBUTES: Mapping[str, Attribute] = {
-    one.name: one
-    for one in (
-        Attribute("code", None, "its name", _of_structure("code")),
-        Attribute("kind", None, "its own kind, e.g. arch", _of_structure("kind")),
-        Attribute("title", None, "its name in words", _of_structure("title")),
-        Attribute("number", "-", "its place among its like, from the ground", _of_structure("number")),
-        Attribute(
-            "side", None, "outer or inner, of a wall facing", _of_structure("side"), words=("outer", "inner")
-        ),
-    )
-}
-"""What can be asked of a structure, within ``member_of(…)``."""
 
 
 def condition(session: Session, expression: str, run: int | None = None) -> ColumnElement[bool]:
@@ -96,7 +78,7 @@ def condition(session: Session, expression: str, run: int | None = None) -> Colu
     return Entity.id.in_(there.joined(select(there.entity.c.id)).where(nested))
 
 
-def column_named(scope: Scope, name: str) -> ColumnElement[Any]:
+def column_named(scope: Where, name: str) -> ColumnElement[Any]:
     """Return the column of an attribute: ``depth``, ``von_mises_max@12``.
 
     Raises

@@ -1,6 +1,7 @@
 """Tokens of query expressions, and errors that point at a token."""
 
 import re
+import unicodedata
 from dataclasses import dataclass
 
 from moma.errors import QueryError
@@ -48,7 +49,8 @@ def complaint(token: Token, what: str, remedy: str | None = None) -> QueryError:
 
 
 def tokenise(text: str) -> list[Token]:
-    """Split an expression into tokens, with an end token after the last."""
+    """Split an expression into tokens, with an end token after the last; letters are in their composed form (NFC)."""
+    text = unicodedata.normalize("NFC", text)
     if len(text) > MAX_LENGTH:
         token = Token("end", "", MAX_LENGTH, text)
         raise complaint(

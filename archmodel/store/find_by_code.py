@@ -1,6 +1,7 @@
 """Search for entities and structures by code; errors name the nearest codes."""
 
 import difflib
+import unicodedata
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
@@ -96,6 +97,7 @@ def _numbers(
     cls: type[Entity] | type[Structure],
     *conditions: ColumnElement[bool],
 ) -> dict[str, int]:
+    codes = [unicodedata.normalize("NFC", code) for code in codes]
     found: dict[str, int] = {}
     for batch in batches(dict.fromkeys(codes)):
         rows = session.execute(select(cls.code, cls.id).where(cls.code.in_(_typable(batch)), *conditions))
@@ -167,6 +169,7 @@ def held_named(session: Session, cls: type[T], name: str) -> T:
 
 def held_or_none(session: Session, cls: type[T], name: str) -> T | None:
     """Return what `held_named` finds, or None."""
+    name = unicodedata.normalize("NFC", name)
     if not name.isprintable():
         return None
     return session.scalar(select(cls).where(_name_column(cls) == name, cls.superseded_id.is_(None)))

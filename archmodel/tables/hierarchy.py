@@ -98,6 +98,6 @@ def kind_among(known: Mapping[str, type[K]], name: str, thing: str = "kind") -> 
     """
     if (cls := known.get(re.sub(r"[\s-]+", "_", name[:80].strip().lower()))) is not None:
         return cls
-    near = difflib.get_close_matches(name[:40].strip().lower(), known, n=3, cutoff=0.5)
+    near = difflib.get_close_matches(name[:40].strip().lower(), known, n=3, cutoff=0.6)
     remedy = f"did you mean {' or '.join(near)}?" if near else f"the kinds are {', '.join(known)}"
     raise UsageError(f"unknown {thing} {name[:40]!r}", remedy=remedy)

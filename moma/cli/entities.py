@@ -23,7 +23,10 @@ Columns = Annotated[
 @reporting
 def query(
     kind: Annotated[
-        str, typer.Argument(metavar="KIND", help="Kind of entity, with its subkinds, e.g. voussoir.")
+        str,
+        typer.Argument(
+            metavar="KIND", help="Kind of stone or structure, with subkinds: voussoir, structure."
+        ),
     ],
     where: Annotated[
         list[str] | None,
@@ -38,27 +41,71 @@ def query(
     flat: Annotated[
         bool, typer.Option("--flat", help="GeoJSON in the plane of the wall: along it, and up.")
     ] = False,
+    sort: Annotated[
+        str | None,
+        typer.Option(
+            "--sort", metavar="NAMES", help="Order by attributes, e.g. phase,-depth; -: largest first."
+        ),
+    ] = None,
+    top: Annotated[int | None, typer.Option("--top", metavar="N", min=1, help="Only the first N.")] = None,
+    count_by: Annotated[
+        str | None,
+        typer.Option("--count-by", metavar="NAMES", help="Count by attributes, e.g. phase or mark,phase."),
+    ] = None,
+    share_of: Annotated[
+        str | None,
+        typer.Option(
+            "--share-of", metavar="NAME", help="With --count-by: sum and share of a number, e.g. area."
+        ),
+    ] = None,
+    only_in: Annotated[
+        str | None,
+        typer.Option(
+            "--only-in",
+            metavar="EXPR",
+            help="With --count-by: only groups of which it is true throughout, e.g. 'phase = 2'.",
+        ),
+    ] = None,
+    excel: Annotated[
+        bool,
+        typer.Option("--excel", help="CSV for spreadsheets: marked as UTF-8, with ; and decimal commas."),
+    ] = False,
     db: Db = DEFAULT_DB,
     json: Json = False,
     verbose: Verbose = False,
 ) -> None:
-    """List the entities of a kind that satisfy conditions."""
+    """List the stones or structures of a kind that satisfy conditions, or count them."""
     with short_lived():
         from archmodel.database.as_known import as_known, entry_named
         from archmodel.database.session import open_database
-        from moma.cli.text.query import Question, answer
+        from moma.cli.text.query import Question, answer, listed
 
         if json and format not in (None, ListFormat.JSON):
             raise UsageError(f"--json and --format {format} request two formats", remedy="give one of them")
         wanted = ListFormat.JSON if json else format or ListFormat.TABLE
+        if excel and (json or format not in (None, ListFormat.CSV)):
+            raise UsageError("--excel is CSV for spreadsheets", remedy="leave out the other format")
+        if (share_of or only_in) and count_by is None:
+            raise UsageError("--share-of and --only-in need --count-by", remedy="give --count-by phase, say")
         if flat and wanted is not ListFormat.GEOJSON:
             raise UsageError("--flat is for faces", remedy="give --format geojson too")
-        names = None if columns is None else [name.strip() for name in columns.split(",")]
-        question = Question(kind, tuple(where or ()), run, names, everything=verbose, flat=flat)
+        question = Question(
+            kind,
+            tuple(where or ()),
+            run,
+            listed(columns),
+            everything=verbose,
+            flat=flat,
+            sort=listed(sort) or (),
+            top=top,
+            count_by=listed(count_by),
+            share_of=share_of,
+            only_in=only_in,
+        )
         with open_database(db, create=False) as database, database.session(read_only=True) as session:
             entry = None if at is None else entry_named(session, at)
             with as_known(session, entry) as then:
-                text, note = answer(then, question, str(wanted))
+                text, note = answer(then, question, "excel" if excel else str(wanted))
         if text:
             print(text)
         if note:

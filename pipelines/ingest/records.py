@@ -1,6 +1,7 @@
 """Conversion between surveyed stones and the records of the database."""
 
 import math
+import unicodedata
 from collections.abc import Iterable
 from dataclasses import fields, replace
 from typing import Any, get_args
@@ -33,9 +34,9 @@ _PLANE = ("normal", "offset", "centroid", "axes", "covariance", "rms", "redundan
 
 
 def stone_record(block: SurveyedBlock) -> StoneRecord:
-    """Convert a surveyed stone to its record."""
+    """Convert a surveyed stone to its record; letters of its texts get their composed form (NFC)."""
     face, fit, record = block.face, block.face.fit, block.face.record
-    return StoneRecord(
+    stone = StoneRecord(
         **_values(block, _STONE),
         **_values(record, _MEASURED),
         **_values(fit, _PLANE),
@@ -59,6 +60,9 @@ def stone_record(block: SurveyedBlock) -> StoneRecord:
         remarks=face.remarks,
         hypothesis=face.provenance.source == "hypothesis",
     )
+    notes = {_composed(key): _composed(text) for key, text in stone.notes.items()}
+    zone = None if stone.zone is None else _composed(stone.zone)
+    return replace(stone, code=_composed(stone.code), zone=zone, notes=notes)
 
 
 def surveyed_block(stone: StoneRecord) -> SurveyedBlock:
@@ -147,6 +151,10 @@ def frame_record(transform: SiteTransform | None) -> dict[str, Any] | None:
 
 def _values(source: object, names: Iterable[str]) -> dict[str, Any]:
     return {name: getattr(source, name) for name in names}
+
+
+def _composed(text: str) -> str:
+    return unicodedata.normalize("NFC", text)
 
 
 def _finite(value: float) -> float | None:

@@ -1,6 +1,7 @@
 """Files of knowledge: from TOML text to a checked RecordFile, without a database."""
 
 import hashlib
+import unicodedata
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -84,7 +85,9 @@ def read_record(path: str | FilePath) -> RecordFile:
 
 def parse_record(text: str, path: str) -> RecordFile:
     """Check the text of a file of knowledge; `path` appears in messages."""
-    given = parse_toml(text, path, UsageError, "see docs/knowledge.md for a file to start from")
+    # one form of each letter, however it was typed; no line changes its number
+    plain = unicodedata.normalize("NFC", text)
+    given = parse_toml(plain, path, UsageError, "see docs/knowledge.md for a file to start from")
     document = TomlDocument(path, key_lines(text))
     try:
         record, tables = _checked(document, given)

@@ -7,6 +7,7 @@ from typing import Any
 from archmodel.query.functions import knowledge as told
 from archmodel.query.functions import relations as related
 from archmodel.query.functions import spatial as places
+from archmodel.query.functions import texts
 from archmodel.query.functions.usages import STRUCTURE_USAGES, USAGES, Ask, Condition
 from archmodel.query.grammar import Call
 
@@ -47,6 +48,7 @@ _SQL: Mapping[str, Sql] = {
     "documented": told.documented,
     "by": told.by,
     "disputed": told.disputed,
+    "text": texts.text,
     "corrected": told.corrected,
     "in_mechanism": told.in_mechanism,
     "is_a": told.is_a,

@@ -73,6 +73,13 @@ USAGES: Mapping[str, Usages] = {
         ("disputed()", "opinions on its phase or its material differ"),
         ("disputed(phase)", "opinions on its phase differ; or material"),
     ),
+    "text": (
+        (
+            "text('WORDS')",
+            "these words are in what is stated of it or of its structures, in the title of a document that treats "
+            "it, in its notes, or in the title of a structure; upper and lower case (A–Z) are the same",
+        ),
+    ),
     "corrected": (
         ("corrected()", "a person corrected an attribute of it"),
         ("corrected(attribute)", "a person corrected that attribute"),

@@ -70,11 +70,16 @@ def as_table(columns: Mapping[str, str | None], rows: Sequence[Mapping[str, obje
     return "\n".join(map(line, [heads, ["─" * width for width in widths], *cells]))
 
 
-def as_csv(columns: Iterable[str], rows: Iterable[Mapping[str, object]]) -> str:
-    """Format rows as CSV with a header line; unknown values are empty."""
+def as_csv(columns: Iterable[str], rows: Iterable[Mapping[str, object]], *, spreadsheet: bool = False) -> str:
+    """Format rows as CSV with a header line; unknown values are empty.
+
+    Parameters
+    ----------
+    spreadsheet : with the mark of UTF-8, semicolons and decimal commas
+    """
     from pipelines.results.table_csv import csv_text
 
-    return csv_text(columns, rows).rstrip("\n")
+    return csv_text(columns, rows, spreadsheet=spreadsheet).rstrip("\n")
 
 
 def shorten(lines: Sequence[str], shown: int, margin: str = "", hint: str = "") -> list[str]:

@@ -6,12 +6,14 @@ from typing import TYPE_CHECKING
 
 from archmodel.query.api import asked_columns, attributes, find_faces, find_rows
 from archmodel.query.attributes import Attribute
+from archmodel.query.tally import count_by, sorted_rows
 from moma.cli.text.formats import USUAL_COLUMNS, as_csv, as_geojson, as_json, as_table, shown_columns
+from moma.errors import UsageError
 
 if TYPE_CHECKING:
     from sqlalchemy.orm import Session
 
-__all__ = ["Question", "answer"]
+__all__ = ["Question", "answer", "listed"]
 
 
 @dataclass(frozen=True)
@@ -26,6 +28,11 @@ class Question:
     columns : attributes to show; None: those usual in the format
     everything : whether a table has every attribute
     flat : whether faces are given in the plane of the wall
+    sort : attributes by which rows are ordered, with - before those whose largest value comes first
+    top : most rows; None: all
+    count_by : attributes by whose values entities are counted; None: they are listed
+    share_of : number whose share each group of a count is given
+    only_in : expression that is true throughout each group of a count
     """
 
     kind: str
@@ -34,31 +41,92 @@ class Question:
     columns: Sequence[str] | None = None
     everything: bool = False
     flat: bool = False
+    sort: Sequence[str] = ()
+    top: int | None = None
+    count_by: Sequence[str] | None = None
+    share_of: str | None = None
+    only_in: str | None = None
+
+
+def listed(names: str | None) -> list[str] | None:
+    """Split names that commas separate; None stays None."""
+    return None if names is None else [name.strip() for name in names.split(",")]
 
 
 def answer(session: "Session", question: Question, format: str) -> tuple[str, str]:
-    """Answer a query in a format (table, csv, json, geojson), with a note for the person at the terminal."""
+    """Answer a query in a format (table, csv, excel, json, geojson), with a note for the person at the terminal."""
     known = {one.name: one for one in attributes(session, question.kind)}
+    if question.count_by is not None:
+        return _counts(session, question, format)
     names = _names(session, question, known, format)
     asked = (question.kind, question.where, question.run, names)
     if format == "geojson":
+        if question.sort or question.top is not None:
+            raise UsageError(
+                "faces have no order", remedy="leave out --sort and --top, or give another format"
+            )
         faces = find_faces(session, *asked)
         from archmodel.query.geojson import feature_collection, flattened  # and with it numpy
 
         doubts = _disputes(session, question, names)
         return as_geojson(feature_collection(flattened(faces) if question.flat else faces)), doubts
-    rows = find_rows(session, *asked)
-    doubts = _disputes(session, question, names)
-    if format == "json":
-        return as_json(rows), doubts
-    if format == "csv":
-        return as_csv(names, rows), doubts
+    order = [name.removeprefix("-") for name in question.sort]
+    fetched = [*names, *(name for name in dict.fromkeys(order) if name not in names)]
+    rows = sorted_rows(find_rows(session, *asked[:-1], fetched), question.sort)
+    found, rows = len(rows), rows[: question.top]
+    if format == "table":
+        names = fetched
+    rows = [{name: row[name] for name in names} for row in rows]
+    doubts = "" if "code" not in known or "zone" not in known else _disputes(session, question, names)
+    if format != "table":
+        return _written(names, rows, format), doubts
     if not rows:
         return "", f"no {question.kind} found" + "".join(f", where {one}" for one in question.where)
     if not question.everything and question.columns is None:
-        names = shown_columns(names, rows, asked_columns(question.where, session, question.kind))
-    units = {name: known[name.partition("@")[0]].unit for name in names}
-    return as_table(units, rows), "; ".join(filter(None, (f"{len(rows)} found", doubts)))
+        asked_for = [*asked_columns(question.where, session, question.kind), *order]
+        names = shown_columns(names, rows, asked_for)
+    units = {name: known[name.partition("@")[0].lower()].unit for name in names}
+    first = "" if found == len(rows) else f", of which the first {len(rows)} are shown"
+    return as_table(units, rows), "; ".join(filter(None, (f"{found} found{first}", doubts)))
+
+
+def _counts(session: "Session", question: Question, format: str) -> tuple[str, str]:
+    """Answer a query with counts of groups."""
+    if format == "geojson":
+        raise UsageError("counts have no faces", remedy="give --format csv or json")
+    by = question.count_by or ()
+    counted = count_by(
+        session,
+        question.kind,
+        question.where,
+        by,
+        share_of=question.share_of,
+        only_in=question.only_in,
+        run=question.run,
+    )
+    names, rows = list(counted.units), list(counted.rows)
+    if wrong := [name for name in question.sort if name.removeprefix("-") not in names]:
+        raise UsageError(f"{wrong[0]} is not counted", remedy=f"sort by {', '.join(names)}")
+    rows = sorted_rows(rows, question.sort)[: question.top]
+    doubts = "" if "zone" not in _entity_attributes(session, question) else _disputes(session, question, by)
+    note = "; ".join(filter(None, (*counted.notes, doubts)))
+    if format != "table":
+        return _written(names, rows, format), note
+    if not rows:
+        return "", "; ".join(filter(None, (f"no such group of {question.kind}", note)))
+    return as_table(counted.units, rows), note
+
+
+def _entity_attributes(session: "Session", question: Question) -> set[str]:
+    """Return the names of the attributes that the question can ask for."""
+    return {one.name for one in attributes(session, question.kind)}
+
+
+def _written(names: Sequence[str], rows: Sequence[Mapping[str, object]], format: str) -> str:
+    """Write rows as JSON, or as CSV for programs or for spreadsheets."""
+    if format == "json":
+        return as_json(rows)
+    return as_csv(names, rows, spreadsheet=format == "excel")
 
 
 def _disputes(session: "Session", question: Question, names: Sequence[str]) -> str:
@@ -89,5 +157,7 @@ def _names(session: "Session", question: Question, known: Mapping[str, Attribute
     if format != "table" or question.everything:
         return list(known)
     named = asked_columns(question.where, session, question.kind)
+    if "zone" not in known:  # structures have few
+        return list(known)
     usual = [name for name in known if name in USUAL_COLUMNS or name in named]
     return [*usual, *(name for name in named if name not in usual)]

@@ -1,0 +1,98 @@
+"""Attributes of structures that expressions and lists can ask for."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from sqlalchemy import ColumnElement, func, select
+
+from archmodel.query.attributes import Attribute
+from archmodel.query.inherited import held
+from archmodel.query.scope import StructureScope
+from archmodel.tables.knowledge import Material, OfPhase, Phase, Statement
+from archmodel.tables.opinions import preference, rule_of
+from archmodel.tables.relations import Membership
+from archmodel.tables.structures import Structure
+
+__all__ = ["STRUCTURE_ATTRIBUTES"]
+
+Source = Callable[[StructureScope, int | None], ColumnElement[Any]]
+
+
+def _own(name: str) -> Source:
+    """Return a source in a column of the structure."""
+    return lambda scope, run: scope.structure.c[name]
+
+
+def _parent(scope: StructureScope, run: int | None) -> ColumnElement[str]:
+    """Return the code of the structure that it is a part of."""
+    whole = scope.context.alias(Structure)
+    found = select(whole.c.code).where(whole.c.id == scope.structure.c.parent_id)
+    return found.correlate(scope.structure).scalar_subquery()
+
+
+def _members(scope: StructureScope, run: int | None) -> ColumnElement[int]:
+    """Count the entities that are its members, without those of its parts."""
+    rows = scope.context.alias(Membership)
+    count = select(func.count(rows.c.id)).where(rows.c.structure_id == scope.structure.c.id, held(rows))
+    return count.correlate(scope.structure).scalar_subquery()
+
+
+def _parts(scope: StructureScope, run: int | None) -> ColumnElement[int]:
+    """Count the structures that are parts of it."""
+    rows = scope.context.alias(Structure)
+    count = select(func.count(rows.c.id)).where(rows.c.parent_id == scope.structure.c.id, held(rows))
+    return count.correlate(scope.structure).scalar_subquery()
+
+
+def _opinion(about: str, column: str, named: type[Phase] | type[Material]) -> Source:
+    """Return the name that the opinion which holds gives: its own, else that of the nearest structure around it."""
+
+    def value(scope: StructureScope, run: int | None) -> ColumnElement[str]:
+        context = scope.context
+        rule = context.once(("rule", about), lambda: rule_of(context.session, about))
+        reach, said, row = (
+            context.statements_of_structures(about),
+            context.alias(Statement),
+            context.alias(named),
+        )
+        found = (
+            select(row.c.name)
+            .select_from(reach)
+            .join(said, said.c.id == reach.c.statement_id)
+            .join(row, row.c.id == said.c[column])
+            .where(reach.c.structure_id == scope.structure.c.id)
+            .order_by(reach.c.distance, *preference(rule, said, context.alias(Statement)))
+            .limit(1)
+        )
+        return found.correlate(scope.structure).scalar_subquery()
+
+    return value
+
+
+def _attribute(
+    name: str, unit: str | None, meaning: str, source: Any, words: tuple[str, ...] | None = None
+) -> Attribute:
+    return Attribute(name, unit, meaning, source, words=words)
+
+
+STRUCTURE_ATTRIBUTES: Mapping[str, Attribute] = {
+    one.name: one
+    for one in (
+        _attribute("code", None, "its name", _own("code")),
+        _attribute("kind", None, "its own kind, e.g. arch", _own("kind")),
+        _attribute("title", None, "its name in words", _own("title")),
+        _attribute("number", "-", "its place among its like, from the ground", _own("number")),
+        _attribute("side", None, "outer or inner, of a wall facing", _own("side"), ("outer", "inner")),
+        _attribute("parent", None, "code of the structure that it is a part of", _parent),
+        _attribute("parts", "-", "structures that are parts of it", _parts),
+        _attribute("members", "-", "stones that are its members, without those of its parts", _members),
+        _attribute(
+            "phase",
+            None,
+            "name of the phase that it is of",
+            _opinion(OfPhase.__kind__, "phase_id", Phase),
+        ),
+        _attribute("material", None, "name of its material", _opinion("made_of", "material_id", Material)),
+    )
+}
+"""Attributes of a structure, in lists of structures and within ``member_of(…)``."""
