@@ -38,7 +38,7 @@ STUDIES: Mapping[str, Mapping[str, object]] = MappingProxyType(
     {
         "arch": {"load": "horizontal 23", "level": 0.15, "friction": 0.05, "samples": 100},
         "block": {"load": "horizontal y", "level": 0.3, "friction": 0.1, "samples": 200},
-        "window": {"load": "horizontal 97", "level": 0.07, "friction": 0.05, "samples": 100},
+        "window": {"load": "horizontal 97", "level": 0.11, "friction": 0.05, "samples": 100},
     }
 )
 """Load, level of failure, standard deviation of the friction and samples of each."""

@@ -24,6 +24,8 @@ _MOST = 30  # samples of a search
 _STARTS = 8
 """Unknowns along which further searches begin, at most."""
 _OUT = 3.0  # distance of their starts from the mean [-]
+_BELOW = 0.5
+"""Distance of g below the tangent, in standard deviations, from which another way to fail is sought [-]."""
 _DISTINCT = 0.1
 """Distance from which two design points are two [-]."""
 _RELEVANT = 2.0
@@ -104,7 +106,7 @@ def design_points(
     if first is None:
         return ()
     found = [first]
-    for start in _starts(along, dimension):
+    for start in _lower(evaluate, failure, first, _starts(along, dimension)):
         other = design_point(evaluate, failure, start)
         if other is None or not other.converged:
             continue
@@ -113,6 +115,19 @@ def design_points(
             found.append(other)
     found.sort(key=lambda design: design.index)
     return tuple(design for design in found if design.index <= found[0].index + _RELEVANT)
+
+
+def _lower(evaluate: Evaluate, failure: Failure, first: Design, starts: Sequence[Array]) -> list[Array]:
+    """Return the starts at which g is less than the tangent at the first design point says: something else governs."""
+    if not starts:
+        return []
+    states = failure.states(evaluate(np.array(starts)))
+    slope = float(np.linalg.norm(first.gradient))
+    return [
+        start
+        for start, state in zip(starts, states.tolist(), strict=True)
+        if state < float(first.gradient @ (start - first.point)) - _BELOW * slope
+    ]
 
 
 def _starts(along: Sequence[int], dimension: int) -> Sequence[Array]:
