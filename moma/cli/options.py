@@ -279,7 +279,7 @@ CloudFiles = Annotated[
     typer.Option(
         "--cloud",
         metavar="FILE",
-        help="Point cloud: LAS, LAZ, E57, PLY, XYZ or PTS; may be repeated.",
+        help="Point cloud: LAS, LAZ, E57, PTX, PLY, PCD, XYZ or PTS; may be repeated.",
         rich_help_panel=_PANEL,
     ),
 ]

@@ -442,7 +442,8 @@ def survey_report(
 @reporting
 def cloud(
     files: Annotated[
-        list[Path], typer.Argument(metavar="FILE…", help="Point clouds: LAS, LAZ, E57, PLY, XYZ or PTS.")
+        list[Path],
+        typer.Argument(metavar="FILE…", help="Point clouds: LAS, LAZ, E57, PTX, PLY, PCD, XYZ or PTS."),
     ],
     wall: Annotated[
         str | None,

@@ -48,8 +48,8 @@ class TextLines:
     end : number of the last line
     """
 
-    def __init__(self, path: Path) -> None:
-        """Check the whole file.
+    def __init__(self, path: Path, longest: int = _LONGEST) -> None:
+        """Check the whole file, of which a line has at most so many bytes.
 
         Raises
         ------
@@ -57,6 +57,7 @@ class TextLines:
             if it cannot be read or is not text, with the line
         """
         self.path = str(path)
+        self._longest = longest
         self._skip = 0
         self._converted: bytes | None = None
         self.encoding = self._find_encoding()
@@ -178,7 +179,7 @@ class TextLines:
                     if cut:
                         yield self._checked(block[:cut], line)
                         line += block.count(b"\n", 0, cut)
-                    if len(rest) > _LONGEST:
+                    if len(rest) > self._longest:
                         break
         except (OSError, ValueError) as error:
             raise unreadable(self.path, error, "give an existing survey file") from error
@@ -191,11 +192,13 @@ class TextLines:
     def _checked(self, block: bytes, line: int) -> bytes:
         """Return the block unless one of its lines is too long."""
         start = 0
-        while (stop := start + _LONGEST) < len(block):
+        while (stop := start + self._longest) < len(block):
             found = block.rfind(b"\n", start, stop + 1) + 1
             if not found:
                 line += block.count(b"\n", 0, start)
-                raise self.fail(line, f"a line of more than {_LONGEST} bytes", "this is not a survey file")
+                raise self.fail(
+                    line, f"a line of more than {self._longest} bytes", "this is not a survey file"
+                )
             start = found
         return block
 

@@ -16,7 +16,7 @@ _ENDINGS: Mapping[str, tuple[str, ...]] = {
     **ENDINGS,
     "pnezd": (".txt", ".csv"),
     "penzd": (".txt", ".csv"),
-    "cloud": (".las", ".laz", ".e57", ".ply", ".xyz", ".pts"),
+    "cloud": (".las", ".laz", ".e57", ".ply", ".ptx", ".pcd", ".xyz", ".pts"),
     "masks": (".png", ".tif", ".tiff", ".json", ".csv", ".geojson", ".gpkg", ".shp", ".fgb", ".dxf"),
 }
 """Endings of the files that are read of a folder, by format."""

@@ -54,7 +54,7 @@ PROJECT_KEYS = (
     Key(
         "colmap",
         ValueKind.TEXT,
-        "Folder with a text model of COLMAP, instead of marks and cameras.",
+        "Folder with a model of COLMAP, as text or binary, instead of marks and cameras.",
         default=None,
     ),
     Key(

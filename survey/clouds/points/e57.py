@@ -39,7 +39,7 @@ def open_e57(path: Path) -> PointCloud:
         file = pye57.E57(str(path))
         headers = [file.get_header(k) for k in range(file.scan_count)]
         count = sum(int(one.point_count) for one in headers)
-        stations = tuple(_station(k, one) for k, one in enumerate(headers, start=1) if one.has_pose())
+        stations = tuple(_station(k, one) for k, one in enumerate(headers, start=1) if _is_placed(one))
         near = _near(headers)
         warnings = _warnings(pye57, path, headers)
         for one in headers:
@@ -109,6 +109,12 @@ def _fields(path: Path, header: Any) -> tuple[str, ...]:
         if known >= set(system):
             return system
     raise SurveyError("a scan has no coordinates", where=str(path), remedy="export it with coordinates")
+
+
+def _is_placed(header: Any) -> bool:
+    """Return whether a scan says where it was made: an identity as its pose is what programs write that do not know."""
+    identity = np.array_equal(header.rotation_matrix, np.eye(3)) and not np.any(header.translation)
+    return bool(header.has_pose()) and not identity
 
 
 def _station(number: int, header: Any) -> Station:

@@ -1,5 +1,6 @@
 """LAS and LAZ files, read with laspy and lazrs."""
 
+import struct
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,13 @@ from survey.clouds.extras import optional
 from survey.clouds.points.chunks import CHUNK, Chunk, PointCloud
 
 __all__ = ["open_las"]
+
+_HEAD, _LEAST_HEAD = (
+    255,
+    227,
+)  # bytes of the head that say how many points and records there are; before version 1.4
+_RECORD, _EXTENDED = 54, 60  # bytes of the shortest variable-length record, and of an extended one
+_COMPRESSED = 0x80  # bit of the format of points in LAZ
 
 
 def open_las(path: Path) -> PointCloud:
@@ -27,11 +35,12 @@ def open_las(path: Path) -> PointCloud:
     laspy = optional("laspy", "LAS and LAZ files")
     if path.suffix.lower() == ".laz":
         optional("lazrs", "LAZ files")
+    _check_counts(path)
     try:
         with laspy.open(path) as file:
             header = file.header
             count, near = int(header.point_count), (np.array(header.mins) + np.array(header.maxs)) / 2.0
-    except Exception as error:  # laspy lets through what lazrs, struct and numpy raise
+    except BaseException as error:  # laspy lets through what lazrs, struct and numpy raise
         raise _damaged(path, error) from error
     if count and not np.isfinite(near).all():
         near = np.zeros(3)
@@ -43,9 +52,7 @@ def open_las(path: Path) -> PointCloud:
                 for points in file.chunk_iterator(CHUNK):
                     read += len(points)
                     yield Chunk(_places(points, file.header, origin), _colours(points) if colours else None)
-        except GeneratorExit:
-            raise
-        except Exception as error:
+        except BaseException as error:
             raise _damaged(path, error) from error
         if read != count:
             raise SurveyError(
@@ -86,9 +93,37 @@ def _selection(laspy: Any, path: Path, colours: bool) -> dict[str, Any]:
     return {"decompression_selection": wanted}
 
 
-def _damaged(path: Path, error: Exception) -> SurveyError:
+def _check_counts(path: Path) -> None:
+    """Refuse a file that announces more records or points than it has room for, before memory is reserved for them."""
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        head = file.read(_HEAD)
+    if head[:4] != b"LASF" or len(head) < _LEAST_HEAD:
+        return  # laspy says what it is not
+    length, start, records, form, point, count = struct.unpack_from("<HIIBHI", head, 94)
+    extended = 0
+    if head[25] >= 4 and len(head) >= _HEAD:
+        extended, count = struct.unpack_from("<IQ", head, 243)
+    room = (start - length) // _RECORD + (size - start) // _EXTENDED
+    for what, many, most in (
+        ("records in its head", records, (min(start, size) - length) // _RECORD),
+        ("extended records", extended, room),
+        ("points", count, (size - start) // point if point and not form & _COMPRESSED else count),
+    ):
+        if many > max(most, 0):
+            raise SurveyError(
+                f"the file announces {many} {what} and has room for {max(most, 0)}",
+                where=str(path),
+                remedy="export it again",
+            )
+
+
+def _damaged(path: Path, error: BaseException) -> BaseException:
+    """Return what to raise: a panic of lazrs, which is written in Rust, is no `Exception`; others of these pass."""
+    if not isinstance(error, Exception) and type(error).__name__ != "PanicException":
+        return error
     return SurveyError(
         f"cannot be read as LAS or LAZ: {' '.join(str(error).split())[:120]}",
         where=str(path),
-        remedy="export it again",
+        remedy="export it again, as LAZ 1.2 or later",
     )

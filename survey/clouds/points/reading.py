@@ -7,7 +7,9 @@ from moma.errors import UsageError
 from survey.clouds.points.chunks import PointCloud
 from survey.clouds.points.e57 import open_e57
 from survey.clouds.points.las import open_las
+from survey.clouds.points.pcd import open_pcd
 from survey.clouds.points.ply import open_ply
+from survey.clouds.points.ptx import open_ptx
 from survey.clouds.points.text import open_text
 
 __all__ = ["CLOUDS", "open_points"]
@@ -17,6 +19,8 @@ CLOUDS: Mapping[str, Callable[[Path], PointCloud]] = {
     ".laz": open_las,
     ".e57": open_e57,
     ".ply": open_ply,
+    ".ptx": open_ptx,
+    ".pcd": open_pcd,
     ".xyz": open_text,
     ".pts": open_text,
     ".asc": open_text,
@@ -26,8 +30,6 @@ CLOUDS: Mapping[str, Callable[[Path], PointCloud]] = {
 """Readers by the ending of the file."""
 
 _OTHERS = {
-    ".ptx": "PTX",
-    ".pcd": "PCD",
     ".fls": "FARO scan",
     ".rcp": "ReCap project",
     ".rcs": "ReCap scan",

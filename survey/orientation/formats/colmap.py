@@ -1,4 +1,4 @@
-"""Text models of COLMAP: cameras.txt, images.txt and points3D.txt in one folder.
+"""Models of COLMAP: cameras.txt, images.txt and points3D.txt in one folder, or the same in binary files (.bin).
 
     cameras.txt    CAMERA_ID MODEL WIDTH HEIGHT PARAMS…
     images.txt     IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then a line of X Y POINT3D_ID for each mark
@@ -18,7 +18,8 @@ from moma.errors import SurveyError
 from moma.tables.text_lines import TextLines
 from survey.arrays import Array
 from survey.formats.fields import parse_number, shown
-from survey.orientation.formats.marks import marks_of_points, numbered
+from survey.orientation.formats.colmap_binary import binary_cameras, binary_images, binary_points
+from survey.orientation.formats.marks import marked_well, marks_of_points, numbered
 from survey.orientation.network import Camera, Network, Photo
 
 __all__ = ["read_colmap", "write_colmap"]
@@ -31,6 +32,9 @@ _MODELS = {
     "OPENCV": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"),
     "FULL_OPENCV": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
 }
+_LONGEST = (
+    1 << 26
+)  # bytes of a line, which holds all marks of a photograph or of a point: a million of 60 bytes
 _FLIP = np.diag([1.0, -1.0, -1.0])  # from y up and z backwards to y down and z forward
 
 
@@ -46,7 +50,7 @@ def read_colmap(folder: Path, sigma: float = 1.0) -> Network:
 
     Parameters
     ----------
-    folder : with the three files
+    folder : with the three files, as text or binary
     sigma : standard deviation of marks [px]
 
     Raises
@@ -54,35 +58,47 @@ def read_colmap(folder: Path, sigma: float = 1.0) -> Network:
     SurveyError
         naming file and line
     """
-    cameras = _cameras(folder / "cameras.txt")
-    images = _images(folder / "images.txt", {number: k for k, number in enumerate(cameras)})
-    places = _points(folder / "points3D.txt")
+    ending = "txt" if (folder / "images.txt").exists() or not (folder / "images.bin").exists() else "bin"
+    source = folder / f"images.{ending}"
+    if ending == "txt":
+        cameras = _cameras(folder / "cameras.txt")
+        images = _images(source, {number: k for k, number in enumerate(cameras)})
+        places = _points(folder / "points3D.txt")
+    else:
+        cameras = {
+            number: _camera(number, model, size, values, where)
+            for number, model, size, values, where in binary_cameras(folder / "cameras.bin")
+        }
+        images = _of_binary(source, {number: k for k, number in enumerate(cameras)})
+        places = binary_points(folder / "points3D.bin")
     index = {number: k for k, number in enumerate(places)}
     photo, point, image, lines = list[int](), list[int](), list[Array](), list[int]()
     for k, one in enumerate(images):
         for number, place, line in one.marks:
             if number not in index:
                 raise SurveyError(
-                    f"point {number} is not in points3D.txt",
-                    where=f"{folder / 'images.txt'}:{line}",
+                    f"point {number} is not in points3D.{ending}",
+                    where=f"{source}:{line}" if line else str(source),
                     remedy="export the model again",
                 )
             photo.append(k)
             point.append(index[number])
             image.append(place)
             lines.append(line)
-    return Network(
-        str(folder / "images.txt"),
-        tuple(cameras.values()),
-        tuple(one.photo for one in images),
-        tuple(map(str, places)),
-        np.array(list(places.values())).reshape(-1, 3),
-        (),
-        np.array(photo, dtype=np.int64),
-        np.array(point, dtype=np.int64),
-        np.array(image).reshape(-1, 2),
-        np.full((len(photo), 2), sigma),
-        np.array(lines, dtype=np.int64),
+    return marked_well(
+        Network(
+            str(source),
+            tuple(cameras.values()),
+            tuple(one.photo for one in images),
+            tuple(map(str, places)),
+            np.array(list(places.values())).reshape(-1, 3),
+            (),
+            np.array(photo, dtype=np.int64),
+            np.array(point, dtype=np.int64),
+            np.array(image).reshape(-1, 2),
+            np.full((len(photo), 2), sigma),
+            np.array(lines, dtype=np.int64),
+        )
     )
 
 
@@ -98,31 +114,38 @@ def _cameras(path: Path) -> dict[int, Camera]:
     lines, out = TextLines(path), dict[int, Camera]()
     for line, text in lines.rows():
         where, words = f"{lines.path}:{line}", text.split()
-        if len(words) < 4 or words[1] not in _MODELS:
-            raise SurveyError(
-                f"camera model {shown(words[1] if len(words) > 1 else '')} cannot be read",
-                where=where,
-                remedy=f"models that can: {', '.join(_MODELS)}",
-            )
-        names = _MODELS[words[1]]
-        if len(words) != 4 + len(names):
-            raise SurveyError(
-                f"{len(words) - 4} parameters of {words[1]}", where=where, remedy=f"it has {', '.join(names)}"
-            )
-        values = dict(
-            zip(names, (parse_number(word, "a parameter", where) for word in words[4:]), strict=True)
-        )
-        for name in ("k4", "k5", "k6"):
-            if values.get(name):
-                raise SurveyError(
-                    f"{name} = {values[name]:g}: rational distortion cannot be read",
-                    where=where,
-                    remedy="estimate the model OPENCV",
-                )
+        model = words[1] if len(words) > 1 else ""
+        if len(words) < 4:
+            raise _unknown(model, where)
         number = _number(words[0], "the camera", where)
         size = _number(words[2], "the width", where), _number(words[3], "the height", where)
-        out[number] = Camera(f"camera{number}", _inner(values), size, 1.0, "px", True, where=where)
+        values = [parse_number(word, "a parameter", where) for word in words[4:]]
+        out[number] = _camera(number, model, size, values, where)
     return out
+
+
+def _unknown(model: str, where: str) -> SurveyError:
+    what, remedy = f"camera model {shown(model)} cannot be read", f"models that can: {', '.join(_MODELS)}"
+    return SurveyError(what, where=where, remedy=remedy)
+
+
+def _camera(number: int, model: str, size: tuple[int, int], given: Sequence[float], where: str) -> Camera:
+    if model not in _MODELS:
+        raise _unknown(model, where)
+    names = _MODELS[model]
+    if len(given) != len(names):
+        raise SurveyError(
+            f"{len(given)} parameters of {model}", where=where, remedy=f"it has {', '.join(names)}"
+        )
+    values = dict(zip(names, given, strict=True))
+    for name in ("k4", "k5", "k6"):
+        if values.get(name):
+            raise SurveyError(
+                f"{name} = {values[name]:g}: rational distortion cannot be read",
+                where=where,
+                remedy="estimate the model OPENCV",
+            )
+    return Camera(f"camera{number}", _inner(values), size, 1.0, "px", True, where=where)
 
 
 def _inner(values: dict[str, float]) -> Array:
@@ -138,7 +161,7 @@ def _inner(values: dict[str, float]) -> Array:
 
 
 def _images(path: Path, cameras: dict[int, int]) -> list[_Image]:
-    lines = TextLines(path)
+    lines = TextLines(path, longest=_LONGEST)
     # the line of marks may be empty, so that empty lines count
     rows = [(line, text) for line, text in lines if not text.lstrip().startswith("#")]
     while rows and not rows[-1][1].strip() and len(rows) % 2:
@@ -159,9 +182,8 @@ def _images(path: Path, cameras: dict[int, int]) -> list[_Image]:
             raise SurveyError(
                 f"camera {camera} is not in cameras.txt", where=where, remedy="export the model again"
             )
-        q = np.array([parse_number(word, "the pose", where) for word in words[1:8]])
-        turn, t = _rotation(q[:4], where), q[4:]
-        photo = Photo(words[9].strip(), cameras[camera], turn.T @ _FLIP, -turn.T @ t, where=where)
+        pose = np.array([parse_number(word, "the pose", where) for word in words[1:8]])
+        photo = _photo(words[9].strip(), cameras[camera], pose, where)
         values = marks.split()
         if len(values) % 3:
             raise SurveyError(
@@ -179,6 +201,26 @@ def _images(path: Path, cameras: dict[int, int]) -> list[_Image]:
         out.append(_Image(number, photo, found))
     if not out:
         raise SurveyError("the file has no images", where=lines.path, remedy="export the model again")
+    return out
+
+
+def _photo(name: str, camera: int, pose: Array, where: str) -> Photo:
+    turn, t = _rotation(pose[:4], where), pose[4:]
+    return Photo(name, camera, turn.T @ _FLIP, -turn.T @ t, where=where)
+
+
+def _of_binary(path: Path, cameras: dict[int, int]) -> list[_Image]:
+    out = list[_Image]()
+    for one in binary_images(path):
+        where = f"{path}, image {one.number}"
+        if one.camera not in cameras:
+            raise SurveyError(
+                f"camera {one.camera} is not in cameras.bin", where=where, remedy="export the model again"
+            )
+        marks = [(int(point), place, 0) for point, place in zip(one.points, one.places, strict=True)]
+        out.append(_Image(one.number, _photo(one.name, cameras[one.camera], one.pose, where), marks))
+    if not out:
+        raise SurveyError("the file has no images", where=str(path), remedy="export the model again")
     return out
 
 
@@ -213,7 +255,7 @@ def _quaternion(rotation: Array) -> list[float]:
 
 
 def _points(path: Path) -> dict[int, Array]:
-    lines, out = TextLines(path), dict[int, Array]()
+    lines, out = TextLines(path, longest=_LONGEST), dict[int, Array]()
     for line, text in lines.rows():
         where, words = f"{lines.path}:{line}", text.split()
         if len(words) < 4:

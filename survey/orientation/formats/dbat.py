@@ -9,9 +9,9 @@
         cameras/camera: name, unit, sensor, image, focal, cc, pp, K, P, aspect, skew, model
     document/operations: set_bundle_estimate_params/io names what is calibrated
 
-Tables have commas between their values. K, P and the aspect are written as what the lens does, not as its correction:
-of the backward models with the opposite sign of the values in result files, and 1 - as. The operations themselves are
-not run: start values that are not given are found here.
+Tables have commas between their values. As in its result files since version 0.9.1.2, the principal point counts to the
+right and down from the upper left corner, and K and P have the signs of a correction; the aspect of backward models is
+1 - as. The operations themselves are not run: start values that are not given are found here.
 """
 
 from collections.abc import Mapping
@@ -252,7 +252,7 @@ def _camera(one: Element, free: tuple[str, ...]) -> Camera:
         raise one.need("sensor").fail(
             f"pixels of {width / image[0]:g} × {pixel:g} mm", "check the sensor's size"
         )
-    xp, yp = (pp[0], -pp[1]) if len(pp) == 2 and any(pp) else (0.5 * width, 0.5 * height)
+    xp, yp = (pp[0], pp[1]) if len(pp) == 2 and any(pp) else (0.5 * width, 0.5 * height)
     radial, tangential = (values("K", 3) + [0.0] * 3)[:3], (values("P", 2) + [0.0] * 2)[:2]
     model = one.find("model")
     number = 1 if model is None else int(model.numbers(1)[0])
@@ -267,7 +267,8 @@ def _camera(one: Element, free: tuple[str, ...]) -> Camera:
             yp,
             side * (aspect - 1.0),
             values("skew", 1)[0],
-            *(side * one for one in (*radial, *tangential)),
+            *radial,
+            *tangential,
         ]
     )
     return Camera(
@@ -351,7 +352,7 @@ def write_dbat(network: Network, folder: Path) -> Path:
     inner = dict(zip(INTERIOR, camera.inner.tolist(), strict=True))
     width, height = camera.size
     side = 1.0 if camera.forward else -1.0
-    k, p = (",".join(repr(side * inner[name]) for name in names) for names in (_PARTS["K"], _PARTS["P"]))
+    k, p = (",".join(repr(inner[name]) for name in names) for names in (_PARTS["K"], _PARTS["P"]))
     estimated = "".join(f"<{name}>true</{name}>" for name in camera.free)
     script = [
         '<?xml version="1.0" encoding="UTF-8"?>',
@@ -367,7 +368,7 @@ def write_dbat(network: Network, folder: Path) -> Path:
         f"<sensor>auto,{camera.pixel * height!r}</sensor>",
         f"<image>{width},{height}</image>",
         f"<cc>{inner['c']!r}</cc>",
-        f"<pp>{inner['xp']!r},{-inner['yp']!r}</pp>",
+        f"<pp>{inner['xp']!r},{inner['yp']!r}</pp>",
         f"<aspect>{1.0 + side * inner['as']!r}</aspect>",
         f"<skew>{inner['sk']!r}</skew>",
         f"<K>{k}</K>",

@@ -5,7 +5,7 @@ corner. Lines that begin with # are comments. The Damped Bundle Adjustment Toolb
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,7 @@ from moma.tables.table import Table, read_table
 from survey.arrays import Array
 from survey.orientation.network import Camera, Network, Photo, listed
 
-__all__ = ["MarkRow", "marks_of_points", "network_of", "numbered", "read_marks", "write_marks"]
+__all__ = ["MarkRow", "marked_well", "marks_of_points", "network_of", "numbered", "read_marks", "write_marks"]
 
 _COLUMNS: Mapping[str, Sequence[str]] = {
     "photograph": (
@@ -29,6 +29,7 @@ _COLUMNS: Mapping[str, Sequence[str]] = {
     "y": ("y", "v", "row", "line", "y px", "py", "pixel y", "Zeile"),
     "sigma": SIGMA,
 }
+_FEWEST = 3  # marks by which a photograph can be oriented
 _PLACES = {one: k for k, one in enumerate(_COLUMNS)}
 _REMEDY = "write: photograph, point, x, y, sigma if it has one"
 
@@ -177,6 +178,29 @@ def numbered(network: Network, table: Path) -> tuple[str, ...]:
     text = ["# number, name", *(f"{number}, {name}" for number, name in pairs), ""]
     table.write_text("\n".join(text), encoding="utf-8", newline="\n")
     return numbers
+
+
+def marked_well(network: Network) -> Network:
+    """Leave out photographs with too few marks to be oriented, with a remark that names them."""
+    counts = np.bincount(network.photo, minlength=len(network.photos))
+    kept = counts >= _FEWEST
+    if kept.all() or not kept.any():
+        return network
+    place, rays = np.cumsum(kept) - 1, kept[network.photo]
+    names = [one.name for one, stays in zip(network.photos, kept, strict=True) if not stays]
+    return replace(
+        network,
+        photos=tuple(one for one, stays in zip(network.photos, kept, strict=True) if stays),
+        photo=place[network.photo[rays]],
+        point=network.point[rays],
+        image=network.image[rays],
+        sigma=network.sigma[rays],
+        lines=network.lines[rays],
+        remarks=(
+            *network.remarks,
+            f"photographs with fewer than {_FEWEST} marks are left out: {listed(names)}",
+        ),
+    )
 
 
 def marks_of_points(network: Network) -> list[list[int]]:

@@ -8,6 +8,7 @@ survey, and their marks on the photographs. Distortion is forward, of coordinate
     u = w/2 + c_x + x' f + x' B₁ + y' B₂,   v = h/2 + c_y + y' f
 """
 
+from dataclasses import replace
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
@@ -16,7 +17,8 @@ import numpy as np
 from moma.errors import SurveyError
 from survey.arrays import Array
 from survey.formats.fields import parse_number
-from survey.orientation.formats.marks import marks_of_points
+from survey.orientation.formats.local_frame import LocalFrame
+from survey.orientation.formats.marks import marked_well, marks_of_points
 from survey.orientation.formats.xml_lines import Element, read_xml
 from survey.orientation.network import Camera, Control, Network, Photo
 
@@ -40,29 +42,63 @@ def read_metashape(path: Path, markers: Path | None = None, sigma: float = 1.0) 
         naming file and line
     """
     chunk = read_xml(path, "document").need("chunk")
-    sensors = {one.attribute("id"): k for k, one in enumerate(chunk.all("sensors", "sensor"))}
-    cameras = tuple(_camera(one) for one in chunk.all("sensors", "sensor"))
-    world = _world(chunk)
-    photos: dict[str, Photo] = {}
-    for one in _grouped(chunk, "cameras", "camera"):
-        if one.attributes.get("enabled", "true").lower() in ("0", "false"):
-            continue
-        if one.attribute("sensor_id") not in sensors:
+    shown = [one for one in _grouped(chunk, "cameras", "camera") if _is_enabled(one)]
+    known = {one.attribute("id"): one for one in chunk.all("sensors", "sensor")}
+    for one in shown:
+        if one.attribute("sensor_id") not in known:
             raise one.fail(
                 f"sensor {one.attributes['sensor_id']} is not in the file", "export the cameras again"
             )
-        photos[one.attribute("id")] = _photo(one, sensors[one.attributes["sensor_id"]], world)
+    # a project has sensors of photographs that were left out
+    used = [number for number in known if any(one.attributes["sensor_id"] == number for one in shown)]
+    sensors = {number: k for k, number in enumerate(used)}
+    cameras = tuple(_camera(known[number]) for number in used)
+    other = chunk if markers is None else read_xml(markers, "document").need("chunk")
+    frame = _local_frame(chunk, other)
+    worlds = {name: frame.moved(one) if frame else one for name, one in _worlds(chunk).items()}
+    photos = {
+        one.attribute("id"): _photo(
+            one,
+            sensors[one.attributes["sensor_id"]],
+            worlds.get(one.attributes.get("component_id", ""), worlds[""]),
+        )
+        for one in shown
+    }
     if not photos:
         raise chunk.fail("the chunk has no cameras", "export the cameras")
-    other = chunk if markers is None else read_xml(markers, "document").need("chunk")
-    remarks = []
-    if (
-        (reference := chunk.find("reference")) is not None
-        and "LOCAL_CS" not in reference.text
-        and reference.text.strip()
-    ):
-        remarks.append("the chunk is georeferenced: places are geocentric")
-    return _network(path if markers is None else markers, other, cameras, photos, sigma, tuple(remarks))
+    source = path if markers is None else markers
+    network = _network(source, other, cameras, photos, sigma, _remarks(chunk, frame))
+    return network if frame is None else _in_frame(network, frame)
+
+
+def _remarks(chunk: Element, frame: LocalFrame | None) -> tuple[str, ...]:
+    if frame is not None:
+        lon, lat, height = frame.origin.tolist()
+        return (
+            f"places are metres to the east, north and up from longitude {lon:.8f}°, latitude {lat:.8f}°, "
+            f"height {height:.3f} m (WGS 84)",
+        )
+    text = "" if (reference := chunk.find("reference")) is None else reference.text.strip()
+    return ("the chunk is georeferenced: places are geocentric",) if text and "LOCAL_CS" not in text else ()
+
+
+def _local_frame(chunk: Element, markers: Element) -> LocalFrame | None:
+    """Return the frame at the first marker, where the chunk has longitudes and latitudes; None elsewhere."""
+    reference = chunk.find("reference") or markers.find("reference")
+    if reference is None or not reference.text.strip().startswith(("GEOGCS", "GEOGCRS")):
+        return None
+    found = (one.find("reference") for one in _grouped(markers, "markers", "marker"))
+    first = next((one for one in found if one is not None and "x" in one.attributes), None)
+    return None if first is None else LocalFrame(np.array([first.number(name) for name in "xyz"]))
+
+
+def _in_frame(network: Network, frame: LocalFrame) -> Network:
+    """Return a network whose control points, given by longitude, latitude and height, are in a local frame."""
+    control = tuple(replace(one, place=frame.place(one.place)) for one in network.control)
+    start = network.start.copy()
+    for one in control:
+        start[one.point] = one.place
+    return replace(network, control=control, start=start)
 
 
 def _grouped(chunk: Element, outer: str, inner: str) -> list[Element]:
@@ -111,9 +147,24 @@ def _camera(sensor: Element) -> Camera:
     return Camera(name, np.array(inner), (width, height), 1.0, "px", True, where=one.where)
 
 
-def _world(chunk: Element) -> tuple[Array, Array, float]:
-    """Return rotation, shift and scale from the chunk to the world."""
-    own = chunk.find("transform")
+def _is_enabled(one: Element) -> bool:
+    return one.attributes.get("enabled", "true").lower() not in ("0", "false")
+
+
+def _worlds(chunk: Element) -> dict[str, tuple[Array, Array, float]]:
+    """Return rotation, shift and scale from each component to the world, "" for photographs of none.
+
+    Since version 2.0 a chunk has components, each with a transform of its own.
+    """
+    components = {one.attribute("id"): one.find("transform") for one in chunk.all("components", "component")}
+    outer = chunk.find("components")
+    active = components.get("" if outer is None else outer.attributes.get("active_id", ""))
+    default = chunk.find("transform") or active
+    found = {number: _world(one or default) for number, one in components.items()}
+    return found | {"": _world(default)}
+
+
+def _world(own: Element | None) -> tuple[Array, Array, float]:
     if own is None:
         return np.eye(3), np.zeros(3), 1.0
     rotation, shift, scale = own.find("rotation"), own.find("translation"), own.find("scale")
@@ -149,16 +200,8 @@ def _network(
     markers = {one.attribute("id"): one for one in _grouped(chunk, "markers", "marker")}
     names = [one.attributes.get("label") or number for number, one in markers.items()]
     index = {number: k for k, number in enumerate(markers)}
-    accuracy = next(
-        (
-            one
-            for one in chunk.all("settings", "property")
-            if one.attributes.get("name") == "accuracy_projections"
-        ),
-        None,
-    )
-    if accuracy is not None:
-        sigma = accuracy.number("value")
+    sigma = _setting(chunk, "accuracy_projections") or sigma
+    common = _setting(chunk, "accuracy_markers")
     control = tuple(
         Control(
             index[number],
@@ -169,7 +212,7 @@ def _network(
         )
         for number, one in markers.items()
         if (found := one.find("reference")) is not None and "x" in found.attributes
-        for place, covariance in [_reference(found)]
+        for place, covariance in [_reference(found, common)]
     )
     photo, point, image, lines, seen = (
         list[int](),
@@ -198,26 +241,36 @@ def _network(
     start = np.full((len(names), 3), np.nan)
     for one in control:
         start[one.point] = one.place
-    return Network(
-        str(path),
-        cameras,
-        tuple(photos.values()),
-        tuple(names),
-        start,
-        control,
-        np.array(photo, dtype=np.int64),
-        np.array(point, dtype=np.int64),
-        np.array(image).reshape(-1, 2),
-        np.full((len(photo), 2), sigma),
-        np.array(lines, dtype=np.int64),
-        remarks,
+    return marked_well(
+        Network(
+            str(path),
+            cameras,
+            tuple(photos.values()),
+            tuple(names),
+            start,
+            control,
+            np.array(photo, dtype=np.int64),
+            np.array(point, dtype=np.int64),
+            np.array(image).reshape(-1, 2),
+            np.full((len(photo), 2), sigma),
+            np.array(lines, dtype=np.int64),
+            remarks,
+        )
     )
 
 
-def _reference(one: Element) -> tuple[Array, Array]:
-    """Return the place of a marker by survey, and its covariance."""
+def _setting(chunk: Element, name: str) -> float | None:
+    """Return an accuracy that the chunk states for all that have none of their own."""
+    found = next((e for e in chunk.all("settings", "property") if e.attributes.get("name") == name), None)
+    return None if found is None else found.number("value")
+
+
+def _reference(one: Element, common: float | None) -> tuple[Array, Array]:
+    """Return the place of a marker by survey, and its covariance, by the accuracy of the chunk if it has none."""
     sigmas = [one.attributes.get(name) or one.attributes.get("sxyz") for name in ("sx", "sy", "sz")]
-    deviations = [0.0 if text is None else parse_number(text, "a deviation", one.where) for text in sigmas]
+    deviations = [
+        common or 0.0 if text is None else parse_number(text, "a deviation", one.where) for text in sigmas
+    ]
     return np.array([one.number(name) for name in "xyz"]), np.diag(np.square(deviations))
 
 

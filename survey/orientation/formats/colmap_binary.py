@@ -1,0 +1,148 @@
+"""Binary models of COLMAP: cameras.bin, images.bin and points3D.bin, little-endian, each a count and then records.
+
+cameras.bin    id, model, width, height, parameters
+images.bin     id, quaternion w x y z, translation, camera, name and a zero, count, then x, y, point of each mark
+points3D.bin   id, place, colour, error, count, then image and mark of each observation
+"""
+
+import struct
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from moma.errors import SurveyError
+from survey.arrays import Array, Ints
+from survey.formats.fields import unreadable
+
+__all__ = ["MODELS", "BinaryImage", "binary_cameras", "binary_images", "binary_points"]
+
+MODELS: Mapping[int, tuple[str, int]] = {
+    0: ("SIMPLE_PINHOLE", 3),
+    1: ("PINHOLE", 4),
+    2: ("SIMPLE_RADIAL", 4),
+    3: ("RADIAL", 5),
+    4: ("OPENCV", 8),
+    5: ("OPENCV_FISHEYE", 8),
+    6: ("FULL_OPENCV", 12),
+    7: ("FOV", 5),
+    8: ("SIMPLE_RADIAL_FISHEYE", 4),
+    9: ("RADIAL_FISHEYE", 5),
+    10: ("THIN_PRISM_FISHEYE", 12),
+}
+"""Names of camera models, and the number of their parameters."""
+
+_MARK = np.dtype([("place", "<f8", 2), ("point", "<i8")])
+_TRACK = 8  # bytes of an observation of a point
+
+
+@dataclass(frozen=True)
+class BinaryImage:
+    """An image.
+
+    Attributes
+    ----------
+    number, camera, name : as in the file
+    pose : (7,) quaternion w, x, y, z and translation
+    places : (n, 2) marks that have a point [px]
+    points : (n,) numbers of these
+    """
+
+    number: int
+    camera: int
+    name: str
+    pose: Array
+    places: Array
+    points: Ints
+
+
+class _Bytes:
+    """Content of a file that is read from its beginning to its end."""
+
+    def __init__(self, path: Path, least: int) -> None:
+        self.path, self.place = path, 0
+        try:
+            self.data = path.read_bytes()
+        except OSError as error:
+            raise unreadable(path, error, "export the model again") from error
+        (self.count,) = self.take("<Q")
+        if self.count * least > len(self.data):
+            raise self.fail(f"the file announces {self.count} records, more than it has room for")
+
+    def fail(self, what: str) -> SurveyError:
+        return SurveyError(what, where=f"{self.path}, byte {self.place}", remedy="export the model again")
+
+    def skip(self, count: int) -> int:
+        """Return the place before so many bytes that are there, and go on behind them."""
+        before = self.place
+        if count > len(self.data) - before:
+            raise self.fail(f"the file ends {count - len(self.data) + before} bytes too early")
+        self.place += count
+        return before
+
+    def take(self, form: str) -> tuple[int, ...]:
+        return struct.unpack_from(form, self.data, self.skip(struct.calcsize(form)))
+
+    def text(self) -> str:
+        end = self.data.find(b"\0", self.place)
+        if end < 0:
+            raise self.fail("a name without its end")
+        return self.data[self.skip(end + 1 - self.place) : end].decode("utf-8", "replace")
+
+
+def binary_cameras(path: Path) -> Iterator[tuple[int, str, tuple[int, int], list[float], str]]:
+    """Yield number, name of the model, width and height, parameters and place of each camera.
+
+    Raises
+    ------
+    SurveyError
+        if the file is damaged
+    """
+    data = _Bytes(path, 24)
+    for _ in range(data.count):
+        where = f"{path}, byte {data.place}"
+        number, model, width, height = data.take("<IiQQ")
+        if model not in MODELS:
+            raise data.fail(f"a camera model with the number {model}")
+        name, count = MODELS[model]
+        yield number, name, (width, height), [float(one) for one in data.take(f"<{count}d")], where
+
+
+def binary_images(path: Path) -> Iterator[BinaryImage]:
+    """Yield the images.
+
+    Raises
+    ------
+    SurveyError
+        if the file is damaged
+    """
+    data = _Bytes(path, 4 + 7 * 8 + 4 + 1 + 8)
+    for _ in range(data.count):
+        (number,) = data.take("<I")
+        pose = np.array(data.take("<7d"))
+        (camera,) = data.take("<I")
+        name = data.text()
+        (count,) = data.take("<Q")
+        start = data.skip(count * _MARK.itemsize)
+        marks = np.frombuffer(data.data, _MARK, count, start)
+        marks = marks[marks["point"] >= 0]
+        yield BinaryImage(number, camera, name, pose, marks["place"].copy(), marks["point"].copy())
+
+
+def binary_points(path: Path) -> dict[int, Array]:
+    """Return the places (3,) of the points by their numbers.
+
+    Raises
+    ------
+    SurveyError
+        if the file is damaged
+    """
+    data, out = _Bytes(path, 8 + 3 * 8 + 3 + 8 + 8), dict[int, Array]()
+    for _ in range(data.count):
+        (number,) = data.take("<Q")
+        out[number] = np.array(data.take("<3d"))
+        data.skip(3 + 8)
+        (count,) = data.take("<Q")
+        data.skip(count * _TRACK)
+    return out
