@@ -36,7 +36,7 @@ fails_below = {level}
 
 STUDIES: Mapping[str, Mapping[str, object]] = MappingProxyType(
     {
-        "arch": {"load": "horizontal 23", "level": 0.15, "friction": 0.05, "samples": 100},
+        "arch": {"load": "horizontal 23", "level": 0.45, "friction": 0.05, "samples": 100},
         "block": {"load": "horizontal y", "level": 0.3, "friction": 0.1, "samples": 200},
         "window": {"load": "horizontal 97", "level": 0.11, "friction": 0.05, "samples": 100},
     }
