@@ -8,6 +8,7 @@ Rooms, each on those above it::
     store        stones, runs and revisions of rows, into it and out of it
     query        the query language and its API
     relations    neighbours, courses, arches and load paths computed from the geometry
+    stratigraphy relations between units, their order in time, the matrix
     assertions   declaring, correcting and withdrawing knowledge
     describe     descriptions of a stone or a structure, its history and its sources
     exchange     the whole of it as one JSON document

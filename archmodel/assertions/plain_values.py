@@ -11,6 +11,7 @@ from archmodel.tables.knowledge import (
     OfPhase,
     Statement,
 )
+from archmodel.tables.stratigraphy import Stratigraphy
 
 __all__ = ["entry_values", "statement_values"]
 
@@ -23,7 +24,8 @@ def statement_values(statement: Statement) -> Values:
     Returns
     -------
     dict
-        material, phase, sign, place, type, severity, at [m], value, sigma [m] or key, as its kind has them; then
+        material, phase, sign, place, type, severity, at [m], value, sigma [m], relation, to or key, as its
+        kind has them; then
         by (author, where that is not who recorded it), certainty, text, document (code), locator, observed_on
     """
     document = statement.document
@@ -66,6 +68,9 @@ def _own(statement: Statement) -> Values:
             return {"type": statement.type, **rest, "at": [x, y, z]}
         case DepthEvidence(value=value, sigma=sigma):
             return {"value": value, "sigma": sigma}
+        case Stratigraphy(relation=relation):
+            target = statement.object_structure or statement.object_entity
+            return {"relation": relation, "to": None if target is None else target.code}
         case Note(key=key):
             return {"key": key}
         case Decision(about=about, chosen=chosen):

@@ -24,6 +24,7 @@ _LISTS: Mapping[str, str] = {
     "depth_evidence": "depth",
     "documents": "reference",
     "notes": "note",
+    "stratigraphy": "stratigraphy",
 }
 """Statements that add up: under what name they are listed, and of which kind they are."""
 

@@ -5,6 +5,6 @@ Public: `Entity`, `kind_named`, `kinds`, `own_attributes` (entities); `Structure
 `Simplification`, `Survey` (surveys); `CellResult`, `ContactPoint`, `EntityResult`, `JointResult`, `MechanismStone`,
 `Run` (runs);
 `Entry`, `held_at`, `new_entry` (entries); `StoneAttribute`, `attribute` (base); `definition_of`, `kind_of`,
-`kinds_below` (hierarchy); `RegisteredKind` (registered);
+`kinds_below` (hierarchy); `Stratigraphy` (stratigraphy); `RegisteredKind` (registered);
 `SCHEMA_VERSION`, `metadata` (layout).
 """

@@ -181,8 +181,8 @@ class Statement(Recorded, Base):
     certainty: Mapped[float | None]
     supersedes_id: Mapped[int | None] = mapped_column(ForeignKey("statement.id"))
 
-    entity: Mapped[Entity | None] = relationship()
-    structure: Mapped[Structure | None] = relationship()
+    entity: Mapped[Entity | None] = relationship(foreign_keys=[entity_id])
+    structure: Mapped[Structure | None] = relationship(foreign_keys=[structure_id])
     document: Mapped[Document | None] = relationship()
 
     @declared_attr.directive

@@ -10,6 +10,7 @@ from archmodel.tables import (
     registered,  # noqa: F401
     relations,  # noqa: F401
     runs,  # noqa: F401
+    stratigraphy,  # noqa: F401
     structures,  # noqa: F401
     surveys,  # noqa: F401
 )

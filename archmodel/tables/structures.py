@@ -19,7 +19,8 @@
     ├── Window
     ├── Door
     ├── Machicolation
-    └── Crenelation
+    ├── Crenelation
+    └── StratigraphicUnit
 
 Structures contain structures (`parent`), and entities are members of structures (`relations.Membership`); an entity
 can be a member of several, of a course and of a window, say. Kinds that a user registers in a database
@@ -48,6 +49,7 @@ __all__ = [
     "Rib",
     "RibVault",
     "Storey",
+    "StratigraphicUnit",
     "Structure",
     "Tower",
     "Wall",
@@ -169,6 +171,10 @@ class Machicolation(Structure):
 
 class Crenelation(Structure):
     """A parapet of merlons and embrasures."""
+
+
+class StratigraphicUnit(Structure):
+    """What one act of building, cutting or decay left: a layer, a wall of one build, a cut, a filling."""
 
 
 def structure_kinds() -> Mapping[str, type[Structure]]:

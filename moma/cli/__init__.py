@@ -11,7 +11,7 @@ from moma.cli.console import PlainCommand, PlainGroup, open_streams
 from moma.cli.database import export, import_, migrate, serve, view
 from moma.cli.entities import query, schema, show
 from moma.cli.geology import geology
-from moma.cli.knowledge import entries, record
+from moma.cli.knowledge import entries, matrix, record
 from moma.cli.proposals import outlines, propose
 from moma.cli.relations import load_path, relate
 from moma.cli.runs import report, runs
@@ -68,6 +68,7 @@ _COMMANDS = (
     survey_report,
     record,
     entries,
+    matrix,
     relate,
     propose,
     query,

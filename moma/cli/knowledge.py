@@ -7,9 +7,9 @@ from typing import Annotated
 import typer
 
 from moma.cli.console import reporting
-from moma.cli.options import DEFAULT_DB, Db, Json, Verbose
+from moma.cli.options import DEFAULT_DB, At, Db, Json, Sheet, Verbose
 
-__all__ = ["entries", "record"]
+__all__ = ["entries", "matrix", "record"]
 
 
 @reporting
@@ -30,7 +30,10 @@ def entries(db: Db = DEFAULT_DB, json: Json = False, verbose: Verbose = False) -
 @reporting
 def record(
     files: Annotated[
-        list[Path], typer.Argument(metavar="FILE.toml…", help="Files of knowledge; see docs/knowledge.md.")
+        list[Path],
+        typer.Argument(
+            metavar="FILE…", help="Files of knowledge: TOML, tables, GeoJSON, GeoPackage, GraphML."
+        ),
     ],
     author: Annotated[
         str | None,
@@ -38,6 +41,21 @@ def record(
             "--author", metavar="NAME", help="Author of the statements; default: that of the files."
         ),
     ] = None,
+    source: Annotated[
+        str | None,
+        typer.Option(
+            "--source", metavar="TEXT", help="Grounds of the statements; default: that of the files."
+        ),
+    ] = None,
+    columns: Annotated[
+        str | None,
+        typer.Option(
+            "--columns",
+            metavar="MAP",
+            help="Columns of tables that are not recognised, e.g. 'code=Inventar,phase=Zeitstellung'.",
+        ),
+    ] = None,
+    sheet: Sheet = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Report what would be recorded; change nothing.")
     ] = False,
@@ -50,5 +68,47 @@ def record(
     from moma.cli.text.knowledge import record_lines
     from pipelines.record.record import record as record_files
 
-    report = record_files(files, db, author=author, dry_run=dry_run)
+    report = record_files(
+        files, db, author=author, source=source, columns=columns, sheet=sheet, dry_run=dry_run
+    )
     print(as_json(asdict(report)) if json else "\n".join(record_lines(report, verbose)))
+
+
+@reporting
+def matrix(
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", metavar="FILE", help="Draw the matrix: .svg, .html (with stones of units) or .graphml."
+        ),
+    ] = None,
+    check: Annotated[
+        bool, typer.Option("--check", help="End with code 1 if matrix and dates contradict each other.")
+    ] = False,
+    author: Annotated[
+        str | None,
+        typer.Option(
+            "--author", metavar="NAME", help="Only relations that this author states; default: all."
+        ),
+    ] = None,
+    at: At = None,
+    db: Db = DEFAULT_DB,
+    json: Json = False,
+    verbose: Verbose = False,
+) -> None:
+    """Order stratigraphic units in time: matrix of Harris, relative dates, contradictions with phases."""
+    from archmodel.database.as_known import as_known, entry_named
+    from archmodel.database.session import open_database
+    from archmodel.stratigraphy.report import draw, study
+    from moma.cli.text.formats import as_json
+    from moma.cli.text.matrix import matrix_lines
+
+    with open_database(db, create=False) as database, database.session(read_only=True) as session:
+        entry = None if at is None else entry_named(session, at)
+        with as_known(session, entry) as then:
+            report = study(then, author)
+    if out is not None:
+        out.write_text(draw(report, out), encoding="utf-8")
+    print(as_json(report.as_values()) if json else "\n".join(matrix_lines(report, verbose)))
+    if check and report.contradictions:
+        raise typer.Exit(1)

@@ -23,7 +23,7 @@ __all__ = ["frame_record", "stone_record", "surveyed_block"]
 
 _STONE = ("code", "kind", "course")
 # measured in the one, resolved for every stone in the other
-_DEPTH = ("depth", "depth_sigma", "depth_source")
+_DEPTH = ("depth", "depth_sigma", "depth_source", "depth_origin")
 _MEASURED = tuple(
     one.name
     for one in fields(BlockRecord)

@@ -1,4 +1,5 @@
-"""Recording of knowledge from TOML files (`moma record`).
+"""Recording of knowledge from TOML files, tables, layers and drawings of the matrix (`moma record`).
 
-Public: `record`, `RecordReport` (record); `read_record`, `RecordFile` (file); `record_depth` (depth); `ARRAYS` (keys).
+Public: `record`, `RecordReport` (record); `FileRecorded` (lists); `read_record`, `RecordFile` (file); `record_depth`
+(depth); `ARRAYS` (keys).
 """

@@ -6,6 +6,7 @@ from archmodel.assertions.declare import DOCUMENT_TYPES
 from archmodel.tables.knowledge import OBSERVATIONS
 from archmodel.tables.opinions import DISPUTABLE, RULES
 from archmodel.tables.relations import RELATIONS
+from archmodel.tables.stratigraphy import DEFINITIONS, INVERSE
 from pipelines.toml.schema import Key, ValueKind
 
 __all__ = ["ABOUT", "ARRAYS", "ATTRIBUTE", "CITED", "PROPERTY", "RECORD", "WHO", "WITHDRAWN"]
@@ -137,13 +138,16 @@ _STRUCTURE = (
     *WHO,
 )
 
+_RELATIONS = tuple(dict.fromkeys((*RELATIONS, "supports", *DEFINITIONS, *INVERSE.values())))
+
 _RELATION = (
-    Key("kind", ValueKind.TEXT, "What it is.", choices=(*RELATIONS, "supports")),
-    Key("of", ValueKind.STONES, "Codes or expressions of the subject stones."),
+    Key("kind", ValueKind.TEXT, "What it is.", choices=_RELATIONS),
+    Key("of", ValueKind.TEXTS, "Codes of the subjects; expressions for stones.", default=()),
+    Key("structures", ValueKind.TEXTS, "Codes of structures among the subjects.", default=()),
     Key(
         "to",
         ValueKind.STONES,
-        "Codes or expressions of the object stones; each subject is related to each of them.",
+        "Codes of the objects; expressions for stones; each subject is related to each of them.",
     ),
     *WHO,
 )
@@ -208,8 +212,8 @@ _WITHDRAW = (
     ),
     Key("property", ValueKind.TEXT, "Name of the property.", default=None),
     *ABOUT,
-    Key("kind", ValueKind.TEXT, "Of the relation.", default=None, choices=(*RELATIONS, "supports")),
-    Key("to", ValueKind.TEXTS, "The other stones of the relation.", default=()),
+    Key("kind", ValueKind.TEXT, "Of the relation.", default=None, choices=_RELATIONS),
+    Key("to", ValueKind.TEXTS, "The objects of the relation.", default=()),
     Key("match", ValueKind.TABLE, 'Only statements with these values: `{ sign = "A" }`.', default={}),
     *WHO,
 )

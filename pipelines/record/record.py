@@ -16,35 +16,12 @@ from archmodel.tables.knowledge import Correction
 from moma.errors import UsageError
 from pipelines.ingest.relate import relate
 from pipelines.record.file import RecordFile, Table, read_record
+from pipelines.record.lists import LISTS, FileRecorded, ListFile, read_list, record_list, recorded_before
 from pipelines.record.tables import STATED, record_table
 
-__all__ = ["FileRecorded", "RecordReport", "record"]
+__all__ = ["RecordReport", "record"]
 
 _CORRECTIONS = ("correction", "depth")
-
-
-@dataclass(frozen=True)
-class FileRecorded:
-    """Report on one file.
-
-    Attributes
-    ----------
-    path : the file
-    tables : outcome of its tables, by name of the array
-    entries : numbers of its acts of recording; empty if nothing in it was new
-    recorded_before : number of the first entry of a file with the same contents; None if there was none. Such a file
-        states again what was withdrawn since, and nothing else
-    """
-
-    path: str
-    tables: dict[str, RowCounts]
-    entries: tuple[int, ...] = ()
-    recorded_before: int | None = None
-
-    @property
-    def outcome(self) -> RowCounts:
-        """Outcome of all its tables."""
-        return sum(self.tables.values(), NOTHING)
 
 
 @dataclass(frozen=True)
@@ -67,28 +44,43 @@ class RecordReport:
 
 
 def record(
-    paths: Sequence[str | Path], url: str, *, author: str | None = None, dry_run: bool = False
+    paths: Sequence[str | Path],
+    url: str,
+    *,
+    author: str | None = None,
+    source: str | None = None,
+    columns: str | None = None,
+    sheet: str | None = None,
+    dry_run: bool = False,
 ) -> RecordReport:
     """Record files of knowledge: all of them or, if anything is wrong in any, none.
 
     Parameters
     ----------
-    paths : files as in docs/knowledge.md
+    paths : files as in docs/knowledge.md: TOML, tables, layers, GraphML
     url : of the database, created if it does not exist
-    author : takes precedence over that of ``[record]``
+    author, source : take precedence over those of ``[record]``; tables and layers need them
+    columns : map of columns of tables and layers with other names, e.g. "phase=Zeitstellung"
+    sheet : of workbooks
     dry_run : report what would happen, and change nothing
 
     Raises
     ------
-    UsageError : at the line of a file that is wrong; the database is unchanged
+    UsageError : at the line of a file that is wrong, or for a table without author or source; the database is
+        unchanged
     SurveyError, GeometryError : a stone cannot be extruded to its recorded depth
     """
-    files = [read_record(path) for path in paths]
+    files = [_read(Path(path), author, source, columns, sheet) for path in paths]
     if not files:
         raise UsageError("no file", remedy="name at least one")
     with open_database(url, create=not dry_run) as database, database.session() as session:
         kept = session.begin_nested()
-        reports = tuple(_record_file(session, file, author) for file in files)
+        reports = tuple(
+            _record_file(session, file, author, source)
+            if isinstance(file, RecordFile)
+            else record_list(session, file)
+            for file in files
+        )
         related = _relate_corrected(session, [number for one in reports for number in one.entries])
         if dry_run:
             kept.rollback()
@@ -97,11 +89,19 @@ def record(
         return RecordReport(database.url, dry_run, reports, related)
 
 
-def _record_file(session: Session, file: RecordFile, author: str | None) -> FileRecorded:
+def _read(
+    path: Path, author: str | None, source: str | None, columns: str | None, sheet: str | None
+) -> RecordFile | ListFile:
+    """Read a file: a table or a layer by its ending, any other as TOML."""
+    if path.suffix.lower() not in LISTS:
+        return read_record(path)
+    return read_list(path, author, source, columns, sheet)
+
+
+def _record_file(session: Session, file: RecordFile, author: str | None, source: str | None) -> FileRecorded:
     path = file.document.path
-    same = select(Entry.id).where(Entry.settings["sha256"].as_string() == file.sha256).order_by(Entry.id)
-    before = session.scalar(same.limit(1))
-    entries, changes = _Entries(session, file, author), dict[int, int]()
+    before = recorded_before(session, file.sha256)
+    entries, changes = _Entries(session, file, author, source), dict[int, int]()
     tables: dict[str, RowCounts] = {}
     for table in file.tables:
         if before is not None and not _stated_again(table):
@@ -133,8 +133,8 @@ def _relate_corrected(session: Session, entries: Sequence[int]) -> int | None:
 class _Entries:
     """Acts of recording of one file: one for each author and source, corrections apart."""
 
-    def __init__(self, session: Session, file: RecordFile, author: str | None) -> None:
-        self.session, self.file, self.author = session, file, author
+    def __init__(self, session: Session, file: RecordFile, author: str | None, source: str | None) -> None:
+        self.session, self.file, self.author, self.source = session, file, author, source
         self.made: dict[tuple[str, str | None, str], Entry] = {}
 
     def of(self, table: Table) -> Entry:
@@ -142,7 +142,9 @@ class _Entries:
         record, own = self.file.record, table.values
         with self.file.at(*table.path):
             author = checked_text("author", own["author"] or self.author or record["author"])
-            source = checked_text("source", own.get("reason") or own["source"] or record["source"])
+            source = checked_text(
+                "source", own.get("reason") or own["source"] or self.source or record["source"]
+            )
         source = source or self.file.document.path
         action = "correction" if table.name in _CORRECTIONS else "declaration"
         key = (action, author, source)

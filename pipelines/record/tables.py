@@ -23,9 +23,15 @@ from archmodel.assertions.statements import (
     say_reference,
     without_replaced,
 )
+from archmodel.assertions.stratigraphy import (
+    Thing,
+    say_stratigraphy,
+    subjects_named,
+    withdraw_stratigraphy,
+)
 from archmodel.assertions.withdraw import withdraw_members, withdraw_relations, withdraw_statements
 from archmodel.query.api import find
-from archmodel.store.find_by_code import Subjects, entity_numbers, held_or_none, subjects
+from archmodel.store.find_by_code import Subjects, entity_numbers, held_or_none, structure_numbers, subjects
 from archmodel.store.hypotheses import withdraw_hypotheses
 from archmodel.store.revisions import NOTHING, RowCounts, withdraw
 from archmodel.tables.entries import Entry
@@ -43,6 +49,8 @@ from archmodel.tables.knowledge import (
     Reference,
     Statement,
 )
+from archmodel.tables.relations import RELATIONS
+from archmodel.tables.stratigraphy import DEFINITIONS, INVERSE
 from archmodel.tables.structures import Structure, structure_kind_named
 from moma.errors import UsageError
 from pipelines.record.depth import record_depth
@@ -176,8 +184,39 @@ def _structure(work: _Work) -> RowCounts:
 
 
 def _relation(work: _Work) -> RowCounts:
+    relations = _stratigraphy(work, (*work["of"], *work["structures"]))
+    if relations is not None:
+        remark = Remark(stated_on=work.file.record["date"])
+        return say_stratigraphy(work.session, work.entry, relations, remark)
+    if not work["of"]:
+        raise UsageError("the relation has no subject", remedy="give of = […]")
     of, to = (list(_named_stones(work.session, work.file, work.table, key).values()) for key in ("of", "to"))
     return declare_relation(work.session, work.entry, work["kind"], of, to)
+
+
+def _stratigraphy(work: _Work, subjects: Sequence[str]) -> list[tuple[Thing, str, Thing]] | None:
+    """Return the relations between units and stones that a table states; None if they are of stones by geometry.
+
+    Structures rest on one another in the sense of stratigraphy: `rests_on` is `above` for them.
+    """
+    things = subjects_named(work.session, (*subjects, *work["to"]))
+    units = [code for code, (_, structure) in things.items() if structure is not None]
+    kind: str = work["kind"]
+    if not units and kind in (*RELATIONS, "supports"):
+        if missing := set(work.table.values["structures"]) - things.keys():
+            structure_numbers(work.session, sorted(missing))
+        return None
+    kind = {"rests_on": "above", "supports": "below"}.get(kind, kind)
+    if kind in ("beside", "across_the_wall"):
+        remedy = f"relations of structures are {', '.join((*DEFINITIONS, *INVERSE.values()))}"
+        raise UsageError(f"{units[0]} is a structure, and {kind} a relation of stones", remedy=remedy)
+    ends = []
+    for key, codes in (("of", subjects), ("to", work["to"])):
+        named = [things[code] for code in codes if code in things]
+        others = tuple(code for code in codes if code not in things)
+        stones = _named_stones(work.session, work.file, Table(work.table.path, {key: others}), key)
+        ends.append([*named, *((number, None) for number in stones.values())])
+    return [(subject, kind, target) for subject in ends[0] for target in ends[1]]
 
 
 def _depth(work: _Work) -> RowCounts:
@@ -225,9 +264,12 @@ def _withdraw(work: _Work) -> RowCounts:
     if what in _NAMED:
         return _withdraw_named(work, what)
     if what == "relation":
-        of, to = (_named_stones(work.session, work.file, work.table, key) for key in ("stones", "to"))
         if work["kind"] is None:
             raise UsageError("the relation has no kind", remedy='give kind = "beside", for example')
+        relations = _stratigraphy(work, (*work["stones"], *work["structures"]))
+        if relations is not None:
+            return withdraw_stratigraphy(work.session, work.entry, relations)
+        of, to = (_named_stones(work.session, work.file, work.table, key) for key in ("stones", "to"))
         return withdraw_relations(
             work.session, work.entry, work["kind"], list(of.values()), list(to.values())
         )

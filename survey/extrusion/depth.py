@@ -1,10 +1,11 @@
 """Depth of a stone by the best evidence.
 
-A measurement on the stone itself comes first; then the archaeologist's rule for its kind in its course or part of
-the building; then the rule for its kind; then the rule for the whole structure.
+What the record of the stone states comes first, a measurement unless it says that a rule was its origin; then the
+archaeologist's rule for its kind in its course or part of the building; then the rule for its kind; then the rule for
+the whole structure.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -52,7 +53,8 @@ def depth_for(record: BlockRecord, rules: Sequence[DepthRule]) -> Depth:
     """
     if record.depth is not None:
         source = record.depth_source or "measured on the stone"
-        return Depth(record.depth, record.depth_sigma, source, "stone", record.line)
+        origin = _STATED.get(record.depth_origin or "stone", "stone")
+        return Depth(record.depth, record.depth_sigma, source, origin, record.line)
     where = f"stone {record.code} (line {record.line})"
     holding = [rule for rule in rules if _holds(rule, record)]
     if not holding:
@@ -72,6 +74,9 @@ def depth_for(record: BlockRecord, rules: Sequence[DepthRule]) -> Depth:
         )
     return Depth(best.depth, best.sigma, best.source, _ORIGINS[_rank(best)], best.line)
 
+
+_STATED: Mapping[str, Origin] = {"rule": "rule", "kind": "kind", "structure": "structure"}
+"""Origins of depths that a record may state though they were not measured on the stone."""
 
 _ORIGINS: tuple[Origin, ...] = ("structure", "kind", "rule", "rule")
 

@@ -11,6 +11,7 @@ from survey.records.review import Doubtful
 from survey.records.snapping import Snapping
 
 __all__ = [
+    "DEPTH_ORIGINS",
     "FRAME_NOTE",
     "OBSERVER",
     "OUTLINE_NOTE",
@@ -31,6 +32,9 @@ __all__ = [
     "SurveyStream",
 ]
 
+
+DEPTH_ORIGINS = ("stone", "rule", "kind", "structure", "solid")
+"""Origins of a depth that a record may state, as `query` gives them; that of a solid is measured on the stone."""
 
 OBSERVER = "observer"
 """Name of the station from which stones without a station of their own were seen."""
@@ -279,9 +283,10 @@ class BlockRecord:
     vertices : (nv, 3) corners of the visible face, in order around it, nv ≥ 3 [m]; none on a photograph
     points : (np, 3) further points on the visible face [m]
     sigma : standard deviation of one measured coordinate [m]; of those in `sigmas`, root mean square
-    depth : depth measured on the stone itself [m]; None if it was not
+    depth : depth measured on the stone itself, unless `depth_origin` says otherwise [m]; None if it was not
     depth_sigma : its standard deviation [m]; None if not known
     depth_source : evidence for the depth; None if there is no depth
+    depth_origin : one of DEPTH_ORIGINS, of a depth that is not the stone's; None: measured on the stone
     line : line of the file on which the record begins, counted from 1
     notes : the surveyor's remarks, e.g. {"edge": "eroded"}
     zone : part of the building, e.g. "north wall"; None if not stated
@@ -328,6 +333,7 @@ class BlockRecord:
     joint: Array | None = None
     evidence: tuple[Mapping[str, object], ...] = ()
     roughness: float = 0.0
+    depth_origin: str | None = None
 
     def lateral_sigmas(self, normal: Array) -> Array:
         """Return the standard deviation of each corner along any direction square to a unit vector, (nv,) [m].

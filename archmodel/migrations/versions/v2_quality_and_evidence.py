@@ -1,4 +1,4 @@
-"""Version 2: quality of masonry, joint and evidence of measurements, cells of disks, opinions of several authors.
+"""Version 2: quality of masonry, joint and evidence of measurements, cells of disks, opinions, stratigraphy.
 
 Statements of phase and material that those of other authors superseded are held again beside them. Programs between
 both versions made databases that have some of these columns and say that they are of version 1; what they have stays.
@@ -44,6 +44,9 @@ _NEWER = (
 )
 """Statements that later ones about the same subject stand beside."""
 
+_OBJECTS = {"object_entity_id": "entity", "object_structure_id": "structure"}
+"""References of stratigraphic relations, and what they are to."""
+
 _QUALITY = [f"mqi_{way}_{end}" for way in ("vertical", "in_plane", "out_of_plane") for end in ("low", "high")]
 
 
@@ -59,6 +62,7 @@ def _added() -> Mapping[str, tuple[Column[object], ...]]:
             Column("stated_on", Date),
             Column("certainty", Double),
             Column("about", TEXT),
+            Column("relation", TEXT),
         ),
     }
 
@@ -98,6 +102,11 @@ def upgrade() -> None:
         ):
             connection.execute(text(sql))
         _rules().create(connection)
+    columns = {one["name"] for one in inspect(connection).get_columns("statement")}
+    for name, target in _OBJECTS.items():
+        if name not in columns:
+            sql = f"ALTER TABLE statement ADD COLUMN {name} INTEGER REFERENCES {target} (id)"
+            connection.execute(text(sql))
     credit_statements(connection)
     connection.execute(update(metadata.tables["moma_schema"]).values(version=2))
 
@@ -106,7 +115,7 @@ def downgrade() -> None:
     """Drop the columns and the table; of several opinions the latest stays."""
     connection = op.get_bind()
     for sql in (
-        "DELETE FROM statement WHERE kind = 'decision'",
+        "DELETE FROM statement WHERE kind IN ('decision', 'stratigraphy')",
         f"UPDATE statement SET superseded_id = ({_NEWER.format('MAX(n.entry_id)')}) "
         f"WHERE {_HELD} AND EXISTS ({_NEWER.format('1')})",
         "DROP TABLE opinion_rule",
@@ -114,7 +123,8 @@ def downgrade() -> None:
     ):
         connection.execute(text(sql))
     with op.batch_alter_table("statement") as batch:
-        batch.drop_column("chosen_id")
+        for name in ("chosen_id", *_OBJECTS):
+            batch.drop_column(name)
     for name, columns in _added().items():
         for one in columns:
             op.drop_column(name, one.name)
@@ -166,7 +176,7 @@ def losses(connection: Connection) -> Iterator[str]:
     """Yield what version 1 cannot hold."""
     for name, columns in _added().items():
         for one in columns:
-            if one.name in ("author", "stated_on", "about"):
+            if one.name in ("author", "stated_on", "about", "relation"):
                 continue
             values = select(func.count()).select_from(table(name)).where(column(one.name).is_not(None))
             if not one.nullable:
@@ -175,6 +185,7 @@ def losses(connection: Connection) -> Iterator[str]:
                 yield f"{one.name} of {count} rows of {name}"
     for what, sql in (
         ("decisions", "SELECT COUNT(*) FROM statement WHERE kind = 'decision'"),
+        ("stratigraphic relations", "SELECT COUNT(*) FROM statement WHERE kind = 'stratigraphy'"),
         ("rules of opinions", "SELECT COUNT(*) FROM opinion_rule"),
         (
             "opinions beside later ones",

@@ -17,16 +17,18 @@ def record_lines(report: "RecordReport", verbose: bool) -> list[str]:
         before = ""
         if file.recorded_before is not None:
             before = f"recorded before, as entry {file.recorded_before}; "
+        notes = [f"  {note}" for note in file.notes]
         if before and not file.entries:
             lines.append(f"{file.path}: {before}nothing changed")
             continue
         if not file.entries:
-            lines.append(f"{file.path}: all of it was known; nothing changed")
+            lines += [f"{file.path}: all of it was known; nothing changed", *notes]
             continue
         numbers = ", ".join(map(str, file.entries))
         noun = "entry" if len(file.entries) == 1 else "entries"
         again = "what was withdrawn since is stated again: " if before else ""
         lines.append(f"{file.path}: {before}{again}{_counts(file.outcome)}, as {noun} {numbers}{would}")
+        lines += notes
         if verbose or report.dry_run:
             lines += [f"  {name}: {_counts(outcome)}" for name, outcome in file.tables.items()]
     if report.related is not None:

@@ -58,6 +58,13 @@ ALIASES: Mapping[str, Sequence[str]] = {
         *("depth source", "source depth", "Quelle Tiefe", "Tiefe Quelle", "source profondeur"),
         *("fonte profondità", "fuente profundidad"),
     ),
+    "depth_origin": (
+        "depth origin",
+        "origin depth",
+        "Herkunft Tiefe",
+        "Tiefe Herkunft",
+        "origine profondeur",
+    ),
     "zone": (
         *("zone", "part", "sector", "bay", "wall", "facade", "Bereich", "Zone", "Bauteil", "Wand"),
         *("Joch", "Fassade", "secteur", "mur", "façade", "travée", "zona", "settore", "muro", "facciata"),

@@ -31,7 +31,7 @@ class TableStone:
     notes : the different texts of each column that is kept as a note, in order
     line : the first of its lines
     error : the first error in its lines; None if there is none
-    depth, depth_sigma, depth_source : as in BlockRecord
+    depth, depth_sigma, depth_source, depth_origin : as in BlockRecord
     """
 
     code: str
@@ -45,6 +45,7 @@ class TableStone:
     depth: float | None = None
     depth_sigma: float | None = None
     depth_source: str | None = None
+    depth_origin: str | None = None
     vertices: "array[float]" = field(default_factory=lambda: array("d"))
     points: "array[float]" = field(default_factory=lambda: array("d"))
     vertex_sigmas: "array[float]" = field(default_factory=lambda: array("d"))
@@ -173,6 +174,7 @@ class PointTable:
             depth=stone.depth,
             depth_sigma=stone.depth_sigma,
             depth_source=source,
+            depth_origin=None if stone.depth is None else stone.depth_origin,
             line=stone.line,
             zone=stone.zone,
             station=stone.station,

@@ -30,7 +30,7 @@ from survey.formats.tables.columns import ColumnMap, Columns, find_columns, kind
 from survey.formats.tables.kinds import kind_of, meant
 from survey.formats.tables.point_table import PointTable, TableStone, check_station
 from survey.formats.tables.wkt import outline_of
-from survey.records.survey import Station, Survey, SurveyHead, SurveyStream
+from survey.records.survey import DEPTH_ORIGINS, Station, Survey, SurveyHead, SurveyStream
 
 __all__ = [
     "CODES",
@@ -51,12 +51,13 @@ NEEDED = ("block", "x", "y", "z")
 """Required columns; `description` serves for `block`, `outline` for the coordinates."""
 
 OPTIONAL = (
-    *("kind", "course", "role", "sigma", "depth", "depth_sigma", "depth_source", "zone", "station"),
+    *("kind", "course", "role", "sigma", "depth", "depth_sigma", "depth_source"),
+    *("depth_origin", "zone", "station"),
     *("name", "description", "outline"),
 )
 """Optional columns."""
 
-_OF_STONES = ("depth", "depth_sigma", "depth_source", "zone", "station")
+_OF_STONES = ("depth", "depth_sigma", "depth_source", "depth_origin", "zone", "station")
 _IDENTITY = ("block", "kind", "course", "role", "description")
 _LIST = {"pnezd": ("name", "y", "x", "z", "description"), "penzd": ("name", "x", "y", "z", "description")}
 _SEPARATORS = ("\t", ";", ",", "|", "")  # empty: any blanks
@@ -645,6 +646,10 @@ class _RowReader:
             value = self._decimals.length(text, name, number, self._scale[name])
         elif name == "station":
             check_station(text, self.collector.head, f"{self._path}:{number}")
+        elif name == "depth_origin":
+            if text not in DEPTH_ORIGINS:
+                remedy = f"write one of {', '.join(DEPTH_ORIGINS)}"
+                raise self._fail(number, f"origin of a depth {shown(text)}", remedy)
         elif not text.isprintable() or (name == "zone" and ('"' in text or len(text) > _LONGEST_NAME)):
             raise self._fail(number, f"{name} {shown(text)} is not a name", "write printable words")
         before = getattr(stone, name)

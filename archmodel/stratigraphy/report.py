@@ -1,0 +1,117 @@
+"""The whole stratigraphy of a database: order, dates, contradictions; and its drawing by the ending of a file."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from sqlalchemy.orm import Session
+
+from archmodel.stratigraphy.dates import Bounds, Contradiction, contradictions, date_bounds
+from archmodel.stratigraphy.drawing import matrix_svg
+from archmodel.stratigraphy.graphml import write_graphml
+from archmodel.stratigraphy.layout import layout_of
+from archmodel.stratigraphy.order import Link, Order, order_of
+from archmodel.stratigraphy.page import matrix_page
+from archmodel.stratigraphy.stored import Dated, load_dates, load_links, load_stones, load_units
+from moma.errors import UsageError
+
+__all__ = ["Matrix", "draw", "study"]
+
+
+@dataclass(frozen=True)
+class Matrix:
+    """Stratigraphy at one time, of one author or of all.
+
+    Attributes
+    ----------
+    order : units in the order of time
+    links : relations that are stated
+    dates : phases of units
+    bounds : years that phases and matrix allow, by the first of equal units
+    stones : members of units
+    contradictions : of matrix and dates
+    """
+
+    order: Order
+    links: tuple[Link, ...]
+    dates: Mapping[str, Dated]
+    bounds: Mapping[str, Bounds]
+    stones: Mapping[str, tuple[str, ...]]
+    contradictions: tuple[Contradiction, ...]
+
+    def as_values(self) -> dict[str, object]:
+        """Return plain values for JSON."""
+        units = [
+            {
+                "unit": unit,
+                "equal_to": list(self.order.equal[unit][1:]),
+                "level": self.order.levels[unit],
+                "later_than": list(self.order.below[unit]),
+                "phase": next((self.dates[c].phase for c in self.order.equal[unit] if c in self.dates), None),
+                "not_before": self.bounds[unit].begins,
+                "not_before_by": self.bounds[unit].begins_by,
+                "not_after": self.bounds[unit].ends,
+                "not_after_by": self.bounds[unit].ends_by,
+                "stones": [stone for code in self.order.equal[unit] for stone in self.stones.get(code, ())],
+            }
+            for unit in self.order.units
+        ]
+        return {
+            "units": units,
+            "relations": [vars(link) for link in self.links],
+            "redundant": self.order.redundant,
+            "contradictions": [vars(contradiction) for contradiction in self.contradictions],
+        }
+
+
+def study(session: Session, author: str | None = None) -> Matrix:
+    """Order the units of a database.
+
+    Parameters
+    ----------
+    author : only relations that this author states; None: all
+
+    Raises
+    ------
+    UsageError
+        if nothing is known of the stratigraphy, or relations form a loop
+    """
+    links, units = tuple(load_links(session, author)), load_units(session)
+    if not links and not units:
+        who = "" if author is None else f" by {author}"
+        remedy = 'record relations: moma record LIST.csv --author NAME --source "…"'
+        raise UsageError(f"no stratigraphy is recorded{who}", remedy=remedy)
+    order = order_of(units, links)
+    codes = [code for group in order.equal.values() for code in group]
+    dates = load_dates(session, codes)
+    return Matrix(
+        order,
+        links,
+        dates,
+        date_bounds(order, dates),
+        load_stones(session, codes),
+        contradictions(order, links, dates),
+    )
+
+
+def draw(matrix: Matrix, path: Path) -> str:
+    """Return the drawing for a file: SVG, a page, or GraphML.
+
+    Raises
+    ------
+    UsageError
+        for another ending
+    """
+    wrong = matrix.contradictions
+    match path.suffix.lower():
+        case ".svg":
+            doubtful = {code for pair in wrong for code in (pair.unit, pair.target)}
+            return matrix_svg(matrix.order, matrix.dates, doubtful)
+        case ".html":
+            return matrix_page(matrix.order, matrix.links, matrix.dates, matrix.bounds, matrix.stones, wrong)
+        case ".graphml":
+            places = {key: x for key, x in layout_of(matrix.order).across.items() if isinstance(key, str)}
+            return write_graphml(matrix.order, matrix.links, places)
+    raise UsageError(
+        f"{path.name} is no drawing", where="--out", remedy="name a file that ends in .svg, .html or .graphml"
+    )

@@ -1,0 +1,168 @@
+"""Lists of stratigraphic relations: a table of unit, relation, unit, or GraphML of the Extended Matrix."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from sqlalchemy.orm import Session
+
+from archmodel.assertions.statements import PLAIN, Remark
+from archmodel.assertions.stratigraphy import declare_units, say_stratigraphy, subjects_named
+from archmodel.store.revisions import RowCounts
+from archmodel.stratigraphy.graphml import read_graphml
+from archmodel.tables.entries import Entry
+from archmodel.tables.stratigraphy import DEFINITIONS, INVERSE
+from moma.errors import MomaError, SurveyError, UsageError
+from moma.tables.columns import plain, spellings
+from moma.tables.table import TableRow, read_table
+
+__all__ = ["RelationList", "read_relation_list", "record_relation_list"]
+
+_WORDS: Mapping[str, Sequence[str]] = {
+    # English; German
+    "above": (
+        "over",
+        "overlies",
+        "covers",
+        "über",
+        "liegt über",
+        "überlagert",
+        "liegt auf",
+        "rests on",
+        "bedeckt",
+    ),
+    "below": (
+        "under",
+        "underlies",
+        "covered by",
+        "unter",
+        "liegt unter",
+        "überlagert von",
+        "supports",
+        "bedeckt von",
+    ),
+    "cuts": ("cut", "schneidet", "stört"),
+    "cut_by": ("is cut by", "geschnitten von", "wird geschnitten von", "gestört von"),
+    "fills": ("fill of", "füllt", "verfüllt", "Verfüllung von"),
+    "filled_by": ("is filled by", "verfüllt von", "gefüllt von", "wird verfüllt von"),
+    "abuts": ("butts against", "stößt an", "lehnt an", "läuft an", "setzt an", "zieht an"),
+    "abutted_by": ("is abutted by", "angebaut von", "gestoßen von"),
+    "later_than": ("after", "is after", "jünger als", "nach"),
+    "earlier_than": ("before", "is before", "älter als", "vor"),
+    "bonded_with": ("bonded", "bonds with", "im Verband mit", "verzahnt mit", "bindet in", "Verband"),
+    "contemporary_with": ("same time as", "contemporary", "gleichzeitig mit", "zeitgleich", "zeitgleich mit"),
+    "equal_to": ("equal", "equals", "same as", "=", "gleich", "identisch mit", "ist gleich", "entspricht"),
+}
+"""Words for relations in tables, besides their names."""
+
+_KNOWN = {
+    spelling: name
+    for name in (*DEFINITIONS, *INVERSE.values())
+    for word in (name, *_WORDS.get(name, ()))
+    for spelling in (*spellings(word), word)
+    if spelling
+}
+_REMEDY = "write three columns, unit, relation, unit: 101;above;102"
+
+
+@dataclass(frozen=True)
+class RelationList:
+    """Relations of a file.
+
+    Attributes
+    ----------
+    path : of the file
+    units : that it names
+    relations : line (0 without lines), unit, name of the relation, unit
+    ignored : number of nodes and lines of a drawing that are no stratigraphy
+    """
+
+    path: str
+    units: tuple[str, ...]
+    relations: tuple[tuple[int, str, str, str], ...]
+    ignored: int = 0
+
+
+def relation_of(text: str) -> str | None:
+    """Return the name of a relation, whatever the language; None if the word is not known."""
+    return _KNOWN.get(plain(text)) or _KNOWN.get(text.strip())
+
+
+def read_relation_list(path: Path, sheet: str | None = None) -> RelationList | None:
+    """Read relations; None if the file is a table of something else.
+
+    Raises
+    ------
+    UsageError, SurveyError
+        at the line of the mistake
+    """
+    if path.suffix.lower() == ".graphml":
+        drawn = read_graphml(path)
+        relations = tuple((0, link.subject, link.relation, link.target) for link in drawn.links)
+        return RelationList(str(path), drawn.units, relations, drawn.ignored)
+    try:
+        table = read_table(path, _is_row, _REMEDY, sheet)
+    except SurveyError as error:
+        if "row of this table" in error.what:
+            return None
+        raise
+    column = next(k for k, cell in enumerate(table.rows[0].cells) if k and relation_of(cell))
+    relations = tuple(
+        (
+            row.line,
+            table.name(row, column - 1, "the unit"),
+            _relation(row, column, table.where(row.line)),
+            table.name(row, column + 1, "the second unit"),
+        )
+        for row in table.rows
+    )
+    units = dict.fromkeys(code for _, unit, _, target in relations for code in (unit, target))
+    return RelationList(str(path), tuple(units), relations)
+
+
+def _is_row(cells: Sequence[str], commas: bool) -> bool:
+    return any(relation_of(cell) for cell in cells[1:-1])
+
+
+def _relation(row: TableRow, column: int, where: str) -> str:
+    text = row.cells[column] if column < len(row.cells) else ""
+    name = relation_of(text)
+    if name is None:
+        known = ", ".join((*DEFINITIONS, *dict.fromkeys(INVERSE.values())))
+        raise UsageError(f"unknown relation {text[:40]!r}", where=where, remedy=f"relations are {known}")
+    return name
+
+
+def record_relation_list(
+    session: Session, entry: Entry, listed: RelationList, remark: Remark = PLAIN
+) -> dict[str, RowCounts]:
+    """Record the relations of a list; units that are neither stones nor structures become stratigraphic units.
+
+    Returns
+    -------
+    dict
+        outcome by name: "unit", "stratigraphy"
+
+    Raises
+    ------
+    UsageError
+        for a unit in relation to itself, at its line; for a loop
+    """
+    things = subjects_named(session, listed.units)
+    missing = [code for code in listed.units if code not in things]
+    outcome = {"unit": declare_units(session, entry, missing)} if missing else {}
+    things |= subjects_named(session, missing)
+    for line, unit, relation, target in listed.relations:
+        if unit == target:
+            where = f"{listed.path}:{line}" if line else listed.path
+            raise UsageError(f"{unit} is {relation} itself", where=where, remedy="name two units")
+    relations = [(things[unit], relation, things[target]) for _, unit, relation, target in listed.relations]
+    try:
+        outcome["stratigraphy"] = say_stratigraphy(session, entry, relations, remark)
+    except UsageError as error:
+        raise _at_lines(listed, error) from None
+    return outcome
+
+
+def _at_lines(listed: RelationList, error: MomaError) -> UsageError:
+    return UsageError(error.what, where=error.where or listed.path, remedy=error.remedy)
