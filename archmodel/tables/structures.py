@@ -174,7 +174,7 @@ class Crenelation(Structure):
 
 
 class StratigraphicUnit(Structure):
-    """What one act of building, cutting or decay left: a layer, a wall of one build, a cut, a filling."""
+    """The result of one act of building, cutting or decay: a layer, a wall of one build, a cut, a filling."""
 
 
 def structure_kinds() -> Mapping[str, type[Structure]]:

@@ -77,7 +77,7 @@ _REMEDY = "name the columns in the first line: stone;phase;material;mark"
 
 @dataclass(frozen=True)
 class AttributeList:
-    """What a table or layer states of stones and structures.
+    """Statements of a table or layer about stones and structures.
 
     Attributes
     ----------

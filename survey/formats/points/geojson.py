@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from moma.errors import SurveyError
+from moma.tables.columns import COORDINATES
 from moma.tables.rows import ListRows, cell_text
 from survey.formats.fields import unreadable
 from survey.formats.options import ReadingOptions
@@ -36,7 +37,9 @@ def open_geojson(path: Path, options: ReadingOptions | None = None) -> SurveyStr
     """
     path = Path(path)
     features = _features(path)
-    names = list(dict.fromkeys(name for one in features for name in _properties(one)))
+    named = dict.fromkeys(name for one in features for name in _properties(one))
+    # the outline has the coordinates; attributes such as x and height of a layer are those of the stone
+    names = [name for name in named if kind_of_column(name) not in COORDINATES]
     known = {kind_of_column(one) for one in names}
     ids = not known & {"block", "description", "name"}
     rows: list[tuple[int, list[str]]] = [(0, [*names, *(["block"] if ids else []), "outline"])]

@@ -18,7 +18,7 @@ def stones(path: Path, origin: str) -> str:
     path.write_text(
         HEAD + "".join(f"A;{x};0;{z};0.5;{origin};a rule\n" for x, z in corners), encoding="utf-8"
     )
-    (block,) = open_survey(path).blocks
+    (block,) = open_survey(path, "csv").blocks
     if isinstance(block, Reject):
         raise block.error
     assert isinstance(block, BlockRecord)
