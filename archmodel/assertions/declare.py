@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
+from archmodel.assertions.edtf import year_bounds
 from archmodel.assertions.validation import (
     checked_choice,
     checked_label,
@@ -133,12 +134,23 @@ def declare_phase(
     session: Session,
     entry: Entry,
     name: str,
-    begins: int | None = None,
-    ends: int | None = None,
+    begins: int | str | None = None,
+    ends: int | str | None = None,
     description: str | None = None,
 ) -> RowCounts:
-    """Declare a time of building or repair; years at the earliest and at the latest."""
+    """Declare a time of building or repair; years at the earliest and at the latest.
+
+    Parameters
+    ----------
+    begins, ends : years, or dates as `archmodel.assertions.edtf.year_bounds` takes them; the earliest year of the one
+        and the latest of the other count, and what is written stays in the description
+    """
     held = held_or_none(session, Phase, name)
+    written = [f"{key} {one}" for key, one in (("begins", begins), ("ends", ends)) if isinstance(one, str)]
+    begins = None if begins is None else year_bounds("begins", begins)[0]
+    ends = None if ends is None else year_bounds("ends", ends)[1]
+    if written:
+        description = "; ".join(filter(None, (description, ", ".join(written))))
     if held is not None:
         begins = held.begins if begins is None else begins
         ends = held.ends if ends is None else ends

@@ -5,9 +5,10 @@ statement supersedes the one before of the same author, a depth that of any auth
 others add up. What an author says already, word for word, is not said again.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import date
+from datetime import date, timedelta
 
 from sqlalchemy import insert, select
 from sqlalchemy.orm import Session, aliased
@@ -22,6 +23,7 @@ from archmodel.assertions.validation import (
 from archmodel.store.bulk import batches
 from archmodel.store.find_by_code import Subjects, held_named
 from archmodel.store.revisions import NOTHING, RowCounts, end_rows, table_of
+from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Entry
 from archmodel.tables.knowledge import (
     OBSERVATIONS,
@@ -56,6 +58,10 @@ __all__ = [
 
 SINGLE: tuple[type[Statement], ...] = (MadeOf, OfPhase, DepthEvidence)
 """Statements of which an author has at most one about a subject."""
+
+FARTHEST = 50.0
+"""Largest distance of an observation from the centroid of its stone [m]: some ten times the largest stones ever
+laid, so that only another frame, unit or stone is farther away."""
 
 
 @dataclass(frozen=True)
@@ -132,6 +138,8 @@ def say_observation(
     at : (x, y, z) in the frame of the site [m]
     """
     x, y, z = _point(at)
+    if at is not None:
+        _refuse_far(session, about, at)
     values = {
         "type": checked_choice("type of observation", type, OBSERVATIONS),
         "severity": checked_whole("severity", severity, 0, 4),
@@ -141,6 +149,24 @@ def say_observation(
         "z": z,
     }
     return _say(session, entry, Observation, about, values, remark)
+
+
+def _refuse_far(session: Session, about: Subjects, at: Sequence[float]) -> None:
+    """Refuse a place that is too far from a stone to be on it: in another frame, or of another stone."""
+    for batch in batches(about.entities):
+        rows = select(Entity.code, Entity.x, Entity.y, Entity.z).where(Entity.id.in_(batch))
+        for code, *centre in session.execute(rows.where(Entity.x.is_not(None))):
+            distance = math.dist(at, centre)
+            if distance > FARTHEST:
+                what = f"at is {distance:.0f} m from the stone {code}, more than {FARTHEST:.0f} m"
+                raise UsageError(what, remedy="give metres in the frame of the site, or leave at out")
+
+
+def _refuse_future(remark: Remark) -> None:
+    """Refuse dates to come; tomorrow can be today in another time zone."""
+    for day in (remark.observed_on, remark.stated_on):
+        if day is not None and day > date.today() + timedelta(days=1):
+            raise UsageError(f"the date {day} is in the future", remedy="check its year")
 
 
 def say_depth(
@@ -210,6 +236,7 @@ def _say(
     remark: Remark,
 ) -> RowCounts:
     """Store one statement about each subject that lacks it."""
+    _refuse_future(remark)
     full = {**values, **remark_row(session, remark), "author": entry.author}
     stated_on = remark.stated_on or entry.recorded_at.date()
     outcome = NOTHING

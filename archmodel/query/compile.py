@@ -160,16 +160,24 @@ def _ordered(scope: Where, name: Token, attribute: Attribute, sign: str, value: 
 def _amount(scope: Where, amount: Amount) -> ColumnElement[Any]:
     """Return a number computed of attributes that are numbers."""
     total: Any = literal(0.0, Double)
-    for factor, token in amount.terms:
-        part: Any = literal(factor, Double)
-        if token is not None:
-            attribute, column = _column(scope, token)
-            if not attribute.is_number:
-                what = f"{attribute.name} is {_type_of(attribute)}, and cannot be computed with"
-                raise complaint(token, what, "compute with numbers such as depth")
-            part = part * column
+    for term in amount.terms:
+        part: Any = literal(term.factor, Double)
+        if term.attribute is not None:
+            part = part * _computable(scope, term.attribute)
+        if term.divisor is not None:
+            # what is divided by zero is not known
+            part = part / func.nullif(_computable(scope, term.divisor), 0)
         total = total + part
     return func.abs(total) if amount.absolute else total
+
+
+def _computable(scope: Where, token: Token) -> ColumnElement[Any]:
+    """Return the column of an attribute that is a number."""
+    attribute, column = _column(scope, token)
+    if not attribute.is_number:
+        what = f"{attribute.name} is {_type_of(attribute)}, and cannot be computed with"
+        raise complaint(token, what, "compute with numbers such as depth")
+    return column
 
 
 def _call(scope: Where, call: Call) -> ColumnElement[bool]:

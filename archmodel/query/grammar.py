@@ -14,7 +14,8 @@
     argument    = value | expression
     amount      = sum | "abs" "(" sum ")"
     sum         = term { ( "+" | "-" ) term }
-    term        = number | [ number "*" ] attribute
+    term        = factor { ( "*" | "/" ) factor }, of which at most one divisor is an attribute
+    factor      = number | attribute
     attribute   = name [ "@" run ]
     value       = number | word | 'quoted' | "quoted"
 
@@ -25,7 +26,7 @@ the grammar (and, or, not, in, like, is, null) are the same in upper and lower c
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from archmodel.query.tokens import Token, complaint, named, tokenise
 
@@ -43,6 +44,7 @@ __all__ = [
     "Like",
     "Node",
     "Not",
+    "Term",
     "attributes_in",
     "parse",
 ]
@@ -55,11 +57,18 @@ MAX_CALLS = 8
 
 OPERATORS = frozenset({"=", "==", "!=", "<", "<=", ">", ">="})
 
+_ORDERS = frozenset({"<", "<=", ">", ">="})
+
 VALUES = frozenset({"quoted", "word", "number"})
 
 
 _SIGNS = {"+": 1.0, "-": -1.0}
-_PRODUCT = re.compile(r"(?P<factor>[0-9]+(\.[0-9]*)?|\.[0-9]+)\*(?P<name>[A-Za-z_][A-Za-z0-9_]*(@[0-9]+)?)")
+_NUMBER = r"[0-9]+(?:\.[0-9]*)?|\.[0-9]+"
+_NAME = r"[A-Za-z_][A-Za-z0-9_]*(?:@[0-9]+)?"
+_PRODUCT = re.compile(
+    rf"(?:(?P<factor>{_NUMBER})\*)?(?P<name>{_NAME})(?:/(?:(?P<by>{_NUMBER})|(?P<divisor>{_NAME})))?"
+)
+"""A term without blanks: 2*depth, depth/length, 3*depth/length, depth/2."""
 
 _JOINING = "join tests by and, or; put a text with blanks in quotes"
 
@@ -74,16 +83,25 @@ class Comparison:
 
 
 @dataclass(frozen=True)
+class Term:
+    """Term of a sum: factor · attribute / divisor; what is None is left out."""
+
+    factor: float
+    attribute: Token | None = None
+    divisor: Token | None = None
+
+
+@dataclass(frozen=True)
 class Amount:
-    """A number computed of attributes: Σ factor · attribute, or its absolute value.
+    """A number computed of attributes: the sum of terms, or its absolute value.
 
     Attributes
     ----------
-    terms : factor and attribute of each term; None: the factor alone
+    terms : of the sum
     absolute : whether the sign is left out
     """
 
-    terms: tuple[tuple[float, Token | None], ...]
+    terms: tuple[Term, ...]
     absolute: bool
 
 
@@ -175,7 +193,8 @@ def attributes_in(node: Node) -> Iterator[Token]:
             if value.role == "word":
                 yield value
         case AmountComparison(left, _, right):
-            yield from (token for _, token in (*left.terms, *right.terms) if token is not None)
+            for term in (*left.terms, *right.terms):
+                yield from (token for token in (term.attribute, term.divisor) if token is not None)
         case IsNull(Token() as attribute) | Like(attribute, _) | IsIn(attribute, _):
             yield attribute
 
@@ -248,7 +267,8 @@ class _Parser:
             return self.null(call) if self.taken("keyword", "is") else call
         if self.token.role == "sign" and self.token.text in OPERATORS:
             operator = self.operator()
-            if self.computes():
+            # a text may hold a stroke, and has no order: code = A/12
+            if self.computes() and (operator in _ORDERS or "/" not in self.token.text):
                 self.index = begin
                 return self.amounts()
             return Comparison(attribute, operator, self.value())
@@ -271,8 +291,9 @@ class _Parser:
         if word.role not in ("word", "number"):
             return False
         called = word.text.lower() == "abs" and (following, role) == ("(", "sign")
-        summed = role == "word" and following in _SIGNS
-        return called or summed or _PRODUCT.fullmatch(word.text) is not None
+        summed = role == "word" and following in (*_SIGNS, "/", "*")
+        product = _PRODUCT.fullmatch(word.text)
+        return called or summed or (product is not None and product["name"] != word.text)
 
     def amounts(self) -> AmountComparison:
         left = self.amount()
@@ -289,16 +310,36 @@ class _Parser:
             self.close()
         return Amount(tuple(terms), absolute)
 
-    def term(self, sign: float) -> tuple[float, Token | None]:
+    def term(self, sign: float) -> Term:
+        term = self.factor(Term(sign), divides=False)
+        while self.token.role == "word" and self.token.text in ("*", "/"):
+            term = self.factor(term, divides=self.take().text == "/")
+        return term
+
+    def factor(self, term: Term, *, divides: bool) -> Term:
+        """Multiply a term by the next factor, or divide it."""
         token = self.take()
         if token.role == "number":
-            return sign * float(token.text), None
-        if token.role != "word":
+            number = float(token.text)
+            if divides and number == 0.0:
+                raise complaint(token, "division by zero", "divide by another number")
+            return replace(term, factor=term.factor / number if divides else term.factor * number)
+        if token.role != "word" or (product := _PRODUCT.fullmatch(token.text)) is None:
+            if token.role == "word" and not divides and term == Term(term.factor):
+                return replace(term, attribute=token)
             raise complaint(token, f"{named(token)} is no number", "write a number, an attribute, or 3*depth")
-        if (product := _PRODUCT.fullmatch(token.text)) is None:
-            return sign, token
-        start = token.position + product.start("name")
-        return sign * float(product["factor"]), Token("word", product["name"], start, token.source)
+        if product["name"] != token.text and divides:
+            raise complaint(token, "a product after /", "put blanks around * and /, e.g. depth / length * 2")
+        factor = term.factor * float(product["factor"] or 1.0)
+        if product["by"] is not None:
+            if float(product["by"]) == 0.0:
+                raise complaint(token, "division by zero", "divide by another number")
+            factor /= float(product["by"])
+        above = None if divides else _piece(token, product, "name")
+        below = _piece(token, product, "name" if divides else "divisor")
+        if (above and term.attribute) or (below and term.divisor):
+            raise complaint(token, "a term with two attributes above or below", "write depth/length, say")
+        return Term(factor, above or term.attribute, below or term.divisor)
 
     def call(self, function: Token, depth: int) -> Call:
         """Parse the arguments; the parenthesis has been taken."""
@@ -357,3 +398,10 @@ class _Parser:
     def close(self) -> None:
         if not self.taken("sign", ")"):
             raise complaint(self.token, f"{named(self.token)} instead of )")
+
+
+def _piece(token: Token, product: "re.Match[str]", name: str) -> Token | None:
+    """Return the attribute within a term that is one word."""
+    if product[name] is None:
+        return None
+    return Token("word", product[name], token.position + product.start(name), token.source)

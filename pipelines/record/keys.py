@@ -105,8 +105,8 @@ PROPERTY = (
 
 _PHASE = (
     Key("name", ValueKind.TEXT, 'Its name, e.g. `"2"` or `"repair of 1860"`.'),
-    Key("begins", ValueKind.INTEGER, "Earliest year; negative before our era.", default=None),
-    Key("ends", ValueKind.INTEGER, "Latest year.", default=None),
+    Key("begins", ValueKind.YEAR, "Earliest year; negative before our era.", default=None),
+    Key("ends", ValueKind.YEAR, "Latest year.", default=None),
     Key("description", ValueKind.TEXT, "In words.", default=None),
     *WHO,
 )

@@ -13,6 +13,7 @@ from archmodel.store.revisions import NOTHING, RowCounts
 from archmodel.store.stone_rows import storable
 from archmodel.tables.entries import Entry, new_entry
 from moma.errors import UsageError
+from pipelines.record.attachments import Attachment
 from pipelines.record.attribute_lists import AttributeList, read_attribute_list, record_attribute_list
 from pipelines.record.relation_lists import RelationList, read_relation_list, record_relation_list
 
@@ -39,6 +40,7 @@ class FileRecorded:
     recorded_before : number of the first entry of a file with the same contents; None if there was none. Such a file
         states again what was withdrawn since, and nothing else
     notes : what of a table or layer was left out, or is new, in words
+    attachments : files that its documents name, which their entries keep with their hashes
     """
 
     path: str
@@ -46,6 +48,7 @@ class FileRecorded:
     entries: tuple[int, ...] = ()
     recorded_before: int | None = None
     notes: tuple[str, ...] = ()
+    attachments: tuple[Attachment, ...] = ()
 
     @property
     def outcome(self) -> RowCounts:

@@ -15,6 +15,7 @@ from archmodel.tables.entries import Entry, new_entry
 from archmodel.tables.knowledge import Correction
 from moma.errors import UsageError
 from pipelines.ingest.relate import relate
+from pipelines.record.attachments import Attachment, attachment_of
 from pipelines.record.file import RecordFile, Table, read_record
 from pipelines.record.lists import LISTS, FileRecorded, ListFile, read_list, record_list, recorded_before
 from pipelines.record.tables import STATED, record_table
@@ -103,6 +104,7 @@ def _record_file(session: Session, file: RecordFile, author: str | None, source:
     before = recorded_before(session, file.sha256)
     entries, changes = _Entries(session, file, author, source), dict[int, int]()
     tables: dict[str, RowCounts] = {}
+    attachments: list[Attachment] = []
     for table in file.tables:
         if before is not None and not _stated_again(table):
             continue
@@ -110,9 +112,15 @@ def _record_file(session: Session, file: RecordFile, author: str | None, source:
         outcome = record_table(session, entry, file, table, before)
         tables[table.name] = tables.get(table.name, NOTHING) + outcome
         changes[entry.id] = changes.get(entry.id, 0) + outcome.changes
+        if (attached := attachment_of(table, Path(path).parent)) is not None:
+            attachments.append(attached)
+            there = {**(entry.settings or {}).get("attachments", {}), attached.document: attached.values()}
+            entry.settings = {**(entry.settings or {}), "attachments": there}
     entries.drop(number for number, count in changes.items() if not count)
     made = tuple(number for number, count in changes.items() if count)
-    return FileRecorded(path, tables if before is None or made else {}, made, before)
+    return FileRecorded(
+        path, tables if before is None or made else {}, made, before, attachments=tuple(attachments)
+    )
 
 
 def _stated_again(table: Table) -> bool:

@@ -41,6 +41,7 @@ class ValueKind(Enum):
     HISTORY = "a number or a table { time = […], value = […] }"
     VECTOR_HISTORY = "a list of three numbers or a table { time = […], value = [[…], …] }"
     DATE = "a date without quotes, e.g. 2024-05-31"
+    YEAR = 'a year, or a date in quotes such as "circa 1400", "../1400", "1380/1420", "14XX"'
     TABLE = "a table { name = value, … }"
 
 
@@ -202,6 +203,8 @@ def _typed(value: object, kind: ValueKind) -> object | None:
             return value if isinstance(value, dict) else _typed(value, constant)
         case ValueKind.DATE:
             return value if type(value) is date else None
+        case ValueKind.YEAR:
+            return value if isinstance(value, str) else _typed(value, ValueKind.INTEGER)
         case ValueKind.TABLE:
             return value if isinstance(value, dict) else None
 

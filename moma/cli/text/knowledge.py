@@ -31,6 +31,11 @@ def record_lines(report: "RecordReport", verbose: bool) -> list[str]:
         lines += notes
         if verbose or report.dry_run:
             lines += [f"  {name}: {_counts(outcome)}" for name, outcome in file.tables.items()]
+        lines += [
+            f"  document {one.document}: {one.place} is not there, and is taken to be elsewhere"
+            for one in file.attachments
+            if one.sha256 is None
+        ]
     if report.related is not None:
         lines.append(f"relations of the corrected stones recomputed, as entry {report.related}")
     return lines

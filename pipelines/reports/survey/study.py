@@ -125,21 +125,37 @@ def study_surveys(
 
     Raises
     ------
-    UsageError : no such file or format
+    UsageError : no such file or format, or files that measure the same stones: campaigns are not pooled
     SurveyError : a file that cannot be read at all, or control points that contradict each other
     """
     sources = survey_sources(paths, format)
+    seen: dict[str, Path] = {}
     stones: list[StoneQuality] = []
     rejects: list[Reject] = []
     files = []
     for source in sources:
         before = len(stones), len(rejects)
         file = _read(source, format, options, stones, rejects, progress)
+        _refuse_second_campaign([one.code for one in stones[before[0] :]], source.path, seen)
         files.append(replace(file, stones=len(stones) - before[0], rejects=len(rejects) - before[1]))
     study = _judge(tuple(files), tuple(stones), tuple(rejects), given or {}, progress)
     if format != "cloud" or not stones:
         return study
     return replace(study, quality=replace(study.quality, verdict=_OF_PATCHES))
+
+
+def _refuse_second_campaign(codes: Sequence[str], path: Path, seen: dict[str, Path]) -> None:
+    """Refuse stones that an earlier file measured too; `seen` has their files by code, and is added to."""
+    again = [code for code in codes if code in seen]
+    if again:
+        some = ", ".join(again[:3]) + (", …" if len(again) > 3 else "")
+        what = f"measures {len(again)} of its {len(codes)} stones a second time, after {seen[again[0]].name}: {some}"
+        remedy = (
+            "report on each campaign by itself, since what moved between them is no scatter; ingest the second with "
+            "--again, and `moma query entity --where 'measurements > 1'` and `moma show CODE --history` compare them"
+        )
+        raise UsageError(what, where=str(path), remedy=remedy)
+    seen.update(dict.fromkeys(codes, path))
 
 
 def _read(

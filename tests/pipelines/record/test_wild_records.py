@@ -63,6 +63,9 @@ TYPED: dict[ValueKind, st.SearchStrategy[Any]] = {
     ValueKind.STONES: st.lists(st.sampled_from(("V1", "V2", "course = 1")), min_size=1, max_size=2),
     ValueKind.NUMBER: st.floats(1e-3, 1e3) | st.floats(0.0),
     ValueKind.INTEGER: st.integers(-1, 3000),
+    ValueKind.YEAR: st.one_of(
+        st.integers(-1, 3000), st.sampled_from(["circa 1400", "14XX", "1400/..", "late"])
+    ),
     ValueKind.BOOLEAN: st.booleans(),
     ValueKind.VECTOR: st.lists(st.floats(allow_nan=False), min_size=3, max_size=3),
     ValueKind.DATE: st.dates(dt.date(1, 1, 1), dt.date(9999, 12, 31)),

@@ -497,3 +497,20 @@ def test_a_frame_that_control_points_may_have_tilted_leans_no_wall():
         lines = measure_courses(stones, facades, [tilt])
         _, (face,) = _movements(stones, facades, lines, [tilt])
         assert bool(face.movements) == leans
+
+
+def test_two_campaigns_of_one_wall_are_not_pooled(tmp_path):
+    def survey(name, *codes):
+        stones = "".join(f"stone {code} header course 1\n{SQUARE}end\n" for code in codes)
+        path = tmp_path / f"{name}.moma"
+        path.write_text(HEAD.format(name=name) + stones, encoding="utf-8")
+        return path
+
+    first, second, other = survey("first", "A1", "A2"), survey("second", "A2"), survey("other", "B1")
+    options = reading_options(None, None)
+    with pytest.raises(
+        UsageError, match=r"1 of its 1 stones a second time, after first\.moma: A2"
+    ) as refused:
+        study_surveys([first, second], "moma", options)
+    assert "each campaign by itself" in str(refused.value.remedy)
+    assert len(study_surveys([first, other], "moma", options).stones) == 3
