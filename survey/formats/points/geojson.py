@@ -38,8 +38,10 @@ def open_geojson(path: Path, options: ReadingOptions | None = None) -> SurveyStr
     path = Path(path)
     features = _features(path)
     named = dict.fromkeys(name for one in features for name in _properties(one))
-    # the outline has the coordinates; attributes such as x and height of a layer are those of the stone
-    names = [name for name in named if kind_of_column(name) not in COORDINATES]
+    # the outline has the coordinates; attributes such as x and height of a layer are those of the stone;
+    # stations are in a header file
+    left_out = {*COORDINATES, *(() if options is not None and options.head is not None else ("station",))}
+    names = [name for name in named if kind_of_column(name) not in left_out]
     known = {kind_of_column(one) for one in names}
     ids = not known & {"block", "description", "name"}
     rows: list[tuple[int, list[str]]] = [(0, [*names, *(["block"] if ids else []), "outline"])]
