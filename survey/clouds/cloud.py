@@ -26,6 +26,7 @@ from survey.clouds.review import drawn_doubts, measured_doubts
 from survey.clouds.settings import CloudOptions
 from survey.clouds.wall import Wall
 from survey.formats.fields import CODE
+from survey.geometry.solids import area_vector
 from survey.records.review import Doubtful
 from survey.records.survey import OBSERVER, BlockRecord, Reject, Station, SurveyHead, SurveyStream
 
@@ -81,6 +82,8 @@ def open_cloud(
     head = options.head_for(options.outlines)
     stations = head.stations or tuple(one for cloud in clouds for one in cloud.stations)
     placed = place_outlines(drawing.outlines, options.wall, stations)
+    if options.wall is None and not head.stations and stations:
+        _check_sides(placed, options.outlines)
     sigmas = np.array([_outline_sigma(one, drawing, options) for one in placed])
     margins = _margins(placed, sigmas, options.margin)
     collected = collect_points(clouds, placed, margins, options.slab, progress)
@@ -92,6 +95,17 @@ def open_cloud(
     review += drawn_doubts(placed, drawing)
     stones = list(_stones(placed, sigmas, collected, head, options, files[0].name, review))
     return SurveyStream(head, iter(stones), review=tuple(review))
+
+
+def _check_sides(placed: Sequence[PlacedOutline], path: Path) -> None:
+    """Refuse stations of a scan that see most outlines from behind: these run counter-clockwise from outside."""
+    behind = sum(float(one.axes[2] @ area_vector(one.corners - one.origin)) < 0.0 for one in placed)
+    if 2 * behind > len(placed):
+        raise SurveyError(
+            f"{behind} of {len(placed)} outlines run clockwise seen from where the scanner is said to have stood",
+            where=str(path),
+            remedy="give true stations in a file: --header; or draw outlines counter-clockwise as seen from outside",
+        )
 
 
 def _outline_sigma(one: PlacedOutline, drawing: Drawing, options: CloudOptions) -> float:

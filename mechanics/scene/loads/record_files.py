@@ -36,6 +36,11 @@ _OTHERS = (
     *("spostamento", "desplazamiento"),
 )
 _OTHER_UNIT = r"(mm|cm|dm|m|km|in|ft)(\s*/\s*s|\s*s\^?-1)?"  # of velocities and displacements
+_AGENCIES = (
+    ("COSMOS", re.compile(r"\(Format v\d+\.\d+ with \d+ (text|comment) lines\)")),
+    ("GeoNet (GNS)", re.compile(r"accelerogram.*\bGNS\b", re.IGNORECASE)),
+    ("CSMIP (DMG)", re.compile(r"^(un)?corrected accelerogram", re.IGNORECASE)),
+)  # formats of agencies by their first line
 _LARGEST = 4.5 * UNITS["g"]  # above every ground acceleration ever recorded (4.1 g, Iwate-Miyagi 2008) [m/s²]
 _SQUARE = 0.02  # cosine from which two components are not square to each other
 
@@ -94,7 +99,24 @@ def _records(path: str | Path, unit: str | None, dt: float | None) -> tuple[Acce
     reader = reader_of(path, start)
     if reader is not None:
         return (reader(path),)
+    _refuse_agency(path)
     return _of_table(path, unit, dt)
+
+
+def _refuse_agency(path: str | Path) -> None:
+    """Name formats of agencies that are not read."""
+    try:
+        with Path(path).open("rb") as file:
+            head = file.readline(400).decode("ascii", "replace")
+    except OSError:
+        return  # the reader of tables says what is wrong
+    for name, mark in _AGENCIES:
+        if mark.search(head):
+            raise SceneError(
+                f"a record in the format of {name}, which is not read",
+                where=str(path),
+                remedy="export time and acceleration as CSV, e.g. with gmprocess of the USGS",
+            )
 
 
 def read_station(

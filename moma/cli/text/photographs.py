@@ -19,6 +19,7 @@ def orient_lines(report: "OrientReport", verbose: bool) -> list[str]:
         f"{len(marks['x'])} marks",
         f"  {values['observations']} observations, {values['unknowns']} unknowns, redundancy {values['redundancy']}"
         + ("" if values["sigma0"] is None else f", σ₀ {values['sigma0']:.6g}"),
+        f"  datum: {_datum(str(values['datum']))}",
     ]
     for camera in values["cameras"]:
         known = [(name, one) for name, one in camera["parameters"].items() if one["sigma"]]
@@ -52,3 +53,10 @@ def orient_lines(report: "OrientReport", verbose: bool) -> list[str]:
         lines += ones if verbose else shorten(ones, 5, "    ", ", with -v")
     lines.append(f"  results in {report.folder}")
     return lines
+
+
+def _datum(name: str) -> str:
+    """Describe what place, orientation and scale come from."""
+    if name == "control":
+        return "control points, or observed stations and angles"
+    return f"{name}: without control, scale and vertical are those of the start values, and nothing tells their error"

@@ -456,10 +456,12 @@ class PointCollector:
         Raises
         ------
         SurveyError
-            if there is one of that name
+            if there is another of that name at another place
         """
         before = self._known.get(name) or self._stations.get(name)
         if before is not None:
+            if np.array_equal(before.position, place):
+                return  # a list names its station at every setup
             raise self.fail(line, f"station {name} a second time", f"the first is on line {before.line}")
         self._stations[name] = Station(name, np.array(place), line)
 

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 from moma.errors import SurveyError
+from survey.clouds.cloud import open_cloud
 from survey.clouds.points import las, pcd, ptx
 from survey.clouds.points.reading import open_points
+from survey.clouds.settings import CloudOptions
+from tests.pipelines.ingest.test_cases import CASES, needs_shared
 from tests.survey.clouds import scans
 from tests.survey.clouds.test_points import COLOURS, POINTS, e57_file, read
 
@@ -160,3 +163,34 @@ def test_an_identity_pose_is_no_station(tmp_path):
     assert open_points(tmp_path / "a.e57").stations == ()
     e57_file(tmp_path / "b.e57", POINTS, np.array([1.0, 0.0, 0.0, 0.0]), np.array([0.0, -5.0, 1.5]))
     assert len(open_points(tmp_path / "b.e57").stations) == 1
+
+
+@pytest.mark.parametrize(("y", "sound"), [(-5.0, True), (-0.5, True), (6.0, False)])
+def test_a_scanner_behind_most_faces_is_refused(tmp_path, y, sound):
+    """The wall of the scans is seen from -y, and its outlines run counter-clockwise from there."""
+    shapes = [scans.in_space(ring) for ring in scans.rings()]
+    outlines = scans.geojson(tmp_path / "a.geojson", shapes)
+    middle = np.mean(np.concatenate(shapes), axis=0)
+    away = np.cross(shapes[0][1] - shapes[0][0], shapes[0][3] - shapes[0][0])
+    place = middle - away / np.linalg.norm(away) * y
+    e57_file(tmp_path / "a.e57", scans.scan() - place, np.array([1.0, 0.0, 0.0, 0.0]), place)
+    options = CloudOptions(outlines=outlines, sigma=0.001)
+    if sound:
+        assert len(list(open_cloud([tmp_path / "a.e57"], options).blocks)) == len(shapes)
+        return
+    with pytest.raises(SurveyError, match=r"6 of 6 outlines run clockwise.*--header"):
+        open_cloud([tmp_path / "a.e57"], options)
+
+
+@needs_shared
+def test_the_case_of_the_identity_pose_is_seen_as_its_text():
+    folder = CASES / "photographs/e57-identity-pose"
+    found = []
+    for name in ("idpose.xyz", "idpose.e57"):
+        options = CloudOptions(outlines=folder / "front.geojson")
+        found.append(list(open_cloud([folder / name], options).blocks))
+    assert [one.station for one in found[0]] == [one.station for one in found[1]]
+    for one, other in zip(*found, strict=True):
+        np.testing.assert_allclose(
+            one.vertices, other.vertices, atol=1e-3
+        )  # single precision, another sample

@@ -130,6 +130,7 @@ def test_a_model_of_another_program_is_oriented_again(tmp_path):
     path.write_text('colmap = "model"\nsigma = 0.5\n', encoding="utf-8")
     told = answer("orient", path, "--out", tmp_path / "out")
     assert told["datum"] == "inner constraints of the points"
+    assert "nothing tells their error" in prints("orient", path, "--out", tmp_path / "out")
     assert told["sigma0"] == pytest.approx(1.0, abs=0.3)
 
 

@@ -222,7 +222,7 @@ def readings(names: list[str], literals: list[str], text: str) -> list[dict[str,
         (ROWS + "5,1,nan,3,A:p\n", 5, "'nan'"),
         (ROWS + "5,1,2e9,3,A:p\n", 5, "beyond"),
         (ROWS + "5,1,2,3,B:v\n", 5, "1 vertices"),
-        (ROWS + "5,1,2,3,S:s\n6,1,2,3,S:s\n", 6, "station S a second time"),
+        (ROWS + "5,1,2,3,S:s\n6,1,2,4,S:s\n", 6, "station S a second time"),
         (ROWS.replace(",", ";") + "5;1,5;2;3;A:p\n", 5, "line 1 writes decimals with '.'"),
         (ROWS.replace(",", ";") + "5;1.234,5;2;3;A:p\n", 5, "a comma and a point"),
     ],
@@ -233,6 +233,13 @@ def test_a_wrong_line_is_named(tmp_path: Path, text: str, line: int, words: str)
     assert f"wall.txt:{line}: " in str(error.value)
     assert words in str(error.value)
     assert error.value.remedy
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_a_station_that_is_listed_at_every_setup_is_one(tmp_path: Path, count: int) -> None:
+    more = "".join(f"{k + 5},1,2,3,S:s\n" for k in range(count))
+    stream = open_pnezd(write(tmp_path, ROWS + more))
+    assert [one.name for one in stream.head.stations] == ["S"]
 
 
 def test_a_wrong_line_spoils_its_stone_and_no_other(tmp_path: Path) -> None:
