@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipelines.propose.outlines.features import Feature
 from survey.clouds.extras import optional
@@ -55,7 +56,8 @@ def _write_geopackage(features: Sequence[Feature], path: Path) -> None:
     shapely = optional("shapely", "GeoPackages")
     shapes = np.array([shapely.polygons(one.ring) for one in features], dtype=object)
     names = ["code", *(name for name in _COLUMNS if any(name in one.said for one in features))]
-    columns, masks = [np.array([one.code for one in features], dtype=object)], [None]
+    columns = [np.array([one.code for one in features], dtype=object)]
+    masks: list[NDArray[np.bool_] | None] = [None]
     for name in names[1:]:
         lacking = np.array([one.said.get(name) is None for one in features])
         values = [one.said.get(name) for one in features]

@@ -162,7 +162,7 @@ def _of_labelme(path: Path, shapes: list[Any]) -> Iterator[_Shape]:
             yield _Shape(_box(*points[0], *points[1]), values, where)
         elif kind == "circle" and points.shape == (2, 2):
             radius = float(np.linalg.norm(points[1] - points[0]))
-            yield _Shape(_ellipse(*points[0], radius, radius), values, where)
+            yield _Shape(_ellipse(float(points[0, 0]), float(points[0, 1]), radius, radius), values, where)
         elif kind == "polygon" and points.ndim == 2 and points.shape[1:] == (2,) and len(points) >= 3:
             yield _Shape(points, values, where)
         else:

@@ -45,9 +45,10 @@ def lightness(pixels: NDArray[np.uint8]) -> tuple[Field, Field, Field]:
     xyz = rgb @ np.array(
         [[0.4339, 0.2127, 0.0178], [0.3762, 0.7152, 0.1095], [0.1899, 0.0722, 0.8727]], dtype=np.float32
     )
-    root = np.where(xyz > 0.008856, np.cbrt(xyz), 7.787 * xyz + 16.0 / 116.0)
+    root: Field = np.where(xyz > 0.008856, np.cbrt(xyz), 7.787 * xyz + 16.0 / 116.0).astype(np.float32)
     x, y, z = root[..., 0], root[..., 1], root[..., 2]
-    return 116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)
+    light, green, blue = 116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)
+    return light.astype(np.float32), green.astype(np.float32), blue.astype(np.float32)
 
 
 def _relief(depth: Field) -> Field:
@@ -87,8 +88,8 @@ def openings(light: Field, depth: Field | None) -> Bools:
     found = uniform_filter(found.astype(np.float32), 7) > 0.5
     size = round(_LEAST * WIDTH)
     # a square, separable and so as quick as two lines
-    eroded: Bools = binary_opening(found, np.ones((1, size)))
-    return np.asarray(binary_opening(eroded, np.ones((size, 1))), dtype=np.bool_)
+    eroded: Bools = binary_opening(found, np.ones((1, size), dtype=bool))
+    return np.asarray(binary_opening(eroded, np.ones((size, 1), dtype=bool)), dtype=np.bool_)
 
 
 def covered(green: Field, depth: Field | None) -> Bools:
@@ -102,8 +103,8 @@ def covered(green: Field, depth: Field | None) -> Bools:
     from scipy.ndimage import binary_closing, binary_opening, uniform_filter
 
     leaves = green < float(np.median(green)) - _GREEN
-    found = binary_opening(leaves, np.ones((3, 3)))
+    found = binary_opening(leaves, np.ones((3, 3), dtype=bool))
     if depth is not None and np.isfinite(depth).any():
         before = np.nan_to_num(depth, nan=0.0) > float(np.nanmedian(depth)) + _BEFORE
         found |= uniform_filter(before.astype(np.float32), 5) > 0.3
-    return np.asarray(binary_closing(found, np.ones((5, 5))), dtype=np.bool_)
+    return np.asarray(binary_closing(found, np.ones((5, 5), dtype=bool)), dtype=np.bool_)

@@ -160,7 +160,7 @@ def _together(stones: list[_Found], more: list[_Found]) -> list[_Found]:
     for k, one in enumerate(out):
         fresh = k >= first or k in taken
         moved.append(
-            replace(one, borders=tuple((renumber.get(o, -1), *rest) for o, *rest in one.borders))
+            replace(one, borders=tuple((renumber.get(other, -1), a, b, c) for other, a, b, c in one.borders))
             if fresh
             else one
         )

@@ -74,8 +74,8 @@ def closed_regions(evidence: Field, typical: float, void: Bools) -> Ints:
     far = gaussian_filter(distance_transform_edt(free).astype(np.float32), 0.5 * WIDTH)
     peaks = (far == maximum_filter(far, size=2 * round(_APART) + 1)) & (far > 1.0) & ~void
     seeds, _ = label(peaks, structure=np.ones((3, 3)))
-    height = evidence / typical - 0.02 * far / max(float(far.max()), 1.0)
-    return np.asarray(_watershed(height, seeds, ~void), dtype=np.int64)
+    height = (evidence / typical - 0.02 * far / max(float(far.max()), 1.0)).astype(np.float32)
+    return _watershed(height, seeds.astype(np.int64), ~void)
 
 
 def _watershed(height: Field, seeds: Ints, wall: Bools) -> Ints:
@@ -86,8 +86,7 @@ def _watershed(height: Field, seeds: Ints, wall: Bools) -> Ints:
             "outlines from pictures need the package scikit-image, which is not installed",
             remedy="pip install 'moma-masonry[outlines]'",
         ) from error
-    out: Ints = segmentation.watershed(height, seeds, mask=wall)
-    return out
+    return np.asarray(segmentation.watershed(height, seeds, mask=wall), dtype=np.int64)
 
 
 def borders_of(regions: Ints, measures: NDArray[np.float32]) -> Borders:
@@ -114,4 +113,4 @@ def borders_of(regions: Ints, measures: NDArray[np.float32]) -> Borders:
     keys, where = np.unique(every[:, 0] * base + every[:, 1], return_inverse=True)
     lengths = np.bincount(where, minlength=len(keys)).astype(np.float64)
     sums = np.column_stack([np.bincount(where, column, len(keys)) for column in found.T])
-    return Borders(np.column_stack([keys // base, keys % base]), lengths, sums)
+    return Borders(np.column_stack([keys // base, keys % base]), lengths, np.asarray(sums, dtype=np.float64))

@@ -93,7 +93,7 @@ def outline_shapes(regions: Ints, stone: Bools) -> list[Shape]:
         if box is None:
             continue
         mask: NDArray[np.bool_] = np.pad((regions[box] == number) & stone[box], 1)
-        mask = binary_fill_holes(binary_opening(mask, np.ones((3, 3))))
+        mask = binary_fill_holes(binary_opening(mask, np.ones((3, 3), dtype=bool)))
         if not mask.any() or np.sqrt(mask.sum()) < _LEAST * WIDTH:
             continue
         dense, _, _ = trace(mask)

@@ -85,7 +85,7 @@ def propose_missing(
 
 def lines_across(
     regions: Ints, strength: Strength, typical: float, hidden: Bools
-) -> Iterator[tuple[tuple[slice, slice], int, Bools, Bools, Line]]:
+) -> Iterator[tuple[tuple[slice, ...], int, Bools, Bools, Line]]:
     """Yield the best lines across all regions: the box of the region, the axis, and both as `_lines` does.
 
     Parameters
@@ -101,7 +101,7 @@ def lines_across(
 
 
 def _lines(
-    regions: Ints, number: int, box: tuple[slice, slice], strength: Strength, typical: float, hidden: Bools
+    regions: Ints, number: int, box: tuple[slice, ...], strength: Strength, typical: float, hidden: Bools
 ) -> Iterator[tuple[int, Bools, Bools, Line]]:
     """Yield the axis, the region, the part beyond and the line: upright (1) and level (0, transposed)."""
     mask = regions[box] == number
@@ -126,7 +126,7 @@ def _best_line(ratio: Field, mask: Bools, hidden: Bools) -> Line | None:
         return None
     wide = maximum_filter1d(ratio, 3, axis=1)
     # the joints at the sides of a region are no joints within it
-    seen = binary_erosion(mask, np.ones((1, 2 * clear + 1))) & ~hidden
+    seen = binary_erosion(mask, np.ones((1, 2 * clear + 1), dtype=bool)) & ~hidden
     best: Line | None = None
     along = np.linspace(-1.0, 1.0, rows)
     for lean in range(-_LEAN, _LEAN + 1, 2):
@@ -168,6 +168,5 @@ def line_features(whole: Bools, after: Bools, line: Line) -> Array:
 
 
 def _box_area(mask: Bools) -> float:
-    rows: Array = np.flatnonzero(mask.any(axis=1))
-    columns: Array = np.flatnonzero(mask.any(axis=0))
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     return float((rows[-1] - rows[0] + 1) * (columns[-1] - columns[0] + 1))
