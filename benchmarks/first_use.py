@@ -1,8 +1,9 @@
-"""First use of MOMA: ``python -m benchmarks.first_use [--record]``; see benchmarks/README.md.
+"""First use of MOMA: ``python -m benchmarks.first_use [--record | --record-others]``; see benchmarks/README.md.
 
 The sample is taken in and run with an empty cache of kernels, and again with the full one; the difference is what
 compiling takes. ``--record`` renews the lists of kernels in ``moma/kernels``, after a change of what kernels are
-called with (Linux).
+called with (Linux): first those of the sample, by command, then what a matrix of small samples, profiles and commands
+calls beyond them, which ``--record-others`` renews alone.
 """
 
 import json
@@ -14,11 +15,41 @@ import time
 from pathlib import Path
 
 from benchmarks.report import machine
-from moma.kernels.uses import COMMANDS, LISTS
+from moma.kernels.uses import COMMANDS, LISTS, OTHERS
+from tests.pipelines.scenes import small_geology
 
 __all__ = ["main"]
 
 _SAMPLE = Path("data/samples/window")
+
+_MATRIX = """
+sample arch --out arch
+ingest arch/arch.moma --db sqlite:///arch.db
+run arch/arch.toml --db sqlite:///arch.db --out arch-run
+assess arch/arch.toml --db sqlite:///arch.db --out arch-limit
+ingest {sample}/window.moma --db sqlite:///window.db
+run {sample}/window.toml --profile fast --db sqlite:///window.db --out window-fast
+check {sample}/window.toml --db sqlite:///window.db
+sample wall --moved settlement --small --out settled
+ingest settled/wall.moma --db sqlite:///settled.db
+run settled/wall.toml --db sqlite:///settled.db --out settled-run
+diagnose settled/diagnosis.toml --db sqlite:///settled.db --out diagnosis
+sample tower --small --courses 2 --out tower
+ingest tower/tower.moma --db sqlite:///tower.db
+run tower/tower.toml --profile fast --db sqlite:///tower.db --out tower-run
+sample rubble-wall --out rubble
+ingest --masks rubble/wall.png --size 1x1.2 --depth 0.2 --kind rubble --db sqlite:///rubble.db
+pushover rubble/rubble-wall.toml --db sqlite:///rubble.db --out pushed
+geology biaxial {geology}/biaxial.toml --out biaxial
+geology repose {geology}/repose.toml --out repose
+geology wedge {geology}/wedge.toml --out wedge
+geology fault {geology}/fault.toml --out fault
+geology fold {geology}/fold.toml --out fold
+"""
+"""Commands in a folder of their own, in this order: every engine, on the smallest sample that comes with it."""
+
+# processor time after which a command of the matrix is ended: it has called its kernels by then [s]
+_LONGEST = 60
 
 _RECORDING = """
 import json, os, sys
@@ -32,12 +63,32 @@ with open(sys.argv[1], "w") as file:
     json.dump([vars(one) for one in uses], file)
 """
 
+_CALLED = """
+import json, resource, signal, sys
+from moma.cli import app
+from moma.kernels.uses import called
+def end(*_):
+    raise KeyboardInterrupt
+signal.signal(signal.SIGXCPU, end)
+resource.setrlimit(resource.RLIMIT_CPU, (int(sys.argv[2]), -1))
+try:
+    app(sys.argv[3:], prog_name="moma", standalone_mode=False)
+except BaseException as error:
+    print("ended by", type(error).__name__, error, file=sys.stderr)
+with open(sys.argv[1], "w") as file:
+    json.dump([vars(one) for one in called()], file)
+"""
 
-def main(record: bool = False) -> None:
-    """Time the first and the second use of the sample, or record the kernels that the first one compiles."""
+
+def main(record: str = "") -> None:
+    """Time the first and the second use of the sample, or record kernels: all lists, or that of the others alone."""
     with tempfile.TemporaryDirectory() as folder:
         if record:
-            lists = {command: _recorded(command, Path(folder)) for command in COMMANDS}
+            lists = json.loads(LISTS.read_text(encoding="utf-8"))
+            if record == "all":
+                lists = {command: _recorded(command, Path(folder)) for command in COMMANDS}
+            known = [one for command in COMMANDS for one in lists[command]]
+            lists[OTHERS] = _matrix(Path(folder), known)
             LISTS.write_text("{\n" + ",\n".join(map(_text, lists.items())) + "\n}\n", encoding="utf-8")
             return
         print(machine())
@@ -72,6 +123,24 @@ def _timed(call: list[str], folder: str) -> float:
     return time.perf_counter() - began
 
 
+def _matrix(folder: Path, known: list[dict[str, object]]) -> list[dict[str, object]]:
+    """Return the kernels that the commands of the matrix call and that are not known yet, in the user's own cache."""
+    small_geology(folder / "geology")
+    uses: list[dict[str, object]] = []
+    found = folder / "called.json"
+    path = os.pathsep.join((os.getcwd(), *filter(None, sys.path)))
+    for line in _MATRIX.strip().splitlines():
+        arguments = line.format(sample=_SAMPLE.resolve(), geology=folder / "geology").split()
+        found.unlink(missing_ok=True)
+        call = [sys.executable, "-c", _CALLED, str(found), str(_LONGEST), *arguments]
+        subprocess.run(call, env=os.environ | {"PYTHONPATH": path}, cwd=folder, stdout=subprocess.DEVNULL)
+        called = json.loads(found.read_text(encoding="utf-8")) if found.exists() else []
+        fresh = [one for one in called if one not in known and one not in uses]
+        print(f"{len(fresh):3d} more kernels: moma {line}", flush=True)
+        uses += fresh
+    return uses
+
+
 def _recorded(command: str, folder: Path) -> list[dict[str, object]]:
     """Return the kernels that a command compiles after those before it."""
     found = folder / "uses.json"
@@ -91,4 +160,4 @@ def _text(named: tuple[str, list[dict[str, object]]]) -> str:
 
 
 if __name__ == "__main__":
-    main("--record" in sys.argv[1:])
+    main({"--record": "all", "--record-others": OTHERS}.get(" ".join(sys.argv[1:]), ""))

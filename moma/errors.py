@@ -119,7 +119,7 @@ class SolverError(MomaError):
 
 
 class MissingLibraryError(MomaError):
-    """Missing shared library of the system; the remedy names the package to install."""
+    """Missing package or shared library of the system; the remedy names the package to install."""
 
 
 _ELSEWHERE = "name a place that can be written"

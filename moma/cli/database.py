@@ -48,6 +48,7 @@ def migrate(
 
 if TYPE_CHECKING:
     from pipelines.ingest.exchange import ExchangeReport
+    from pipelines.record.export.export import Exported
 
 
 Document = Annotated[
@@ -57,24 +58,57 @@ Document = Annotated[
 Target = Annotated[
     Path,
     typer.Argument(
-        metavar="FILE.json",
-        help="The document, or FILE.json.gz, or - for standard output; see docs/exchange.md.",
+        metavar="FILE",
+        help="FILE.json or .json.gz: all, as one document; - for standard output. FILE.ifc, .dxf, .gpkg, .glb, "
+        ".compas.json, .results.json, .lmgc90.py or .3ddat: for other programs; see docs/exchange.md.",
     ),
 ]
 
 
 @reporting
-def export(document: Target, db: Db = DEFAULT_DB, json: Json = False, verbose: Verbose = False) -> None:
-    """Export the whole database as one JSON document."""
+def export(
+    document: Target,
+    run: Annotated[
+        int | None,
+        typer.Option("--run", metavar="N", help="Run whose results go into a file for another program."),
+    ] = None,
+    crs: Annotated[
+        str | None,
+        typer.Option(
+            "--crs", metavar="NAME", help="Reference system of the site for IFC and GeoPackage: EPSG:25832."
+        ),
+    ] = None,
+    db: Db = DEFAULT_DB,
+    json: Json = False,
+    verbose: Verbose = False,
+) -> None:
+    """Export the database as one JSON document, or its stones into a file for another program."""
     from moma.cli.text.formats import as_json
     from pipelines.ingest.exchange import export_database, export_to_stream
+    from pipelines.record.export.export import ENDINGS, export_file
 
+    name = document.name.lower()
+    if name.endswith(ENDINGS):
+        done = export_file(db, document, run, crs)
+        print(as_json(asdict(done)) if json else _told(done))
+        return
+    check_ending(document if name != "-" else None, ".json", ".json.gz", *ENDINGS)
+    for option, given in (("--run", run), ("--crs", crs)):
+        if given is not None:
+            remedy = "leave it out: the document has all runs"
+            raise UsageError(f"{option} with a JSON document", where=str(document), remedy=remedy)
     if str(document) == "-":
         export_to_stream(db, sys.stdout.buffer)
         return
-    check_ending(document, ".json", ".json.gz")
     report = export_database(db, document)
     print(as_json(asdict(report)) if json else "\n".join(_lines(report, "from", verbose)))
+
+
+def _told(done: "Exported") -> str:
+    """Return what was written in one line."""
+    results = "" if done.run is None else f", results of run {done.run}"
+    size = f"{done.bytes / 1e6:.1f} MB"
+    return f"{done.path}: {done.stones} stones, {done.groups} groups{results} from {done.database} ({size})"
 
 
 @reporting

@@ -16,24 +16,41 @@ __all__ = ["use_packed_kernels"]
 
 _FITTING = Path(__file__).with_name("packed.json")
 
+_SAID = "MOMA_KERNELS_SAID"
+"""Variable of the environment that is set once the reason has been said."""
+
 
 def use_packed_kernels() -> None:
     """Have numba read the kernels of the wheel, if this is one, they fit, and nobody has told numba otherwise."""
     if "numba" in sys.modules or not _FITTING.exists():
         return
     fitting = json.loads(_FITTING.read_text(encoding="utf-8"))
-    if not os.environ.keys() & fitting["environment"].keys() and _fits(fitting):
+    if os.environ.keys() & fitting["environment"].keys():
+        return
+    reason = _misfit(fitting)
+    if reason is None:
         os.environ.update(fitting["environment"])
+    elif _SAID not in os.environ:
+        os.environ[_SAID] = "1"  # processes that this one starts say it no more
+        print(f"moma: warning: {reason}; kernels are compiled here, once", file=sys.stderr)
 
 
-def _fits(fitting: dict[str, Any]) -> bool:
-    """Return whether this machine reads and runs such kernels."""
+def _misfit(fitting: dict[str, Any]) -> str | None:
+    """Return why this machine does not read or run such kernels; None if it does."""
     from importlib.metadata import version
 
-    if (sysconfig.get_python_version(), version("numba")) != (fitting["python"], fitting["numba"]):
-        return False
+    for name, here, there in (
+        ("Python", sysconfig.get_python_version(), fitting["python"]),
+        ("numba", version("numba"), fitting["numba"]),
+    ):
+        if here != there:
+            remedy = f": pip install numba=={there}" if name == "numba" else ""
+            return f"the kernels of this wheel are for {name} {there}, here is {here}{remedy}"
     needed = {one.lstrip("+") for one in fitting["environment"]["NUMBA_CPU_FEATURES"].split(",")}
-    return needed <= _features()
+    lacking = sorted(needed - _features())
+    if lacking:
+        return f"the kernels of this wheel need a processor with {', '.join(lacking)}"
+    return None
 
 
 def _features() -> set[str]:

@@ -1,12 +1,14 @@
 """Kernels that commands call, with the types of their arguments: what a first use has to compile.
 
-The list ``usual.json`` was recorded from the sample by ``python -m benchmarks.first_use``. It only saves time: a kernel
+The list ``usual.json`` was recorded by ``python -m benchmarks.first_use --record``: from the sample by command, and
+from a matrix of samples, profiles and commands. It only saves time: a kernel
 that it does not name is compiled where it is called, one that is no longer called like that is compiled in vain.
 """
 
 import json
+import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -14,11 +16,15 @@ from typing import Any
 
 import numba
 from numba.core import event
+from numba.core.dispatcher import Dispatcher
 
-__all__ = ["COMMANDS", "LISTS", "KernelUse", "kernels_of", "recording"]
+__all__ = ["COMMANDS", "LISTS", "OTHERS", "KernelUse", "called", "kernels_of", "recording"]
 
 COMMANDS = ("orient", "ingest", "run")
 """Commands with a list, in their usual order."""
+
+OTHERS = "others"
+"""Name of the list of what other commands, samples and profiles compile beyond them."""
 
 LISTS = Path(__file__).with_name("usual.json")
 """File of the lists, by command."""
@@ -60,6 +66,24 @@ def recording() -> Iterator[list[KernelUse]]:
         yield listener.uses
     finally:
         event.unregister("numba:compile", listener)
+
+
+def called() -> list[KernelUse]:
+    """Return the kernels that Python code has called in this process, whether they were compiled or loaded.
+
+    Kernels that others call are not loaded by themselves where the cache is full.
+    """
+    uses: list[KernelUse] = []
+    for name in sorted(sys.modules):
+        for kernel in list(vars(sys.modules[name]).values()) if "._kernels" in name else ():
+            if not isinstance(kernel, Dispatcher) or kernel.py_func.__module__ != name:
+                continue
+            for types in kernel.overloads:
+                use = KernelUse(name, kernel.py_func.__qualname__, tuple(_encoded(one) for one in types))
+                with suppress(AttributeError, TypeError, KeyError):  # of a type that has no name here
+                    if tuple(_decoded(one) for one in use.types) == tuple(types) and use not in uses:
+                        uses.append(use)
+    return uses
 
 
 class _Recorder(event.Listener):  # type: ignore[misc]

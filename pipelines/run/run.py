@@ -33,6 +33,7 @@ from pipelines.reports.page.scenes import run_model
 from pipelines.reports.run import write_report
 from pipelines.results.folder import check_replaceable, replacing, source_of
 from pipelines.results.joints_csv import write_joints
+from pipelines.results.notebook import notebook_html
 from pipelines.results.peaks import rocking_caution
 from pipelines.results.series_csv import write_series
 from pipelines.results.stone_values import stone_results
@@ -76,6 +77,10 @@ class RunReport:
     summary: dict[str, Any]
     warnings: tuple[str, ...]
     run: int
+
+    def _repr_html_(self) -> str:
+        """Return headline, cautions and the page in a frame, as notebooks show it."""
+        return notebook_html(self.folder, self.summary, self.warnings)
 
 
 def run_scene(

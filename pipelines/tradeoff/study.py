@@ -18,6 +18,7 @@ from pipelines.scene.file import read_scene
 from pipelines.scene.stages import refuse_stages
 from pipelines.toml.schema import nearest
 from pipelines.tradeoff.grid import grid
+from pipelines.tradeoff.memory import machine_memory
 from pipelines.tradeoff.report import Goal, study_record, write_study
 from pipelines.tradeoff.scheduler import Limits, carry_out
 from pipelines.tradeoff.store import Store, study_key
@@ -110,7 +111,9 @@ def run_trade(
     settings = grid(scene, blocks, width, stress=_STRESS in quantity)
     store = Store(Path(folder), study_key(scene, assembly))
     store.prepare()
-    limits = Limits(asked.budget, asked.jobs, _MEMORY_SHARE * _memory(), quantity, scene.solver.threads)
+    limits = Limits(
+        asked.budget, asked.jobs, _MEMORY_SHARE * machine_memory(), quantity, scene.solver.threads
+    )
     job = Job(scene.text, str(path), url, {}, width)
     forecast, left = carry_out(job, settings, store, limits, progress)
     goal = Goal(scene.name, quantity, asked.error, width)
@@ -119,8 +122,3 @@ def run_trade(
     }
     write_study(store, record)
     return TradeReport(store.folder, record)
-
-
-def _memory() -> int:
-    """Return the memory of this machine [bytes]."""
-    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")

@@ -7,7 +7,6 @@ input, which stays open as long as the parent lives; the answer is one line of J
 import ctypes
 import json
 import os
-import resource
 import signal
 import sys
 import threading
@@ -22,6 +21,7 @@ from moma.errors import MomaError
 from pipelines.results.quantities import quantities
 from pipelines.run.assemble import assemble
 from pipelines.scene.file import SceneFile, parse_scene
+from pipelines.tradeoff.memory import peak_memory
 from pipelines.tuning.overlay import overlaid, overlay_from
 
 __all__ = ["FAILED", "SHORT", "Job"]
@@ -54,7 +54,7 @@ class Job:
 
 def _measured(job: Job) -> dict[str, Any]:
     """Run the scene, twice if that is short, and return its cost and results."""
-    program = _peak_memory()
+    program = peak_memory()
     scene = overlaid(parse_scene(job.text, job.path), overlay_from(job.overlay), job.width)
     for _ in range(2):
         cpu, wall = time.process_time(), time.perf_counter()
@@ -65,7 +65,7 @@ def _measured(job: Job) -> dict[str, Any]:
     return {
         "cpu": cpu,
         "wall": wall,
-        "memory": _peak_memory(),
+        "memory": peak_memory(),
         "program_memory": program,
         "nodes": sum(len(body.reference) for body in result.bodies if body.element is not None),
         "contacts": len(result.contacts.gap),
@@ -81,12 +81,6 @@ def _simulated(scene: SceneFile, url: str) -> Result:
     with open_database(url, create=False) as database, database.session(read_only=True) as session:
         assembly = assemble(scene, session)
     return simulate(assembly.scene)
-
-
-def _peak_memory() -> int:
-    """Return the peak memory of this process [bytes]."""
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak if sys.platform == "darwin" else 1024 * peak
 
 
 def _end_with_parent(parent: int) -> None:

@@ -19,7 +19,7 @@ import numpy as np
 from mechanics.arrays import Array, Ints
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.mesh import VolumeMesh
-from moma.errors import MeshError, UsageError
+from moma.errors import MeshError, MissingLibraryError, UsageError
 
 __all__ = ["check_mesh_file", "read_meshes", "write_meshes"]
 
@@ -159,8 +159,7 @@ def read_meshes(path: str | Path) -> dict[str, VolumeMesh]:
     UsageError : no format has the ending of the name, or the file cannot be read
     MeshError : the file holds no named set of cells, or one with cells of two kinds
     """
-    import meshio
-
+    meshio = _meshio(path)
     path, form = Path(path), _format(path)
     try:
         found = meshio.read(path, file_format=form.writer.removesuffix("22"))
@@ -214,13 +213,22 @@ def _listed(words: Any) -> str:
     return f"{', '.join(first)} or {last}" if first else last
 
 
+def _meshio(path: str | Path) -> Any:
+    """Load the package that reads and writes files of meshes."""
+    try:
+        import meshio
+    except ImportError as error:
+        what = "files of volume meshes need the package meshio, which is not installed"
+        raise MissingLibraryError(what, where=str(path), remedy="pip install meshio") from error
+    return meshio
+
+
 def _codes_file(path: Path) -> Path:
     return path.with_name(f"{path.name}.stones.json")
 
 
 def _write(path: Path, form: _Format, stones: Mapping[str, VolumeMesh]) -> None:
-    import meshio
-
+    meshio = _meshio(path)
     starts = np.cumsum([0, *(len(mesh.nodes) for mesh in stones.values())])
     cells: dict[Element, list[Ints]] = {}
     numbers: dict[Element, list[Ints]] = {}

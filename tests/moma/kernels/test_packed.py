@@ -67,16 +67,25 @@ def test_kernels_that_fit_are_used(told, before_numba):
 
 
 @pytest.mark.parametrize(
-    "other",
+    ("other", "said"),
     [
-        {"python": "3.1"},
-        {"numba": "0.1.0"},
-        {"environment": TARGET | {"NUMBA_CPU_FEATURES": "+one,+four"}},
+        ({"python": "3.1"}, f"are for Python 3.1, here is {THIS['python']}"),
+        ({"numba": "0.1.0"}, f"are for numba 0.1.0, here is {THIS['numba']}: pip install numba==0.1.0"),
+        ({"environment": TARGET | {"NUMBA_CPU_FEATURES": "+one,+four"}}, "need a processor with four"),
     ],
     ids=["python", "numba", "processor"],
 )
-def test_kernels_of_another_python_numba_or_processor_are_not(told, before_numba, other):
-    assert told(THIS | other) == {}
+def test_kernels_of_another_python_numba_or_processor_are_not_and_one_line_says_why(
+    told, before_numba, other, said, capsys
+):
+    environment = told(THIS | other)
+    assert not environment.keys() & TARGET.keys()
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("moma: warning: the kernels of this wheel")
+    assert said in line
+    # a process that this one starts says it no more
+    told(THIS | other, **environment)
+    assert capsys.readouterr().err == ""
 
 
 def test_a_source_tree_has_none(told, before_numba):

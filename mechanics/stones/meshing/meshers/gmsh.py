@@ -49,11 +49,15 @@ def mesh_with_gmsh(
 
     Raises
     ------
-    MissingLibraryError : if gmsh's shared libraries are absent
+    MissingLibraryError : if gmsh or its shared libraries are absent
     MeshError : if gmsh cannot mesh the stone
     """
     try:
         import gmsh
+    except ImportError as error:
+        what = "its mesh is one of gmsh, and that package is not installed"
+        remedy = "pip install gmsh, or model the stone as rigid"
+        raise MissingLibraryError(what, where=f"stone {code}", remedy=remedy) from error
     except OSError as error:
         raise MissingLibraryError(
             f"gmsh cannot be loaded: {error}", remedy=f"install the system packages {_SYSTEM_PACKAGES}"

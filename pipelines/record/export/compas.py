@@ -1,0 +1,235 @@
+"""Block models and results as COMPAS (compas_dem 0.6) writes them: plain JSON, without COMPAS."""
+
+import json
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from archmodel.store.stone_arrays import Faces
+from archmodel.tables.entities import Entity
+from archmodel.tables.runs import ContactPoint, EntityResult, JointResult
+from mechanics.arrays import Array
+from pipelines.record.export.building import Building, stable_uuid
+
+__all__ = ["model_content", "results_content"]
+
+_MESH_DEFAULTS = {"x": 0.0, "y": 0.0, "z": 0.0}
+
+
+def model_content(building: Building, session: Session) -> bytes:
+    """Return a `BlockModel` with all stones; with a run, its supports and the joints with their forces."""
+    guids = [str(stable_uuid("block", code)) for code in building.codes]
+    supports: set[str] = set()
+    edges: dict[str, dict[str, Any]] = {str(row): {} for row in range(len(guids))}
+    if building.run is not None:
+        fixed = select(Entity.code).join(EntityResult).where(
+            EntityResult.run_id == building.run, EntityResult.fidelity == "fixed"
+        )  # fmt: skip
+        supports = {str(code) for code in session.scalars(fixed)}
+        for first, second, contact in _contacts(building, session):
+            edges[str(first)].setdefault(str(second), {"contacts": []})["contacts"].append(contact)
+    used = building.values("material")
+    names = sorted({str(name) for name in used if name is not None})
+    materials = {str(stable_uuid("material", name)): _material(building, name) for name in names}
+    elements = {
+        guid: _block(code, guid, *building.shapes[row], code in supports, used[row])
+        for row, (code, guid) in enumerate(zip(building.codes, guids, strict=True))
+    }
+    data = {
+        "transformation": None,
+        "elements": elements,
+        "materials": materials,
+        "tree": {
+            "attributes": {},
+            "root": {
+                "name": "root",
+                "children": [{"name": "ElementNode", "element": guid} for guid in guids],
+            },
+        },
+        "graph": {
+            "attributes": {},
+            "default_node_attributes": _MESH_DEFAULTS | {"element": None},
+            "default_edge_attributes": {"modifiers": None, "contacts": None},
+            "node": {str(row): {"element": guid} for row, guid in enumerate(guids)},
+            "edge": edges,
+            "max_node": len(guids) - 1,
+        },
+    }
+    return _written(
+        {
+            "dtype": "compas_dem.models/BlockModel",
+            "data": data,
+            "inheritance": ["compas_model.models/Model"],
+            "name": building.title,
+            "guid": _model_guid(building),
+        }
+    )
+
+
+def results_content(building: Building, session: Session) -> bytes:
+    """Return the `Results` of a run: by edge of the graph its resultant, its points and their forces."""
+    edges: dict[str, dict[str, Any]] = {}
+    for first, second, contact in _contacts(building, session):
+        forces = contact["data"]["forces"]
+        frame = contact["data"]["frame"]["data"]
+        axes = [np.array(frame["xaxis"]), np.array(frame["yaxis"])]
+        axes.append(np.cross(*axes))
+        local = np.array(
+            [[force["c_u"], force["c_v"], force["c_np"] - force["c_nn"]] for force in forces]
+        ).reshape(-1, 3)
+        total = local.sum(axis=0)
+        points = [point["data"] for point in contact["data"]["points"]]
+        edges[f"{first},{second}"] = {
+            "contact_data": contact,
+            "contact_points": points,
+            "contact_frame": contact["data"]["frame"],
+            "face_contact": len(points) >= 3,
+            "edge_contact": len(points) == 2,
+            "point_contact": len(points) == 1,
+            "force_normal": local[:, 2].tolist(),
+            "force_tangent1": local[:, 0].tolist(),
+            "force_tangent2": local[:, 1].tolist(),
+            "resultant_local": total.tolist(),
+            "resultant_global": (total @ np.array(axes)).tolist(),
+            "force_magnitude": float(np.linalg.norm(total)),
+        }
+    data = {
+        "model_id": _model_guid(building),
+        "problem_id": str(stable_uuid("problem", str(building.run))),
+        "displacement_scale": 1.0,
+        "node_data": {},
+        "edge_data": edges,
+        "metadata": {"solver": "MOMA", "run": building.run, "outcome": building.outcome},
+    }
+    guid = str(stable_uuid("results", str(building.run)))
+    return _written({"dtype": "compas_dem.problem/Results", "data": data, "name": "Results", "guid": guid})
+
+
+def _model_guid(building: Building) -> str:
+    return str(stable_uuid("model", building.title))
+
+
+def _written(document: dict[str, Any]) -> bytes:
+    return json.dumps(document, ensure_ascii=False, allow_nan=False).encode() + b"\n"
+
+
+def _block(
+    code: str, guid: str, vertices: Array, faces: Faces, support: bool, material: object
+) -> dict[str, Any]:
+    """Return a block; its mesh has the corners and the faces of the solid."""
+    mesh = {
+        "attributes": {},
+        "default_vertex_attributes": _MESH_DEFAULTS,
+        "default_edge_attributes": {},
+        "default_face_attributes": {},
+        "vertex": {str(at): {"x": x, "y": y, "z": z} for at, (x, y, z) in enumerate(vertices.tolist())},
+        "face": {str(at): list(face) for at, face in enumerate(faces)},
+        "facedata": {str(at): {} for at in range(len(faces))},
+        "edgedata": {},
+        "max_vertex": len(vertices) - 1,
+        "max_face": len(faces) - 1,
+    }
+    geometry = {
+        "dtype": "compas.datastructures/Mesh",
+        "data": mesh,
+        "inheritance": [],
+        "guid": str(stable_uuid("mesh", code)),
+    }
+    data = {
+        "transformation": None,
+        "features": [],
+        "name": code,
+        "material": None if material is None else str(stable_uuid("material", str(material))),
+        "geometry": geometry,
+        "is_support": support,
+    }
+    return {"dtype": "compas_dem.elements/Block", "data": data, "name": code, "guid": guid}
+
+
+def _material(building: Building, name: str) -> dict[str, Any]:
+    """Return a material; COMPAS has strengths and moduli in MPa."""
+    known = {label: value for label, (value, _) in building.materials.get(name, {}).items()}
+
+    def in_megapascals(label: str) -> float | None:
+        """Return a property of the material [MPa]; None where not known."""
+        return known[label] / 1e6 if label in known else None
+
+    data = {
+        "name": name,
+        "fck": in_megapascals("compressive_strength"),
+        "ft": in_megapascals("tensile_strength"),
+        "Ecm": in_megapascals("young"),
+        "density": known.get("density"),
+        "poisson": known.get("poisson", 0.2),
+    }
+    guid = str(stable_uuid("material", name))
+    return {"dtype": "compas_dem.material/Stone", "data": data, "name": name, "guid": guid}
+
+
+def _contacts(building: Building, session: Session) -> Iterator[tuple[int, int, dict[str, Any]]]:
+    """Yield rows of both stones and the contact of each joint of the run that has points."""
+    rows = {code: row for row, code in enumerate(building.codes)}
+    codes = {number: str(code) for number, code in session.execute(select(Entity.id, Entity.code))}
+    points: dict[int, list[ContactPoint]] = {}
+    found = select(ContactPoint).where(ContactPoint.run_id == building.run, ContactPoint.joint.is_not(None))
+    for one in session.scalars(found.order_by(ContactPoint.number)):
+        points.setdefault(int(one.joint or 0), []).append(one)
+    joints = select(JointResult).where(JointResult.run_id == building.run).order_by(JointResult.number)
+    for joint in session.scalars(joints):
+        first, second = (rows.get(codes[number]) for number in (joint.first_id, joint.second_id))
+        some = points.get(joint.number, [])
+        if first is not None and second is not None and some:
+            yield first, second, _contact(joint, some, f"{codes[joint.first_id]}\x1f{codes[joint.second_id]}")
+
+
+def _contact(joint: JointResult, points: Sequence[ContactPoint], name: str) -> dict[str, Any]:
+    """Return a contact with the forces on the first stone, in its frame."""
+    normal = np.array([joint.nx, joint.ny, joint.nz])
+    x, y = _tangents(normal)
+    places = np.array([[one.x, one.y, one.z] for one in points])
+    # forces of points act on the candidate, those of the joint on its first stone
+    signs = np.array([1.0 if one.candidate_id == joint.first_id else -1.0 for one in points])
+    forces = np.array([[one.fx, one.fy, one.fz] for one in points]) * signs[:, None]
+    order = _around(places, x, y)
+    guid = str(stable_uuid("contact", name, str(joint.number)))
+    centre = [joint.x, joint.y, joint.z]
+    data = {
+        "name": "FrictionContact",
+        "points": [_geometry("Point", guid, at, places[at].tolist()) for at in order],
+        "frame": _geometry(
+            "Frame", guid, "frame", {"point": centre, "xaxis": x.tolist(), "yaxis": y.tolist()}
+        ),
+        "size": joint.area,
+        "mesh": None,
+        "holes": None,
+        "forces": [_force(forces[at], x, y, normal) for at in order],
+    }
+    return {"dtype": "compas_dem.interactions/FrictionContact", "data": data, "guid": guid}
+
+
+def _force(force: Array, x: Array, y: Array, normal: Array) -> dict[str, float]:
+    along = float(force @ normal)
+    pressing, pulling = max(along, 0.0), max(-along, 0.0)
+    return {"c_np": pressing, "c_nn": pulling, "c_u": float(force @ x), "c_v": float(force @ y)}
+
+
+def _geometry(kind: str, guid: str, at: object, data: object) -> dict[str, Any]:
+    return {"dtype": f"compas.geometry/{kind}", "data": data, "guid": str(stable_uuid(guid, kind, str(at)))}
+
+
+def _tangents(normal: Array) -> tuple[Array, Array]:
+    """Return two unit vectors that make a right-handed frame with a normal."""
+    axis = np.zeros(3)
+    axis[np.argmin(np.abs(normal))] = 1.0
+    x = np.cross(axis, normal)
+    x /= np.linalg.norm(x)
+    return x, np.asarray(np.cross(normal, x))
+
+
+def _around(places: Array, x: Array, y: Array) -> list[int]:
+    """Return points in the order in which they lie around their middle."""
+    arms = places - places.mean(axis=0)
+    return [int(at) for at in np.argsort(np.arctan2(arms @ y, arms @ x), kind="stable")]

@@ -1,0 +1,118 @@
+"""`moma export` into files of other programs, by ending."""
+
+import os
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from sqlalchemy.orm import Session
+
+from archmodel.database.session import open_database
+from moma.errors import ExchangeError, UsageError
+from pipelines.record.export.building import Building, read_building
+from pipelines.record.export.compas import model_content, results_content
+from pipelines.record.export.dxf import dxf_content
+from pipelines.record.export.glb import glb_content
+from pipelines.record.export.gpkg import write_gpkg
+from pipelines.record.export.ifc import ifc_content
+from pipelines.record.export.lmgc90 import lmgc90_content
+from pipelines.record.export.same_scene import same_scene
+from pipelines.record.export.threedec import threedec_content
+
+__all__ = ["ENDINGS", "Exported", "export_file"]
+
+
+@dataclass(frozen=True)
+class Exported:
+    """A file for another program: its path, the database, its size in bytes, and what is in it."""
+
+    path: str
+    database: str
+    bytes: int
+    stones: int
+    groups: int
+    run: int | None
+
+
+@dataclass(frozen=True)
+class _Order:
+    """Building to be written, and the session that it came from."""
+
+    building: Building
+    session: Session
+    crs: str | None
+
+
+def _results(order: _Order) -> bytes:
+    if order.building.run is None:
+        raise UsageError("results of no run", where="export", remedy="name the run with --run")
+    return results_content(order.building, order.session)
+
+
+_CONTENTS: Mapping[str, Callable[[_Order], bytes]] = {
+    ".ifc": lambda order: ifc_content(order.building, order.crs),
+    ".dxf": lambda order: dxf_content(order.building),
+    ".glb": lambda order: glb_content(order.building),
+    ".compas.json": lambda order: model_content(order.building, order.session),
+    ".results.json": _results,
+    ".lmgc90.py": lambda order: lmgc90_content(
+        order.building, same_scene(order.session, order.building.run, "LMGC90")
+    ),
+    ".3ddat": lambda order: threedec_content(
+        order.building, same_scene(order.session, order.building.run, "3DEC")
+    ),
+}
+
+ENDINGS = (*_CONTENTS, ".gpkg")
+"""Endings of the files that are written for other programs."""
+
+_OF_CRS = (".ifc", ".gpkg")
+
+
+def export_file(url: str, path: Path, run: int | None = None, crs: str | None = None) -> Exported:
+    """Write the stones of a database into a file for another program.
+
+    The file replaces an older one only when it is complete.
+
+    Parameters
+    ----------
+    url : of the database
+    path : of the file; its ending, one of `ENDINGS`, names the format
+    run : whose results come along; None: none
+    crs : coordinate reference system of the site, as AUTHORITY:NUMBER; None: not known
+
+    Raises
+    ------
+    UsageError : the ending, the run or the system is wrong, or a package is missing
+    ExchangeError : the file cannot be written
+    """
+    ending = next(one for one in ENDINGS if path.name.lower().endswith(one))
+    if crs is not None:
+        _check_crs(crs, ending)
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        with open_database(url, create=False) as database, database.session(read_only=True) as session:
+            building = read_building(session, run)
+            shown = database.url
+            if ending == ".gpkg":
+                write_gpkg(building, part, crs)
+            else:
+                part.write_bytes(_CONTENTS[ending](_Order(building, session, crs)))
+        part.replace(path)
+    except OSError as error:
+        what = f"it cannot be written: {error.strerror}"
+        raise ExchangeError(what, where=str(path), remedy="name a file in another folder") from error
+    finally:
+        with suppress(OSError):  # a folder that is read-only refuses this too
+            part.unlink(missing_ok=True)
+    return Exported(str(path), shown, path.stat().st_size, len(building.codes), len(building.groups), run)
+
+
+def _check_crs(crs: str, ending: str) -> None:
+    if ending not in _OF_CRS:
+        remedy = f"leave it out; {' and '.join(_OF_CRS)} have one"
+        raise UsageError(f"a file {ending} has no coordinate reference system", where="--crs", remedy=remedy)
+    authority, _, number = crs.partition(":")
+    if not authority or not number.isascii() or not number.isdigit():
+        raise UsageError(f"{crs!r} is no reference system", where="--crs", remedy="write e.g. EPSG:25832")
