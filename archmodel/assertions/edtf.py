@@ -37,7 +37,7 @@ def year_bounds(name: str, value: int | str) -> Bounds:
     >>> year_bounds("begins", "14XX"), year_bounds("begins", "circa 1400"), year_bounds("ends", "../1400")
     ((1400, 1499), (1400, 1400), (None, 1400))
     """
-    if isinstance(value, int):
+    if not isinstance(value, str):
         return value, value
     text = value.strip()
     for pattern, edtf in _WORDS:
