@@ -60,7 +60,7 @@ Target = Annotated[
     typer.Argument(
         metavar="FILE",
         help="FILE.json or .json.gz: all, as one document; - for standard output. FILE.ifc, .dxf, .gpkg, .glb, "
-        ".compas.json, .results.json, .lmgc90.py or .3ddat: for other programs; see docs/exchange.md.",
+        ".compas.json, .results.json, .lmgc90.py or .3ddat: for other programs; see docs/howto/other-programs.md.",
     ),
 ]
 

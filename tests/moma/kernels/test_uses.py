@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 from numba import njit
 
-from moma.kernels.uses import COMMANDS, _decoded, _encoded, kernels_of, recording
+from moma.kernels.uses import COMMANDS, OTHERS, _decoded, _encoded, kernels_of, recording
 
 USES = {
-    f"{command}-{use.name}-{at}": use for command in COMMANDS for at, use in enumerate(kernels_of(command))
+    f"{command}-{use.name}-{at}": use
+    for command in (*COMMANDS, OTHERS)
+    for at, use in enumerate(kernels_of(command))
 }
 
 
