@@ -70,16 +70,12 @@ def store_survey(
         if a stone cannot be stored, at its ``file:line``
     """
     with session.begin_nested():
-        known_file = survey_with_hash(session, sha256)
-        if known_file is not None and not again:
-            raise _taken_in(known_file, source_path)
+        earlier = _earlier(session, sha256, source_path, again)
         entry = new_entry(session, "ingest", storable(source_path))
-        if known_file is not None:  # another reading of the same bytes, whose digest is unique
-            sha256 = hashlib.sha256(f"{entry.id}: {sha256}".encode()).hexdigest()
         survey = Survey(
             name=storable(name),
             path=storable(source_path),
-            sha256=sha256,
+            sha256=sha256 if earlier is None else _digest_again(sha256, entry.id),
             entry_id=entry.id,
             stations={name: [float(value) for value in place] for name, place in (stations or {}).items()},
             frame=None if frame is None else dict(frame),
@@ -105,8 +101,7 @@ def store_survey(
             remedy = "give it at least one stone record"
             raise DatabaseError("the survey has no stones", where=source_path, remedy=remedy)
         new = range(start, start + len(lines) - len(measured_again))
-        if known_file is not None:
-            _refuse_others(new, known_file, source_path)
+        _refuse_others(new, earlier, source_path)
         return StoredSurvey(survey.id, survey.entry_id, new, tuple(measured_again))
 
 
@@ -132,17 +127,26 @@ def load_stones(session: Session, entities: Iterable[Entity]) -> list[StoneRecor
     return [found[number] for number in wanted]
 
 
-def _taken_in(known: Survey, source_path: str) -> DatabaseError:
+def _earlier(session: Session, sha256: str, source_path: str, again: bool) -> Survey | None:
+    """Return the survey that was taken in from the same bytes; refuse it unless it is read again."""
+    known = survey_with_hash(session, sha256)
+    if known is None or again:
+        return known
     what = f"this file is in the database already, as survey {known.name!r} from {known.path}"
     remedy = (
         "there is nothing to do; to read it with other options, give --again too, or another database (--db)"
     )
-    return DatabaseError(what, where=source_path, remedy=remedy)
+    raise DatabaseError(what, where=source_path, remedy=remedy)
 
 
-def _refuse_others(new: range, known: Survey, source_path: str) -> None:
+def _digest_again(sha256: str, entry: int) -> str:
+    """Return the digest of another reading of the same bytes, as digests are unique."""
+    return hashlib.sha256(f"{entry}: {sha256}".encode()).hexdigest()
+
+
+def _refuse_others(new: range, known: Survey | None, source_path: str) -> None:
     """Refuse stones of the same file under other codes, which would be there twice."""
-    if len(new):
+    if known is not None and len(new):
         what = (
             f"{len(new)} stones have codes that the survey {known.name!r} of the same file did not give them"
         )

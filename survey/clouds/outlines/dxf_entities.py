@@ -53,7 +53,7 @@ class DrawnText:
 
 @dataclass
 class Entities:
-    """What a drawing shows.
+    """Entities of a drawing by their use.
 
     Attributes
     ----------
