@@ -1,6 +1,6 @@
 """Order, counts and shares of what a query finds; computed here, so that every database orders texts alike."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from sqlalchemy import select
@@ -121,7 +121,8 @@ def _with_each_mark(session: Session, rows: Sequence[dict[str, object]]) -> list
     signs: dict[object, list[str]] = {}
     for code, sign in session.execute(held):
         signs.setdefault(code, []).append(str(sign))
-    return [{**row, MARK: sign} for row in rows for sign in sorted(signs.get(row["code"], [])) or [None]]
+    none: list[str | None] = [None]
+    return [{**row, MARK: sign} for row in rows for sign in sorted(signs.get(row["code"], [])) or none]
 
 
 def _only_in(
@@ -134,7 +135,7 @@ def _only_in(
     """Keep the groups in which an expression is true of every entity; note those in which it is not known of some."""
     kind, where, run = asked
 
-    def codes(*more: str) -> Collection[object]:
+    def codes(*more: str) -> set[object]:
         return {row["code"] for row in find_rows(session, kind, [*where, *more], run, ["code"])}
 
     true, false = codes(expression), codes(f"not ({expression})")

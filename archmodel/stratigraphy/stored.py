@@ -68,7 +68,10 @@ def load_links(session: Session, author: str | None = None) -> list[Link]:
     )
     if author is not None:
         rows = rows.where(Stratigraphy.author == author)
-    return [Link(*row) for row in session.execute(rows)]
+    return [
+        Link(str(unit), kind or "", str(other), author)
+        for unit, kind, other, author in session.execute(rows).tuples()
+    ]
 
 
 def load_units(session: Session) -> list[str]:

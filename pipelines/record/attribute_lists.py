@@ -212,7 +212,7 @@ def _features(path: Path) -> list[tuple[int, Mapping[str, Any]]]:
     features = document.get("features") if isinstance(document, dict) else None
     if not isinstance(features, list) or not features or not all(isinstance(one, dict) for one in features):
         raise UsageError("no features of GeoJSON", where=str(path), remedy="export a layer as GeoJSON")
-    rows = []
+    rows: list[tuple[int, Mapping[str, Any]]] = []
     for number, feature in enumerate(features, start=1):
         values = feature.get("properties")
         values = dict(values) if isinstance(values, dict) else {}

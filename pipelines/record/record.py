@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from sqlalchemy import select
 from sqlalchemy.orm import Session
@@ -114,8 +115,12 @@ def _record_file(session: Session, file: RecordFile, author: str | None, source:
         changes[entry.id] = changes.get(entry.id, 0) + outcome.changes
         if (attached := attachment_of(table, Path(path).parent)) is not None:
             attachments.append(attached)
-            there = {**(entry.settings or {}).get("attachments", {}), attached.document: attached.values()}
-            entry.settings = {**(entry.settings or {}), "attachments": there}
+            settings: dict[str, Any] = dict(entry.settings or {})
+            settings["attachments"] = {
+                **settings.get("attachments", {}),
+                attached.document: attached.values(),
+            }
+            entry.settings = settings
     entries.drop(number for number, count in changes.items() if not count)
     made = tuple(number for number, count in changes.items() if count)
     return FileRecorded(

@@ -102,9 +102,9 @@ def upgrade() -> None:
         ):
             connection.execute(text(sql))
         _rules().create(connection)
-    columns = {one["name"] for one in inspect(connection).get_columns("statement")}
+    there = {one["name"] for one in inspect(connection).get_columns("statement")}
     for name, target in _OBJECTS.items():
-        if name not in columns:
+        if name not in there:
             sql = f"ALTER TABLE statement ADD COLUMN {name} INTEGER REFERENCES {target} (id)"
             connection.execute(text(sql))
     credit_statements(connection)

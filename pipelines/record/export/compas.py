@@ -38,7 +38,7 @@ def model_content(building: Building, session: Session) -> bytes:
         guid: _block(code, guid, *building.shapes[row], code in supports, used[row])
         for row, (code, guid) in enumerate(zip(building.codes, guids, strict=True))
     }
-    data = {
+    data: dict[str, Any] = {
         "transformation": None,
         "elements": elements,
         "materials": materials,
@@ -76,7 +76,7 @@ def results_content(building: Building, session: Session) -> bytes:
         forces = contact["data"]["forces"]
         frame = contact["data"]["frame"]["data"]
         axes = [np.array(frame["xaxis"]), np.array(frame["yaxis"])]
-        axes.append(np.cross(*axes))
+        axes.append(np.cross(axes[0], axes[1]))
         local = np.array(
             [[force["c_u"], force["c_v"], force["c_np"] - force["c_nn"]] for force in forces]
         ).reshape(-1, 3)
@@ -138,7 +138,7 @@ def _block(
         "inheritance": [],
         "guid": str(stable_uuid("mesh", code)),
     }
-    data = {
+    data: dict[str, Any] = {
         "transformation": None,
         "features": [],
         "name": code,
