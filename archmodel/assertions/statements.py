@@ -155,8 +155,8 @@ def _refuse_far(session: Session, about: Subjects, at: Sequence[float]) -> None:
     """Refuse a place that is too far from a stone to be on it: in another frame, or of another stone."""
     for batch in batches(about.entities):
         rows = select(Entity.code, Entity.x, Entity.y, Entity.z).where(Entity.id.in_(batch))
-        for code, x, y, z in session.execute(rows.where(Entity.x.is_not(None))).tuples():
-            distance = math.dist(at, (x or 0.0, y or 0.0, z or 0.0))
+        for row in session.execute(rows.where(Entity.x.is_not(None))):
+            code, distance = row[0], math.dist(at, tuple(value or 0.0 for value in row[1:]))
             if distance > FARTHEST:
                 what = f"at is {distance:.0f} m from the stone {code}, more than {FARTHEST:.0f} m"
                 raise UsageError(what, remedy="give metres in the frame of the site, or leave at out")

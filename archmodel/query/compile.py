@@ -124,7 +124,7 @@ def condition_in(scope: Where, node: Node) -> ColumnElement[bool]:
             attribute, column = _column(scope, name)
             if attribute.name == "kind":
                 return _of_kind(scope, column, sign, value)
-            if sign not in ("=", "!=") and not attribute.is_number:
+            if sign not in ("=", "!=") and not attribute.is_number and attribute.name != "code":
                 return _ordered(scope, name, attribute, sign, value)
             operand = _operand(scope, attribute, value)
             if attribute.several is not None:
@@ -147,7 +147,7 @@ def _tested(
 
 
 def _ordered(scope: Where, name: Token, attribute: Attribute, sign: str, value: Token) -> ColumnElement[bool]:
-    """Return a comparison by order of what is no number: phases have the order of their years."""
+    """Return a comparison of what is no number by its order: phases have that of their years, codes that of letters."""
     if attribute.order is None or isinstance(scope, StructureScope):
         what = f"{attribute.name} is {_type_of(attribute)}, which has no order"
         raise complaint(name, what, "write =, != or like")

@@ -68,10 +68,7 @@ def load_links(session: Session, author: str | None = None) -> list[Link]:
     )
     if author is not None:
         rows = rows.where(Stratigraphy.author == author)
-    return [
-        Link(str(unit), kind or "", str(other), author)
-        for unit, kind, other, author in session.execute(rows).tuples()
-    ]
+    return [Link(str(row[0]), row[1] or "", str(row[2]), row[3]) for row in session.execute(rows)]
 
 
 def load_units(session: Session) -> list[str]:
