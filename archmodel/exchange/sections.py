@@ -28,6 +28,7 @@ _READING_ORDER = (
     "structures",
     "relations",
     "knowledge",
+    "opinions",
     "runs",
 )
 """Modules of `archmodel.tables`, in the order in which a reader wants their tables, as far as references allow."""

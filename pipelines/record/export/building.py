@@ -130,7 +130,7 @@ def read_building(session: Session, run: int | None = None) -> Building:
             raise UsageError(
                 f"there is no run {run}", where="--run", remedy="moma runs lists those there are"
             )
-    solids = list(stone_shapes(session))
+    solids = [one for one in stone_shapes(session) if len(one[2])]
     if not solids:
         raise UsageError("no stone has a solid", where="export", remedy="take in a survey first: moma ingest")
     ids = {number: row for row, (number, _, _) in enumerate(solids)}

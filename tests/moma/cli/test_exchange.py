@@ -71,12 +71,15 @@ def test_a_filled_database_is_refused(url: str):
     assert "--db" in message
 
 
+EXPORTED = ".json or .json.gz or .ifc or .dxf or .glb or .compas.json or .results.json or .lmgc90.py or .3ddat or .gpkg"
+
+
 @pytest.mark.parametrize(
     ("words", "endings"),
     [
-        (["export", "castle.ifc"], ".json or .json.gz"),
-        (["export", "castle"], ".json or .json.gz"),
-        (["export", "castle.gz"], ".json or .json.gz"),
+        (["export", "castle.skp"], EXPORTED),
+        (["export", "castle"], EXPORTED),
+        (["export", "castle.gz"], EXPORTED),
         (["view", "--out", "castle.glb"], ".html or .htm"),
         (["view", "--elevation", "castle.dxf"], ".svg"),
         (["ingest", "wall.csv", "--review", "review.xlsx"], ".csv"),
