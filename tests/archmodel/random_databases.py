@@ -93,7 +93,9 @@ def _row(table: Table, number: int, rows: int, random: Random, known: dict[str, 
             row[column.name] = 1 + 3 * number
         elif column.name == "kind":
             row[column.name] = _kind(table, random)
-        elif column.name in ("code", "name", "sha256"):
+        elif column.name in ("code", "name", "sha256") or (
+            column.key == "about" and table.name == "opinion_rule"
+        ):
             row[column.name] = f"{random.choice(TEXTS[:-1])}{number}"
         else:
             row[column.name] = value(column.type, annotation_of(column, _mapper(table)), random)

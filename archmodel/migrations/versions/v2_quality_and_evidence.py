@@ -80,7 +80,13 @@ def _rules() -> Table:
         Column("authors", JSON, nullable=False),
         Column("entry_id", Integer, ForeignKey("entry.id"), nullable=False),
         Column("superseded_id", Integer, ForeignKey("entry.id")),
-        Index("ix_opinion_rule_about", "about", unique=True, sqlite_where=text("superseded_id IS NULL")),
+        Index(
+            "ix_opinion_rule_about",
+            "about",
+            unique=True,
+            sqlite_where=text("superseded_id IS NULL"),
+            postgresql_where=text("superseded_id IS NULL"),
+        ),
     )
 
 
