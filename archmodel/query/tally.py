@@ -11,7 +11,7 @@ from archmodel.tables.entities import Entity
 from archmodel.tables.knowledge import MasonMark
 from moma.errors import UsageError
 
-__all__ = ["Tally", "count_by", "sorted_rows"]
+__all__ = ["Tally", "count_by", "kind_has_marks", "sorted_rows"]
 
 Row = Mapping[str, object]
 

@@ -272,7 +272,7 @@ def is_workbook(path: Path) -> bool:
         with path.open("rb") as handle:
             return handle.read(4) in _WORKBOOKS
     except (OSError, ValueError) as error:
-        raise unreadable(path, error, "give an existing survey file") from error
+        raise unreadable(path, error, "give an existing file") from error
 
 
 def open_rows(path: Path, sheet: str | None = None) -> TextRows | ListRows:

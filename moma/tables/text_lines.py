@@ -104,7 +104,7 @@ class TextLines:
                 if handle.read(1):
                     raise self.fail(1, f"UTF-16, or old line ends, in more than {_LARGEST} bytes", _SAVE_AS)
         except (OSError, ValueError) as error:
-            raise unreadable(self.path, error, "give an existing survey file") from error
+            raise unreadable(self.path, error, "give an existing file") from error
         if wide is not None:
             try:
                 data = data.decode(wide).encode("utf-8")
@@ -182,7 +182,7 @@ class TextLines:
                     if len(rest) > self._longest:
                         break
         except (OSError, ValueError) as error:
-            raise unreadable(self.path, error, "give an existing survey file") from error
+            raise unreadable(self.path, error, "give an existing file") from error
         if rest:
             yield self._checked(rest, line)
 

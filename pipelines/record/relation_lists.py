@@ -16,7 +16,7 @@ from moma.errors import MomaError, SurveyError, UsageError
 from moma.tables.columns import plain, spellings
 from moma.tables.table import TableRow, read_table
 
-__all__ = ["RelationList", "read_relation_list", "record_relation_list"]
+__all__ = ["RelationList", "read_relation_list", "record_relation_list", "relation_of"]
 
 _WORDS: Mapping[str, Sequence[str]] = {
     # English; German

@@ -63,6 +63,8 @@ def read_control(path: Path) -> tuple[ControlRow, ...]:
     table = read_table(path, _is_row, _REMEDY)
     table.check_titles(_REMEDY)
     header, places = table.columns(_COLUMNS, least=3)
+    if header is not None and header in table.comments and not _fits(table, places):
+        header = None  # a comment that names fewer columns than there are
     if header is not None:
         _check_header(table, header, places)
     rows: dict[str, ControlRow] = {}
@@ -77,6 +79,16 @@ def read_control(path: Path) -> tuple[ControlRow, ...]:
             )
         rows[row.number] = row
     return tuple(rows.values())
+
+
+def _fits(table: Table, places: Mapping[str, int]) -> bool:
+    """Return whether the columns of coordinates hold numbers in every row."""
+    columns = [places[one] for one in "xyz" if one in places]
+    return all(
+        column < len(row.cells) and is_number(row.cells[column], table.commas)
+        for row in table.rows
+        for column in columns
+    )
 
 
 def _is_row(cells: Sequence[str], commas: bool) -> bool:

@@ -33,7 +33,7 @@ class LocalFrame:
         """Return the place (3,) of longitude, latitude [°] and height [m] in the frame [m].
 
         >>> frame = LocalFrame(np.array([11.0, 48.0, 500.0]))
-        >>> frame.place(np.array([11.0, 48.0, 503.0])).round(6).tolist()
+        >>> (frame.place(np.array([11.0, 48.0, 503.0])).round(6) + 0.0).tolist()
         [0.0, 0.0, 3.0]
         """
         return self.axes @ (_geocentric(geographic) - _geocentric(self.origin))

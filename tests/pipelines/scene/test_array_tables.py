@@ -242,7 +242,7 @@ def test_histories_are_constants_tables_or_files_beside_the_scene(tmp_path):
     ):
         parse_scene(text, str(tmp_path / "scene.toml"))
     (tmp_path / "push.csv").unlink()
-    with pytest.raises(SceneError, match=r"push.csv: no such file"):
+    with pytest.raises(SceneError, match=r"push.csv: cannot be read: No such file"):
         parse_scene(text, str(tmp_path / "scene.toml"))
 
 

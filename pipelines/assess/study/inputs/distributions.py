@@ -34,7 +34,7 @@ class Distribution:
     >>> Distribution(Shape.UNIFORM, low=1.0, high=3.0).value(0.0)
     2.0
     >>> round(Distribution(Shape.LOGNORMAL, mean=2.0, sigma=0.2).value(1.0), 4)
-    2.1983
+    2.1988
     """
 
     shape: Shape
