@@ -30,7 +30,7 @@ _LEVEL = 0.95  # of the intervals [-]
 
 @dataclass(frozen=True)
 class Run:
-    """What claims are tested on.
+    """Results on which claims are tested.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Finding:
-    """What the runs of one seed say of a claim.
+    """Margin of a claim by the runs of one seed, with its numbers.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What is concluded of margins.
+    """Conclusion from margins.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""How long will a run take? `python -m benchmarks.cost [--fit] [--json]`.
+"""Forecast of what a run takes, beside what it took: `python -m benchmarks.cost [--fit] [--json]`.
 
 Runs scenes of known size and compares the time and the memory they take with what `mechanics.results.forecast.cost`
 expects of them. With `--fit` other scenes are run, and the rates are found anew: what is printed is to replace those
@@ -146,7 +146,7 @@ def _leaves(stones: int) -> list[tuple[Array, bool]]:
 
 
 def _lift(course: int, height: float, courses: int) -> Array:
-    """What takes a corner of a stone as high as the wall to its course."""
+    """Return the shifts (8, 3) of the corners of a stone as high as the wall to its course [m]."""
     top = np.arange(8) // 4
     lift = np.zeros((8, 3))
     lift[:, 2] = height * (course + top) - top * courses * height
@@ -448,7 +448,7 @@ def _kind(row: Row) -> str:
 
 
 def _seconds(row: Row, stage: str) -> float | None:
-    """What a stage took, or one step of a pace; None if the run had none of it."""
+    """Return the time of a stage, or of one step of a pace [s]; None if the run had none of it."""
     stages: Mapping[str, float] = row["stages"]
     if stage in _PACE.values():
         steps = [*_STEP, *(["assemble"] if _kind(row) == "rigid" else [])]

@@ -1,4 +1,4 @@
-"""What leaving the rest rigid costs in accuracy: `python -m benchmarks.region [--structures NAME …] [--json]`.
+"""Cost in accuracy of leaving the rest rigid: `python -m benchmarks.region [--structures NAME …] [--json]`.
 
 Stress is asked for in a region. It deforms with a ring of neighbours, all other stones are rigid; what comes of it is
 compared with the same stones when all of them deform. See docs/accuracy.md, section 13.

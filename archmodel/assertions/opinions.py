@@ -8,7 +8,6 @@ from sqlalchemy.orm import Session
 from archmodel.assertions.plain_values import statement_values
 from archmodel.assertions.statements import PLAIN, Remark, remark_row
 from archmodel.assertions.validation import checked_choice, checked_label
-from archmodel.store.bulk import batches
 from archmodel.store.find_by_code import Subjects
 from archmodel.store.revisions import NOTHING, RowCounts, end_rows
 from archmodel.tables.entries import Entry
@@ -41,9 +40,8 @@ def decide(
     """
     checked_choice("kind of opinions", about, DISPUTABLE)
     outcome = NOTHING
-    for owner, numbers in (("entity_id", subjects.entities), ("structure_id", subjects.structures)):
-        for batch in batches(numbers):
-            outcome += _decide_batch(session, entry, about, owner, batch, match, remark)
+    for owner, batch in subjects.batches():
+        outcome += _decide_batch(session, entry, about, owner, batch, match, remark)
     return outcome
 
 
@@ -71,7 +69,7 @@ def _decide_batch(
         some = len(chosen[wrong[0]])
         what = f"{some or 'no'} opinions of {about} about {len(wrong)} of the subjects match"
         raise UsageError(what, remedy="name the one that holds by its author or value; see: moma show CODE")
-    details = remark_row(session, remark)
+    details = remark_row(session, entry, remark)
     outcome = NOTHING
     for number in numbers:
         (choice,), old = chosen[number], before.get(number)
@@ -86,8 +84,6 @@ def _decide_batch(
                 **details,
                 about=about,
                 chosen_id=choice.id,
-                author=entry.author,
-                stated_on=remark.stated_on or entry.recorded_at.date(),
                 entry_id=entry.id,
                 supersedes_id=None if old is None else old.id,
             )

@@ -205,25 +205,19 @@ def say_note(session: Session, entry: Entry, about: Subjects, key: str, remark: 
 def without_replaced(session: Session, cls: type[Statement], about: Subjects, author: str | None) -> Subjects:
     """Leave out the subjects of which an author has replaced a statement of this kind by a later one."""
     later = aliased(Statement)
-
-    def replaced(owner: str, numbers: Sequence[int]) -> set[int]:
+    replaced: dict[str, set[int]] = {"entity_id": set(), "structure_id": set()}
+    for owner, batch in about.batches():
         column = getattr(Statement, owner)
-        found: set[int] = set()
-        for batch in batches(numbers):
-            rows = (
-                select(column)
-                .join(later, later.supersedes_id == Statement.id)
-                .where(column.in_(batch), Statement.kind == cls.__kind__, Statement.author == author)
-                .where(later.superseded_id.is_(None))
-            )
-            found.update(session.scalars(rows))
-        return found
-
-    entities = replaced("entity_id", about.entities)
-    structures = replaced("structure_id", about.structures)
+        rows = (
+            select(column)
+            .join(later, later.supersedes_id == Statement.id)
+            .where(column.in_(batch), Statement.kind == cls.__kind__, Statement.author == author)
+            .where(later.superseded_id.is_(None))
+        )
+        replaced[owner].update(session.scalars(rows))
     return Subjects(
-        tuple(number for number in about.entities if number not in entities),
-        tuple(number for number in about.structures if number not in structures),
+        tuple(number for number in about.entities if number not in replaced["entity_id"]),
+        tuple(number for number in about.structures if number not in replaced["structure_id"]),
     )
 
 
@@ -237,12 +231,10 @@ def _say(
 ) -> RowCounts:
     """Store one statement about each subject that lacks it."""
     _refuse_future(remark)
-    full = {**values, **remark_row(session, remark), "author": entry.author}
-    stated_on = remark.stated_on or entry.recorded_at.date()
+    full = {**values, **remark_row(session, entry, remark)}
     outcome = NOTHING
-    for owner, numbers in (("entity_id", about.entities), ("structure_id", about.structures)):
-        for batch in batches(numbers):
-            outcome += _say_of_batch(session, entry, cls, owner, batch, full, stated_on)
+    for owner, batch in about.batches():
+        outcome += _say_of_batch(session, entry, cls, owner, batch, full)
     return outcome
 
 
@@ -253,7 +245,6 @@ def _say_of_batch(
     owner: str,
     numbers: Sequence[int],
     values: Mapping[str, object],
-    stated_on: date,
 ) -> RowCounts:
     session.flush()
     table = table_of(Statement)
@@ -263,7 +254,8 @@ def _say_of_batch(
     same: set[int] = set()
     others: dict[int, int] = {}
     for row in session.execute(held).mappings():
-        if all(row[name] == value for name, value in values.items()):
+        # the same opinion on another day is no other one
+        if all(row[name] == value for name, value in values.items() if name != "stated_on"):
             same.add(row[owner])
         elif cls is DepthEvidence or (cls in SINGLE and row["author"] == values["author"]):
             others[row[owner]] = row["id"]
@@ -271,7 +263,7 @@ def _say_of_batch(
         end_rows(session, entry, Statement, list(others.values()))
     rows = [
         {"kind": cls.__kind__, "entry_id": entry.id, owner: number, "supersedes_id": others.get(number)}
-        | {"stated_on": stated_on, **values}
+        | dict(values)
         for number in numbers
         if number not in same
     ]
@@ -280,8 +272,8 @@ def _say_of_batch(
     return RowCounts(new=len(rows) - len(others), replaced=len(others), unchanged=len(same))
 
 
-def remark_row(session: Session, remark: Remark) -> dict[str, object]:
-    """Return the columns of the details of a statement."""
+def remark_row(session: Session, entry: Entry, remark: Remark) -> dict[str, object]:
+    """Return the columns of a statement that say whose it is, of which day, and its details."""
     document = remark.document
     if remark.locator is not None and document is None:
         raise UsageError(f"the locator {remark.locator[:40]!r} is in no document", remedy="name the document")
@@ -291,6 +283,8 @@ def remark_row(session: Session, remark: Remark) -> dict[str, object]:
         "locator": checked_text("locator", remark.locator),
         "observed_on": remark.observed_on,
         "certainty": checked_number("certainty", remark.certainty, "-", at_least=0.0, at_most=1.0),
+        "author": entry.author,
+        "stated_on": remark.stated_on or entry.recorded_at.date(),
     }
 
 

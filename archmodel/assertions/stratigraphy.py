@@ -92,12 +92,7 @@ def say_stratigraphy(
     """
     keys = list(dict.fromkeys(_key(*relation) for relation in relations))
     stated = _held(session, entry.author, keys)
-    details = remark_row(session, remark) | {
-        "kind": Stratigraphy.__kind__,
-        "entry_id": entry.id,
-        "author": entry.author,
-        "stated_on": remark.stated_on or entry.recorded_at.date(),
-    }
+    details = remark_row(session, entry, remark) | {"kind": Stratigraphy.__kind__, "entry_id": entry.id}
     rows = [dict(zip(_COLUMNS, key, strict=True)) | details for key in keys if key not in stated]
     for batch in batches(rows):
         session.execute(insert(table_of(Stratigraphy)), list(batch))

@@ -49,15 +49,14 @@ def withdraw_statements(
         raise UsageError("a depth cannot be withdrawn", remedy="record the depth that holds instead")
     outcome = NOTHING
     held: list[Statement] = []
-    for owner, numbers in ((cls.entity_id, about.entities), (cls.structure_id, about.structures)):
-        for batch in batches(numbers):
-            for one in session.scalars(select(cls).where(owner.in_(batch))):
-                if not says(one, match or {}):
-                    continue
-                if one.superseded_id is None and one.entry_id > since:
-                    held.append(one)
-                else:
-                    outcome += RowCounts(unchanged=1)
+    for owner, batch in about.batches():
+        for one in session.scalars(select(cls).where(getattr(cls, owner).in_(batch))):
+            if not says(one, match or {}):
+                continue
+            if one.superseded_id is None and one.entry_id > since:
+                held.append(one)
+            else:
+                outcome += RowCounts(unchanged=1)
     mine = [one for one in held if one.author == entry.author]
     ended = mine or held
     voices = {one.author for one in ended}

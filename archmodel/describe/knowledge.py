@@ -143,20 +143,25 @@ def _holding(
     if not opinions:
         return None
     nearest = [one for distance, one in opinions if distance == opinions[0][0]]
-    table, decisions = aliased(Statement), aliased(Statement)
-    rule = rule_of(session, cls.__kind__)
-    order = preference(rule, inspect(table).selectable, inspect(decisions).selectable)
-    first = select(table.id).where(table.id.in_([one.id for one in nearest])).order_by(*order).limit(1)
-    number = session.scalar(first)
-    said: Any = next(one for one in nearest if one.id == number)
+    rule = rule_of(session, cls.__kind__) if len(nearest) > 1 else None
+    said: Any = nearest[0] if rule is None else _preferred(session, rule, nearest)
     about = _material(session, said.material) if isinstance(said, MadeOf) else _phase(said.phase)
     rest = {name: value for name, value in _told(said, far).items() if name not in ("material", "phase")}
-    others = [_opinion(one, far) for one in nearest if one is not said]
-    if not others:
+    if rule is None:
         return about | rest
+    others = [_opinion(one, far) for one in nearest if one is not said]
     column = DISPUTABLE[cls.__kind__]
     disputed = any(getattr(one, column) != getattr(said, column) for one in nearest)
     return about | rest | {"disputed": disputed, "rule": _rule(session, said, rule), "others": others}
+
+
+def _preferred(session: Session, rule: OpinionRule, opinions: Sequence[Statement]) -> Statement:
+    """Return the opinion of several at one distance that holds."""
+    table, decisions = aliased(Statement), aliased(Statement)
+    order = preference(rule, inspect(table).selectable, inspect(decisions).selectable)
+    first = select(table.id).where(table.id.in_([one.id for one in opinions])).order_by(*order).limit(1)
+    number = session.scalar(first)
+    return next(one for one in opinions if one.id == number)
 
 
 def _opinion(statement: Statement, far: Mapping[int, Owner]) -> Values:

@@ -2,7 +2,7 @@
 
 import difflib
 import unicodedata
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -50,6 +50,12 @@ class Subjects:
 
     def __len__(self) -> int:
         return len(self.entities) + len(self.structures)
+
+    def batches(self) -> Iterator[tuple[str, list[int]]]:
+        """Yield the column of statements that names the subjects, and their numbers, a batch at a time."""
+        for owner, numbers in (("entity_id", self.entities), ("structure_id", self.structures)):
+            for batch in batches(numbers):
+                yield owner, batch
 
 
 def check_entry(session: Session, at: int | None) -> None:

@@ -12,6 +12,7 @@ import hashlib
 import io
 import json
 import os
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, fields
@@ -35,7 +36,7 @@ from mechanics.results.stages import StageResult
 from mechanics.scene.laws.law import Terms
 from mechanics.scene.state import State
 
-__all__ = ["Checkpoint", "Checkpoints", "DamagedError", "write_whole"]
+__all__ = ["Checkpoint", "Checkpoints", "DamagedError", "write_shared", "write_whole"]
 
 _RECORDS = {
     one.__name__: one
@@ -171,6 +172,19 @@ def write_whole(path: Path, content: bytes) -> str:
         finally:
             os.close(handle)
     return hashlib.sha256(content).hexdigest()
+
+
+def write_shared(path: Path, content: bytes) -> None:
+    """Write a file that appears whole or not at all, whoever else writes the same one at the same time."""
+    handle, passing = tempfile.mkstemp(prefix=".", suffix=".part", dir=path.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+        Path(passing).chmod(0o644)
+        os.replace(passing, path)
+    except BaseException:
+        Path(passing).unlink(missing_ok=True)
+        raise
 
 
 def _image(values: Any, arrays: Mapping[str, np.ndarray[Any, Any]]) -> bytes:

@@ -2,8 +2,6 @@
 
 import hashlib
 import json
-import os
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from enum import StrEnum
@@ -15,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from moma.errors import UsageError
+from pipelines.results.checkpoints import write_shared
 from pipelines.results.quantities import Quantities, quantities_from
 from pipelines.results.summary import as_json
 from pipelines.run.assemble import Assembly
@@ -138,15 +137,7 @@ class Store:
         """
         target = self.folder / name
         try:
-            handle, fresh = tempfile.mkstemp(prefix=".", suffix=".part", dir=target.parent)
-            try:
-                with os.fdopen(handle, "wb") as file:
-                    file.write(content)
-                Path(fresh).chmod(0o644)
-                os.replace(fresh, target)
-            except BaseException:
-                Path(fresh).unlink(missing_ok=True)
-                raise
+            write_shared(target, content)
         except OSError as error:
             raise UsageError(f"cannot be written: {error.strerror}", where=str(target)) from error
 

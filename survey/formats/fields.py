@@ -1,22 +1,12 @@
-"""Strict parsing of numbers and names, shared by all formats; numbers are those of `moma.tables`."""
+"""Strict parsing of names of stones and kinds, and of courses, shared by all formats."""
 
 import re
 import unicodedata
 
 from moma.errors import SurveyError
-from moma.tables.numbers import FARTHEST, parse_length, parse_number, shown, unreadable
+from moma.tables.numbers import shown
 
-__all__ = [
-    "CODE",
-    "FARTHEST",
-    "KIND",
-    "code_of",
-    "parse_course",
-    "parse_length",
-    "parse_number",
-    "shown",
-    "unreadable",
-]
+__all__ = ["CODE", "KIND", "code_of", "parse_course"]
 
 CODE = re.compile(r"[^\W_][\w.+/:-]{0,63}")
 """Pattern of the name of a stone."""

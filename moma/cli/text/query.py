@@ -57,7 +57,7 @@ def answer(session: "Session", question: Question, format: str) -> tuple[str, st
     """Answer a query in a format (table, csv, excel, json, geojson), with a note for the person at the terminal."""
     known = {one.name: one for one in attributes(session, question.kind)}
     if question.count_by is not None:
-        return _counts(session, question, format)
+        return _counts(session, question, known, format)
     names = _names(session, question, known, format)
     asked = (question.kind, question.where, question.run, names)
     if format == "geojson":
@@ -68,7 +68,7 @@ def answer(session: "Session", question: Question, format: str) -> tuple[str, st
         faces = find_faces(session, *asked)
         from archmodel.query.geojson import feature_collection, flattened  # and with it numpy
 
-        doubts = _disputes(session, question, names)
+        doubts = _disputes(session, question, known, names)
         return as_geojson(feature_collection(flattened(faces) if question.flat else faces)), doubts
     order = [name.removeprefix("-") for name in question.sort]
     fetched = [*names, *(name for name in dict.fromkeys(order) if name not in names)]
@@ -77,7 +77,7 @@ def answer(session: "Session", question: Question, format: str) -> tuple[str, st
     if format == "table":
         names = fetched
     rows = [{name: row[name] for name in names} for row in rows]
-    doubts = "" if "code" not in known or "zone" not in known else _disputes(session, question, names)
+    doubts = _disputes(session, question, known, names)
     if format != "table":
         return _written(names, rows, format), doubts
     if not rows:
@@ -90,7 +90,9 @@ def answer(session: "Session", question: Question, format: str) -> tuple[str, st
     return as_table(units, rows), "; ".join(filter(None, (f"{found} found{first}", doubts)))
 
 
-def _counts(session: "Session", question: Question, format: str) -> tuple[str, str]:
+def _counts(
+    session: "Session", question: Question, known: Mapping[str, Attribute], format: str
+) -> tuple[str, str]:
     """Answer a query with counts of groups."""
     if format == "geojson":
         raise UsageError("counts have no faces", remedy="give --format csv or json")
@@ -108,18 +110,12 @@ def _counts(session: "Session", question: Question, format: str) -> tuple[str, s
     if wrong := [name for name in question.sort if name.removeprefix("-") not in names]:
         raise UsageError(f"{wrong[0]} is not counted", remedy=f"sort by {', '.join(names)}")
     rows = sorted_rows(rows, question.sort)[: question.top]
-    doubts = "" if "zone" not in _entity_attributes(session, question) else _disputes(session, question, by)
-    note = "; ".join(filter(None, (*counted.notes, doubts)))
+    note = "; ".join(filter(None, (*counted.notes, _disputes(session, question, known, by))))
     if format != "table":
         return _written(names, rows, format), note
     if not rows:
         return "", "; ".join(filter(None, (f"no such group of {question.kind}", note)))
     return as_table(counted.units, rows), note
-
-
-def _entity_attributes(session: "Session", question: Question) -> set[str]:
-    """Return the names of the attributes that the question can ask for."""
-    return {one.name for one in attributes(session, question.kind)}
 
 
 def _written(names: Sequence[str], rows: Sequence[Mapping[str, object]], format: str) -> str:
@@ -129,8 +125,17 @@ def _written(names: Sequence[str], rows: Sequence[Mapping[str, object]], format:
     return as_csv(names, rows, spreadsheet=format == "excel")
 
 
-def _disputes(session: "Session", question: Question, names: Sequence[str]) -> str:
+def _of_structures(known: Mapping[str, Attribute]) -> bool:
+    """Return whether these are the attributes of structures, which have no zone."""
+    return "zone" not in known
+
+
+def _disputes(
+    session: "Session", question: Question, known: Mapping[str, Attribute], names: Sequence[str]
+) -> str:
     """Say of how many entities the answer rests on an opinion beside which there is another one."""
+    if _of_structures(known):
+        return ""
     asked = {*names, *asked_columns(question.where, session, question.kind)}
     notes = []
     for subject, resting in RESTS_ON.items():
@@ -157,7 +162,7 @@ def _names(session: "Session", question: Question, known: Mapping[str, Attribute
     if format != "table" or question.everything:
         return list(known)
     named = asked_columns(question.where, session, question.kind)
-    if "zone" not in known:  # structures have few
+    if _of_structures(known):  # they have few
         return list(known)
     usual = [name for name in known if name in USUAL_COLUMNS or name in named]
     return [*usual, *(name for name in named if name not in usual)]

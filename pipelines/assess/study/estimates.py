@@ -120,8 +120,6 @@ def _counted(
         if linear is not None and name == first:
             predicted = linear.predicted(points)
             means[name] = controlled(numbers, predicted, linear.mean, study.confidence)
-        elif name != first and linear is None:
-            means[name] = mean_of(numbers, study.confidence)
         else:
             means[name] = mean_of(numbers, study.confidence)
     table = problem.quantities[0]

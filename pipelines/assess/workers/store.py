@@ -7,8 +7,6 @@ worked, and whoever comes next, here or on another machine with the same folder,
 
 import hashlib
 import json
-import os
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +16,7 @@ import numpy as np
 
 from mechanics.arrays import Array
 from moma.errors import UsageError, storing
+from pipelines.results.checkpoints import write_shared
 
 __all__ = ["Sample", "SampleStore", "Snapshot"]
 
@@ -160,15 +159,7 @@ class SampleStore:
 
 
 def _write(path: Path, content: bytes) -> None:
-    """Write a file that appears whole or not at all, whoever else writes the same one."""
+    """Write a file and the folder in which it stands."""
     with storing(str(path.parent), "records before are kept, and the same command goes on from there"):
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, passing = tempfile.mkstemp(prefix=".", suffix=".part", dir=path.parent)
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(content)
-            Path(passing).chmod(0o644)
-            os.replace(passing, path)
-        except BaseException:
-            Path(passing).unlink(missing_ok=True)
-            raise
+        write_shared(path, content)

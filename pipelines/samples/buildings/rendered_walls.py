@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pipelines.samples.rubble_wall import SIZE, make_rubble_wall
 from survey.arrays import Array, Ints
 from survey.clouds.extras import optional
+from survey.geometry.polygons import ring_area
 
 __all__ = ["STYLES", "RenderedWall", "rasterised", "render_wall"]
 
@@ -162,12 +163,7 @@ def _rings(shape: Any, least: float = 0.004) -> list[Array]:
         for one in parts
         if one.geom_type == "Polygon" and one.area > least
     ]
-    return [ring if _area(ring) > 0.0 else ring[::-1] for ring in rings]
-
-
-def _area(ring: Array) -> float:
-    x, y = ring.T
-    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+    return [ring if ring_area(ring) > 0.0 else ring[::-1] for ring in rings]
 
 
 def _with_door(

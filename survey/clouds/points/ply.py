@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from moma.errors import SurveyError
+from moma.tables.numbers import unreadable
 from survey.arrays import Array
 from survey.clouds.points.chunks import CHUNK, Chunk, PointCloud, lost_digits
-from survey.formats.fields import unreadable
 
 __all__ = ["open_ply"]
 

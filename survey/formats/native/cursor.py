@@ -4,7 +4,8 @@ import re
 from re import Pattern
 
 from moma.errors import SurveyError
-from survey.formats.fields import CODE, KIND, parse_course, parse_length, parse_number, shown
+from moma.tables.numbers import parse_length, parse_number, shown
+from survey.formats.fields import CODE, KIND, parse_course
 
 __all__ = ["NAME_REMEDY", "Cursor"]
 

@@ -5,8 +5,8 @@ import re
 
 import numpy as np
 
+from moma.tables.numbers import FARTHEST
 from survey.arrays import Array
-from survey.formats.fields import FARTHEST
 from survey.formats.native.cursor import Cursor
 from survey.formats.native.header import missing, read_extrusion
 from survey.records.survey import BlockRecord, Extrusion, PointMark, SurveyHead

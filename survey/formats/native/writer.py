@@ -5,7 +5,8 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from moma.errors import SurveyError
-from survey.formats.fields import CODE, FARTHEST
+from moma.tables.numbers import FARTHEST
+from survey.formats.fields import CODE
 from survey.records.survey import (
     OBSERVER,
     BlockRecord,

@@ -13,8 +13,8 @@ import numpy as np
 
 from moma.errors import SurveyError
 from moma.tables.columns import COORDINATES
+from moma.tables.numbers import unreadable
 from moma.tables.rows import ListRows, cell_text
-from survey.formats.fields import unreadable
 from survey.formats.options import ReadingOptions
 from survey.formats.tables.columns import kind_of_column
 from survey.formats.tables.reader import open_table

@@ -11,8 +11,9 @@ passed over; lines without coordinates too.
 import re
 from pathlib import Path
 
+from moma.tables.numbers import shown
 from moma.tables.text_lines import TextLines
-from survey.formats.fields import code_of, shown
+from survey.formats.fields import code_of
 from survey.formats.options import ReadingOptions
 from survey.formats.tables.reader import PointCollector
 from survey.records.survey import SurveyStream

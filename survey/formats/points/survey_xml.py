@@ -11,7 +11,8 @@ from pathlib import Path
 from xml.parsers import expat
 
 from moma.errors import SurveyError
-from survey.formats.fields import code_of, parse_number, shown, unreadable
+from moma.tables.numbers import parse_number, shown, unreadable
+from survey.formats.fields import code_of
 from survey.formats.options import ReadingOptions
 from survey.formats.tables.reader import PointCollector
 from survey.records.survey import SurveyStream

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from moma.errors import SurveyError
+from moma.tables.numbers import parse_number, shown
 from moma.tables.text_lines import TextLines
-from survey.formats.fields import parse_number, shown
 from survey.formats.solids.bodies import RawBody, compact
 
 __all__ = ["obj_bodies"]

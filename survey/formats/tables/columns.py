@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from moma.errors import SurveyError, UsageError
 from moma.tables.columns import COORDINATES, POINT, SIGMA, length_scale, plain, spellings, unit_of
-from survey.formats.fields import shown
+from moma.tables.numbers import shown
 
 __all__ = [
     "ALIASES",

@@ -7,8 +7,9 @@ from typing import Any
 
 from moma.errors import UsageError
 from moma.tables.columns import plain
+from moma.tables.numbers import shown
 from moma.tables.rows import open_rows
-from survey.formats.fields import KIND, shown
+from survey.formats.fields import KIND
 
 __all__ = ["KINDS", "kind_of", "meant", "read_kinds"]
 

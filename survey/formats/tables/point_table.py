@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from moma.errors import SurveyError
+from moma.tables.numbers import shown
 from survey.arrays import Array
-from survey.formats.fields import shown
 from survey.records.survey import BlockRecord, Reject, SurveyHead
 
 __all__ = ["PointTable", "TableStone", "check_station"]

@@ -21,9 +21,9 @@ import numpy as np
 from moma.errors import SurveyError
 from moma.tables.columns import plain
 from moma.tables.decimals import Decimals
-from moma.tables.numbers import EMPTY
+from moma.tables.numbers import EMPTY, shown
 from moma.tables.rows import DATE_REMEDY, ListRows, Row, TextRows, open_rows
-from survey.formats.fields import CODE, KIND, code_of, parse_course, shown
+from survey.formats.fields import CODE, KIND, code_of, parse_course
 from survey.formats.options import ReadingOptions, whole
 from survey.formats.tables.code_template import ROLES, STATION, CodeFields, CodeTemplate
 from survey.formats.tables.columns import ColumnMap, Columns, find_columns, kind_of_column, read_map

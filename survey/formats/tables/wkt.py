@@ -5,8 +5,8 @@ import re
 import numpy as np
 
 from moma.errors import SurveyError
+from moma.tables.numbers import FARTHEST, shown
 from survey.arrays import Array
-from survey.formats.fields import FARTHEST, shown
 
 __all__ = ["FLAT", "outline_of", "ring_of"]
 

@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from moma.errors import SurveyError
+from moma.tables.numbers import parse_number, shown
 from moma.tables.text_lines import TextLines
 from survey.arrays import Array
-from survey.formats.fields import parse_number, shown
 from survey.orientation.formats.colmap_binary import binary_cameras, binary_images, binary_points
 from survey.orientation.formats.marks import marked_well, marks_of_points, numbered
 from survey.orientation.network import Camera, Network, Photo

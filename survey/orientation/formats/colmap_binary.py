@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from moma.errors import SurveyError
+from moma.tables.numbers import unreadable
 from survey.arrays import Array, Ints
-from survey.formats.fields import unreadable
 
 __all__ = ["MODELS", "BinaryImage", "binary_cameras", "binary_images", "binary_points"]
 

@@ -13,10 +13,9 @@ import numpy as np
 
 from moma.errors import SurveyError
 from moma.tables.columns import COORDINATES, POINT, SIGMA, length_scale
-from moma.tables.numbers import EMPTY, is_number
+from moma.tables.numbers import EMPTY, is_number, shown
 from moma.tables.table import Table, TableRow, read_table
 from survey.arrays import Array
-from survey.formats.fields import shown
 from survey.orientation.network import Control, Network, listed
 
 __all__ = ["ControlRow", "read_control", "with_control", "write_control"]

@@ -22,9 +22,9 @@ from xml.sax.saxutils import escape
 import numpy as np
 
 from moma.errors import SurveyError
+from moma.tables.numbers import parse_number, shown
 from moma.tables.rows import TextRows
 from survey.arrays import Array
-from survey.formats.fields import parse_number, shown
 from survey.orientation.formats.control import ControlRow, with_control, write_control
 from survey.orientation.formats.marks import MarkRow, network_of
 from survey.orientation.formats.xml_lines import Element, read_xml

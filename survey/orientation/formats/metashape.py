@@ -15,8 +15,8 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from moma.errors import SurveyError
+from moma.tables.numbers import parse_number
 from survey.arrays import Array
-from survey.formats.fields import parse_number
 from survey.orientation.formats.local_frame import LocalFrame
 from survey.orientation.formats.marks import marked_well, marks_of_points
 from survey.orientation.formats.xml_lines import Element, read_xml

@@ -21,9 +21,9 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 
 from moma.errors import SurveyError
+from moma.tables.numbers import parse_number, shown
 from moma.tables.text_lines import TextLines
 from survey.arrays import Array
-from survey.formats.fields import parse_number, shown
 from survey.orientation.formats.marks import numbered
 from survey.orientation.network import Camera, Control, Network, Photo
 from survey.orientation.rotations import angles, from_angles

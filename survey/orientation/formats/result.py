@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from moma.errors import SurveyError
+from moma.tables.numbers import unreadable
 from survey.arrays import Array
-from survey.formats.fields import unreadable
 from survey.orientation.bundle.control import control_tests
 from survey.orientation.bundle.orient import Orientation
 from survey.orientation.bundle.statistics import photo_precision

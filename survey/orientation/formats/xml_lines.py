@@ -6,7 +6,7 @@ from pathlib import Path
 from xml.parsers import expat
 
 from moma.errors import SurveyError
-from survey.formats.fields import parse_number, shown, unreadable
+from moma.tables.numbers import parse_number, shown, unreadable
 
 __all__ = ["Element", "read_xml"]
 

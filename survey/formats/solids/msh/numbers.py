@@ -5,8 +5,8 @@ import re
 import numpy as np
 
 from moma.errors import SurveyError
+from moma.tables.numbers import shown
 from survey.arrays import Array, Ints
-from survey.formats.fields import shown
 
 __all__ = ["MshNumbers"]
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from moma.tables.numbers import shown, unreadable
 from survey.arrays import Array, Ints
-from survey.formats.fields import shown, unreadable
 from survey.formats.solids.msh.numbers import MshNumbers
 
 __all__ = ["Elements", "MshFile"]
