@@ -51,7 +51,7 @@ test: $(VENV)/.tests $(VENV)/.kernels
 $(VENV)/.installed: pyproject.toml | $(VENV)/.kernels
 	@echo "Installing into $(VENV); the first time this takes a minute or two."
 	@$(PIP) numba scipy
-	@$(VENV)/bin/python -m moma.kernels & compiler=$$!; trap "kill $$compiler; exit 130" INT TERM; \
+	@$(VENV)/bin/python -m ground.kernels & compiler=$$!; trap "kill $$compiler; exit 130" INT TERM; \
 	  $(PIP) --editable .; failed=$$?; kill $$compiler 2>/dev/null; wait $$compiler 2>/dev/null; exit $$failed
 	@touch $@
 

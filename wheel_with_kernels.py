@@ -1,4 +1,4 @@
-"""Build backend of MOMA: setuptools', whose wheels carry compiled kernels too (`moma.kernels.packed` uses them).
+"""Build backend of MOMA: setuptools', whose wheels carry compiled kernels too (`ground.kernels.packed` uses them).
 
 They are compiled for a level of processors, not for the one at hand, and in a copy of the packages: what a source tree
 has in its own cache may be of another processor or of older callees. Only Linux on x86-64 has such a level that we name
@@ -43,7 +43,7 @@ _TARGET = {"NUMBA_CPU_NAME": "x86-64-v3", "NUMBA_CPU_FEATURES": ",".join(f"+{one
 """Processors with AVX2 and FMA: Intel's since 2013, AMD's since 2015. numba would add the features of the processor at
 hand to a name without features."""
 
-_SOURCES = ("moma", "survey", "archmodel", "mechanics", "pipelines")
+_SOURCES = ("ground", "moma", "survey", "archmodel", "mechanics", "pipelines")
 
 
 def get_requires_for_build_wheel(config_settings: Mapping[str, Any] | None = None) -> list[str]:
@@ -82,10 +82,10 @@ def _compile_kernels() -> None:
     # SVML is a library of its own, which numba uses where it is installed
     environment |= {**_TARGET, "NUMBA_DISABLE_INTEL_SVML": "1", "PYTHONDONTWRITEBYTECODE": "1"}
     environment["PYTHONPATH"] = os.pathsep.join((os.getcwd(), *filter(None, sys.path)))
-    subprocess.run([sys.executable, "-P", "-m", "moma.kernels"], env=environment, check=True)
+    subprocess.run([sys.executable, "-P", "-m", "ground.kernels"], env=environment, check=True)
     fitting = {
         "python": sysconfig.get_python_version(),
         "numba": version("numba"),
         "environment": _TARGET,
     }
-    Path("moma/kernels/packed.json").write_text(json.dumps(fitting, indent=1) + "\n", encoding="utf-8")
+    Path("ground/kernels/packed.json").write_text(json.dumps(fitting, indent=1) + "\n", encoding="utf-8")

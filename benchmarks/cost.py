@@ -30,6 +30,7 @@ from benchmarks.report import (
     progress,
     show,
 )
+from ground.errors import SolverError
 from mechanics.arrays import Array
 from mechanics.dynamics.energy_balance import EnergyBalance
 from mechanics.dynamics.simulation import Simulation
@@ -44,7 +45,6 @@ from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene, Start
 from mechanics.scene.shapes import BOX_FACES, box_corners
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
-from moma.errors import SolverError
 
 __all__ = ["KINDS", "Case", "fitted", "main", "measured"]
 

@@ -37,6 +37,7 @@ from benchmarks.report import (
 from benchmarks.scenes import BlockScene, engine_scene, rigid_scenes
 from benchmarks.siconos_child import timed
 from benchmarks.stored import StoredDelassus, read_problem
+from ground.errors import MissingLibraryError, SolverError, UsageError
 from mechanics.arrays import Array
 from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
@@ -44,7 +45,6 @@ from mechanics.problem.problem import ContactProblem, ContactSolution, ContactSt
 from mechanics.problem.residual import project_on_cone
 from mechanics.scene.scene import Method, SolverSettings
 from mechanics.solvers.choice import choose_solver
-from moma.errors import MissingLibraryError, SolverError, UsageError
 
 __all__ = ["main", "siconos_error"]
 

@@ -1,7 +1,7 @@
 """First use of MOMA: ``python -m benchmarks.first_use [--record | --record-others]``; see benchmarks/README.md.
 
 The sample is taken in and run with an empty cache of kernels, and again with the full one; the difference is what
-compiling takes. ``--record`` renews the lists of kernels in ``moma/kernels``, after a change of what kernels are
+compiling takes. ``--record`` renews the lists of kernels in ``ground/kernels``, after a change of what kernels are
 called with (Linux): first those of the sample, by command, then what a matrix of small samples, profiles and commands
 calls beyond them, which ``--record-others`` renews alone.
 """
@@ -15,7 +15,7 @@ import time
 from pathlib import Path
 
 from benchmarks.report import machine
-from moma.kernels.uses import COMMANDS, LISTS, OTHERS
+from ground.kernels.uses import COMMANDS, LISTS, OTHERS
 from tests.pipelines.scenes import small_geology
 
 __all__ = ["main"]
@@ -56,7 +56,7 @@ import json, os, sys
 # on one processor no second process compiles what is to be recorded
 os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:1])
 from moma.cli import app
-from moma.kernels.uses import recording
+from ground.kernels.uses import recording
 with recording() as uses:
     app(sys.argv[2:], prog_name="moma", standalone_mode=False)
 with open(sys.argv[1], "w") as file:
@@ -66,7 +66,7 @@ with open(sys.argv[1], "w") as file:
 _CALLED = """
 import json, resource, signal, sys
 from moma.cli import app
-from moma.kernels.uses import called
+from ground.kernels.uses import called
 def end(*_):
     raise KeyboardInterrupt
 signal.signal(signal.SIGXCPU, end)

@@ -25,8 +25,8 @@ from benchmarks.report import (
     progress,
     show,
 )
+from ground.errors import SurveyError
 from mechanics.arrays import Array
-from moma.errors import SurveyError
 from pipelines.ingest.exchange import export_database, import_database
 from pipelines.ingest.ingest import ingest
 from pipelines.samples.buildings.openings import ArchShape

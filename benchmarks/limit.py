@@ -30,6 +30,7 @@ from benchmarks.report import (
     table_lines,
     write_between,
 )
+from ground.errors import UsageError
 from mechanics.limit.assembly import RigidAssembly, assembly
 from mechanics.limit.confirm import confirm, likeness
 from mechanics.limit.held import HeldLimit, held_limit
@@ -39,7 +40,6 @@ from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene
 from mechanics.scene.shapes import bond, box, wall
 from mechanics.stones.materials import Material
-from moma.errors import UsageError
 
 __all__ = ["FACADES", "FRICTION", "WALLS", "LimitCase", "facade", "facade_case", "main", "measured"]
 

@@ -38,6 +38,7 @@ from benchmarks.report import (
     write_between,
 )
 from benchmarks.scenes import engine_scene, list_scenes, read_scene, rigid_scenes, write_scene
+from ground.errors import MissingLibraryError, SolverError, UsageError
 from mechanics.arrays import Array
 from mechanics.contact.contacts import gaps, material_points
 from mechanics.dynamics.simulation import Simulation
@@ -45,7 +46,6 @@ from mechanics.dynamics.step import Step
 from mechanics.model.model import build_model
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.scene import Scene
-from moma.errors import MissingLibraryError, SolverError, UsageError
 
 __all__ = ["gravity_of", "main", "run_moma", "traced"]
 

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from scipy.sparse import issparse
 
+from ground.errors import MomaError, SolverError, UsageError
 from mechanics.dynamics.progress import Clock
-from moma.errors import MomaError, SolverError, UsageError
 
 __all__ = [
     "ROOT",

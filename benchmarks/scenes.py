@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ground.errors import UsageError
 from mechanics.arrays import Array, Bools
 from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
@@ -30,7 +31,6 @@ from mechanics.scene.scene import (
 from mechanics.scene.shapes import BOX_FACES, box, box_corners
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
-from moma.errors import UsageError
 
 __all__ = [
     "BlockScene",

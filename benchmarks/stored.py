@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csc_array, csr_array
 from scipy.sparse.linalg import splu
 
+from ground.errors import SolverError, UsageError
 from mechanics.arrays import Array
 from mechanics.problem._kernels import Laws, local_factors, solve_contact
 from mechanics.problem.forms import block_diagonal
 from mechanics.problem.problem import ContactProblem, GaussSeidel, ScaledDelassus, mean_diagonal
-from moma.errors import SolverError, UsageError
 
 __all__ = ["StoredDelassus", "StoredForm", "read_problem"]
 

@@ -1,3 +1,3 @@
 """Pillar 3: bodies in unilateral contact — meshes, contacts, non-smooth dynamics, stresses."""
 
-import moma.kernels  # noqa: F401 - before numba
+import ground.kernels  # noqa: F401 - before numba

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
+from ground.errors import SolverError
 from mechanics.carried import Carried, Carrier, Checkpointing
 from mechanics.dynamics.handover import Beginning, Handover, of_run
 from mechanics.dynamics.outcome import Outcome, StaticStart
@@ -27,7 +28,6 @@ from mechanics.scene.laws.law import REST
 from mechanics.scene.scene import Fidelity, Method, Scene, Start
 from mechanics.scene.stages import Stage, check_stages, whole_scene
 from mechanics.scene.state import State
-from moma.errors import SolverError
 
 __all__ = ["Archive", "simulate", "simulate_stages"]
 

@@ -28,7 +28,7 @@ Each name of `__all__` is loaded when it is first used. A survey goes into a dat
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from moma.errors import MomaError
+from ground.errors import MomaError
 
 if TYPE_CHECKING:
     from archmodel.database.session import open_database

@@ -15,4 +15,4 @@ quality       report on precision, courses and contradictions
 unseen        proposals for the core of walls and for missing stones
 """
 
-import moma.kernels  # noqa: F401 - before numba
+import ground.kernels  # noqa: F401 - before numba

@@ -7,7 +7,7 @@ import pytest
 
 from tests.paths import ROOT
 
-PACKAGES = ("moma", "survey", "archmodel", "mechanics", "pipelines")
+PACKAGES = ("ground", "moma", "survey", "archmodel", "mechanics", "pipelines")
 MODULES = sorted(
     ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
     for package in PACKAGES

@@ -12,7 +12,7 @@ import pytest
 
 from tests.paths import ROOT
 
-PACKAGES = ("moma", "survey", "archmodel", "mechanics", "pipelines")
+PACKAGES = ("ground", "moma", "survey", "archmodel", "mechanics", "pipelines")
 MODULES = sorted(
     name
     for package in PACKAGES

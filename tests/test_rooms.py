@@ -6,7 +6,7 @@ import re
 
 from tests.paths import ROOT
 
-PACKAGES = ("moma", "survey", "archmodel", "mechanics", "pipelines")
+PACKAGES = ("ground", "moma", "survey", "archmodel", "mechanics", "pipelines")
 FILES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
 ROOMS = sorted({path.parent for path in FILES})
 

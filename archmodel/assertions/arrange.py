@@ -18,7 +18,7 @@ from archmodel.tables.entries import Entry
 from archmodel.tables.hierarchy import kind_of
 from archmodel.tables.relations import INVERSE, RELATIONS, SYMMETRIC, Membership, Relation
 from archmodel.tables.structures import Structure, structure_kind_named
-from moma.errors import UsageError
+from ground.errors import UsageError
 
 __all__ = ["declare_members", "declare_relation", "declare_structure"]
 

@@ -30,7 +30,7 @@ from archmodel.tables.entries import Entry
 from archmodel.tables.hierarchy import kind_of
 from archmodel.tables.knowledge import Correction
 from archmodel.tables.surveys import Measurement
-from moma.errors import DatabaseError, UsageError
+from ground.errors import DatabaseError, UsageError
 
 __all__ = ["correct", "replace_measurement"]
 

@@ -24,7 +24,7 @@ from archmodel.store.revisions import RowCounts, revise, supersede
 from archmodel.tables.entries import Entry
 from archmodel.tables.knowledge import Document, Material, MaterialProperty, Phase
 from archmodel.tables.structures import Structure
-from moma.errors import UsageError
+from ground.errors import UsageError
 
 __all__ = [
     "DOCUMENT_TYPES",

@@ -2,7 +2,7 @@
 
 import re
 
-from moma.errors import UsageError
+from ground.errors import UsageError
 
 __all__ = ["year_bounds"]
 

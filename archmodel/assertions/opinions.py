@@ -13,7 +13,7 @@ from archmodel.store.revisions import NOTHING, RowCounts, end_rows
 from archmodel.tables.entries import Entry
 from archmodel.tables.knowledge import Decision, Statement
 from archmodel.tables.opinions import DISPUTABLE, RULES, OpinionRule
-from moma.errors import UsageError
+from ground.errors import UsageError
 
 __all__ = ["decide", "says", "set_rule"]
 

@@ -18,7 +18,7 @@ from archmodel.tables.entities import Entity, kinds, own_attributes
 from archmodel.tables.entries import Entry
 from archmodel.tables.hierarchy import kind_among, kind_chain, kind_of
 from archmodel.tables.registered import NO_ATTRIBUTES, RegisteredKind, all_kinds, declare_registered
-from moma.errors import QueryError, UsageError
+from ground.errors import QueryError, UsageError
 
 __all__ = ["MAX_LEVELS", "register_kind"]
 

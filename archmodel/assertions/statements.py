@@ -39,7 +39,7 @@ from archmodel.tables.knowledge import (
     Reference,
     Statement,
 )
-from moma.errors import UsageError
+from ground.errors import UsageError
 
 __all__ = [
     "PLAIN",

@@ -16,7 +16,7 @@ from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Entry
 from archmodel.tables.stratigraphy import DEFINITIONS, INVERSE, SYMMETRIC, Stratigraphy
 from archmodel.tables.structures import StratigraphicUnit, Structure
-from moma.errors import UsageError
+from ground.errors import UsageError
 
 __all__ = [
     "Thing",

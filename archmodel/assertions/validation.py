@@ -5,7 +5,7 @@ import math
 import unicodedata
 from collections.abc import Iterable
 
-from moma.errors import UsageError
+from ground.errors import UsageError
 
 __all__ = [
     "checked_choice",

@@ -18,7 +18,7 @@ from archmodel.store.revisions import NOTHING, RowCounts, end_rows, table_of
 from archmodel.tables.entries import Entry
 from archmodel.tables.knowledge import DepthEvidence, Statement
 from archmodel.tables.relations import INVERSE, RELATIONS, SYMMETRIC, Membership, Relation
-from moma.errors import UsageError
+from ground.errors import UsageError
 
 __all__ = ["withdraw_members", "withdraw_relations", "withdraw_statements"]
 

@@ -20,7 +20,7 @@ from archmodel.tables.knowledge import Correction, Document, Material, Phase
 from archmodel.tables.layout import SchemaVersion, metadata
 from archmodel.tables.registered import declare_registered
 from archmodel.tables.structures import Structure
-from moma.errors import UsageError
+from ground.errors import UsageError
 
 __all__ = ["as_known", "entry_named"]
 

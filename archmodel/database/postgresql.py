@@ -10,7 +10,7 @@ from sqlalchemy.pool import ConnectionPoolEntry
 
 from archmodel.tables.base import json_text
 from archmodel.tables.layout import metadata
-from moma.errors import DatabaseError, MissingLibraryError
+from ground.errors import DatabaseError, MissingLibraryError
 
 __all__ = ["HOW_TO_WRITE", "WRITE_LOCK", "PostgresqlServer"]
 

@@ -16,7 +16,7 @@ from archmodel.database.postgresql import PostgresqlServer
 from archmodel.database.sqlite import SqliteFile
 from archmodel.tables.layout import SCHEMA_VERSION, SchemaVersion, metadata
 from archmodel.tables.registered import declare_registered, release_registered
-from moma.errors import DatabaseError, NoDatabaseError
+from ground.errors import DatabaseError, NoDatabaseError
 
 __all__ = ["Database", "Home", "home_of", "missing_columns", "open_database", "version_of"]
 

@@ -14,7 +14,7 @@ from sqlalchemy.exc import DBAPIError
 from sqlalchemy.pool import ConnectionPoolEntry
 
 from archmodel.tables.base import json_text
-from moma.errors import DatabaseError, NoDatabaseError
+from ground.errors import DatabaseError, NoDatabaseError
 
 __all__ = ["HOW_TO_WRITE", "SqliteFile"]
 

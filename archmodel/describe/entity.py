@@ -21,7 +21,7 @@ from archmodel.tables.relations import INVERSE, Membership, Relation
 from archmodel.tables.runs import EntityResult, JointResult, Run
 from archmodel.tables.structures import Structure
 from archmodel.tables.surveys import Measurement, Survey
-from moma.errors import UsageError
+from ground.errors import UsageError
 
 __all__ = ["describe"]
 

@@ -9,7 +9,7 @@ from sqlalchemy.orm import InstrumentedAttribute, Session, aliased, joinedload
 from archmodel.tables.entities import Entity
 from archmodel.tables.runs import CellResult, EntityResult, JointResult, Run
 from archmodel.tables.surveys import Simplification
-from moma.errors import UsageError
+from ground.errors import UsageError
 
 __all__ = ["compare_runs", "describe_run", "list_runs"]
 

@@ -11,7 +11,7 @@ from archmodel.tables.entities import Entity
 from archmodel.tables.entries import held_at
 from archmodel.tables.runs import EntityResult, Run
 from archmodel.tables.surveys import Measurement, Simplification
-from moma.errors import UsageError
+from ground.errors import UsageError
 
 __all__ = ["Trace", "trace"]
 

@@ -12,7 +12,7 @@ from archmodel.exchange.values import INSTANT, Schema, quoted, value_of
 from archmodel.tables.base import UtcDateTime
 from archmodel.tables.entries import Entry
 from archmodel.tables.layout import SCHEMA_VERSION
-from moma.errors import ExchangeError
+from ground.errors import ExchangeError
 
 __all__ = [
     "ADDED",

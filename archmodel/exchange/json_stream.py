@@ -11,7 +11,7 @@ import zlib
 from json import JSONDecodeError, JSONDecoder
 from typing import Any, BinaryIO, NoReturn
 
-from moma.errors import ExchangeError
+from ground.errors import ExchangeError
 
 __all__ = ["VALUE_LIMIT", "JsonText"]
 

@@ -16,7 +16,7 @@ from archmodel.exchange.sections import Section, sections
 from archmodel.exchange.store import SectionStore
 from archmodel.migrations.versions.v2_quality_and_evidence import credit_statements
 from archmodel.tables.registered import RegisteredKind, declare_registered, release_registered
-from moma.errors import DatabaseError, ExchangeError
+from ground.errors import DatabaseError, ExchangeError
 
 __all__ = ["import_building"]
 

@@ -11,7 +11,7 @@ from archmodel.exchange.values import Mismatch, quoted
 from archmodel.query.grammar import parse
 from archmodel.tables.hierarchy import Kind, kinds_below
 from archmodel.tables.registered import RegisteredKind
-from moma.errors import ExchangeError, QueryError
+from ground.errors import ExchangeError, QueryError
 
 __all__ = ["Row", "RowReader", "nearest", "quoted_key"]
 

@@ -12,7 +12,7 @@ from archmodel.exchange.rows import Row, quoted_key
 from archmodel.exchange.sections import Label, Section
 from archmodel.exchange.values import quoted
 from archmodel.store.bulk import BATCH, insert_rows
-from moma.errors import ExchangeError
+from ground.errors import ExchangeError
 
 __all__ = ["SectionStore"]
 

@@ -18,7 +18,7 @@ from archmodel.exchange.head import TABLES, head_of
 from archmodel.exchange.sections import Section, sections
 from archmodel.exchange.values import Mismatch
 from archmodel.tables.base import ArrayType
-from moma.errors import ExchangeError
+from ground.errors import ExchangeError
 
 __all__ = ["export_building", "write_building"]
 

@@ -18,7 +18,7 @@ from archmodel.database.session import Home, home_of, missing_columns, version_o
 from archmodel.database.sqlite import SqliteFile
 from archmodel.migrations.layouts import version1
 from archmodel.tables.layout import SCHEMA_VERSION, metadata
-from moma.errors import DatabaseError, UsageError
+from ground.errors import DatabaseError, UsageError
 
 __all__ = ["Migration", "migrate"]
 

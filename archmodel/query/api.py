@@ -18,7 +18,7 @@ from archmodel.tables.entities import Entity, kind_named
 from archmodel.tables.hierarchy import kind_among, kinds_below
 from archmodel.tables.registered import all_kinds, refuse_unknown_kinds
 from archmodel.tables.structures import Structure, structure_kinds
-from moma.errors import DatabaseError, QueryError, UsageError
+from ground.errors import DatabaseError, QueryError, UsageError
 
 __all__ = [
     "MAX_EXPRESSIONS",

@@ -36,7 +36,7 @@ from archmodel.query.tokens import Token, complaint
 from archmodel.tables.entities import Entity, kind_named
 from archmodel.tables.hierarchy import names_below
 from archmodel.tables.structures import structure_kind_named
-from moma.errors import UsageError
+from ground.errors import UsageError
 
 __all__ = ["column_named", "condition", "condition_in"]
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from archmodel.arrays import Array
 from archmodel.query.api import FoundFace
-from moma.errors import UsageError
+from ground.errors import UsageError
 
 __all__ = ["MAX_ANGLE", "feature_collection", "flattened"]
 

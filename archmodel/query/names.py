@@ -12,7 +12,7 @@ from archmodel.tables.entities import Entity
 from archmodel.tables.knowledge import Document, MasonMark, Phase, Statement
 from archmodel.tables.runs import Run
 from archmodel.tables.structures import Structure
-from moma.errors import QueryError
+from ground.errors import QueryError
 
 __all__ = [
     "author_named",

@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 from archmodel.query.api import attributes, find_rows
 from archmodel.tables.entities import Entity
 from archmodel.tables.knowledge import MasonMark
-from moma.errors import UsageError
+from ground.errors import UsageError
 
 __all__ = ["Tally", "count_by", "kind_has_marks", "sorted_rows"]
 

@@ -4,7 +4,7 @@ import re
 import unicodedata
 from dataclasses import dataclass
 
-from moma.errors import QueryError
+from ground.errors import QueryError
 
 __all__ = ["KEYWORDS", "MAX_LENGTH", "Token", "complaint", "named", "tokenise"]
 

@@ -15,7 +15,7 @@ from archmodel.arrays import Array, Bools, Ints
 from archmodel.tables.entities import Entity, Header, Quoin, RibSegment, Voussoir, WebStone
 from archmodel.tables.hierarchy import names_below
 from archmodel.tables.relations import RELATIONS
-from moma.errors import UsageError
+from ground.errors import UsageError
 
 __all__ = ["FoundRelations", "RelationSettings", "StoneContacts", "StonesOf", "relations_between"]
 

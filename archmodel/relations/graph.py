@@ -18,7 +18,7 @@ from archmodel.tables.entries import held_at
 from archmodel.tables.hierarchy import kinds_below
 from archmodel.tables.relations import INVERSE, Membership, Relation
 from archmodel.tables.structures import Course, Structure
-from moma.errors import UsageError
+from ground.errors import UsageError
 
 __all__ = [
     "CourseStones",

@@ -14,7 +14,7 @@ from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Entry, latest_entry
 from archmodel.tables.knowledge import Correction, Document, Material, Phase
 from archmodel.tables.structures import Structure
-from moma.errors import UsageError
+from ground.errors import UsageError
 
 __all__ = [
     "Subjects",

@@ -21,7 +21,7 @@ from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Entry, new_entry
 from archmodel.tables.knowledge import Correction
 from archmodel.tables.surveys import Measurement, Survey
-from moma.errors import DatabaseError, UsageError
+from ground.errors import DatabaseError, UsageError
 
 __all__ = ["store_hypotheses", "withdraw_hypotheses"]
 

@@ -27,7 +27,7 @@ from archmodel.tables.knowledge import (
 )
 from archmodel.tables.relations import Membership
 from archmodel.tables.structures import Structure
-from moma.errors import DatabaseError, UsageError
+from ground.errors import DatabaseError, UsageError
 
 __all__ = ["NOTHING", "RowCounts", "end_rows", "revise", "supersede", "table_of", "withdraw"]
 

@@ -34,7 +34,7 @@ from archmodel.tables.runs import (
     Run,
 )
 from archmodel.tables.surveys import Simplification
-from moma.errors import DatabaseError
+from ground.errors import DatabaseError
 
 __all__ = [
     "cell_rows",

@@ -20,7 +20,7 @@ from archmodel.tables.base import ArrayType, Base, annotation_of
 from archmodel.tables.entities import Entity, kind_named
 from archmodel.tables.hierarchy import kind_of
 from archmodel.tables.surveys import Measurement
-from moma.errors import DatabaseError, GeometryError, SurveyError, UsageError
+from ground.errors import DatabaseError, GeometryError, SurveyError, UsageError
 
 __all__ = [
     "ENTITY_COLUMNS",

@@ -15,7 +15,7 @@ from archmodel.store.stone_rows import entity_rows, measurement_row, stone_recor
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import new_entry
 from archmodel.tables.surveys import Measurement, Survey
-from moma.errors import DatabaseError
+from ground.errors import DatabaseError
 
 __all__ = ["StoredSurvey", "insert_stones", "load_stones", "store_survey", "survey_with_hash"]
 

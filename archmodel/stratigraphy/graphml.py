@@ -12,7 +12,7 @@ from xml.etree import ElementTree as etree
 
 from archmodel.stratigraphy.order import Link, Order
 from archmodel.tables.stratigraphy import DEFINITIONS, INVERSE, SYMMETRIC
-from moma.errors import UsageError
+from ground.errors import UsageError
 
 __all__ = ["GraphmlStratigraphy", "read_graphml", "write_graphml"]
 

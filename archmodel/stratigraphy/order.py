@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from archmodel.tables.stratigraphy import LATER
-from moma.errors import UsageError
+from ground.errors import UsageError
 
 __all__ = ["Link", "Order", "check_order", "find_loop", "order_of"]
 

@@ -13,7 +13,7 @@ from archmodel.stratigraphy.layout import layout_of
 from archmodel.stratigraphy.order import Link, Order, order_of
 from archmodel.stratigraphy.page import matrix_page
 from archmodel.stratigraphy.stored import Dated, load_dates, load_links, load_stones, load_units
-from moma.errors import UsageError
+from ground.errors import UsageError
 
 __all__ = ["Matrix", "draw", "study"]
 

@@ -9,7 +9,7 @@ from weakref import WeakSet
 from sqlalchemy import inspect
 from sqlalchemy.orm import Session
 
-from moma.errors import UsageError
+from ground.errors import UsageError
 
 __all__ = [
     "Kind",

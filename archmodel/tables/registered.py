@@ -12,7 +12,7 @@ from archmodel.tables.base import JSON_TYPE, Base, StoneAttribute
 from archmodel.tables.entities import Entity, kinds
 from archmodel.tables.hierarchy import Kind, kinds_below
 from archmodel.tables.structures import Structure, structure_kinds
-from moma.errors import DatabaseError
+from ground.errors import DatabaseError
 
 __all__ = [
     "NO_ATTRIBUTES",

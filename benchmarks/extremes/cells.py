@@ -10,11 +10,11 @@ import numpy as np
 
 from benchmarks.extremes.laws import judge
 from benchmarks.extremes.problems import VELOCITY_TOLERANCE, Row
+from ground.errors import MomaError
 from mechanics.problem.problem import ContactProblem, ContactStart
 from mechanics.problem.residual import natural_map
 from mechanics.scene.scene import Method, SolverSettings
 from mechanics.solvers.choice import choose_solver
-from moma.errors import MomaError
 
 __all__ = ["TOLERANCE", "Cell", "Outcome", "attempt", "refused_cell", "solved_cells"]
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_array
 
+from ground.errors import SceneError
 from mechanics.arrays import Array, Bools, Ints
 from mechanics.contact._kernels.balls import ball_points
 from mechanics.contact._kernels.broad_phase import boxes, close_pairs, grid_of, place, single_points
@@ -33,7 +34,6 @@ from mechanics.contact.surfaces import Placed, Surfaces, middles
 from mechanics.scene.scene import Placement
 from mechanics.scene.state import State
 from mechanics.scene.threads import at_once
-from moma.errors import SceneError
 
 __all__ = ["FLAT", "THIN", "Detector"]
 

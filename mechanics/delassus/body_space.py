@@ -8,13 +8,13 @@ import numpy as np
 from scipy.sparse import block_diag, csc_array, csr_array
 from scipy.sparse.linalg import SuperLU, splu
 
+from ground.errors import SolverError
 from mechanics.arrays import Array, Ints
 from mechanics.delassus._kernels import bodies as kernel
 from mechanics.delassus._kernels.rigid import apply
 from mechanics.delassus.elimination import elimination
 from mechanics.problem.forms import SparseForm
 from mechanics.problem.problem import RigidContacts
-from moma.errors import SolverError
 
 __all__ = ["BodyForm", "scaled_frames"]
 

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dgetrf, dgetrs
 
+from ground.errors import SolverError
 from mechanics.arrays import Array, Ints
 from mechanics.delassus._kernels.fronts import Layout, add_into, solve
 from mechanics.delassus.elimination import elimination
 from mechanics.scene.threads import at_once
-from moma.errors import SolverError
 
 __all__ = ["Cliques", "Factors", "Fronts", "fronts", "fronts_of_graph"]
 

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ground.errors import SceneError
 from mechanics.arrays import Array, Bools
 from mechanics.contact.contacts import PAIR_BIT, Contacts, gaps
 from mechanics.delassus.assembly import local_velocity
@@ -30,7 +31,6 @@ from mechanics.scene.laws.law import REST, SPRING, Approach, Springs, Terms
 from mechanics.scene.scene import Method
 from mechanics.scene.state import State
 from mechanics.stones.validation import SMALLEST
-from moma.errors import SceneError
 
 __all__ = [
     "SOFTNESS",

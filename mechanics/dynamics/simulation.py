@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ground.errors import SolverError
 from mechanics.arrays import Array, Bools
 from mechanics.carried import Carried, Carrier
 from mechanics.dynamics.contact_problem import (
@@ -33,7 +34,6 @@ from mechanics.scene.state import State
 from mechanics.solvers.chain import Solver
 from mechanics.solvers.choice import choose_solver
 from mechanics.solvers.from_nothing import rests_from_nothing
-from moma.errors import SolverError
 
 __all__ = ["CLOSED_BIAS", "Simulation"]
 

@@ -16,6 +16,7 @@ from difflib import get_close_matches
 import numpy as np
 from scipy.sparse import csc_array, csr_array
 
+from ground.errors import SceneError
 from mechanics.arrays import Array, Ints
 from mechanics.contact.contacts import Contacts, gaps, take
 from mechanics.contact.shared_area import SLACK
@@ -28,7 +29,6 @@ from mechanics.scene.laws.law import STATE, Approach
 from mechanics.scene.laws.table import LawTable
 from mechanics.scene.scene import Scene
 from mechanics.scene.state import State
-from moma.errors import SceneError
 
 __all__ = ["CLOSED", "RigidAssembly", "Strength", "assembly", "joint_strength"]
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ground.errors import SceneError
 from mechanics.arrays import Array
 from mechanics.dynamics.outcome import Outcome
 from mechanics.dynamics.progress import Listener, silent
@@ -20,7 +21,6 @@ from mechanics.results.result import Result
 from mechanics.scene.loads.load import Force, Loads
 from mechanics.scene.scene import Block, LawRule, Part, Scene, Start
 from mechanics.simulate import simulate
-from moma.errors import SceneError
 
 __all__ = ["Standing", "at_instant", "self_stress_alone_holds", "stands"]
 

@@ -22,11 +22,11 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial.transform import Rotation
 
+from ground.errors import SolverError
 from mechanics.arrays import Array, Ints
 from mechanics.limit.assembly import RigidAssembly
 from mechanics.limit.limit_load import LimitLoad, Mechanism
 from mechanics.limit.live_loads import Acceleration
-from moma.errors import SolverError
 
 __all__ = ["Kinematics", "kinematics"]
 

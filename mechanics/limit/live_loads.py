@@ -6,12 +6,12 @@ from typing import Protocol
 
 import numpy as np
 
+from ground.errors import SceneError
 from mechanics.arrays import Array, Ints
 from mechanics.limit.assembly import RigidAssembly
 from mechanics.scene.loads.forces import StoneForce
 from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import Scene
-from moma.errors import SceneError
 
 __all__ = ["Acceleration", "LiveLoad", "PointForce", "SpreadForce", "levers"]
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from ground.errors import SceneError, SolverError
 from mechanics.arrays import Array, Bools, Ints
 from mechanics.dynamics.energy_balance import EnergyBalance
 from mechanics.dynamics.observers.energy import kinetic_energy
@@ -25,7 +26,6 @@ from mechanics.scene.jaws import JawPath
 from mechanics.scene.rig import BEAM, JAWS, Rig, rigged
 from mechanics.scene.scene import Scene, TimeSettings
 from mechanics.scene.state import State
-from moma.errors import SceneError, SolverError
 
 __all__ = ["LoadingTest", "loading_test", "softening_step"]
 

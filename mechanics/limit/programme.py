@@ -12,9 +12,9 @@ from enum import StrEnum
 import numpy as np
 from scipy.sparse import block_array, csc_array, csr_array, diags_array, vstack
 
+from ground.errors import SolverError
 from mechanics.arrays import Array
 from mechanics.limit.assembly import RigidAssembly, Strength
-from moma.errors import SolverError
 
 __all__ = ["Ending", "Optimum", "Programme"]
 

@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ground.errors import SolverError
 from mechanics.arrays import Array, Bools
 from mechanics.dynamics.observers.energy import mass_norm
 from mechanics.dynamics.progress import Listener, Progress, silent
@@ -30,7 +31,6 @@ from mechanics.limit.live_loads import LiveLoad, levers
 from mechanics.model.model import build_model
 from mechanics.scene.loads.load import Force, Loads
 from mechanics.scene.scene import Scene, TimeSettings
-from moma.errors import SolverError
 
 __all__ = ["SPEED", "Pushover", "pushover"]
 

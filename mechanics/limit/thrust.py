@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ground.errors import SceneError
 from mechanics.arrays import Array
 from mechanics.limit.assembly import RigidAssembly
 from mechanics.limit.limit_load import Mechanism, mechanism
 from mechanics.limit.programme import Ending, Programme
-from moma.errors import SceneError
 
 __all__ = ["Extreme", "Thrust", "thrust"]
 

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ground.errors import SceneError
 from mechanics.scene.scene import Block, Fidelity
 from mechanics.stones.materials import Material
 from mechanics.stones.polyhedra import MassProperties
-from moma.errors import SceneError
 
 __all__ = ["ball", "ball_properties"]
 

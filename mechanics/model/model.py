@@ -7,6 +7,7 @@ from itertools import chain
 
 import numpy as np
 
+from ground.errors import GeometryError, SceneError
 from mechanics.arrays import Array, Bools, Ints
 from mechanics.contact._kernels.narrow_phase import MAX_CORNERS
 from mechanics.contact.face_meshes import FaceMesh
@@ -30,7 +31,6 @@ from mechanics.stones.polyhedra import (
     mass_properties_alike,
     united,
 )
-from moma.errors import GeometryError, SceneError
 
 __all__ = ["BodyCorners", "Model", "build_model", "laws_between"]
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ground.errors import SceneError
 from mechanics.arrays import Array, Bools
 from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.planar.contacts import PlanarDetector
@@ -16,7 +17,6 @@ from mechanics.planar.scene import Disk, PlanarScene, PlanarTime, Wall
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import Method, SolverSettings
 from mechanics.solvers.first_order.disk_admm import DiskADMM
-from moma.errors import SceneError
 
 __all__ = ["Deposit", "deposit"]
 

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ground.errors import SceneError
 from mechanics.arrays import Array, Bools
 from mechanics.planar.scene import PlanarScene
 from mechanics.scene.laws.table import LawTable, law_table
-from moma.errors import SceneError
 
 __all__ = ["PlanarModel", "PlanarState", "build_planar_model"]
 

@@ -15,13 +15,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ground.errors import SceneError
 from mechanics.arrays import Array, Ints
 from mechanics.carried import Carrier
 from mechanics.planar.contacts import PlanarContacts
 from mechanics.planar.delassus import PlanarDelassus
 from mechanics.planar.model import PlanarModel, PlanarState
 from mechanics.scene.laws.law import Terms
-from moma.errors import SceneError
 
 __all__ = ["Apart", "Overlaps", "refuse_deep"]
 

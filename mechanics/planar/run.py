@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from ground.errors import SceneError
 from mechanics.arrays import Array
 from mechanics.carried import Carried, Carrier, Rows
 from mechanics.dynamics.outcome import Outcome
@@ -32,7 +33,6 @@ from mechanics.planar.simulation import PlanarSimulation, PlanarStep
 from mechanics.results.result import Errors
 from mechanics.scene.laws.status import contact_status
 from mechanics.solvers.chain import Solver
-from moma.errors import SceneError
 
 __all__ = ["PlanarRun"]
 

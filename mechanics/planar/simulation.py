@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ground.errors import SolverError
 from mechanics.arrays import Array, Bools, Ints
 from mechanics.carried import Carrier
 from mechanics.dynamics.progress import Clock
@@ -18,7 +19,6 @@ from mechanics.scene.laws.law import Approach, Terms
 from mechanics.solvers.chain import Solver
 from mechanics.solvers.choice import choose_planar_solver
 from mechanics.solvers.first_order.disk_admm import DiskADMM
-from moma.errors import SolverError
 
 __all__ = ["PlanarSimulation", "PlanarStep"]
 

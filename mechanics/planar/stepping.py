@@ -11,10 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from ground.errors import SceneError
 from mechanics.arrays import Array, Ints
 from mechanics.planar.model import PlanarModel, PlanarState
 from mechanics.scene.loads.load import Motion
-from moma.errors import SceneError
 
 __all__ = ["Drive", "fly", "load_velocity", "load_work", "space"]
 

@@ -7,8 +7,8 @@ import numpy as np
 from scipy.sparse import block_array, bsr_array, csc_array, diags_array
 from scipy.sparse.linalg import splu
 
+from ground.errors import SolverError
 from mechanics.arrays import Array
-from moma.errors import SolverError
 
 __all__ = ["Form", "ScaledForm", "SparseForm", "block_diagonal"]
 

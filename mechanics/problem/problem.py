@@ -12,10 +12,10 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from ground.errors import SolverError
 from mechanics.arrays import Array, Ints
 from mechanics.problem.forms import Form, ScaledForm
 from mechanics.problem.validation import check_problem
-from moma.errors import SolverError
 
 __all__ = [
     "ContactProblem",

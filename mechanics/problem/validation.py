@@ -4,9 +4,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ground.errors import SolverError
 from mechanics.arrays import Array
 from mechanics.stones.validation import LARGEST, SMALLEST
-from moma.errors import SolverError
 
 __all__ = ["check_compliance", "check_problem", "require_finite"]
 

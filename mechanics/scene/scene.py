@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Annotated
 
+from ground.errors import SceneError
 from mechanics.arrays import Array
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.law import Law
@@ -16,7 +17,6 @@ from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.meshers.choice import Mesher
 from mechanics.stones.settings import Setting, check_settings
 from mechanics.stones.validation import check_corners, finite, refuse_unless
-from moma.errors import SceneError
 
 __all__ = [
     "Block",

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from ground.errors import SceneError
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.scene import Block, Fidelity, Scene
-from moma.errors import SceneError
 
 __all__ = ["Stage", "check_stages", "whole_scene"]
 

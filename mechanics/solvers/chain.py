@@ -11,10 +11,10 @@ from typing import Protocol
 
 import numpy as np
 
+from ground.errors import SolverError
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.problem.residual import residual
 from mechanics.solvers.self_stress import without_self_stress
-from moma.errors import SolverError
 
 __all__ = ["KEPT", "Begin", "Chain", "Link", "Solver", "follow"]
 

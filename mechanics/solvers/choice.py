@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 
+from ground.errors import SolverError
 from mechanics.scene.scene import Method, SolverSettings
 from mechanics.solvers.auto import Auto
 from mechanics.solvers.chain import Chain, Solver
@@ -15,7 +16,6 @@ from mechanics.solvers.first_order.nsgs import NSGS
 from mechanics.solvers.kinds import ENDED_PATH
 from mechanics.solvers.scales import PLAIN_LOOK
 from mechanics.solvers.second_order.newton import Newton
-from moma.errors import SolverError
 
 __all__ = ["choose_planar_solver", "choose_solver"]
 

@@ -6,10 +6,10 @@ from typing import Annotated
 
 import numpy as np
 
+from ground.errors import SceneError
 from mechanics.arrays import Array
 from mechanics.stones.settings import Setting, check_settings
 from mechanics.stones.validation import LARGEST
-from moma.errors import SceneError
 
 __all__ = ["Material", "Orthotropy", "fourth_order"]
 

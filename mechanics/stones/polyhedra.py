@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ground.errors import GeometryError
 from mechanics.arrays import Array, Ints
-from moma.errors import GeometryError
 
 __all__ = [
     "MassProperties",

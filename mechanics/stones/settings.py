@@ -5,8 +5,8 @@ from functools import cache
 from math import inf
 from typing import Any, NamedTuple, get_type_hints
 
+from ground.errors import SceneError
 from mechanics.stones.validation import LARGEST, SMALLEST
-from moma.errors import SceneError
 
 __all__ = ["Setting", "check_settings", "declared"]
 
@@ -61,7 +61,7 @@ def check_settings(where: str, settings: object) -> None:
     's'
     >>> check_settings("time", Step(-1.0))
     Traceback (most recent call last):
-    moma.errors.SceneError: time: length = -1.0; give a number greater than 0 [s]
+    ground.errors.SceneError: time: length = -1.0; give a number greater than 0 [s]
     """
     owner: Any = type(settings)
     for name, setting in declared(owner).items():

@@ -5,8 +5,8 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ground.errors import SceneError
 from mechanics.arrays import Array
-from moma.errors import SceneError
 
 __all__ = ["LARGEST", "SMALLEST", "Rule", "check_corners", "finite", "refuse_unless"]
 

@@ -8,10 +8,10 @@ from typing import Annotated, Any
 
 import typer
 
+from ground.errors import UsageError
 from moma.cli.console import reporting, say
 from moma.cli.options import DEFAULT_DB, AcceptUnsound, Db, Json, Out, Overwrite, SceneArgument, Verbose
 from moma.cli.progress import progress_bars
-from moma.errors import UsageError
 
 __all__ = ["assess", "compare", "diagnose", "pushover", "study"]
 

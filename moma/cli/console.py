@@ -16,7 +16,7 @@ from typing import Any, ParamSpec, TextIO
 import typer
 from typer.core import HAS_RICH, TyperCommand, TyperGroup
 
-from moma.errors import MomaError, storage_error
+from ground.errors import MomaError, storage_error
 
 __all__ = ["PlainCommand", "PlainGroup", "open_streams", "reporting", "say", "short_lived"]
 

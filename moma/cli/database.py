@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ground.errors import UsageError
 from moma.cli.console import reporting, say
 from moma.cli.options import DEFAULT_DB, Db, Json, Verbose, check_ending
-from moma.errors import UsageError
 
 __all__ = ["export", "import_", "migrate", "serve", "view"]
 

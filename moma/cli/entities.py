@@ -4,9 +4,9 @@ from typing import Annotated
 
 import typer
 
+from ground.errors import UsageError
 from moma.cli.console import reporting, say, short_lived
 from moma.cli.options import DEFAULT_DB, At, Db, Json, ListFormat, Verbose
-from moma.errors import UsageError
 
 __all__ = ["query", "schema", "show"]
 

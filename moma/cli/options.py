@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from moma.errors import UsageError
+from ground.errors import UsageError
 
 __all__ = [
     "DEFAULT_DB",

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ground.errors import UsageError
 from moma.cli.console import reporting, say
 from moma.cli.options import DEFAULT_DB, Db, Json, Verbose
 from moma.cli.progress import progress_bars
-from moma.errors import UsageError
 
 if TYPE_CHECKING:
     from pipelines.propose.propose import ProposalReport

@@ -5,9 +5,9 @@ from typing import Annotated, Any
 
 import typer
 
+from ground.errors import UsageError
 from moma.cli.console import reporting, say
 from moma.cli.options import DEFAULT_DB, Db, Json, Verbose, check_ending
-from moma.errors import UsageError
 
 __all__ = ["report", "runs"]
 

@@ -97,9 +97,9 @@ def run(
 ) -> None:
     """Simulate a scene; write tables, pictures and a report, and store the results in the database."""
     with short_lived():
+        from ground.kernels.beside import compiling_beside
         from moma.cli.text.formats import as_json
         from moma.cli.text.runs_and_surveys import run_lines
-        from moma.kernels.beside import compiling_beside
         from pipelines.run.run import run_scene
         from pipelines.run.unfinished import finished_run
         from pipelines.scene.file import read_scene

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ground.errors import UsageError
 from moma.cli.console import reporting, say
 from moma.cli.options import (
     DEFAULT_DB,
@@ -46,7 +47,6 @@ from moma.cli.options import (
     check_ending,
 )
 from moma.cli.progress import progress_bars
-from moma.errors import UsageError
 
 if TYPE_CHECKING:
     from survey.formats.options import ReadingOptions
@@ -192,9 +192,9 @@ def orient(
     verbose: Verbose = False,
 ) -> None:
     """Orient photographs: bundle adjustment with calibration, precision of every point, blunders."""
+    from ground.kernels.beside import compiling_beside
     from moma.cli.text.formats import as_json
     from moma.cli.text.photographs import orient_lines
-    from moma.kernels.beside import compiling_beside
     from pipelines.reports.photographs.orient import orient_photographs, photomodeler_project
     from pipelines.reports.photographs.project import read_project
 
@@ -296,9 +296,9 @@ def ingest(
     verbose: Verbose = False,
 ) -> None:
     """Ingest survey files into the database: all of them, or none if anything is wrong."""
+    from ground.kernels.beside import compiling_beside
     from moma.cli.text.formats import as_json
     from moma.cli.text.runs_and_surveys import ingest_lines
-    from moma.kernels.beside import compiling_beside
     from pipelines.ingest.ingest import ingest as ingest_files
     from pipelines.ingest.kind_rules import kind_rules
     from pipelines.ingest.reading_options import format_of_all, reading_options

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ground.errors import SolverError
 from mechanics.arrays import Array
 from mechanics.dynamics.outcome import Outcome
 from mechanics.limit.assembly import RigidAssembly
@@ -26,7 +27,6 @@ from mechanics.limit.live_loads import Acceleration, LiveLoad
 from mechanics.limit.pushover import Pushover, pushover
 from mechanics.limit.thickness import geometric_safety
 from mechanics.limit.thrust import thrust
-from moma.errors import SolverError
 from pipelines.assess.codes.check import check_code
 from pipelines.assess.questions import LoadQuestion, Question, Thickness, ThrustQuestion
 from pipelines.assess.sensitivity import sensitivity

@@ -11,6 +11,7 @@ import numpy as np
 from archmodel.database.session import open_database
 from archmodel.store.run_record import MovingStone, RunRecord
 from archmodel.tables.entries import latest_entry
+from ground.errors import MissingLibraryError, UsageError
 from mechanics.arrays import Array
 from mechanics.dynamics.outcome import Outcome
 from mechanics.dynamics.progress import Listener, Progress, silent
@@ -21,7 +22,6 @@ from mechanics.limit.limit_load import Mechanism
 from mechanics.limit.pushover import Pushover
 from mechanics.results.forecast.plan import loose_blocks
 from mechanics.scene.scene import Fidelity, Scene
-from moma.errors import MissingLibraryError, UsageError
 from pipelines.assess.answers import (
     FALLS,
     NOT_DECIDED,

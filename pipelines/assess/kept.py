@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from moma.errors import UsageError, storing
+from ground.errors import UsageError, storing
 from pipelines.results.checkpoints import write_whole
 from pipelines.results.folder import locked
 from pipelines.run.record import versions

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from ground.errors import SceneError, UsageError
 from mechanics.arrays import Array
 from mechanics.limit.live_loads import Acceleration, LiveLoad, PointForce, SpreadForce
-from moma.errors import SceneError, UsageError
 from pipelines.assess.codes.check import CODES
 from pipelines.scene.array_tables import ArrayTable
 from pipelines.scene.file import SceneFile

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from ground.errors import MissingLibraryError
 from mechanics.arrays import Array, Ints
-from moma.errors import MissingLibraryError
 from pipelines.draw.elevations.closing import draw_moved
 from pipelines.draw.elevations.closing_shapes import ClosingShapes
 from pipelines.draw.elevations.joints import draw_joints

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ground.errors import UsageError
 from mechanics.dynamics.progress import Listener, Progress, silent
-from moma.errors import UsageError
 from pipelines.results.folder import check_replaceable, replacing
 from survey.arrays import Array
 from survey.clouds.extras import optional

@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 
 from archmodel.store.run_record import without_rounding
+from ground.errors import MissingLibraryError
 from mechanics.arrays import Array
 from mechanics.results.contact_result import JointResult
 from mechanics.results.result import BodyResult, Outcome, Result
 from mechanics.results.stress_values import volume_quantile
 from mechanics.scene.scene import Fidelity
 from mechanics.stones.materials import Material
-from moma.errors import MissingLibraryError
 from pipelines.draw.catalogue import PICTURES
 from pipelines.draw.offscreen.jobs import save_job
 from pipelines.draw.offscreen.surfaces import FIELDS, stone_fields, support_motion, wall_surface

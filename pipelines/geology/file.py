@@ -7,9 +7,9 @@ from typing import Any, cast
 
 import numpy as np
 
+from ground.errors import SceneError
 from mechanics.planar.measures.cells import Cell
 from mechanics.scene.loads.motions import ImposedMotion
-from moma.errors import SceneError
 from pipelines.geology.experiments.biaxial import Biaxial
 from pipelines.geology.experiments.deposition import Deposition
 from pipelines.geology.experiments.experiment import Experiment

@@ -11,6 +11,7 @@ import numpy as np
 
 from archmodel.database.session import open_database
 from archmodel.store.run_record import RunRecord
+from ground.errors import SceneError
 from mechanics.arrays import Array, Ints
 from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.planar.result import PlanarResult
@@ -21,7 +22,6 @@ from mechanics.scene.laws.law import Law
 from mechanics.scene.laws.lennard_jones import LennardJones
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.scene import LawRule, Method, SolverSettings
-from moma.errors import SceneError
 from pipelines.geology.experiments.experiment import Observed, Setup
 from pipelines.geology.experiments.membrane import Membrane
 from pipelines.geology.file import GeologyScene, read_geology

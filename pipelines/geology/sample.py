@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from ground.errors import UsageError
 from mechanics.arrays import Array, Ints
 from mechanics.dynamics.progress import Listener, silent
 from mechanics.planar.deposit import Deposit, deposit
-from moma.errors import UsageError
 from pipelines.geology.file import GeologyScene
 
 __all__ = ["PreparedSample", "prepare"]

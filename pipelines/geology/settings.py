@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import Annotated
 
+from ground.errors import SceneError
 from mechanics.stones.settings import Setting
-from moma.errors import SceneError
 
 __all__ = ["DiskContact", "GeologyOutput", "Layer", "SampleSettings", "Stepping", "Sweeping"]
 

@@ -12,7 +12,7 @@ from archmodel.database.session import home_of, open_database
 from archmodel.database.sqlite import SqliteFile
 from archmodel.exchange.reader import import_building
 from archmodel.exchange.writer import export_building, write_building
-from moma.errors import DatabaseError, ExchangeError
+from ground.errors import DatabaseError, ExchangeError
 
 __all__ = ["ExchangeReport", "export_database", "export_to_stream", "import_database"]
 

@@ -14,8 +14,8 @@ from archmodel.store.bulk import first_free_id
 from archmodel.store.stone_record import StoneRecord
 from archmodel.store.stones import store_survey
 from archmodel.tables.entities import Entity, kind_named, kinds
+from ground.errors import NoDatabaseError, SurveyError, UsageError
 from mechanics.dynamics.progress import Listener, Progress, silent
-from moma.errors import NoDatabaseError, SurveyError, UsageError
 from pipelines.ingest.kind_rules import KindRule, apply_rules, check_kinds
 from pipelines.ingest.outlined import (
     check_outline_rejects,

@@ -28,7 +28,7 @@ from archmodel.query.grammar import (
 from archmodel.query.tokens import Token, complaint
 from archmodel.tables.entities import kind_named
 from archmodel.tables.hierarchy import names_below
-from moma.errors import UsageError
+from ground.errors import UsageError
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.solids import area_vector
 

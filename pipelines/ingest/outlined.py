@@ -7,8 +7,8 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from ground.errors import UsageError
 from mechanics.dynamics.progress import Listener, Progress, silent
-from moma.errors import UsageError
 from pipelines.ingest.reading_options import Source
 from survey.clouds.outlines.outline import field_map
 from survey.clouds.settings import CloudOptions, MaskOptions

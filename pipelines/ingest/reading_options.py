@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from moma.errors import UsageError
-from moma.tables.columns import UNITS, length_unit
+from ground.errors import UsageError
+from ground.tables.columns import UNITS, length_unit
 from survey.formats.options import ReadingOptions
 from survey.formats.reading import ENDINGS, format_of, solid_files, with_header
 from survey.formats.tables.kinds import read_kinds

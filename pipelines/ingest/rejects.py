@@ -11,9 +11,9 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
-from moma.errors import UsageError
-from moma.tables.rows import is_workbook, open_rows
-from moma.tables.text_lines import TextLines
+from ground.errors import UsageError
+from ground.tables.rows import is_workbook, open_rows
+from ground.tables.text_lines import TextLines
 from survey.formats.reading import ENDINGS, SOLIDS
 from survey.records.survey import Reject
 

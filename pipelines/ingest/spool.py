@@ -15,8 +15,8 @@ from typing import Any, Self
 import numpy as np
 
 from archmodel.store.stone_record import StoneRecord
+from ground.errors import SurveyError
 from mechanics.arrays import Array
-from moma.errors import SurveyError
 
 __all__ = ["Spool"]
 

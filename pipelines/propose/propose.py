@@ -14,8 +14,8 @@ from archmodel.store.stone_record import StoneRecord
 from archmodel.store.stones import load_stones
 from archmodel.tables.entities import Entity, Infill, Joint, RibSegment, Support, WebStone
 from archmodel.tables.hierarchy import names_below
+from ground.errors import UsageError
 from mechanics.arrays import Array
-from moma.errors import UsageError
 from pipelines.ingest.records import stone_record, surveyed_block
 from pipelines.ingest.relate import relate
 from survey.extrusion.imported_solids import block_of_solid

@@ -33,9 +33,9 @@ from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Entry
 from archmodel.tables.knowledge import MadeOf, MasonMark, Material, Note, OfPhase, Phase, Statement
 from archmodel.tables.structures import Structure
-from moma.errors import UsageError
-from moma.tables.columns import places_of, plain
-from moma.tables.table import read_table
+from ground.errors import UsageError
+from ground.tables.columns import places_of, plain
+from ground.tables.table import read_table
 
 __all__ = ["COLUMNS", "AttributeList", "read_attribute_list", "record_attribute_list"]
 

@@ -14,7 +14,7 @@ from archmodel.store.revisions import NOTHING, RowCounts
 from archmodel.store.stones import load_stones
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Entry
-from moma.errors import UsageError
+from ground.errors import UsageError
 from pipelines.ingest.records import stone_record, surveyed_block
 
 __all__ = ["record_depth"]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
 
-from moma.errors import (
+from ground.errors import (
     DatabaseError,
     GeometryError,
     MomaError,

@@ -12,7 +12,7 @@ from archmodel.assertions.validation import checked_text
 from archmodel.store.revisions import NOTHING, RowCounts
 from archmodel.store.stone_rows import storable
 from archmodel.tables.entries import Entry, new_entry
-from moma.errors import UsageError
+from ground.errors import UsageError
 from pipelines.record.attachments import Attachment
 from pipelines.record.attribute_lists import AttributeList, read_attribute_list, record_attribute_list
 from pipelines.record.relation_lists import RelationList, read_relation_list, record_relation_list

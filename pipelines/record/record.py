@@ -14,7 +14,7 @@ from archmodel.store.revisions import NOTHING, RowCounts
 from archmodel.store.stone_rows import storable
 from archmodel.tables.entries import Entry, new_entry
 from archmodel.tables.knowledge import Correction
-from moma.errors import UsageError
+from ground.errors import UsageError
 from pipelines.ingest.relate import relate
 from pipelines.record.attachments import Attachment, attachment_of
 from pipelines.record.file import RecordFile, Table, read_record

@@ -12,9 +12,9 @@ from archmodel.store.revisions import RowCounts
 from archmodel.stratigraphy.graphml import read_graphml
 from archmodel.tables.entries import Entry
 from archmodel.tables.stratigraphy import DEFINITIONS, INVERSE
-from moma.errors import MomaError, SurveyError, UsageError
-from moma.tables.columns import plain, spellings
-from moma.tables.table import TableRow, read_table
+from ground.errors import MomaError, SurveyError, UsageError
+from ground.tables.columns import plain, spellings
+from ground.tables.table import TableRow, read_table
 
 __all__ = ["RelationList", "read_relation_list", "record_relation_list", "relation_of"]
 

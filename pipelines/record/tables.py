@@ -52,7 +52,7 @@ from archmodel.tables.knowledge import (
 from archmodel.tables.relations import RELATIONS
 from archmodel.tables.stratigraphy import DEFINITIONS, INVERSE
 from archmodel.tables.structures import Structure, structure_kind_named
-from moma.errors import UsageError
+from ground.errors import UsageError
 from pipelines.record.depth import record_depth
 from pipelines.record.file import RecordFile, Table
 

@@ -15,8 +15,8 @@ from archmodel.query.api import FoundFace, find_faces, find_rows
 from archmodel.store.stone_arrays import ENTITY, id_conditions, stone_shapes
 from archmodel.tables.entities import Entity
 from archmodel.tables.surveys import Survey
+from ground.errors import UsageError
 from mechanics.arrays import Array
-from moma.errors import UsageError
 from pipelines.reports.html import page_text
 from pipelines.reports.page.elevation import elevation
 from pipelines.reports.page.inline import again, packed_models

@@ -21,7 +21,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from moma.errors import UsageError, storing
+from ground.errors import UsageError, storing
 
 if sys.platform != "win32":
     import fcntl

@@ -6,12 +6,12 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 from archmodel.database.session import open_database
+from ground.errors import GeometryError, MeshError
 from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.results.forecast.cost import expected_cost, machine_slowness
 from mechanics.results.forecast.plan import Plan, plan
 from mechanics.scene.scene import Fidelity, Scene
 from mechanics.stones.meshing.quality import MeshReport
-from moma.errors import GeometryError, MeshError
 from pipelines.draw.catalogue import PICTURES
 from pipelines.draw.closing_pictures import draw_closing
 from pipelines.draw.elevations.closing_shapes import ClosingShapes, Stages, closing_shapes

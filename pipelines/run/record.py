@@ -23,11 +23,11 @@ from archmodel.store.run_record import (
 )
 from archmodel.store.runs import store_run
 from archmodel.store.stone_rows import solid_volume
+from ground.errors import DatabaseError
 from mechanics.arrays import Array
 from mechanics.results.contact_result import ContactResult, JointResult
 from mechanics.results.result import Errors, Result
 from mechanics.scene.scene import Scene
-from moma.errors import DatabaseError
 from pipelines.results.joints_csv import normal_and_shear
 from pipelines.run.assemble import Assembly
 from pipelines.scene.file import SceneFile

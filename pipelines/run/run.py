@@ -13,6 +13,7 @@ from typing import Any
 from archmodel.database.session import open_database
 from archmodel.store.run_record import StoneResult
 from archmodel.tables.entries import latest_entry
+from ground.errors import MissingLibraryError, MomaError, UsageError, storing
 from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.limit.dead_load import self_stress_alone_holds
 from mechanics.model.model import build_model
@@ -23,7 +24,6 @@ from mechanics.simulate import simulate, simulate_stages
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.files import check_mesh_file, write_meshes
 from mechanics.stones.meshing.mesh import VolumeMesh
-from moma.errors import MissingLibraryError, MomaError, UsageError, storing
 from pipelines.draw.animation import draw_motion
 from pipelines.draw.catalogue import PICTURES
 from pipelines.draw.pictures import OF_RESULTS, draw_pictures, drawing_process, missing

@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+from ground.errors import GeometryError, UnsoundSceneError
 from mechanics.model.model import build_model
 from mechanics.results.forecast.plan import loose_blocks
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.scene import Fidelity, Scene
-from moma.errors import GeometryError, UnsoundSceneError
 from pipelines.run.assemble import Assembly
 from pipelines.run.plausibility import impossible_values
 from pipelines.scene.file import SceneFile

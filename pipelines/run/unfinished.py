@@ -9,11 +9,11 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from ground.errors import StorageError, UsageError, storing
 from mechanics.carried import Carried
 from mechanics.dynamics.progress import Listener, Progress
 from mechanics.results.result import BodyResult, Frame
 from mechanics.scene.scene import Block
-from moma.errors import StorageError, UsageError, storing
 from pipelines.results.checkpoints import Checkpoint, Checkpoints, write_whole
 from pipelines.results.folder import RUN_INDEX, UNFINISHED, locked
 from pipelines.results.vtkhdf import RESULTS, GrowingResults

@@ -12,7 +12,7 @@ from random import Random
 
 import numpy as np
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.arrays import Array
 
 __all__ = [

@@ -13,7 +13,7 @@ from random import Random
 import numpy as np
 from numpy.typing import NDArray
 
-from moma.errors import UsageError
+from ground.errors import UsageError
 from pipelines.draw.offscreen.photographs import PhotographedScene
 from pipelines.draw.pictures import draw_apart
 from pipelines.samples.buildings.window import WindowBay, make_window

@@ -7,8 +7,8 @@ from types import MappingProxyType
 
 import numpy as np
 
+from ground.errors import UsageError
 from mechanics.dynamics.progress import Listener, silent
-from moma.errors import UsageError
 from pipelines.samples.building import SyntheticBuilding
 from pipelines.samples.buildings.block import block_on_ground
 from pipelines.samples.buildings.facings import two_facings

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ground.errors import SolverError
 from mechanics.dynamics.progress import Listener, silent
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.elastic_joint import ElasticJoint
@@ -12,7 +13,6 @@ from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import Block, ContactSettings, Fidelity, Placement, Scene, Start, TimeSettings
 from mechanics.simulate import simulate
 from mechanics.stones.materials import Material
-from moma.errors import SolverError
 from pipelines.samples.causes import PULSE, Cause, MovedBuilding
 from pipelines.samples.frame import Movement, RigidMotion
 from survey.arrays import Array

@@ -5,8 +5,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from ground.errors import UsageError, storing
 from mechanics.dynamics.progress import Listener, silent
-from moma.errors import UsageError, storing
 from pipelines.samples.buildings.study_files import STUDIES, study_text
 from pipelines.samples.causes import PULSE, Cause
 from pipelines.samples.granite_wall import GRANITE_SCENE, GRANITE_WALL, MEASURED, units, units_text

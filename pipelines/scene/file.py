@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from archmodel.store.lookalikes import explained, plain_form
+from ground.errors import SceneError
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import ContactSettings, SolverSettings, TimeSettings
 from mechanics.stones.materials import Material, Orthotropy
-from moma.errors import SceneError
 from pipelines.draw.catalogue import PICTURES
 from pipelines.scene.array_tables import ArrayTable, read_entries
 from pipelines.scene.keys import build, typed_values

@@ -9,9 +9,9 @@ from sqlalchemy.orm import Session
 from archmodel.query.api import MAX_EXPRESSIONS, find, find_rows
 from archmodel.store.stone_record import StoneRecord
 from archmodel.store.stones import load_stones
+from ground.errors import QueryError, UsageError
 from mechanics.scene.scene import Fidelity
 from mechanics.stones.materials import Material
-from moma.errors import QueryError, UsageError
 from pipelines.scene.file import SceneFile
 from pipelines.toml.lines import Path
 from pipelines.toml.schema import nearest

@@ -5,8 +5,8 @@ from typing import Annotated
 
 import numpy as np
 
+from ground.errors import SceneError
 from mechanics.stones.settings import Setting, check_settings
-from moma.errors import SceneError
 
 __all__ = ["Site", "damping_factor"]
 

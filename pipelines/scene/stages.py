@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from moma.errors import UsageError
+from ground.errors import UsageError
 from pipelines.scene.array_tables import ArrayTable, read_entries
 from pipelines.toml.lines import Path
 from pipelines.toml.schema import Key, TomlDocument, ValueKind, nearest

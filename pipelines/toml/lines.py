@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path as FilePath
 from typing import Any
 
-from moma.errors import UsageError
+from ground.errors import UsageError
 
 __all__ = ["Path", "key_lines", "line_of", "parse_toml", "read_text"]
 

@@ -9,7 +9,7 @@ from enum import Enum
 from math import isfinite
 from typing import NoReturn
 
-from moma.errors import SceneError
+from ground.errors import SceneError
 from pipelines.toml.lines import Path, line_of
 
 __all__ = ["REQUIRED", "Key", "TomlDocument", "ValueKind", "check_table", "nearest"]
@@ -124,7 +124,7 @@ def check_table(
     {'friction': 1.0}
     >>> check_table(TomlDocument("scene.toml"), ("contact",), {"frictoin": 1}, [friction])
     Traceback (most recent call last):
-    moma.errors.SceneError: scene.toml:1: unknown key 'frictoin' in [contact]; did you mean 'friction'?
+    ground.errors.SceneError: scene.toml:1: unknown key 'frictoin' in [contact]; did you mean 'friction'?
     """
     known = {key.name: key for key in keys}
     title = title or f"[{'.'.join(table)}]"

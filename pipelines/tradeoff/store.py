@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from moma.errors import UsageError
+from ground.errors import UsageError
 from pipelines.results.checkpoints import write_shared
 from pipelines.results.quantities import Quantities, quantities_from
 from pipelines.results.summary import as_json

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Any
 
 from archmodel.database.session import open_database
+from ground.errors import UsageError
 from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.model.model import build_model
 from mechanics.results.forecast.plan import loose_blocks
 from mechanics.scene.scene import Fidelity
-from moma.errors import UsageError
 from pipelines.results.quantities import QUANTITIES
 from pipelines.run.assemble import assemble
 from pipelines.run.soundness import caution_of, problems_of, refuse_unsound

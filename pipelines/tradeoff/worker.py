@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from archmodel.database.session import open_database
+from ground.errors import MomaError
 from mechanics.results.result import Result
 from mechanics.simulate import simulate
-from moma.errors import MomaError
 from pipelines.results.quantities import quantities
 from pipelines.run.assemble import assemble
 from pipelines.scene.file import SceneFile, parse_scene

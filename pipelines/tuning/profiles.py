@@ -4,9 +4,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
+from ground.errors import UsageError
 from mechanics.scene.scene import Fidelity, Method, Placement, TimeSettings
 from mechanics.stones.meshing.elements import Element
-from moma.errors import UsageError
 from pipelines.scene.file import SceneFile
 from pipelines.scene.selection import StoneModel
 from pipelines.toml.schema import nearest

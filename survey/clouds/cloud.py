@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from moma.errors import GeometryError, SurveyError, UsageError
+from ground.errors import GeometryError, SurveyError, UsageError
 from survey.arrays import Array
 from survey.clouds._kernels.planes import COVERED, FEW, FINE, Rules, fit_patches, patch_sigmas
 from survey.clouds.collecting import Collected, collect_points

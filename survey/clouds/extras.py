@@ -3,7 +3,7 @@
 from importlib import import_module
 from typing import Any
 
-from moma.errors import UsageError
+from ground.errors import UsageError
 
 __all__ = ["optional"]
 

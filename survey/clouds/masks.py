@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from moma.errors import SurveyError, UsageError
+from ground.errors import SurveyError, UsageError
 from survey.arrays import Array
 from survey.clouds.cloud import first_codes, viewed
 from survey.clouds.outlines.outline import Outline

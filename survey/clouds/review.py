@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from moma.errors import UsageError
+from ground.errors import UsageError
 from survey.arrays import Array, Ints
 from survey.clouds.extras import optional
 from survey.clouds.outlines.outline import Outline

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from moma.errors import SurveyError, UsageError
+from ground.errors import SurveyError, UsageError
 from survey.arrays import Array
 from survey.quality.facades import WallPlane
 

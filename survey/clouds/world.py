@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from moma.errors import SurveyError
+from ground.errors import SurveyError
 from survey.arrays import Array
 
 __all__ = ["PixelPlace", "world_file", "world_of"]

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from moma.errors import SurveyError
+from ground.errors import SurveyError
 from survey.records.survey import BlockRecord, DepthRule
 
 __all__ = ["Depth", "Origin", "depth_for"]

@@ -5,7 +5,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.arrays import Array
 from survey.extrusion._kernels import FacePlane, HiddenSide, corner_deviations
 from survey.extrusion.depth import Depth

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.arrays import Array
 from survey.extrusion.depth import Depth
 from survey.extrusion.extrusion import SurveyedBlock

@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.arrays import Array
 from survey.faces.outline import OutlineMeasures, level_direction, measure_outline, outline_polygon
 from survey.faces.planes import FaceFit, fit_plane, with_shared_errors

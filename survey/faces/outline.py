@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.arrays import Array
 
 __all__ = ["Outline", "OutlineMeasures", "level_direction", "measure_outline", "outline_polygon"]

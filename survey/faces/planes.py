@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.arrays import Array
 
 __all__ = ["FaceFit", "fit_plane", "with_shared_errors"]

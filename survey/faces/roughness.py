@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.arrays import Array
 from survey.faces.planes import FaceFit, fit_plane
 from survey.records.survey import BlockRecord

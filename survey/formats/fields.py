@@ -3,8 +3,8 @@
 import re
 import unicodedata
 
-from moma.errors import SurveyError
-from moma.tables.numbers import shown
+from ground.errors import SurveyError
+from ground.tables.numbers import shown
 
 __all__ = ["CODE", "KIND", "code_of", "parse_course"]
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from moma.errors import UsageError
+from ground.errors import UsageError
 from survey.records.survey import BlockRecord, Reject, Survey, SurveyHead, SurveyStream
 
 __all__ = ["ReadingOptions", "whole"]

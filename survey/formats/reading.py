@@ -3,8 +3,8 @@
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from moma.errors import UsageError
-from moma.tables.numbers import unreadable
+from ground.errors import UsageError
+from ground.tables.numbers import unreadable
 from survey.formats.native.reader import open_moma, read_head, with_header
 from survey.formats.options import ReadingOptions, whole
 from survey.formats.points.geojson import open_geojson

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import linprog
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.arrays import Array
 from survey.geometry.convexity import ReflexEdge, flatness, is_convex, reflex_edges
 from survey.geometry.half_spaces import intersection

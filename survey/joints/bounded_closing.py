@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.arrays import Array, Bools, Ints
 from survey.geometry._kernels.convexity import highest_corners
 from survey.geometry.adjacency import SolidArrays

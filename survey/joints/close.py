@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.arrays import Array, Ints
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.adjacency import SolidArrays

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from moma.errors import SurveyError
+from ground.errors import SurveyError
 from survey.arrays import Array
 from survey.orientation.network import Camera, Photo, listed
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from moma.errors import MomaError, SurveyError
+from ground.errors import MomaError, SurveyError
 from survey.arrays import Array
 from survey.records.review import Doubtful
 from survey.records.snapping import Snapping

@@ -14,7 +14,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.arrays import Array, Bools
 from survey.registration.outliers import Agreement, find_outliers, point_tests
 from survey.registration.projective import (

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from moma.errors import GeometryError, MomaError, SurveyError
+from ground.errors import GeometryError, MomaError, SurveyError
 from survey.arrays import Array
 from survey.faces.common_planes import CommonPlane, PlaneEstimate, common_plane
 from survey.faces.neighbours import MeasuredFace, Neighbours

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import ndtri
 
-from moma.errors import SurveyError
+from ground.errors import SurveyError
 from survey.arrays import Array, Bools
 from survey.records.survey import BlockRecord, ControlPoint, Extrusion, SolidRecord, SurveyHead
 from survey.registration.outliers import LEVEL, Agreement, find_outliers

@@ -6,7 +6,7 @@ from itertools import chain
 
 import numpy as np
 
-from moma.errors import MomaError
+from ground.errors import MomaError
 from survey.extrusion.depth import depth_for
 from survey.extrusion.extrusion import SurveyedBlock, extrude
 from survey.extrusion.imported_solids import block_of_solid

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.arrays import Array
 from survey.extrusion.extrusion import SurveyedBlock, prism
 from survey.geometry.folds import fold, warp

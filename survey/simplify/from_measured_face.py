@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.arrays import Array, Bools
 from survey.extrusion.extrusion import SurveyedBlock, hidden_side, prism
 from survey.geometry.solids import Solid

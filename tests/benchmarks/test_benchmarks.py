@@ -15,7 +15,7 @@ from benchmarks.lmgc90 import gravity_of, traced
 from benchmarks.report import columns, commit, progress, table_lines, write_between
 from benchmarks.scenes import BlockScene, rigid_scenes, running_bond, write_scene
 from benchmarks.siconos_child import timed
-from moma.errors import UsageError
+from ground.errors import UsageError
 from pipelines.geology.file import read_geology
 from tests.paths import ROOT
 

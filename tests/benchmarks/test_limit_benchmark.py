@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from benchmarks import limit as benchmark
-from moma.errors import UsageError
+from ground.errors import UsageError
 
 NAME = "4 × 6, 0, 0.7, out"
 

@@ -5,11 +5,11 @@ import pytest
 from scipy.sparse import bsr_array
 
 from benchmarks.stored import StoredDelassus
+from ground.errors import SolverError
 from mechanics.problem.problem import ContactProblem, ContactStart
 from mechanics.problem.residual import natural_map
 from mechanics.solvers.first_order.nsgs import NSGS
 from mechanics.solvers.second_order.newton import Newton
-from moma.errors import SolverError
 from tests.mechanics.dense_operator import slow_sweep
 
 

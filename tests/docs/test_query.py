@@ -19,7 +19,7 @@ from archmodel.query.tokens import MAX_LENGTH
 from archmodel.store.stones import store_survey
 from archmodel.tables.entities import canon_of, kinds
 from archmodel.tables.hierarchy import definition_of, kind_of
-from moma.errors import QueryError
+from ground.errors import QueryError
 from tests.archmodel.conftest import WALL
 from tests.archmodel.known_wall import MEMBERS, RELATIONS, STRUCTURES, furnish
 from tests.archmodel.stones import SHA

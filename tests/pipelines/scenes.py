@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from archmodel.database.session import open_database
+from ground.errors import SceneError
 from mechanics.arrays import Array
-from moma.errors import SceneError
 from pipelines.run.assemble import Assembly, assemble
 from pipelines.scene.file import parse_scene
 from tests.paths import ROOT

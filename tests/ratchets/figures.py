@@ -16,7 +16,7 @@ from tests.paths import ROOT
 
 __all__ = ["FIGURES", "WORDS", "identifier", "parameters", "per_10_000"]
 
-PACKAGES = ("moma", "survey", "archmodel", "mechanics", "pipelines")
+PACKAGES = ("ground", "moma", "survey", "archmodel", "mechanics", "pipelines")
 # they name no thing of the field
 WORDS = {
     *("one", "own", "other", "part", "way", "near", "far"),

@@ -8,14 +8,15 @@ import pytest
 from tests.ratchets.figures import FIGURES, WORDS, identifier, parameters, per_10_000
 
 MOST = {
-    "numbers of moma": 44,
+    "numbers of ground": 24,
+    "numbers of moma": 20,
     "numbers of survey": 995,
     "numbers of archmodel": 103,
     "numbers of mechanics": 740,
     "numbers of pipelines": 915,
     "long functions": 55,
     "wide functions": 16,
-    "undocumented functions": 177,
+    "undocumented functions": 176,
 }
 """Today's figures: whoever lowers one lowers its bound, and nobody raises one."""
 

@@ -19,7 +19,7 @@ from archmodel.tables.knowledge import OBSERVATIONS, Correction, Statement
 from archmodel.tables.opinions import DISPUTABLE
 from archmodel.tables.runs import MechanismStone
 from archmodel.tables.structures import structure_kind_named
-from moma.errors import QueryError, UsageError
+from ground.errors import QueryError, UsageError
 
 __all__ = [
     "by",

@@ -9,7 +9,7 @@ from sqlalchemy import ColumnElement
 from archmodel.query.grammar import Call, Node
 from archmodel.query.tokens import Token, complaint
 from archmodel.tables.knowledge import OBSERVATIONS
-from moma.errors import QueryError
+from ground.errors import QueryError
 
 __all__ = ["MAX_METRES", "STRUCTURE_USAGES", "USAGES", "Ask", "Condition", "metres", "only", "tokens"]
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ground.errors import SceneError
 from mechanics.arrays import Array, Ints
-from moma.errors import SceneError
 
 __all__ = ["Cell", "Shape", "layer_members", "members", "shape_of"]
 

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ground.errors import SceneError
 from mechanics.arrays import Array, Ints
 from mechanics.planar.measures.tessellation import tessellation
-from moma.errors import SceneError
 
 __all__ = ["sides_of"]
 

@@ -11,7 +11,7 @@ where ψ_b and ψ_0 are the angles of the largest principal stress from the base
 import numpy as np
 from scipy.optimize import brentq
 
-from moma.errors import SceneError
+from ground.errors import SceneError
 
 __all__ = ["critical_slope"]
 

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import numpy as np
 
+from ground.errors import SceneError
 from mechanics.arrays import Array, Bools
 from mechanics.scene.laws.bonds import BROKEN, bonded, with_bonds
 from mechanics.scene.laws.closure import FLOOR, Closure
@@ -28,7 +29,6 @@ from mechanics.scene.laws.law import (
 )
 from mechanics.scene.laws.mortar import MortarJoint, check_tension
 from mechanics.stones.settings import Setting, check_settings
-from moma.errors import SceneError
 
 __all__ = ["ElasticJoint"]
 

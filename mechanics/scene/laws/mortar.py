@@ -5,12 +5,12 @@ from typing import Annotated
 
 import numpy as np
 
+from ground.errors import SceneError
 from mechanics.arrays import Array
 from mechanics.scene.laws.bonds import BROKEN, bonded, with_bonds
 from mechanics.scene.laws.dry_joint import DryJoint, DynamicFriction, Friction, at_limit, slid
 from mechanics.scene.laws.law import BOND, REST, SLIDING, SLIP, Approach, Joint, Law, Terms
 from mechanics.stones.settings import Setting, check_settings
-from moma.errors import SceneError
 
 __all__ = ["MortarJoint", "check_tension", "held_tension"]
 
@@ -34,7 +34,7 @@ def check_tension(where: str, friction: float, tension: float, shear: float) -> 
 
     >>> check_tension("mortar joint", 0.5, 1e5, 0.0)
     Traceback (most recent call last):
-    moma.errors.SceneError: mortar joint: tension = 100000.0 holds nothing with friction = 0.5 and shear = 0; give a \
+    ground.errors.SceneError: mortar joint: tension = 100000.0 holds nothing with friction = 0.5 and shear = 0; give a \
 shear strength, of 50000 Pa or more to hold all of it, or tension = 0 for a dry joint
     """
     if tension > 0 and held_tension(friction, tension, shear) == 0:

@@ -5,8 +5,8 @@ from functools import cached_property
 
 import numpy as np
 
+from ground.errors import SceneError
 from mechanics.arrays import Array
-from moma.errors import SceneError
 
 __all__ = ["Accelerogram", "Direction"]
 

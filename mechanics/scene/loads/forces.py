@@ -5,12 +5,12 @@ from typing import Annotated
 
 import numpy as np
 
+from ground.errors import SceneError
 from mechanics.arrays import Array
 from mechanics.scene.loads.load import Course
 from mechanics.scene.loads.time_series import History
 from mechanics.stones.settings import Setting
 from mechanics.stones.validation import finite, refuse_unless
-from moma.errors import SceneError
 
 __all__ = ["StoneForce"]
 

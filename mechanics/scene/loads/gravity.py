@@ -6,11 +6,11 @@ from typing import Annotated
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from ground.errors import SceneError
 from mechanics.arrays import Array
 from mechanics.scene.loads.load import Course
 from mechanics.scene.loads.time_series import History
 from mechanics.stones.settings import Setting, check_settings
-from moma.errors import SceneError
 
 __all__ = ["GravityRamp", "TiltingTable"]
 

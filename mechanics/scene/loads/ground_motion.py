@@ -6,11 +6,11 @@ from typing import Annotated
 
 import numpy as np
 
+from ground.errors import SceneError
 from mechanics.scene.loads.accelerogram import Accelerogram
 from mechanics.scene.loads.load import Course, Pose
 from mechanics.scene.loads.time_series import History
 from mechanics.stones.settings import Setting
-from moma.errors import SceneError
 
 __all__ = ["Component", "GroundMotion", "braking_time"]
 

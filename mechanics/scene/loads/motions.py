@@ -7,11 +7,11 @@ from typing import Annotated
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from ground.errors import SceneError
 from mechanics.scene.loads.load import Course, Pose
 from mechanics.scene.loads.time_series import History
 from mechanics.stones.settings import Setting
 from mechanics.stones.validation import finite
-from moma.errors import SceneError
 
 __all__ = ["ImposedMotion", "settlement", "spreading"]
 

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
+from ground.errors import SceneError
 from mechanics.arrays import Array
 from mechanics.scene.loads.accelerogram import Accelerogram, Direction
 from mechanics.scene.loads.record_formats import UNITS, direction_of, read_at2, reader_of, unit_of
 from mechanics.scene.loads.tables import Table, fail_at, numbered_lines, read_table
 from mechanics.scene.loads.waveforms import is_waveform, read_waveforms
-from moma.errors import SceneError
 
 __all__ = [
     "UNITS",

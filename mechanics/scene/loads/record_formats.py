@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ground.errors import SceneError
 from mechanics.scene.loads.accelerogram import Accelerogram, Direction
 from mechanics.scene.loads.tables import fail_at, number_at, numbered_lines
-from moma.errors import SceneError
 
 __all__ = ["UNITS", "direction_of", "read_at2", "read_esm", "read_knet", "read_smc", "reader_of", "unit_of"]
 

@@ -8,8 +8,8 @@ from typing import Literal
 
 import numpy as np
 
+from ground.errors import SceneError
 from mechanics.scene.loads.accelerogram import Accelerogram
-from moma.errors import SceneError
 
 __all__ = ["band_pass", "without_drift"]
 

@@ -1,4 +1,4 @@
-"""Tables of numbers for loads, by the rules of `moma.tables`: time series, and the rows of accelerograms.
+"""Tables of numbers for loads, by the rules of `ground.tables`: time series, and the rows of accelerograms.
 
 Lines before the numbers are titles; what stands after ``#`` is a comment. A wrong table is a mistake in a scene.
 """
@@ -12,11 +12,11 @@ from typing import NoReturn
 
 import numpy as np
 
+from ground.errors import SceneError, SurveyError, UsageError
+from ground.tables.numbers import is_number
+from ground.tables.table import read_table as read_rows
 from mechanics.arrays import Array, Ints
 from mechanics.scene.loads.time_series import History
-from moma.errors import SceneError, SurveyError, UsageError
-from moma.tables.numbers import is_number
-from moma.tables.table import read_table as read_rows
 
 __all__ = ["Table", "fail_at", "number_at", "numbered_lines", "read_columns", "read_history", "read_table"]
 

@@ -7,8 +7,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ground.errors import SceneError
 from mechanics.arrays import Array
-from moma.errors import SceneError
 
 __all__ = ["History", "Outside"]
 

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ground.errors import SceneError
 from mechanics.scene.loads.accelerogram import Accelerogram
 from mechanics.scene.loads.record_formats import direction_of
-from moma.errors import SceneError
 
 __all__ = ["is_waveform", "read_waveforms"]
 

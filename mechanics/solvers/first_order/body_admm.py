@@ -14,6 +14,7 @@ from itertools import chain, cycle
 
 import numpy as np
 
+from ground.errors import SolverError
 from mechanics.arrays import Array, Ints
 from mechanics.delassus.elimination import elimination
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, Delassus, RigidContacts
@@ -24,7 +25,6 @@ from mechanics.solvers._kernels import body_cholesky as cholesky
 from mechanics.solvers._kernels.body_parts import Parts, parts_of
 from mechanics.solvers.first_order.body_factors import factorise
 from mechanics.solvers.scales import LOOK, MANY, OVERSHOOT, ROUNDING, SPARE
-from moma.errors import SolverError
 
 __all__ = ["RESTING", "SORTED", "STEADY", "BodyADMM", "Stage"]
 

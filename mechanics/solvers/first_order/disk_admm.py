@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ground.errors import SolverError
 from mechanics.arrays import Array, Ints
 from mechanics.delassus.elimination import elimination
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, PlaneContacts
@@ -16,7 +17,6 @@ from mechanics.solvers._kernels import body_cholesky as cholesky
 from mechanics.solvers._kernels import disk_admm as kernel
 from mechanics.solvers.first_order.body_factors import factorise
 from mechanics.solvers.scales import FOLLOWING, OVERSHOOT, PLAIN_LOOK, SPARE
-from moma.errors import SolverError
 
 __all__ = ["DiskADMM"]
 

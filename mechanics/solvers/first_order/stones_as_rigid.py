@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from ground.errors import SolverError
 from mechanics.delassus.compliant import simplified
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.solvers.first_order.body_admm import BodyADMM
-from moma.errors import SolverError
 
 __all__ = ["StonesAsRigid"]
 

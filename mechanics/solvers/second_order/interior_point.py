@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ground.errors import SolverError
 from mechanics.arrays import Array
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.problem.residual import Residual, residual
 from mechanics.solvers.second_order.central_path import NAME, CentralPath
 from mechanics.solvers.second_order.scaling import equilibrated
-from moma.errors import SolverError
 
 __all__ = ["InteriorPoint"]
 

@@ -14,6 +14,7 @@ from typing import Protocol
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
+from ground.errors import SolverError
 from mechanics.arrays import Array, Ints
 from mechanics.delassus.compliant import CompliantDelassus, simplified
 from mechanics.delassus.elimination import elimination
@@ -22,7 +23,6 @@ from mechanics.problem.problem import ContactProblem, Delassus, RigidContacts
 from mechanics.solvers._kernels import body_newton as bodies
 from mechanics.solvers.scales import ROUNDING
 from mechanics.solvers.second_order.sparse_blocks import SparseBlocks
-from moma.errors import SolverError
 
 __all__ = ["Equations", "equations_of"]
 

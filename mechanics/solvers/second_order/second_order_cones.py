@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ground.errors import SolverError
 from mechanics.arrays import Array
-from moma.errors import SolverError
 
 __all__ = ["Scaling", "central", "divide", "product", "reach", "scaling", "tangential", "to_bounds"]
 

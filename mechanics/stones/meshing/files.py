@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
+from ground.errors import MeshError, MissingLibraryError, UsageError
 from mechanics.arrays import Array, Ints
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.mesh import VolumeMesh
-from moma.errors import MeshError, MissingLibraryError, UsageError
 
 __all__ = ["check_mesh_file", "read_meshes", "write_meshes"]
 

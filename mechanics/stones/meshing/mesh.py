@@ -4,11 +4,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ground.errors import MeshError
 from mechanics.arrays import Array, Ints
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.shape_functions import integration, jacobians
 from mechanics.stones.polyhedra import face_plane, face_planes, mass_properties
-from moma.errors import MeshError
 
 __all__ = ["SolidMesh", "VolumeMesh", "boundary_facets", "solid_mesh", "tet_mesh", "with_middle_nodes"]
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from ground.errors import GeometryError, MeshError
 from mechanics.arrays import Array, Bools
 from mechanics.stones.polyhedra import face_plane, face_planes, fan, mass_properties
-from moma.errors import GeometryError, MeshError
 
 __all__ = ["CONVEX", "check_meshable", "is_convex"]
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from archmodel.query.api import asked_columns, attributes, find_faces, find_rows
 from archmodel.query.attributes import Attribute
 from archmodel.query.tally import count_by, sorted_rows
+from ground.errors import UsageError
 from moma.cli.text.formats import USUAL_COLUMNS, as_csv, as_geojson, as_json, as_table, shown_columns
-from moma.errors import UsageError
 
 if TYPE_CHECKING:
     from sqlalchemy.orm import Session

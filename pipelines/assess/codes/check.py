@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from ground.errors import UsageError
 from mechanics.limit.kinematic import Kinematics
-from moma.errors import UsageError
 from pipelines.scene.site import Site, damping_factor
 
 __all__ = [

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from archmodel.store.lookalikes import explained, plain_form
-from moma.errors import SceneError
+from ground.errors import SceneError
 from pipelines.scene.file import BESIDE
 from pipelines.toml.lines import key_lines, parse_toml, read_text
 from pipelines.toml.schema import Key, TomlDocument, ValueKind, check_table, nearest

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from archmodel.database.session import open_database
+from ground.errors import SceneError
 from mechanics.arrays import Array
 from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.model.model import build_model
 from mechanics.results.forecast.plan import loose_blocks
-from moma.errors import SceneError
 from pipelines.assess.diagnosis.file import DiagnosisFile, Hypothesis
 from pipelines.assess.diagnosis.fit import Ask, Fit, fit
 from pipelines.assess.diagnosis.ranking import APART, STILL, Ranked, Ranking, rank, with_others

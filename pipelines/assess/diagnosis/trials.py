@@ -9,9 +9,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from archmodel.database.session import open_database
+from ground.errors import MomaError
 from mechanics.results.result import Outcome
 from mechanics.simulate import simulate, simulate_stages
-from moma.errors import MomaError
 from pipelines.assess.motions import Motions, stone_motions
 from pipelines.assess.workers.pool import Lost, workers
 from pipelines.run.assemble import assemble

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ground.errors import UsageError
 from mechanics.arrays import Array
-from moma.errors import UsageError
 
 __all__ = ["read_curve"]
 

@@ -10,12 +10,12 @@ import numpy as np
 from archmodel.database.session import open_database
 from archmodel.store.run_record import RunRecord
 from archmodel.tables.entries import latest_entry
+from ground.errors import UsageError
 from mechanics.arrays import Array
 from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.limit.loading_test import LoadingTest, loading_test
 from mechanics.scene.rig import Rig
 from mechanics.scene.scene import Fidelity, Scene
-from moma.errors import UsageError
 from pipelines.assess.pushover.band import Band, banded, varied
 from pipelines.assess.pushover.findings import doubts_of, headline_of
 from pipelines.assess.pushover.measured import read_curve

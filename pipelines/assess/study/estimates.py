@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ground.errors import SceneError
 from mechanics.arrays import Array
-from moma.errors import SceneError
 from pipelines.assess.study.methods.counting import (
     Estimate,
     Probability,

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from archmodel.store.stone_record import StoneRecord
+from ground.errors import SceneError, UsageError
 from mechanics.arrays import Array
-from moma.errors import SceneError, UsageError
 from pipelines.assess.study.inputs.distributions import Distribution, correlation_root
 from pipelines.assess.study.inputs.realise import LAW_KEYS, law_value, records_of
 from pipelines.assess.study.quantities import live_load, quantity_name

@@ -11,9 +11,9 @@ from sqlalchemy.orm import Session
 
 from archmodel.query.api import find_rows
 from archmodel.store.stone_record import StoneRecord
+from ground.errors import SceneError, UsageError
 from mechanics.scene.scene import Fidelity
 from mechanics.stones.materials import Material, Orthotropy
-from moma.errors import SceneError, UsageError
 from pipelines.assess.kept import Kept
 from pipelines.assess.study.file import Correlation, StudyFile
 from pipelines.assess.study.inputs.distributions import correlation_root

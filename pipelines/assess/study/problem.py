@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from ground.errors import MomaError
 from mechanics.arrays import Array
 from mechanics.limit.assembly import RigidAssembly, Strength, assembly, joint_strength
 from mechanics.limit.dead_load import at_instant
 from mechanics.limit.live_loads import Acceleration
-from moma.errors import MomaError
 from pipelines.assess.study.gradient import (
     Changed,
     Dual,

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ground.errors import SceneError, SolverError
 from mechanics.arrays import Array
 from mechanics.limit.assembly import RigidAssembly, assembly
 from mechanics.limit.dead_load import at_instant
@@ -16,7 +17,6 @@ from mechanics.limit.live_loads import Acceleration, LiveLoad
 from mechanics.limit.programme import Ending, Optimum, Programme
 from mechanics.limit.thickness import geometric_safety
 from mechanics.simulate import simulate
-from moma.errors import SceneError, SolverError
 from pipelines.assess.questions import LoadQuestion, parse_question
 from pipelines.assess.study.settings import QuantityTable, QuantityType
 from pipelines.ingest.records import surveyed_block

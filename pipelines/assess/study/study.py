@@ -12,9 +12,9 @@ import numpy as np
 from archmodel.database.session import open_database
 from archmodel.store.run_record import RunRecord, StoneResult
 from archmodel.tables.entries import latest_entry
+from ground.errors import SceneError, UsageError
 from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.scene.scene import Fidelity
-from moma.errors import SceneError, UsageError
 from pipelines.assess.study.estimates import estimated
 from pipelines.assess.study.file import StudyFile, read_study
 from pipelines.assess.study.prepare import problem_of, snapshot_content

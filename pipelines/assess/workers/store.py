@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from ground.errors import UsageError, storing
 from mechanics.arrays import Array
-from moma.errors import UsageError, storing
 from pipelines.results.checkpoints import write_shared
 
 __all__ = ["Sample", "SampleStore", "Snapshot"]

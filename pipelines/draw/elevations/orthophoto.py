@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from moma.errors import SurveyError, UsageError
+from ground.errors import SurveyError, UsageError
 from pipelines.draw.elevations.sheet import project
 from survey.clouds.wall import Wall, read_wall
 from survey.clouds.world import PixelPlace, world_of

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from ground.errors import UsageError
 from mechanics.dynamics.progress import Listener, Progress, silent
-from moma.errors import UsageError
 from pipelines.propose.outlines.features import (
     CORRECTED,
     PROPOSED,

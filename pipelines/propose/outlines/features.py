@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from moma.errors import SurveyError
+from ground.errors import SurveyError
 from survey.arrays import Array
 from survey.clouds.outlines.outline import Outline
 from survey.clouds.outlines.reading import read_outlines

@@ -18,9 +18,9 @@ from archmodel.tables.relations import Membership
 from archmodel.tables.runs import Run
 from archmodel.tables.structures import Structure
 from archmodel.tables.surveys import Survey
+from ground.errors import UsageError
 from mechanics.arrays import Array, Ints
 from mechanics.stones.polyhedra import mass_properties
-from moma.errors import UsageError
 from pipelines.reports.page.known import column_of
 from pipelines.reports.page.model import Column, Stones
 from pipelines.reports.page.surfaces import stones_of

@@ -9,7 +9,7 @@ from pathlib import Path
 from sqlalchemy.orm import Session
 
 from archmodel.database.session import open_database
-from moma.errors import ExchangeError, UsageError
+from ground.errors import ExchangeError, UsageError
 from pipelines.record.export.building import Building, read_building
 from pipelines.record.export.compas import model_content, results_content
 from pipelines.record.export.dxf import dxf_content

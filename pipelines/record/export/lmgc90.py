@@ -4,10 +4,10 @@ from importlib.metadata import version
 
 import numpy as np
 
+from ground.errors import UsageError
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.law import Law
 from mechanics.scene.laws.mortar import MortarJoint
-from moma.errors import UsageError
 from pipelines.record.export.building import Building
 from pipelines.record.export.same_scene import SameScene, is_fixed, laws_by_group
 

@@ -8,10 +8,10 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from archmodel.tables.runs import Run
+from ground.errors import UsageError
 from mechanics.arrays import Array
 from mechanics.scene.laws.law import Law
 from mechanics.scene.scene import Block, Fidelity, Scene
-from moma.errors import UsageError
 from pipelines.run.assemble import assemble
 from pipelines.scene.file import parse_scene
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from markupsafe import Markup, escape
 
-from moma.errors import MomaError, UsageError
+from ground.errors import MomaError, UsageError
 
 __all__ = ["NO_SUM", "appraise_page", "check_sum", "contents", "print_pdf", "sealed", "title_block"]
 

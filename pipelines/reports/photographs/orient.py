@@ -7,7 +7,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from moma.errors import SurveyError, UsageError
+from ground.errors import SurveyError, UsageError
 from pipelines.reports.photographs.project import Project, calibrated, exported_control, read_project
 from pipelines.results.folder import check_replaceable, replacing
 from survey.orientation.bundle.orient import Orientation, orient

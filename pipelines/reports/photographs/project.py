@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from moma.errors import SceneError, UsageError
+from ground.errors import SceneError, UsageError
 from pipelines.toml.lines import key_lines, parse_toml, read_text
 from pipelines.toml.schema import Key, TomlDocument, ValueKind, check_table, nearest
 from survey.orientation.formats.colmap import read_colmap

@@ -14,7 +14,7 @@ from archmodel.query.geojson import feature_collection
 from archmodel.tables.entities import Entity
 from archmodel.tables.runs import Run
 from archmodel.tables.surveys import Survey
-from moma.errors import UsageError
+from ground.errors import UsageError
 from pipelines.reports.view import database_model, view_page
 from pipelines.results.table_csv import csv_text
 

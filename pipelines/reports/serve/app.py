@@ -26,7 +26,7 @@ from archmodel.describe.history import history
 from archmodel.describe.runs import describe_run, list_runs
 from archmodel.describe.schema_tree import schema
 from archmodel.tables.entries import latest_entry
-from moma.errors import DatabaseError, MomaError, UsageError
+from ground.errors import DatabaseError, MomaError, UsageError
 from pipelines.reports.html import render
 from pipelines.reports.serve.answers import COLUMNS, Answers
 from pipelines.reports.serve.settings import ServeSettings

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from archmodel.database.session import open_database
-from moma.errors import MissingLibraryError
+from ground.errors import MissingLibraryError
 from pipelines.reports.serve.settings import LOCAL, ServeSettings
 
 __all__ = ["serve_database"]

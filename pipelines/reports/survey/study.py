@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from archmodel.tables.entities import kind_named
+from ground.errors import UsageError
 from mechanics.arrays import Array
 from mechanics.dynamics.progress import Listener, Progress, silent
-from moma.errors import UsageError
 from pipelines.ingest.outlined import open_source
 from pipelines.ingest.reading_options import Source, survey_sources
 from survey.extrusion.extrusion import SurveyedBlock

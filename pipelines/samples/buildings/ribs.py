@@ -27,7 +27,7 @@ from random import Random
 
 import numpy as np
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from pipelines.samples.bond import PlannedStone
 from pipelines.samples.building import Draft, SolidDraft, SyntheticBuilding, measured_building, observer
 from pipelines.samples.frame import TrueStone, WallFrame

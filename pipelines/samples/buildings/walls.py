@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from pipelines.samples.bond import (
     CLEARANCES,
     WIDTHS,

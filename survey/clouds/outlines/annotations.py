@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from moma.errors import SurveyError, UsageError
+from ground.errors import SurveyError, UsageError
 from survey.arrays import Array
 from survey.clouds.outlines.outline import Attributes, Outline, attributes_of, made_code
 from survey.clouds.outlines.tracing import few_corners

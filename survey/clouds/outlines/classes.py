@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from moma.errors import SurveyError, UsageError
+from ground.errors import SurveyError, UsageError
 from survey.arrays import Bools, Ints
 
 __all__ = ["check_stones", "neck", "of_class", "refuse_mortar"]

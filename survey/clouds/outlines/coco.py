@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from moma.errors import SurveyError, UsageError
+from ground.errors import SurveyError, UsageError
 from survey.clouds.outlines.labels import outline_of_mask
 from survey.clouds.outlines.outline import Attributes, Outline, attributes_of, made_code
 from survey.clouds.outlines.tracing import few_corners

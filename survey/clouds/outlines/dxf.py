@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from moma.errors import SurveyError
+from ground.errors import SurveyError
 from survey.arrays import Array
 from survey.clouds.extras import optional
 from survey.clouds.outlines.dxf_entities import Curve, DrawnText, Entities, entities_of

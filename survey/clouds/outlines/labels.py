@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from moma.errors import SurveyError
+from ground.errors import SurveyError
 from survey.arrays import Array
 from survey.clouds.outlines.classes import check_stones, neck, of_class, refuse_mortar
 from survey.clouds.outlines.outline import Attributes, Outline

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from moma.errors import SurveyError, UsageError
+from ground.errors import SurveyError, UsageError
 from survey.arrays import Array
 
 __all__ = ["FIELDS", "Attributes", "Outline", "attributes_of", "distinct", "field_map", "made_code"]

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from moma.errors import SurveyError
-from moma.tables import table as tables
-from moma.tables.columns import length_scale, unit_of
-from moma.tables.numbers import is_number
+from ground.errors import SurveyError
+from ground.tables import table as tables
+from ground.tables.columns import length_scale, unit_of
+from ground.tables.numbers import is_number
 from survey.arrays import Array
 from survey.clouds.outlines.outline import FIELDS, Outline, attributes_of, made_code
 

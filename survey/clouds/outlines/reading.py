@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from moma.errors import SurveyError, UsageError
+from ground.errors import SurveyError, UsageError
 from survey.arrays import Array
 from survey.clouds.outlines.annotations import is_annotated, read_annotations
 from survey.clouds.outlines.coco import is_coco, load_json, read_coco

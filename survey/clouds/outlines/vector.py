@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from moma.errors import SurveyError, UsageError
+from ground.errors import SurveyError, UsageError
 from survey.arrays import Array
 from survey.clouds.extras import optional
 from survey.clouds.outlines.outline import Attributes, Outline, attributes_of, made_code

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from moma.errors import SurveyError, UsageError
+from ground.errors import SurveyError, UsageError
 from survey.arrays import Bools
 from survey.clouds.pictures.joints import Field
 from survey.clouds.views.orthophoto import STEP, filled

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from moma.errors import UsageError
+from ground.errors import UsageError
 from survey.arrays import Array, Bools, Ints
 from survey.clouds.extras import optional
 from survey.clouds.pictures.joints import WIDTH, Field, Strength

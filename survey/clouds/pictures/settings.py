@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from moma.errors import UsageError
+from ground.errors import UsageError
 
 __all__ = ["MASONRY", "OutlineSettings"]
 

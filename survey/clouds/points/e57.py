@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from moma.errors import SurveyError, UsageError
+from ground.errors import SurveyError, UsageError
 from survey.arrays import Array
 from survey.clouds.extras import optional
 from survey.clouds.points.chunks import CHUNK, Chunk, PointCloud, lost_digits

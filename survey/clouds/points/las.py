@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from moma.errors import SurveyError
+from ground.errors import SurveyError
 from survey.arrays import Array
 from survey.clouds.extras import optional
 from survey.clouds.points.chunks import CHUNK, Chunk, PointCloud

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from moma.errors import SurveyError
+from ground.errors import SurveyError
 from survey.arrays import Array
 from survey.clouds.points.chunks import CHUNK, Chunk, PointCloud, lost_digits
 from survey.records.survey import Station

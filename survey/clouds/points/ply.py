@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from moma.errors import SurveyError
-from moma.tables.numbers import unreadable
+from ground.errors import SurveyError
+from ground.tables.numbers import unreadable
 from survey.arrays import Array
 from survey.clouds.points.chunks import CHUNK, Chunk, PointCloud, lost_digits
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from moma.errors import UsageError
+from ground.errors import UsageError
 from survey.clouds.points.chunks import PointCloud
 from survey.clouds.points.e57 import open_e57
 from survey.clouds.points.las import open_las

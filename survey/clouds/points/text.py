@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from moma.tables.columns import COORDINATES, length_scale
-from moma.tables.number_stream import NumberStream, open_numbers
+from ground.tables.columns import COORDINATES, length_scale
+from ground.tables.number_stream import NumberStream, open_numbers
 from survey.arrays import Array
 from survey.clouds.points.chunks import CHUNK, Chunk, PointCloud
 

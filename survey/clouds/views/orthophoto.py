@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from moma.errors import SurveyError, UsageError
+from ground.errors import SurveyError, UsageError
 from survey.arrays import Array, Bools
 from survey.clouds._kernels.paint import Canvas, paint
 from survey.clouds.points.chunks import PointCloud

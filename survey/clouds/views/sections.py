@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from moma.errors import UsageError
+from ground.errors import UsageError
 from survey.arrays import Array, Ints
 from survey.clouds.views.orthophoto import Picture, filled
 from survey.clouds.wall import Wall

@@ -3,8 +3,8 @@
 import re
 from re import Pattern
 
-from moma.errors import SurveyError
-from moma.tables.numbers import parse_length, parse_number, shown
+from ground.errors import SurveyError
+from ground.tables.numbers import parse_length, parse_number, shown
 from survey.formats.fields import CODE, KIND, parse_course
 
 __all__ = ["NAME_REMEDY", "Cursor"]

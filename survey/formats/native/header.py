@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from moma.errors import SurveyError
+from ground.errors import SurveyError
 from survey.formats.native.cursor import Cursor
 from survey.records.survey import (
     OBSERVER,

@@ -39,8 +39,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from moma.errors import SurveyError, UsageError
-from moma.tables.text_lines import TextLines
+from ground.errors import SurveyError, UsageError
+from ground.tables.text_lines import TextLines
 from survey.formats.native.cursor import Cursor
 from survey.formats.native.header import HeadReader
 from survey.formats.native.stone import STONE_WORDS, StoneReader

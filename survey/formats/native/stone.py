@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 
-from moma.tables.numbers import FARTHEST
+from ground.tables.numbers import FARTHEST
 from survey.arrays import Array
 from survey.formats.native.cursor import Cursor
 from survey.formats.native.header import missing, read_extrusion

@@ -4,8 +4,8 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from moma.errors import SurveyError
-from moma.tables.numbers import FARTHEST
+from ground.errors import SurveyError
+from ground.tables.numbers import FARTHEST
 from survey.formats.fields import CODE
 from survey.records.survey import (
     OBSERVER,

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from moma.errors import SurveyError
-from moma.tables.columns import COORDINATES
-from moma.tables.numbers import unreadable
-from moma.tables.rows import ListRows, cell_text
+from ground.errors import SurveyError
+from ground.tables.columns import COORDINATES
+from ground.tables.numbers import unreadable
+from ground.tables.rows import ListRows, cell_text
 from survey.formats.options import ReadingOptions
 from survey.formats.tables.columns import kind_of_column
 from survey.formats.tables.reader import open_table

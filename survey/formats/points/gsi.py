@@ -11,8 +11,8 @@ passed over; lines without coordinates too.
 import re
 from pathlib import Path
 
-from moma.tables.numbers import shown
-from moma.tables.text_lines import TextLines
+from ground.tables.numbers import shown
+from ground.tables.text_lines import TextLines
 from survey.formats.fields import code_of
 from survey.formats.options import ReadingOptions
 from survey.formats.tables.reader import PointCollector

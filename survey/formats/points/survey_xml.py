@@ -10,8 +10,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from xml.parsers import expat
 
-from moma.errors import SurveyError
-from moma.tables.numbers import parse_number, shown, unreadable
+from ground.errors import SurveyError
+from ground.tables.numbers import parse_number, shown, unreadable
 from survey.formats.fields import code_of
 from survey.formats.options import ReadingOptions
 from survey.formats.tables.reader import PointCollector

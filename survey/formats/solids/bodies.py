@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from moma.errors import GeometryError, SurveyError
-from moma.tables.numbers import FARTHEST
+from ground.errors import GeometryError, SurveyError
+from ground.tables.numbers import FARTHEST
 from survey.arrays import Array
 from survey.formats.solids.body_groups import body_groups, signed_volume
 from survey.formats.solids.flat_faces import merge_flat, rounding

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.arrays import Array
 from survey.geometry.solids import area_vector
 

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from moma.errors import SurveyError
-from moma.tables.numbers import parse_number, shown
-from moma.tables.text_lines import TextLines
+from ground.errors import SurveyError
+from ground.tables.numbers import parse_number, shown
+from ground.tables.text_lines import TextLines
 from survey.formats.solids.bodies import RawBody, compact
 
 __all__ = ["obj_bodies"]

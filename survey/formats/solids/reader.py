@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from moma.errors import GeometryError, SurveyError, UsageError
-from moma.tables.numbers import shown
+from ground.errors import GeometryError, SurveyError, UsageError
+from ground.tables.numbers import shown
 from survey.formats.fields import CODE, code_of
 from survey.formats.options import ReadingOptions
 from survey.formats.solids.bodies import ClosedBody, RawBody, closed_bodies

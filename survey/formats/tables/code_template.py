@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
-from moma.errors import UsageError
+from ground.errors import UsageError
 from survey.formats.fields import code_of
 
 __all__ = ["ROLES", "STATION", "CodeFields", "CodeTemplate"]

@@ -10,9 +10,9 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from moma.errors import SurveyError, UsageError
-from moma.tables.columns import COORDINATES, POINT, SIGMA, length_scale, plain, spellings, unit_of
-from moma.tables.numbers import shown
+from ground.errors import SurveyError, UsageError
+from ground.tables.columns import COORDINATES, POINT, SIGMA, length_scale, plain, spellings, unit_of
+from ground.tables.numbers import shown
 
 __all__ = [
     "ALIASES",

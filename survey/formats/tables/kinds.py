@@ -5,10 +5,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from moma.errors import UsageError
-from moma.tables.columns import plain
-from moma.tables.numbers import shown
-from moma.tables.rows import open_rows
+from ground.errors import UsageError
+from ground.tables.columns import plain
+from ground.tables.numbers import shown
+from ground.tables.rows import open_rows
 from survey.formats.fields import KIND
 
 __all__ = ["KINDS", "kind_of", "meant", "read_kinds"]

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from moma.errors import SurveyError
-from moma.tables.numbers import shown
+from ground.errors import SurveyError
+from ground.tables.numbers import shown
 from survey.arrays import Array
 from survey.records.survey import BlockRecord, Reject, SurveyHead
 

@@ -18,11 +18,11 @@ from typing import Any
 
 import numpy as np
 
-from moma.errors import SurveyError
-from moma.tables.columns import plain
-from moma.tables.decimals import Decimals
-from moma.tables.numbers import EMPTY, shown
-from moma.tables.rows import DATE_REMEDY, ListRows, Row, TextRows, open_rows
+from ground.errors import SurveyError
+from ground.tables.columns import plain
+from ground.tables.decimals import Decimals
+from ground.tables.numbers import EMPTY, shown
+from ground.tables.rows import DATE_REMEDY, ListRows, Row, TextRows, open_rows
 from survey.formats.fields import CODE, KIND, code_of, parse_course
 from survey.formats.options import ReadingOptions, whole
 from survey.formats.tables.code_template import ROLES, STATION, CodeFields, CodeTemplate

@@ -4,8 +4,8 @@ import re
 
 import numpy as np
 
-from moma.errors import SurveyError
-from moma.tables.numbers import FARTHEST, shown
+from ground.errors import SurveyError
+from ground.tables.numbers import FARTHEST, shown
 from survey.arrays import Array
 
 __all__ = ["FLAT", "outline_of", "ring_of"]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.arrays import Array
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.joints.settings import JointMode, JointSettings

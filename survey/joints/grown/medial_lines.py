@@ -14,7 +14,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import Voronoi, cKDTree
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.arrays import Array, Ints
 from survey.geometry.polygons import inside
 from survey.joints.grown.openings import open_places, usual_width

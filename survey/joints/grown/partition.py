@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.arrays import Array
 from survey.geometry.polygons import inside
 from survey.joints.grown.chains import apart, crosses, is_simple

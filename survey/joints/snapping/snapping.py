@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from moma.errors import UsageError
+from ground.errors import UsageError
 from survey.arrays import Array, Ints
 from survey.geometry.convexity import is_convex, reflex_edges
 from survey.geometry.folds import fold

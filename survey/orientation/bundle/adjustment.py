@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.arrays import Array
 from survey.orientation._kernels.adjustment import Rays, Unknowns, back_substitute, reduced_normals
 from survey.orientation.network import INTERIOR, Network, Photo

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from moma.errors import SurveyError
+from ground.errors import SurveyError
 from survey.arrays import Array
 from survey.orientation.bundle.adjustment import Solution
 from survey.orientation.bundle.start import FLAT

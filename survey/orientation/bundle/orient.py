@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
-from moma.errors import GeometryError, MomaError, SurveyError
+from ground.errors import GeometryError, MomaError, SurveyError
 from survey.arrays import Array
 from survey.orientation.bundle.adjustment import Prepared, Solution, adjust, prepare
 from survey.orientation.bundle.control import FAR_OFF, MISSES, control_remarks, control_tests

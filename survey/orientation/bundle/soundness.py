@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from moma.errors import SurveyError
+from ground.errors import SurveyError
 from survey.orientation.network import Camera, Network, listed
 from survey.orientation.projection import corrected
 

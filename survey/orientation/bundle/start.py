@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from moma.errors import GeometryError, SurveyError
+from ground.errors import GeometryError, SurveyError
 from survey.arrays import Array
 from survey.orientation.bundle.resection import (
     essential_orientations,

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg.lapack import dpotri
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.arrays import Array
 from survey.orientation._kernels.adjustment import datum_sums, point_statistics
 from survey.orientation.bundle.adjustment import (

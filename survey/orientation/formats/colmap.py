@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from moma.errors import SurveyError
-from moma.tables.numbers import parse_number, shown
-from moma.tables.text_lines import TextLines
+from ground.errors import SurveyError
+from ground.tables.numbers import parse_number, shown
+from ground.tables.text_lines import TextLines
 from survey.arrays import Array
 from survey.orientation.formats.colmap_binary import binary_cameras, binary_images, binary_points
 from survey.orientation.formats.marks import marked_well, marks_of_points, numbered

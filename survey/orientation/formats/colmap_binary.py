@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from moma.errors import SurveyError
-from moma.tables.numbers import unreadable
+from ground.errors import SurveyError
+from ground.tables.numbers import unreadable
 from survey.arrays import Array, Ints
 
 __all__ = ["MODELS", "BinaryImage", "binary_cameras", "binary_images", "binary_points"]

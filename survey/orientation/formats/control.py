@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from moma.errors import SurveyError
-from moma.tables.columns import COORDINATES, POINT, SIGMA, length_scale
-from moma.tables.numbers import EMPTY, is_number, shown
-from moma.tables.table import Table, TableRow, read_table
+from ground.errors import SurveyError
+from ground.tables.columns import COORDINATES, POINT, SIGMA, length_scale
+from ground.tables.numbers import EMPTY, is_number, shown
+from ground.tables.table import Table, TableRow, read_table
 from survey.arrays import Array
 from survey.orientation.network import Control, Network, listed
 

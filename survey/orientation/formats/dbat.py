@@ -21,9 +21,9 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
-from moma.errors import SurveyError
-from moma.tables.numbers import parse_number, shown
-from moma.tables.rows import TextRows
+from ground.errors import SurveyError
+from ground.tables.numbers import parse_number, shown
+from ground.tables.rows import TextRows
 from survey.arrays import Array
 from survey.orientation.formats.control import ControlRow, with_control, write_control
 from survey.orientation.formats.marks import MarkRow, network_of

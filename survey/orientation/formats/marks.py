@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from moma.errors import SurveyError
-from moma.tables.columns import POINT, SIGMA, length_scale
-from moma.tables.numbers import is_number
-from moma.tables.table import Table, read_table
+from ground.errors import SurveyError
+from ground.tables.columns import POINT, SIGMA, length_scale
+from ground.tables.numbers import is_number
+from ground.tables.table import Table, read_table
 from survey.arrays import Array
 from survey.orientation.network import Camera, Network, Photo, listed
 

@@ -14,8 +14,8 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from moma.errors import SurveyError
-from moma.tables.numbers import parse_number
+from ground.errors import SurveyError
+from ground.tables.numbers import parse_number
 from survey.arrays import Array
 from survey.orientation.formats.local_frame import LocalFrame
 from survey.orientation.formats.marks import marked_well, marks_of_points

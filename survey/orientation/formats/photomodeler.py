@@ -20,9 +20,9 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from moma.errors import SurveyError
-from moma.tables.numbers import parse_number, shown
-from moma.tables.text_lines import TextLines
+from ground.errors import SurveyError
+from ground.tables.numbers import parse_number, shown
+from ground.tables.text_lines import TextLines
 from survey.arrays import Array
 from survey.orientation.formats.marks import numbered
 from survey.orientation.network import Camera, Control, Network, Photo

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from moma.errors import SurveyError
-from moma.tables.numbers import unreadable
+from ground.errors import SurveyError
+from ground.tables.numbers import unreadable
 from survey.arrays import Array
 from survey.orientation.bundle.control import control_tests
 from survey.orientation.bundle.orient import Orientation

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
 
-from moma.errors import SurveyError
-from moma.tables.numbers import parse_number, shown, unreadable
+from ground.errors import SurveyError
+from ground.tables.numbers import parse_number, shown, unreadable
 
 __all__ = ["Element", "read_xml"]
 

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.arrays import Array
 from survey.orientation.bundle.resection import intersect_rays
 from survey.orientation.oriented import Oriented

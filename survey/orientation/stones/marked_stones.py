@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from moma.errors import MomaError, SurveyError
+from ground.errors import MomaError, SurveyError
 from survey.arrays import Array
 from survey.orientation.formats.result import read_orientation
 from survey.orientation.oriented import Oriented

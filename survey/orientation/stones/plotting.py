@@ -11,7 +11,7 @@ with the points Pᵢ that define the surface and the scatter s of faces about it
 
 import numpy as np
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.arrays import Array
 from survey.orientation.oriented import Oriented
 from survey.orientation.projection import directions

@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.arrays import Array
 from survey.faces.planes import FaceFit, fit_plane
 from survey.orientation.oriented import Oriented

@@ -9,7 +9,7 @@ them; nor has an opening, or a hole where a stone is missing.
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-from moma.errors import UsageError
+from ground.errors import UsageError
 from survey.arrays import Array
 from survey.geometry.solids import Solid, volume_of
 from survey.unseen.core.blocks import core_blocks

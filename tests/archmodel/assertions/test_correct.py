@@ -11,7 +11,7 @@ from archmodel.store.revisions import RowCounts
 from archmodel.tables.entities import Entity, Header, Quoin, Voussoir
 from archmodel.tables.entries import Entry, new_entry
 from archmodel.tables.knowledge import Correction
-from moma.errors import UsageError
+from ground.errors import UsageError
 
 
 def entry_of(session: Session) -> Entry:

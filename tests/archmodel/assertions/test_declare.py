@@ -23,7 +23,7 @@ from archmodel.tables.entries import Entry, held_at, new_entry
 from archmodel.tables.knowledge import Document, MaterialProperty, Phase
 from archmodel.tables.relations import Membership, Relation
 from archmodel.tables.structures import Arch, Structure
-from moma.errors import DatabaseError, UsageError
+from ground.errors import DatabaseError, UsageError
 
 NEW, SAME, OTHER = RowCounts(new=1), RowCounts(unchanged=1), RowCounts(replaced=1)
 

@@ -26,7 +26,7 @@ from archmodel.store.find_by_code import subjects
 from archmodel.store.stones import store_survey
 from archmodel.tables.entries import new_entry
 from archmodel.tables.knowledge import Decision, OfPhase
-from moma.errors import QueryError, UsageError
+from ground.errors import QueryError, UsageError
 from tests.archmodel.stones import SHA, box_stone
 
 CODES = ("A", "B", "C")

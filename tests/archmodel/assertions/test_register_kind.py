@@ -30,7 +30,7 @@ from archmodel.tables.hierarchy import definition_of, kind_chain
 from archmodel.tables.knowledge import Correction
 from archmodel.tables.registered import all_kinds
 from archmodel.tables.structures import Rib, Structure, structure_kind_named, structure_kinds
-from moma.errors import DatabaseError, MomaError, UsageError
+from ground.errors import DatabaseError, MomaError, UsageError
 from tests.archmodel.stones import box_stone
 
 OWN: dict[str, tuple[str | None, str]] = {

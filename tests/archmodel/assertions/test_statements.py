@@ -25,7 +25,7 @@ from archmodel.store.find_by_code import Subjects, subjects
 from archmodel.store.revisions import RowCounts, supersede, withdraw
 from archmodel.tables.entries import Entry, new_entry
 from archmodel.tables.knowledge import DepthEvidence, MadeOf, MasonMark, Note, Observation, Statement
-from moma.errors import UsageError
+from ground.errors import UsageError
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from archmodel.database.postgresql import WRITE_LOCK
 from archmodel.database.session import open_database
 from archmodel.store.stones import store_survey
 from archmodel.tables.entities import Entity
-from moma.errors import DatabaseError, MissingLibraryError
+from ground.errors import DatabaseError, MissingLibraryError
 from tests.archmodel.stones import SHA, box_stone
 from tests.postgresql import Server
 

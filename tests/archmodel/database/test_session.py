@@ -13,7 +13,7 @@ from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Entry
 from archmodel.tables.layout import SchemaVersion
 from archmodel.tables.relations import Membership
-from moma.errors import DatabaseError
+from ground.errors import DatabaseError
 from tests.archmodel.stones import SHA, box_stone, contents
 
 

@@ -10,7 +10,7 @@ from sqlalchemy import func, select
 from archmodel.database.session import Database, open_database
 from archmodel.store.stones import store_survey
 from archmodel.tables.entities import Entity
-from moma.errors import DatabaseError
+from ground.errors import DatabaseError
 from tests.archmodel.stones import SHA, box_stone, contents
 
 

@@ -26,7 +26,7 @@ from archmodel.store.revisions import withdraw
 from archmodel.store.stones import store_survey
 from archmodel.tables.entries import Entry, new_entry
 from archmodel.tables.knowledge import MasonMark, Material
-from moma.errors import UsageError
+from ground.errors import UsageError
 from tests.archmodel.stones import SHA, box_stone
 
 CODES = ("A", "B", "C")

@@ -11,7 +11,7 @@ from archmodel.database.session import Database
 from archmodel.describe.runs import compare_runs, describe_run, list_runs
 from archmodel.store.run_record import ErrorMeasures, JointArrays, SimplificationRecord
 from archmodel.store.runs import store_run
-from moma.errors import UsageError
+from ground.errors import UsageError
 from tests.archmodel.stones import run_record
 
 NAN = float("nan")

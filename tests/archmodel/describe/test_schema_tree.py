@@ -24,8 +24,8 @@ from archmodel.tables.hierarchy import definition_of, kind_of
 from archmodel.tables.registered import RegisteredKind, declare_registered
 from archmodel.tables.relations import INVERSE
 from archmodel.tables.structures import structure_kinds
+from ground.errors import QueryError, UsageError
 from moma.cli.text.schema import schema_lines
-from moma.errors import QueryError, UsageError
 from tests.archmodel.stones import SHA, box_stone
 
 

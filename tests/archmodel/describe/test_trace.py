@@ -13,7 +13,7 @@ from archmodel.store.runs import store_run
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import latest_entry, new_entry
 from archmodel.tables.surveys import Measurement
-from moma.errors import UsageError
+from ground.errors import UsageError
 from tests.archmodel.conftest import WALL
 from tests.archmodel.stones import run_record
 

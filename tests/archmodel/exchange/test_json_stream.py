@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from archmodel.exchange import json_stream as exchange_text
 from archmodel.exchange.json_stream import JsonText
-from moma.errors import ExchangeError
+from ground.errors import ExchangeError
 
 VALUES = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),

@@ -16,7 +16,7 @@ from archmodel.exchange.reader import import_building
 from archmodel.exchange.writer import export_building
 from archmodel.tables.layout import SCHEMA_VERSION
 from archmodel.tables.registered import all_kinds, release_registered
-from moma.errors import ExchangeError, MomaError
+from ground.errors import ExchangeError, MomaError
 from tests.archmodel.random_databases import everything, fill, tables
 from tests.postgresql import Server
 

@@ -40,7 +40,7 @@ from archmodel.tables.entities import Entity, Header, kinds
 from archmodel.tables.entries import Entry, new_entry
 from archmodel.tables.knowledge import MadeOf, Material
 from archmodel.tables.structures import Building, Tower, structure_kinds
-from moma.errors import ExchangeError
+from ground.errors import ExchangeError
 from tests.archmodel.random_databases import everything, exact, fill, tables
 from tests.postgresql import Server
 

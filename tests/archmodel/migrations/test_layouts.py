@@ -22,7 +22,7 @@ from archmodel.query.api import find
 from archmodel.store.stones import store_survey
 from archmodel.tables.layout import SCHEMA_VERSION
 from archmodel.tables.surveys import Measurement
-from moma.errors import DatabaseError, UsageError
+from ground.errors import DatabaseError, UsageError
 from tests.archmodel.migrations.next_version import connected
 from tests.archmodel.stones import SHA, box_stone
 from tests.paths import ROOT

@@ -20,7 +20,7 @@ from archmodel.migrations.migrate import migrate
 from archmodel.store.stones import store_survey
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import new_entry
-from moma.errors import DatabaseError, UsageError
+from ground.errors import DatabaseError, UsageError
 from tests.archmodel.migrations import next_version
 from tests.archmodel.migrations.next_version import LAYOUTS, connected, rows_of, run_alembic
 from tests.archmodel.random_databases import fill

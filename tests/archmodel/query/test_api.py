@@ -9,7 +9,7 @@ from archmodel.query.api import attributes, find, find_rows, row_of, rows_of
 from archmodel.query.attributes import ATTRIBUTES
 from archmodel.store.runs import store_run
 from archmodel.tables.entities import Header, Keystone, Voussoir
-from moma.errors import DatabaseError, QueryError, UsageError
+from ground.errors import DatabaseError, QueryError, UsageError
 from tests.archmodel.stones import run_record
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from archmodel.database.session import Database
 from archmodel.query.api import FoundFace, find_faces
 from archmodel.query.geojson import feature_collection, flattened
-from moma.errors import UsageError
+from ground.errors import UsageError
 from tests.archmodel.conftest import WALL
 
 SQUARE = np.array([[0.0, 0, 0], [2, 0, 0], [2, 0, 1], [0, 0, 1]])

@@ -16,7 +16,7 @@ from archmodel.query.api import find, find_rows
 from archmodel.query.attributes import ATTRIBUTES
 from archmodel.query.functions.registry import FUNCTIONS, STRUCTURE_FUNCTIONS
 from archmodel.store.stones import store_survey
-from moma.errors import QueryError
+from ground.errors import QueryError
 from tests.archmodel.conftest import WALL
 from tests.archmodel.known_wall import furnish
 from tests.archmodel.stones import SHA, box_stone, contents

@@ -22,7 +22,7 @@ from archmodel.store.bulk import insert_rows
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import new_entry
 from archmodel.tables.relations import Relation
-from moma.errors import UsageError
+from ground.errors import UsageError
 from pipelines.ingest.relate import relate
 from tests.pipelines.ingest.standing_stones import arch, take_in, wall
 

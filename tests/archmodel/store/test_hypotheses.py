@@ -14,7 +14,7 @@ from archmodel.store.stones import load_stones
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Entry, new_entry
 from archmodel.tables.surveys import Measurement
-from moma.errors import DatabaseError, UsageError
+from ground.errors import DatabaseError, UsageError
 from pipelines.ingest.records import stone_record, surveyed_block
 from pipelines.samples.buildings.window import make_window
 from survey.extrusion.depth import depth_for

@@ -10,7 +10,7 @@ from archmodel.database.session import open_database
 from archmodel.store.lookalikes import plain_form
 from archmodel.store.stones import store_survey
 from archmodel.tables.entries import new_entry
-from moma.errors import DatabaseError, UsageError
+from ground.errors import DatabaseError, UsageError
 from tests.archmodel.stones import SHA, box_stone
 
 CYRILLIC = "\N{CYRILLIC CAPITAL LETTER A}1"

@@ -9,7 +9,7 @@ from archmodel.tables.entities import Entity
 from archmodel.tables.entries import held_at
 from archmodel.tables.knowledge import Correction
 from archmodel.tables.surveys import Measurement
-from moma.errors import DatabaseError, GeometryError
+from ground.errors import DatabaseError, GeometryError
 from tests.archmodel.stones import box_stone
 
 LONGER = box_stone("V2", "header", course=9, size=(0.25, 0.42, 0.3), at=(1.4, 0.0, 1.1))

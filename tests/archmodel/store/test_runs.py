@@ -21,7 +21,7 @@ from archmodel.store.stones import store_survey
 from archmodel.tables.entities import Entity
 from archmodel.tables.runs import ContactPoint, EntityResult, JointResult, Run
 from archmodel.tables.surveys import Simplification
-from moma.errors import DatabaseError
+from ground.errors import DatabaseError
 from tests.archmodel.stones import SHA, box_stone, contents, run_record
 
 NAN, INF = float("nan"), float("inf")

@@ -8,7 +8,7 @@ from archmodel.database.session import Database
 from archmodel.query.api import find
 from archmodel.store.stone_record import StoneRecord
 from archmodel.store.stones import load_stones, store_survey, survey_with_hash
-from moma.errors import DatabaseError, GeometryError, MomaError, SurveyError
+from ground.errors import DatabaseError, GeometryError, MomaError, SurveyError
 from tests.archmodel.stones import SHA, box_stone, contents
 
 OTHER = "cd" * 32

@@ -13,7 +13,7 @@ from archmodel.stratigraphy.graphml import read_graphml, write_graphml
 from archmodel.stratigraphy.order import Link, check_order, find_loop, order_of
 from archmodel.stratigraphy.stored import Dated
 from archmodel.tables.stratigraphy import DEFINITIONS, LATER
-from moma.errors import UsageError
+from ground.errors import UsageError
 
 
 def links(text: str) -> list[Link]:

@@ -19,7 +19,7 @@ from archmodel.tables.entities import (
     own_attributes,
 )
 from archmodel.tables.hierarchy import definition_of, kind_chain, kind_of
-from moma.errors import UsageError
+from ground.errors import UsageError
 
 
 def test_a_keystone_is_a_voussoir_is_an_ashlar_is_an_entity() -> None:

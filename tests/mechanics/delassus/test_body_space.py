@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from ground.errors import SolverError
 from mechanics.delassus._kernels import bodies as kernel
-from moma.errors import SolverError
 from tests.mechanics.shapes import brick, ground, posed, scene
 
 PILE = (

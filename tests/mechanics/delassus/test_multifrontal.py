@@ -8,13 +8,13 @@ from scipy.linalg import block_diag, lu_solve
 from scipy.linalg.lapack import dgetrs
 from threadpoolctl import ThreadpoolController
 
+from ground.errors import SolverError
 from mechanics.delassus import elimination, multifrontal
 from mechanics.delassus._kernels.fronts import add_into, solve
 from mechanics.delassus.mixed import ELASTIC
 from mechanics.delassus.mixed_form import mixed_fronts
 from mechanics.delassus.multifrontal import Cliques, fronts
 from mechanics.scene.scene import Fidelity
-from moma.errors import SolverError
 from tests.mechanics.shapes import TURN, brick, dense_operator, ground, moved, posed, scene
 
 SOFT = Fidelity.DEFORMABLE

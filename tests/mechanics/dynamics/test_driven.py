@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from ground.errors import SceneError
 from mechanics.dynamics.energy_balance import EnergyBalance
 from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
@@ -13,7 +14,6 @@ from mechanics.scene.loads.forces import StoneForce
 from mechanics.scene.loads.load import Loads, Pose
 from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import Fidelity, SolverSettings
-from moma.errors import SceneError
 from tests.mechanics.shapes import brick, ground, scene
 
 G = 9.81

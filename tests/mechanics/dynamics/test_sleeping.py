@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ground.errors import SceneError
 from mechanics.dynamics.observers.equilibrium import imbalance, support_reaction
 from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
@@ -16,7 +17,6 @@ from mechanics.scene.loads.motions import ImposedMotion, settlement
 from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import ContactSettings, Scene, TimeSettings
 from mechanics.simulate import simulate
-from moma.errors import SceneError
 from tests.validation.scenes import G, box, ground, moved, rotation, tilted_gravity
 
 SLEEP = 1e-3

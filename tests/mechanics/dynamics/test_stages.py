@@ -6,6 +6,7 @@ from itertools import count
 import numpy as np
 import pytest
 
+from ground.errors import SceneError
 from mechanics.dynamics.handover import of_run
 from mechanics.dynamics.outcome import Outcome
 from mechanics.dynamics.simulation import Simulation
@@ -20,7 +21,6 @@ from mechanics.scene.scene import ContactSettings, Fidelity
 from mechanics.scene.shapes import semicircular_arch
 from mechanics.scene.stages import Stage
 from mechanics.simulate import simulate, simulate_stages
-from moma.errors import SceneError
 from tests.mechanics.dynamics.test_resuming import Kept, assert_same_bits
 from tests.mechanics.shapes import brick, ground, scene
 from tests.validation.one_answer.matrix import Setting, at

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ground.errors import SceneError, SolverError
 from mechanics.limit.loading_test import _loaded, loading_test, softening_step
 from mechanics.model.model import build_model
 from mechanics.scene.jaws import JawPath
@@ -18,7 +19,6 @@ from mechanics.scene.rig import BASE, BEAM, JAWS, Head, Rig, rigged
 from mechanics.scene.scene import ContactSettings, LawRule, Placement, Scene
 from mechanics.scene.shapes import box
 from mechanics.stones.materials import Material
-from moma.errors import SceneError, SolverError
 
 WIDTH, DEEP, TALL, PUSH, LOAD = 0.6, 0.2, 1.0, 1.1, 40e3
 STONE = Material("stone", 2000.0, 10e9, 0.2)

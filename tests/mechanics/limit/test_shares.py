@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ground.errors import SceneError
 from mechanics.limit.assembly import assembly
 from mechanics.limit.confirm import likeness
 from mechanics.limit.dead_load import at_instant
@@ -17,7 +18,6 @@ from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import ContactSettings, Scene
 from mechanics.scene.shapes import prism
-from moma.errors import SceneError
 from tests.mechanics.shapes import brick, ground, scene
 from tests.validation.masonry import semicircular_arch
 

@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 from scipy.optimize import nnls
 from scipy.spatial.transform import Rotation
 
+from ground.errors import SceneError
 from mechanics.model.balls import ball
 from mechanics.scene.scene import Fidelity
 from mechanics.stones.materials import Material
-from moma.errors import SceneError
 from tests.mechanics.shapes import brick, detected, moved, scene
 
 STONE = Material("stone", density=2000.0, young=1e9, poisson=0.2)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ground.errors import GeometryError
 from mechanics.contact.contacts import gaps, material_points
 from mechanics.dynamics.outcome import Outcome
 from mechanics.model.model import build_model
@@ -12,7 +13,6 @@ from mechanics.scene.scene import Fidelity, Part
 from mechanics.simulate import simulate
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.polyhedra import mass_properties
-from moma.errors import GeometryError
 from tests.mechanics.shapes import (
     TURN,
     brick,

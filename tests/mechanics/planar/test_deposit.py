@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from ground.errors import SceneError
 from mechanics.planar.deposit import Deposit, deposit
 from mechanics.planar.measures.tessellation import tessellation
-from moma.errors import SceneError
 
 
 def asked(**changed):

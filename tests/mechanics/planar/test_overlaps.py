@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ground.errors import SceneError
 from mechanics.dynamics.progress import Clock
 from mechanics.planar.delassus import PlanarGaussSeidel
 from mechanics.planar.model import build_planar_model
@@ -16,7 +17,6 @@ from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.motions import ImposedMotion
 from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import Method, SolverSettings
-from moma.errors import SceneError
 from tests.mechanics.planar.shapes import G, grid_of_disks
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from ground.errors import SceneError
 from mechanics.planar.scene import Disk, PlanarScene, PlanarTime, Wall
 from mechanics.planar.simulate import simulate_planar
 from mechanics.scene.laws.dry_joint import DryJoint
@@ -10,7 +11,6 @@ from mechanics.scene.loads.forces import StoneForce
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.motions import ImposedMotion
 from mechanics.scene.loads.time_series import History
-from moma.errors import SceneError
 
 FLOOR = Wall("floor", (-5.0, 0.0), (5.0, 0.0))
 ROW = tuple(Disk(f"d{i}", (2.0 * i - 2.0, 1.0), 1.0, density=100.0 / np.pi) for i in range(3))

@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from ground.errors import SceneError
 from mechanics.carried import Carrier
 from mechanics.dynamics.outcome import Outcome
 from mechanics.planar.run import PlanarRun
@@ -16,7 +17,6 @@ from mechanics.scene.laws.bonds import BROKEN
 from mechanics.scene.laws.law import BOND
 from mechanics.scene.laws.mortar import MortarJoint
 from mechanics.scene.scene import SolverSettings
-from moma.errors import SceneError
 from tests.mechanics.dynamics.test_resuming import Kept, assert_same_bits, copied
 from tests.mechanics.planar.shapes import box, grid_of_disks
 from tests.mechanics.planar.test_overlaps import pushed_bed

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from ground.errors import SceneError
 from mechanics.planar.model import build_planar_model
 from mechanics.planar.scene import Disk, PlanarScene, PlanarTime, Wall
 from mechanics.scene.laws.dry_joint import DryJoint
@@ -10,7 +11,6 @@ from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.motions import ImposedMotion
 from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import LawRule
-from moma.errors import SceneError
 
 DISK = Disk("d", (0.0, 1.0), 0.5)
 WALL = Wall("w", (-1.0, 0.0), (1.0, 0.0))

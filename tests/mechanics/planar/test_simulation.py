@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ground.errors import SceneError, SolverError
 from mechanics.dynamics.outcome import Outcome
 from mechanics.dynamics.progress import Clock
 from mechanics.planar.contacts import PlanarDetector
@@ -19,7 +20,6 @@ from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.motions import ImposedMotion
 from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import LawRule, Method, SolverSettings
-from moma.errors import SceneError, SolverError
 from tests.mechanics.planar.shapes import ACCURATE, G, box, grid_of_disks
 
 FLOOR = Wall("floor", (-10.0, 0.0), (10.0, 0.0))

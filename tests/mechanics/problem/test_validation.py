@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ground.errors import SolverError
 from mechanics.problem.problem import ContactProblem
 from mechanics.stones.validation import LARGEST, SMALLEST
-from moma.errors import SolverError
 from tests.mechanics.dense_operator import blocks_apart
 
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from ground.errors import GeometryError, SceneError
 from mechanics.model.model import build_model
 from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene
 from mechanics.stones.materials import Material
-from moma.errors import GeometryError, SceneError
 from tests.mechanics.shapes import LIMESTONE, TURN, brick, ellipse, ground, moved, prism, scene
 from tests.pipelines.results_by_hand import BOX_FACES, box
 

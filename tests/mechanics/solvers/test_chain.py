@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from ground.errors import SolverError
 from mechanics.problem.problem import ContactSolution, ContactStart
 from mechanics.problem.residual import residual
 from mechanics.solvers.chain import KEPT, Begin, Link, follow
-from moma.errors import SolverError
 from tests.mechanics.solvers.problems import alone, cold
 
 LIMITS = 1e-6, 1e-5

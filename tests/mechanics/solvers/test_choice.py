@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ground.errors import SolverError
 from mechanics.problem.problem import ContactStart
 from mechanics.problem.residual import natural_map
 from mechanics.scene.laws.mortar import MortarJoint
@@ -16,7 +17,6 @@ from mechanics.solvers.first_order.body_admm import BodyADMM
 from mechanics.solvers.first_order.disk_admm import DiskADMM
 from mechanics.solvers.first_order.nsgs import NSGS
 from mechanics.solvers.second_order.newton import Newton
-from moma.errors import SolverError
 from tests.mechanics.shapes import brick, ground, posed, scene
 from tests.mechanics.solvers.problems import BACK, FORWARD, RIGID, SOFT, cold, stack, velocity_of
 

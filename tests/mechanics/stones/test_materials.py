@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from ground.errors import SceneError
 from mechanics.stones.elasticity.tensors import from_voigt, to_voigt
 from mechanics.stones.materials import Material, Orthotropy
-from moma.errors import SceneError
 
 # along the bed of a sandstone, across it
 BEDDED = Orthotropy(young=(12e9, 10e9, 6e9), shear=(4e9, 2.5e9, 3e9), poisson=(0.2, 0.25, 0.1))

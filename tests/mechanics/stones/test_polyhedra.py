@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from scipy.spatial import ConvexHull
 
+from ground.errors import GeometryError
 from mechanics.stones.polyhedra import (
     alike,
     face_plane,
@@ -15,7 +16,6 @@ from mechanics.stones.polyhedra import (
     smallest_width,
     smallest_widths,
 )
-from moma.errors import GeometryError
 from tests.mechanics.shapes import TETRAHEDRON_FACES, TURN, hexahedra
 from tests.pipelines.results_by_hand import BOX_FACES, box
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from ground.errors import SceneError
 from mechanics.scene.scene import Block, Fidelity
 from mechanics.stones.validation import check_corners, finite
-from moma.errors import SceneError
 
 CUBE = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
 

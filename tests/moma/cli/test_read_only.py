@@ -9,7 +9,7 @@ import pytest
 
 from archmodel.database.session import open_database
 from archmodel.store.stones import store_survey
-from moma.errors import DatabaseError
+from ground.errors import DatabaseError
 from tests.archmodel.stones import SHA, box_stone, contents
 from tests.paths import ROOT
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from moma.errors import SceneError
+from ground.errors import SceneError
 from pipelines.assess.compare import facades_of
 from pipelines.assess.diagnosis.dating import date_movement
 from pipelines.assess.diagnosis.file import Unknown, read_diagnosis

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ground.errors import SceneError
 from mechanics.limit.assembly import Strength, assembly
 from mechanics.limit.dead_load import at_instant, stands
 from mechanics.limit.live_loads import levers
@@ -15,7 +16,6 @@ from mechanics.scene.loads.motions import settlement
 from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import Scene
 from mechanics.scene.shapes import bond, box, drum, prism, wall
-from moma.errors import SceneError
 from pipelines.assess.directions import facade_pushes, push, weakest_push
 from tests.mechanics.shapes import brick, ground, moved, scene
 

@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
+from ground.errors import StorageError
 from mechanics.limit.limit_load import Mechanism
 from mechanics.limit.pushover import Pushover
-from moma.errors import StorageError
 from pipelines.assess import kept as kept_module
 from pipelines.assess.answers import Answer
 from pipelines.assess.diagnosis.trials import Tried

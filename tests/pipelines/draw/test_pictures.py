@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from ground.errors import MissingLibraryError
 from mechanics.scene.scene import Fidelity
-from moma.errors import MissingLibraryError
 from pipelines.draw import pictures
 from pipelines.draw.catalogue import PICTURES
 from pipelines.draw.offscreen.jobs import load_surface, save_surface

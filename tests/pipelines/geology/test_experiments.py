@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from moma.errors import SceneError
+from ground.errors import SceneError
 from pipelines.geology.experiments.biaxial import Biaxial
 from pipelines.geology.experiments.fault import Fault
 from pipelines.geology.experiments.fold import Fold

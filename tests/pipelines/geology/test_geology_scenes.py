@@ -10,11 +10,11 @@ from sqlalchemy import select
 
 from archmodel.database.session import open_database
 from archmodel.tables.runs import CellResult
+from ground.errors import MomaError, SceneError
 from mechanics.planar.model import build_planar_model
 from mechanics.planar.scene import Disk, PlanarScene, PlanarTime
 from mechanics.planar.simulate import simulate_planar
 from moma.cli.geology import ExperimentName
-from moma.errors import MomaError, SceneError
 from pipelines.geology.file import EXPERIMENTS, parse_geology, read_geology
 from pipelines.geology.observe import CELL_COLUMNS, Fields, read_rows
 from pipelines.geology.results import quality_of

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from moma.errors import SceneError
+from ground.errors import SceneError
 from pipelines.geology.experiments.membrane import Membrane
 from pipelines.geology.observe import Instants, read_rows
 from pipelines.geology.run import run_geology

@@ -8,8 +8,8 @@ from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerProcess
 from pathlib import Path
 
+from ground.errors import DatabaseError
 from mechanics.dynamics.progress import Progress
-from moma.errors import DatabaseError
 from pipelines.ingest.ingest import ingest
 
 __all__ = ["Ingest", "wall_survey"]

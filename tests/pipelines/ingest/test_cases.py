@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ground.errors import SurveyError
 from mechanics.scene.loads.record_files import read_accelerogram
-from moma.errors import SurveyError
 from pipelines.ingest.ingest import ingest
 from pipelines.ingest.reading_options import reading_options
 from survey.formats.reading import open_survey

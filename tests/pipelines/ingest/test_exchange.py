@@ -13,7 +13,7 @@ from random import Random
 import pytest
 
 from archmodel.database.session import open_database
-from moma.errors import DatabaseError, ExchangeError
+from ground.errors import DatabaseError, ExchangeError
 from pipelines.ingest import exchange
 from pipelines.ingest.exchange import export_database, import_database
 from tests.archmodel.random_databases import everything, fill

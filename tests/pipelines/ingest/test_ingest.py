@@ -10,7 +10,7 @@ import pytest
 from archmodel.database.session import open_database
 from archmodel.query.api import find
 from archmodel.store.stones import load_stones
-from moma.errors import DatabaseError, GeometryError, SurveyError, UsageError
+from ground.errors import DatabaseError, GeometryError, SurveyError, UsageError
 from pipelines.ingest.ingest import ingest
 from pipelines.ingest.reading_options import reading_options
 from tests.moma.commands import invoke, prints

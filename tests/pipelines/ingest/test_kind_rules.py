@@ -7,8 +7,8 @@ import pytest
 
 from archmodel.database.session import open_database
 from archmodel.tables.entities import Entity
+from ground.errors import QueryError, UsageError
 from moma.cli.text.runs_and_surveys import ingest_lines
-from moma.errors import QueryError, UsageError
 from pipelines.ingest.ingest import ingest
 from pipelines.ingest.kind_rules import RULE_ATTRIBUTES, kind_rules
 from pipelines.ingest.reading_options import reading_options

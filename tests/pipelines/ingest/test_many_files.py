@@ -2,7 +2,7 @@
 
 import pytest
 
-from moma.errors import SurveyError, UsageError
+from ground.errors import SurveyError, UsageError
 from pipelines.ingest.ingest import ingest
 from pipelines.run.check import check_scene
 from tests.moma.commands import prints

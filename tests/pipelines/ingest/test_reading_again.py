@@ -9,7 +9,7 @@ import trimesh
 from archmodel.database.session import open_database
 from archmodel.store.stones import load_stones
 from archmodel.tables.entities import Entity
-from moma.errors import DatabaseError, SurveyError
+from ground.errors import DatabaseError, SurveyError
 from pipelines.ingest.ingest import ingest
 from pipelines.ingest.outlined import mask_options
 from pipelines.ingest.reading_options import reading_options

@@ -19,7 +19,7 @@ from archmodel.tables.knowledge import Correction
 from archmodel.tables.relations import Membership, Relation
 from archmodel.tables.structures import Structure
 from archmodel.tables.surveys import Measurement
-from moma.errors import UsageError
+from ground.errors import UsageError
 from pipelines.ingest import relate as relating
 from pipelines.ingest.relate import KnownSolids, relate
 from tests.archmodel.stones import box_stone

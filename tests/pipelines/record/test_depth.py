@@ -15,7 +15,7 @@ from archmodel.tables.entities import Entity
 from archmodel.tables.entries import held_at, new_entry
 from archmodel.tables.knowledge import Correction, DepthEvidence
 from archmodel.tables.surveys import Measurement
-from moma.errors import UsageError
+from ground.errors import UsageError
 from pipelines.ingest.ingest import ingest
 from pipelines.record.depth import record_depth
 from tests.paths import ROOT

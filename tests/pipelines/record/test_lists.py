@@ -17,7 +17,7 @@ from archmodel.store.revisions import RowCounts
 from archmodel.store.stones import store_survey
 from archmodel.stratigraphy.report import draw, study
 from archmodel.tables.knowledge import Note, Statement
-from moma.errors import UsageError
+from ground.errors import UsageError
 from pipelines.record.record import record
 from tests.archmodel.stones import SHA, box_stone
 

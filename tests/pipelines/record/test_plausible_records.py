@@ -12,8 +12,8 @@ from archmodel.query.api import find
 from archmodel.store.stones import store_survey
 from archmodel.tables.entries import Entry
 from archmodel.tables.knowledge import Phase
+from ground.errors import QueryError, UsageError
 from moma.cli.text.knowledge import record_lines
-from moma.errors import QueryError, UsageError
 from pipelines.record.record import record
 from tests.archmodel.stones import SHA, box_stone
 

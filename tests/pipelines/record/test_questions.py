@@ -10,7 +10,7 @@ from archmodel.database.session import open_database
 from archmodel.query.api import attributes, find, find_rows
 from archmodel.query.tally import count_by, sorted_rows
 from archmodel.store.stones import store_survey
-from moma.errors import QueryError, UsageError
+from ground.errors import QueryError, UsageError
 from pipelines.record.record import record
 from pipelines.results.table_csv import csv_text
 from tests.archmodel.stones import SHA, box_stone

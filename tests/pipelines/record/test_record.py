@@ -15,7 +15,7 @@ from archmodel.tables.entries import Entry
 from archmodel.tables.knowledge import Correction, MasonMark, Material, Observation, Phase, Statement
 from archmodel.tables.relations import Relation
 from archmodel.tables.structures import Structure
-from moma.errors import UsageError
+from ground.errors import UsageError
 from pipelines.record.file import read_record
 from pipelines.record.record import record
 from tests.archmodel.stones import SHA, box_stone

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from archmodel.database.session import open_database
 from archmodel.store.stones import store_survey
-from moma.errors import MomaError
+from ground.errors import MomaError
 from pipelines.record.keys import ARRAYS
 from pipelines.record.record import record
 from pipelines.toml.schema import REQUIRED, ValueKind

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ground.errors import UsageError
 from mechanics.carried import Carried, Rows
 from mechanics.dynamics.progress import silent
-from moma.errors import UsageError
 from pipelines.results import checkpoints
 from pipelines.results.checkpoints import Checkpoints
 from pipelines.run.unfinished import UnfinishedRun, unfinished_run

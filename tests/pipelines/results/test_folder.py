@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from moma.errors import StorageError, UsageError
+from ground.errors import StorageError, UsageError
 from pipelines.results.folder import UNFINISHED_ASSESSMENT, check_replaceable, replacing, source_of
 from tests.paths import ROOT
 

@@ -6,8 +6,8 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
+from ground.errors import UsageError
 from moma.cli.text.checks import check_lines, duration
-from moma.errors import UsageError
 from pipelines.ingest.ingest import ingest
 from pipelines.run.check import check_scene
 from pipelines.run.check_report import CheckReport

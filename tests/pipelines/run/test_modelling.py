@@ -9,11 +9,11 @@ from typer.testing import CliRunner
 
 from archmodel.tables.entities import Entity
 from archmodel.tables.surveys import Measurement
+from ground.errors import SceneError
 from mechanics.scene.scene import Fidelity
 from mechanics.simulate import simulate
 from moma.cli import app
 from moma.cli.text.checks import check_lines
-from moma.errors import SceneError
 from pipelines.run.assemble import assemble
 from pipelines.run.check import check_scene
 from pipelines.scene.file import parse_scene

@@ -10,8 +10,8 @@ from dataclasses import replace
 
 import pytest
 
+from ground.errors import UsageError
 from mechanics.dynamics.outcome import Outcome
-from moma.errors import UsageError
 from pipelines.run.planar import run_planar
 from tests.mechanics.planar.test_overlaps import pushed_bed
 from tests.paths import ROOT

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from ground.errors import SceneError
 from mechanics.scene.scene import Fidelity
-from moma.errors import SceneError
 from pipelines.ingest.ingest import ingest
 from pipelines.reports.survey.report import report_surveys
 from pipelines.run.check import check_scene

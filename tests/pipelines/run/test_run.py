@@ -12,9 +12,9 @@ from archmodel.describe.entity import describe
 from archmodel.describe.runs import describe_run
 from archmodel.query.api import find_rows
 from archmodel.store.run_record import STONE_VALUES
+from ground.errors import MissingLibraryError, UsageError
 from mechanics.dynamics.outcome import Outcome
 from mechanics.scene.scene import Fidelity
-from moma.errors import MissingLibraryError, UsageError
 from pipelines.ingest.records import surveyed_block
 from pipelines.results.stone_values import stone_results
 from pipelines.run import run as run_module

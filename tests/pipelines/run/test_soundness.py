@@ -4,7 +4,7 @@ import pytest
 
 from archmodel.database.session import open_database
 from archmodel.describe.runs import describe_run, list_runs
-from moma.errors import UnsoundSceneError
+from ground.errors import UnsoundSceneError
 from pipelines.draw import pictures as pictures_module
 from pipelines.ingest.ingest import ingest
 from pipelines.run.check import check_scene

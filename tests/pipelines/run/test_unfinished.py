@@ -13,7 +13,7 @@ from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
 from archmodel.database.session import open_database
-from moma.errors import DatabaseError, UsageError
+from ground.errors import DatabaseError, UsageError
 from pipelines.results import checkpoints, vtkhdf
 from pipelines.run import record as record_module
 from pipelines.run import run as run_module

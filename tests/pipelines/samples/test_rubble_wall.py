@@ -9,7 +9,7 @@ from PIL import Image
 from sqlalchemy.orm import Session
 
 from archmodel.database.session import open_database
-from moma.errors import UsageError
+from ground.errors import UsageError
 from pipelines.ingest.ingest import ingest
 from pipelines.ingest.outlined import mask_options
 from pipelines.run.assemble import assemble

@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 
+from ground.errors import SceneError
 from mechanics.scene.laws.cohesive_zone import CohesiveZone
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.elastic_joint import ElasticJoint
@@ -14,7 +15,6 @@ from mechanics.scene.scene import Block, Fidelity, Placement
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.polyhedra import mass_properties
 from moma.cli.text.checks import check_lines
-from moma.errors import SceneError
 from pipelines.run.check import check_scene
 from pipelines.scene.file import parse_scene
 from pipelines.scene.laws import law_rules

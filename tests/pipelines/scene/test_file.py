@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ground.errors import MomaError, SceneError
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import ContactSettings, SolverSettings, Start, TimeSettings
 from mechanics.stones.meshing.elements import Element
-from moma.errors import MomaError, SceneError
 from pipelines.scene.file import parse_scene, read_scene
 from pipelines.scene.settings import Fidelities, MeshSettings, Output, Selection
 from pipelines.scene.tables import TABLES

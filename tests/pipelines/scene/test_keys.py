@@ -6,8 +6,8 @@ from typing import Annotated
 
 import pytest
 
+from ground.errors import SceneError
 from mechanics.stones.settings import Setting, check_settings
-from moma.errors import SceneError
 from pipelines.scene.keys import build, keys_of
 from pipelines.toml.schema import REQUIRED, TomlDocument, ValueKind, check_table
 

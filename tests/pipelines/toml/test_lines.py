@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from moma.errors import UsageError
+from ground.errors import UsageError
 from pipelines.record.file import parse_record
 from pipelines.scene.file import parse_scene
 from pipelines.toml.lines import key_lines, read_text

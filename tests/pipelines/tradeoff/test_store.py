@@ -7,10 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from ground.errors import UsageError
 from mechanics.scene.loads.gravity import TiltingTable
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.scene import Fidelity, Method, Scene
-from moma.errors import UsageError
 from pipelines.tradeoff.store import Measured, Status, Store, study_key
 from pipelines.tuning.overlay import Overlay
 from tests.pipelines.tradeoff.test_grid import blocks

@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ground.errors import UsageError
 from mechanics.scene import shapes
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import ContactSettings, Fidelity, Scene, Start, TimeSettings
 from mechanics.simulate import simulate
 from mechanics.stones.meshing.elements import Element
 from moma.cli.options import ProfileName
-from moma.errors import UsageError
 from pipelines.results.quantities import QUANTITIES, Quantities, StoneQuantities
 from pipelines.scene.file import parse_scene
 from pipelines.tuning.expected_errors import BOUNDS, TYPICAL, expected_errors, loops

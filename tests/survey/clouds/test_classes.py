@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from moma.errors import SurveyError, UsageError
+from ground.errors import SurveyError, UsageError
 from survey.clouds.outlines.reading import read_outlines
 from tests.paths import ROOT
 

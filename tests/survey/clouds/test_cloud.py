@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from moma.errors import SurveyError, UsageError
+from ground.errors import SurveyError, UsageError
 from pipelines.samples.buildings.window import make_window
 from pipelines.samples.scan import outlines_text, scan_window, visible_corners
 from survey.clouds import cloud as cloud_module

@@ -6,7 +6,7 @@ import ezdxf
 import numpy as np
 import pytest
 
-from moma.errors import SurveyError, UsageError
+from ground.errors import SurveyError, UsageError
 from survey.clouds.masks import open_masks
 from survey.clouds.outlines.reading import read_outlines
 from survey.clouds.settings import MaskOptions

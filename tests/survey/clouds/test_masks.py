@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from moma.errors import UsageError
+from ground.errors import UsageError
 from survey.clouds.masks import open_masks
 from survey.clouds.settings import MaskOptions
 from survey.clouds.wall import read_wall

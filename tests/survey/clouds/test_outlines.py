@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from moma.errors import SurveyError, UsageError
+from ground.errors import SurveyError, UsageError
 from survey.clouds.outlines.coco import run_lengths
 from survey.clouds.outlines.labels import read_labels
 from survey.clouds.outlines.outline import attributes_of, field_map, made_code

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from moma.errors import SurveyError
+from ground.errors import SurveyError
 from survey.clouds.masks import open_masks
 from survey.clouds.outlines.reading import read_outlines
 from survey.clouds.settings import MaskOptions

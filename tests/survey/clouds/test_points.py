@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from moma.errors import SurveyError, UsageError
+from ground.errors import SurveyError, UsageError
 from survey.clouds.points import chunks, e57, las, ply, text
 from survey.clouds.points.reading import open_points
 from tests.survey.clouds import scans

@@ -5,7 +5,7 @@ import struct
 import numpy as np
 import pytest
 
-from moma.errors import SurveyError
+from ground.errors import SurveyError
 from survey.clouds.cloud import open_cloud
 from survey.clouds.points import las, pcd, ptx
 from survey.clouds.points.reading import open_points

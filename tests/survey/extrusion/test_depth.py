@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from moma.errors import SurveyError
+from ground.errors import SurveyError
 from survey.extrusion.depth import depth_for
 from survey.records.survey import BlockRecord, DepthRule
 

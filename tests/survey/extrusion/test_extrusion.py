@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.extrusion.depth import Depth
 from survey.extrusion.extrusion import extrude
 from survey.faces.faces import outline_face

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.extrusion.imported_solids import block_of_solid
 from survey.records.survey import SolidRecord
 

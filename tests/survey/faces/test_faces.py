@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from moma.errors import GeometryError, SurveyError
+from ground.errors import GeometryError, SurveyError
 from survey.extrusion.depth import depth_for
 from survey.extrusion.extrusion import extrude
 from survey.faces.faces import outline_face

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.faces import outline as module
 from survey.faces.outline import level_direction, measure_outline, outline_polygon
 

@@ -4,7 +4,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.arrays import Array
 from survey.faces.planes import fit_plane
 from tests.survey.faces.plane_twin import CHECKERBOARD

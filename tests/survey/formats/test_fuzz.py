@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from moma.errors import MomaError, SurveyError
+from ground.errors import MomaError, SurveyError
 from survey.formats.reading import open_survey, read_survey
 from survey.geometry.solids import Solid
 from survey.geometry.watertight import check_watertight

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from moma.errors import UsageError
+from ground.errors import UsageError
 from survey.formats.reading import FORMATS, ReadingOptions, open_survey, read_head, read_survey
 from survey.records.survey import BlockRecord
 from tests.survey.formats.survey_files import CSV, EXAMPLES, MOMA, PNEZD

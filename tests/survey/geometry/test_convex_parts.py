@@ -8,7 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.geometry.convex_parts import convex_parts
 from survey.geometry.convexity import is_convex, reflex_edges
 from survey.geometry.solids import Solid, planes_of_solid

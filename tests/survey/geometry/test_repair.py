@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.formats.options import ReadingOptions
 from survey.formats.reading import open_survey
 from survey.formats.solids.bodies import RawBody, closed_bodies

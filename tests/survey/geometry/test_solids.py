@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.geometry.solids import (
     Solid,
     area_vector,

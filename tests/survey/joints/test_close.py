@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from pipelines.samples.buildings.window import make_window
 from survey.extrusion.depth import Depth
 from survey.extrusion.extrusion import SurveyedBlock, extrude

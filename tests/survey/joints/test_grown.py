@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.clouds.masks import open_masks
 from survey.clouds.settings import MaskOptions
 from survey.geometry.solids import volume_of

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.orientation.network import Camera, Photo
 from survey.orientation.oriented import Oriented
 from survey.orientation.projection import project

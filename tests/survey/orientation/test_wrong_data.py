@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from moma.errors import MomaError, SurveyError
+from ground.errors import MomaError, SurveyError
 from survey.orientation.bundle.orient import orient
 from survey.orientation.bundle.start import without_start
 from tests.survey.orientation.synthetic_block import noisy, spread_points, wall_block, with_points

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from moma.errors import SurveyError
+from ground.errors import SurveyError
 from survey.quality.contradictions import Contradiction
 from survey.quality.corners import SeenFace, Sign, misplaced_corners
 from survey.quality.departures.depths import DoubtfulDepth

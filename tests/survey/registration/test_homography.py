@@ -3,7 +3,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.arrays import Array
 from survey.registration.homography import fit_homography
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from moma.errors import GeometryError, MomaError, SurveyError
+from ground.errors import GeometryError, MomaError, SurveyError
 from survey.arrays import Array
 from survey.faces.neighbours import Neighbours
 from survey.faces.planes import FaceFit, fit_plane

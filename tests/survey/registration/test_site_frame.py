@@ -6,7 +6,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
-from moma.errors import SurveyError
+from ground.errors import SurveyError
 from survey.arrays import Array
 from survey.records.survey import (
     BlockRecord,

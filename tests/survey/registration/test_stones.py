@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from moma.errors import GeometryError, SurveyError
+from ground.errors import GeometryError, SurveyError
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.formats.reading import open_survey
 from survey.records.survey import (

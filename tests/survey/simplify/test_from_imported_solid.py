@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.extrusion.imported_solids import block_of_solid
 from survey.formats.solids.reader import open_solids

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+from ground.errors import MomaError
 from mechanics.dynamics.outcome import Outcome
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import ContactSettings, Fidelity, Scene, SolverSettings, Start, TimeSettings
 from mechanics.simulate import simulate
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
-from moma.errors import MomaError
 from tests.validation.elastic.elastic_blocks import base_force, elastic_box
 from tests.validation.scenes import G, box, ground
 

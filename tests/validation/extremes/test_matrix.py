@@ -12,8 +12,8 @@ from benchmarks.extremes.cells import Outcome, refused_cell, solved_cells
 from benchmarks.extremes.problems import Row, rows
 from benchmarks.extremes.scenes import run_cells, scene_rows
 from benchmarks.stored import read_problem
+from ground.errors import SolverError
 from mechanics.scene.scene import Method
-from moma.errors import SolverError
 from tests.paths import ROOT
 from tests.validation.extremes.published import published
 from tests.validation.extremes.refusals import refusals

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.tower import tower_scene
+from ground.errors import SceneError, SolverError
 from mechanics.dynamics.energy_balance import EnergyBalance
 from mechanics.dynamics.observers.equilibrium import displacement, seen_from_supports
 from mechanics.dynamics.simulation import Simulation
@@ -32,7 +33,6 @@ from mechanics.scene.scene import (
 from mechanics.scene.shapes import prism, voussoir_arch
 from mechanics.simulate import simulate
 from mechanics.stones.materials import Material
-from moma.errors import SceneError, SolverError
 from tests.validation.masonry import rectangle
 from tests.validation.scenes import STONE, G, box, ground, tilted_gravity
 

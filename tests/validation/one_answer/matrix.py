@@ -7,9 +7,9 @@ import time
 from collections import Counter
 from dataclasses import dataclass, replace
 
+from ground.errors import MomaError
 from mechanics.scene.scene import Method, Scene, Start
 from mechanics.simulate import simulate
-from moma.errors import MomaError
 from pipelines.tuning.overlay import overlaid_scene
 from pipelines.tuning.profiles import PROFILES
 from tests.validation.one_answer.scenes import SCENES

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.limit import FACADES
+from ground.errors import SceneError
 from mechanics.limit.assembly import assembly
 from mechanics.limit.confirm import confirm, likeness
 from mechanics.limit.joints import resultants
@@ -18,7 +19,6 @@ from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import ContactSettings, Fidelity, LawRule, Scene
 from mechanics.scene.shapes import bond
 from mechanics.stones.materials import Material
-from moma.errors import SceneError
 from tests.validation.masonry import (
     buttressed_arch,
     cuboid,

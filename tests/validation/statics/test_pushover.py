@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from benchmarks.limit import WALLS
+from ground.errors import SolverError
 from mechanics.limit.assembly import assembly
 from mechanics.limit.kinematic import kinematics
 from mechanics.limit.limit_load import Flow, limit_load
@@ -14,7 +15,6 @@ from mechanics.scene.loads.forces import StoneForce
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import ContactSettings, Scene
-from moma.errors import SolverError
 from tests.validation.masonry import cuboid
 from tests.validation.scenes import G, ground
 from tests.validation.statics.test_limit_loads import ALONG, standing

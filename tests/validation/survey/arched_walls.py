@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from survey.extrusion.depth import Depth
 from survey.extrusion.extrusion import extrude
 from survey.faces.faces import outline_face

@@ -11,7 +11,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from moma.errors import GeometryError, SurveyError
+from ground.errors import GeometryError, SurveyError
 from survey.records.survey import ControlPoint
 from survey.registration.homography import fit_homography
 from survey.registration.similarity import best_similarity

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from moma.errors import MomaError
+from ground.errors import MomaError
 from survey.formats.reading import ReadingOptions, open_survey
 from survey.records.survey import BlockRecord, Reject, SolidRecord
 

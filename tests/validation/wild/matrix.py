@@ -11,9 +11,9 @@ from enum import StrEnum
 
 import numpy as np
 
+from ground.errors import MomaError
 from mechanics.scene.scene import Scene, Start
 from mechanics.simulate import simulate
-from moma.errors import MomaError
 from pipelines.tuning.overlay import overlaid_scene
 from pipelines.tuning.profiles import PROFILES
 from tests.validation.wild import driven, imperfect, limits, motions, sizes, supports  # noqa: F401 they enter scenes

@@ -6,11 +6,11 @@ centres of its three faces and the centre of the stone; each of these into n × 
 
 import numpy as np
 
+from ground.errors import MeshError
 from mechanics.arrays import Array, Ints
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.mesh import SolidMesh, solid_mesh
 from mechanics.stones.meshing.sizes import SizeField, as_field
-from moma.errors import MeshError
 
 __all__ = ["mesh_at_corners"]
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import Delaunay, QhullError
 
+from ground.errors import MeshError
 from mechanics.arrays import Array, Bools, Ints
 from mechanics.stones.meshing.mesh import SolidMesh, tet_mesh
 from mechanics.stones.meshing.meshers._kernels.sampling import Polyhedron, Sizes, lay_points
@@ -18,7 +19,6 @@ from mechanics.stones.meshing.meshers.slivers import improve_cells
 from mechanics.stones.meshing.sizes import SizeField, as_field
 from mechanics.stones.meshing.soundness import CONVEX
 from mechanics.stones.polyhedra import face_planes
-from moma.errors import MeshError
 
 __all__ = ["mesh_with_delaunay"]
 

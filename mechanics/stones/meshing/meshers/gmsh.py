@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
+from ground.errors import MeshError, MissingLibraryError
 from mechanics.arrays import Array, Ints
 from mechanics.stones.meshing.mesh import SolidMesh, tet_mesh
 from mechanics.stones.meshing.meshers.slivers import improved
 from mechanics.stones.meshing.sizes import SizeField, as_field
-from moma.errors import MeshError, MissingLibraryError
 
 __all__ = ["Algorithm", "mesh_with_gmsh"]
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from ground.errors import MeshError
 from mechanics.arrays import Array
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.mesh import SolidMesh, solid_mesh
 from mechanics.stones.meshing.sizes import SizeField, as_field
-from moma.errors import MeshError
 
 __all__ = ["mesh_with_hexahedra"]
 

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Protocol
 
+from ground.errors import MeshError, MissingLibraryError
 from mechanics.arrays import Array
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.mesh import SolidMesh, with_middle_nodes
@@ -17,7 +18,6 @@ from mechanics.stones.meshing.quality import mesh_quality
 from mechanics.stones.meshing.sizes import SizeField, as_field, graded
 from mechanics.stones.meshing.soundness import check_meshable, is_convex
 from mechanics.stones.polyhedra import mass_properties
-from moma.errors import MeshError, MissingLibraryError
 
 __all__ = ["Meshable", "Meshed", "mesh_block", "meshed_block"]
 

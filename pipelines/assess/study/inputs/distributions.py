@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
+from ground.errors import SceneError
 from mechanics.arrays import Array
-from moma.errors import SceneError
 from pipelines.assess.study.settings import Shape
 
 __all__ = ["Distribution", "correlation_root"]

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from archmodel.store.stone_record import StoneRecord
+from ground.errors import SceneError
 from mechanics.arrays import Array
-from moma.errors import SceneError
 from pipelines.assess.study.inputs.unknowns import PLANE_PARTS, Unknown
 from pipelines.assess.study.settings import Acts, InputTable, InputType
 from pipelines.scene.file import SceneFile, parse_scene

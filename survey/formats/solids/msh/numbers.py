@@ -4,8 +4,8 @@ import re
 
 import numpy as np
 
-from moma.errors import SurveyError
-from moma.tables.numbers import shown
+from ground.errors import SurveyError
+from ground.tables.numbers import shown
 from survey.arrays import Array, Ints
 
 __all__ = ["MshNumbers"]

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from moma.tables.numbers import shown, unreadable
+from ground.tables.numbers import shown, unreadable
 from survey.arrays import Array, Ints
 from survey.formats.solids.msh.numbers import MshNumbers
 

@@ -6,7 +6,7 @@ from sqlalchemy import select
 from archmodel.database.session import Database
 from archmodel.query.api import condition, find, find_rows
 from archmodel.tables.entities import Entity, Voussoir
-from moma.errors import QueryError
+from ground.errors import QueryError
 from tests.archmodel.known_wall import furnish
 
 

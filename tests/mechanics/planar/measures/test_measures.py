@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from ground.errors import SceneError
 from mechanics.planar.measures.blocks import blocks_of
 from mechanics.planar.measures.cells import Cell, members, shape_of
 from mechanics.planar.measures.fabric import fabric_of
@@ -11,7 +12,6 @@ from mechanics.planar.measures.strain import deformation
 from mechanics.planar.measures.stress import mean_stress, moments
 from mechanics.planar.measures.surface import profile, slope
 from mechanics.planar.measures.tessellation import tessellation
-from moma.errors import SceneError
 
 MAP = np.array([[1.2, 0.4], [-0.1, 0.8]])
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from ground.errors import SceneError
 from mechanics.planar.measures.taper import critical_slope
-from moma.errors import SceneError
 
 
 def friction_on_base(internal, surface, base):

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from ground.errors import SceneError
 from mechanics.scene.laws.bonds import BROKEN, WHOLE
 from mechanics.scene.laws.cohesive_zone import CohesiveZone
 from mechanics.scene.laws.law import BOND, OPENING, SLIDING, SLIP, STATE
-from moma.errors import SceneError
 from tests.mechanics.scene.laws.one_contact import Block, approach
 
 STRENGTH, ENERGY = 0.3e6, 50.0

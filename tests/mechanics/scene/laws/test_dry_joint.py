@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from ground.errors import SceneError
 from mechanics.scene.laws.dry_joint import DryJoint, at_limit, slid
 from mechanics.scene.laws.law import REST, SLIDING, STATE, Terms
-from moma.errors import SceneError
 from tests.mechanics.scene.laws.one_contact import Block, approach
 
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ground.errors import SceneError
 from mechanics.scene.laws.elastic_joint import ElasticJoint
 from mechanics.scene.laws.law import BOND, CRUSHED, ENERGY, REST, SPRING, STATE
-from moma.errors import SceneError
 from tests.mechanics.scene.laws.driven import Driven
 from tests.mechanics.scene.laws.one_contact import approach
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from ground.errors import SceneError
 from mechanics.scene.laws.lennard_jones import LennardJones
-from moma.errors import SceneError
 from tests.mechanics.scene.laws.one_contact import Block, approach
 
 LAW = LennardJones(friction=0.5, force=10.0, distance=1e-3)

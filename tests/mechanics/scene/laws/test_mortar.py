@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from ground.errors import SceneError
 from mechanics.scene.laws.bonds import BROKEN, WHOLE
 from mechanics.scene.laws.law import BOND, REST, SLIDING, STATE
 from mechanics.scene.laws.mortar import MortarJoint, held_tension
-from moma.errors import SceneError
 from tests.mechanics.scene.laws.one_contact import Block, approach
 
 MORTAR = MortarJoint(friction=0.5, tension=1e4, shear=2e4, dynamic_friction=0.3)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ground.errors import SceneError
 from mechanics.dynamics.outcome import Outcome
 from mechanics.model.model import build_model
 from mechanics.scene.laws.dry_joint import DryJoint
@@ -13,7 +14,6 @@ from mechanics.scene.laws.mortar import MortarJoint
 from mechanics.scene.laws.table import law_table
 from mechanics.scene.scene import LawRule
 from mechanics.simulate import simulate
-from moma.errors import SceneError
 from tests.mechanics.scene.laws.one_contact import approach
 from tests.mechanics.shapes import brick, ground, scene
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from ground.errors import SceneError
 from mechanics.scene.loads.accelerogram import Accelerogram
 from mechanics.scene.loads.ground_motion import Component, GroundMotion, braking_time
 from mechanics.scene.loads.record_processing import band_pass, without_drift
-from moma.errors import SceneError
 
 DT = 0.005
 

@@ -2,8 +2,8 @@
 
 import pytest
 
+from ground.errors import SceneError
 from mechanics.scene.loads.record_files import read_accelerogram
-from moma.errors import SceneError
 
 ROWS = "   0.000   0.114   0.245   0.394   0.558\n" * 20
 

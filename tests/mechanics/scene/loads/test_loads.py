@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from ground.errors import SceneError
 from mechanics.scene.loads.forces import StoneForce
 from mechanics.scene.loads.gravity import GravityRamp, TiltingTable
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.motions import ImposedMotion, settlement, spreading
 from mechanics.scene.loads.time_series import History
-from moma.errors import SceneError
 
 DOWN = np.array([0.0, 0.0, -9.81])
 NORTH = frozenset({"N1"})

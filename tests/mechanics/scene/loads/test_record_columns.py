@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from ground.errors import SceneError
 from mechanics.scene.loads.record_files import read_accelerogram, read_accelerograms
-from moma.errors import SceneError
 
 GRAVITY = 9.80665
 TIMES = 0.01 * np.arange(20)

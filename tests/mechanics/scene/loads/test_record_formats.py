@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ground.errors import SceneError
 from mechanics.scene.loads.record_files import read_accelerogram, read_accelerograms, read_station
-from moma.errors import SceneError
 
 VALUES = 12.5 * np.sin(np.arange(40) / 3.0)  # [cm/s²]
 EAST, NORTH, UP = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)

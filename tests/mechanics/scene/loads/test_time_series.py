@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ground.errors import SceneError
 from mechanics.scene.loads.time_series import History, Outside
-from moma.errors import SceneError
 
 numbers = st.floats(-10, 10).map(lambda x: round(x, 3))
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ground.errors import SolverError
 from mechanics.delassus.compliant import CompliantDelassus
 from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
@@ -17,7 +18,6 @@ from mechanics.scene.scene import SolverSettings
 from mechanics.scene.shapes import bond, wall
 from mechanics.solvers.first_order.body_admm import BodyADMM, Stage
 from mechanics.solvers.second_order.newton import Newton
-from moma.errors import SolverError
 from tests.mechanics.dense_operator import products_alone
 from tests.mechanics.shapes import posed, scene
 from tests.mechanics.solvers.problems import by_path, cold, leaning

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ground.errors import SolverError
 from mechanics.dynamics.progress import Clock
 from mechanics.planar.delassus import PlanarDelassus
 from mechanics.planar.model import build_planar_model
@@ -14,7 +15,6 @@ from mechanics.problem.residual import residual
 from mechanics.solvers.choice import choose_planar_solver
 from mechanics.solvers.first_order.disk_admm import DiskADMM
 from mechanics.solvers.first_order.nsgs import NSGS
-from moma.errors import SolverError
 from tests.mechanics.dense_operator import blocks_apart
 from tests.mechanics.planar.shapes import random_problem
 from tests.mechanics.planar.test_overlaps import pushed_bed

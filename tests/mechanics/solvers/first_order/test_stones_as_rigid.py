@@ -5,13 +5,13 @@ from functools import partial
 import numpy as np
 import pytest
 
+from ground.errors import SolverError
 from mechanics.problem.problem import ContactStart
 from mechanics.problem.residual import natural_map
 from mechanics.solvers.auto import Auto
 from mechanics.solvers.first_order.body_admm import BodyADMM, Stage
 from mechanics.solvers.first_order.stones_as_rigid import StonesAsRigid
 from mechanics.solvers.second_order.newton import Newton
-from moma.errors import SolverError
 from tests.mechanics.shapes import posed
 from tests.mechanics.solvers.problems import cold, few_deformable, leaning, yielding
 

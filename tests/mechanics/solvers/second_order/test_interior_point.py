@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from ground.errors import SolverError
 from mechanics.delassus.assembly import mixed_delassus
 from mechanics.problem.problem import ContactProblem, ContactStart
 from mechanics.problem.residual import natural_map, residual
@@ -15,7 +16,6 @@ from mechanics.solvers.first_order.nsgs import NSGS
 from mechanics.solvers.second_order.central_path import CentralPath
 from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.second_order.scaling import equilibrated
-from moma.errors import SolverError
 from tests.mechanics.dense_operator import DenseDelassus, products_alone
 from tests.mechanics.shapes import TURN, brick, dense_operator, ground, moved, posed, scene
 from tests.mechanics.solvers.problems import BACK, FORWARD, SOFT, by_path, cold, few_deformable, velocity_of

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ground.errors import SolverError
 from mechanics.planar.delassus import PlanarDelassus
 from mechanics.problem.problem import ContactProblem, ContactStart
 from mechanics.problem.residual import natural_map, residual
@@ -19,7 +20,6 @@ from mechanics.solvers.first_order.nsgs import NSGS
 from mechanics.solvers.second_order.newton import Newton
 from mechanics.solvers.second_order.newton_equations import equations_of
 from mechanics.solvers.second_order.scaling import equilibrated
-from moma.errors import SolverError
 from tests.mechanics.dense_operator import products_alone
 from tests.mechanics.planar.shapes import random_problem
 from tests.mechanics.shapes import brick, ground, posed, scene

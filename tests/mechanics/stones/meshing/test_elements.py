@@ -8,6 +8,7 @@ import vtk
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ground.errors import MeshError, SceneError
 from mechanics.scene.scene import Block, Fidelity
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.mesh import boundary_facets, solid_mesh, with_middle_nodes
@@ -15,7 +16,6 @@ from mechanics.stones.meshing.meshers.delaunay import mesh_with_delaunay
 from mechanics.stones.meshing.meshers.mesher import mesh_block
 from mechanics.stones.meshing.shape_functions import integration, jacobians, reference_points, tabulated
 from mechanics.stones.polyhedra import face_plane, mass_properties
-from moma.errors import MeshError, SceneError
 from tests.mechanics.shapes import LIMESTONE, TETRAHEDRON_FACES, TURN, hexahedra, prism, profile
 from tests.pipelines.results_by_hand import BOX_FACES, box
 

@@ -9,12 +9,12 @@ import meshio
 import numpy as np
 import pytest
 
+from ground.errors import MeshError, UsageError
 from mechanics.scene.scene import Fidelity
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.files import check_mesh_file, read_meshes, write_meshes
 from mechanics.stones.meshing.meshers.mesher import mesh_block
 from mechanics.stones.meshing.shape_functions import integration, jacobians
-from moma.errors import MeshError, UsageError
 from tests.mechanics.shapes import brick
 
 USUAL = (Element.TET4, Element.TET10, Element.HEX8, Element.HEX20)

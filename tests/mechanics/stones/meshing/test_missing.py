@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ground.errors import MissingLibraryError
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.files import read_meshes, write_meshes
 from mechanics.stones.meshing.mesh import VolumeMesh
 from mechanics.stones.meshing.meshers.gmsh import mesh_with_gmsh
-from moma.errors import MissingLibraryError
 
 CORNERS = np.vstack([np.zeros(3), np.eye(3)])
 TETRAHEDRON = VolumeMesh(Element.TET4, CORNERS, np.array([[0, 1, 2, 3]]))

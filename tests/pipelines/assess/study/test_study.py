@@ -7,7 +7,7 @@ import pytest
 
 from archmodel.database.session import open_database
 from archmodel.query.api import find_rows
-from moma.errors import SceneError, UsageError
+from ground.errors import SceneError, UsageError
 from pipelines.assess.study.file import read_study
 from pipelines.assess.study.sampling import Part
 from pipelines.assess.study.study import run_study

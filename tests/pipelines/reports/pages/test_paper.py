@@ -5,7 +5,7 @@ import string
 
 import pytest
 
-from moma.errors import MomaError, UsageError
+from ground.errors import MomaError, UsageError
 from pipelines.reports.html import page_text
 from pipelines.reports.page import paper
 from pipelines.reports.page.inline import module_text

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from archmodel.database.session import open_database
-from moma.errors import MissingLibraryError
+from ground.errors import MissingLibraryError
 from pipelines.reports.serve.settings import ServeSettings
 from pipelines.results.table_csv import csv_text
 

@@ -10,8 +10,8 @@ from enum import Enum
 import numpy as np
 import pytest
 
+from ground.errors import SurveyError, UsageError
 from moma.cli.text.runs_and_surveys import survey_report_lines
-from moma.errors import SurveyError, UsageError
 from pipelines.ingest.reading_options import reading_options
 from pipelines.reports.survey import report as survey_report
 from pipelines.reports.survey.page import write_survey_page

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from moma.errors import GeometryError
+from ground.errors import GeometryError
 from pipelines.samples.buildings.ribs import RibVaultShape, SyntheticRibVault, rib_vault
 from survey.geometry.solids import planes_of_solid
 from survey.geometry.watertight import check_watertight

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from moma.errors import SurveyError, UsageError
+from ground.errors import SurveyError, UsageError
 from survey.clouds.points.chunks import Chunk, PointCloud
 from survey.clouds.views.orthophoto import STEP, find_wall, paint_wall, write_picture
 from survey.clouds.views.sections import Section, contour, join, section_plane

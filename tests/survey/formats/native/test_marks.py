@@ -162,7 +162,7 @@ def test_marks_need_an_orientation(tmp_path):
         + "end\n",
         encoding="utf-8",
     )
-    from moma.errors import SurveyError
+    from ground.errors import SurveyError
 
     with pytest.raises(SurveyError, match="moma orient"):
         list(survey_stones(open_moma(tmp_path / "b.moma")).stones)

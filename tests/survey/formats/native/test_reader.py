@@ -8,7 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from moma.errors import SurveyError, UsageError
+from ground.errors import SurveyError, UsageError
 from survey.formats.native.reader import open_moma, read_head, read_moma, with_header, write_moma
 from survey.formats.options import ReadingOptions
 from survey.records.survey import (

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from moma.errors import SurveyError, UsageError
+from ground.errors import SurveyError, UsageError
 from survey.formats.options import ReadingOptions
 from survey.formats.reading import WAYS_OUT, format_of, open_survey
 from survey.records.survey import Reject

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from moma.errors import MomaError, SurveyError, UsageError
+from ground.errors import MomaError, SurveyError, UsageError
 from survey.formats.options import ReadingOptions
 from survey.formats.solids.msh.sections import MshFile
 from survey.formats.solids.reader import open_solids

@@ -4,7 +4,7 @@ from datetime import date
 
 import pytest
 
-from moma.errors import SurveyError
+from ground.errors import SurveyError
 from survey.formats.options import ReadingOptions
 from survey.formats.tables.reader import open_csv
 from survey.records.survey import Reject

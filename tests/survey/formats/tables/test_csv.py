@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from moma.errors import SurveyError
+from ground.errors import SurveyError
 from survey.formats.options import ReadingOptions
 from survey.formats.tables.reader import open_csv, read_csv
 from survey.records.survey import BlockRecord, Reject, Station, Survey, SurveyHead

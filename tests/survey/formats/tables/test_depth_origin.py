@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from moma.errors import SurveyError
+from ground.errors import SurveyError
 from survey.extrusion.depth import depth_for
 from survey.formats.reading import open_survey
 from survey.records.survey import BlockRecord, Reject

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from moma.errors import SurveyError, UsageError
+from ground.errors import SurveyError, UsageError
 from survey.formats.options import ReadingOptions
 from survey.formats.reading import read_survey
 from survey.formats.tables.code_template import CodeFields, CodeTemplate

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from moma.errors import SurveyError, UsageError
-from moma.tables.columns import unit_of
+from ground.errors import SurveyError, UsageError
+from ground.tables.columns import unit_of
 from survey.formats.options import ReadingOptions
 from survey.formats.reading import open_survey
 from survey.formats.tables.columns import ALIASES, find_columns, read_map

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog, minimize
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
-from moma.errors import UsageError
+from ground.errors import UsageError
 from survey.arrays import Array
 from survey.formats.options import ReadingOptions
 from survey.formats.solids.reader import open_solids

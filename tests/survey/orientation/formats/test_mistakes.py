@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from moma.errors import SurveyError
+from ground.errors import SurveyError
 from survey.orientation.formats.colmap import read_colmap, write_colmap
 from survey.orientation.formats.control import ControlRow, read_control, with_control
 from survey.orientation.formats.dbat import read_dbat, write_dbat

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from moma.errors import SurveyError
+from ground.errors import SurveyError
 from survey.orientation.formats.colmap import _quaternion, read_colmap, write_colmap
 from survey.orientation.formats.dbat import read_dbat, write_dbat
 from survey.orientation.formats.local_frame import LocalFrame

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from moma.errors import SurveyError
+from ground.errors import SurveyError
 from survey.orientation.bundle.orient import orient
 from survey.orientation.formats.colmap import read_colmap, write_colmap
 from survey.orientation.formats.control import read_control, with_control, write_control

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from moma.errors import GeometryError, UsageError
+from ground.errors import GeometryError, UsageError
 from pipelines.ingest.records import surveyed_block
 from pipelines.propose.propose import core_record
 from pipelines.samples.buildings.facings import two_facings

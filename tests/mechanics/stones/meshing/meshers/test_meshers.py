@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ground.errors import MeshError, MissingLibraryError
 from mechanics.scene.scene import Fidelity
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.mesh import boundary_facets, tet_mesh
@@ -16,7 +17,6 @@ from mechanics.stones.meshing.meshers.delaunay import mesh_with_delaunay
 from mechanics.stones.meshing.meshers.gmsh import mesh_with_gmsh
 from mechanics.stones.meshing.meshers.mesher import meshed_block
 from mechanics.stones.polyhedra import face_plane, mass_properties
-from moma.errors import MeshError, MissingLibraryError
 from tests.mechanics.shapes import TETRAHEDRON_FACES, TURN, brick, hexahedra
 from tests.pipelines.results_by_hand import BOX_FACES, box
 

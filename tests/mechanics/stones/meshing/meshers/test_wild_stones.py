@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ground.errors import MeshError
 from mechanics.scene.scene import Block, Fidelity
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.mesh import with_middle_nodes
@@ -18,7 +19,6 @@ from mechanics.stones.meshing.meshers.delaunay import mesh_with_delaunay
 from mechanics.stones.meshing.meshers.gmsh import mesh_with_gmsh
 from mechanics.stones.meshing.meshers.hexahedral import mesh_with_hexahedra
 from mechanics.stones.meshing.meshers.mesher import mesh_block
-from moma.errors import MeshError
 from tests.mechanics.shapes import LIMESTONE, profile
 from tests.mechanics.stones.meshing.wild_stones import (
     BOX_FACES,

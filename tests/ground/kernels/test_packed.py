@@ -13,7 +13,7 @@ from pathlib import Path
 import numba
 import pytest
 
-from moma.kernels import packed
+from ground.kernels import packed
 from tests.paths import ROOT, SAMPLE
 
 TARGET = {"NUMBA_CPU_NAME": "some-level", "NUMBA_CPU_FEATURES": "+one,+two"}

@@ -17,7 +17,7 @@ from typing import Any
 
 from numba.core import event
 
-from moma.kernels.uses import COMMANDS, KernelUse, kernels_of
+from ground.kernels.uses import COMMANDS, KernelUse, kernels_of
 
 __all__ = ["compiling_beside"]
 
@@ -63,7 +63,7 @@ class _FirstCompilation(event.Listener):  # type: ignore[misc]
         self._asked = True
         with suppress(OSError):  # without a second process, the command compiles everything itself
             self._helper = subprocess.Popen(
-                [sys.executable, "-P", "-m", "moma.kernels.beside"],
+                [sys.executable, "-P", "-m", "ground.kernels.beside"],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,

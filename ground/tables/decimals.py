@@ -2,8 +2,8 @@
 
 import re
 
-from moma.errors import SurveyError
-from moma.tables.numbers import FARTHEST, parse_length, parse_number, shown
+from ground.errors import SurveyError
+from ground.tables.numbers import FARTHEST, parse_length, parse_number, shown
 
 __all__ = ["Decimals"]
 

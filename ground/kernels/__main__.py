@@ -1,4 +1,4 @@
-"""Compilation of the usual kernels by ``python -m moma.kernels``, beside an installation.
+"""Compilation of the usual kernels by ``python -m ground.kernels``, beside an installation.
 
 It needs nothing but numba and SciPy, and may be ended at any moment: what it has compiled stays in the cache.
 The kernels of the first command come first, those of the next from its far end: that command begins at the near one.
@@ -8,7 +8,7 @@ Last come those of other engines.
 import gc
 from contextlib import suppress
 
-from moma.kernels.uses import COMMANDS, OTHERS, kernels_of
+from ground.kernels.uses import COMMANDS, OTHERS, kernels_of
 
 __all__: list[str] = []
 

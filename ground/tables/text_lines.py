@@ -13,8 +13,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-from moma.errors import SurveyError
-from moma.tables.numbers import unreadable
+from ground.errors import SurveyError
+from ground.tables.numbers import unreadable
 
 __all__ = ["TextLines"]
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from moma.errors import SurveyError
+from ground.errors import SurveyError
 from survey.orientation.formats.control import read_control
 from survey.orientation.formats.marks import read_marks
 

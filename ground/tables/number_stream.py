@@ -16,9 +16,9 @@ from typing import TextIO
 import numpy as np
 from numpy.typing import NDArray
 
-from moma.errors import SurveyError
-from moma.tables.columns import COORDINATES, places_of
-from moma.tables.numbers import is_number, unreadable
+from ground.errors import SurveyError
+from ground.tables.columns import COORDINATES, places_of
+from ground.tables.numbers import is_number, unreadable
 
 __all__ = ["NumberStream", "open_numbers"]
 

@@ -5,6 +5,6 @@ Whoever loads kernels imports this package before numba, which learns here to re
 Public: `compiling_beside` (beside); `use_packed_kernels` (packed); `KernelUse`, `kernels_of` (uses).
 """
 
-from moma.kernels.packed import use_packed_kernels
+from ground.kernels.packed import use_packed_kernels
 
 use_packed_kernels()

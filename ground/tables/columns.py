@@ -8,8 +8,8 @@ import re
 import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
 
-from moma.errors import SurveyError
-from moma.tables.numbers import shown
+from ground.errors import SurveyError
+from ground.tables.numbers import shown
 
 __all__ = [
     "COORDINATES",

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from moma.errors import SurveyError
+from ground.errors import SurveyError
 from survey.clouds.points.text import open_text
 
 PLACES = np.array([[1.25, 0.5, 7.0], [2.25, 0.75, 7.5], [3.5, 0.25, 8.0]])

@@ -16,9 +16,9 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from moma.errors import SurveyError, UsageError
-from moma.tables.numbers import shown, unreadable
-from moma.tables.text_lines import TextLines
+from ground.errors import SurveyError, UsageError
+from ground.tables.numbers import shown, unreadable
+from ground.tables.text_lines import TextLines
 
 __all__ = ["DATE_REMEDY", "ListRows", "Row", "TextRows", "cell_text", "is_workbook", "open_rows"]
 

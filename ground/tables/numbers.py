@@ -3,7 +3,7 @@
 import math
 import re
 
-from moma.errors import SurveyError
+from ground.errors import SurveyError
 
 __all__ = ["EMPTY", "FARTHEST", "is_number", "parse_length", "parse_number", "shown", "unreadable"]
 

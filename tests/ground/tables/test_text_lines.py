@@ -4,8 +4,8 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from moma.errors import SurveyError
-from moma.tables.text_lines import TextLines
+from ground.errors import SurveyError
+from ground.tables.text_lines import TextLines
 
 
 def lines(path: Path, data: bytes) -> tuple[list[str], str, int]:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from moma.kernels.uses import COMMANDS, OTHERS, _decoded, _encoded, kernels_of, recording
+from ground.kernels.uses import COMMANDS, OTHERS, _decoded, _encoded, kernels_of, recording
 
 USES = {
     f"{command}-{use.name}-{at}": use

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
-from moma.errors import SurveyError
-from moma.tables.columns import places_of
-from moma.tables.decimals import Decimals
-from moma.tables.numbers import is_number, shown
-from moma.tables.rows import DATE_REMEDY, ListRows, Row, TextRows, open_rows
+from ground.errors import SurveyError
+from ground.tables.columns import places_of
+from ground.tables.decimals import Decimals
+from ground.tables.numbers import is_number, shown
+from ground.tables.rows import DATE_REMEDY, ListRows, Row, TextRows, open_rows
 
 __all__ = ["Table", "TableRow", "read_table"]
 

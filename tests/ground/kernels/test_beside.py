@@ -7,8 +7,8 @@ import time
 import pytest
 from numba.core import event
 
-from moma.kernels import beside
-from moma.kernels.uses import COMMANDS, kernels_of
+from ground.kernels import beside
+from ground.kernels.uses import COMMANDS, kernels_of
 
 
 @pytest.fixture
@@ -73,7 +73,7 @@ def test_the_order_begins_at_the_far_end_and_names_every_kernel_once():
 
 @pytest.mark.slow
 def test_the_second_process_ends_by_itself_when_its_command_is_killed():
-    command = [sys.executable, "-m", "moma.kernels.beside"]
+    command = [sys.executable, "-m", "ground.kernels.beside"]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         process.stdin.write("run 9999\n")  # a list of another program
         process.stdin.flush()

@@ -1,0 +1,10 @@
+"""The ground that all packages stand on; it imports none of them.
+
+errors   what fails, with exit code and remedy
+tables   rows and columns of texts and workbooks
+kernels  compiled kernels, loaded before numba
+
+Public: `DatabaseError`, `ExchangeError`, `GeometryError`, `MeshError`, `MissingLibraryError`, `MomaError`,
+`NoDatabaseError`, `QueryError`, `SceneError`, `SolverError`, `StorageError`, `SurveyError`,
+`UnsoundSceneError`, `UsageError`, `storage_error`, `storing` (errors).
+"""
