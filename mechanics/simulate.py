@@ -133,7 +133,7 @@ def simulate_stages(
     check_stages(stages)
     with ThreadpoolController().limit(limits=1, user_api="blas"):
         scene = whole_scene(stages)
-        if whole is None and any(one.fidelity is Fidelity.DEFORMABLE for one in scene.blocks):
+        if whole is None and any(block.fidelity is Fidelity.DEFORMABLE for block in scene.blocks):
             whole = build_model(scene, lambda done, total: progress(Progress("mesh", done, total)))
         result = _Building(stages, whole, archive).built(progress, stop)
         if whole is None or not _keeps_strain(whole[0], *(stage.scene for stage in stages)):
@@ -343,7 +343,7 @@ class _Building:
         archive = None if self.archive is None else _StageArchive(self.archive, self, number, earlier)
         result, run = _simulate(model, begin, clock, report, stop, archive)
         codes = {block.code for block in stage.scene.blocks}
-        stood = set() if self.before is None else {one.code for one in self.before.model.scene.blocks}
+        stood = set() if self.before is None else {block.code for block in self.before.model.scene.blocks}
         end = stage_result(
             result, stage.name, len(codes - stood), len(stood - codes), self._held(stage), run.bed
         )
@@ -355,13 +355,15 @@ class _Building:
 
     def _held(self, stage: Stage) -> int:
         """Return the number of stones that are fixed in a stage and free in another."""
-        return sum(one.fidelity is Fidelity.FIXED and one.code in self._free for one in stage.scene.blocks)
+        return sum(
+            block.fidelity is Fidelity.FIXED and block.code in self._free for block in stage.scene.blocks
+        )
 
     @cached_property
     def _free(self) -> set[str]:
         """Codes of the stones that are free in some stage."""
         blocks = chain.from_iterable(stage.scene.blocks for stage in self.stages)
-        return {one.code for one in blocks if one.fidelity is not Fidelity.FIXED}
+        return {block.code for block in blocks if block.fidelity is not Fidelity.FIXED}
 
     def _cautions(self) -> tuple[str, ...]:
         """Return the cautions of the last stage, after what it has left unbuilt; then those of the others."""
@@ -370,9 +372,9 @@ class _Building:
         why = "was interrupted" if last.outcome == Outcome.INTERRUPTED else "did not come to rest"
         unbuilt = (f"{left} of {count} stages were not built, as stage {last.name!r} {why}",)
         earlier = (
-            f"in stage {one.name!r}, {said}"
-            for one in self.ends[:-1]
-            for said in filter(None, (one.reason, *one.cautions))
+            f"in stage {end.name!r}, {said}"
+            for end in self.ends[:-1]
+            for said in filter(None, (end.reason, *end.cautions))
         )
         return (*(unbuilt if left else ()), *last.cautions, *earlier)
 

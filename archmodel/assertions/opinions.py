@@ -62,9 +62,9 @@ def _decide_batch(
     ).all()
     before = {getattr(one, owner): one for one in rows if isinstance(one, Decision) and one.about == about}
     chosen: dict[int, list[Statement]] = {number: [] for number in numbers}
-    for one in rows:
-        if not isinstance(one, Decision) and says(one, match):
-            chosen[getattr(one, owner)].append(one)
+    for row in rows:
+        if not isinstance(row, Decision) and says(row, match):
+            chosen[getattr(row, owner)].append(row)
     if wrong := [number for number in numbers if len(chosen[number]) != 1]:
         some = len(chosen[wrong[0]])
         what = f"{some or 'no'} opinions of {about} about {len(wrong)} of the subjects match"

@@ -50,11 +50,11 @@ def withdraw_statements(
     outcome = NOTHING
     held: list[Statement] = []
     for owner, batch in about.batches():
-        for one in session.scalars(select(cls).where(getattr(cls, owner).in_(batch))):
-            if not says(one, match or {}):
+        for row in session.scalars(select(cls).where(getattr(cls, owner).in_(batch))):
+            if not says(row, match or {}):
                 continue
-            if one.superseded_id is None and one.entry_id > since:
-                held.append(one)
+            if row.superseded_id is None and row.entry_id > since:
+                held.append(row)
             else:
                 outcome += RowCounts(unchanged=1)
     mine = [one for one in held if one.author == entry.author]
@@ -90,9 +90,9 @@ def withdraw_members(session: Session, entry: Entry, about: Subjects) -> RowCoun
             Membership.structure_id.in_(about.structures),
             Membership.declared,
         )
-        for one in session.scalars(statement):
-            if one.superseded_id is None:
-                held.append(one.id)
+        for row in session.scalars(statement):
+            if row.superseded_id is None:
+                held.append(row.id)
             else:
                 outcome += RowCounts(unchanged=1)
     return _ended(session, entry, Membership, held, outcome, "declared membership")

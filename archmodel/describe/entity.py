@@ -75,8 +75,8 @@ def _described_at(session: Session, code: str, at: int) -> Values:
         if number is not None and then.get(Entity, number) is not None:
             return _entity(then, number)
         # a code that was given up can have been given to another structure since
-        for one in structures:
-            if number is None and (held := then.get(Structure, one.id)) is not None:
+        for structure in structures:
+            if number is None and (held := then.get(Structure, structure.id)) is not None:
                 return _structure(then, held)
     raise UsageError(f"{code} was not known at entry {at}", remedy="ask for a later one")
 
@@ -105,7 +105,7 @@ def _entity(session: Session, number: int) -> Values:
             "source": row["depth_source"],
             "origin": row["depth_origin"],
         },
-        "structures": [_membership(session, one) for one in members],
+        "structures": [_membership(session, member) for member in members],
         "relations": _relations(session, number),
         "knowledge": knowledge(session, "entity_id", number, owners_of(session, members)),
         "survey": None if measured is None else _survey(measured),
@@ -149,8 +149,8 @@ def _own(cls: type[Entity], row: Values) -> Values:
     kept = row["own"] or {}
     values = {name: row[name] if name in row else kept.get(name) for name in own_attributes(cls)}
     return {
-        name: {"value": values[name], "unit": one.unit, "definition": one.definition}
-        for name, one in own_attributes(cls).items()
+        name: {"value": values[name], "unit": attribute.unit, "definition": attribute.definition}
+        for name, attribute in own_attributes(cls).items()
         if values[name] is not None
     }
 
@@ -197,8 +197,8 @@ def _corrections(session: Session, number: int) -> list[Values]:
         .order_by(Correction.id)
     )
     return [
-        {"attribute": one.attribute, "before": one.before, "after": one.after} | entry_values(one.entry)
-        for one in session.scalars(statement)
+        {"attribute": row.attribute, "before": row.before, "after": row.after} | entry_values(row.entry)
+        for row in session.scalars(statement)
     ]
 
 
@@ -277,15 +277,15 @@ def _relations(session: Session, entity: int) -> dict[str, list[Values]]:
         .order_by(Relation.id)
     )
     told: dict[str, dict[str, Values]] = {name: {} for name in INVERSE}
-    for one in session.scalars(statement):
-        name = one.kind if one.subject_id == entity else INVERSE[one.kind]
-        other = one.object if one.subject_id == entity else one.subject
+    for row in session.scalars(statement):
+        name = row.kind if row.subject_id == entity else INVERSE[row.kind]
+        other = row.object if row.subject_id == entity else row.subject
         values = {
             "code": other.code,
-            "declared": one.declared,
-            "area": one.area,
-            "gap": one.gap,
-            "entry": one.entry_id,
+            "declared": row.declared,
+            "area": row.area,
+            "gap": row.gap,
+            "entry": row.entry_id,
         }
         # computed and declared: one relation, of which the geometry gives the numbers
         before = told[name].get(other.code)
@@ -308,16 +308,16 @@ def _joints(session: Session, entity: int, run: int) -> list[Values]:
     )
     return [
         {
-            "neighbour": (one.second if one.first_id == entity else one.first).code,
-            "area": one.area,
-            "width": one.width,
-            "force_normal": one.force_normal,
-            "force_shear": one.force_shear,
-            "pressure_max": one.pressure_max,
-            "kern": one.kern,
-            "friction_use": one.friction_use,
-            "opening": one.opening,
-            "sliding": one.sliding,
+            "neighbour": (row.second if row.first_id == entity else row.first).code,
+            "area": row.area,
+            "width": row.width,
+            "force_normal": row.force_normal,
+            "force_shear": row.force_shear,
+            "pressure_max": row.pressure_max,
+            "kern": row.kern,
+            "friction_use": row.friction_use,
+            "opening": row.opening,
+            "sliding": row.sliding,
         }
-        for one in session.scalars(statement)
+        for row in session.scalars(statement)
     ]

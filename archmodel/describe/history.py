@@ -73,7 +73,7 @@ def history(session: Session, code: str) -> tuple[Event, ...]:
     structures = structures_named(session, code) if code.isprintable() else []
     if not structures:
         raise no_such_code(session, code, Entity.code, Structure.code)
-    return _ordered([event for one in structures for event in _of_structure(session, one)])
+    return _ordered([event for structure in structures for event in _of_structure(session, structure)])
 
 
 def known_at(session: Session, code: str, entry: int) -> dict[str, object]:
@@ -111,8 +111,8 @@ def _of_entity(session: Session, number: int) -> Iterator[Event]:
     measured = select(Measurement).where(Measurement.entity_id == number).order_by(Measurement.id)
     yield from _chain(session.scalars(measured).all(), "measurement", _measurement, lambda one: one.entity_id)
     corrections = select(Correction).where(Correction.entity_id == number).order_by(Correction.id)
-    for one in session.scalars(corrections):
-        yield _event(one.entry, "corrected", one.attribute, {"value": one.after}, {"value": one.before})
+    for row in session.scalars(corrections):
+        yield _event(row.entry, "corrected", row.attribute, {"value": row.after}, {"value": row.before})
     member = (
         select(Membership)
         .where(Membership.entity_id == number)
@@ -144,7 +144,7 @@ def _relations(session: Session, number: int) -> Iterator[Event]:
     )
     rows = session.scalars(statement).all()
     for kind in dict.fromkeys(INVERSE.values()):
-        seen = [one for one in rows if (one.kind if one.subject_id == number else INVERSE[one.kind]) == kind]
+        seen = [row for row in rows if (row.kind if row.subject_id == number else INVERSE[row.kind]) == kind]
 
         def told(one: Relation) -> Values:
             other = one.object if one.subject_id == number else one.subject
@@ -159,9 +159,9 @@ def _of_structure(session: Session, held: Structure) -> Iterator[Event]:
     while versions[0].supersedes_id is not None:
         versions.insert(0, session.get_one(Structure, versions[0].supersedes_id))
     before: Values | None = None
-    for one in versions:
-        told = _structure(session, one)
-        yield _event(one.entry, "recorded" if before is None else "replaced", "structure", told, before)
+    for version in versions:
+        told = _structure(session, version)
+        yield _event(version.entry, "recorded" if before is None else "replaced", "structure", told, before)
         before = told
     members = (
         select(Membership)
@@ -200,14 +200,14 @@ def _statements(session: Session, column: str, number: int) -> Iterator[Event]:
     ).all()
     by_number = {one.id: one for one in rows}
     replaced = {one.supersedes_id for one in rows}
-    for one in rows:
-        old = by_number.get(one.supersedes_id) if one.supersedes_id is not None else None
+    for row in rows:
+        old = by_number.get(row.supersedes_id) if row.supersedes_id is not None else None
         before = None if old is None else statement_values(old)
         yield _event(
-            one.entry, "said" if old is None else "replaced", one.kind, statement_values(one), before
+            row.entry, "said" if old is None else "replaced", row.kind, statement_values(row), before
         )
-        if one.superseded_by is not None and one.id not in replaced:
-            yield _event(one.superseded_by, "withdrawn", one.kind, statement_values(one))
+        if row.superseded_by is not None and row.id not in replaced:
+            yield _event(row.superseded_by, "withdrawn", row.kind, statement_values(row))
 
 
 def _chain(
@@ -220,11 +220,11 @@ def _chain(
     ended: dict[tuple[Hashable, int], Recorded] = {
         (about(one), one.superseded_id): one for one in rows if one.superseded_id is not None
     }
-    for one in rows:
-        old = ended.pop((about(one), one.entry_id), None)
+    for row in rows:
+        old = ended.pop((about(row), row.entry_id), None)
         first = "measured" if what == "measurement" else "said"
         before = None if old is None else told(old)
-        yield _event(one.entry, first if old is None else "replaced", what, told(one), before)
+        yield _event(row.entry, first if old is None else "replaced", what, told(row), before)
     for old in ended.values():
         if old.superseded_by is not None:
             yield _event(old.superseded_by, "withdrawn", what, told(old))

@@ -159,9 +159,11 @@ def _preferred(session: Session, rule: OpinionRule, opinions: Sequence[Statement
     """Return the opinion of several at one distance that holds."""
     table, decisions = aliased(Statement), aliased(Statement)
     order = preference(rule, inspect(table).selectable, inspect(decisions).selectable)
-    first = select(table.id).where(table.id.in_([one.id for one in opinions])).order_by(*order).limit(1)
+    first = (
+        select(table.id).where(table.id.in_([opinion.id for opinion in opinions])).order_by(*order).limit(1)
+    )
     number = session.scalar(first)
-    return next(one for one in opinions if one.id == number)
+    return next(opinion for opinion in opinions if opinion.id == number)
 
 
 def _opinion(statement: Statement, far: Mapping[int, Owner]) -> Values:

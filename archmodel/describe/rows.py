@@ -36,6 +36,6 @@ def first_values(session: Session, number: int, *names: str) -> dict[str, Any]:
 def structures_named(session: Session, code: str) -> list[Structure]:
     """List structures that have or had a code, latest first, without rows that only keep an earlier revision."""
     rows = session.scalars(select(Structure).where(Structure.code == code)).all()
-    kept = {one.supersedes_id for one in rows}
-    found = [one for one in rows if one.id not in kept]
+    kept = {row.supersedes_id for row in rows}
+    found = [row for row in rows if row.id not in kept]
     return sorted(found, key=lambda one: (one.superseded_id is None, one.superseded_id or 0), reverse=True)

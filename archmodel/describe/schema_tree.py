@@ -58,7 +58,8 @@ def schema(session: Session | None = None, kind: str | None = None) -> dict[str,
     return {
         **tree,
         "attributes": [
-            {"name": one.name, "unit": one.unit, "definition": one.definition} for one in ATTRIBUTES.values()
+            {"name": attribute.name, "unit": attribute.unit, "definition": attribute.definition}
+            for attribute in ATTRIBUTES.values()
         ],
         "structures": [_kind_of_structure(cls) for cls in of_structures.values()],
         "relations": [

@@ -286,7 +286,7 @@ def _shape_of(annotation: object) -> _Shape:
         name, kinds, schema = _PLAIN[annotation]
         return _Shape(name, lambda value: type(value) in kinds, _no_items, schema)
     origin, arguments = get_origin(annotation), get_args(annotation)
-    shapes = [_shape_of(one) for one in arguments]
+    shapes = [_shape_of(argument) for argument in arguments]
     if origin in (types.UnionType, Union):
         return _union(shapes)
     if origin is list:

@@ -23,7 +23,9 @@ def begin_layout(connection: Connection, before: MetaData, after: MetaData) -> M
             _set_aside(connection, table)
             aside[table.name] = table.to_metadata(MetaData(), name=_ASIDE + table.name)
     after.create_all(
-        connection, tables=[one for one in after.sorted_tables if one.name != "moma_schema"], checkfirst=False
+        connection,
+        tables=[table for table in after.sorted_tables if table.name != "moma_schema"],
+        checkfirst=False,
     )
     return aside
 
@@ -66,7 +68,7 @@ def _set_aside(connection: Connection, table: Table) -> None:
             connection.execute(text(f'DROP INDEX "{index["name"]}"'))
     if connection.dialect.name == "postgresql":
         constraints = [inspector.get_pk_constraint(table.name)["name"]]
-        constraints += [one["name"] for one in inspector.get_unique_constraints(table.name)]
+        constraints += [constraint["name"] for constraint in inspector.get_unique_constraints(table.name)]
         for name in constraints:
             connection.execute(text(f'ALTER INDEX "{name}" RENAME TO "{_ASIDE}{name}"'))
         if (sequence := _sequence(connection, table)) is not None:

@@ -140,7 +140,7 @@ def asked_columns(where: Sequence[str], session: Session | None = None, kind: st
     """List the attributes that expressions name, without those of other entities: ``depth``, ``von_mises_max@12``."""
     known = _known(session, kind)
     expressions = [where] if isinstance(where, str) else where
-    named = [token.text.lower() for one in expressions for token in attributes_in(parse(one))]
+    named = [token.text.lower() for expression in expressions for token in attributes_in(parse(expression))]
     return [name for name in dict.fromkeys(named) if name.partition("@")[0] in known]
 
 

@@ -80,7 +80,7 @@ def count_by(
     QueryError
         if an expression cannot be understood
     """
-    known = {one.name: one for one in attributes(session, kind)}
+    known = {attribute.name: attribute for attribute in attributes(session, kind)}
     names = list(dict.fromkeys(["code", *by, *([share_of] if share_of else [])]))
     rows = find_rows(session, kind, where, run, names)
     if share_of is not None and not known[share_of.partition("@")[0]].is_number:
@@ -145,7 +145,7 @@ def _only_in(
         if inside <= true:
             kept[values] = members
         elif inside & true and not inside & false:
-            named = ", ".join("none" if one is None else str(one) for one in values)
+            named = ", ".join("none" if value is None else str(value) for value in values)
             notes.append(f"{named}: not known of {len(inside - true)}")
     return kept
 
@@ -153,7 +153,7 @@ def _only_in(
 def _total(rows: Sequence[Row], name: str) -> float:
     """Sum a number over entities, each once."""
     values = {row["code"]: row[name] for row in rows}
-    return sum(float(one) for one in values.values() if isinstance(one, int | float))
+    return sum(float(value) for value in values.values() if isinstance(value, int | float))
 
 
 def _add_shares(

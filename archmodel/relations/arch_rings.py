@@ -194,7 +194,9 @@ def _within_rings(
     degrees = Counter(i for joint in joints for i in (joint.first, joint.second))
     if max(degrees.values(), default=0) <= 2 and len(joints) < len(group):
         return list(joints), np.zeros(2)  # one row, however its centre lies
-    middle = 0.5 * (view.places(one.first for one in joints) + view.places(one.second for one in joints))
+    middle = 0.5 * (
+        view.places(joint.first for joint in joints) + view.places(joint.second for joint in joints)
+    )
     normal = view.project(np.array([joint.normal for joint in joints]))
     centre = _centre(middle, normal)
     for _ in range(_ROUNDS):

@@ -95,12 +95,16 @@ def carries(session: Session, code: str, as_of: int | None = None) -> tuple[Neig
     UsageError
         if there is no stone of this code or no such entry, here as in what follows; names the nearest codes
     """
-    return tuple(one for one in neighbours(session, code, as_of) if one.relation == "supports")
+    return tuple(
+        neighbour for neighbour in neighbours(session, code, as_of) if neighbour.relation == "supports"
+    )
 
 
 def carried_by(session: Session, code: str, as_of: int | None = None) -> tuple[Neighbour, ...]:
     """List the stones on which this one rests directly."""
-    return tuple(one for one in neighbours(session, code, as_of) if one.relation == "rests_on")
+    return tuple(
+        neighbour for neighbour in neighbours(session, code, as_of) if neighbour.relation == "rests_on"
+    )
 
 
 def neighbours(session: Session, code: str, as_of: int | None = None) -> tuple[Neighbour, ...]:

@@ -54,7 +54,7 @@ def held_settings(session: Session) -> RelationSettings:
     Relations that are computed later, of stones that come or change, are so to the same measure.
     """
     last = select(Entry.settings).where(Entry.action == "geometry").order_by(Entry.id.desc()).limit(1)
-    known = {one.name for one in fields(RelationSettings)}
+    known = {field.name for field in fields(RelationSettings)}
     given: dict[str, Any] = {
         name: value for name, value in (session.scalar(last) or {}).items() if name in known
     }
@@ -174,10 +174,10 @@ def _concerning(only: Collection[int] | None) -> Iterator[ColumnElement[bool]]:
     if only is None:
         yield table_of(Relation).c.id.is_not(None)
         return
-    for one in id_conditions(table_of(Relation).c.subject_id, only):
-        yield one
-    for one in id_conditions(table_of(Relation).c.object_id, only):
-        yield one
+    for condition in id_conditions(table_of(Relation).c.subject_id, only):
+        yield condition
+    for condition in id_conditions(table_of(Relation).c.object_id, only):
+        yield condition
 
 
 def _keys(kind: Ints, subject: Ints, other: Ints) -> Ints:

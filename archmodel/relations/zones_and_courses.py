@@ -251,7 +251,7 @@ def _held(
     )
     chosen = [statement]
     if among is not None:
-        chosen = [statement.where(one) for one in id_conditions(Membership.entity_id, among)]
+        chosen = [statement.where(condition) for condition in id_conditions(Membership.entity_id, among)]
     for one in chosen:
         for number, entity, structure, rank, said in session.execute(one):
             if said:

@@ -140,5 +140,5 @@ def _end_geometry(session: Session, entry: Entry, entities: Sequence[Entity]) ->
     ]
     session.execute(insert(Correction), rows)
     session.execute(update(Entity).where(Entity.id.in_(numbers)).values(dict.fromkeys(_GIVEN_UP)))
-    for one in entities:
-        session.expire(one)
+    for entity in entities:
+        session.expire(entity)

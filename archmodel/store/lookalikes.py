@@ -62,11 +62,11 @@ class Lookalikes:
         # names beyond ASCII, which are few; SQLite and PostgreSQL say so in words of their own
         sqlite = session.get_bind().dialect.name == "sqlite"
         beyond = column.op("GLOB")("*[^ -~]*") if sqlite else column.regexp_match("[^ -~]")
-        self._odd = {plain_form(one): one for one in session.scalars(self._names.where(beyond))}
+        self._odd = {plain_form(row): row for row in session.scalars(self._names.where(beyond))}
 
     def like(self, names: Sequence[str]) -> tuple[str, str] | None:
         """Return the first of new names that looks like another, new or there already, with the other; None: none."""
-        ascii = {one for one in names if one.isascii()}
+        ascii = {name for name in names if name.isascii()}
         for name in names:
             other = self._odd.setdefault(plain_form(name), name) if name not in ascii else self._odd.get(name)
             if other not in (None, name):

@@ -82,5 +82,7 @@ def _correct(session: Session, entry_id: int, made: Mapping[int, Mapping[str, ob
         session.execute(update(Entity), changed)
     first = first_free_id(session, Correction)
     insert_rows(
-        session, Correction, ({"id": number, **one} for number, one in enumerate(corrections, start=first))
+        session,
+        Correction,
+        ({"id": number, **correction} for number, correction in enumerate(corrections, start=first)),
     )

@@ -244,7 +244,7 @@ def store_run(session: Session, run: RunRecord) -> int:
     place = f"run of {run.scene}"
     codes = [result.code for result in run.results]
     _refuse_twice(codes, "results", place)
-    _refuse_twice([one.code for one in run.simplifications], "simplifications", place)
+    _refuse_twice([simplification.code for simplification in run.simplifications], "simplifications", place)
     with session.begin_nested():
         if run.as_of is not None and session.get(Entry, run.as_of) is None:
             raise DatabaseError(f"there is no entry {run.as_of}", where=place)
@@ -277,19 +277,19 @@ def _results(run: RunRecord, numbers: dict[str, int], stored: int, place: str) -
 def _simplifications(
     run: RunRecord, numbers: dict[str, int], stored: int, place: str
 ) -> Iterator[dict[str, object]]:
-    for one in run.simplifications:
-        if one.code not in numbers:
-            raise DatabaseError(f"stone {one.code} has a solid and no result", where=place)
-        keys = {"run_id": stored, "entity_id": numbers[one.code]}
-        yield keys | simplification_row(one, f"{place}, stone {one.code}")
+    for simplification in run.simplifications:
+        if simplification.code not in numbers:
+            raise DatabaseError(f"stone {simplification.code} has a solid and no result", where=place)
+        keys = {"run_id": stored, "entity_id": numbers[simplification.code]}
+        yield keys | simplification_row(simplification, f"{place}, stone {simplification.code}")
 
 
 def _moving(session: Session, run: RunRecord, stored: int, place: str) -> Iterator[dict[str, object]]:
     for load, stones in run.mechanisms.items():
         entities = _primary_keys(session, [one.code for one in stones], place)
-        for one, entity in zip(stones, entities.tolist(), strict=True):
-            where = f"{place}, {load}, stone {one.code}"
-            numbers = dict(zip(_MOTION, (one.speed, *one.velocity, *one.spin), strict=True))
+        for stone, entity in zip(stones, entities.tolist(), strict=True):
+            where = f"{place}, {load}, stone {stone.code}"
+            numbers = dict(zip(_MOTION, (stone.speed, *stone.velocity, *stone.spin), strict=True))
             yield {"run_id": stored, "load": storable(load), "entity_id": entity} | {
                 name: _finite(value, name, where) for name, value in numbers.items()
             }

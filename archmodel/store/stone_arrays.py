@@ -90,7 +90,7 @@ def stone_columns(session: Session, *conditions: ColumnElement[bool]) -> StoneCo
 def _columns(rows: Sequence[Any]) -> StoneColumns:
     """Return the columns of some rows, each name kept in memory once."""
     ids, kinds, zones, courses, x, y, z, normals = zip(*rows, strict=True)
-    packed = b"".join(_UNKNOWN if one is None else one for one in normals)
+    packed = b"".join(_UNKNOWN if normal is None else normal for normal in normals)
     return StoneColumns(
         ids=np.array(ids, dtype=np.int64),
         kinds=[intern(kind) for kind in kinds],

@@ -176,7 +176,7 @@ _PLAIN: dict[object, Callable[[Any], object]] = {
     bool: bool,
     int: int,
     str: storable,
-    list[int]: lambda values: tuple(int(one) for one in values),
+    list[int]: lambda values: tuple(int(value) for value in values),
     list[str]: lambda values: values,
     list[list[int]]: _plain_faces,
     list[dict[str, object]]: list,

@@ -174,8 +174,8 @@ def declared_attributes(mapper: Mapper[Any]) -> Iterator[tuple[Column[Any], Ston
 
 def annotation_of(column: Column[Any], mapper: Mapper[Any]) -> object:
     """Return the Python type with which a column is declared, without ``Mapped``; object if unknown."""
-    for one in mapper.self_and_descendants:
-        for cls in one.class_.__mro__:
+    for mapper_below in mapper.self_and_descendants:
+        for cls in mapper_below.class_.__mro__:
             declared = inspect.get_annotations(cls).get(column.key)
             if declared is not None and get_args(declared):
                 return get_args(declared)[0]

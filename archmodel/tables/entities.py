@@ -147,7 +147,7 @@ class Entity(Kind, Base):
     measurements: Mapped[list[Measurement]] = relationship(order_by=Measurement.entry_id)
 
     def __init_subclass__(cls, **options: Any) -> None:
-        columns = [(name, one.column) for name, one in vars(cls).items() if isinstance(one, MappedColumn)]
+        columns = [(name, var.column) for name, var in vars(cls).items() if isinstance(var, MappedColumn)]
         declared = [declared_attribute(column, name) for name, column in columns]
         if declared:
             cls.__own__ = tuple(one for one in declared if one is not None)

@@ -46,7 +46,7 @@ def _misfit(fitting: dict[str, Any]) -> str | None:
         if here != there:
             remedy = f": pip install numba=={there}" if name == "numba" else ""
             return f"the kernels of this wheel are for {name} {there}, here is {here}{remedy}"
-    needed = {one.lstrip("+") for one in fitting["environment"]["NUMBA_CPU_FEATURES"].split(",")}
+    needed = {word.lstrip("+") for word in fitting["environment"]["NUMBA_CPU_FEATURES"].split(",")}
     lacking = sorted(needed - _features())
     if lacking:
         return f"the kernels of this wheel need a processor with {', '.join(lacking)}"

@@ -97,7 +97,7 @@ class _Recorder(event.Listener):  # type: ignore[misc]
         """Take down a kernel that Python code calls."""
         if self._depth == 0:
             function = event.data["dispatcher"].py_func
-            types = tuple(_encoded(one) for one in event.data["args"])
+            types = tuple(_encoded(arg) for arg in event.data["args"])
             self.uses.append(KernelUse(function.__module__, function.__qualname__, types))
         self._depth += 1
 

@@ -148,10 +148,10 @@ def open_numbers(
         if names and {*"xyz"} <= set(places):
             starts = all(_is_float(cells[places[one]], commas) for one in "xyz")
         if starts:
-            if len([one for one in cells if _is_float(one, commas)]) < least:
+            if len([cell for cell in cells if _is_float(cell, commas)]) < least:
                 break
             _check(path, head, titles, names, places)
-            even = all(_is_float(one, commas) for one in cells) and not line.rstrip().endswith(
+            even = all(_is_float(cell, commas) for cell in cells) and not line.rstrip().endswith(
                 separator or "\n"
             )
             stream = NumberStream(
@@ -181,7 +181,7 @@ def _encoding(path: Path) -> str:
 
 def _fields(line: str, separator: str | None) -> list[str]:
     """Return the fields of a line, without an empty one at its end."""
-    cells = [one.strip().strip('"') for one in line.strip().split(separator)]
+    cells = [word.strip().strip('"') for word in line.strip().split(separator)]
     return cells[:-1] if len(cells) > 1 and not cells[-1] else cells
 
 
@@ -190,8 +190,8 @@ def _style(line: str) -> tuple[str | None, bool]:
     if ";" in line:
         return ";", "," in line
     if "\t" in line.strip() or len(line.split()) >= 3:
-        blank = len([one for one in line.split() if one.strip(",")]) >= 3
-        ends = all(one.endswith(",") for one in line.split()[:2])
+        blank = len([word for word in line.split() if word.strip(",")]) >= 3
+        ends = all(word.endswith(",") for word in line.split()[:2])
         return (",", False) if ends else (None, blank and "," in line)
     return ",", False
 
@@ -205,7 +205,7 @@ def _names(titles: Sequence[str], count: int, separator: str | None) -> list[str
     """Return the names of the columns: the last title that has as many fields; otherwise an empty list."""
     for title in reversed(titles):
         names = _fields(title.strip().lstrip("/#").strip(), separator)
-        if len(names) == count and not any(is_number(one) for one in names):
+        if len(names) == count and not any(is_number(name) for name in names):
             return names
     return []
 

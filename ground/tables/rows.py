@@ -112,20 +112,20 @@ class TextRows:
                 values = self._quoted(row)
             except csv.Error as error:
                 if limit and str(error) != _OPEN and not row.lstrip().startswith('"'):  # inches, say
-                    return [one.strip() for one in row.split(self.delimiter, limit - 1)]
+                    return [word.strip() for word in row.split(self.delimiter, limit - 1)]
                 what, remedy = f"not a table line: {error}", "check quotes and separators"
                 raise self.fail(line, what, remedy) from error
-            values = [" ".join(one.split("\n")).strip() for one in values]
+            values = [" ".join(value.split("\n")).strip() for value in values]
             if limit and len(values) > limit:
                 values[limit - 1 :] = [self.delimiter.join(values[limit - 1 :])]
             return values
         if not self.delimiter:
-            return [one.strip('"') for one in row.split(None, limit - 1 if limit else -1)]
-        return [one.strip() for one in row.split(self.delimiter, limit - 1 if limit else -1)]
+            return [word.strip('"') for word in row.split(None, limit - 1 if limit else -1)]
+        return [word.strip() for word in row.split(self.delimiter, limit - 1 if limit else -1)]
 
     def rough_cells(self, row: str) -> list[str]:
         """Split a row that has wrong quotes, to find the stone that it names."""
-        return [one.strip() for one in row.replace('"', "").split(self.delimiter or None)]
+        return [word.strip() for word in row.replace('"', "").split(self.delimiter or None)]
 
     def is_date(self, text: str, line: int, column: int) -> bool:
         """Return whether a field is a date as spreadsheets write it for 1-1: 1-Jan, 01. Jan, Jan 01."""
@@ -140,7 +140,9 @@ class TextRows:
         if self.delimiter is not None:
             return (self.delimiter,)
         bare = re.sub(r'"[^"]*"', "", row)
-        found = sorted((one for one in _DELIMITERS if one in bare), key=bare.count, reverse=True)
+        found = sorted(
+            (delimiter for delimiter in _DELIMITERS if delimiter in bare), key=bare.count, reverse=True
+        )
         return found if set(found) - {","} else (*found, _BLANKS)
 
 
@@ -176,7 +178,7 @@ class ListRows:
         """Return the cells; those after `limit` are joined by blanks."""
         values = list(row)
         if limit and len(values) > limit:
-            values[limit - 1 :] = [" ".join(one for one in values[limit - 1 :] if one)]
+            values[limit - 1 :] = [" ".join(value for value in values[limit - 1 :] if value)]
         return values
 
     def rough_cells(self, row: Sequence[str]) -> list[str]:
@@ -211,9 +213,9 @@ def _sheet_rows(path: Path, sheet: str | None) -> ListRows:
             raise UsageError(
                 f"no sheet {shown(sheet)}", where=str(path), remedy=f"sheets: {', '.join(names)}"
             )
-        sheets = {one: book.get_sheet_by_name(one) for one in ([sheet] if sheet is not None else names)}
-        cells = {one: _spread(content) for one, content in sheets.items()}
-        tables = {one: _filled(rows) for one, (rows, _) in cells.items()}
+        sheets = {name: book.get_sheet_by_name(name) for name in ([sheet] if sheet is not None else names)}
+        cells = {key: _spread(content) for key, content in sheets.items()}
+        tables = {key: _filled(rows) for key, (rows, _) in cells.items()}
     except (CalamineError, OSError, ValueError) as error:
         raise SurveyError(
             f"looks like a workbook, but cannot be read: {str(error)[:120]}".replace("\n", " "),
@@ -222,7 +224,7 @@ def _sheet_rows(path: Path, sheet: str | None) -> ListRows:
         ) from error
     if not names:
         raise SurveyError("the workbook has no sheets", where=str(path), remedy="save the table as CSV")
-    full = [one for one, rows in tables.items() if rows]
+    full = [key for key, rows in tables.items() if rows]
     if len(full) > 1:
         raise UsageError(
             f"the workbook has {len(full)} sheets: {', '.join(full)}",
@@ -304,7 +306,7 @@ def _filled(rows: Sequence[Sequence[Any]]) -> list[tuple[int, list[str]]]:
     found = []
     for number, row in enumerate(rows, start=1):
         cells = [cell_text(one) for one in row]
-        full = [one for one in cells if one]
+        full = [cell for cell in cells if cell]
         if full and not (len(full) == 1 and full[0].startswith("#")):
             found.append((number, cells))
     return found

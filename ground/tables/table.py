@@ -128,7 +128,7 @@ class Table:
             if it has as many fields as the rows, some of them numbers
         """
         for title in self.titles:
-            numbers = [one for one in title.cells[1:] if is_number(one, self.commas)]
+            numbers = [cell for cell in title.cells[1:] if is_number(cell, self.commas)]
             if numbers and len(title.cells) == len(self.rows[0].cells):
                 raise SurveyError(
                     f"{shown(' '.join(title.cells))} is neither names of columns nor a row like the others",
@@ -171,7 +171,7 @@ def read_table(
         what = f"{text} is not a row of this table" if rows else "the file has no rows"
         raise SurveyError(what, where=f"{source.path}:{line}", remedy=remedy)
     remarks = tuple(
-        TableRow(number, tuple(one.strip() for one in text.split(source.delimiter or None)))
+        TableRow(number, tuple(word.strip() for word in text.split(source.delimiter or None)))
         for number, text in source.comments
     )
     decimals = Decimals(source.path, commas, source.any_mark)
@@ -208,10 +208,12 @@ def _separator(source: TextRows, lines: Sequence[tuple[int, Row]], is_row: IsRow
                     numbers += sum(is_number(cell, one != ",") for cell in cells) / len(cells)
         scores[one] = rows, numbers
     most = max(rows for rows, _ in scores.values())
-    clear = (one for one in _SEPARATORS[:-1] if one in scores and scores[one][0] == most)
+    clear = (
+        separator for separator in _SEPARATORS[:-1] if separator in scores and scores[separator][0] == most
+    )
     best: str = next(clear, None) or max(scores, key=lambda one: scores[one])
     pairs = [str(line).strip().strip('"') for _, line in lines if _TWO_PARTS.fullmatch(str(line).strip())]
-    if best == "," and len(pairs) >= scores[","][0] and _repeats([one.partition(",")[0] for one in pairs]):
+    if best == "," and len(pairs) >= scores[","][0] and _repeats([pair.partition(",")[0] for pair in pairs]):
         return _BLANKS
     return best
 

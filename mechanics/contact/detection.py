@@ -212,7 +212,7 @@ class Detector:
         spacing = self.spacing if self.spacing and self.placement == Placement.AREA else 0.0
 
         def part(a: int, b: int) -> tuple[Any, ...]:
-            some = Pairs._make(one[a:b] for one in pairs)
+            some = Pairs._make(pair[a:b] for pair in pairs)
             try:
                 found, *points = interface_points(
                     some, self.points, inner, middle, spacing, FLAT, THIN, placed.shapes

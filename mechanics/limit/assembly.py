@@ -159,7 +159,7 @@ def assembly(scene: Scene, widest: float = CLOSED) -> RigidAssembly:
         dead=_dead(model, state, free),
         strength=joint_strength(model, found.contacts, model.laws),
         joints=joints,
-        crushing=stress_blocks(joints, np.array([np.inf if one is None else one for one in crushes])),
+        crushing=stress_blocks(joints, np.array([np.inf if crush is None else crush for crush in crushes])),
         widest=float(gap[closed].max()),
     )
 

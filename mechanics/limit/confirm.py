@@ -76,7 +76,7 @@ class Confirmation:
     @property
     def collapse(self) -> ConfirmationRun | None:
         """Run of the least load that collapses; None where none does."""
-        fallen = [one for one in self.trials if one.outcome is Outcome.COLLAPSED]
+        fallen = [trial for trial in self.trials if trial.outcome is Outcome.COLLAPSED]
         return min(fallen, key=lambda one: one.multiplier, default=None)
 
     def agrees(self, candidate: float) -> bool:
@@ -167,7 +167,7 @@ def confirm(
             # next to the candidate first, half-way later on
             multiplier = min(0.5 * (held + lost), held * (1.0 + way))
             way *= 2.0
-    if np.isfinite(lost) and all(one.outcome.rests for one in trials) and not stop():
+    if np.isfinite(lost) and all(trial.outcome.rests for trial in trials) and not stop():
         # how stones fall beyond the bound
         trials.append(_trial(on, live, (1.0 + _NEAR) * lost, progress, stop))
     return Confirmation(held, float(lost), tuple(trials))

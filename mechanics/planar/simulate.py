@@ -88,7 +88,7 @@ def _simulated(
         report(Progress("step", run.steps, run.total, f"η {step.solution.natural_map:.1e}"))
         stopped = not run.done and stop()
         last = run.done or stopped
-        due = [one for one in observers if last or one.wants(run.steps)]
+        due = [observer for observer in observers if last or observer.wants(run.steps)]
         if due:
             instant = run.instant()
             for one in due:

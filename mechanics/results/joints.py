@@ -307,8 +307,8 @@ def _merged(section: JointPolygons, other: JointPolygons, rows: Ints) -> JointPo
         for one in (section, other)
     )
     values: dict[str, Any] = {
-        one.name: _put(getattr(wide, one.name), rows, getattr(narrow, one.name)[rows])
-        for one in fields(JointPolygons)
+        field.name: _put(getattr(wide, field.name), rows, getattr(narrow, field.name)[rows])
+        for field in fields(JointPolygons)
     }
     return JointPolygons(**values)
 

@@ -174,7 +174,7 @@ def stage_result(result: Result, name: str, laid: int, removed: int, held: int, 
         displacement=moved[most] if moved else 0.0,
         moved=free[most].code if moved else "",
         bed=bed,
-        supports=tuple(body.code for body, one in zip(result.bodies, supports, strict=True) if one),
+        supports=tuple(body.code for body, support in zip(result.bodies, supports, strict=True) if support),
         forces=_forces(result)[supports],
     )
 

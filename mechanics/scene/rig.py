@@ -118,7 +118,7 @@ class _Shop:
 
     def make(self, code: str, *boxes: Box, density: float | None = None) -> None:
         """Make a piece that fills some boxes; without a density [kg/m³] it is fixed."""
-        parts = [Part(box_corners(*one) @ self._axes, BOX_FACES) for one in boxes]
+        parts = [Part(box_corners(*box) @ self._axes, BOX_FACES) for box in boxes]
         faces = tuple(
             tuple(k + len(part.vertices) * number for k in face)
             for number, part in enumerate(parts)
@@ -151,8 +151,8 @@ def rigged(scene: Scene, rig: Rig, motion: Motion) -> Scene:
     SceneError : the push is not where it can act
     """
     shop, corners = _Shop(rig.axes), [block.vertices @ rig.axes.T for block in scene.blocks]
-    a, c, bottom = np.min([one.min(axis=0) for one in corners], axis=0).tolist()
-    b, d, top = np.max([one.max(axis=0) for one in corners], axis=0).tolist()
+    a, c, bottom = np.min([corner.min(axis=0) for corner in corners], axis=0).tolist()
+    b, d, top = np.max([corner.max(axis=0) for corner in corners], axis=0).tolist()
     tall, at = top - bottom, bottom + rig.height
     wide, forces = _BEYOND * tall, scene.loads.forces
     fall = float(np.linalg.norm(scene.gravity))
@@ -186,7 +186,9 @@ def rigged(scene: Scene, rig: Rig, motion: Motion) -> Scene:
         if rig.height > tall:
             raise _misplaced(rig, "above", tall, "push lower, or put a beam on")
         edge, yields = _EDGE * _LUG * tall, _YIELDS
-        near = [one for one in corners if one[:, 2].min() < at + edge and one[:, 2].max() > at - edge]
+        near = [
+            corner for corner in corners if corner[:, 2].min() < at + edge and corner[:, 2].max() > at - edge
+        ]
         face = min(float(one[:, 0].min()) for one in near)
         shop.make(JAWS[0], ((face - wide, c, at - edge), (face, d, at + edge)))
         width = 2 * edge

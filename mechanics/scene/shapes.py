@@ -258,7 +258,7 @@ def wall(
             if course[k] > 0
         ]
         fixed = row == 0 and not slab
-        blocks += [replace(one, fidelity=Fidelity.FIXED) for one in stones] if fixed else stones
+        blocks += [replace(stone, fidelity=Fidelity.FIXED) for stone in stones] if fixed else stones
     return tuple(blocks)
 
 

@@ -376,7 +376,7 @@ def _checked(on: RigidAssembly, oscillator: Kinematics, code: str, site: Site) -
         "caution": found.caution,
         "passed": found.passed,
         "values": list(found.values),
-        "checks": [asdict(one) | {"ratio": one.ratio, "passed": one.passed} for one in found.checks],
+        "checks": [asdict(check) | {"ratio": check.ratio, "passed": check.passed} for check in found.checks],
     }
 
 

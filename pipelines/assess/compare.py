@@ -126,7 +126,7 @@ def compare(
         summary = _summary(result, assembly, courses, plumb, battered)
         summary["inputs"] = {title: list(lines) for title, lines in inputs.items()}
         values = _values(courses, plumb)
-        results = tuple(_with_values(one, values.get(one.code, {})) for one in stone_results(result))
+        results = tuple(_with_values(result, values.get(result.code, {})) for result in stone_results(result))
         lines = [
             Lines(one.name, one.colour, [line - assembly.origin for line in one.lines])
             for one in bed_lines(courses, {facade.name: facade.frame.axes[2] for facade in facades})
@@ -155,9 +155,9 @@ def measured_stones(models: Sequence[StoneModel]) -> tuple[tuple[StoneQuality, .
 def facades_of(stones: Sequence[StoneQuality]) -> tuple[Facade, ...]:
     """Return the facades that measured stones make."""
     return find_facades(
-        np.array([one.normal for one in stones]).reshape(-1, 3),
-        np.array([one.area for one in stones]),
-        np.array([one.outline.mean(axis=0) for one in stones]).reshape(-1, 3),
+        np.array([stone.normal for stone in stones]).reshape(-1, 3),
+        np.array([stone.area for stone in stones]),
+        np.array([stone.outline.mean(axis=0) for stone in stones]).reshape(-1, 3),
     )
 
 
@@ -169,8 +169,8 @@ def _summary(
     battered: bool,
 ) -> dict[str, Any]:
     walls: dict[tuple[str, str | None], list[Misfit]] = {}
-    for one in courses:
-        walls.setdefault((one.line.facade, one.line.zone or None), []).append(one.misfit)
+    for course in courses:
+        walls.setdefault((course.line.facade, course.line.zone or None), []).append(course.misfit)
     beds = [
         {"facade": facade, "zone": zone, "quantity": "beds", **_told(_sum(found))}
         for (facade, zone), found in walls.items()
@@ -199,7 +199,9 @@ def _summary(
 
 def _sum(misfits: Sequence[Misfit]) -> Misfit:
     return Misfit(
-        sum(one.chi2 for one in misfits), sum(one.still for one in misfits), sum(one.dof for one in misfits)
+        sum(misfit.chi2 for misfit in misfits),
+        sum(misfit.still for misfit in misfits),
+        sum(misfit.dof for misfit in misfits),
     )
 
 
@@ -231,12 +233,12 @@ def _values(courses: Sequence[CourseMovement], plumb: Sequence[PlumbMovement]) -
     found: dict[str, dict[str, float]] = {}
     for name, groups in (("sag", courses), ("plumb", plumb)):
         for group in groups:
-            for code, one in group.stones.items():
+            for code, stone in group.stones.items():
                 found.setdefault(code, {}).update(
                     {
-                        f"{name}_measured": one.measured,
-                        f"{name}_simulated": one.simulated,
-                        f"{name}_sigma": one.sigma,
+                        f"{name}_measured": stone.measured,
+                        f"{name}_simulated": stone.simulated,
+                        f"{name}_sigma": stone.sigma,
                     }
                 )
     return found
@@ -252,15 +254,15 @@ def _draw(
     """Draw of each facade and zone the bed lines, measured and simulated, and the misfit of each stone."""
     by_code = {stone.code: stone for stone in stones}
     walls: dict[tuple[str, str], list[CourseMovement]] = {}
-    for one in courses:
-        walls.setdefault((one.line.facade, one.line.zone or ""), []).append(one)
+    for course in courses:
+        walls.setdefault((course.line.facade, course.line.zone or ""), []).append(course)
     frames = {facade.name: facade for facade in facades}
     for number, ((facade, _), lines) in enumerate(walls.items(), start=1):
         draw_bed_movement(folder / f"beds-{number}.png", lines)
         misfit = {
-            code: (one.measured - one.simulated) / one.sigma
+            code: (stone.measured - stone.simulated) / stone.sigma
             for line in lines
-            for code, one in line.stones.items()
+            for code, stone in line.stones.items()
         }
         outlines = [by_code[code].outline for code in misfit]
         draw_misfit(folder / f"misfit-{number}.png", frames[facade], outlines, list(misfit.values()), _WORST)

@@ -64,7 +64,7 @@ def weakest_push(on: RigidAssembly) -> LoadQuestion:
             known[angle] = limit_load(on, push(angle).live).multiplier
         return known[angle]
 
-    best = min((float(one) for one in range(0, 360, _COARSE)), key=bound)
+    best = min((float(index) for index in range(0, 360, _COARSE)), key=bound)
     width = _COARSE / 2.0
     while width >= _FINE:
         best = min((best - width, best, best + width), key=bound)

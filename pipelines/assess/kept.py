@@ -34,7 +34,7 @@ class Kept:
 
     def __init__(self, place: Path, records: Sequence[type]) -> None:
         self._place = place
-        self._records = {one.__name__: one for one in records}
+        self._records = {record.__name__: record for record in records}
         self._versions = json.dumps(dict(versions()), sort_keys=True)
 
     def __len__(self) -> int:
@@ -72,7 +72,7 @@ class Kept:
         if isinstance(value, np.ndarray):
             return ["array", value.dtype.str, value.shape, value.ravel().tolist()]
         if is_dataclass(value) and type(value).__name__ in self._records:
-            parts = {one.name: self.plain(getattr(value, one.name)) for one in fields(value)}
+            parts = {field.name: self.plain(getattr(value, field.name)) for field in fields(value)}
             return ["record", type(value).__name__, parts]
         if isinstance(value, Mapping):
             return ["mapping", {key: self.plain(one) for key, one in value.items()}]

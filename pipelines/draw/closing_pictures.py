@@ -83,12 +83,12 @@ def draw_in_space(folder: Path, shapes: ClosingShapes) -> tuple[str, ...]:
 
 def flat_facades(shapes: ClosingShapes) -> tuple[Facade, ...]:
     """Find the facades that an elevation shows undistorted, largest first; a vault or a dome has none."""
-    seen = np.array([k for k, one in enumerate(shapes.stones) if not one.core])
+    seen = np.array([k for k, stone in enumerate(shapes.stones) if not stone.core])
     if not len(seen):
         return ()
-    normals = np.array([one.normal for one in shapes.stones])
-    areas = np.array([0.0 if one.core else one.area for one in shapes.stones])
-    centroids = np.array([one.centroid for one in shapes.stones])
+    normals = np.array([stone.normal for stone in shapes.stones])
+    areas = np.array([0.0 if stone.core else stone.area for stone in shapes.stones])
+    centroids = np.array([stone.centroid for stone in shapes.stones])
     found = []
     for own_facade in find_facades(normals[seen], areas[seen], centroids[seen]):
         facade = replace(own_facade, members=seen[own_facade.members])
@@ -104,8 +104,8 @@ def flat_facades(shapes: ClosingShapes) -> tuple[Facade, ...]:
 
 def viewpoint(shapes: ClosingShapes) -> tuple[Array, float]:
     """Choose a viewpoint for all stones: horizontal direction to the viewer (3,), and elevation above it [rad]."""
-    areas = np.array([one.area for one in shapes.stones])
-    mean = areas @ np.array([one.normal for one in shapes.stones]) / areas.sum()
+    areas = np.array([stone.area for stone in shapes.stones])
+    mean = areas @ np.array([stone.normal for stone in shapes.stones]) / areas.sum()
     level = mean * [1.0, 1.0, 0.0]
     size = float(np.linalg.norm(level))
     steep = abs(float(mean[2])) > max(size, _LEVEL)
@@ -117,8 +117,8 @@ def viewpoint(shapes: ClosingShapes) -> tuple[Array, float]:
 
 def _along(shapes: ClosingShapes) -> Array:
     """Return the horizontal direction that the fewest faces look in: the axis of a vault, from its southern end."""
-    areas = np.array([one.area for one in shapes.stones])
-    level = np.array([one.normal for one in shapes.stones])[:, :2]
+    areas = np.array([stone.area for stone in shapes.stones])
+    level = np.array([stone.normal for stone in shapes.stones])[:, :2]
     _, directions = np.linalg.eigh((level * areas[:, None]).T @ level)
     x, y = directions[:, 0].tolist()
     sign = -1.0 if (y, x) > (0.0, 0.0) else 1.0
@@ -128,28 +128,32 @@ def _along(shapes: ClosingShapes) -> Array:
 def closing_surface(shapes: ClosingShapes, step: str = "moved") -> ClosingSurface:
     """Gather the faces of all stones and joints, with the movement of each corner in one of the two steps."""
     simplified = step == "simplified"
-    solids = [one.surveyed if simplified else one.simple for one in shapes.stones]
-    starts = np.cumsum([0, *(len(one.vertices) for one in solids)])
-    shut = [one for one in shapes.joints if not one.joint.left_open and one.polygon is not None]
-    left = [one for one in shapes.joints if one.joint.left_open and one.polygon is not None]
+    solids = [stone.surveyed if simplified else stone.simple for stone in shapes.stones]
+    starts = np.cumsum([0, *(len(solid.vertices) for solid in solids)])
+    shut = [joint for joint in shapes.joints if not joint.joint.left_open and joint.polygon is not None]
+    left = [joint for joint in shapes.joints if joint.joint.left_open and joint.polygon is not None]
     joint_points, joint_triangles, of_joint = fan_polygons(
         [one.polygon for one in shut if one.polygon is not None]
     )
     gap_points, gap_triangles, _ = fan_polygons([one.polygon for one in left if one.polygon is not None])
     return ClosingSurface(
-        points=np.concatenate([one.vertices for one in solids]),
+        points=np.concatenate([solid.vertices for solid in solids]),
         triangles=np.concatenate(
-            [triangulate(one) + start for one, start in zip(solids, starts[:-1], strict=True)]
+            [triangulate(solid) + start for solid, start in zip(solids, starts[:-1], strict=True)]
         ).astype(np.int64),
-        edges=np.concatenate([_edges(one) + start for one, start in zip(solids, starts[:-1], strict=True)]),
-        moved=np.concatenate([one.simplified if simplified else one.moved for one in shapes.stones]),
+        edges=np.concatenate(
+            [_edges(solid) + start for solid, start in zip(solids, starts[:-1], strict=True)]
+        ),
+        moved=np.concatenate([stone.simplified if simplified else stone.moved for stone in shapes.stones]),
         joint_points=joint_points,
         joint_triangles=joint_triangles,
         joint_width=np.array([one.joint.width for one in shut])[of_joint],
         gap_points=gap_points,
         gap_triangles=gap_triangles,
-        gaps=np.array([one.centroid for one in shapes.places if one.kind == "gap"]).reshape(-1, 3),
-        overlaps=np.array([one.centroid for one in shapes.places if one.kind == "overlap"]).reshape(-1, 3),
+        gaps=np.array([place.centroid for place in shapes.places if place.kind == "gap"]).reshape(-1, 3),
+        overlaps=np.array([place.centroid for place in shapes.places if place.kind == "overlap"]).reshape(
+            -1, 3
+        ),
     )
 
 
@@ -160,14 +164,14 @@ _TITLES = {"simplified": "what simplifying moved", "moved": "what closing the jo
 def _steps(shapes: ClosingShapes) -> list[str]:
     """List the steps that moved any corner: simplifying, closing the joints, or both."""
     known = {
-        "simplified": any(np.nanmax(one.simplified, initial=0.0) > _NOTHING for one in shapes.stones),
-        "moved": any(np.nanmax(one.moved, initial=0.0) > _NOTHING for one in shapes.stones),
+        "simplified": any(np.nanmax(stone.simplified, initial=0.0) > _NOTHING for stone in shapes.stones),
+        "moved": any(np.nanmax(stone.moved, initial=0.0) > _NOTHING for stone in shapes.stones),
     }
     return [name for name, shown in known.items() if shown]
 
 
 def _note(shapes: ClosingShapes) -> str:
-    gaps = sum(one.kind == "gap" for one in shapes.places)
+    gaps = sum(place.kind == "gap" for place in shapes.places)
     overlaps = len(shapes.places) - gaps
     parts = [f"orange: {gaps} gap{'s' * (gaps > 1)}"] if gaps else []
     parts += [f"black: {overlaps} overlap{'s' * (overlaps > 1)}"] if overlaps else []

@@ -112,7 +112,7 @@ def draw_views(
         progress(Progress(stage, done, total))
 
     frame = find_wall(clouds, listen) if wall is None else read_wall(wall)
-    planes = [section_plane(one, frame) for one in sections]
+    planes = [section_plane(section, frame) for section in sections]
     picture, read, shown = paint_wall(clouds, frame, pixel, slab, listen)
     cell = max(pixel, 0.5 * thickness)
     cut = [Section(plane, thickness, cell) for plane in planes if not plane.name.startswith("d")]
@@ -168,14 +168,14 @@ def _cut(
     origin, read = np.floor(clouds[0].near), 0
     for cloud in clouds:
         for chunk in cloud.chunks(origin, False):
-            for one in sections:
-                one.add(chunk.places, origin)
+            for section in sections:
+                section.add(chunk.places, origin)
             read += len(chunk.places)
             listen("cut", read, cloud.count)
 
 
 def _length(lines: Sequence[Array]) -> float:
-    return round(sum(float(np.linalg.norm(np.diff(one, axis=0), axis=1).sum()) for one in lines), 3)
+    return round(sum(float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum()) for line in lines), 3)
 
 
 def _write_sections(lines: dict[str, list[Array]], folder: Path) -> None:

@@ -96,4 +96,4 @@ def draw_mechanisms(
             np.stack(kerns),
         )
         draw_apart("pipelines.draw.offscreen.mechanism", surface, pictures)
-    return [Path(one["path"]).name for one in pictures]
+    return [Path(picture["path"]).name for picture in pictures]

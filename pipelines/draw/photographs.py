@@ -41,10 +41,10 @@ def draw_network(path: Path, values: Mapping[str, Any]) -> float:
     from matplotlib.collections import EllipseCollection, LineCollection
 
     stations = np.array([[one["x"], one["y"], one["z"]] for one in values["photos"]])
-    points = np.array([one["xyz"] for one in values["points"]]).reshape(-1, 3)
-    covariances = np.array([one["covariance"] for one in values["points"]]).reshape(-1, 3, 3)
+    points = np.array([point["xyz"] for point in values["points"]]).reshape(-1, 3)
+    covariances = np.array([point["covariance"] for point in values["points"]]).reshape(-1, 3, 3)
     control = {one["id"] for one in values["control"]}
-    held = np.array([one["id"] in control for one in values["points"]], dtype=bool)
+    held = np.array([point["id"] in control for point in values["points"]], dtype=bool)
     rays = _rays(values, stations, points)
     some = np.linspace(0, len(points) - 1, min(len(points), _ELLIPSES)).astype(int)
     everything = np.concatenate([stations, points])
@@ -71,8 +71,8 @@ def draw_network(path: Path, values: Mapping[str, Any]) -> float:
             )
         )  # fmt: skip
         if len(stations) <= _NAMED:
-            for one, place in zip(values["photos"], stations[:, flat], strict=True):
-                axes.annotate(one["name"], place, xytext=(3, 3), textcoords="offset points", fontsize=6)
+            for photo, place in zip(values["photos"], stations[:, flat], strict=True):
+                axes.annotate(photo["name"], place, xytext=(3, 3), textcoords="offset points", fontsize=6)
         axes.set_aspect("equal")
         axes.set_xlabel(names[0])
         axes.set_ylabel(names[1])
@@ -83,8 +83,8 @@ def draw_network(path: Path, values: Mapping[str, Any]) -> float:
 
 
 def _rays(values: Mapping[str, Any], stations: Array, points: Array) -> Array:
-    photo = {one["name"]: k for k, one in enumerate(values["photos"])}
-    point = {one["id"]: k for k, one in enumerate(values["points"])}
+    photo = {photo["name"]: k for k, photo in enumerate(values["photos"])}
+    point = {point["id"]: k for k, point in enumerate(values["points"])}
     pairs = [
         (photo[f], point[i])
         for f, i in zip(values["marks"]["photo"], values["marks"]["point"], strict=True)
@@ -113,7 +113,7 @@ def draw_photo_residuals(
     pictures : files of the photographs themselves, by their names
     """
     marks = values["marks"]
-    size = {one["name"]: one["size"] for one in values["cameras"]}
+    size = {camera["name"]: camera["size"] for camera in values["cameras"]}
     photos = sorted(values["photos"], key=lambda one: -(one["rms"] or 0.0))[:_PHOTOS]
     names = {one["name"] for one in photos}
     photos = [one for one in values["photos"] if one["name"] in names]
@@ -131,16 +131,18 @@ def draw_photo_residuals(
     rows = -(-len(photos) // columns)
     figure = new_sheet((11.0, 2.2 * rows + 0.4))
     grid = np.atleast_1d(figure.subplots(rows, columns, squeeze=False)).ravel()
-    for axes, one in zip(grid, photos, strict=False):
-        mine = of == one["name"]
-        if one["name"] in pictures:
-            _lay_under(axes, pictures[one["name"]], size[one["camera"]])
+    for axes, photo in zip(grid, photos, strict=False):
+        mine = of == photo["name"]
+        if photo["name"] in pictures:
+            _lay_under(axes, pictures[photo["name"]], size[photo["camera"]])
         _vectors(axes, at[mine], factor * off[mine], verdict[mine] != "")
-        w, h = size[one["camera"]]
+        w, h = size[photo["camera"]]
         axes.set_xlim(0, w)
         axes.set_ylim(h, 0)
         axes.set_title(
-            f"{one['name']}: {one['marks']} marks, rms {one['rms'] or 0.0:.2f} px", fontsize=7, color=INK
+            f"{photo['name']}: {photo['marks']} marks, rms {photo['rms'] or 0.0:.2f} px",
+            fontsize=7,
+            color=INK,
         )
     for axes in grid:
         axes.set_aspect("equal")
@@ -204,7 +206,9 @@ def draw_outlines(
     stones : in the frame of the photographs
     pictures : files of the photographs themselves, by their names
     """
-    count = {one.name: sum(len(stone.marks.get(one.name, ())) for stone in stones) for one in oriented.photos}
+    count = {
+        photo.name: sum(len(stone.marks.get(photo.name, ())) for stone in stones) for photo in oriented.photos
+    }
     drawn_on = {stone.drawn for stone in stones}
     best = sorted(count, key=lambda name: (name not in drawn_on, -count[name]))
     chosen = sorted(name for name in best[:_DRAWN] if count[name])

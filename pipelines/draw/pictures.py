@@ -151,7 +151,7 @@ def _heading(result: Result, name: str) -> list[str]:
     seen = ""
     if (
         name == "displacement"
-        and support_motion(result.bodies, [one.position for one in result.bodies]).any()
+        and support_motion(result.bodies, [body.position for body in result.bodies]).any()
     ):
         seen = ", seen from the supports"
     lines = [f"{result.scene.name}: {picture.title}{seen}, {ending}", *result.cautions[:1]]

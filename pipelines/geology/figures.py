@@ -277,7 +277,7 @@ def draw_course(path: Path, rows: Mapping[str, Array], phases: Sequence[float], 
     figure = new_sheet((_WIDE, 0.6 + 2.4 * len(units)))
     panels = figure.subplots(len(units), 1, sharex=True, squeeze=False)[:, 0]
     for axes, unit in zip(panels, units, strict=True):
-        for name in (one for one in names if one.endswith(unit)):
+        for name in (name for name in names if name.endswith(unit)):
             axes.plot(rows["time"], rows[name], label=name.removesuffix(unit).strip(), linewidth=0.9)
         for time in phases:
             axes.axvline(time, color="black", linewidth=0.5, linestyle="--")

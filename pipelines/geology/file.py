@@ -167,7 +167,7 @@ def _check_motion(scene: GeologyScene) -> None:
     time, smallest = scene.time, scene.sample.smallest
     with scene.document.at(scene.kind):
         setup = scene.experiment.setup(time.step, time.step * time.steps)
-    for motion in (one for one in setup.loads.motions if isinstance(one, ImposedMotion)):
+    for motion in (motion for motion in setup.loads.motions if isinstance(motion, ImposedMotion)):
         way = time.step * float(np.linalg.norm(np.atleast_2d(motion.velocity.value), axis=1).max())
         if way > smallest:
             scene.document.fail(

@@ -100,7 +100,7 @@ def _pulls(scene: GeologyScene) -> str:
 def _cohesions(scene: GeologyScene) -> list[float]:
     """Return the pull of the contacts within each layer [N]."""
     own = scene.contact.cohesion
-    return [own if one.cohesion is None else one.cohesion for one in scene.layers] or [own]
+    return [own if layer.cohesion is None else layer.cohesion for layer in scene.layers] or [own]
 
 
 def write_results(

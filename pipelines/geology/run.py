@@ -137,8 +137,8 @@ def _between_layers(
         return []
     contact, names = scene.contact, np.array(codes)
     groups = [frozenset(names[material == number].tolist()) for number in range(len(layers))]
-    friction = [contact.friction if one.friction is None else one.friction for one in layers]
-    cohesion = [contact.cohesion if one.cohesion is None else one.cohesion for one in layers]
+    friction = [contact.friction if layer.friction is None else layer.friction for layer in layers]
+    cohesion = [contact.cohesion if layer.cohesion is None else layer.cohesion for layer in layers]
     rules = []
     for one, other in combinations_with_replacement(range(len(layers)), 2):
         if groups[one] and groups[other]:

@@ -78,7 +78,7 @@ def ingest(
     DatabaseError : a stone or a file is in the database already; the database is unchanged
     """
     sources = survey_sources(paths, format)
-    surveys = [one.path for one in sources]
+    surveys = [source.path for source in sources]
     rejects = None if isinstance(keep_going, bool) else Path(keep_going)
     if rejects is not None and len(surveys) > 1:
         raise UsageError(
@@ -96,7 +96,7 @@ def ingest(
         for target in targets:
             check_outline_rejects(target)
     elif keep_going:
-        check_targets(targets, [file for one in sources for file in one.files])
+        check_targets(targets, [file for source in sources for file in source.files])
     with ExitStack() as held:
         _open_if_there(url, held)
         check_kinds(rules)
@@ -158,7 +158,7 @@ def _listed_stations(tally: Tally, options: ReadingOptions | None) -> list[int]:
     """List the lines of the stations that are given among the points, not in the header file."""
     elsewhere = () if options is None or options.head is None else options.head.stations
     known = {one.name for one in elsewhere}
-    return [one.line for one in tally.stream.head.stations if one.name not in known]
+    return [station.line for station in tally.stream.head.stations if station.name not in known]
 
 
 def _measure(
@@ -175,11 +175,11 @@ def _measure(
     stream = survey_stones(open_source(source, format, options, progress))
     tally = Tally(path, stream, read_files(source, options), options or ReadingOptions())
     stage, head, kinds = f"fit {path.name}", tally.stream.head, set[str]()
-    for one in tally.stream.stones:
+    for stone in tally.stream.stones:
         made = (
-            one
-            if isinstance(one, Reject)
-            else _of_known_kind(apply_rules(one, rules), head.path, kinds, format not in ("moma", "solids"))
+            stone
+            if isinstance(stone, Reject)
+            else _of_known_kind(apply_rules(stone, rules), head.path, kinds, format not in ("moma", "solids"))
         )
         if not isinstance(made, Reject):
             tally.count(made)
@@ -206,7 +206,7 @@ def _store(session: Session, tally: Tally, stones: Iterator[StoneRecord], again:
         head.path,
         _sha256(tally.files),
         stones,
-        stations={one.name: one.position.tolist() for one in head.stations},
+        stations={station.name: station.position.tolist() for station in head.stations},
         frame=frame_record(tally.stream.transform),
         again=again,
     )

@@ -223,10 +223,10 @@ def _holds(node: Node, values: Mapping[str, Value]) -> bool | None:
     """Evaluate an expression for a stone; None where a value is missing."""
     match node:
         case All(operands):
-            found = [_holds(one, values) for one in operands]
+            found = [_holds(operand, values) for operand in operands]
             return False if False in found else None if None in found else True
         case AnyOf(operands):
-            found = [_holds(one, values) for one in operands]
+            found = [_holds(operand, values) for operand in operands]
             return True if True in found else None if None in found else False
         case Not(operand):
             held = _holds(operand, values)
@@ -238,12 +238,13 @@ def _holds(node: Node, values: Mapping[str, Value]) -> bool | None:
         case Comparison(Token(text="kind"), sign, value):
             return _is_a(values["kind"], value) is (sign == "=")
         case IsIn(Token(text="kind"), members):
-            return any(_is_a(values["kind"], one) for one in members)
+            return any(_is_a(values["kind"], member) for member in members)
         case Comparison(attribute, sign, value):
             return _compared(sign, values[attribute.text], _value(attribute, value, values))
         case IsIn(attribute, members):
             found = [
-                _compared("=", values[attribute.text], _value(attribute, one, values)) for one in members
+                _compared("=", values[attribute.text], _value(attribute, member, values))
+                for member in members
             ]
             return True if True in found else None if None in found else False
     return None

@@ -34,11 +34,11 @@ def masonry_values(
     found: dict[int, dict[str, float | None]] = {}
     for faces in zones.values():
         facades = find_facades(
-            np.array([one.normal for one in faces]),
-            np.array([one.area for one in faces]),
-            np.array([one.outline.mean(axis=0) for one in faces]),
+            np.array([face.normal for face in faces]),
+            np.array([face.area for face in faces]),
+            np.array([face.outline.mean(axis=0) for face in faces]),
         )
-        for wall in judge_masonry([_stone(one) for one in faces], facades):
+        for wall in judge_masonry([_stone(face) for face in faces], facades):
             values = _values(wall)
             found.update((faces[i].id, values) for i in wall.stones.tolist())
     return found

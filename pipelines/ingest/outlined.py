@@ -232,7 +232,7 @@ def size_of(text: str) -> tuple[float, float]:
     """
     found = _SIZE.fullmatch(text.strip().lower().removesuffix("m").strip())
     if found is not None:
-        width, height = (float(one.replace(",", ".")) for one in found.groups())
+        width, height = (float(group.replace(",", ".")) for group in found.groups())
         if 0.0 < width < _LARGEST and 0.0 < height < _LARGEST:
             return width, height
     remedy = "give width and height of the picture or wall in metres, e.g. 1.0x1.2"
@@ -241,4 +241,4 @@ def size_of(text: str) -> tuple[float, float]:
 
 def _shared(base: ReadingOptions) -> dict[str, Any]:
     """Return the options of all formats."""
-    return {one.name: getattr(base, one.name) for one in fields(ReadingOptions)}
+    return {field.name: getattr(base, field.name) for field in fields(ReadingOptions)}

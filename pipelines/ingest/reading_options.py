@@ -34,7 +34,7 @@ def format_of_all(paths: Sequence[str | Path]) -> str:
         if not path.exists():
             raise UsageError("no such file", where=str(path), remedy="name a survey file")
         if path.is_dir():
-            known = {one for ends in ENDINGS.values() for one in ends} - {".json", ".xml"}
+            known = {end for ends in ENDINGS.values() for end in ends} - {".json", ".xml"}
             inside = {
                 format_of(one): one
                 for one in sorted(path.iterdir())

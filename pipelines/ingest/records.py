@@ -92,11 +92,11 @@ def surveyed_block(stone: StoneRecord) -> SurveyedBlock:
 
 
 def _origin(stone: StoneRecord) -> Origin:
-    return next(one for one in get_args(Origin) if one == stone.depth_origin)
+    return next(arg for arg in get_args(Origin) if arg == stone.depth_origin)
 
 
 def _source(stone: StoneRecord) -> Source:
-    return next(one for one in get_args(Source) if one == stone.provenance)
+    return next(arg for arg in get_args(Source) if arg == stone.provenance)
 
 
 def _kept_face(stone: StoneRecord, measured: BlockRecord) -> Face:

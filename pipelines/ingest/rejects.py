@@ -132,7 +132,7 @@ def _head_lines(survey: Path) -> list[bytes]:
 
 
 def _picked(survey: Path, wanted: set[int], sheet: str | None) -> Iterator[tuple[int, bytes]]:
-    return (one for one in _lines(survey, sheet) if one[0] in wanted)
+    return (line for line in _lines(survey, sheet) if line[0] in wanted)
 
 
 def _lines(survey: Path, sheet: str | None = None) -> Iterator[tuple[int, bytes]]:

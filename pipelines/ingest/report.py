@@ -200,7 +200,7 @@ class Tally:
             remarks=self.changed,
             doubts=self.doubts,
             reading=self.stream.remarks,
-            questions=tuple(f"{one.what}: {one.remedy}" for one in self.questions()),
+            questions=tuple(f"{question.what}: {question.remedy}" for question in self.questions()),
             review=self.stream.review,
         )
 

@@ -59,7 +59,7 @@ def _extrude(
     for entity in entities:
         if entity.measurement is None:
             raise UsageError(f"{entity.code} was not measured", remedy="ingest a survey of its face first")
-    changed = [one for one in entities if (one.depth, one.depth_sigma) != (value, sigma)]
+    changed = [entity for entity in entities if (entity.depth, entity.depth_sigma) != (value, sigma)]
     for stone in load_stones(session, changed):
         if stone.provenance == "solid":
             what = f"the depth of {stone.code} is that of its solid, which was surveyed"

@@ -83,7 +83,7 @@ def record(
             else record_list(session, file)
             for file in files
         )
-        related = _relate_corrected(session, [number for one in reports for number in one.entries])
+        related = _relate_corrected(session, [number for report in reports for number in report.entries])
         if dry_run:
             kept.rollback()
         else:

@@ -57,10 +57,10 @@ def write_assessment(path: Path, summary: Mapping[str, Any], model: Model | None
         version=summary["versions"]["moma"],
         versions=summary["versions"],
         head=_HEAD,
-        loads=[_row(one) for one in loads],
+        loads=[_row(load) for load in loads],
         value_head=_VALUES,
         check_head=_CHECKS,
-        parts=[_part(path.parent, number, one) for number, one in enumerate(loads, start=1)],
+        parts=[_part(path.parent, number, load) for number, load in enumerate(loads, start=1)],
     )
 
 
@@ -109,9 +109,9 @@ def _place(axes: WallAxes | None, stones: Sequence[Mapping[str, Any]]) -> str:
     text = (
         f"{len(stones)} stones move, the fastest, {first['code']}, {direction_text(axes, first['velocity'])}"
     )
-    if axes is None or any("centre" not in one for one in stones):
+    if axes is None or any("centre" not in stone for stone in stones):
         return text
-    places = [axes.place(np.array(one["centre"])) for one in stones]
+    places = [axes.place(np.array(stone["centre"])) for stone in stones]
     (left, right), (low, high) = ((min(values), max(values)) for values in zip(*places, strict=True))
     return (
         f"{text}; their centres are {low:.2f} to {high:.2f} m above the foot and {left:.2f} to {right:.2f} m from the "

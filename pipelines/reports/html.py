@@ -65,7 +65,7 @@ def page_text(template: str, model: Model | None = None, **values: object) -> st
         "viewer": None if model is None else viewer_html(model),
         "elevation": None if model is None else elevation(model),
         "title_block": title_block(str(values["name"]), versions),  # type: ignore[arg-type]
-        "languages": {tag: one["name"] for tag, one in catalogues().items()},
+        "languages": {tag: catalogue["name"] for tag, catalogue in catalogues().items()},
         "languages_packed": languages_packed(),
         "viewer_style": style(),
         "viewer_script": script(),
@@ -89,7 +89,9 @@ def input_rows(summary: Mapping[str, Any]) -> list[tuple[str, list[str]]]:
     """Return the lines of each input of a result, by title, and the versions of the programs."""
     rows = [(title, lines) for title, lines in summary.get("inputs", {}).items() if lines]
     if "versions" in summary:
-        rows.append(("Versions", [", ".join(f"{name} {one}" for name, one in summary["versions"].items())]))
+        rows.append(
+            ("Versions", [", ".join(f"{name} {version}" for name, version in summary["versions"].items())])
+        )
     return rows
 
 

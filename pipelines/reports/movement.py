@@ -68,8 +68,8 @@ def write_comparison(path: Path, summary: Mapping[str, Any], model: Model | None
         versions=summary["versions"],
         figures=_figures(path.parent),
         tables=[
-            ("Walls", _WALLS, [_wall(one) for one in summary["walls"]]),
-            ("Courses", _COURSES, [_course(one) for one in summary["courses"]]),
+            ("Walls", _WALLS, [_wall(wall) for wall in summary["walls"]]),
+            ("Courses", _COURSES, [_course(course) for course in summary["courses"]]),
         ],
         notes=(),
     )
@@ -92,11 +92,15 @@ def write_diagnosis_page(path: Path, name: str, summary: Mapping[str, Any], mode
         versions=summary["versions"],
         figures=_figures(path.parent),
         tables=[
-            ("Hypotheses", _HYPOTHESES, [row for one in summary["hypotheses"] for row in _hypothesis(one)]),
+            (
+                "Hypotheses",
+                _HYPOTHESES,
+                [row for hypothesis in summary["hypotheses"] for row in _hypothesis(hypothesis)],
+            ),
             (
                 "Walls and courses",
                 (*_WALLS[:3], "Course", *_WALLS[3:]),
-                [_group(one) for one in summary["groups"]],
+                [_group(group) for group in summary["groups"]],
             ),
         ],
         notes=notes,

@@ -38,7 +38,7 @@ def peak_rows(summary: Mapping[str, Any]) -> list[tuple[str, ...]]:
 
 def _distinct(summary: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """Return the peaks that are known; relative displacements only where the supports move."""
-    known = {name: one for name, one in summary["peaks"].items() if one is not None}
+    known = {name: peak for name, peak in summary["peaks"].items() if peak is not None}
     if known.get("displacement") == known.get("relative_displacement"):
         known.pop("relative_displacement", None)
     return known

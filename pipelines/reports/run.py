@@ -276,17 +276,17 @@ def _stages(summary: Mapping[str, Any]) -> _Section:
     """List the stages of building."""
     rows = [
         (
-            one["name"],
-            one["outcome"],
-            str(one["stones"]),
-            ", ".join(f"{one[name]} {name}" for name in ("laid", "removed", "held") if one[name]),
-            kilonewtons(one["weight"]),
-            kilonewtons(one["reaction"]),
-            f"{millimetres(one['displacement']['max'])} ({one['displacement']['stone'] or 'none moves'})",
-            f"{1e3 * one['bed']:+.1f} mm" if one["bed"] else "",
-            scientific(one["errors"]["balance"]),
+            stage["name"],
+            stage["outcome"],
+            str(stage["stones"]),
+            ", ".join(f"{stage[name]} {name}" for name in ("laid", "removed", "held") if stage[name]),
+            kilonewtons(stage["weight"]),
+            kilonewtons(stage["reaction"]),
+            f"{millimetres(stage['displacement']['max'])} ({stage['displacement']['stone'] or 'none moves'})",
+            f"{1e3 * stage['bed']:+.1f} mm" if stage["bed"] else "",
+            scientific(stage["errors"]["balance"]),
         )
-        for one in summary["stages"]
+        for stage in summary["stages"]
     ]
     head = (
         "Stage", "Outcome", "Stones", "Of these", "Weight", "Reaction", "Largest displacement", "Thickest bed",

@@ -38,7 +38,7 @@ def write_study(path: Path, summary: Mapping[str, Any], pictures: Sequence[str])
         versions=summary["versions"],
         numbers=_numbers(summary),
         shares=[(name, percent(share)) for name, share in _sorted(summary["shares"]["by_input"])],
-        designs=[_design(number, one) for number, one in enumerate(summary["designs"], start=1)],
+        designs=[_design(number, design) for number, design in enumerate(summary["designs"], start=1)],
         sobol=[
             (
                 row["input"],
@@ -47,7 +47,7 @@ def write_study(path: Path, summary: Mapping[str, Any], pictures: Sequence[str])
             )
             for row in summary["sobol"]
         ],
-        actions=[(one["text"], percent(one["share"])) for one in summary["actions"][:_FEW]],
+        actions=[(action["text"], percent(action["share"])) for action in summary["actions"][:_FEW]],
         certain=summary["certain"],
         figures=[picture(path.parent / name, _CAPTIONS[Path(name).stem]) for name in pictures],
     )

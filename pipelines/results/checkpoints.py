@@ -141,7 +141,7 @@ class Checkpoints:
                 rows.setdefault(key, Rows()).extend(_revived_rows(one, columns))
         carried = _revived(values["carried"], arrays, rows)
         self._kept, self._histories = [name], values["histories"]
-        self._counts = {key: len(one) for key, one in rows.items()}
+        self._counts = {key: len(row) for key, row in rows.items()}
         return Checkpoint(values["step"], carried, values["notes"])
 
     def _remove_others(self) -> None:
@@ -260,15 +260,15 @@ class _Store:
         """Return rows: of numbers and arrays column by column, others one by one."""
         if isinstance(rows[0], tuple) and not hasattr(rows[0], "_fields"):
             columns = (np.array(column) for column in zip(*rows, strict=True))
-            return ["columns", [self._array(one, f"{name}/{k}") for k, one in enumerate(columns)]]
-        return ["list", [self.plain(one, f"{name}/{k}") for k, one in enumerate(rows)]]
+            return ["columns", [self._array(column, f"{name}/{k}") for k, column in enumerate(columns)]]
+        return ["list", [self.plain(row, f"{name}/{k}") for k, row in enumerate(rows)]]
 
     def _named(self, values: Mapping[str, Any], name: str) -> dict[str, Any]:
-        return {key: self.plain(one, f"{name}/{key}" if name else key) for key, one in values.items()}
+        return {key: self.plain(value, f"{name}/{key}" if name else key) for key, value in values.items()}
 
     def _tuple(self, value: tuple[Any, ...], name: str) -> Any:
         arrays = [one for one in value if isinstance(one, np.ndarray)]
-        kinds = {(one.dtype, one.shape[1:], one.ndim > 0) for one in arrays}
+        kinds = {(array.dtype, array.shape[1:], array.ndim > 0) for array in arrays}
         if len(kinds) != 1 or any(one is not None and not isinstance(one, np.ndarray) for one in value):
             return ["tuple", [self.plain(one, f"{name}/{k}") for k, one in enumerate(value)]]
         # thousands of small arrays are one large one
@@ -281,7 +281,7 @@ class _Store:
 
 
 def _items(record: Any) -> Iterator[tuple[str, Any]]:
-    names = record._fields if hasattr(record, "_fields") else [one.name for one in fields(record)]
+    names = record._fields if hasattr(record, "_fields") else [field.name for field in fields(record)]
     return ((name, getattr(record, name)) for name in names)
 
 
@@ -291,7 +291,7 @@ def _revived(value: Any, arrays: Mapping[str, Any], rows: Mapping[str, Rows[Any]
         return value
 
     def each(values: Mapping[str, Any]) -> dict[str, Any]:
-        return {key: _revived(one, arrays, rows) for key, one in values.items()}
+        return {key: _revived(value, arrays, rows) for key, value in values.items()}
 
     kind, *content = value
     if kind == "array":

@@ -149,7 +149,7 @@ def replacing(folder: Path, index: str = RUN_INDEX) -> Iterator[Path]:
             f"cannot be written: {error.strerror}", where=str(target.parent), remedy="name another folder"
         ) from error
     try:
-        earlier = any((folder / one).exists() for one in _INDEXES)
+        earlier = any((folder / index).exists() for index in _INDEXES)
         with storing(str(folder), "earlier results there are as they were" if earlier else ""):
             yield fresh
             fresh.chmod(0o777 & ~_umask())  # mkdtemp makes it private
@@ -173,7 +173,7 @@ def source_of(files: Iterable[str | Path], folder: Path) -> list[str]:
         except ValueError:
             return path.as_posix()
 
-    return [relative(Path(one).resolve()) for one in files]
+    return [relative(Path(file).resolve()) for file in files]
 
 
 def _source(folder: Path) -> list[str] | None:

@@ -89,9 +89,9 @@ def _at_end(result: Result, peaks: Peaks) -> dict[str, float]:
         "opening": float(joints.opening.max(initial=0.0)),
         "sliding": float(joints.sliding.max(initial=0.0)),
         "pressure": _most(joints.pressure_max, ~joints.sliver),
-        "von_mises": max((one.von_mises_max for one in values), default=0.0),
-        "tension": max((one.principal_tension for one in values), default=0.0),
-        "compression": max((-one.principal_compression for one in values), default=0.0),
+        "von_mises": max((value.von_mises_max for value in values), default=0.0),
+        "tension": max((value.principal_tension for value in values), default=0.0),
+        "compression": max((-value.principal_compression for value in values), default=0.0),
     }
 
 
@@ -122,13 +122,13 @@ def realisations(result: Result) -> list[dict[str, Any]]:
     runs = [result] if result.repeated is None else [result, result.repeated]
     return [
         {
-            "step": one.scene.time.step,
-            "outcome": str(one.outcome),
+            "step": run.scene.time.step,
+            "outcome": str(run.outcome),
             "peaks": {
-                name: record["value"] for name, record in peak_records(one).items() if record is not None
+                name: record["value"] for name, record in peak_records(run).items() if record is not None
             },
         }
-        for one in runs
+        for run in runs
     ]
 
 

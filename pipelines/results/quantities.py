@@ -97,9 +97,9 @@ class Quantities:
     def stress_error(self) -> float | None:
         """Estimated error of the stress of all stones, weighted by volume and squared stress [-]."""
         known = [
-            (one.stress_error, one.volume * one.von_mises_mean**2)
-            for one in self.stones.values()
-            if one.stress_error is not None and one.von_mises_mean is not None
+            (stone.stress_error, stone.volume * stone.von_mises_mean**2)
+            for stone in self.stones.values()
+            if stone.stress_error is not None and stone.von_mises_mean is not None
         ]
         total = sum(weight for _, weight in known)
         if total == 0.0:
@@ -134,8 +134,8 @@ def quantities(result: Result) -> Quantities:
 def quantities_from(record: Mapping[str, Any]) -> Quantities:
     """Read the quantities that `Quantities.as_record` returned."""
     stones = {
-        code: StoneQuantities(**one | {"displacement": tuple(one["displacement"])})
-        for code, one in record["stones"].items()
+        code: StoneQuantities(**stone | {"displacement": tuple(stone["displacement"])})
+        for code, stone in record["stones"].items()
     }
     joints = {pair: tuple(force) for pair, force in record["joint_forces"].items()}
     return Quantities(**{**record, "stones": stones, "joint_forces": joints})
@@ -150,7 +150,7 @@ def differences(found: Quantities, reference: Quantities) -> dict[str, float | N
     the p99 of all is known only if those are the same stones. Reference movements below 10⁻⁶ of a stone's size count
     as that.
     """
-    both = [(found.stones[code], one) for code, one in reference.stones.items() if code in found.stones]
+    both = [(found.stones[code], stone) for code, stone in reference.stones.items() if code in found.stones]
     stressed = [(a, b) for a, b in both if a.von_mises_max is not None and b.von_mises_max is not None]
     ours, theirs = [a for a, _ in stressed], [b for _, b in stressed]
     alike = _stressed(found) == _stressed(reference)
@@ -230,16 +230,16 @@ def _apart(found: float | None, reference: float | None, least: float = 0.0) -> 
 
 
 def _stressed(of: Quantities) -> set[str]:
-    return {code for code, one in of.stones.items() if one.von_mises_max is not None}
+    return {code for code, stone in of.stones.items() if stone.von_mises_max is not None}
 
 
 def _largest(stones: Iterable[StoneQuantities]) -> float | None:
-    return max((_number(one.von_mises_max) for one in stones), default=None)
+    return max((_number(stone.von_mises_max) for stone in stones), default=None)
 
 
 def _mean(stones: Iterable[StoneQuantities]) -> float | None:
     """Return the mean stress of stones, weighted by volume."""
-    known = [(_number(one.von_mises_mean), one.volume) for one in stones]
+    known = [(_number(stone.von_mises_mean), stone.volume) for stone in stones]
     volume = sum(one for _, one in known)
     return sum(mean * one for mean, one in known) / volume if volume > 0.0 else None
 

@@ -74,4 +74,6 @@ def _write(folder: Path, name: str, time: Array, named: Iterable[Sequence[object
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(SERIES_COLUMNS[name])
         for instant, words, numbers in zip(time.tolist(), named, (values + 0.0).tolist(), strict=True):
-            writer.writerow([f"{instant:.12g}", *map(inert, words), *(f"{one:.12g}" for one in numbers)])
+            writer.writerow(
+                [f"{instant:.12g}", *map(inert, words), *(f"{number:.12g}" for number in numbers)]
+            )

@@ -101,7 +101,7 @@ def _joint_values(joints: JointResult, count: int) -> dict[str, Array]:
         "sliding": joints.sliding,
         "friction_use": joints.friction_use,
     }
-    return {f"joint_{name}": _largest(joints.bodies, one, count) for name, one in values.items()}
+    return {f"joint_{name}": _largest(joints.bodies, value, count) for name, value in values.items()}
 
 
 def _peak_values(peaks: Peaks | None) -> dict[str, Array]:

@@ -78,8 +78,8 @@ def summarise(
         "tolerance": {"length": length_tolerance(result)},
         "admissible": indeterminacy(result),
         "rocking": {"stones": rocking_stones(result), "realisations": realisations(result)},
-        "loads": [asdict(one) for one in result.scene.loads.courses],
-        "stages": [_stage(one) for one in result.stages],
+        "loads": [asdict(course) for course in result.scene.loads.courses],
+        "stages": [_stage(stage) for stage in result.stages],
         "profile": profile,
         "version": version,
     }

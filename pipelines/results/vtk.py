@@ -130,7 +130,7 @@ def body_grid(result: Result, frame: Frame, cells: Cells) -> UnstructuredGrid:
     bodies = result.bodies
     stone = np.repeat(np.arange(len(bodies)), [max(len(body.cells), 1) for body in bodies])
     fidelity = np.array([FIDELITIES.index(body.fidelity) for body in bodies])
-    error = np.array([np.nan if one is None else one for one in frame.stress_errors])
+    error = np.array([np.nan if error is None else error for error in frame.stress_errors])
     return UnstructuredGrid(
         points=np.concatenate(frame.positions),
         cells=cells,
@@ -157,8 +157,8 @@ def point_fields(
         return motion
     forces = frame.nodal_forces or (None,) * len(bodies)
     on_nodes = [
-        np.full((len(place), 3), np.nan) if one is None else one
-        for place, one in zip(frame.positions, forces, strict=True)
+        np.full((len(place), 3), np.nan) if force is None else force
+        for place, force in zip(frame.positions, forces, strict=True)
     ]
     return motion | _stresses(blocks, frame) | {"contact_force": np.concatenate(on_nodes)}
 
@@ -167,8 +167,8 @@ def _stresses(blocks: Sequence[Block], frame: Frame) -> dict[str, Array]:
     """Compute the fields derived from the stress of the points; NaN where there is no stress."""
     stress = np.concatenate(
         [
-            np.full((len(place), 6), np.nan) if one is None else one
-            for place, one in zip(frame.positions, frame.stresses, strict=True)
+            np.full((len(place), 6), np.nan) if stress is None else stress
+            for place, stress in zip(frame.positions, frame.stresses, strict=True)
         ]
     )
     known = np.isfinite(stress[:, 0])
@@ -219,7 +219,7 @@ def joint_grid(joints: JointResult) -> UnstructuredGrid:
         one if len(one) > 2 else np.tile(centre, (3, 1))
         for one, centre in zip(joints.polygon, joints.centroid, strict=True)
     ]
-    sizes = np.array([len(one) for one in polygons], dtype=np.int64)
+    sizes = np.array([len(polygon) for polygon in polygons], dtype=np.int64)
     ends = np.cumsum(sizes)
     return UnstructuredGrid(
         points=np.concatenate([*polygons, np.zeros((0, 3))]),

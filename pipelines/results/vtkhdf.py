@@ -94,7 +94,7 @@ class _Stones:
         arrays: dict[str, NDArray[Any]] = {"Points": now}
         arrays |= {f"PointData/{name}": values.astype(np.float32) for name, values in fields.items()}
         if self._elastic:
-            error = np.array([np.nan if one is None else one for one in frame.stress_errors])
+            error = np.array([np.nan if error is None else error for error in frame.stress_errors])
             arrays["CellData/stress_error"] = error[self._stone].astype(np.float32)
         return _Part(len(now), len(self._stone), len(self.once["Connectivity"]), arrays)
 
@@ -293,8 +293,8 @@ def _add(
     import h5py
 
     new = [_parts_of(blocks, frame) for frame in frames] if parts is None else parts
-    size = sum(one.nbytes for part in new for block in part.values() for one in block.arrays.values())
-    least = sum(max(one.nbytes, _CHUNK) for block in new[-1].values() for one in block.arrays.values())
+    size = sum(array.nbytes for part in new for block in part.values() for array in block.arrays.values())
+    least = sum(max(array.nbytes, _CHUNK) for block in new[-1].values() for array in block.arrays.values())
     with path.open("r+b") as room:
         if hasattr(os, "posix_fallocate"):
             os.posix_fallocate(room.fileno(), 0, path.stat().st_size + 2 * (size + least) + _ROOM)

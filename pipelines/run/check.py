@@ -157,16 +157,17 @@ def _shapes(scene: str, assembly: Assembly) -> ClosingShapes:
         scene,
         Stages(
             surveyed=[
-                Solid(one.code, one.solid_vertices - assembly.origin, one.solid_faces) for one in records
+                Solid(record.code, record.solid_vertices - assembly.origin, record.solid_faces)
+                for record in records
             ],
             simple=[one.solid for one in assembly.simplified],
-            closed=[Solid(one.code, one.vertices, one.faces) for one in assembly.scene.blocks],
+            closed=[Solid(block.code, block.vertices, block.faces) for block in assembly.scene.blocks],
         ),
         simplified={one.code: one.report.displacement for one in assembly.simplified},
         closing=assembly.closing,
-        faces=[one.outline - assembly.origin for one in records],
+        faces=[record.outline - assembly.origin for record in records],
         hypotheses=_hypotheses(assembly),
-        core=frozenset(one.code for one in records if one.kind == "infill"),
+        core=frozenset(record.code for record in records if record.kind == "infill"),
     )
 
 
@@ -192,7 +193,7 @@ def _report(
             StoneModelling(code, str(one.fidelity), one.reason, one.stress) for code, one in chosen.items()
         ),
         materials=tuple(
-            MaterialUse(one.name, one.density, one.young, one.poisson, count) for one, count in uses.items()
+            MaterialUse(key.name, key.density, key.young, key.poisson, count) for key, count in uses.items()
         ),
         meshes=() if assembly is None else _meshes(assembly.scene),
         mesh_quality=None if needs is None else _mesh_quality(needs.meshes),
@@ -205,7 +206,7 @@ def _report(
         else _cost(
             needs, assembly.scene, len(USUAL if scene.output.pictures is None else scene.output.pictures)
         ),
-        laws=tuple(describe(one.entry, groups) for one in scene.laws),
+        laws=tuple(describe(law.entry, groups) for law in scene.laws),
         loads=tuple(describe(entry, groups) for entry in (*scene.loads, *scene.throws)),
         stages=() if assembly is None else stage_lines(scene, assembly),
         filling=None if assembly is None else filling(scene, assembly),
@@ -224,7 +225,7 @@ def _report(
 
 def _modelled(scene: SceneFile, models: Sequence[StoneModel], groups: Groups) -> Mapping[str, Modelled]:
     """Return the models of stones whose joints are unknown."""
-    return modelled([one.record.code for one in models], {}, wishes_of(scene, models, groups))
+    return modelled([model.record.code for model in models], {}, wishes_of(scene, models, groups))
 
 
 def _meshes(scene: Scene) -> tuple[MeshUse, ...]:

@@ -148,15 +148,15 @@ def simplification_report(stones: Sequence[BlockyStone]) -> SimplificationReport
     """Summarise the changes by simplification; None without stones."""
     if not stones:
         return None
-    moved = {one.code: float(one.report.displacement.max(initial=0.0)) for one in stones}
+    moved = {stone.code: float(stone.report.displacement.max(initial=0.0)) for stone in stones}
     least = min(stones, key=lambda one: one.report.blockiness)
     worst = max(moved, key=lambda code: moved[code])
     outside = [
-        OutsideStone(one.code, moved[one.code], one.report.tolerance, one.report.reason)
-        for one in stones
-        if not one.report.within
+        OutsideStone(stone.code, moved[stone.code], stone.report.tolerance, stone.report.reason)
+        for stone in stones
+        if not stone.report.within
     ]
-    shapes = Counter(str(one.shape) for one in stones)
+    shapes = Counter(str(stone.shape) for stone in stones)
     return SimplificationReport(
         shapes=dict(shapes.most_common()),
         least_blocky=least.code,
@@ -164,7 +164,7 @@ def simplification_report(stones: Sequence[BlockyStone]) -> SimplificationReport
         max_displacement=moved[worst],
         worst_stone=worst,
         outside=tuple(sorted(outside, key=lambda one: -one.displacement)),
-        general={one.code: one.report.reason for one in stones if str(one.shape) == "polyhedron"},
+        general={stone.code: stone.report.reason for stone in stones if str(stone.shape) == "polyhedron"},
         displacement=moved,
     )
 
@@ -176,16 +176,16 @@ def joints_report(
 
     Overlaps of the stones in `hypotheses`, which were not measured, are left out.
     """
-    closed = [one for one in closing.joints if not one.left_open]
-    areas = np.array([one.area for one in closing.joints])
+    closed = [joint for joint in closing.joints if not joint.left_open]
+    areas = np.array([joint.area for joint in closing.joints])
     moved = {code: float(one.max(initial=0.0)) for code, one in closing.displacement.items()}
     worst = max(moved, key=lambda code: moved[code], default=None)
-    open_for = Counter(one.left_open for one in closing.joints if one.left_open)
+    open_for = Counter(joint.left_open for joint in closing.joints if joint.left_open)
     return JointsReport(
         mode=str(closing.mode),
         count=len(closed),
         planes=len({one.plane for one in closed}),
-        mean_width=float(np.average([one.width for one in closing.joints], weights=areas))
+        mean_width=float(np.average([joint.width for joint in closing.joints], weights=areas))
         if areas.any()
         else 0.0,
         area=sum(one.area for one in closed),
@@ -201,14 +201,14 @@ def joints_report(
             if one.width < -_DEEP and not hypotheses & set(one.stones)
         ),
         gaps=tuple(
-            GapPlace(one.stones, one.width, one.area, _place(one.centroid + origin), one.reason)
-            for one in sorted(closing.gaps, key=lambda one: -one.width * one.area)
+            GapPlace(gap.stones, gap.width, gap.area, _place(gap.centroid + origin), gap.reason)
+            for gap in sorted(closing.gaps, key=lambda one: -one.width * one.area)
         ),
         overlaps=tuple(
-            OverlapPlace(one.stones, one.volume, one.depth, _place(one.centroid + origin))
-            for one in sorted(closing.overlaps, key=lambda one: -one.volume)
+            OverlapPlace(overlap.stones, overlap.volume, overlap.depth, _place(overlap.centroid + origin))
+            for overlap in sorted(closing.overlaps, key=lambda one: -one.volume)
         ),
-        leaves=tuple(leaf_report(one, closing.joints, origin) for one in closing.leaves),
+        leaves=tuple(leaf_report(leaf, closing.joints, origin) for leaf in closing.leaves),
     )
 
 

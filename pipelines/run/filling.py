@@ -51,7 +51,7 @@ class OpeningPlace:
         )
         if len(self.sides) >= _SURROUNDED:
             return f"{size_and_place} and about the wall (crop the picture to it)"
-        sides = " and ".join(_REACHED[one] for one in self.sides)
+        sides = " and ".join(_REACHED[side] for side in self.sides)
         return f"{size_and_place}, up to {sides}" if sides else size_and_place
 
 
@@ -113,14 +113,14 @@ class LeafReport:
 
     def open_in_words(self) -> tuple[str, ...]:
         """Return what stays open as lines for a person."""
-        lines = [f"an opening stays open: {one.in_words()}" for one in self.openings[:_NAMED]]
+        lines = [f"an opening stays open: {opening.in_words()}" for opening in self.openings[:_NAMED]]
         if len(self.openings) > _NAMED:
             rest = self.openings[_NAMED:]
             lines.append(
                 f"{len(rest)} more openings, {sum(one.area for one in rest):.3g} m² in all, stay open"
             )
         if self.pockets:
-            area = sum(one.area for one in self.pockets)
+            area = sum(pocket.area for pocket in self.pockets)
             lines.append(
                 f"{len(self.pockets)} pockets smaller than a usual stone, {area:.2g} m² in all, stay open; the "
                 f"largest: {self.pockets[0].in_words()}"
@@ -134,7 +134,7 @@ class LeafReport:
 
 def leaf_report(leaf: GrownLeaf, joints: Sequence[StoneJoint], origin: Array) -> LeafReport:
     """Summarise a leaf and what stays open in it, whose positions are relative to `origin` (3,) [m]."""
-    own = [one for one in joints if all(code in leaf.grown for code in one.stones)]
+    own = [joint for joint in joints if all(code in leaf.grown for code in joint.stones)]
     pairs = [value for stones, value in leaf.thickness.items() if len(stones) > 1]
     areas = np.array([one.area for one in own])
     mean = float(np.average([one.width for one in own], weights=areas)) if len(own) else 0.0
@@ -154,15 +154,15 @@ def leaf_report(leaf: GrownLeaf, joints: Sequence[StoneJoint], origin: Array) ->
         crossing=leaf.crossing,
         open_share=leaf.open_over_all,
         filled=leaf.filled,
-        openings=tuple(_opening(one, origin) for one in leaf.openings if one.area >= usual),
-        pockets=tuple(_opening(one, origin) for one in leaf.openings if one.area < usual),
+        openings=tuple(_opening(opening, origin) for opening in leaf.openings if opening.area >= usual),
+        pockets=tuple(_opening(opening, origin) for opening in leaf.openings if opening.area < usual),
     )
 
 
 def stays_open(assembly: Assembly) -> tuple[str, ...]:
     """Return the openings and pockets of the leaves of a scene as lines for a person."""
     closing = assembly.closing
-    reports = (leaf_report(one, closing.joints, assembly.origin) for one in closing.leaves)
+    reports = (leaf_report(leaf, closing.joints, assembly.origin) for leaf in closing.leaves)
     return tuple(line for report in reports for line in report.open_in_words())
 
 
@@ -216,14 +216,16 @@ def filling(scene: SceneFile, assembly: Assembly) -> Filling:
     """Return how much volume and weight closing the joints of a scene adds to its stones."""
     records = [model.record for model in assembly.models]
     density = np.array([model.material.density for model in assembly.models])
-    before = np.array([volume_of(Solid(one.code, one.solid_vertices, one.solid_faces)) for one in records])
+    before = np.array(
+        [volume_of(Solid(record.code, record.solid_vertices, record.solid_faces)) for record in records]
+    )
     blocks = assembly.scene.blocks
-    after = np.array([volume_of(Solid(one.code, one.vertices, one.faces)) for one in blocks])
+    after = np.array([volume_of(Solid(block.code, block.vertices, block.faces)) for block in blocks])
     gravity = float(np.linalg.norm(scene.gravity))
     return Filling(
         surveyed=float(before.sum()),
         modelled=float(after.sum()),
         surveyed_weight=gravity * float(density @ before),
-        modelled_weight=gravity * float(np.array([one.material.density for one in blocks]) @ after),
+        modelled_weight=gravity * float(np.array([block.material.density for block in blocks]) @ after),
         mortar_density=scene.joints.mortar_density if assembly.closing.leaves else None,
     )

@@ -43,7 +43,7 @@ def scene_inputs(
         "Survey": tuple(_surveys(session, [model.record.code for model in models])),
         "Stones": (f"{len(models)}: " + ", ".join(f"{count} {kind}" for kind, count in kinds.items()),),
         "Depths of the stones": tuple(_depths(models)),
-        "Materials": tuple(_material(one, count) for one, count in materials.items()),
+        "Materials": tuple(_material(key, count) for key, count in materials.items()),
         "Contact": tuple(_laws(scene, built, groups)),
         "Supports": tuple(block.code for block in built.blocks if block.fidelity is Fidelity.FIXED),
         "Loads": (
@@ -73,11 +73,11 @@ def run_inputs(
 def stage_lines(scene: SceneFile, assembly: Assembly) -> tuple[str, ...]:
     """Describe the stages of building: how many stones stand in each and are held, and the loads that act in it."""
     lines = []
-    own = {one.code for one in assembly.scene.blocks if one.fidelity is Fidelity.FIXED}
+    own = {block.code for block in assembly.scene.blocks if block.fidelity is Fidelity.FIXED}
     for stage in assembly.stages:
         blocks = stage.scene.blocks
-        held = sum(one.fidelity is Fidelity.FIXED and one.code not in own for one in blocks)
-        acting = [one.type for one in scene.loads if stage.name in one.values[ACTS_IN.name]]
+        held = sum(block.fidelity is Fidelity.FIXED and block.code not in own for block in blocks)
+        acting = [load.type for load in scene.loads if stage.name in load.values[ACTS_IN.name]]
         said = [f"{len(blocks)} stones", *([f"{held} held"] if held else []), *acting]
         lines.append(f"{stage.name}: {', '.join(said)}")
     return tuple(lines)
@@ -99,7 +99,7 @@ def closing_lines(report: JointsReport) -> tuple[str, ...]:
     lines += [f"{number} left open: {reason}" for reason, number in report.left_open.items()]
     for name, places in (("gaps", report.gaps), ("overlaps", report.overlaps)):
         if places:
-            shown = ", ".join(" and ".join(one.stones) for one in places[:_MOST])
+            shown = ", ".join(" and ".join(place.stones) for place in places[:_MOST])
             lines.append(f"{len(places)} {name}: {shown}{', …' if len(places) > _MOST else ''}")
     if report.alone:
         lines.append(f"{len(report.alone)} stones without a joint, e.g. {report.alone[0]}")
@@ -126,10 +126,10 @@ def _depths(models: Iterable[StoneModel]) -> Iterator[str]:
     for model in models:
         sources.setdefault(model.record.depth_source, []).append(model.record)
     for source, records in sorted(sources.items(), key=lambda one: -len(one[1]))[:_MOST]:
-        depths = [one.depth for one in records]
+        depths = [record.depth for record in records]
         least, most = (f"{value:.3g}" for value in (min(depths), max(depths)))
         span = least if least == most else f"{least} to {most}"
-        sigmas = [one.depth_sigma for one in records if one.depth_sigma is not None]
+        sigmas = [record.depth_sigma for record in records if record.depth_sigma is not None]
         known = f"σ up to {1e3 * max(sigmas):.2g} mm" if sigmas else "taken as certain"
         yield f"{source or 'source not stated'}, {len(records)} stones: {span} m, {known}"
     if len(sources) > _MOST:

@@ -44,7 +44,7 @@ def unusual_values(scene: SceneFile, models: Sequence[StoneModel]) -> list[str]:
 
 def corner_warnings(models: Sequence[StoneModel]) -> list[str]:
     """List the measured stones of which a corner seems out of place; outlines have as many as they like."""
-    measured = (one for one in models if one.record.provenance == "points")
+    measured = (model for model in models if model.record.provenance == "points")
     found = misplaced_corners([_seen(one) for one in measured if OUTLINE_NOTE not in one.record.notes])
     texts = [f"stone {one.code}: {one.text}; measure its corners again" for one in found]
     left = len(texts) - _SHOWN
@@ -57,8 +57,8 @@ def depth_warnings(models: Sequence[StoneModel]) -> list[str]:
     The leaf is as thick as the stones that reach through it: those of the deepest tenth of the façade's area. Fixed
     stones, as a slab of ground, belong to no façade.
     """
-    records = [one.record for one in models if one.listed is not Fidelity.FIXED]
-    facing = np.array([one.normal for one in records]).reshape(-1, 3)
+    records = [model.record for model in models if model.listed is not Fidelity.FIXED]
+    facing = np.array([record.normal for record in records]).reshape(-1, 3)
     upright = np.abs(facing[:, 2]) <= np.sin(np.radians(_SQUARE))
     turn = np.degrees(np.arctan2(facing[:, 1], facing[:, 0]))
     left, texts = upright.copy(), list[str]()
@@ -75,7 +75,8 @@ def _thin(records: Sequence[StoneRecord], facade: Ints, outwards: Array) -> list
     """Return a warning on the stones of a façade (rows of the records) that are thinner than its leaf."""
     axes = np.array([(-outwards[1], outwards[0], 0.0), outwards, (0.0, 0.0, 1.0)]).T
     low, high = (
-        np.array([bound(one.solid_vertices @ axes, axis=0) for one in records]) for bound in (np.min, np.max)
+        np.array([bound(record.solid_vertices @ axes, axis=0) for record in records])
+        for bound in (np.min, np.max)
     )
     depth = (high - low)[facade, 1]
     order = np.argsort(-depth, kind="stable")
@@ -104,13 +105,13 @@ def _thin(records: Sequence[StoneRecord], facade: Ints, outwards: Array) -> list
 def _doubts(scene: SceneFile, models: Sequence[StoneModel]) -> Iterator[tuple[str, Doubt]]:
     yield from _of_sizes(models)
     yield from _of_steps(scene)
-    for material in dict.fromkeys(one.material for one in models):
+    for material in dict.fromkeys(model.material for model in models):
         for value, of in ((material.density, DENSITY), (material.young, YOUNG), (material.poisson, POISSON)):
             if (doubt := doubt_of(value, of)) is not None:
                 yield f"material {material.name}: {doubt.text}", doubt
     document = scene.document
-    laws = [("contact",), *(one.entry.path for one in scene.laws)]
-    values = [scene.contact.law, *(one.law for one in scene.laws)]
+    laws = [("contact",), *(law.entry.path for law in scene.laws)]
+    values = [scene.contact.law, *(law.law for law in scene.laws)]
     for path, law in zip(laws, values, strict=True):
         friction = getattr(law, "friction", None)
         if friction is not None and (doubt := doubt_of(friction, FRICTION)) is not None:

@@ -88,7 +88,9 @@ def run_record(
             surveyed_widths(result.joints, [block.code for block in result.scene.blocks], assembly.closing),
         ),
         contacts=contact_arrays(result.contacts, assembly.origin),
-        simplifications=tuple(one for one in simplifications(assembly) if one.code in standing),
+        simplifications=tuple(
+            simplification for simplification in simplifications(assembly) if simplification.code in standing
+        ),
     )
 
 
@@ -125,8 +127,8 @@ def surveyed_widths(joints: JointResult, codes: Sequence[str], closing: ClosingR
     closing : joints before the run. Of several joints of two stones, the one of most similar orientation counts
     """
     known: dict[frozenset[str], list[StoneJoint]] = defaultdict(list)
-    for one in closing.joints:
-        known[frozenset(one.stones)].append(one)
+    for joint in closing.joints:
+        known[frozenset(joint.stones)].append(joint)
     widths = np.full(len(joints.area), np.nan)
     for number, (stones, frame) in enumerate(zip(joints.bodies.tolist(), joints.frame, strict=True)):
         found = known.get(frozenset(codes[stone] for stone in stones))
@@ -198,7 +200,9 @@ def error_measures(errors: Errors) -> ErrorMeasures:
 
 def _shared(record: type[Any], source: object) -> dict[str, Any]:
     """Return the fields of a record that the source has under the same name."""
-    return {one.name: getattr(source, one.name) for one in fields(record) if hasattr(source, one.name)}
+    return {
+        field.name: getattr(source, field.name) for field in fields(record) if hasattr(source, field.name)
+    }
 
 
 def _values(settings: object) -> dict[str, Any]:

@@ -81,7 +81,9 @@ def _lies_between(rule: LawRule, one: str, other: str) -> bool:
 
 def remarks_on_stones(stones: Sequence[BlockyStone]) -> tuple[str, ...]:
     """Return a remark on the imported stones whose warped faces were made plane: by how much, and what it weighs."""
-    changed = [one for one in stones if one.face.provenance.source not in _MEASURED and not one.report.within]
+    changed = [
+        stone for stone in stones if stone.face.provenance.source not in _MEASURED and not stone.report.within
+    ]
     if not changed:
         return ()
     moved = max(changed, key=lambda one: float(one.report.displacement.max()))

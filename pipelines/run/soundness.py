@@ -74,7 +74,9 @@ def refuse_unsound(problems: Sequence[str], where: str, remedy: str = _ALL_THE_S
     UnsoundSceneError : with all problems and their remedies
     """
     if problems:
-        listed = problems if len(problems) == 1 else [f"({i}) {one}" for i, one in enumerate(problems, 1)]
+        listed = (
+            problems if len(problems) == 1 else [f"({i}) {problem}" for i, problem in enumerate(problems, 1)]
+        )
         raise UnsoundSceneError(
             f"the scene is unsound: {'; '.join(listed)}",
             where=where,
@@ -109,12 +111,12 @@ def _unclosed(assembly: Assembly) -> list[str]:
     if assembly.closing.mode is JointMode.AS_SURVEYED:
         return []
     held = {block.code for block in assembly.scene.blocks if block.fidelity is Fidelity.FIXED}
-    closed = {code for one in assembly.closing.joints if not one.left_open for code in one.stones}
+    closed = {code for joint in assembly.closing.joints if not joint.left_open for code in joint.stones}
     left = {
-        code: one.left_open
-        for one in reversed(assembly.closing.joints)
-        for code in one.stones
-        if one.left_open and code not in closed | held
+        code: joint.left_open
+        for joint in reversed(assembly.closing.joints)
+        for code in joint.stones
+        if joint.left_open and code not in closed | held
     }
     if not left:
         return []
@@ -145,7 +147,7 @@ def _alone(assembly: Assembly) -> list[str]:
 
 def _overlapping(assembly: Assembly) -> list[str]:
     """Report stones that initially overlap deeply and would be driven apart."""
-    deep = [one for one in assembly.closing.overlaps if one.depth > _DEEP]
+    deep = [overlap for overlap in assembly.closing.overlaps if overlap.depth > _DEEP]
     return [
         f"{' and '.join(one.stones)} lie {one.depth * 1e3:.0f} mm in each other; measure them again, or exclude one"
         for one in sorted(deep, key=lambda one: -one.volume)[:_NAMED]

@@ -101,8 +101,8 @@ class SyntheticBuilding:
         """Make the surveyed stones, in the order of the true ones: fit planes, extrude outlines by their depth."""
         head = self.survey.head
         extruded = [
-            extrude(outline_face(one, head.viewpoint(one.station)), depth_for(one, head.depth_rules))
-            for one in self.survey.blocks
+            extrude(outline_face(block, head.viewpoint(block.station)), depth_for(block, head.depth_rules))
+            for block in self.survey.blocks
         ]
         return [*extruded, *(block_of_solid(one, head.viewpoint(None), self.name) for one in self.modelled)]
 

@@ -143,8 +143,8 @@ def _pushed_wall(stones: int, shaken: bool = False) -> Callable[[Movement, int |
     def build(movement: Movement, measured: int | None) -> MovedBuilding:
         built = wall(stones, batter=0.0, movement=movement, measured=measured)
         frame = wall_frame(0.0)
-        last = max(one.course or 0 for one in built.survey.blocks)
-        pushed = {one.code: frame.axes[2] for one in built.survey.blocks if one.course == last - 1}
+        last = max(block.course or 0 for block in built.survey.blocks)
+        pushed = {block.code: frame.axes[2] for block in built.survey.blocks if block.course == last - 1}
         settled = dict(zip(built.base, (1.0, 0.5), strict=False))
         inward = -frame.axes[2] if shaken else None
         return MovedBuilding(built, settled, {}, frame.axes[0], pushed, inward)
@@ -166,7 +166,7 @@ def _core_sunk(length: float, lower: int, upper: int) -> Callable[[Movement, int
             movement=movement,
             measured=measured,
         ).building
-        ground = tuple(one.code for one in built.survey.blocks if (one.course or 0) <= lower)
+        ground = tuple(block.code for block in built.survey.blocks if (block.course or 0) <= lower)
         core = {f"kind = infill and course = {lower}": 1.0}
         corner = [code for code in ground if code.startswith(f"F{lower:02d}")][:2]
         rival = dict(zip(corner, (1.0, 0.5), strict=False))

@@ -162,16 +162,16 @@ def render_photographs(folder: Path) -> None:
     names, points = _targets(bay, Random(_SEED))
     jobs = [
         {
-            "path": str((folder / f"{one.photo.name}.jpg").absolute()),
+            "path": str((folder / f"{camera.photo.name}.jpg").absolute()),
             "inner": _CAMERA.inner.tolist(),
             "size": list(_CAMERA.size),
             "pixel": _CAMERA.pixel,
             "forward": _CAMERA.forward,
-            "rotation": np.asarray(one.photo.rotation).tolist(),
-            "station": np.asarray(one.photo.station).tolist(),
+            "rotation": np.asarray(camera.photo.rotation).tolist(),
+            "station": np.asarray(camera.photo.station).tolist(),
             "reduced": _REDUCED,
         }
-        for one in true_cameras(bay)
+        for camera in true_cameras(bay)
     ]
     draw_apart("pipelines.draw.offscreen.photographs", _scene(bay, names, points), jobs)
 

@@ -116,10 +116,10 @@ def recipe_of(
     if kind in _RENAMED:
         raise UsageError(f"no sample {kind!r} any more", remedy=f"it is now: moma sample {_RENAMED[kind]}")
     if kind not in SAMPLES:
-        kinds = [*(one for one in SAMPLES if " " not in one), RUBBLE_WALL, GRANITE_WALL]
+        kinds = [*(sample for sample in SAMPLES if " " not in sample), RUBBLE_WALL, GRANITE_WALL]
         raise UsageError(f"no sample {kind!r}", remedy=f"the samples are {', '.join(kinds)}")
     if name not in SAMPLES:
-        known = [f"'{one}'" for one in SAMPLES if one.split()[0] == kind]
+        known = [f"'{sample}'" for sample in SAMPLES if sample.split()[0] == kind]
         raise UsageError(f"no sample {name!r}", remedy=f"there is {', '.join(known)}")
     if courses is None:
         return SAMPLES[name]

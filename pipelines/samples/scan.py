@@ -79,7 +79,7 @@ def scan_window(bay: WindowBay, spacing: float = 0.006, seed: int = 42, clutter:
     """
     rng = np.random.default_rng(seed)
     corners = [visible_corners(*pair) for pair in zip(bay.stones, bay.measured, strict=True)]
-    flat, row = _grid(np.concatenate([one.plan.corners for one in bay.stones]), spacing, rng)
+    flat, row = _grid(np.concatenate([stone.plan.corners for stone in bay.stones]), spacing, rng)
     depth, colours = _surface(bay, corners, flat, spacing, rng)
     opening = np.isnan(depth)
     depth[opening] = -_BEHIND + rng.normal(0.0, 0.05, int(opening.sum()))
@@ -89,7 +89,7 @@ def scan_window(bay: WindowBay, spacing: float = 0.006, seed: int = 42, clutter:
     depth += rng.normal(0.0, _NOISE, len(depth)) + rng.normal(0.0, _STREAK, row.max() + 1)[row]
     frame = bay.frame
     points = frame.origin + flat @ frame.axes[:2] + np.outer(depth, frame.axes[2])
-    drawn = tuple(one + rng.normal(0.0, JITTER, one.shape) for one in corners)
+    drawn = tuple(corner + rng.normal(0.0, JITTER, corner.shape) for corner in corners)
     return Scan(points, colours, foreign & ~opening, drawn, bay)
 
 
@@ -191,7 +191,7 @@ def write_masks(scan: Scan, path: Path) -> None:
     """Write the drawn outlines as a picture: stones in white, mortar in black, of the panel and nothing else."""
     from PIL import Image, ImageDraw
 
-    panel = np.concatenate([one.plan.corners for one in scan.bay.stones])
+    panel = np.concatenate([stone.plan.corners for stone in scan.bay.stones])
     low, high = panel.min(axis=0), panel.max(axis=0)
     columns, rows = (int(one) for one in np.round((high - low) / _PIXEL))
     picture = Image.new("L", (columns, rows))

@@ -86,8 +86,8 @@ def _faces(solid: Solid, origin: Array) -> _Faces:
 
 def _near(faces: Sequence[_Faces]) -> Iterator[tuple[int, int]]:
     """Find pairs i < j whose boxes touch, by a sweep along the longest axis."""
-    low = np.array([one.low for one in faces]) - _COPLANAR
-    high = np.array([one.high for one in faces]) + _COPLANAR
+    low = np.array([face.low for face in faces]) - _COPLANAR
+    high = np.array([face.high for face in faces]) + _COPLANAR
     axis = int(np.argmax(high.max(axis=0) - low.min(axis=0)))
     order = np.argsort(low[:, axis], kind="stable")
     starts = low[order, axis]

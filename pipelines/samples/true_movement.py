@@ -41,17 +41,17 @@ def true_movement(cause: Cause, progress: Listener = silent) -> Movement:
     building = site.building
     limestone = Material("limestone", density=2350.0, young=12e9, poisson=0.2)
     middle = building.solids[0].vertices[0]
-    course = {one.code: one.course or 0 for one in building.survey.blocks}
+    course = {block.code: block.course or 0 for block in building.survey.blocks}
     blocks = tuple(
         Block(
-            one.code,
-            one.vertices - middle,
-            one.faces,
+            solid.code,
+            solid.vertices - middle,
+            solid.faces,
             limestone,
-            Fidelity.FIXED if one.code in building.base else Fidelity.RIGID,
+            Fidelity.FIXED if solid.code in building.base else Fidelity.RIGID,
         )
-        for one in building.solids
-        if cause.stood is None or course[one.code] <= cause.stood
+        for solid in building.solids
+        if cause.stood is None or course[solid.code] <= cause.stood
     )
     core = _core(site)
     blocks += tuple(

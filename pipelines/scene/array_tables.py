@@ -49,7 +49,7 @@ def read_entries(
 ) -> tuple[ArrayTable, ...]:
     """Check all tables [[name]]; an array of a single type has no key `type`."""
     tables = given.get(name, [])
-    if not isinstance(tables, list) or not all(isinstance(one, dict) for one in tables):
+    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
         document.fail(f"{name!r} is not a list of tables", name, remedy=f"write [[{name}]] above each")
     return tuple(
         _entry(document, (name, str(index)), table, types, common) for index, table in enumerate(tables)

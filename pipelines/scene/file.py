@@ -207,7 +207,7 @@ def _orthotropy(document: TomlDocument, material: str, content: Any) -> Orthotro
 
 def _joints(document: TomlDocument, laws: Sequence[JointLaw], values: Mapping[str, Any]) -> JointSettings:
     settings = build(JointSettings, values)
-    if settings.mode is JointMode.MORTAR and not any(one.entry.type in BONDS for one in laws):
+    if settings.mode is JointMode.MORTAR and not any(law.entry.type in BONDS for law in laws):
         document.fail(
             'mode = "mortar", but no law says how mortar bonds',
             "joints",

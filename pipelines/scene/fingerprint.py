@@ -37,14 +37,14 @@ def fingerprint(
     >>> dict(_parts(TimeSettings(step=2e-3), "time"))["time.step"]
     '0.002'
     """
-    own = {one.name: getattr(scene, one.name) for one in fields(scene) if one.name != "blocks"}
+    own = {field.name: getattr(scene, field.name) for field in fields(scene) if field.name != "blocks"}
     recorded = (
         (stone.record.code, [stone.record.solid_vertices, stone.record.solid_faces]) for stone in stones
     )
     found = {f"{_STONE}{code}: solid in the database": digest(solid) for code, solid in recorded}
     found |= dict(_parts(own, ""))
     for block in scene.blocks:
-        values = ((one.name, getattr(block, one.name)) for one in fields(block) if one.name != "code")
+        values = ((field.name, getattr(block, field.name)) for field in fields(block) if field.name != "code")
         found |= {f"{_STONE}{block.code}: {name}": digest(value) for name, value in values}
     for number, stage in enumerate(stages, 1):
         standing = [(block.code, str(block.fidelity)) for block in stage.scene.blocks]
@@ -59,14 +59,18 @@ def fingerprint(
         [stone and stone.mesh for stone in model.stones],
     )
     return found | {
-        "order of the stones": digest([one.code for one in scene.blocks]),
+        "order of the stones": digest([block.code for block in scene.blocks]),
         "meshes": digest(built),
     }
 
 
 def planar_fingerprint(scene: PlanarScene) -> dict[str, str]:
     """Return a text for each setting, load and body of a scene of the plane."""
-    own = {one.name: getattr(scene, one.name) for one in fields(scene) if one.name not in ("disks", "walls")}
+    own = {
+        field.name: getattr(scene, field.name)
+        for field in fields(scene)
+        if field.name not in ("disks", "walls")
+    }
     bodies = [(f"disk {disk.code}", digest(disk)) for disk in scene.disks]
     bodies += [(f"wall {wall.code}", digest(wall)) for wall in scene.walls]
     return dict(_parts(own, "")) | dict(bodies) | {"order of the bodies": digest(scene.codes)}
@@ -102,7 +106,7 @@ def _parts(value: Any, path: str) -> Iterator[tuple[str, str]]:
     """Yield the path and the text of each part of a value made of dataclasses, collections, arrays and plain values."""
     if is_dataclass(value):
         yield f"{path}.type", type(value).__name__
-        value = {one.name: getattr(value, one.name) for one in fields(value)}
+        value = {field.name: getattr(value, field.name) for field in fields(value)}
     if isinstance(value, Mapping):
         for name, one in value.items():
             yield from _parts(one, f"{path}.{name}" if path else str(name))
@@ -139,7 +143,7 @@ def _bytes(value: Any) -> Iterator[bytes]:
         yield np.ascontiguousarray(value).tobytes()
     elif is_dataclass(value):
         yield type(value).__name__.encode()
-        yield from _bytes([getattr(value, one.name) for one in fields(value)])
+        yield from _bytes([getattr(value, field.name) for field in fields(value)])
     elif isinstance(value, list | tuple):
         yield f"({len(value)}".encode()
         for one in value:

@@ -43,21 +43,21 @@ def keys_of(owner: type[Any], *required: str) -> tuple[Key, ...]:
     ('step', 'a number', 's', 0.001, 0)
     """
     declared, keys = _declared(owner), []
-    for one in fields(owner):
-        if one.name not in declared:
+    for field in fields(owner):
+        if field.name not in declared:
             continue
-        hint, setting = declared[one.name]
-        default = one.default.value if isinstance(one.default, Enum) else one.default
+        hint, setting = declared[field.name]
+        default = field.default.value if isinstance(field.default, Enum) else field.default
         choices = (
             tuple(choice.value for choice in hint) if _is_enum(hint) else getattr(setting, "choices", ())
         )
         keys.append(
             Key(
-                one.name,
+                field.name,
                 ValueKind.TEXT if _is_enum(hint) else _KINDS[hint],
                 setting.doc,
                 setting.unit,
-                REQUIRED if default is MISSING or one.name in required else default,
+                REQUIRED if default is MISSING or field.name in required else default,
                 setting.above,
                 setting.at_least,
                 setting.below,
@@ -93,7 +93,7 @@ def _declared(owner: type[Any]) -> Mapping[str, tuple[Any, MechanicsSetting | Su
 
 
 def _without_none(hint: Any) -> Any:
-    others = [one for one in get_args(hint) if one is not NoneType]
+    others = [arg for arg in get_args(hint) if arg is not NoneType]
     return others[0] if NoneType in get_args(hint) else hint
 
 

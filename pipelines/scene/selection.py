@@ -64,7 +64,7 @@ def select_groups(scene: SceneFile, session: Session, models: Sequence[StoneMode
     records = {model.record.code: model.record for model in models}
     entries = (
         *scene.meshes,
-        *(one.entry for one in scene.laws),
+        *(law.entry for law in scene.laws),
         *scene.loads,
         *scene.throws,
         *scene.stages,
@@ -97,9 +97,9 @@ def _selected(scene: SceneFile, session: Session) -> dict[str, StoneRecord]:
             remedy="try the selection with: moma query",
         )
     out = _named(
-        scene, session, {one.code: one for one in entities}, ("select", "exclude"), selection.exclude
+        scene, session, {entity.code: entity for entity in entities}, ("select", "exclude"), selection.exclude
     )
-    left = [one for one in entities if one.code not in out]
+    left = [entity for entity in entities if entity.code not in out]
     if not left:
         document.fail("all selected stones are excluded", "select", "exclude", remedy="exclude fewer")
     return {record.code: record for record in load_stones(session, left)}

@@ -212,7 +212,7 @@ def _typed(value: object, kind: ValueKind) -> object | None:
 def _list_of(value: object, typed: Callable[[object], object | None]) -> tuple[object, ...] | None:
     """Return all entries of a list as `typed` gives them, or None if it gives None for any."""
     entries = [typed(one) for one in value] if isinstance(value, list) else [None]
-    return None if any(one is None for one in entries) else tuple(entries)
+    return None if any(entry is None for entry in entries) else tuple(entries)
 
 
 def _numbers(typed: object) -> Iterator[int | float]:
@@ -243,7 +243,9 @@ def _within(number: float, key: Key) -> bool:
 def _expected(key: Key) -> str:
     """Return the expected value in words: type, unit and bounds."""
     if key.choices:
-        return " or ".join(f'"{one}"' if isinstance(one, str) else str(one) for one in key.choices)
+        return " or ".join(
+            f'"{choice}"' if isinstance(choice, str) else str(choice) for choice in key.choices
+        )
     bounds = [
         f"{words} {bound:g}"
         for words, bound in (

@@ -26,17 +26,21 @@ def toml_text(tables: Mapping[str, Any]) -> str:
 
 def _lines(tables: Mapping[str, Any]) -> Iterator[str]:
     # values before tables, as those after a header would belong to it
-    for name, one in tables.items():
-        if not isinstance(one, Mapping) and not is_table_array(one):
-            yield f"{_key(name)} = {_value(one)}"
-    for name, one in tables.items():
-        if isinstance(one, Mapping) and all(isinstance(inner, Mapping) for inner in one.values()) and one:
-            for inner, content in one.items():
+    for name, table in tables.items():
+        if not isinstance(table, Mapping) and not is_table_array(table):
+            yield f"{_key(name)} = {_value(table)}"
+    for name, table in tables.items():
+        if (
+            isinstance(table, Mapping)
+            and all(isinstance(inner, Mapping) for inner in table.values())
+            and table
+        ):
+            for inner, content in table.items():
                 yield from _table(f"[{_key(name)}.{_key(inner)}]", content)
-        elif isinstance(one, Mapping):
-            yield from _table(f"[{_key(name)}]", one)
-        elif is_table_array(one):
-            for content in one:
+        elif isinstance(table, Mapping):
+            yield from _table(f"[{_key(name)}]", table)
+        elif is_table_array(table):
+            for content in table:
                 yield from _table(f"[[{_key(name)}]]", content)
 
 

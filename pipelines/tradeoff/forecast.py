@@ -137,14 +137,14 @@ def next_run(
 
     Time that the variants leave goes to the models again, so that the reference is as fine as possible.
     """
-    waiting = [one for one in forecast.settings.values() if one.name not in begun]
+    waiting = [setting for setting in forecast.settings.values() if setting.name not in begun]
     models = [one for one in waiting if one.varied is None]
     variants = [one for one in waiting if one.varied in worth and forecast.seconds(one) is not None]
     of_models = left - (1.0 - _MODELS_SHARE) * budget
     for candidates, time in ((models, of_models), (variants, left), (models, left)):
-        for one in sorted(candidates, key=lambda one: _order(forecast, one)):
-            if _refusal(forecast, one, time, memory) == "":
-                return Choice(one, min(_patience(forecast.seconds(one), budget), left))
+        for candidate in sorted(candidates, key=lambda one: _order(forecast, one)):
+            if _refusal(forecast, candidate, time, memory) == "":
+                return Choice(candidate, min(_patience(forecast.seconds(candidate), budget), left))
     return None
 
 

@@ -100,11 +100,17 @@ def grid(
     models = _models(scene, moving, width, stress)
     settings = [
         *models,
-        *chain(*(_of_solver(scene, one) for one in models if not one.name.startswith(_PROFILE))),
-        *chain(*(_of_time(scene, one) for one in models)),
-        *chain(*(_of_points(scene, one) for one in models if one.element is None and one.overlay in _PLAIN)),
+        *chain(*(_of_solver(scene, model) for model in models if not model.name.startswith(_PROFILE))),
+        *chain(*(_of_time(scene, model) for model in models)),
+        *chain(
+            *(
+                _of_points(scene, model)
+                for model in models
+                if model.element is None and model.overlay in _PLAIN
+            )
+        ),
     ]
-    return tuple({one.name: one for one in reversed(settings)}.values())[::-1]
+    return tuple({setting.name: setting for setting in reversed(settings)}.values())[::-1]
 
 
 def setting_name(overlay: Overlay) -> str:
@@ -134,7 +140,7 @@ def _models(scene: SceneFile, moving: Sequence[Block], width: float, stress: boo
     for element, counts in _CELLS.items() if soft else ():
         if element.is_tetrahedron or all(map(_suits_hexahedra, soft)):
             meshes = [replace(plain, element=element, cells=float(cells)) for cells in counts]
-            found += [_model(scene, one, moving, soft, width) for one in meshes]
+            found += [_model(scene, mesh, moving, soft, width) for mesh in meshes]
     found += _profiles(scene, moving, () if plain is all_soft else soft, width)
     return sorted(found, key=lambda one: one.effort * one.unknowns)
 

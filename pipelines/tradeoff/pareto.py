@@ -221,8 +221,8 @@ def _coarser(
     settings: Mapping[str, Variant], fine: Variant, runs: Sequence[Measured], size: str
 ) -> tuple[Measured, float] | None:
     """Return the first of the runs that is coarser in cell or step size, and by how much."""
-    for one in runs:
-        ratio = getattr(settings[one.name], size) / getattr(fine, size)
+    for run in runs:
+        ratio = getattr(settings[run.name], size) / getattr(fine, size)
         if ratio > _COARSER:
-            return one, ratio
+            return run, ratio
     return None

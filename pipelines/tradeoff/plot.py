@@ -96,24 +96,24 @@ def _draw(axes: Any, panel: Panel, asked: float) -> None:
     axes.plot(
         [one.cpu for one in front], [seen(one.error) for one in front], color=_FRONT, linewidth=1.0, zorder=1
     )
-    for one in panel.points:
-        estimated = one.setting == panel.reference
+    for point in panel.points:
+        estimated = point.setting == panel.reference
         axes.plot(
-            one.cpu,
-            seen(one.error),
+            point.cpu,
+            seen(point.error),
             marker="D" if estimated else "o",
-            markersize=5.5 if one in front else 3.5,
-            color=_COLOURS.get(one.kind, _OTHER),
+            markersize=5.5 if point in front else 3.5,
+            color=_COLOURS.get(point.kind, _OTHER),
             fillstyle="none" if estimated else "full",
             linestyle="none",
             zorder=2,
         )
-        if one.setting == panel.recommended:
-            axes.plot(one.cpu, seen(one.error), "o", markersize=13, color="#c4302b", fillstyle="none")
-    for number, one in enumerate(front):
+        if point.setting == panel.recommended:
+            axes.plot(point.cpu, seen(point.error), "o", markersize=13, color="#c4302b", fillstyle="none")
+    for number, point in enumerate(front):
         axes.annotate(
-            one.setting,
-            (one.cpu, seen(one.error)),
+            point.setting,
+            (point.cpu, seen(point.error)),
             xytext=(4, 5 if number % 2 else -9),
             textcoords="offset points",
             fontsize=6.5,
@@ -135,7 +135,7 @@ def _legend(figure: Any, panels: Sequence[Panel]) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    kinds = dict.fromkeys(one.kind for panel in panels for one in panel.points)
+    kinds = dict.fromkeys(point.kind for panel in panels for point in panel.points)
     handles: list[Any] = [
         Line2D([], [], marker="o", linestyle="none", color=_COLOURS.get(kind, _OTHER), label=kind)
         for kind in kinds

@@ -161,7 +161,7 @@ def _panels(record: Mapping[str, Any]) -> list[Panel]:
             Panel(
                 title=QUANTITIES[quantity],
                 points=tuple(points),
-                front=front((one.cpu, one.error) for one in points),
+                front=front((point.cpu, point.error) for point in points),
                 reference=reference["name"],
                 reference_error=reference["errors"][quantity],
                 recommended=None if recommended is None else recommended["setting"],

@@ -121,7 +121,7 @@ class Store:
         """Write one run; the file appears whole or not at all."""
         record = {
             "study": self.key,
-            **{one.name: getattr(run, one.name) for one in fields(run)},
+            **{field.name: getattr(run, field.name) for field in fields(run)},
             "overlay": overlay_record(run.overlay),
             "quantities": None if run.quantities is None else run.quantities.as_record(),
         }
@@ -166,9 +166,9 @@ def study_key(scene: SceneFile, assembly: Assembly) -> str:
 def _feed(value: object, digest: Any) -> None:
     """Add a value, with everything that it contains, to the digest."""
     if is_dataclass(value):
-        for one in fields(value):
-            _feed(one.name, digest)
-            _feed(getattr(value, one.name), digest)
+        for field in fields(value):
+            _feed(field.name, digest)
+            _feed(getattr(value, field.name), digest)
     else:
         digest.update(f"{type(value).__name__} {value!r};".encode())
 

@@ -125,7 +125,7 @@ def _expected(name: str, quantity: str, stress_error: float | None, free: float,
     elastic = ERRORS["balanced" if name == "fast" else name]
     if quantity in _FORCES:
         # a reaction is a force in a joint; where it was more accurate, that is due to the structure
-        ratio = max((ERRORS["fast"] if rigid else elastic)[one][0] for one in _FORCES)
+        ratio = max((ERRORS["fast"] if rigid else elastic)[force][0] for force in _FORCES)
         return ratio * measure(quantity, None if rigid else stress_error, free)
     if quantity in _MOVEMENTS:
         ratio, _, _ = (ERRORS["fast"] if rigid else elastic)[quantity]

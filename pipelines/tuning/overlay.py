@@ -97,10 +97,10 @@ def overlaid_scene(scene: Scene, overlay: Overlay, listed: frozenset[str] = froz
     """Return an assembled scene at the settings of the overlay; the blocks `listed` by code keep their fidelity."""
     size = None
     if overlay.cells is not None:
-        size = _median_width((one.vertices, one.faces) for one in scene.blocks) / overlay.cells
+        size = _median_width((block.vertices, block.faces) for block in scene.blocks) / overlay.cells
     return replace(
         scene,
-        blocks=tuple(_block(one, overlay, size, one.code in listed) for one in scene.blocks),
+        blocks=tuple(_block(block, overlay, size, block.code in listed) for block in scene.blocks),
         **_replaced(scene, overlay),
     )
 
@@ -148,7 +148,7 @@ def scene_lines(overlay: Overlay, width: float) -> str:
 
 def typical_width(models: Iterable[StoneModel]) -> float:
     """Return the median of the smallest widths of surveyed stones [m]."""
-    return _median_width((one.record.solid_vertices, one.record.solid_faces) for one in models)
+    return _median_width((model.record.solid_vertices, model.record.solid_faces) for model in models)
 
 
 def _median_width(solids: Iterable[tuple[Array, tuple[tuple[int, ...], ...]]]) -> float:

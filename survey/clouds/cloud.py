@@ -80,7 +80,7 @@ def open_cloud(
         raise UsageError("nothing says where the picture lies", where=str(drawing.path), remedy=remedy)
     clouds = [open_points(path) for path in files]
     head = options.head_for(options.outlines)
-    stations = head.stations or tuple(one for cloud in clouds for one in cloud.stations)
+    stations = head.stations or tuple(station for cloud in clouds for station in cloud.stations)
     placed = place_outlines(drawing.outlines, options.wall, stations)
     if options.wall is None and not head.stations and stations:
         _check_sides(placed, options.outlines)

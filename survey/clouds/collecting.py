@@ -124,8 +124,8 @@ def collect_points(
     count = int(patches.first[-1])
     samples = Samples(np.zeros(count, np.int64), np.zeros((count, _KEPT, 3), np.float32))
     grid = _grid(placed, origin, slab)
-    counts = [one.count for one in clouds]
-    total = None if None in counts else sum(one or 0 for one in counts)
+    counts = [cloud.count for cloud in clouds]
+    total = None if None in counts else sum(count or 0 for count in counts)
     read = inside = 0
     with ThreadPoolExecutor(1) as beside:
         sorting: Future[int] | None = None

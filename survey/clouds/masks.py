@@ -65,20 +65,22 @@ def open_masks(path: Path, options: MaskOptions) -> SurveyStream:
         kinds=options.kinds,
     )
     drawing = replace(drawing, outlines=levelled(drawing.outlines))
-    if any(one.corners.shape[1] == 3 for one in drawing.outlines):
+    if any(outline.corners.shape[1] == 3 for outline in drawing.outlines):
         return _spatial(drawing, options)
     places, stretched = _places(drawing, options)
     outlines = drawing.outlines
     if places is not None:
-        outlines = tuple(replace(one, corners=places.place(one.corners)) for one in outlines)
+        outlines = tuple(replace(outline, corners=places.place(outline.corners)) for outline in outlines)
     pixel = places.pixel if places is not None else drawing.pixel
     wall = options.wall or _UPRIGHT
     head = _with_depth(options, path)
-    middle = wall.origin + np.mean([one.corners.mean(axis=0) for one in outlines], axis=0) @ wall.axes[:2]
+    middle = (
+        wall.origin + np.mean([outline.corners.mean(axis=0) for outline in outlines], axis=0) @ wall.axes[:2]
+    )
     head = viewed(head, wall, middle)
     review = [
         *stretched,
-        *flat_doubts(outlines, [one.corners for one in outlines], replace(drawing, pixel=pixel)),
+        *flat_doubts(outlines, [outline.corners for outline in outlines], replace(drawing, pixel=pixel)),
     ]
     if pixel is None:
         pixel, how = options.outline_sigma, f"outline drawn to {options.outline_sigma * 1e3:.1f} mm"
@@ -98,10 +100,10 @@ def _spatial(drawing: Drawing, options: MaskOptions) -> SurveyStream:
             what = f"{option} with outlines that lie in space"
             raise UsageError(what, where=str(drawing.path), remedy=f"leave {option} out")
     outlines = [
-        replace(one, corners=np.column_stack([one.corners, np.zeros(len(one.corners))]))
-        if one.corners.shape[1] == 2
-        else one
-        for one in drawing.outlines
+        replace(outline, corners=np.column_stack([outline.corners, np.zeros(len(outline.corners))]))
+        if outline.corners.shape[1] == 2
+        else outline
+        for outline in drawing.outlines
     ]
     head = _with_depth(options, drawing.path)
     placed = place_outlines(outlines, None, head.stations)
@@ -134,12 +136,12 @@ def _beyond(outlines: Sequence[Outline], frame: Array | None) -> list[Doubtful]:
     if frame is None:
         return []
     out = []
-    for one in outlines:
-        low, high = one.corners.min(axis=0), one.corners.max(axis=0)
+    for outline in outlines:
+        low, high = outline.corners.min(axis=0), outline.corners.max(axis=0)
         over = float(max((frame[0] - low).max(), (high - frame[1]).max()))
         if over > _OVER:
             text = f"it reaches {over * 1e3:.0f} mm beyond the stated size of {frame[1][0]:g} × {frame[1][1]:g} m"
-            out.append(Doubtful(one.code, "beyond the size", text, one.where))
+            out.append(Doubtful(outline.code, "beyond the size", text, outline.where))
     return out
 
 
@@ -177,15 +179,15 @@ def _stones(
     options: MaskOptions,
 ) -> Iterator[BlockRecord | Reject]:
     first = first_codes([one.code for one in outlines])
-    for k, one in enumerate(outlines):
-        span = (range(one.number, one.number + 1),)
+    for k, outline in enumerate(outlines):
+        span = (range(outline.number, outline.number + 1),)
         if first[k] != k:
             remedy = f"the first is {outlines[first[k]].where}"
-            error = SurveyError(f"a second stone {one.code}", where=one.where, remedy=remedy)
-            yield Reject(one.code, error, span)
+            error = SurveyError(f"a second stone {outline.code}", where=outline.where, remedy=remedy)
+            yield Reject(outline.code, error, span)
             continue
-        said = one.said
-        corners = _distinct(one.corners, max(_TWICE * sigma, _NEAREST))
+        said = outline.said
+        corners = _distinct(outline.corners, max(_TWICE * sigma, _NEAREST))
         notes = dict(said.notes) | {OUTLINE_NOTE: how}
         if frame is not None:
             beyond = np.concatenate([corners.min(axis=0) - frame[0], frame[1] - corners.max(axis=0)])
@@ -193,7 +195,7 @@ def _stones(
         if said.score is not None:
             notes["score"] = f"{said.score:g}"
         yield BlockRecord(
-            code=one.code,
+            code=outline.code,
             kind=said.kind or options.kind,
             course=said.course,
             vertices=corners if wall is None else wall.origin + corners @ wall.axes[:2],
@@ -201,8 +203,8 @@ def _stones(
             sigma=max(sigma, said.sigma or 0.0),
             depth=said.depth,
             depth_sigma=said.depth_sigma,
-            depth_source=None if said.depth is None else f"attribute of {one.where}",
-            line=one.number,
+            depth_source=None if said.depth is None else f"attribute of {outline.where}",
+            line=outline.number,
             notes=notes,
             zone=said.zone,
             spans=span,

@@ -68,23 +68,25 @@ def place_outlines(
     """
     if wall is not None and abs(float(wall.axes[2, 2])) < _UPRIGHT:
         outlines = levelled(outlines)
-    flat = next((one for one in outlines if one.corners.shape[1] == 2), None)
+    flat = next((outline for outline in outlines if outline.corners.shape[1] == 2), None)
     if flat is not None and wall is None:
         remedy = 'give the frame of the wall: --wall FILE.toml, or two points on its foot: --wall "X,Y X,Y"'
         raise UsageError("the outlines lie in a plane, without heights", where=flat.where, remedy=remedy)
     return tuple(
-        _on_wall(one, wall) if wall is not None and one.corners.shape[1] == 2 else _in_space(one, stations)
-        for one in outlines
+        _on_wall(outline, wall)
+        if wall is not None and outline.corners.shape[1] == 2
+        else _in_space(outline, stations)
+        for outline in outlines
     )
 
 
 def levelled(outlines: Sequence[Outline]) -> tuple[Outline, ...]:
     """Return outlines of which those at one elevation, as 2D polylines have it, lie in the plane of the drawing."""
     return tuple(
-        replace(one, corners=one.corners[:, :2])
-        if one.corners.shape[1] == 3 and np.ptp(one.corners[:, 2]) <= _LEVEL
-        else one
-        for one in outlines
+        replace(outline, corners=outline.corners[:, :2])
+        if outline.corners.shape[1] == 3 and np.ptp(outline.corners[:, 2]) <= _LEVEL
+        else outline
+        for outline in outlines
     )
 
 

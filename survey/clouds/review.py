@@ -77,17 +77,17 @@ def _shape_doubts(
     logs = np.log(np.maximum(areas, 1e-12))
     middle = float(np.median(logs))
     spread = max(deviation(logs, middle), _SPREAD)
-    for one, ring, area, log in zip(outlines, rings, areas, logs, strict=True):
-        for reason, text in one.doubts:
-            yield Doubtful(one.code, reason, text, one.where)
-        if one.said.score is not None and one.said.score < _UNSURE:
-            yield Doubtful(one.code, "low score", f"a score of {one.said.score:g}", one.where)
+    for outline, ring, area, log in zip(outlines, rings, areas, logs, strict=True):
+        for reason, text in outline.doubts:
+            yield Doubtful(outline.code, reason, text, outline.where)
+        if outline.said.score is not None and outline.said.score < _UNSURE:
+            yield Doubtful(outline.code, "low score", f"a score of {outline.said.score:g}", outline.where)
         if len(outlines) >= _FEWEST and abs(log - middle) > _ODD * spread:
             text = f"{area:.3g} m², the usual outline has {np.exp(middle):.3g} m²"
-            yield Doubtful(one.code, "odd size", text, one.where)
+            yield Doubtful(outline.code, "odd size", text, outline.where)
         if (solid := area / max(_hull_area(ring), 1e-12)) < _SOLID:
             text = f"it fills {solid:.0%} of its convex hull: a mask may leak into a joint or a neighbour"
-            yield Doubtful(one.code, "leak", text, one.where)
+            yield Doubtful(outline.code, "leak", text, outline.where)
 
 
 def _seams(
@@ -130,8 +130,8 @@ def measured_doubts(one: PlacedOutline, plane: Array, numbers: Array) -> Iterato
 def _overlaps_in_space(placed: Sequence[PlacedOutline]) -> Iterator[Doubtful]:
     """Yield pairs of outlines that share much of their area, seen along the line of sight of the first."""
     corners = [one.corners for one in placed]
-    low = np.array([one.min(axis=0) for one in corners]) - _THICK
-    high = np.array([one.max(axis=0) for one in corners]) + _THICK
+    low = np.array([corner.min(axis=0) for corner in corners]) - _THICK
+    high = np.array([corner.max(axis=0) for corner in corners]) + _THICK
     pairs = _near_pairs(low, high)
     pairs = pairs[[abs(float(placed[i].axes[2] @ placed[j].axes[2])) > 0.5 for i, j in pairs]]
     second = [((corners[j] - placed[i].origin) @ placed[i].axes[:2].T) for i, j in pairs]

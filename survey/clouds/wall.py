@@ -72,7 +72,7 @@ def wall_lines(wall: Wall) -> str:
 
 def _numbers(text: str) -> Array | None:
     try:
-        values = [float(one) for point in text.split() for one in point.split(",")]
+        values = [float(word) for point in text.split() for word in point.split(",")]
     except ValueError:
         return None
     return np.array(values) if len(values) == 4 and len(text.split()) == 2 else None
@@ -91,7 +91,9 @@ def _of_file(path: Path) -> Wall:
         if value is None and name == "up":
             continue
         numbers = value if isinstance(value, list) else []
-        if len(numbers) != 3 or not all(type(one) in (int, float) and math.isfinite(one) for one in numbers):
+        if len(numbers) != 3 or not all(
+            type(number) in (int, float) and math.isfinite(number) for number in numbers
+        ):
             raise SurveyError(f"{name} is {value!r}", where=str(path), remedy=_EXAMPLE)
         vectors[name] = np.array(numbers, dtype=np.float64)
     return _frame(vectors["origin"], vectors["right"], vectors.get("up"), str(path))

@@ -86,7 +86,7 @@ def _read(path: Path) -> PixelPlace:
         "a world file has six lines: the change of x, of y by a column, by a row, and x, y of the first pixel"
     )
     try:
-        numbers = [float(one.replace(",", ".")) for one in path.read_text(encoding="utf-8-sig").split()]
+        numbers = [float(word.replace(",", ".")) for word in path.read_text(encoding="utf-8-sig").split()]
     except (OSError, ValueError) as error:
         raise SurveyError(f"cannot be read: {error}", where=str(path), remedy=remedy) from error
     if len(numbers) != 6:

@@ -45,12 +45,12 @@ def estimate_roughness(records: Sequence[BlockRecord]) -> float:
     """
     places = [
         (
-            np.concatenate([one.points.reshape(-1, 3), one.vertices]),
-            one.point_and_vertex_sigmas,
-            one.seen_from,
+            np.concatenate([record.points.reshape(-1, 3), record.vertices]),
+            record.point_and_vertex_sigmas,
+            record.seen_from,
         )
-        for one in records
-        if len(one.points) + len(one.vertices) > 3
+        for record in records
+        if len(record.points) + len(record.vertices) > 3
     ]
     fits = _fits(places, 0.0)
     freedom = sum(len(points) - 3 for points, *_ in places)

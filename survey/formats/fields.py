@@ -41,6 +41,6 @@ def code_of(name: str) -> str:
     """
     if CODE.fullmatch(name):
         return name
-    words = (_NOT_IN_CODES.sub("", one) for one in unicodedata.normalize("NFC", name).split())
-    code = "_".join(one for one in words if one).lstrip("_.+/:-")
+    words = (_NOT_IN_CODES.sub("", word) for word in unicodedata.normalize("NFC", name).split())
+    code = "_".join(word for word in words if word).lstrip("_.+/:-")
     return code if CODE.fullmatch(code) else ""

@@ -74,12 +74,12 @@ def whole(stream: SurveyStream, path: Path) -> Survey:
         if the file holds solids
     """
     blocks: list[BlockRecord] = []
-    for one in stream.blocks:
-        if isinstance(one, Reject):
-            raise one.error
-        if not isinstance(one, BlockRecord):
+    for block in stream.blocks:
+        if isinstance(block, Reject):
+            raise block.error
+        if not isinstance(block, BlockRecord):
             raise UsageError(
                 "the file holds solids, not measured faces", where=str(path), remedy="iterate over its stream"
             )
-        blocks.append(one)
+        blocks.append(block)
     return Survey(stream.head, tuple(blocks))

@@ -197,16 +197,16 @@ class _Cutter:
     def _cuts(self, region: _Region) -> Iterator[Plane]:
         """Yield planes through two reflex edges, continuations of faces, and bisectors."""
         edges = region.edges
-        for k, one in enumerate(edges):
+        for k, edge in enumerate(edges):
             for other in edges[k + 1 :]:
-                plane = self._through(one, other)
-                if plane is not None and self._divides(plane, one) and self._divides(plane, other):
+                plane = self._through(edge, other)
+                if plane is not None and self._divides(plane, edge) and self._divides(plane, other):
                     yield plane
         if edges:
             yield from dict.fromkeys(self._planes[k] for one in edges for k in (one.first, one.second))
-            for one in edges:
-                normal = np.array(self._planes[one.first][:3]) - self._planes[one.second][:3]
-                yield _plane_through(normal, one.start)
+            for edge in edges:
+                normal = np.array(self._planes[edge.first][:3]) - self._planes[edge.second][:3]
+                yield _plane_through(normal, edge.start)
         else:  # pieces that are not connected
             yield from (self._planes[k] for k in dict(region.pieces))
 

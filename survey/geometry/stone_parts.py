@@ -74,7 +74,7 @@ def _families(solid: Solid) -> list[Array] | None:
     for polygon in polygons:
         vector = area_vector(polygon)
         plane = np.append(vector, float(vector @ polygon.mean(axis=0))) / np.linalg.norm(vector)
-        group = next((one for one in groups if abs(one[0][:3] @ plane[:3]) > _FAMILY), None)
+        group = next((group for group in groups if abs(group[0][:3] @ plane[:3]) > _FAMILY), None)
         if group is None:
             groups.append(group := [])
         elif group[0][:3] @ plane[:3] < 0.0:
@@ -85,7 +85,9 @@ def _families(solid: Solid) -> list[Array] | None:
         return None
     families = [_in_order(group, solid.vertices) for group in groups]
     return (
-        None if any(family is None for family in families) else [one for one in families if one is not None]
+        None
+        if any(family is None for family in families)
+        else [family for family in families if family is not None]
     )
 
 

@@ -94,7 +94,7 @@ def as_building(stones: Sequence[BlockyStone]) -> LocalStones:
             )
         known.add(stone.code)
     origin = stones[0].solid.vertices.mean(axis=0)
-    solids = tuple(replace(one.solid, vertices=one.solid.vertices - origin) for one in stones)
+    solids = tuple(replace(stone.solid, vertices=stone.solid.vertices - origin) for stone in stones)
     gathered = SolidArrays.gather((solid.vertices, solid.faces) for solid in solids)
     planes = planes_of(gathered)
     height, extent = highest_corners(*_arrays(gathered), planes.normals, planes.offsets)

@@ -123,7 +123,7 @@ def _with_leaves(
     stones: Sequence[SurveyedBlock | BlockyStone], leaves: Sequence[Leaf], settings: JointSettings
 ) -> ClosedStones:
     """Let the stones of leaves grow, and close the joints of the others among themselves."""
-    codes = [one.code for one in stones]
+    codes = [stone.code for stone in stones]
     _check_distinct(codes)
     grown = [grow(leaf, [codes[k] for k in leaf.members], settings) for leaf in leaves]
     members = {k: one for leaf, one in zip(leaves, grown, strict=True) for k in leaf.members}
@@ -132,7 +132,7 @@ def _with_leaves(
     )
     blocky = {one.code: one for one in rest.simplified}
     blocky |= {codes[k]: _unsimplified(stones[k]) for k in members}
-    solids = {one.code: one for one in rest.solids}
+    solids = {solid.code: solid for solid in rest.solids}
     solids |= {solid.code: solid for one in grown for solid in one.solids}
     ordered = [solids[code] for code in codes]
     joints = (*(joint for one in grown for joint in one.joints), *rest.report.joints)

@@ -82,14 +82,16 @@ class GrownLeaf:
     @property
     def open_over_all(self) -> float:
         """Area of the openings over that of the frame [-]."""
-        return sum(one.area for one in self.openings) / (self.size[0] * self.size[1])
+        return sum(opening.area for opening in self.openings) / (self.size[0] * self.size[1])
 
     @property
     def usual_area(self) -> float:
         """Median area of an outline [m²]."""
-        return float(np.median([abs(ring_area(one)) for one in self.outlines.values()]))
+        return float(np.median([abs(ring_area(outline)) for outline in self.outlines.values()]))
 
     @property
     def stones_over_all(self) -> float:
         """Area of the outlines over that of the frame [-]."""
-        return sum(abs(ring_area(one)) for one in self.outlines.values()) / (self.size[0] * self.size[1])
+        return sum(abs(ring_area(outline)) for outline in self.outlines.values()) / (
+            self.size[0] * self.size[1]
+        )

@@ -144,7 +144,7 @@ def closing_report(
     codes = [stone.code for stone in building.stones]
     joined = {code for joint in joints for code in joint.stones}
     facing_area = facing.area.tolist()
-    within = {frozenset(one.codes) for one in overlaps}
+    within = {frozenset(overlap.codes) for overlap in overlaps}
     gaps = [
         Gap(joint.stones, max(joint.width, 0.0), facing_area[k], joint.centroid, joint.left_open or _BENT)
         for k, joint in enumerate(joints)

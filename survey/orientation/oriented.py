@@ -42,8 +42,8 @@ class Oriented:
         SurveyError
             if there is none of this name
         """
-        for number, one in enumerate(self.photos):
-            if one.name == name:
+        for number, photo in enumerate(self.photos):
+            if photo.name == name:
                 return number
         names = [one.name for one in self.photos]
         raise SurveyError(

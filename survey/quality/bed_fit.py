@@ -87,11 +87,11 @@ def scatter_of(bed: BedCorners, parameters: int) -> BedScatter:
 
 def pool(scatters: Sequence[BedScatter]) -> BedScatter | None:
     """Return the root mean squares of courses with enough stones, for courses of few; None if there are none."""
-    freedom = sum(one.freedom for one in scatters)
+    freedom = sum(scatter.freedom for scatter in scatters)
     if not freedom:
         return None
-    tau = math.sqrt(sum(one.freedom * one.tau**2 for one in scatters) / freedom)
-    kappa = math.sqrt(sum(one.freedom * one.kappa**2 for one in scatters) / freedom)
+    tau = math.sqrt(sum(scatter.freedom * scatter.tau**2 for scatter in scatters) / freedom)
+    kappa = math.sqrt(sum(scatter.freedom * scatter.kappa**2 for scatter in scatters) / freedom)
     return BedScatter(tau, kappa, freedom)
 
 

@@ -79,8 +79,10 @@ def standards(stones: Sequence[StoneQuality], canons: Iterable[Canon]) -> dict[s
     canons : usual dimensions according to archaeologists
     """
     found = {
-        one.kind: KindStandard(one.kind, one.length, one.height, one.sigma, one.sigma, one.source, 0)
-        for one in canons
+        canon.kind: KindStandard(
+            canon.kind, canon.length, canon.height, canon.sigma, canon.sigma, canon.source, 0
+        )
+        for canon in canons
     }
     for kind in sorted({stone.kind for stone in stones} - set(found)):
         own = [stone for stone in stones if stone.kind == kind]

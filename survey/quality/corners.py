@@ -103,11 +103,11 @@ def misplaced_corners(faces: Sequence[SeenFace]) -> tuple[Misplaced, ...]:
         kinds[face.kind].append(face)
     askew = {kind: _least_askew(members) for kind, members in kinds.items()}
     found = [finding for members in kinds.values() for finding in _odd_sizes(members)]
-    middles = np.array([one.outline.mean(axis=0) for one in faces]).reshape(-1, 3)
-    normals = np.array([one.normal for one in faces]).reshape(-1, 3)
-    for facade in find_facades(normals, np.array([one.area for one in faces]), middles):
+    middles = np.array([face.outline.mean(axis=0) for face in faces]).reshape(-1, 3)
+    normals = np.array([face.normal for face in faces]).reshape(-1, 3)
+    for facade in find_facades(normals, np.array([face.area for face in faces]), middles):
         members = [faces[i] for i in facade.members.tolist()]
-        flat = [facade.frame.flatten(one.outline) for one in members]
+        flat = [facade.frame.flatten(member.outline) for member in members]
         away = (middles[facade.members] - facade.frame.origin) @ facade.frame.axes[2]
         found += [*_overlaps(members, flat, away), *_odd_angles(members, flat, askew), *_seams(members, flat)]
     order = list(Sign)
@@ -185,9 +185,9 @@ def _distances(points: Array, starts: Array, ends: Array) -> Array:
 def _least_askew(faces: Sequence[SeenFace]) -> float:
     """Return the departure from a right angle beyond which an angle is odd for a kind [degrees]."""
     worst = [
-        np.abs(_angles(one) - 90.0)[_sound_corners(one)].max(initial=0.0)
-        for one in faces
-        if len(one.outline) > 3
+        np.abs(_angles(face) - 90.0)[_sound_corners(face)].max(initial=0.0)
+        for face in faces
+        if len(face.outline) > 3
     ]
     if len(worst) < ENOUGH:
         return 90.0 - _SPIKE
@@ -251,7 +251,7 @@ def _odd_sizes(faces: Sequence[SeenFace]) -> Iterator[Misplaced]:
     if len(faces) < ENOUGH:
         return
     for name, word in (("length", "long"), ("height", "high")):
-        sizes = np.array([getattr(one, name) for one in faces])
+        sizes = np.array([getattr(face, name) for face in faces])
         usual = float(np.median(sizes))
         for k in np.flatnonzero(_outliers(sizes, _LARGER * usual)).tolist():
             text = f"its face is {sizes[k]:.3f} m {word}, the usual {faces[k].kind} {usual:.3f} m"

@@ -167,10 +167,10 @@ def measure_courses(
     One line per facade, zone and course that has any sound lower corner, in that order
     """
     standing = [facade for facade in facades if facade.azimuth is not None]
-    courses = [one for facade in standing for one in _courses(stones, facade, _tilt(facade, tilts))]
-    own = {k: scatter_of(one.bed, 2) for k, one in enumerate(courses) if one.bed.count >= ENOUGH}
+    courses = [course for facade in standing for course in _courses(stones, facade, _tilt(facade, tilts))]
+    own = {k: scatter_of(course.bed, 2) for k, course in enumerate(courses) if course.bed.count >= ENOUGH}
     pooled = pool(list(own.values()))
-    return tuple(_line(one, own.get(k), pooled) for k, one in enumerate(courses))
+    return tuple(_line(course, own.get(k), pooled) for k, course in enumerate(courses))
 
 
 def with_scatter(
@@ -185,7 +185,7 @@ def with_scatter(
     """
     courses = [_course_of(line) for line in lines]
     walls = {
-        wall: corner_roughness([one.bed for one in courses if (one.facade, one.zone) == wall])
+        wall: corner_roughness([course.bed for course in courses if (course.facade, course.zone) == wall])
         for wall in scatters
     }
     fitted = []
@@ -240,7 +240,7 @@ def _tilt(facade: Facade, tilts: Sequence[Array]) -> float:
     """Return the standard deviation of a slope along a facade: the rotation ω raises s·u by (ω × u)_z s."""
     along = facade.frame.axes[0]
     lever = np.array([along[1], -along[0], 0.0])
-    return max((math.sqrt(float(lever @ one @ lever)) for one in tilts), default=0.0)
+    return max((math.sqrt(float(lever @ tilt @ lever)) for tilt in tilts), default=0.0)
 
 
 def _courses(stones: Sequence[StoneQuality], facade: Facade, frame_sigma: float) -> list[_Course]:
@@ -261,7 +261,7 @@ def _courses(stones: Sequence[StoneQuality], facade: Facade, frame_sigma: float)
             if (stones[i].zone or "") == zone and _at_least(stones[i].course, course)
         }
         courses.append(_course(groups[zone, course], facade, frame_sigma, sides.of(spanning | same)))
-    return [one for one in courses if one is not None]
+    return [course for course in courses if course is not None]
 
 
 def _at_least(course: int | None, other: int) -> bool:

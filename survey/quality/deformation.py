@@ -108,11 +108,11 @@ class Deformation:
     @property
     def dof(self) -> int:
         """Degrees of freedom of all groups."""
-        return sum(one.dof for one in self.groups)
+        return sum(group.dof for group in self.groups)
 
     def residuals(self, displacement: Displacement) -> Array:
         """Return the standardised residuals (m,) that a movement leaves [-]."""
-        return np.concatenate([np.zeros(0), *(one.residuals(displacement) for one in self.groups)])
+        return np.concatenate([np.zeros(0), *(group.residuals(displacement) for group in self.groups)])
 
 
 def measure_deformation(
@@ -133,10 +133,10 @@ def measure_deformation(
     every, walls_beds = measure_beds(stones, facades)
     lines = [line for line in every if line.slope is not None]
     beds = (_bed(line, built.level, undetermined) for line in lines)
-    walls = (one for facade in facades for one in _walls(stones, facade, built))
-    scatter = {(one.facade, one.zone or None): one.scatter for one in walls_beds}
-    freedom = sum(one.freedom for one in walls_beds)
-    return Deformation((*(one for one in beds if one is not None), *walls), scatter, freedom)
+    walls = (wall for facade in facades for wall in _walls(stones, facade, built))
+    scatter = {(bed.facade, bed.zone or None): bed.scatter for bed in walls_beds}
+    freedom = sum(bed.freedom for bed in walls_beds)
+    return Deformation((*(bed for bed in beds if bed is not None), *walls), scatter, freedom)
 
 
 def _bed(line: CourseLine, level: float, undetermined: frozenset[str]) -> DeformationGroup | None:

@@ -223,7 +223,7 @@ def _left_out(block: SurveyedBlock) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 def judge_survey(stones: Sequence[StoneQuality]) -> SurveyQuality:
     """Summarise the stones of a survey; stones without points of their own contribute no residual."""
-    own = [one for one in stones if one.measured]
+    own = [stone for stone in stones if stone.measured]
     squares = sum(one.redundancy * one.sigma0**2 for one in own if one.sigma0 is not None)
     redundancy = sum(one.redundancy for one in own)
     sigma0 = math.sqrt(squares / redundancy) if redundancy else None
@@ -237,9 +237,9 @@ def judge_survey(stones: Sequence[StoneQuality]) -> SurveyQuality:
     residuals = np.concatenate([one.standardised for one in own]) if own else np.empty(0, np.float32)
     return SurveyQuality(
         stones=len(stones),
-        points=sum(one.points for one in stones),
-        blunders=sum(len(one.blunders) for one in stones),
-        worn=sum(len(one.worn) for one in stones),
+        points=sum(stone.points for stone in stones),
+        blunders=sum(len(stone.blunders) for stone in stones),
+        worn=sum(len(stone.worn) for stone in stones),
         redundancy=redundancy,
         sigma0=sigma0,
         sigma0_sigma=error,
@@ -247,10 +247,10 @@ def judge_survey(stones: Sequence[StoneQuality]) -> SurveyQuality:
         verdict=_verdict(sigma0, error, sigma, rough) if own or not stones else _NOTHING,
         rms=math.sqrt(total / sum(counts)) if own else math.nan,
         residuals=_histogram(residuals),
-        kinds=_count(one.kind for one in stones),
-        shapes=_count(one.shape for one in stones),
-        depths=_count(one.depth_origin for one in stones),
-        provenances=_count(one.source for one in stones),
+        kinds=_count(stone.kind for stone in stones),
+        shapes=_count(stone.shape for stone in stones),
+        depths=_count(stone.depth_origin for stone in stones),
+        provenances=_count(stone.source for stone in stones),
     )
 
 

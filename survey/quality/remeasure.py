@@ -195,23 +195,23 @@ def list_remeasures(
     misplaced : signs of corners out of place; the size of a stone of the wrong kind is none
     depths : depths that contradict other evidence
     """
-    made = {one.code for one in stones}
-    found = [_missing(one, made) for one in rejects]
+    made = {stone.code for stone in stones}
+    found = [_missing(reject, made) for reject in rejects]
     scale = quality.sigma0 or 1.0
     for stone in stones:
         found += _reasons(stone, scale, _UNLIKELY / len(stones))
     found += [
         Remeasure(
-            one.code,
-            one.line,
+            depth.code,
+            depth.line,
             Urgency.DEPTH,
-            one.score,
-            f"{one.text} ({one.score:.1f} σ)",
+            depth.score,
+            f"{depth.text} ({depth.score:.1f} σ)",
             "measure its depth again, or correct the rule that gives it",
         )
-        for one in depths
+        for depth in depths
     ]
-    of_wrong_kind = {one.code for one in contradictions}
+    of_wrong_kind = {contradiction.code for contradiction in contradictions}
     found += [
         Remeasure(one.code, one.line, _URGENCIES[one.sign], one.severity, one.text, _CORNER_ACTIONS[one.sign])
         for one in misplaced
@@ -219,14 +219,14 @@ def list_remeasures(
     ]
     found += [
         Remeasure(
-            one.code,
-            one.line,
+            contradiction.code,
+            contradiction.line,
             Urgency.KIND,
-            one.significance,
-            f"is called a {one.kind}, but {one.text} ({one.significance:.1f} σ)",
+            contradiction.significance,
+            f"is called a {contradiction.kind}, but {contradiction.text} ({contradiction.significance:.1f} σ)",
             "see on site what kind of stone it is, and measure its face and depth again",
         )
-        for one in contradictions
+        for contradiction in contradictions
     ]
     return tuple(sorted(found, key=lambda one: (one.urgency, -one.severity)))
 

@@ -227,7 +227,7 @@ def _fan(sides: Side, joints: _Joints, stone: int, sigma: float) -> tuple[float,
 
 def _connected(members: Collection[int], links: Sequence[tuple[int, int]]) -> Iterator[set[int]]:
     """Yield the sets of members that links join."""
-    number = {one: k for k, one in enumerate(members)}
+    number = {member: k for k, member in enumerate(members)}
     if not number:
         return
     rows = np.array([(number[a], number[b]) for a, b in links], dtype=np.intp).reshape(-1, 2)

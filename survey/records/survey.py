@@ -266,7 +266,7 @@ class SurveyHead:
             if one.name == wanted:
                 return one.position
         if station is not None:
-            known = ", ".join(one.name for one in self.stations) or "none"
+            known = ", ".join(station.name for station in self.stations) or "none"
             raise SurveyError(f"no station {station!r}", remedy=f"stations of this survey: {known}")
         return self.stations[0].position if len(self.stations) == 1 else None
 

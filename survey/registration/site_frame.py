@@ -170,7 +170,9 @@ def to_site(head: SurveyHead, transform: SiteTransform) -> SurveyHead:
     """
     return replace(
         head,
-        stations=tuple(replace(one, position=transform.apply(one.position)) for one in head.stations),
+        stations=tuple(
+            replace(station, position=transform.apply(station.position)) for station in head.stations
+        ),
         photographs=tuple(
             replace(
                 photograph,

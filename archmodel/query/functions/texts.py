@@ -27,7 +27,7 @@ def text(scope: Scope, call: Call, ask: Ask) -> Condition:
     context = scope.context
 
     def has(*columns: ColumnElement[str]) -> Condition:
-        return or_(*(one.icontains(words.text, autoescape=True) for one in columns))
+        return or_(*(column.icontains(words.text, autoescape=True) for column in columns))
 
     documents, phases, materials = (context.alias(one) for one in (Document, Phase, Material))
     named = {

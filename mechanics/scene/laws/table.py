@@ -46,7 +46,7 @@ class LawTable:
 
         Not a number where it is needed, but not known.
         """
-        own = [one if one.by_thickness else None for one in self.laws]
+        own = [law if law.by_thickness else None for law in self.laws]
         if not any(own):
             return None
         otherwise = np.array([0.0 if one is None else one.thickness or np.nan for one in own])[law]
@@ -75,7 +75,7 @@ class LawTable:
 
     def makes_bonds(self, law: Ints) -> Bools:
         """Return the contacts (n,) whose law bonds stones that meet at the start."""
-        return np.array([one.bonded for one in self.laws])[law]
+        return np.array([law.bonded for law in self.laws])[law]
 
     def of(self, bodies: Ints) -> Ints:
         """Return the index of the law of each contact between bodies (nc, 2); of two rules, the later holds."""

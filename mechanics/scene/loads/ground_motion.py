@@ -51,7 +51,9 @@ class GroundMotion:
     start: Annotated[float, Setting("Start time.", "s", at_least=0)] = 0.0
 
     def __post_init__(self) -> None:
-        directions = np.array([one.direction for one in self.components], dtype=float).reshape(-1, 3)
+        directions = np.array([component.direction for component in self.components], dtype=float).reshape(
+            -1, 3
+        )
         # records in parallel directions would merely add up
         if not self.components or np.linalg.matrix_rank(directions) < len(directions):
             raise SceneError(
@@ -74,7 +76,7 @@ class GroundMotion:
     @property
     def course(self) -> Course:
         """Course of the acceleration of the strongest component."""
-        record = max((one.record for one in self.components), key=lambda one: one.peak)
+        record = max((component.record for component in self.components), key=lambda one: one.peak)
         return Course.of("ground motion", self.start + record.time, record.acceleration, self.until)
 
     def pose(self, time: float) -> Pose:
@@ -84,7 +86,7 @@ class GroundMotion:
     @cached_property
     def _velocity(self) -> tuple[History, ...]:
         """Velocity (3,) of each component with time [m/s]."""
-        return tuple(self._history(one) for one in self.components)
+        return tuple(self._history(component) for component in self.components)
 
     def _history(self, component: Component) -> History:
         record = component.record

@@ -162,14 +162,14 @@ class Loads:
     @property
     def until(self) -> float:
         """Time from which all of them are constant [s]; 0 without loads."""
-        gravity, forces = (one.until for one in self.gravity), (one.until for one in self.forces)
-        return max([0.0, *gravity, *forces, *(one.until for one in self.motions)])
+        gravity, forces = (one.until for one in self.gravity), (force.until for force in self.forces)
+        return max([0.0, *gravity, *forces, *(motion.until for motion in self.motions)])
 
     @property
     def courses(self) -> tuple[Course, ...]:
         """Courses of the loads that change with time."""
-        gravity, forces = (one.course for one in self.gravity), (one.course for one in self.forces)
-        found = (*gravity, *forces, *(one.course for one in self.motions))
+        gravity, forces = (one.course for one in self.gravity), (force.course for force in self.forces)
+        found = (*gravity, *forces, *(motion.course for motion in self.motions))
         return tuple(one for one in found if one is not None)
 
     def unfinished(self, end: float, missed: bool) -> tuple[str, ...]:
@@ -177,5 +177,5 @@ class Loads:
 
         With `missed` those alone of which it misses the peak or strong part, otherwise the other ones.
         """
-        found = (one.beyond(end) for one in self.courses if one.missed(end) is missed)
+        found = (course.beyond(end) for course in self.courses if course.missed(end) is missed)
         return tuple(dict.fromkeys(filter(None, found)))

@@ -133,7 +133,7 @@ def read_station(
     files = sorted(one for one in folder.glob(rest) if one.is_file())
     if not files:
         raise SceneError("no such file", where=str(pattern), remedy="name files, with * for what differs")
-    found = [one for file in files for one in read_accelerograms(file, unit, dt)]
+    found = [accelerogram for file in files for accelerogram in read_accelerograms(file, unit, dt)]
     for one in found:
         if one.direction is None:
             raise SceneError(
@@ -266,7 +266,7 @@ def _bare(name: str) -> str:
 
 def _unit_in(text: str) -> str | None:
     found = _UNIT.search(text)
-    return None if found is None else next(one for one in found.groups() if one).casefold()
+    return None if found is None else next(group for group in found.groups() if group).casefold()
 
 
 def _size(path: str | Path, unit: str | None, table: Table | None) -> float:

@@ -87,7 +87,9 @@ def reader_of(path: str | Path, start: str) -> Callable[[str | Path], Accelerogr
     start : its first lines
     """
     lines = start.splitlines()
-    if Path(path).suffix.lower() == ".at2" or any(one.search(line) for one in _STEPS for line in lines[3:4]):
+    if Path(path).suffix.lower() == ".at2" or any(
+        step.search(line) for step in _STEPS for line in lines[3:4]
+    ):
         return read_at2
     if lines and lines[0].startswith("Origin Time"):
         return read_knet
@@ -160,7 +162,7 @@ def read_esm(path: str | Path) -> Accelerogram:
         if found:
             keys.setdefault(found[1], (number, found[2].strip()))
         elif values or text[0] in "+-.0123456789":
-            values += [number_at(path, number, one) for one in text.split()]
+            values += [number_at(path, number, word) for word in text.split()]
     kind = keys.get("DATA_TYPE", (1, "ACCELERATION"))
     if "ACC" not in kind[1].upper():
         fail_at(path, kind[0], f"the data are {kind[1]!r}", "give the file of the acceleration (ACC)")
@@ -198,7 +200,7 @@ def read_knet(path: str | Path) -> Accelerogram:
             header[key] = (number, line[18:].strip())
             begun = line.startswith("Memo")
         else:
-            values += [number_at(path, number, one) for one in line.split()]
+            values += [number_at(path, number, word) for word in line.split()]
     (rate,) = _header_numbers(path, header, "Sampling Freq", r"([0-9.]+)")
     gals, steps = _header_numbers(path, header, "Scale Factor", r"([0-9.]+)\s*\(gal\)\s*/\s*([0-9.]+)")
     counts = np.array(values)
@@ -219,8 +221,8 @@ def _header_numbers(
     found = re.match(pattern, text, re.IGNORECASE)
     if found is None:
         fail_at(path, line, f"no {key} in the header", "give the file of K-NET as it is")
-    numbers = tuple(number_at(path, line, one) for one in found.groups())
-    if not all(one > 0.0 for one in numbers):
+    numbers = tuple(number_at(path, line, group) for group in found.groups())
+    if not all(number > 0.0 for number in numbers):
         fail_at(path, line, f"{key} is {text!r}", "give the file of K-NET as it is")
     return numbers
 
@@ -266,6 +268,6 @@ def _fixed(
             )
         number, line = lines[at]
         cells = [line[width * k : width * (k + 1)].strip() for k in range(min(across, count - len(values)))]
-        values += [number_at(path, number, one) for one in cells]
+        values += [number_at(path, number, cell) for cell in cells]
         at += 1
     return values, at

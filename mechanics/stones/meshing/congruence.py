@@ -111,7 +111,7 @@ def motion(
 
 def _tolerance(*corners: Array) -> float:
     size = float(np.ptp(corners[0], axis=0).max())
-    return _EQUAL * size + _ROUNDING * max(float(np.abs(one).max()) for one in corners)
+    return _EQUAL * size + _ROUNDING * max(float(np.abs(corner).max()) for corner in corners)
 
 
 def _off(a: Array, b: Array, turn: Array) -> float:

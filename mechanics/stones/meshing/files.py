@@ -297,10 +297,12 @@ def _sets(found: Any, form: _Format, path: Path) -> dict[str, list[Ints]]:
     """Return by code the cells of each block that belong to a stone."""
     if form.writer == "abaqus":
         return {
-            code: [np.asarray(one, dtype=np.int64) for one in members]
+            code: [np.asarray(member, dtype=np.int64) for member in members]
             for code, members in found.cell_sets.items()
         }
-    numbers: list[Array] = found.cell_data.get(form.number, [np.zeros(len(one.data)) for one in found.cells])
+    numbers: list[Array] = found.cell_data.get(
+        form.number, [np.zeros(len(cell.data)) for cell in found.cells]
+    )
     if form.writer == "gmsh22":
         codes = {
             int(number): code for code, (number, dimension) in found.field_data.items() if dimension == 3

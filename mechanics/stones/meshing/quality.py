@@ -51,7 +51,7 @@ def _batch_quality(
     element: Element, meshes: Sequence[SolidMesh], own: Sequence[int]
 ) -> dict[int, MeshQuality]:
     corners = [meshes[k].nodes[meshes[k].cells[:, : element.corners]] for k in own]
-    starts = np.cumsum([0, *(len(one) for one in corners[:-1])])
+    starts = np.cumsum([0, *(len(corner) for corner in corners[:-1])])
     angle, jacobian = cell_quality(element, np.concatenate(corners))
     angles = np.minimum.reduceat(angle, starts).tolist()
     worst = np.minimum.reduceat(jacobian, starts).tolist()

@@ -24,8 +24,8 @@ def assessment_lines(done: "Assessment", verbose: bool) -> list[str]:
         f"weight {1e-3 * summary['weight']:.2f} kN",
         *(f"  {caution}" for caution in summary["cautions"]),
     ]
-    for one in summary["loads"]:
-        lines += [f"  {one['headline']}", *_code(one.get("code")), *_mechanism(one["mechanism"], verbose)]
+    for load in summary["loads"]:
+        lines += [f"  {load['headline']}", *_code(load.get("code")), *_mechanism(load["mechanism"], verbose)]
     return [*lines, f"  run {done.run}", *(f"  {done.folder / name}" for name in summary["files"])]
 
 
@@ -36,13 +36,13 @@ def _code(found: dict[str, Any] | None) -> list[str]:
     return [
         *([f"    CAUTION: {found['caution']}"] if found["caution"] else []),
         *(
-            f"    {one['symbol']} = {one['value']:.4g} {one['unit']}   {one['formula']}   [{one['article']}]"
-            for one in found["values"]
+            f"    {value['symbol']} = {value['value']:.4g} {value['unit']}   {value['formula']}   [{value['article']}]"
+            for value in found["values"]
         ),
         *(
-            f"    {'passed' if one['passed'] else 'NOT PASSED'}: {one['name']}: {one['capacity']:.4g} against "
-            f"{one['demand']:.4g} {one['unit']}, ratio {one['ratio']:.2f}   {one['formula']}   [{one['article']}]"
-            for one in found["checks"]
+            f"    {'passed' if rule['passed'] else 'NOT PASSED'}: {rule['name']}: {rule['capacity']:.4g} against "
+            f"{rule['demand']:.4g} {rule['unit']}, ratio {rule['ratio']:.2f}   {rule['formula']}   [{rule['article']}]"
+            for rule in found["checks"]
         ),
     ]
 
@@ -70,7 +70,7 @@ def comparison_lines(done: "SurveyComparison", verbose: bool) -> list[str]:
         f"{summary['scene']}: {_misfit(summary)}{unrested(summary['outcome'])}",
         "  χ² near its degrees of freedom: the movement explains what was measured; in brackets, if nothing had moved",
         *(f"  {caution}" for caution in summary["cautions"]),
-        *(f"  {_wall(one)}, {one['quantity']}: {_misfit(one)}" for one in summary["walls"]),
+        *(f"  {_wall(wall)}, {wall['quantity']}: {_misfit(wall)}" for wall in summary["walls"]),
         "  courses" + ("" if len(shown) == len(courses) else " that differ most"),
         *(f"    {_wall(one)}, course {one['course']}: {_misfit(one)}{_shape(one)}" for one in shown),
         f"  run {done.run}",

@@ -31,21 +31,21 @@ def check_lines(report: "CheckReport", verbose: bool, explain: bool = False) -> 
     lines = [
         f"{report.scene}: {sum(report.kinds.values())} stones "
         f"({', '.join(f'{count} {kind}' for kind, count in report.kinds.items())})",
-        *(f"  caution: {one}" for one in report.cautions),
+        *(f"  caution: {caution}" for caution in report.cautions),
         f"  models: {', '.join(f'{count} {name}' for name, count in report.bodies.items())}",
         *_stress_lines(report),
         *(_explanation(report) if explain else []),
         *(
-            f"  material {one.name}: {one.stones} stones, ρ {one.density:g} kg/m³, "
-            f"E {one.young / 1e9:g} GPa, ν {one.poisson:g}"
-            for one in report.materials
+            f"  material {material.name}: {material.stones} stones, ρ {material.density:g} kg/m³, "
+            f"E {material.young / 1e9:g} GPa, ν {material.poisson:g}"
+            for material in report.materials
         ),
     ]
-    lines += [f"  mesh {one.element}, {one.size:g} m: {one.stones} stones" for one in report.meshes]
+    lines += [f"  mesh {mesh.element}, {mesh.size:g} m: {mesh.stones} stones" for mesh in report.meshes]
     if report.mesh_quality is not None:
         lines += _mesh_lines(report.mesh_quality)
-    lines += [f"  law {one}" for one in report.laws] + [f"  load {one}" for one in report.loads]
-    lines += [f"  stage {one}" for one in report.stages]
+    lines += [f"  law {law}" for law in report.laws] + [f"  load {load}" for load in report.loads]
+    lines += [f"  stage {stage}" for stage in report.stages]
     if report.simplification is not None:
         lines += _simplification_lines(report.simplification, verbose)
     if report.joints is not None:
@@ -88,7 +88,7 @@ def _expected(cost: "Cost") -> str:
 
 def _stress_lines(report: "CheckReport") -> list[str]:
     """Count the stones whose stress is computed, if only some of the moving stones deform."""
-    asked = sum(one.stress for one in report.stones)
+    asked = sum(stone.stress for stone in report.stones)
     if not report.bodies["deformable"] or (not report.bodies["rigid"] and not report.ring):
         return []
     ring = f"; {report.ring} around them deform too" if report.ring else ""
@@ -97,8 +97,8 @@ def _stress_lines(report: "CheckReport") -> list[str]:
 
 def _explanation(report: "CheckReport") -> list[str]:
     """List each stone's model and the reason for it, in columns."""
-    wide = max(len(one.code) for one in report.stones)
-    return [f"    {one.code:{wide}}  {one.fidelity:10}  {one.reason}" for one in report.stones]
+    wide = max(len(stone.code) for stone in report.stones)
+    return [f"    {stone.code:{wide}}  {stone.fidelity:10}  {stone.reason}" for stone in report.stones]
 
 
 def _mesh_lines(quality: "MeshQualityReport") -> list[str]:
@@ -140,8 +140,8 @@ def _simplification_lines(report: "SimplificationReport", verbose: bool) -> list
 def _joint_lines(report: "JointsReport", verbose: bool) -> list[str]:
     """Describe the joints, and list gaps and overlaps."""
     left, as_surveyed = sum(report.left_open.values()), report.mode == "as-surveyed"
-    in_part = sum(one.reason not in report.left_open for one in report.gaps)
-    touching = sum(one.reason not in report.left_open and one.width <= _NOTHING for one in report.gaps)
+    in_part = sum(gap.reason not in report.left_open for gap in report.gaps)
+    touching = sum(gap.reason not in report.left_open and gap.width <= _NOTHING for gap in report.gaps)
     partly = f" ({touching} of them on less than half of their area)" if touching else ""
     lines = [
         f"  joints ({report.mode}): {left} left as they are, {_mm(report.mean_width)} wide on average"
@@ -156,24 +156,24 @@ def _joint_lines(report: "JointsReport", verbose: bool) -> list[str]:
         )
     lines += [f"  {line}" for leaf in report.leaves for line in leaf.in_words()]
     into = [
-        f"    {' and '.join(one.stones)} were measured {_mm(-one.width)} into each other at {_place(one.place)}"
-        for one in report.measured_overlaps
+        f"    {' and '.join(pair.stones)} were measured {_mm(-pair.width)} into each other at {_place(pair.place)}"
+        for pair in report.measured_overlaps
     ]
     if into:
         many = _count(len(into), "joint")
         lines += [f"  {many} closed half-way between overlapping stones; check their corners:"]
         lines += _shortened(into, verbose)
     overlaps = [
-        f"    {' and '.join(one.stones)} lie {_mm(one.depth)} in each other ({one.volume * 1e6:.3g} cm³) "
-        f"at {_place(one.place)}"
-        for one in report.overlaps
+        f"    {' and '.join(overlap.stones)} lie {_mm(overlap.depth)} in each other ({overlap.volume * 1e6:.3g} cm³) "
+        f"at {_place(overlap.place)}"
+        for overlap in report.overlaps
     ]
     if overlaps:
         lines += [f"  {_count(len(overlaps), 'overlap')} left:", *_shortened(overlaps, verbose)]
     gaps = [
-        f"    {' and '.join(one.stones)} {_apart(one)} at {_place(one.place)}"
-        + ("" if as_surveyed else f": {one.reason}")
-        for one in report.gaps
+        f"    {' and '.join(gap.stones)} {_apart(gap)} at {_place(gap.place)}"
+        + ("" if as_surveyed else f": {gap.reason}")
+        for gap in report.gaps
     ]
     if gaps:
         left_by = ", the largest first:" if len(gaps) > 1 else ":"

@@ -22,7 +22,7 @@ def diagnosis_lines(done: "Diagnosis", verbose: bool) -> list[str]:
         ),
         *(f"  {caution}" for caution in summary["cautions"]),
         "  hypotheses, by AICc; P: of so large a χ² by chance",
-        *(line for one in summary["hypotheses"] for line in _hypothesis(one)),
+        *(line for hypothesis in summary["hypotheses"] for line in _hypothesis(hypothesis)),
         *(_groups(summary["groups"]) if verbose else ()),
         f"  {summary['runs']} runs, {summary['cpu']:.0f} s of the processor",
         "  look closer, and keep the best in the database: "
@@ -56,9 +56,9 @@ def _groups(groups: list[dict[str, Any]]) -> list[str]:
     return [
         "  χ² of the best, in brackets if nothing had moved",
         *(
-            f"    {one['facade']}{'' if one['zone'] is None else ' ' + one['zone']}, "
-            f"{'plumb' if one['course'] is None else 'course ' + str(one['course'])}: "
-            f"{one['chi2']:.4g} of {one['dof']} ({one['chi2_still']:.4g})"
-            for one in groups
+            f"    {group['facade']}{'' if group['zone'] is None else ' ' + group['zone']}, "
+            f"{'plumb' if group['course'] is None else 'course ' + str(group['course'])}: "
+            f"{group['chi2']:.4g} of {group['dof']} ({group['chi2_still']:.4g})"
+            for group in groups
         ),
     ]

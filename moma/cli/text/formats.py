@@ -102,8 +102,8 @@ def as_json(value: object) -> str:
 def as_geojson(collection: Mapping[str, Any]) -> str:
     """Format a FeatureCollection with one feature on each line."""
     features = (
-        json.dumps(one, ensure_ascii=not _printable(str(one)), allow_nan=False)
-        for one in collection["features"]
+        json.dumps(feature, ensure_ascii=not _printable(str(feature)), allow_nan=False)
+        for feature in collection["features"]
     )
     return '{"type": "FeatureCollection", "features": [\n' + ",\n".join(features) + "\n]}"
 

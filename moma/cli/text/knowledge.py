@@ -32,9 +32,9 @@ def record_lines(report: "RecordReport", verbose: bool) -> list[str]:
         if verbose or report.dry_run:
             lines += [f"  {name}: {_counts(outcome)}" for name, outcome in file.tables.items()]
         lines += [
-            f"  document {one.document}: {one.place} is not there, and is taken to be elsewhere"
-            for one in file.attachments
-            if one.sha256 is None
+            f"  document {attachment.document}: {attachment.place} is not there, and is taken to be elsewhere"
+            for attachment in file.attachments
+            if attachment.sha256 is None
         ]
     if report.related is not None:
         lines.append(f"relations of the corrected stones recomputed, as entry {report.related}")

@@ -22,14 +22,14 @@ def orient_lines(report: "OrientReport", verbose: bool) -> list[str]:
         f"  datum: {_datum(str(values['datum']))}",
     ]
     for camera in values["cameras"]:
-        known = [(name, one) for name, one in camera["parameters"].items() if one["sigma"]]
+        known = [(name, parameter) for name, parameter in camera["parameters"].items() if parameter["sigma"]]
         if known:
             lines.append(f"  camera {camera['name']} ({camera['model']} distortion):")
             lines += [f"    {name} {one['value']:.8g} ± {one['sigma']:.3g}" for name, one in known]
     photos = [
-        f"    {one['name']}: {one['marks']} marks, rms {one['rms'] or 0.0:.2f} px, station ± "
-        f"{1e3 * max(one['sigma'][axis] for axis in 'xyz'):.1f} mm"
-        for one in values["photos"]
+        f"    {photo['name']}: {photo['marks']} marks, rms {photo['rms'] or 0.0:.2f} px, station ± "
+        f"{1e3 * max(photo['sigma'][axis] for axis in 'xyz'):.1f} mm"
+        for photo in values["photos"]
     ]
     lines += ["  photographs:", *(photos if verbose else shorten(photos, 12, "    ", ", with -v"))]
     for use in ("weighted", "check"):

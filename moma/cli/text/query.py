@@ -55,7 +55,7 @@ def listed(names: str | None) -> list[str] | None:
 
 def answer(session: "Session", question: Question, format: str) -> tuple[str, str]:
     """Answer a query in a format (table, csv, excel, json, geojson), with a note for the person at the terminal."""
-    known = {one.name: one for one in attributes(session, question.kind)}
+    known = {attribute.name: attribute for attribute in attributes(session, question.kind)}
     if question.count_by is not None:
         return _counts(session, question, known, format)
     names = _names(session, question, known, format)

@@ -23,7 +23,7 @@ def ingest_lines(report: "IngestReport", verbose: bool) -> list[str]:
     for file in report.files:
         kinds = ", ".join(f"{count} {kind}" for kind, count in file.stones.items())
         lines.append(f"{file.path}: {sum(file.stones.values())} stones of survey {file.survey!r} ({kinds})")
-        lines += [f"  question: {one}" for one in file.questions]
+        lines += [f"  question: {question}" for question in file.questions]
         lines += [f"  {one}" for one in file.reading]
         if file.again:
             lines.append(f"  {file.again} of them were in the database and have a new measurement")
@@ -126,7 +126,7 @@ def run_lines(report: "RunReport", verbose: bool) -> list[str]:
             f"  began in static equilibrium: {static['steps']} steps of the search, balance {static['balance']:.1e}, "
             f"natural_map {static['natural_map']:.1e}"
         )
-    lines += [_stage_line(number, one) for number, one in enumerate(summary["stages"], 1)]
+    lines += [_stage_line(number, stage) for number, stage in enumerate(summary["stages"], 1)]
     lines += _joint_lines(summary)
     lines += _profile_lines(summary["profile"])
     errors = {name: value for name, value in summary["errors"].items() if value is not None}
@@ -235,7 +235,7 @@ def _part(value: float) -> str:
 def survey_report_lines(report: "SurveyReport", verbose: bool) -> list[str]:
     """Describe the precision of a survey and what to measure again, and list the files of the report."""
     study, quality = report.study, report.study.quality
-    files = ", ".join(one.head.path for one in study.files)
+    files = ", ".join(file.head.path for file in study.files)
     lines = [
         f"{files}: {len(study.stones)} stones of survey {study.name!r}"
         + (f", {len(study.rejects)} could not be made" if study.rejects else ""),
@@ -256,22 +256,27 @@ def survey_report_lines(report: "SurveyReport", verbose: bool) -> list[str]:
                 f"  {len(fit.names)} control points, σ₀ {fit.sigma0:.2f}, scale {fit.scale:.6f}{left_out}"
             )
     lines += [
-        f"  {one.name}: {len(one.members)} stones, {one.area:.1f} m²"
-        + ("" if one.azimuth is None else f", looks to {one.azimuth:.0f}°")
-        for one in study.facades
+        f"  {facade.name}: {len(facade.members)} stones, {facade.area:.1f} m²"
+        + ("" if facade.azimuth is None else f", looks to {facade.azimuth:.0f}°")
+        for facade in study.facades
     ]
     lines += _movement_lines(report, verbose)
     masonry = _masonry_lines(report)
     lines += masonry if verbose else shorten(masonry, _SHOWN, "  ", ", with -v")
-    lines += [f"  {one.code} is called a {one.kind}, but {one.text}" for one in study.contradictions[:_SHOWN]]
+    lines += [
+        f"  {contradiction.code} is called a {contradiction.kind}, but {contradiction.text}"
+        for contradiction in study.contradictions[:_SHOWN]
+    ]
     changed = [
-        f"  {one.code}: {'; '.join(one.remarks)}" for one in study.stones if one.remarks and one.measured
+        f"  {stone.code}: {'; '.join(stone.remarks)}"
+        for stone in study.stones
+        if stone.remarks and stone.measured
     ]
     lines += changed if verbose else shorten(changed, _SHOWN, "  ", ", with -v")
     again = [
-        f"  {one.code or '(no code)'}: {one.reason}; {one.action}"
-        + (f" (decides {one.changes})" if one.changes else "")
-        for one in study.again.rows
+        f"  {row.code or '(no code)'}: {row.reason}; {row.action}"
+        + (f" (decides {row.changes})" if row.changes else "")
+        for row in study.again.rows
     ]
     lines.append(
         "measure again, what changes a verdict first:" if again else "nothing needs to be measured again"
@@ -290,8 +295,8 @@ def _movement_lines(report: "SurveyReport", verbose: bool) -> list[str]:
     for beds in study.beds:
         place = _wall(beds.facade, beds.zone)
         found += [
-            f"  {place}: {one.text}{'' if one.older_than is None else f'; {one.dating}'}"
-            for one in beds.movements
+            f"  {place}: {movement.text}{'' if movement.older_than is None else f'; {movement.dating}'}"
+            for movement in beds.movements
         ]
         if not beds.movements and beds.excluded is not None:
             still.append(
@@ -299,7 +304,7 @@ def _movement_lines(report: "SurveyReport", verbose: bool) -> list[str]:
             )
     for face in study.faces:
         place = _wall(face.facade, face.zone)
-        found += [f"  {place}: {one.text}" for one in face.movements]
+        found += [f"  {place}: {movement.text}" for movement in face.movements]
         if not face.movements and face.excluded is not None:
             still.append(
                 f"  {place}, face: no movement found; more than {face.excluded * 1e3:.1f} mm is excluded"

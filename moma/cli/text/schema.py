@@ -41,7 +41,7 @@ def schema_lines(schema: Branch) -> Iterator[str]:
     if "attributes" in schema:
         yield ""
         yield "Attributes of every entity"
-        yield from (f"  {_attribute(one)}" for one in schema["attributes"])
+        yield from (f"  {_attribute(attribute)}" for attribute in schema["attributes"])
 
 
 def _kind_lines(branch: Branch, first: str, rest: str) -> Iterator[str]:
@@ -50,8 +50,8 @@ def _kind_lines(branch: Branch, first: str, rest: str) -> Iterator[str]:
     below = rest + ("│   " if branch["kinds"] else "    ")
     if branch["canonical"] is not None:
         yield f"{below}canonical: {branch['canonical']}"
-    for one in branch["attributes"]:
-        yield f"{below}· {_attribute(one)}"
+    for attribute in branch["attributes"]:
+        yield f"{below}· {_attribute(attribute)}"
     for number, sub in enumerate(branch["kinds"], start=1):
         last = number == len(branch["kinds"])
         yield from _kind_lines(sub, rest + ("└── " if last else "├── "), rest + ("    " if last else "│   "))

@@ -77,7 +77,7 @@ class CodeCheck:
     @property
     def passed(self) -> bool:
         """True if all linear comparisons pass, or all nonlinear ones: the code asks for either."""
-        groups = [[one.passed for one in self.checks if one.name.startswith(kind)] for kind in _KINDS]
+        groups = [[check.passed for check in self.checks if check.name.startswith(kind)] for kind in _KINDS]
         return any(group and all(group) for group in groups)
 
 

@@ -73,10 +73,14 @@ def date_movement(file: DiagnosisFile, ranking: Ranking, found: Measurements, wh
 def _verdict(file: DiagnosisFile, ranking: Ranking, best: Ranked) -> str:
     if not best.explains:
         return "not dated, as no hypothesis explains the movement; the shares below tell of courses alone"
-    rivals = [one for one in ranking.rivals if one.stood != best.stood]
+    rivals = [rival for rival in ranking.rivals if rival.stood != best.stood]
     if rivals:
         return f"not dated: {best.title!r} and {rivals[0].title!r} explain what was measured about as well"
-    others = [one for one in ranking.hypotheses if one.name == best.name and one.stood != best.stood]
+    others = [
+        hypothesis
+        for hypothesis in ranking.hypotheses
+        if hypothesis.name == best.name and hypothesis.stood != best.stood
+    ]
     if not others:
         return f"not dated: {best.name!r} could be tried at one time only"
     margin = min(one.aicc for one in others) - best.aicc
@@ -121,7 +125,7 @@ def _evidence(
 
 def _course(line: CourseMovement, resting: frozenset[str]) -> str | None:
     """Return the two stones of a course between which the movement is largest, measured and simulated."""
-    stones = {code: one for code, one in line.stones.items() if code not in resting}
+    stones = {code: stone for code, stone in line.stones.items() if code not in resting}
     if len(stones) < 2:
         return None
     low, high = (pick(stones, key=lambda code: stones[code].simulated) for pick in (min, max))

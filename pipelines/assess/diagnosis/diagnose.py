@@ -103,6 +103,6 @@ def _dated(
 ) -> Dating:
     """Date the best hypothesis, with a run of what it would have moved if all phases had stood."""
     best = done.ranking.hypotheses[0]
-    case = next(one for one in cases if one.hypothesis.name == best.name and not one.later)
+    case = next(case for case in cases if case.hypothesis.name == best.name and not case.later)
     (tried,) = runs([(case, best.fit.amplitudes)])
     return date_movement(file, done.ranking, found, tried.motions or Motions({}, {}))

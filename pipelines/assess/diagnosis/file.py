@@ -149,7 +149,7 @@ class Hypothesis:
 
     def scene(self, base: Mapping[str, Any], amplitudes: tuple[float, ...]) -> dict[str, Any]:
         """Return the contents of the scene file with these amplitudes."""
-        values = dict(zip((one.name for one in self.unknowns), amplitudes, strict=True))
+        values = dict(zip((unknown.name for unknown in self.unknowns), amplitudes, strict=True))
         return _merged(base, _filled(self.change, values))
 
 
@@ -226,7 +226,7 @@ def _distinct(document: TomlDocument, phases: tuple[str, ...]) -> tuple[str, ...
 
 def _hypotheses(document: TomlDocument, given: Mapping[str, Any]) -> Iterator[Hypothesis]:
     tables = given.get("hypotheses", [])
-    if not isinstance(tables, list) or not tables or not all(isinstance(one, dict) for one in tables):
+    if not isinstance(tables, list) or not tables or not all(isinstance(table, dict) for table in tables):
         document.fail("no hypothesis", "hypotheses", remedy="write [[hypotheses]] above each")
     names: dict[str, str] = {}
     for index, table in enumerate(tables):
@@ -239,12 +239,12 @@ def _hypotheses(document: TomlDocument, given: Mapping[str, Any]) -> Iterator[Hy
             what = f"the hypothesis {explained(values['name'], other)}"
             document.fail(what, *path, "name", remedy="name each differently")
         unknowns = tuple(_unknowns(document, path, table.get("unknowns", [])))
-        _check_formulas(document, path, values["scene"], [one.name for one in unknowns])
+        _check_formulas(document, path, values["scene"], [unknown.name for unknown in unknowns])
         yield Hypothesis(values["name"], path, unknowns, values["scene"])
 
 
 def _unknowns(document: TomlDocument, path: tuple[str, ...], tables: Any) -> Iterator[Unknown]:
-    if not isinstance(tables, list) or not all(isinstance(one, dict) for one in tables):
+    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
         what = "'unknowns' is not a list of tables"
         document.fail(what, *path, "unknowns", remedy="write [[hypotheses.unknowns]] above each")
     for index, table in enumerate(tables):

@@ -71,9 +71,11 @@ def fit(unknowns: Sequence[Unknown]) -> Ask:
     >>> round(found.amplitudes[0], 6), round(float(found.covariance[0, 0]), 6)
     (0.31, 0.005)
     """
-    low, high, step = (np.array([getattr(one, name) for one in unknowns]) for name in ("low", "high", "step"))
+    low, high, step = (
+        np.array([getattr(unknown, name) for unknown in unknowns]) for name in ("low", "high", "step")
+    )
     span = high - low
-    best = np.array([one.start for one in unknowns], dtype=np.float64)
+    best = np.array([unknown.start for unknown in unknowns], dtype=np.float64)
     answer = yield _asked(best, step, high)
     residuals, jacobian, trouble = _read(answer, best, step, high)
     turns = 1
@@ -125,18 +127,18 @@ def _scan(
     """Return the places to be tried before the search: a grid over the unknowns that ask for it, or do not answer."""
     blind = [
         residuals is None
-        or (jacobian is not None and np.linalg.norm(jacobian[:, k]) * (one.high - one.low) < _FELT)
-        for k, one in enumerate(unknowns)
+        or (jacobian is not None and np.linalg.norm(jacobian[:, k]) * (unknown.high - unknown.low) < _FELT)
+        for k, unknown in enumerate(unknowns)
     ]
     few = max(2, _SCANNED // max(1, sum(blind)))
-    counts = [one.scan or (few if own else 0) for one, own in zip(unknowns, blind, strict=True)]
+    counts = [unknown.scan or (few if own else 0) for unknown, own in zip(unknowns, blind, strict=True)]
     if not any(counts):
         return []
     values = [
-        [float(one.low + (one.high - one.low) * (i + 0.5) / count) for i in range(count)]
+        [float(unknown.low + (unknown.high - unknown.low) * (i + 0.5) / count) for i in range(count)]
         if count
         else [float(x)]
-        for one, count, x in zip(unknowns, counts, start, strict=True)
+        for unknown, count, x in zip(unknowns, counts, start, strict=True)
     ]
     return list(product(*values))
 

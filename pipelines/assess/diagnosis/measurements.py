@@ -58,7 +58,9 @@ def measurements(file: DiagnosisFile, url: str) -> Measurements:
         stones, facades = measured_stones(models)
         groups = select_groups(scene, session, models)
         inputs = scene_inputs(scene, assemble_stones(scene, models, groups), groups, session)
-        records = [[one.record.code, one.record.solid_vertices, one.record.solid_faces] for one in models]
+        records = [
+            [model.record.code, model.record.solid_vertices, model.record.solid_faces] for model in models
+        ]
         solids = digest([latest_entry(session), records])
         rows = find_rows(session, "entity", (), columns=("code", "phase")) if file.phases else ()
     known = {str(row["code"]): row["phase"] for row in rows}
@@ -106,7 +108,9 @@ def _resting(
         for stone in members:
             own = along[stone.code]
             below = (
-                one for one in members if one.course == (stone.course or 0) - 1 and one.zone == stone.zone
+                member
+                for member in members
+                if member.course == (stone.course or 0) - 1 and member.zone == stone.zone
             )
             if any(
                 order.index(phases[one.code]) < order.index(phases[stone.code])

@@ -119,7 +119,7 @@ class Ranking:
     def rivals(self) -> tuple[Ranked, ...]:
         """Others that are not told apart from the best."""
         best = self.hypotheses[0]
-        return tuple(one for one in self.hypotheses[1:] if one.aicc - best.aicc < APART)
+        return tuple(hypothesis for hypothesis in self.hypotheses[1:] if hypothesis.aicc - best.aicc < APART)
 
 
 def rank(
@@ -154,18 +154,18 @@ def estimates(unknowns: Sequence[Unknown], found: Fit, dof: int) -> Iterator[Est
     blind = np.abs(np.array(found.undetermined).reshape(len(found.undetermined), len(unknowns))).max(
         axis=0, initial=0.0
     )
-    for k, (one, value) in enumerate(zip(unknowns, found.amplitudes, strict=True)):
+    for k, (unknown, value) in enumerate(zip(unknowns, found.amplitudes, strict=True)):
         variance = found.covariance[k, k]
         # a part of a direction that nothing feels may be as large as the bounds allow
         known = blind[k] < 0.1 and math.isfinite(variance)
         half = wide * math.sqrt(variance) if known else math.inf
-        near = 1e-6 * (one.high - one.low)
-        bound = min(value - one.low, one.high - value) <= near
-        yield Estimate(one.name, one.unit, value, value - half, value + half, bound)
+        near = 1e-6 * (unknown.high - unknown.low)
+        bound = min(value - unknown.low, unknown.high - value) <= near
+        yield Estimate(unknown.name, unknown.unit, value, value - half, value + half, bound)
 
 
 def _remarks(unknowns: Sequence[Unknown], found: Fit, own: Sequence[Estimate]) -> Iterator[str]:
-    names = [one.name for one in unknowns]
+    names = [unknown.name for unknown in unknowns]
     if found.trouble:
         yield found.trouble
     for one in own:
@@ -181,7 +181,7 @@ def _remarks(unknowns: Sequence[Unknown], found: Fit, own: Sequence[Estimate]) -
 
 def _tied(unknowns: Sequence[Unknown], found: Fit) -> Iterator[str]:
     """Yield the pairs of amplitudes of which the measurements tell a combination alone."""
-    names = [one.name for one in unknowns]
+    names = [unknown.name for unknown in unknowns]
     sigma = np.sqrt(np.diag(found.covariance))
     for i in range(len(names)):
         for k in range(i):
@@ -238,15 +238,15 @@ def verdict(ranking: Ranking) -> str:
             f"NONE OF THESE EXPLAINS what was measured; the best of them is {best.title!r} ({chi2}); "
             f"CAUTION: {uneven or 'its amounts are no estimates of anything'}"
         )
-    rivals = [one for one in ranking.rivals if one.name != best.name]
-    names = " and ".join(repr(one.name) for one in rivals)
+    rivals = [rival for rival in ranking.rivals if rival.name != best.name]
+    names = " and ".join(repr(rival.name) for rival in rivals)
     other = (
         f"it cannot be told apart from {names}"
         if rivals
         else "a cause that is not in the list may move the stones alike"
     )
     caution = f"CAUTION: {'; '.join(filter(None, (best.fit.trouble, uneven, *best.tied, other)))}"
-    amounts = "; ".join(_amount(one) for one in best.estimates)
+    amounts = "; ".join(_amount(estimate) for estimate in best.estimates)
     return f"{best.title!r} explains what was measured ({chi2}){f': {amounts}' if amounts else ''}; {caution}"
 
 

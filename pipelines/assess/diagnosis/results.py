@@ -59,7 +59,7 @@ def write_diagnosis(
     _write_hypotheses(folder / "hypotheses.csv", done)
     _write_stones(folder / "stones.csv", courses)
     _draw(folder, courses)
-    case = next(one for one in cases if (one.hypothesis.name, one.stood) == (best.name, best.stood))
+    case = next(case for case in cases if (case.hypothesis.name, case.stood) == (best.name, best.stood))
     write_best(folder, file, case, best)
     summary = _summary(file, found, done, dating)
     summary["cautions"] += cautions
@@ -83,7 +83,9 @@ def _summary(file: DiagnosisFile, found: Measurements, done: Fitted, dating: Dat
         if dating is None
         else {
             "verdict": dating.verdict,
-            "shares": [{"phase": one.phase, "value": one.value, "sigma": one.sigma} for one in dating.shares],
+            "shares": [
+                {"phase": share.phase, "value": share.value, "sigma": share.sigma} for share in dating.shares
+            ],
             "evidence": list(dating.evidence),
         },
         "cautions": [
@@ -91,8 +93,10 @@ def _summary(file: DiagnosisFile, found: Measurements, done: Fitted, dating: Dat
             "each run begins with the stones as they are now, and its movement alone is compared"
             + ", counted from where the scene rests without any cause" * file.from_rest,
         ],
-        "hypotheses": [_told(one, ranking.hypotheses[0]) for one in (*ranking.hypotheses, ranking.still)],
-        "not_told_apart": [one.title for one in ranking.rivals],
+        "hypotheses": [
+            _told(hypothesis, ranking.hypotheses[0]) for hypothesis in (*ranking.hypotheses, ranking.still)
+        ],
+        "not_told_apart": [rival.title for rival in ranking.rivals],
         "scatter": {
             " ".join(filter(None, wall)): {"beds": value} for wall, value in deformation.scatter.items()
         },
@@ -142,17 +146,17 @@ def _groups(found: Measurements, done: Fitted) -> list[dict[str, Any]]:
     still, motions = Motions({}, {}), done.motions[best.name, best.stood]
     return [
         {
-            "facade": one.facade,
-            "zone": one.zone,
-            "quantity": one.quantity,
-            "course": one.course,
+            "facade": group.facade,
+            "zone": group.zone,
+            "quantity": group.quantity,
+            "course": group.course,
             **{
-                name: _square(one.residuals(by.displacement))
+                name: _square(group.residuals(by.displacement))
                 for name, by in (("chi2", motions), ("chi2_still", still))
             },
-            "dof": one.dof,
+            "dof": group.dof,
         }
-        for one in found.deformation.groups
+        for group in found.deformation.groups
     ]
 
 
@@ -164,11 +168,19 @@ def _write_hypotheses(path: Path, done: Fitted) -> None:
     with path.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file)
         table.writerow(_HYPOTHESIS.split())
-        for number, one in enumerate((*done.ranking.hypotheses, done.ranking.still), start=1):
-            head = [number, one.name, " ".join(one.stood), one.fit.chi2, one.dof, one.probability, one.aicc]
-            for own in one.estimates:
+        for number, hypothesis in enumerate((*done.ranking.hypotheses, done.ranking.still), start=1):
+            head = [
+                number,
+                hypothesis.name,
+                " ".join(hypothesis.stood),
+                hypothesis.fit.chi2,
+                hypothesis.dof,
+                hypothesis.probability,
+                hypothesis.aicc,
+            ]
+            for own in hypothesis.estimates:
                 table.writerow([*head, own.name, own.unit, own.value, own.low, own.high])
-            if not one.estimates:
+            if not hypothesis.estimates:
                 table.writerow([*head, "", "", "", "", ""])
 
 
@@ -177,17 +189,24 @@ def _write_stones(path: Path, courses: tuple[CourseMovement, ...]) -> None:
         table = csv.writer(file)
         table.writerow(["stone", "facade", "course", "sag_measured", "sag_simulated", "sag_sigma"])
         for line in courses:
-            for code, one in line.stones.items():
+            for code, stone in line.stones.items():
                 table.writerow(
-                    [inert(code), line.line.facade, line.line.course, one.measured, one.simulated, one.sigma]
+                    [
+                        inert(code),
+                        line.line.facade,
+                        line.line.course,
+                        stone.measured,
+                        stone.simulated,
+                        stone.sigma,
+                    ]
                 )
 
 
 def _draw(folder: Path, courses: tuple[CourseMovement, ...]) -> None:
     """Draw the bed lines of each wall, measured and simulated by the best hypothesis."""
     walls: dict[str, list[CourseMovement]] = {}
-    for one in courses:
-        walls.setdefault(one.line.facade, []).append(one)
+    for course in courses:
+        walls.setdefault(course.line.facade, []).append(course)
     for number, lines in enumerate(walls.values(), start=1):
         draw_bed_movement(folder / f"beds-{number}.png", lines)
 

@@ -76,7 +76,7 @@ class Case:
     @property
     def start(self) -> tuple[float, ...]:
         """Amplitudes with which the search begins."""
-        return tuple(one.start for one in self.hypothesis.unknowns)
+        return tuple(unknown.start for unknown in self.hypothesis.unknowns)
 
 
 Place = tuple[Case, tuple[float, ...]]
@@ -106,14 +106,14 @@ class Fitted:
 def cases_of(file: DiagnosisFile, phases: Mapping[str, str]) -> tuple[Case, ...]:
     """Return each hypothesis, at each time if the stones have phases."""
     if not phases:
-        return tuple(Case(one) for one in file.hypotheses)
+        return tuple(Case(hypothesis) for hypothesis in file.hypotheses)
     return tuple(
         Case(
-            one,
+            hypothesis,
             file.phases[:count],
             tuple(sorted(code for code, phase in phases.items() if phase in file.phases[count:])),
         )
-        for one in file.hypotheses
+        for hypothesis in file.hypotheses
         for count in range(len(file.phases), 0, -1)
     )
 
@@ -162,8 +162,8 @@ def runs_of(file: DiagnosisFile, url: str, run: Runner) -> Runs:
         first = [Trial(toml_text(_without(file.base, later)), file.scene_path, url) for later in fresh]
         answers = iter(run([*first, *trials]))
         rest.update({later: next(answers) for later in fresh})
-        for (case, _), one in zip(places, scenes, strict=True):
-            tried = next(answers) if isinstance(one, str) else one
+        for (case, _), scene in zip(places, scenes, strict=True):
+            tried = next(answers) if isinstance(scene, str) else scene
             yield since_rest(tried, rest[case.later]) if file.from_rest else tried
 
     return made
@@ -189,10 +189,14 @@ def kept_runner(file: DiagnosisFile, solids: str, kept: Kept, run: Runner) -> Ru
 
     def decides(trial: Trial) -> list[str]:
         scene = tomllib.loads(trial.text)
-        return [solids, trial.text, digest([one.read_bytes() for one in named_files(scene, file.scene_path)])]
+        return [
+            solids,
+            trial.text,
+            digest([file.read_bytes() for file in named_files(scene, file.scene_path)]),
+        ]
 
     def made(trials: Sequence[Trial]) -> Iterator[Tried]:
-        known = [(one, keys, kept.get(keys)) for one in trials for keys in [decides(one)]]
+        known = [(trial, keys, kept.get(keys)) for trial in trials for keys in [decides(trial)]]
         others = iter(run([one for one, _, tried in known if tried is None]))
         for _, keys, tried in known:
             if tried is None:
@@ -319,8 +323,8 @@ def _found(case: Case, done: Fit, dof: int) -> str:
     if not len(done.residuals):
         return f"{name}: {done.trouble}"
     amounts = ", ".join(
-        f"{one.name} = {value:.4g} {one.unit}"
-        for one, value in zip(case.hypothesis.unknowns, done.amplitudes, strict=True)
+        f"{unknown.name} = {value:.4g} {unknown.unit}"
+        for unknown, value in zip(case.hypothesis.unknowns, done.amplitudes, strict=True)
     )
     return f"{name}: χ² {done.chi2:.4g} of {dof - len(done.amplitudes)}, {amounts or 'no unknowns'}"
 

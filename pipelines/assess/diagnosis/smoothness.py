@@ -28,9 +28,11 @@ Answer = Array | str
 def probes(unknowns: Sequence[Unknown], best: Place) -> list[list[Place]]:
     """Return for each unknown five places across its best amplitude, within its bounds, the others at their best."""
     found = []
-    for k, one in enumerate(unknowns):
-        middle = min(max(best[k], one.low + one.step), one.high - one.step)
-        found.append([(*best[:k], float(middle + one.step * share), *best[k + 1 :]) for share in _OFFSETS])
+    for k, unknown in enumerate(unknowns):
+        middle = min(max(best[k], unknown.low + unknown.step), unknown.high - unknown.step)
+        found.append(
+            [(*best[:k], float(middle + unknown.step * share), *best[k + 1 :]) for share in _OFFSETS]
+        )
     return found
 
 
@@ -54,8 +56,8 @@ def with_unevenness(ranked: Ranked, unknowns: Sequence[Unknown], answers: Mappin
     inverse = np.linalg.pinv(jacobian)
     wide = float(stdtrit(ranked.dof, QUANTILE))
     estimates, uneven = [], []
-    for k, (one, own) in enumerate(zip(unknowns, ranked.estimates, strict=True)):
-        told = one.step * _OFFSETS - residuals[k] @ inverse[k]
+    for k, (unknown, own) in enumerate(zip(unknowns, ranked.estimates, strict=True)):
+        told = unknown.step * _OFFSETS - residuals[k] @ inverse[k]
         left = told - np.polyval(np.polyfit(_OFFSETS, told, 2), _OFFSETS)
         sigma = float(np.sqrt(left @ left / (len(left) - 3)))
         half = own.high - own.value

@@ -74,7 +74,7 @@ def varied(scene: Scene, rig: Rig, name: str, factor: float) -> tuple[Scene, Rig
 
 def _law(law: Law, name: str, factor: float) -> Law:
     assert is_dataclass(law)
-    present = {one.name: getattr(law, one.name) for one in fields(law) if one.name in _LAWS[name]}
+    present = {field.name: getattr(law, field.name) for field in fields(law) if field.name in _LAWS[name]}
     changed: Any = replace(
         law, **{key: factor * value for key, value in present.items() if value is not None}
     )

@@ -169,7 +169,8 @@ def _in_rig(scene: SceneFile, stones: Scene, groups: Groups, rig: Rig) -> Scene:
     Its base and beam count as of the material of all other stones.
     """
     general = next(
-        (one.material.name for one in scene.materials if not one.stones), scene.materials[0].material.name
+        (material.material.name for material in scene.materials if not material.stones),
+        scene.materials[0].material.name,
     )
     materials = {block.code: block.material.name for block in stones.blocks} | dict.fromkeys(
         rig.pieces, general

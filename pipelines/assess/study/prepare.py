@@ -57,7 +57,9 @@ def snapshot_content(file: StudyFile, session: Session) -> dict[str, Any]:
         "inputs": [asdict(table) for table in file.inputs],
         "stones": [sorted(codes) for codes in named],
         "quantities": [asdict(table) for table in file.quantities],
-        "correlations": [[list(one.inputs), one.matrix.tolist()] for one in file.correlations],
+        "correlations": [
+            [list(correlation.inputs), correlation.matrix.tolist()] for correlation in file.correlations
+        ],
         "versions": dict(versions()),
     }
 

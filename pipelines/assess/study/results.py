@@ -21,7 +21,7 @@ __all__ = ["write_results"]
 
 def write_results(folder: Path, summary: dict[str, Any], problem: Problem, found: Estimates) -> None:
     """Write tables, pictures and the page of a study, each file whole."""
-    measures = [(one["text"], one["stone"], one["share"]) for one in summary["actions"]]
+    measures = [(action["text"], action["stone"], action["share"]) for action in summary["actions"]]
     write_whole(folder / "actions.csv", _csv([("measurement", "stone", "share"), *measures]))
     names = list(found.values)
     rows = np.column_stack([found.values[name] for name in names]).tolist() if names else []

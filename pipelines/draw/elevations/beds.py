@@ -106,11 +106,11 @@ def _fitted(line: CourseLine, moved: Sequence[BedMovement], along: Array) -> Arr
 def _movements(line: CourseLine, walls: Sequence[WallBeds]) -> list[BedMovement]:
     """Return the movements of a course."""
     return [
-        one
+        movement
         for wall in walls
         if wall.zone == line.zone and wall.facade == line.facade
-        for one in wall.movements
-        if one.first <= line.course <= one.last
+        for movement in wall.movements
+        if movement.first <= line.course <= movement.last
     ]
 
 

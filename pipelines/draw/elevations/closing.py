@@ -60,7 +60,7 @@ def draw_moved(path: Path, shapes: ClosingShapes, facade: Facade, step: str) -> 
     known = np.concatenate(values)
     known = known[np.isfinite(known)]
     end, _ = robust_ceiling(known, _FINEST)
-    low, high = extent([corners for one in faces for corners, _ in one])
+    low, high = extent([corners for face in faces for corners, _ in face])
     figure = new_sheet(sheet_size(high - low))
     axes = figure.subplots()
     shading = _shade_all(axes, faces, values, end)
@@ -101,7 +101,7 @@ def hatch(axes: "Axes", stones: Sequence[DrawnStone], faces: Sequence[Sequence[V
     from matplotlib.collections import PolyCollection
 
     guessed = [
-        corners for stone, one in zip(stones, faces, strict=True) if stone.hypothesis for corners, _ in one
+        corners for stone, face in zip(stones, faces, strict=True) if stone.hypothesis for corners, _ in face
     ]
     if guessed:
         axes.add_collection(
@@ -119,9 +119,9 @@ def name_stones(
     shade : where on the colour scale each is, from 0 to 1; NaN where it has no colour
     """
     found = [
-        (stone.code, max((corners for corners, _ in one), key=_area), dark)
-        for stone, one, dark in zip(stones, faces, shade, strict=True)
-        if one
+        (stone.code, max((corners for corners, _ in face), key=_area), dark)
+        for stone, face, dark in zip(stones, faces, shade, strict=True)
+        if face
     ]
     if found and len(found) <= CODES:
         codes, corners, dark = zip(*found, strict=True)
@@ -145,8 +145,8 @@ def _shade_all(
 
     coloured = [
         (corners, moved[list(indices)])
-        for one, moved in zip(faces, values, strict=True)
-        for corners, indices in one
+        for face, moved in zip(faces, values, strict=True)
+        for corners, indices in face
     ]
     unknown = [corners for corners, moved in coloured if not np.isfinite(moved).all()]
     axes.add_collection(PolyCollection(unknown, facecolors=_UNKNOWN, edgecolors="none"))
@@ -156,7 +156,7 @@ def _shade_all(
         points, heights, triangles = zip(*fans, strict=True)
         starts = np.cumsum([0, *map(len, points)])[:-1]
         x, y = np.concatenate(points).T
-        rows = np.concatenate([one + start for one, start in zip(triangles, starts, strict=True)])
+        rows = np.concatenate([triangle + start for triangle, start in zip(triangles, starts, strict=True)])
         # triangles are drawn in order, so that nearer stones cover those behind
         shading = axes.tripcolor(
             x,

@@ -161,8 +161,11 @@ def closing_shapes(
     )
     closed = {one.code: one for one in solids.closed}
     joints = tuple(
-        DrawnJoint(one, joint_polygon(closed[one.stones[0]], closed[one.stones[1]], one.normal, one.centroid))
-        for one in closing.joints
+        DrawnJoint(
+            joint,
+            joint_polygon(closed[joint.stones[0]], closed[joint.stones[1]], joint.normal, joint.centroid),
+        )
+        for joint in closing.joints
     )
     openings = tuple(opening for leaf in closing.leaves for opening in leaf.openings)
     return ClosingShapes(scene, stones, joints, places(closing), openings)
@@ -173,20 +176,20 @@ def places(closing: ClosingReport) -> tuple[Place, ...]:
     overlaps = [
         Place(
             "overlap",
-            one.stones,
-            one.centroid,
-            f"{_pair(one.stones)} lie {one.depth * 1e3:.1f} mm in each other",
+            overlap.stones,
+            overlap.centroid,
+            f"{_pair(overlap.stones)} lie {overlap.depth * 1e3:.1f} mm in each other",
         )
-        for one in sorted(closing.overlaps, key=lambda one: -one.volume)
+        for overlap in sorted(closing.overlaps, key=lambda one: -one.volume)
     ]
     gaps = [
         Place(
             "gap",
-            one.stones,
-            one.centroid,
-            f"{_pair(one.stones)} open by {one.width * 1e3:.1f} mm: {one.reason}",
+            gap.stones,
+            gap.centroid,
+            f"{_pair(gap.stones)} open by {gap.width * 1e3:.1f} mm: {gap.reason}",
         )
-        for one in sorted(closing.gaps, key=lambda one: -one.width * one.area)
+        for gap in sorted(closing.gaps, key=lambda one: -one.width * one.area)
     ]
     return (*overlaps, *gaps)
 
@@ -252,7 +255,9 @@ def _clipped(subject: Array, window: Array) -> Array:
     corners: Sequence[Array] = list(subject)
     for start, end in zip(window, np.roll(window, -1, axis=0), strict=True):
         edge = end - start
-        inside = [float(edge[0] * (one[1] - start[1]) - edge[1] * (one[0] - start[0])) for one in corners]
+        inside = [
+            float(edge[0] * (corner[1] - start[1]) - edge[1] * (corner[0] - start[0])) for corner in corners
+        ]
         kept: list[Array] = []
         for i, corner in enumerate(corners):
             before = inside[i - 1]

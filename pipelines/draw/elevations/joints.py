@@ -54,11 +54,11 @@ def draw_joints(path: Path, shapes: ClosingShapes, facade: Facade) -> None:
     own = back_to_front(shapes.stones, facade)
     codes = {stone.code for stone in own}
     faces = [visible_faces(stone.closed, facade) for stone in own]
-    flat = [corners for one in faces for corners, _ in one]
+    flat = [corners for face in faces for corners, _ in face]
     low, high = extent(flat)
-    shown = [one for one in shapes.joints if _is_seen(one, facade, codes)]
+    shown = [joint for joint in shapes.joints if _is_seen(joint, facade, codes)]
     marked = [place for place in shapes.places if codes & {*place.stones}]
-    openings = [one for one in shapes.openings if codes & {*one.stones}]
+    openings = [opening for opening in shapes.openings if codes & {*opening.stones}]
     keys = _keys(shown, marked, len(shapes.places), any(one.hypothesis for one in own))
     keys += [_open_key()] if openings else []
     width, height = sheet_size(high - low)
@@ -90,10 +90,10 @@ def _add_closed(
 
     if not joints:
         return
-    width = np.array([1e3 * one.joint.width for one in joints])
+    width = np.array([1e3 * joint.joint.width for joint in joints])
     end, _ = robust_ceiling(width, _FINEST)
     lines = LineCollection(
-        [_trace(one, facade) for one in joints],
+        [_trace(joint, facade) for joint in joints],
         array=width,
         cmap=_width_colours(),
         clim=(0.0, end),
@@ -111,7 +111,7 @@ def _add_open(axes: "Axes", joints: Sequence[DrawnJoint], facade: Facade, stroke
     """Draw open joints as double lines."""
     from matplotlib.collections import LineCollection
 
-    traces = [_trace(one, facade) for one in joints]
+    traces = [_trace(joint, facade) for joint in joints]
     for colour, share in ((FLAG, 2.4), ("white", 1.0)):
         axes.add_collection(LineCollection(traces, colors=colour, linewidths=share * stroke))
 
@@ -120,12 +120,12 @@ def _draw_openings(axes: "Axes", openings: Sequence[Opening], facade: Facade) ->
     """Draw the edges of openings dashed, and write the size of each into it."""
     from matplotlib.collections import LineCollection
 
-    for one in openings:
-        edges = project(one.front.reshape(-1, 3), facade).reshape(-1, 2, 2)
+    for opening in openings:
+        edges = project(opening.front.reshape(-1, 3), facade).reshape(-1, 2, 2)
         axes.add_collection(
             LineCollection(list(edges), colors=INK, linewidths=1.0, linestyles="dashed", zorder=4)
         )
-        (x, y), (width, height) = 0.5 * (edges.min(axis=(0, 1)) + edges.max(axis=(0, 1))), one.size
+        (x, y), (width, height) = 0.5 * (edges.min(axis=(0, 1)) + edges.max(axis=(0, 1))), opening.size
         text = f"open\n{width:.2f} × {height:.2f} m"
         axes.annotate(text, (x, y), ha="center", va="center", fontsize=7.0, color=INK, clip_on=True)
 

@@ -50,18 +50,18 @@ def draw_bed_movement(path: Path, courses: Sequence[CourseMovement]) -> None:
     figure = new_sheet((10.0, float(np.clip(2.0 + 0.42 * len(courses), 3.5, 24.0))))
     axes = figure.subplots()
     right = max(float(one.line.along.max()) for one in courses)
-    for one, level, (measured, _), own, factor in zip(
+    for course, level, (measured, _), own, factor in zip(
         courses, levels, lines, simulated, factors, strict=True
     ):
-        along = one.line.along
+        along = course.line.along
         axes.plot(along[[0, -1]], [level] * 2, color=PALE, linewidth=0.8, zorder=1)
         axes.errorbar(
-            along, level + factor * measured, factor * one.line.sigma, fmt="o-", markersize=2.0,
+            along, level + factor * measured, factor * course.line.sigma, fmt="o-", markersize=2.0,
             color=FLAG, ecolor=PALE, linewidth=0.8, elinewidth=0.8, zorder=2,
         )  # fmt: skip
         axes.plot(along, level + factor * own, color=PLAIN, linewidth=1.6, zorder=3)
         axes.annotate(
-            f"{one.line.course}: × {factor:g}", (right, level), (8, 0), textcoords="offset points", va="center",
+            f"{course.line.course}: × {factor:g}", (right, level), (8, 0), textcoords="offset points", va="center",
             fontsize=8, annotation_clip=False, parse_math=False,
         )  # fmt: skip
     line = courses[0].line
@@ -91,7 +91,7 @@ def draw_misfit(
     """
     from matplotlib.collections import PolyCollection
 
-    polygons = [project(one, facade) for one in outlines]
+    polygons = [project(outline, facade) for outline in outlines]
     low, high = extent(polygons)
     figure = new_sheet(sheet_size(high - low))
     axes = figure.subplots()

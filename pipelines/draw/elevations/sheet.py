@@ -76,7 +76,7 @@ def write_codes(axes: "Axes", codes: Sequence[str], polygons: Sequence[Array], s
     shade : (n,) where on the colour scale each is, from 0 to 1; NaN where it has no colour
     """
     figure = axes.figure
-    width, height = (float(one) for one in figure.get_size_inches())  # type: ignore[union-attr]
+    width, height = (float(inches) for inches in figure.get_size_inches())  # type: ignore[union-attr]
     low, high = extent(polygons)
     scale = 0.95 * min(0.82 * width / float(high[0] - low[0]), (height - 1.4) / float(high[1] - low[1]))
     for code, polygon, dark in zip(codes, polygons, shade, strict=True):

@@ -103,7 +103,7 @@ def draw_departure(
     stones : all stones of the survey
     walls : departures of the walls of this facade; others are left out
     """
-    own = [one for one in walls if one.facade == facade.name]
+    own = [wall for wall in walls if wall.facade == facade.name]
     members = facade.members.tolist()
     polygons = {i: project(stones[i].outline, facade) for i in members}
     low, high = extent(list(polygons.values()))

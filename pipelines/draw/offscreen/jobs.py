@@ -61,7 +61,7 @@ def run_job(kind: type[Surface], draw: Callable[[Surface, Path, dict[str, Any]],
 
 def save_surface(path: Path, surface: Any) -> None:
     """Write a dataclass of arrays as .npz."""
-    np.savez(path, **{one.name: getattr(surface, one.name) for one in fields(surface)})
+    np.savez(path, **{field.name: getattr(surface, field.name) for field in fields(surface)})
 
 
 def load_surface(path: Path, kind: type[Surface]) -> Surface:

@@ -69,19 +69,21 @@ def wall_surface(result: Result) -> WallSurface:
     sizes = [len(body.reference) for body in result.bodies]
     offsets = np.concatenate([[0], np.cumsum(sizes)[:-1]])
     triangles = [_fans(body.faces) for body in result.bodies]
-    counts = [len(one) for one in triangles]
+    counts = [len(triangle) for triangle in triangles]
     carried = support_motion(result.bodies, [body.position for body in result.bodies])
     pressed = np.flatnonzero(result.joints.pressed)
     corners, of_joints, owners = fan_polygons([result.joints.polygon[number] for number in pressed])
     return WallSurface(
         points=np.concatenate([body.position for body in result.bodies]),
-        triangles=np.concatenate([one + offset for one, offset in zip(triangles, offsets, strict=True)]),
+        triangles=np.concatenate(
+            [triangle + offset for triangle, offset in zip(triangles, offsets, strict=True)]
+        ),
         deformable=np.repeat([body.fidelity is Fidelity.DEFORMABLE for body in result.bodies], counts),
         fixed=np.repeat([body.fidelity is Fidelity.FIXED for body in result.bodies], counts),
         edges=np.concatenate(
             [
-                _stone_edges(body, one) + offset
-                for body, one, offset in zip(result.bodies, triangles, offsets, strict=True)
+                _stone_edges(body, triangle) + offset
+                for body, triangle, offset in zip(result.bodies, triangles, offsets, strict=True)
             ]
         ),
         fields=np.concatenate(

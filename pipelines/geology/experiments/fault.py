@@ -155,5 +155,7 @@ class Fault:
             if limits is not None:
                 kind, _, symbol = name.rpartition(" ")
                 seen[name] = unit * value
-                seen[f"{kind}, from {symbol}"], seen[f"{kind}, to {symbol}"] = (unit * one for one in limits)
+                seen[f"{kind}, from {symbol}"], seen[f"{kind}, to {symbol}"] = (
+                    unit * limit for limit in limits
+                )
         return seen

@@ -133,12 +133,15 @@ def _chosen(
     """Return the outlines that are asked for, and the doubts about them."""
     if request.review is not None:
         features = reviewed_features(request.review, photograph.places)
-        marks = mark_outlines([one.ring for one in features], proposal)
+        marks = mark_outlines([feature.ring for feature in features], proposal)
         return features, [
             PageDoubt(
-                tuple(features[k].code for k in one.outlines), f"{one.reason}: {one.text}", 1.0, *one.place
+                tuple(features[k].code for k in mark.outlines),
+                f"{mark.reason}: {mark.text}",
+                1.0,
+                *mark.place,
             )
-            for one in marks
+            for mark in marks
         ]
     if request.corrected is not None:
         return corrected_features(request.corrected), []
@@ -147,16 +150,16 @@ def _chosen(
 
 def _doubts(proposal: Proposal) -> list[PageDoubt]:
     """Return the joints that are not sure, the most doubtful first."""
-    codes = [one.named.code for one in proposal.stones]
+    codes = [stone.named.code for stone in proposal.stones]
     return [
         PageDoubt(
-            tuple(codes[k] for k in one.stones),
-            f"a joint between {' and '.join(codes[k] for k in one.stones)}? {one.probability:.0%} sure",
-            1.0 - abs(2.0 * one.probability - 1.0),
-            *one.place,
+            tuple(codes[k] for k in border.stones),
+            f"a joint between {' and '.join(codes[k] for k in border.stones)}? {border.probability:.0%} sure",
+            1.0 - abs(2.0 * border.probability - 1.0),
+            *border.place,
         )
-        for one in proposal.borders
-        if one.probability < _SURE
+        for border in proposal.borders
+        if border.probability < _SURE
     ]
 
 
@@ -168,23 +171,23 @@ def _written(
     doubts: list[PageDoubt],
     folder: Path,
 ) -> DrawnOutlines:
-    kinds = [one.said.get("kind") for one in features]
-    courses = [one.said.get("course") for one in features]
-    facts = bond_statistics([one.ring for one in features], kinds, courses)
-    by_hand = sum(one.said.get("evidence") == CORRECTED for one in features)
-    there = {one.code for one in features}
-    gone = sorted(one.named.code for one in proposal.stones if one.named.code not in there)
+    kinds = [feature.said.get("kind") for feature in features]
+    courses = [feature.said.get("course") for feature in features]
+    facts = bond_statistics([feature.ring for feature in features], kinds, courses)
+    by_hand = sum(feature.said.get("evidence") == CORRECTED for feature in features)
+    there = {feature.code for feature in features}
+    gone = sorted(stone.named.code for stone in proposal.stones if stone.named.code not in there)
     names = [*(NAMES if features else ()), _PAGE]
     made = DrawnOutlines(
         stones=len(features),
-        courses=len({one for one in courses if one is not None}),
+        courses=len({course for course in courses if course is not None}),
         openings=len(proposal.openings),
-        kinds={kind: kinds.count(kind) for kind in sorted({one for one in kinds if one is not None})},
+        kinds={kind: kinds.count(kind) for kind in sorted({kind for kind in kinds if kind is not None})},
         masonry=proposal.masonry,
         joint=round(proposal.joint[1], 5),
         doubtful=len(doubts),
         corrected=by_hand,
-        unchanged=sum(one.said.get("evidence") == PROPOSED for one in features),
+        unchanged=sum(feature.said.get("evidence") == PROPOSED for feature in features),
         superseded=tuple(gone) if request.corrected is not None else (),
         statistics=tuple(facts),
         doubts=_warnings(request, photograph, proposal),
@@ -199,7 +202,7 @@ def _written(
             photograph.pixels,
             photograph.places.matrix,
             photograph.places.origin,
-            [_for_page(one) for one in features],
+            [_for_page(feature) for feature in features],
             doubts,
             facts,
         )
@@ -215,15 +218,15 @@ def _for_page(one: Feature) -> dict[str, Any]:
 
 def _borders(proposal: Proposal) -> list[dict[str, object]]:
     """Return the joints with their probabilities, by the codes of the stones as they were proposed."""
-    codes = [one.named.code for one in proposal.stones]
+    codes = [stone.named.code for stone in proposal.stones]
     return [
         {
-            "stones": [codes[k] for k in one.stones],
-            "probability": round(one.probability, 4),
-            "length": round(one.length, 4),
-            "place": [round(x, 4) for x in one.place],
+            "stones": [codes[k] for k in border.stones],
+            "probability": round(border.probability, 4),
+            "length": round(border.length, 4),
+            "place": [round(x, 4) for x in border.place],
         }
-        for one in proposal.borders
+        for border in proposal.borders
     ]
 
 

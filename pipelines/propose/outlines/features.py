@@ -41,19 +41,19 @@ def proposed_features(proposal: Proposal) -> list[Feature]:
     """Return the stones of a proposal."""
     return [
         Feature(
-            one.named.code,
-            one.ring,
+            stone.named.code,
+            stone.ring,
             {
-                "kind": one.named.kind,
-                **({} if one.named.course is None else {"course": one.named.course}),
-                "place": one.named.place,
-                "score": round(one.score, 3),
-                "sigma": round(one.sigma, 5),
+                "kind": stone.named.kind,
+                **({} if stone.named.course is None else {"course": stone.named.course}),
+                "place": stone.named.place,
+                "score": round(stone.score, 3),
+                "sigma": round(stone.sigma, 5),
                 "evidence": PROPOSED,
-                **({"cut": "by the edge of the picture"} if one.cut else {}),
+                **({"cut": "by the edge of the picture"} if stone.cut else {}),
             },
         )
-        for one in proposal.stones
+        for stone in proposal.stones
     ]
 
 
@@ -72,13 +72,15 @@ def reviewed_features(path: Path, places: PixelPlace) -> list[Feature]:
     """
     drawing = read_outlines(path)
     out = []
-    for one in drawing.outlines:
-        if one.corners.shape[1] != 2:
+    for outline in drawing.outlines:
+        if outline.corners.shape[1] != 2:
             raise SurveyError(
-                "the outline lies in space", where=one.where, remedy="draw it in the wall's plane"
+                "the outline lies in space", where=outline.where, remedy="draw it in the wall's plane"
             )
-        ring = places.place(one.corners) if drawing.pixels else one.corners
-        out.append(Feature(one.code, _turned(ring), _said(one) | {"evidence": f"outline of {path.name}"}))
+        ring = places.place(outline.corners) if drawing.pixels else outline.corners
+        out.append(
+            Feature(outline.code, _turned(ring), _said(outline) | {"evidence": f"outline of {path.name}"})
+        )
     return out
 
 
@@ -91,11 +93,11 @@ def corrected_features(path: Path) -> list[Feature]:
         if it cannot be read, or two stones have one code
     """
     out: dict[str, Feature] = {}
-    for one in read_outlines(path).outlines:
-        if one.code in out:
+    for outline in read_outlines(path).outlines:
+        if outline.code in out:
             remedy = "give each stone a code of its own"
-            raise SurveyError(f"a second stone {one.code}", where=one.where, remedy=remedy)
-        out[one.code] = Feature(one.code, _turned(one.corners), _said(one))
+            raise SurveyError(f"a second stone {outline.code}", where=outline.where, remedy=remedy)
+        out[outline.code] = Feature(outline.code, _turned(outline.corners), _said(outline))
     return list(out.values())
 
 

@@ -27,10 +27,10 @@ _LETTER = 0.04  # height of the codes in a drawing [m]
 def geojson_text(features: Sequence[Feature], about: str) -> str:
     """Return outlines as GeoJSON, a line for each."""
     lines = []
-    for one in features:
-        ring = (np.round(one.ring, _DIGITS) + 0.0).tolist()
+    for feature in features:
+        ring = (np.round(feature.ring, _DIGITS) + 0.0).tolist()
         shape = {"type": "Polygon", "coordinates": [[*ring, ring[0]]]}
-        said = {"code": one.code, **one.said}
+        said = {"code": feature.code, **feature.said}
         lines.append(
             json.dumps({"type": "Feature", "properties": said, "geometry": shape}, ensure_ascii=False)
         )
@@ -54,19 +54,19 @@ def write_outlines(features: Sequence[Feature], folder: Path, about: str) -> Non
 def _write_geopackage(features: Sequence[Feature], path: Path) -> None:
     pyogrio = optional("pyogrio", "GeoPackages")
     shapely = optional("shapely", "GeoPackages")
-    shapes = np.array([shapely.polygons(one.ring) for one in features], dtype=object)
-    names = ["code", *(name for name in _COLUMNS if any(name in one.said for one in features))]
-    columns = [np.array([one.code for one in features], dtype=object)]
+    shapes = np.array([shapely.polygons(feature.ring) for feature in features], dtype=object)
+    names = ["code", *(name for name in _COLUMNS if any(name in feature.said for feature in features))]
+    columns = [np.array([feature.code for feature in features], dtype=object)]
     masks: list[NDArray[np.bool_] | None] = [None]
     for name in names[1:]:
-        lacking = np.array([one.said.get(name) is None for one in features])
-        values = [one.said.get(name) for one in features]
+        lacking = np.array([feature.said.get(name) is None for feature in features])
+        values = [feature.said.get(name) for feature in features]
         if name in _WHOLE:
-            column = np.array([0 if one is None else int(one) for one in values], dtype=np.int64)
+            column = np.array([0 if value is None else int(value) for value in values], dtype=np.int64)
         elif name in _REAL:
-            column = np.array([0.0 if one is None else float(one) for one in values])
+            column = np.array([0.0 if value is None else float(value) for value in values])
         else:
-            column = np.array([None if one is None else str(one) for one in values], dtype=object)
+            column = np.array([None if value is None else str(value) for value in values], dtype=object)
         columns.append(column)
         masks.append(None if column.dtype == object else lacking)
     with warnings.catch_warnings():
@@ -90,9 +90,9 @@ def _write_dxf(features: Sequence[Feature], path: Path) -> None:
     drawing = ezdxf.new("R2000", units=6)  # metres
     drawing.layers.add("stones")
     space = drawing.modelspace()
-    for one in features:
-        space.add_lwpolyline(one.ring.tolist(), close=True, dxfattribs={"layer": "stones"})
-        inside = shapely.point_on_surface(shapely.make_valid(shapely.polygons(one.ring)))
-        text = space.add_text(one.code, height=_LETTER, dxfattribs={"layer": "stones"})
+    for feature in features:
+        space.add_lwpolyline(feature.ring.tolist(), close=True, dxfattribs={"layer": "stones"})
+        inside = shapely.point_on_surface(shapely.make_valid(shapely.polygons(feature.ring)))
+        text = space.add_text(feature.code, height=_LETTER, dxfattribs={"layer": "stones"})
         text.set_placement((inside.x, inside.y))
     drawing.saveas(path)

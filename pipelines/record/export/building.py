@@ -130,7 +130,7 @@ def read_building(session: Session, run: int | None = None) -> Building:
             raise UsageError(
                 f"there is no run {run}", where="--run", remedy="moma runs lists those there are"
             )
-    solids = [one for one in stone_shapes(session) if len(one[2])]
+    solids = [shape for shape in stone_shapes(session) if len(shape[2])]
     if not solids:
         raise UsageError("no stone has a solid", where="export", remedy="take in a survey first: moma ingest")
     ids = {number: row for row, (number, _, _) in enumerate(solids)}
@@ -167,9 +167,9 @@ def read_building(session: Session, run: int | None = None) -> Building:
 def _columns(session: Session, codes: Sequence[str], run: int | None) -> tuple[Column, ...]:
     """Return the attributes of which any stone has a value."""
     asked = {
-        name: one
-        for name, one in attributes_of(session).items()
-        if name not in _OMITTED and (run is not None or not (one.of_run or name in ("run", "runs")))
+        name: attribute
+        for name, attribute in attributes_of(session).items()
+        if name not in _OMITTED and (run is not None or not (attribute.of_run or name in ("run", "runs")))
     }
     place = {code: row for row, code in enumerate(codes)}
     rows: list[dict[str, object]] = [{} for _ in codes]

@@ -87,7 +87,7 @@ def export_file(url: str, path: Path, run: int | None = None, crs: str | None = 
     UsageError : the ending, the run or the system is wrong, or a package is missing
     ExchangeError : the file cannot be written
     """
-    ending = next(one for one in ENDINGS if path.name.lower().endswith(one))
+    ending = next(ending for ending in ENDINGS if path.name.lower().endswith(ending))
     if crs is not None:
         _check_crs(crs, ending)
     part = path.with_name(f".{path.name}.{os.getpid()}.part")

@@ -230,12 +230,12 @@ class _Writer:
             )
             for one in groups
         }
-        for one in groups:
-            members = [elements[row] for row in one.members]
-            members += [made[other.code] for other in groups if other.parent == one.code]
+        for group in groups:
+            members = [elements[row] for row in group.members]
+            members += [made[other.code] for other in groups if other.parent == group.code]
             if members:
                 self._relate(
-                    "IFCRELASSIGNSTOGROUP", "group", list_of(members), f"$,{made[one.code]}", one.code
+                    "IFCRELASSIGNSTOGROUP", "group", list_of(members), f"$,{made[group.code]}", group.code
                 )
 
     def _relate(self, kind: str, role: str, first: str, second: str, name: str = "") -> None:

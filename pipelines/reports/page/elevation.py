@@ -51,7 +51,7 @@ def elevation(model: Model, most: int = 6000, scale: int | None = None) -> Eleva
         return None
     low, high = flat[:, :2].min(axis=0), flat[:, :2].max(axis=0)
     size = 1e3 * (high - low)
-    fitting = [one for one in _SCALES if (size / one <= (_WIDE, _HIGH)).all()]
+    fitting = [scale for scale in _SCALES if (size / scale <= (_WIDE, _HIGH)).all()]
     chosen = scale or (fitting[0] if fitting else int(np.ceil(size.max() / _WIDE)))
     order = sorted(faces, key=lambda face: float(flat[face[1], 2].max()))
     paper = (flat[:, :2] - low) * [1.0, -1.0] * 1e3 / chosen + [0.0, size[1] / chosen]

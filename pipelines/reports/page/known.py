@@ -53,9 +53,9 @@ def known_stones(
     """
     number = {code: index for index, code in enumerate(codes)}
     asked = {
-        name: one
-        for name, one in attributes_of(session).items()
-        if name not in _OMITTED and (results or not (one.of_run or name in ("run", "runs")))
+        name: attribute
+        for name, attribute in attributes_of(session).items()
+        if name not in _OMITTED and (results or not (attribute.of_run or name in ("run", "runs")))
     }
     rows: list[dict[str, object]] = [{} for _ in codes]
     for row in find_rows(session, "entity", run=run, columns=["code", *asked]):
@@ -66,7 +66,7 @@ def known_stones(
         id_: number[code] for code, id_ in session.execute(select(Entity.code, Entity.id)) if code in number
     }
     return Known(
-        tuple(one for one in columns if one is not None),
+        tuple(column for column in columns if column is not None),
         _relations(session, ids),
         tuple(_events(session, ids)),
         _points(session, ids),
@@ -111,16 +111,16 @@ def _relations(session: Session, ids: dict[int, int]) -> Relations:
 
 def _events(session: Session, ids: dict[int, int]) -> Iterator[Event]:
     """Yield what was recorded of each stone itself, in the order of recording."""
-    entries = {one.id: one for one in session.scalars(select(Entry))}
+    entries = {row.id: row for row in session.scalars(select(Entry))}
     told: list[tuple[int, int, str]] = [
         (entry, ids[entity], "measured")
         for entry, entity in session.execute(select(Measurement.entry_id, Measurement.entity_id))
         if entity in ids
     ]
     told += [
-        (one.entry_id, ids[one.entity_id], f"{one.attribute} corrected: {one.before} → {one.after}")
-        for one in session.scalars(select(Correction))
-        if one.entity_id in ids
+        (row.entry_id, ids[row.entity_id], f"{row.attribute} corrected: {row.before} → {row.after}")
+        for row in session.scalars(select(Correction))
+        if row.entity_id in ids
     ]
     members = select(Membership.entry_id, Membership.entity_id, Structure.code).join(Membership.structure)
     told += [

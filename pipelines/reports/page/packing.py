@@ -99,19 +99,19 @@ def _head(model: Model, packer: _Packer) -> dict[str, Any]:
         "owner": packer.indices(stones.owner),
         "triangles": packer.indices(stones.triangles),
         "edges": packer.indices(stones.edges),
-        "columns": [_column(one, packer) for one in model.columns],
+        "columns": [_column(column, packer) for column in model.columns],
         "fields": [
             {
-                "name": one.name,
-                "label": one.label,
-                "unit": one.unit,
-                "values": packer.add(one.values, "float32"),
+                "name": field.name,
+                "label": field.label,
+                "unit": field.unit,
+                "values": packer.add(field.values, "float32"),
             }
-            for one in model.fields
+            for field in model.fields
         ],
         "motion": None if model.motion is None else _motion(model.motion, packer),
         "joints": None if model.joints is None else _joints(model.joints, packer),
-        "mechanisms": [_mechanism(one, packer) for one in model.mechanisms],
+        "mechanisms": [_mechanism(mechanism, packer) for mechanism in model.mechanisms],
         "lines": [
             {
                 "name": one.name,
@@ -140,7 +140,7 @@ def _head(model: Model, packer: _Packer) -> dict[str, Any]:
             "names": list(relations.names),
             "inverse": list(relations.inverse),
         }
-    head["events"] = [[one.stone, one.when, one.who, one.what] for one in model.events]
+    head["events"] = [[event.stone, event.when, event.who, event.what] for event in model.events]
     return head
 
 
@@ -175,11 +175,11 @@ def _joints(joints: Joints, packer: _Packer) -> dict[str, Any]:
     return {
         "bodies": packer.indices(joints.bodies),
         "corners": packer.places(np.concatenate([*joints.polygons, np.zeros((0, 3))]), _COARSE),
-        "counts": [len(one) for one in joints.polygons],
+        "counts": [len(polygon) for polygon in joints.polygons],
         "place": packer.add(joints.place, "float32"),
         "force": packer.add(joints.force, "float32"),
         "kern": packer.add(joints.kern, "float32"),
-        "columns": [_column(one, packer) for one in joints.columns],
+        "columns": [_column(column, packer) for column in joints.columns],
     }
 
 

@@ -40,7 +40,7 @@ def title_block(title: str, versions: Mapping[str, str] | str) -> Markup:
     told = (
         versions
         if isinstance(versions, str)
-        else ", ".join(f"{name} {one}" for name, one in versions.items())
+        else ", ".join(f"{name} {version}" for name, version in versions.items())
     )
     rows = (
         ("Building", escape(title)),

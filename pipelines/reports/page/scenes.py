@@ -111,7 +111,7 @@ def run_model(
 def _first_colour(result: Result, columns: Sequence[Column]) -> str:
     """Return the displacement; of stones that have not moved, what their joints carry, where they carry anything."""
     still = all(np.abs(body.displacement).max() < length_tolerance(result) for body in result.bodies)
-    carried = any(one.name == "joint_pressure" for one in columns)
+    carried = any(column.name == "joint_pressure" for column in columns)
     return "joint_pressure" if still and carried else "displacement"
 
 
@@ -218,7 +218,7 @@ def _result_columns(stones: Sequence[StoneResult]) -> list[Column]:
         return np.array([np.nan if value is None else value for value in values], dtype=float)
 
     columns = [
-        Column("fidelity", "modelled as", None, [one.fidelity for one in stones], "Results"),
+        Column("fidelity", "modelled as", None, [stone.fidelity for stone in stones], "Results"),
         Column(
             "displacement_max",
             "displacement at the end",
@@ -250,12 +250,18 @@ def _result_columns(stones: Sequence[StoneResult]) -> list[Column]:
     ]
     columns += [
         Column(
-            name, name.replace("_", " "), unit, numbers([one.values.get(name) for one in stones]), "Results"
+            name,
+            name.replace("_", " "),
+            unit,
+            numbers([stone.values.get(name) for stone in stones]),
+            "Results",
         )
         for name, (unit, _) in STONE_VALUES.items()
     ]
     return [
-        one for one in columns if one.unit is None or np.isfinite(np.asarray(one.values, dtype=float)).any()
+        column
+        for column in columns
+        if column.unit is None or np.isfinite(np.asarray(column.values, dtype=float)).any()
     ]
 
 

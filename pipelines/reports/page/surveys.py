@@ -40,10 +40,10 @@ def survey_model(
     lines : polylines, in the frame of the survey
     colour : name of the column that colours at first
     """
-    shapes = [_prism(one) for one in stones]
-    mesh, _ = stones_of([one.code for one in stones], shapes)
+    shapes = [_prism(stone) for stone in stones]
+    mesh, _ = stones_of([stone.code for stone in stones], shapes)
     origin = np.floor(mesh.vertices.mean(axis=0)) if len(mesh.vertices) else np.zeros(3)
-    near = np.array([one.normal * one.area for one in stones]).reshape(-1, 3).sum(axis=0)
+    near = np.array([stone.normal * stone.area for stone in stones]).reshape(-1, 3).sum(axis=0)
     return Model(
         title=title,
         stones=type(mesh)(mesh.codes, mesh.vertices - origin, mesh.owner, mesh.triangles, mesh.edges),
@@ -75,9 +75,9 @@ def bed_lines(courses: Sequence[CourseMovement], normals: dict[str, Array]) -> l
     largest = max(max(departures), max(float(np.abs(own).max()) for own in simulated), 1e-6)
     factor = max(1.0, float(f"{_LARGEST * room / largest:.1g}"))
     found: dict[str, list[Array]] = {"measured": [], "simulated": []}
-    for one, level, own in zip(courses, levels, simulated, strict=True):
-        places = one.line.places + _BEFORE * normals.get(one.line.facade, np.zeros(3))
-        for name, departure in (("measured", one.line.height - level), ("simulated", own)):
+    for course, level, own in zip(courses, levels, simulated, strict=True):
+        places = course.line.places + _BEFORE * normals.get(course.line.facade, np.zeros(3))
+        for name, departure in (("measured", course.line.height - level), ("simulated", own)):
             found[name].append(np.column_stack([places[:, :2], level + factor * departure]))
     colours = {"measured": _ORANGE, "simulated": _BLUE}
     return [
@@ -108,11 +108,11 @@ def _motion(
 
 def _columns(stones: Sequence[StoneQuality]) -> list[Column]:
     def numbers(name: str) -> Array:
-        values = (getattr(one, name) for one in stones)
+        values = (getattr(stone, name) for stone in stones)
         return np.array([np.nan if value is None else value for value in values], dtype=float)
 
     def texts(name: str) -> list[str | None]:
-        return [None if (value := getattr(one, name)) is None else str(value) for one in stones]
+        return [None if (value := getattr(stone, name)) is None else str(value) for stone in stones]
 
     return [
         Column("kind", "kind", None, texts("kind"), "Stone"),
@@ -129,7 +129,7 @@ def _columns(stones: Sequence[StoneQuality]) -> list[Column]:
             "blunders",
             "left out as blunders",
             "-",
-            np.array([float(len(one.blunders)) for one in stones]),
+            np.array([float(len(stone.blunders)) for stone in stones]),
             "Survey",
         ),
         Column("tilt_sigma", "σ of the tilt", "°", numbers("tilt_sigma"), "Survey"),

@@ -95,16 +95,16 @@ def orient_photographs(project: Path | Project, folder: Path) -> OrientReport:
     read = project if isinstance(project, Project) else read_project(project)
     result = orient(read.network, "remove" if read.blunders == "remove" else "report")
     values = orientation_values(result, name=read.name)
-    for one in values["photos"]:
-        if one["name"] in read.pictures:
-            one["picture"] = _beside(read.pictures[one["name"]], folder)
+    for photo in values["photos"]:
+        if photo["name"] in read.pictures:
+            photo["picture"] = _beside(read.pictures[photo["name"]], folder)
     with replacing(folder, INDEX) as fresh:
         pictures = draw_photographs(values, fresh, read.pictures)
-        for one in read.write:
+        for photo in read.write:
             try:
-                _WRITERS[one](result.adjusted, fresh)
+                _WRITERS[photo](result.adjusted, fresh)
             except SurveyError as error:
-                raise error.at(f'write = ["{one}"]') from error
+                raise error.at(f'write = ["{photo}"]') from error
         values["files"] = sorted([INDEX, "report.html", *(entry.name for entry in fresh.iterdir())])
         write_photographs_page(fresh / "report.html", values, pictures, version("moma-masonry"))
         write_orientation(fresh / INDEX, values)

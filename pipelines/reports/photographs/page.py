@@ -73,14 +73,14 @@ def photographs_section(
     return {
         "pictures": [picture(folder / name, caption) for name, caption in pictures.items()],
         "adjustment": _adjustment(values),
-        "cameras": [_camera(one) for one in values["cameras"]],
-        "photos": [_photo(one) for one in values["photos"][:_MOST]],
+        "cameras": [_camera(camera) for camera in values["cameras"]],
+        "photos": [_photo(photo) for photo in values["photos"][:_MOST]],
         "control": [_control(one) for one in values["control"][:_MOST]],
         "suspected": [_mark(marks, k) for k in suspected[:_MOST]],
         "suspects": len(suspected),
         "correlations": [
-            (one["of"], one["a"], one["b"], f"{100.0 * one['value']:.1f} %")
-            for one in values["correlations"][:_MOST]
+            (correlation["of"], correlation["a"], correlation["b"], f"{100.0 * correlation['value']:.1f} %")
+            for correlation in values["correlations"][:_MOST]
         ],
         "most": _MOST,
     }

@@ -259,7 +259,7 @@ def _pictures(document: TomlDocument, folder: Path, network: Network) -> dict[st
         document.fail(
             f"no folder {folder}", "pictures", remedy="give the folder of the photographs, or leave it out"
         )
-    by_name = {one.stem.lower(): one for one in files} | {one.name.lower(): one for one in files}
+    by_name = {file.stem.lower(): file for file in files} | {file.name.lower(): file for file in files}
     out = dict[str, Path]()
     for f, photo in enumerate(network.photos):
         found = by_name.get(photo.name.lower()) or by_name.get(Path(photo.name).stem.lower())
@@ -310,7 +310,8 @@ def calibrated(network: Network, names: tuple[str, ...], where: str) -> Network:
     if not names:
         return network
     return replace(
-        network, cameras=tuple(one if one.free else replace(one, free=names) for one in network.cameras)
+        network,
+        cameras=tuple(camera if camera.free else replace(camera, free=names) for camera in network.cameras),
     )
 
 
@@ -366,13 +367,13 @@ def _marked(
     """Make a network of a file of marks and the cameras and photographs of the project file."""
     if not cameras:
         document.fail("the project has no cameras", remedy="write [[cameras]] with name, size, pixel, c")
-    made = tuple(_camera(document, k, one) for k, one in enumerate(cameras))
+    made = tuple(_camera(document, k, camera) for k, camera in enumerate(cameras))
     names = [one.name for one in made]
     if len(set(names)) < len(names):
         document.fail("two cameras have one name", "cameras", remedy="give each a name of its own")
     marks = folder / str(values["marks"])
     rows = read_marks(marks)
-    known = tuple(_photo(document, k, one, names) for k, one in enumerate(photos))
+    known = tuple(_photo(document, k, photo, names) for k, photo in enumerate(photos))
     if not known:
         if len(made) > 1:
             document.fail(

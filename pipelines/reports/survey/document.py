@@ -26,9 +26,9 @@ def survey_json(study: SurveyStudy, version: str) -> dict[str, Any]:
         "survey": study.name,
         "version": version,
         "warnings": study.warnings,
-        "inputs": [_file(one) for one in study.files],
+        "inputs": [_file(file) for file in study.files],
         "quality": _quality(study.quality, len(study.rejects)),
-        "facades": [_facade(one) for one in study.facades],
+        "facades": [_facade(facade) for facade in study.facades],
         "kinds": [_record(one) for one in study.usual.values()],
     }
     plain: dict[str, Any] = _plain(content)
@@ -45,18 +45,19 @@ def write_survey_json(path: Path, study: SurveyStudy, content: Mapping[str, Any]
     content : result of `survey_json`, with additions if wanted
     """
     parts: dict[str, Iterable[dict[str, Any]]] = {
-        "courses": (_course(one, study.beds) for one in study.courses),
+        "courses": (_course(course, study.beds) for course in study.courses),
         "course_heights": map(_record, study.course_heights),
         "contradictions": map(_record, study.contradictions),
         "beds": map(_beds, study.beds),
-        "faces": (_face(one, study.stones) for one in study.faces),
+        "faces": (_face(face, study.stones) for face in study.faces),
         "depths": map(_record, study.depths),
         "masonry": (_masonry(one, study.stones) for one in study.masonry),
         "measure_again": map(_remeasure, study.again.rows),
         "measure_again_left": ({"text": one} for one in study.again.left),
         "remeasure": map(_remeasure, study.remeasures),
         "rejects": (
-            {"code": one.code, "line": _line(one.spans), "reason": str(one.error)} for one in study.rejects
+            {"code": reject.code, "line": _line(reject.spans), "reason": str(reject.error)}
+            for reject in study.rejects
         ),
         "stones": _stones(study),
     }
@@ -72,12 +73,12 @@ def write_survey_json(path: Path, study: SurveyStudy, content: Mapping[str, Any]
 
 
 def _stones(study: SurveyStudy) -> Iterator[dict[str, Any]]:
-    deviations = {one.code: one for one in study.deviations}
+    deviations = {deviation.code: deviation for deviation in study.deviations}
     facade_of = {i: facade.name for facade in study.facades for i in facade.members.tolist()}
     reasons: dict[str, list[str]] = {}
-    for one in study.remeasures:
-        if one.code is not None:
-            reasons.setdefault(one.code, []).append(one.reason)
+    for remeasure in study.remeasures:
+        if remeasure.code is not None:
+            reasons.setdefault(remeasure.code, []).append(remeasure.reason)
     for i, stone in enumerate(study.stones):
         yield _stone(stone, facade_of.get(i), deviations.get(stone.code), reasons.get(stone.code, []))
 
@@ -106,7 +107,7 @@ def _file(file: SurveyFile) -> dict[str, Any]:
         "survey": file.head.name,
         "stones": file.stones,
         "rejects": file.rejects,
-        "stations": [{"name": one.name, "position": one.position} for one in file.head.stations],
+        "stations": [{"name": station.name, "position": station.position} for station in file.head.stations],
         "control": control,
     }
 
@@ -149,15 +150,15 @@ def _beds(wall: WallBeds) -> dict[str, Any]:
     values = _record(wall)
     values["movements"] = [
         {
-            **_record(one),
-            "text": one.text,
-            "dating": one.dating,
+            **_record(movement),
+            "text": movement.text,
+            "dating": movement.dating,
             "courses": [
                 {"course": number, "amount": amount, "sigma": sigma}
-                for number, (amount, sigma) in one.courses.items()
+                for number, (amount, sigma) in movement.courses.items()
             ],
         }
-        for one in wall.movements
+        for movement in wall.movements
     ]
     values["odd"] = [_record(one) for one in wall.odd]
     values["excluded_in"] = [{"course": number, "amount": one} for number, one in wall.excluded_in.items()]
@@ -171,7 +172,7 @@ def _face(wall: WallFace, stones: Sequence[StoneQuality]) -> dict[str, Any]:
         {"code": stones[i].code, "plane": before, "plumb": upright}
         for i, before, upright in zip(wall.stones.tolist(), plane.tolist(), plumb.tolist(), strict=True)
     ]
-    values["movements"] = [{**_record(one), "text": one.text} for one in wall.movements]
+    values["movements"] = [{**_record(movement), "text": movement.text} for movement in wall.movements]
     values["odd"] = [{**_record(one), "text": one.text} for one in wall.odd]
     return values
 
@@ -180,8 +181,8 @@ def _masonry(wall: MasonryQuality, stones: Sequence[StoneQuality]) -> dict[str, 
     values = _record(wall)
     values["stones"] = [stones[i].code for i in wall.stones.tolist()]
     values["grades"] = {
-        name: {"grade": one.words, "chances": one.chances, "text": one.text}
-        for name, one in wall.grades.items()
+        name: {"grade": grade.words, "chances": grade.chances, "text": grade.text}
+        for name, grade in wall.grades.items()
     }
     return {**values, "categories": wall.categories, "strengths": wall.strengths}
 
@@ -192,7 +193,7 @@ def _remeasure(one: Remeasure) -> dict[str, Any]:
 
 def finding_of(line: CourseLine, walls: Sequence[WallBeds]) -> str:
     """Return the verdict on a course, which its wall gives."""
-    own = (one for one in walls if (one.facade, one.zone) == (line.facade, line.zone))
+    own = (wall for wall in walls if (wall.facade, wall.zone) == (line.facade, line.zone))
     return next((one.finding(line.course) for one in own), "not tested")
 
 

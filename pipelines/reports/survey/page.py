@@ -47,7 +47,7 @@ def write_survey_page(
     """
     inside = {name: picture(path.parent / name, caption) for name, caption in pictures.items()}
     facade_of = {i: facade.name for facade in study.facades for i in facade.members.tolist()}
-    deviation_of = {one.code: one for one in study.deviations}
+    deviation_of = {deviation.code: deviation for deviation in study.deviations}
     write_page(
         path,
         "survey.html",
@@ -60,7 +60,7 @@ def write_survey_page(
         residuals=[one for name, one in inside.items() if name == "residuals.png"],
         facades=len(study.facades),
         plumb=[one for name, one in inside.items() if name.startswith("plumb")],
-        remeasures=[_remeasure_row(one) for one in study.again.rows],
+        remeasures=[_remeasure_row(row) for row in study.again.rows],
         more_stones=study.again.more,
         left=study.again.left,
         movements=list(_movements(study)),
@@ -92,9 +92,9 @@ def _facades_column(study: SurveyStudy, facade_of: Mapping[int, str]) -> Column:
 def _again_column(study: SurveyStudy) -> Column:
     """Return what to measure again, and why."""
     reasons: dict[str, list[str]] = {}
-    for one in study.remeasures:
-        reasons.setdefault(one.code or "", []).append(f"{one.reason}: {one.action}")
-    texts = ["; ".join(reasons[one.code]) if one.code in reasons else None for one in study.stones]
+    for remeasure in study.remeasures:
+        reasons.setdefault(remeasure.code or "", []).append(f"{remeasure.reason}: {remeasure.action}")
+    texts = ["; ".join(reasons[stone.code]) if stone.code in reasons else None for stone in study.stones]
     return Column("again", "to measure again", None, texts, "Survey")
 
 
@@ -116,7 +116,7 @@ def _located(study: SurveyStudy) -> Iterator[Row]:
 
 def _first(items: Sequence[T], row: Callable[[T], Row]) -> dict[str, Any]:
     """Describe the first items by a row each, and count all of them."""
-    return {"rows": [row(one) for one in items[:_MOST]], "count": len(items)}
+    return {"rows": [row(item) for item in items[:_MOST]], "count": len(items)}
 
 
 def _lead(study: SurveyStudy) -> str:
@@ -125,8 +125,8 @@ def _lead(study: SurveyStudy) -> str:
     if study.rejects:
         made += f", and {len(study.rejects)} that could not be made"
     verdict = study.quality.verdict
-    moved = [f"{_place(wall)}: {one.text}" for wall in study.beds for one in wall.movements]
-    moved += [f"{_place(wall)}: {one.text}" for wall in study.faces for one in wall.movements]
+    moved = [f"{_place(wall)}: {movement.text}" for wall in study.beds for movement in wall.movements]
+    moved += [f"{_place(wall)}: {movement.text}" for wall in study.faces for movement in wall.movements]
     found = f" Movement: {'; '.join(moved[:3])}{', and more' if len(moved) > 3 else ''}." if moved else ""
     return f"{made}; {again} to measure again. {verdict[:1].upper()}{verdict[1:]}.{found}"
 
@@ -144,8 +144,8 @@ def _movements(study: SurveyStudy) -> Iterator[Row]:
     """Yield what the beds of each wall tell: wall, finding, age, probability, what is excluded."""
     for wall in study.beds:
         place, bound = _place(wall), _bound(wall.excluded)
-        for one in wall.movements:
-            yield (place, one.text, one.dating, _percent(one.probability), bound)
+        for movement in wall.movements:
+            yield (place, movement.text, movement.dating, _percent(movement.probability), bound)
         if not wall.movements:
             none = "not tested: too few stones" if wall.excluded is None else "no movement found"
             yield (place, none, "–", "–", bound)
@@ -161,8 +161,8 @@ def _faces(study: SurveyStudy) -> Iterator[Row]:
         )
         head = (_place(wall), lean, _mm(wall.scatter))
         tail = (_bound(wall.excluded), _bound(wall.excluded_stone))
-        for one in wall.movements:
-            yield (*head, one.text, _percent(one.probability), *tail)
+        for movement in wall.movements:
+            yield (*head, movement.text, _percent(movement.probability), *tail)
         if not wall.movements:
             yield (*head, "no movement found" if wall.excluded is not None else "not tested", "–", *tail)
 
@@ -218,7 +218,7 @@ def _contradiction_row(one: Contradiction) -> Row:
 def _overall(study: SurveyStudy) -> list[tuple[str, str]]:
     quality = study.quality
     return [
-        ("Files", ", ".join(one.head.path for one in study.files)),
+        ("Files", ", ".join(file.head.path for file in study.files)),
         ("Points and corners", str(quality.points)),
         ("Left out as blunders", str(quality.blunders)),
         ("Corners off their plane, worn or bevelled", str(quality.worn)),
@@ -262,7 +262,7 @@ def _control(files: Iterable[SurveyFile]) -> Iterator[dict[str, Any]]:
 
 def _courses(study: SurveyStudy) -> Iterator[dict[str, Any]]:
     """Yield the bed lines of each facade."""
-    heights = {(one.facade, one.zone, one.course): one for one in study.course_heights}
+    heights = {(height.facade, height.zone, height.course): height for height in study.course_heights}
     for facade in dict.fromkeys(line.facade for line in study.courses):
         lines = [line for line in study.courses if line.facade == facade]
         tilted = lines[0].frame_sigma
@@ -314,7 +314,7 @@ def _kinds(study: SurveyStudy) -> list[Row]:
 
 def _by_urgency(study: SurveyStudy) -> list[int]:
     """Return the stones to measure again first, then the others by the scatter of their points."""
-    flagged = {one.code for one in study.remeasures}
+    flagged = {remeasure.code for remeasure in study.remeasures}
     return sorted(
         range(len(study.stones)), key=lambda i: (study.stones[i].code not in flagged, -study.stones[i].rms)
     )

@@ -79,7 +79,7 @@ def report_surveys(
     SurveyError : a file that cannot be read at all, or control points that contradict each other
     """
     folder = Path(folder)
-    source = [Path(one) for one in paths]
+    source = [Path(path) for path in paths]
     if isinstance(options, CloudOptions):
         source.append(options.outlines)
     check_replaceable(folder, INDEX, () if overwrite else source)
@@ -115,15 +115,19 @@ def write_survey_report(
 
 def _photographs(study: SurveyStudy, folder: Path) -> Iterator[dict[str, Any]]:
     """Draw the photographs that stones were marked on, and describe them for the page."""
-    paths = [Path(one.head.path).parent / one.head.orientation for one in study.files if one.head.orientation]
+    paths = [
+        Path(file.head.path).parent / file.head.orientation for file in study.files if file.head.orientation
+    ]
     for number, path in enumerate(dict.fromkeys(paths), start=1):
         values = json.loads(path.read_text(encoding="utf-8"))
-        files = {one["name"]: path.parent / one["picture"] for one in values["photos"] if "picture" in one}
+        files = {
+            photo["name"]: path.parent / photo["picture"] for photo in values["photos"] if "picture" in photo
+        }
         gone = [name for name, file in files.items() if not file.is_file()]
         there = {name: file for name, file in files.items() if name not in gone}
         pictures = draw_photographs(values, folder, there, f"photographs-{number}-")
         oriented = read_orientation(path)
-        if stones := list(_outlines(study, {one.name for one in oriented.photos})):
+        if stones := list(_outlines(study, {photo.name for photo in oriented.photos})):
             name = f"photographs-{number}-outlines.png"
             draw_outlines(folder / name, oriented, stones, there)
             pictures[name] = (
@@ -135,7 +139,7 @@ def _photographs(study: SurveyStudy, folder: Path) -> Iterator[dict[str, Any]]:
 
 def _outlines(study: SurveyStudy, photos: set[str]) -> Iterator[DrawnOutline]:
     """Yield the stones that were marked on some photographs, unless control points moved them to another frame."""
-    if any(one.head.control for one in study.files):
+    if any(file.head.control for file in study.files):
         return
     for stone in study.stones:
         marks: dict[str, list[tuple[float, float]]] = {}
@@ -154,7 +158,7 @@ def _outlines(study: SurveyStudy, photos: set[str]) -> Iterator[DrawnOutline]:
 def _draw(study: SurveyStudy, folder: Path, photo: Orthophoto | None) -> dict[str, str]:
     """Draw the pictures; return captions by file name. Those of the first facade have no number."""
     captions = {}
-    flagged = {one.code for one in study.again.rows if one.code is not None}
+    flagged = {row.code for row in study.again.rows if row.code is not None}
     for number, facade in enumerate(study.facades[:_FACADES], start=1):
         ending = ".png" if number == 1 else f"-{number}.png"
         name = f"elevation{ending}"
@@ -171,7 +175,7 @@ def _draw(study: SurveyStudy, folder: Path, photo: Orthophoto | None) -> dict[st
             captions[name] = (
                 f"The beds of {facade.name}. Each black stroke is the bed of one stone, between its lower corners."
             )
-        if any(one.facade == facade.name for one in study.faces):
+        if any(face.facade == facade.name for face in study.faces):
             name = f"plumb{ending}"
             draw_departure(folder / name, facade, study.stones, study.faces)
             captions[name] = (

@@ -136,7 +136,7 @@ def study_surveys(
     for source in sources:
         before = len(stones), len(rejects)
         file = _read(source, format, options, stones, rejects, progress)
-        _refuse_second_campaign([one.code for one in stones[before[0] :]], source.path, seen)
+        _refuse_second_campaign([stone.code for stone in stones[before[0] :]], source.path, seen)
         files.append(replace(file, stones=len(stones) - before[0], rejects=len(rejects) - before[1]))
     study = _judge(tuple(files), tuple(stones), tuple(rejects), given or {}, progress)
     if format != "cloud" or not stones:
@@ -168,11 +168,11 @@ def _read(
 ) -> SurveyFile:
     stream = open_source(source, format, options, progress)
     survey = survey_stones(replace(stream, head=_with_some_depth(stream.head)))
-    for number, one in enumerate(survey.stones, start=1):
-        if isinstance(one, Reject):
-            rejects.append(one)
+    for number, stone in enumerate(survey.stones, start=1):
+        if isinstance(stone, Reject):
+            rejects.append(stone)
         else:
-            stones.append(_appraised(one))
+            stones.append(_appraised(stone))
         if number % _INTERVAL == 0:
             progress(Progress(f"fit {source.path.name}", number, number + _INTERVAL))
     head = replace(survey.head, depth_rules=stream.head.depth_rules)
@@ -203,23 +203,23 @@ def _judge(
     progress(Progress("judge", 0, 3, "courses and faces"))
     quality = judge_survey(stones)
     facades = find_facades(
-        np.array([one.normal for one in stones]).reshape(-1, 3),
-        np.array([one.area for one in stones]),
-        np.array([one.outline.mean(axis=0) for one in stones]).reshape(-1, 3),
+        np.array([stone.normal for stone in stones]).reshape(-1, 3),
+        np.array([stone.area for stone in stones]),
+        np.array([stone.outline.mean(axis=0) for stone in stones]).reshape(-1, 3),
     )
     usual = standards(stones, _canons(files))
     odd = contradictions(stones, facades)
-    tilts = [one.transform.covariance[3:6, 3:6] for one in files if one.transform is not None]
+    tilts = [file.transform.covariance[3:6, 3:6] for file in files if file.transform is not None]
     lines = measure_courses(stones, facades, tilts)
     beds, faces = _movements(stones, facades, lines, tilts)
     # one scatter of beds in the table of courses and in the verdict on movement
-    lines = with_scatter(lines, {(one.facade, one.zone): (one.scatter, one.freedom) for one in beds})
+    lines = with_scatter(lines, {(bed.facade, bed.zone): (bed.scatter, bed.freedom) for bed in beds})
     rules = [rule for file in files for rule in file.head.depth_rules]
     depths = doubtful_depths(stones, facades, rules, CHANCES["depths"])
-    seen = [_seen(one) for one in stones if one.measured]
+    seen = [_seen(stone) for stone in stones if stone.measured]
     remeasures = list_remeasures(stones, rejects, odd, quality, misplaced_corners(seen), depths)
     progress(Progress("judge", 1, 3, "masonry"))
-    masonry = judge_masonry([_wall_stone(one) for one in stones], facades, given)
+    masonry = judge_masonry([_wall_stone(stone) for stone in stones], facades, given)
     progress(Progress("judge", 2, 3, "what depends on doubtful stones"))
     again = short_list(remeasures, len(stones) + len(rejects), _verdicts(stones, facades, tilts, beds, faces))
     progress(Progress("judge", 3, 3))
@@ -253,14 +253,14 @@ def _movements(
     walls: tuple[int, int] = (1, 1),
 ) -> tuple[tuple[WallBeds, ...], tuple[WallFace, ...]]:
     """Find what has moved; `walls` share the chances, of which these are one."""
-    lengths = {one.code: one.length for one in stones}
-    rows = {one.code: one.line for one in stones}
+    lengths = {stone.code: stone.length for stone in stones}
+    rows = {stone.code: stone.line for stone in stones}
     leans = {}
     for facade in facades:
         # the rotation ω moves what is z up by ω × z, of which this is the part outwards
         x, y, _ = facade.frame.axes[2]
         lever = np.array([-y, x, 0.0])
-        leans[facade.name] = max((math.sqrt(float(lever @ one @ lever)) for one in tilts), default=0.0)
+        leans[facade.name] = max((math.sqrt(float(lever @ tilt @ lever)) for tilt in tilts), default=0.0)
     beds = find_bed_movements(lines, lengths, CHANCES["beds"] / max(walls[0], 1), rows)
     return beds, find_face_departures(stones, facades, CHANCES["faces"] / max(walls[1], 1), leans)
 
@@ -269,12 +269,14 @@ def _findings(beds: Sequence[WallBeds], faces: Sequence[WallFace]) -> dict[tuple
     """Return the verdicts on the walls, each with its name."""
     found: dict[tuple[object, ...], str] = {}
     for wall in beds:
-        for one in wall.movements:
-            name = "settlement" if one.kind in ("step", "part") else one.kind
+        for movement in wall.movements:
+            name = "settlement" if movement.kind in ("step", "part") else movement.kind
             found[wall.facade, wall.zone, name] = f"the {name} of {wall.facade}"
-            if one.older_than is not None:
-                dated = f"that it is older than course {one.older_than}"
-                found[wall.facade, wall.zone, name, one.older_than] = f"{dated} ({name} of {wall.facade})"
+            if movement.older_than is not None:
+                dated = f"that it is older than course {movement.older_than}"
+                found[wall.facade, wall.zone, name, movement.older_than] = (
+                    f"{dated} ({name} of {wall.facade})"
+                )
     for face in faces:
         for moved in face.movements:
             found[face.facade, face.zone, moved.kind] = f"the {moved.kind} of {face.facade}"

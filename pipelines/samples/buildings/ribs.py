@@ -315,7 +315,7 @@ def _course(
     outward *= np.sign(outward[2])
     frame = WallFrame(into @ [low.x, 0.0, low.z], np.array([np.cross(rise, -outward), rise, -outward]))
     along = float(frame.axes[0] @ into[:, 1])
-    back = [into @ one.up / float((into @ one.up) @ outward) for one in beds]
+    back = [into @ bed.up / float((into @ bed.up) @ outward) for bed in beds]
     for number, ends in enumerate(pairwise(heads), start=1):
         start, stop = sorted(along * end for end in ends)
         corners = np.array([(start, 0.0), (stop, 0.0), (stop, length), (start, length)])

@@ -86,9 +86,9 @@ def read_annotations(
             size = int(content["imageWidth"]), int(content["imageHeight"])
         shapes = list(_of_labelme(path, content["shapes"]))
     else:
-        images = [one for one in _via_images(content) or () if one["regions"]]
+        images = [image for image in _via_images(content) or () if image["regions"]]
         if len(images) > 1:
-            names = ", ".join(str(one["filename"]) for one in images[:5])
+            names = ", ".join(str(image["filename"]) for image in images[:5])
             raise UsageError(
                 f"outlines on {len(images)} pictures: {names}",
                 where=str(path),
@@ -115,7 +115,7 @@ def _size_of(picture: Path) -> tuple[int, int] | None:
 def _outlines(
     path: Path, shapes: list[_Shape], tolerance: float, chosen: Mapping[str, str], label: str | None
 ) -> Iterator[Outline]:
-    found = [(one, attributes_of(one.values, chosen, one.where)) for one in shapes]
+    found = [(shape, attributes_of(shape.values, chosen, shape.where)) for shape in shapes]
     counts = Counter(said.code for _, said in found)
     classes = max(counts.values(), default=0) > 1
     if classes:
@@ -136,27 +136,30 @@ def _of_class(
     path: Path, found: list[tuple[_Shape, Attributes]], counts: Counter[str | None], label: str | None
 ) -> list[tuple[_Shape, Attributes]]:
     """Return the shapes of the class of stones."""
-    names = {str(one): count for one, count in counts.items()}
+    names = {str(key): count for key, count in counts.items()}
     listed = ", ".join(f"{name} ({count})" for name, count in names.items())
     if label is not None and label not in names:
         raise UsageError(f"no label {label!r}", where=str(path), remedy=f"labels are: {listed}")
     if label is not None:
         return [one for one in found if str(one[1].code) == label]
-    if len(names) > 1 and not all(kind_of(one, {}) in KINDS for one in names):
+    if len(names) > 1 and not all(kind_of(name, {}) in KINDS for name in names):
         remedy = f"name that of the stones, e.g. --layer {max(names, key=names.__getitem__)}"
         raise UsageError(f"{len(names)} labels: {listed}", where=str(path), remedy=remedy)
     return found
 
 
 def _of_labelme(path: Path, shapes: list[Any]) -> Iterator[_Shape]:
-    for number, one in enumerate(shapes, start=1):
+    for number, shape in enumerate(shapes, start=1):
         where = f"{path}, shape {number}"
         try:
-            kind, points = str(one.get("shape_type", "polygon")), np.array(one["points"], dtype=np.float64)
-            label = str(one.get("label") or "")
+            kind, points = (
+                str(shape.get("shape_type", "polygon")),
+                np.array(shape["points"], dtype=np.float64),
+            )
+            label = str(shape.get("label") or "")
         except (AttributeError, KeyError, TypeError, ValueError) as error:
             raise SurveyError("a shape without points", where=where, remedy=_REMEDY) from error
-        flags = {name: str(value) for name, value in (one.get("flags") or {}).items()}
+        flags = {name: str(value) for name, value in (shape.get("flags") or {}).items()}
         values = flags | ({"label": label} if label else {})
         if kind == "rectangle" and points.shape == (2, 2):
             yield _Shape(_box(*points[0], *points[1]), values, where)

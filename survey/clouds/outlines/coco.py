@@ -52,7 +52,7 @@ def read_coco(
     annotations = content if isinstance(content, list) else content["annotations"]
     head = {} if isinstance(content, list) else content
     images = {one.get("id"): one for one in head.get("images", [])}
-    shown = {one.get("image_id") for one in annotations}
+    shown = {annotation.get("image_id") for annotation in annotations}
     if len(shown) > 1:
         names = ", ".join(
             str(images.get(one, {}).get("file_name", one)) for one in sorted(shown, key=str)[:5]
@@ -77,21 +77,21 @@ def _outlines(
     tolerance: float,
     chosen: Mapping[str, str],
 ) -> Iterator[Outline]:
-    for number, one in enumerate(annotations, start=1):
-        where = f"{path}, annotation {one.get('id', number)}"
+    for number, annotation in enumerate(annotations, start=1):
+        where = f"{path}, annotation {annotation.get('id', number)}"
         values = {
             name: value
-            for name, value in (one | one.get("attributes", {})).items()
+            for name, value in (annotation | annotation.get("attributes", {})).items()
             if isinstance(value, str | int | float)
             and name not in ("area", "iscrowd", "image_id", "category_id")
         }
-        if one.get("category_id") in kinds:
-            values["category"] = kinds[one["category_id"]]
+        if annotation.get("category_id") in kinds:
+            values["category"] = kinds[annotation["category_id"]]
         said = attributes_of(values, chosen, where)
         code = made_code(said.code or "") or f"S{number:03d}"
         if code.isdigit():
             code = f"S{int(code):03d}"
-        segmentation = one.get("segmentation")
+        segmentation = annotation.get("segmentation")
         if isinstance(segmentation, dict):
             mask, column = _columns(segmentation, where)
             found = outline_of_mask(number, mask, (column, 0), tolerance, where, said)
@@ -157,7 +157,7 @@ def _columns(coded: Mapping[str, Any], where: str) -> tuple[NDArray[np.bool_], i
     try:
         height, width = (int(one) for one in coded["size"])
         counts = coded["counts"]
-        runs = _uncompressed(counts) if isinstance(counts, str) else [int(one) for one in counts]
+        runs = _uncompressed(counts) if isinstance(counts, str) else [int(count) for count in counts]
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise SurveyError("run lengths that cannot be read", where=where, remedy=_REMEDY) from error
     if sum(runs) != height * width or min(runs, default=0) < 0:

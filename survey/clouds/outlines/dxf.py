@@ -69,8 +69,8 @@ def read_dxf(
     scale = unit or _UNITS.get(code, 1.0)
     if not found.curves:
         raise _empty(path, layer, found)
-    curves = [replace(one, ring=_flat(one.ring * scale)) for one in found.curves]
-    texts = [replace(one, places=tuple(scale * place for place in one.places)) for one in found.texts]
+    curves = [replace(curve, ring=_flat(curve.ring * scale)) for curve in found.curves]
+    texts = [replace(text, places=tuple(scale * place for place in text.places)) for text in found.texts]
     return tuple(_coded(curves, texts, chosen, path)), tuple(_left_out(found))
 
 
@@ -104,11 +104,11 @@ def _flat(ring: Array) -> Array:
 def _coded(
     curves: Sequence[Curve], texts: Sequence[DrawnText], chosen: Mapping[str, str], path: Path
 ) -> Iterator[Outline]:
-    layers = [one.layer for one in curves]
+    layers = [curve.layer for curve in curves]
     wanted = chosen.get("code")
     by_layer = wanted == "layer" or (wanted is None and not texts and len(set(layers)) == len(layers) > 1)
     tags = {meaning: name for meaning, name in chosen.items() if name not in ("layer", "text")}
-    areas = [float(np.linalg.norm(area_vector(_in_space(one.ring)))) for one in curves]
+    areas = [float(np.linalg.norm(area_vector(_in_space(curve.ring)))) for curve in curves]
     smallest = sorted(range(len(curves)), key=lambda k: areas[k])
     own: dict[int, list[DrawnText]] = {}
     around: Counter[int] = Counter()
@@ -139,7 +139,7 @@ def _outline(
 ) -> Outline:
     values = {tag: text for one in texts for tag, text in one.values.items()}
     said = attributes_of(values, {m: name for m, name in tags.items() if name in values}, where)
-    names = [one.text or said.code or next(iter(one.values.values()), "") for one in texts]
+    names = [text.text or said.code or next(iter(text.values.values()), "") for text in texts]
     name = curve.layer if by_layer else names[0] if names else f"S{number}"
     doubts = []
     if not by_layer and len(names) > 1:

@@ -78,7 +78,7 @@ def entities_of(drawing: Any, layer: str | None) -> Entities:
     layer : on which outlines lie, which may be hidden; None: all that are shown
     """
     found = Entities()
-    hidden = {one.dxf.name.lower() for one in drawing.layers if one.is_frozen() or one.is_off()}
+    hidden = {layer.dxf.name.lower() for layer in drawing.layers if layer.is_frozen() or layer.is_off()}
     hatches = list[Curve]()
     for entity, on in _resolved(drawing.modelspace(), None, found, 0):
         kind = entity.dxftype()
@@ -95,9 +95,9 @@ def entities_of(drawing: Any, layer: str | None) -> Entities:
             found.hidden[on] += len(rings)
         else:
             (hatches if kind == "HATCH" else found.curves).extend(Curve(ring, on, where) for ring in rings)
-    boxes = [_box(one.ring) for one in found.curves]
+    boxes = [_box(curve.ring) for curve in found.curves]
     # the filling of an outline is not a second stone
-    found.curves += [one for one in hatches if not any(_alike(_box(one.ring), box) for box in boxes)]
+    found.curves += [hatch for hatch in hatches if not any(_alike(_box(hatch.ring), box) for box in boxes)]
     return found
 
 
@@ -109,7 +109,7 @@ def _resolved(entities: Any, layer: str | None, found: Entities, depth: int) -> 
         if entity.dxftype() != "INSERT":
             yield entity, on
             continue
-        if any(one.dxf.text.strip() for one in entity.attribs):
+        if any(attribute.dxf.text.strip() for attribute in entity.attribs):
             found.texts.append(_label(entity))
         if depth == _DEEPEST:
             found.left["INSERT"] += 1
@@ -125,8 +125,12 @@ def _text(entity: Any) -> DrawnText:
 
 def _label(insert: Any) -> DrawnText:
     """Return the attributes of an inserted label, which may stand beside the stone that it was inserted in."""
-    values = {one.dxf.tag: " ".join(one.dxf.text.split()) for one in insert.attribs if one.dxf.text.strip()}
-    places = (*(_place(one.dxf.insert) for one in insert.attribs), _place(insert.dxf.insert))
+    values = {
+        attribute.dxf.tag: " ".join(attribute.dxf.text.split())
+        for attribute in insert.attribs
+        if attribute.dxf.text.strip()
+    }
+    places = (*(_place(attribute.dxf.insert) for attribute in insert.attribs), _place(insert.dxf.insert))
     return DrawnText(places, "", values)
 
 
@@ -141,8 +145,8 @@ def _rings(entity: Any) -> list[Array]:
         from ezdxf.path import from_hatch
 
         paths = (np.array([tuple(one) for one in path.flattening(_SAGITTA)]) for path in from_hatch(entity))
-        rings = [_opened(one) for one in paths if len(one) > 3]
-        boxes = [_box(one) for one in rings]
+        rings = [_opened(path) for path in paths if len(path) > 3]
+        boxes = [_box(ring) for ring in rings]
         # a boundary within another of the same hatch is a hole
         return [
             ring for ring, box in zip(rings, boxes, strict=True) if not any(_within(box, o) for o in boxes)
@@ -157,10 +161,10 @@ def _corners(entity: Any) -> Array:
     """Return the corners (n, 3) of a curve, arcs by chords."""
     kind = entity.dxftype()
     if kind == "POLYLINE" and entity.is_3d_polyline:
-        return np.array([tuple(one.dxf.location) for one in entity.vertices], dtype=np.float64)
+        return np.array([tuple(vertex.dxf.location) for vertex in entity.vertices], dtype=np.float64)
     if kind in ("LWPOLYLINE", "POLYLINE") and not entity.has_arc:
         points = entity.vertices_in_wcs() if kind == "LWPOLYLINE" else entity.points_in_wcs()
-        return np.array([tuple(one) for one in points], dtype=np.float64)
+        return np.array([tuple(point) for point in points], dtype=np.float64)
     from ezdxf.path import make_path
 
     return np.array([tuple(one) for one in make_path(entity).flattening(_SAGITTA)], dtype=np.float64)

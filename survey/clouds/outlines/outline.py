@@ -225,6 +225,6 @@ def _course(text: str | None, where: str) -> int | None:
 def distinct(outlines: Sequence[Outline]) -> Iterator[tuple[Outline, Outline | None]]:
     """Yield each outline with the earlier one of the same code, if there is one."""
     seen: dict[str, Outline] = {}
-    for one in outlines:
-        yield one, seen.get(one.code)
-        seen.setdefault(one.code, one)
+    for outline in outlines:
+        yield outline, seen.get(outline.code)
+        seen.setdefault(outline.code, outline)

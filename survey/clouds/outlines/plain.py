@@ -96,7 +96,7 @@ def read_table(path: Path, chosen: Mapping[str, str], unit: float | None = None)
     """
     table = tables.read_table(path, _is_row, _CSV)
     header = table.titles[-1] if table.titles else tables.TableRow(1, ())
-    titles = [unit_of(one)[0] for one in header.cells]
+    titles = [unit_of(cell)[0] for cell in header.cells]
     places = {name.lower(): k for k, name in reversed(list(enumerate(titles)))}
     across, upward, code = (
         next((places[one] for one in alike if one in places), None) for alike in _corners(chosen)
@@ -104,8 +104,8 @@ def read_table(path: Path, chosen: Mapping[str, str], unit: float | None = None)
     if across is None or upward is None or code is None:
         names = ", ".join(header.cells or table.rows[0].cells)
         raise SurveyError(f"columns {names}", where=table.where(header.line), remedy=_CSV)
-    scales = [length_scale(one, table.where(header.line)) or 1.0 for one in header.cells]
-    sides = [length_scale(one, table.where(header.line)) or unit or 1.0 for one in header.cells]
+    scales = [length_scale(cell, table.where(header.line)) or 1.0 for cell in header.cells]
+    sides = [length_scale(cell, table.where(header.line)) or unit or 1.0 for cell in header.cells]
     corners: dict[str, list[list[float]]] = {}
     first: dict[str, tuple[int, dict[str, Any]]] = {}
     for row in table.rows:
@@ -127,7 +127,7 @@ def _corners(chosen: Mapping[str, str]) -> tuple[Sequence[str], ...]:
 
 
 def _is_row(cells: Sequence[str], commas: bool) -> bool:
-    return sum(is_number(one, commas) for one in cells) >= len("xy")
+    return sum(is_number(cell, commas) for cell in cells) >= len("xy")
 
 
 def _of_rows(

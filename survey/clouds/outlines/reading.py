@@ -94,8 +94,8 @@ def read_outlines(
         raise SurveyError("has no outlines", where=str(path), remedy="draw each stone as a polygon")
     if drawing.pixel is None and not drawing.pixels:
         drawing = replace(drawing, outlines=tuple(_sparse(one, _LIKELY * sigma) for one in drawing.outlines))
-    for one in drawing.outlines:
-        _check(one)
+    for outline in drawing.outlines:
+        _check(outline)
     return replace(drawing, outlines=tuple(_of_kind(one, kinds or {}) for one in drawing.outlines))
 
 
@@ -134,7 +134,8 @@ def _scaled(drawing: Drawing, unit: float | None) -> Drawing:
     if unit is None or unit == 1.0:
         return drawing
     return replace(
-        drawing, outlines=tuple(replace(one, corners=unit * one.corners) for one in drawing.outlines)
+        drawing,
+        outlines=tuple(replace(outline, corners=unit * outline.corners) for outline in drawing.outlines),
     )
 
 
@@ -158,7 +159,7 @@ def _placed(
     """Move outlines from pixels to metres, if it is known where the picture lies."""
     if places is None:
         return Drawing(path, outlines, True, None, size)
-    moved = tuple(replace(one, corners=places.place(one.corners)) for one in outlines)
+    moved = tuple(replace(outline, corners=places.place(outline.corners)) for outline in outlines)
     return Drawing(path, moved, False, places.pixel, size)
 
 

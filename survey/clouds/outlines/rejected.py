@@ -30,11 +30,11 @@ def rejected_outlines(
     rejects : whose spans are the numbers of outlines
     """
     outlines = read_outlines(path, layer=layer, chosen=chosen, sigma=sigma, smooth=smooth).outlines
-    by_number = {one.number: one for one in outlines}
+    by_number = {outline.number: outline for outline in outlines}
     features = [
-        _feature(by_number[span.start], str(one.error))
-        for one in rejects
-        for span in one.spans
+        _feature(by_number[span.start], str(reject.error))
+        for reject in rejects
+        for span in reject.spans
         if span.start in by_number
     ]
     head = {"type": "FeatureCollection", "about": f"{MARK}: {len(features)} of {path.name}"}
@@ -43,7 +43,7 @@ def rejected_outlines(
 
 
 def _lines(features: Iterable[Mapping[str, object]]) -> Iterable[str]:
-    return (json.dumps(one, ensure_ascii=False) for one in features)
+    return (json.dumps(feature, ensure_ascii=False) for feature in features)
 
 
 def _feature(one: Outline, reason: str) -> dict[str, object]:

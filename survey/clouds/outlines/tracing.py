@@ -36,9 +36,9 @@ def trace(mask: Bools) -> tuple[Array, int, float]:
         return np.empty((0, 2)), 0, 0.0
     padded = np.zeros((mask.shape[0] + 2, mask.shape[1] + 2))
     padded[1:-1, 1:-1] = mask
-    rings = [np.asarray(one)[:-1] - 1.0 for one in contour_generator(z=padded).lines(0.5)]
-    areas = np.array([abs(ring_area(one)) for one in rings])
-    outer = [k for k, one in enumerate(rings) if _is_outer(one, mask)]
+    rings = [np.asarray(line)[:-1] - 1.0 for line in contour_generator(z=padded).lines(0.5)]
+    areas = np.array([abs(ring_area(ring)) for ring in rings])
+    outer = [k for k, ring in enumerate(rings) if _is_outer(ring, mask)]
     if not outer:
         return np.empty((0, 2)), 0, 0.0
     best = max(outer, key=lambda k: areas[k])

@@ -41,12 +41,14 @@ def mark_outlines(rings: Sequence[Array], proposal: Proposal) -> list[Mark]:
     marks = _overlaps(shapely, drawn)
     if not proposal.stones:
         return marks
-    own = shapely.make_valid(np.array([shapely.polygons(one.ring) for one in proposal.stones], dtype=object))
+    own = shapely.make_valid(
+        np.array([shapely.polygons(stone.ring) for stone in proposal.stones], dtype=object)
+    )
     first, second = shapely.STRtree(own).query(drawn, predicate="intersects")
     shared = shapely.area(shapely.intersection(drawn[first], own[second]))
     holds = shared > _PART * shapely.area(own[second])
     lies = shared > _MOST * shapely.area(drawn[first])
-    joints = {tuple(sorted(one.stones)): one for one in proposal.borders}
+    joints = {tuple(sorted(border.stones)): border for border in proposal.borders}
     for k in np.unique(first[holds]).tolist():
         inside = second[holds & (first == k)].tolist()
         for i, a in enumerate(inside):

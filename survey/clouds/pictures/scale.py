@@ -30,16 +30,16 @@ def joint_width(pixels: NDArray[np.uint8], depth: Field | None = None) -> tuple[
     """
     parts = list(_parts(pixels.shape))
     found = []
-    for one in _WIDTHS:
-        if min(pixels.shape[:2]) * WIDTH / one < 40:
+    for width in _WIDTHS:
+        if min(pixels.shape[:2]) * WIDTH / width < 40:
             break
         ratios = []
         for part in parts:
-            heights = None if depth is None else resized_field(depth[part], one / WIDTH)
-            channels, _, _ = channels_of(resized(pixels[part], one / WIDTH), heights)
+            heights = None if depth is None else resized_field(depth[part], width / WIDTH)
+            channels, _, _ = channels_of(resized(pixels[part], width / WIDTH), heights)
             grain, contrast = grain_and_contrast(combined(channels))
             ratios.append(contrast / grain)
-        found.append((one, float(np.mean(sorted(ratios)[-_BEST:]))))
+        found.append((width, float(np.mean(sorted(ratios)[-_BEST:]))))
     if not found:
         return WIDTH, 0.0
     best = max(ratio for _, ratio in found)

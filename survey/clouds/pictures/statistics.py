@@ -28,10 +28,10 @@ def bond_statistics(
     rows: list[tuple[str, str]] = [
         ("Usual length and height", f"{np.median(size[:, 0]):.2f} × {np.median(size[:, 1]):.2f} m")
     ]
-    found = sorted({one for one in courses if one is not None})
+    found = sorted({course for course in courses if course is not None})
     if found:
         heights = [
-            float(np.median([size[k, 1] for k, one in enumerate(courses) if one == number]))
+            float(np.median([size[k, 1] for k, course in enumerate(courses) if course == number]))
             for number in found
         ]
         rows.append(("Height of courses", f"{min(heights):.2f} to {max(heights):.2f} m"))
@@ -52,7 +52,7 @@ def _staggered(
     heads: dict[int, list[float]] = {}
     for number in numbers:
         members = sorted(
-            (k for k, one in enumerate(courses) if one == number), key=lambda k: float(boxes[k, 0, 0])
+            (k for k, course in enumerate(courses) if course == number), key=lambda k: float(boxes[k, 0, 0])
         )
         heads[number] = [
             0.5 * float(boxes[a, 1, 0] + boxes[b, 0, 0])
@@ -62,7 +62,9 @@ def _staggered(
     good = count = 0
     for below, above in pairwise(numbers):
         height = float(
-            np.median([boxes[k, 1, 1] - boxes[k, 0, 1] for k, one in enumerate(courses) if one == above])
+            np.median(
+                [boxes[k, 1, 1] - boxes[k, 0, 1] for k, course in enumerate(courses) if course == above]
+            )
         )
         for place in heads[above]:
             if not heads[below]:

@@ -42,8 +42,8 @@ def open_e57(path: Path) -> PointCloud:
         stations = tuple(_station(k, one) for k, one in enumerate(headers, start=1) if _is_placed(one))
         near = _near(headers)
         warnings = _warnings(pye57, path, headers)
-        for one in headers:
-            _fields(path, one)
+        for header in headers:
+            _fields(path, header)
         file.close()
     except (SurveyError, UsageError):
         raise

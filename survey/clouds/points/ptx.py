@@ -48,13 +48,15 @@ def open_ptx(path: Path) -> PointCloud:
     """
     with path.open(encoding="ascii", errors="replace") as file:
         scans = tuple(_scans(file, path))
-    near = next((one.near for one in scans if one.near is not None), None)
+    near = next((scan.near for scan in scans if scan.near is not None), None)
     if near is None:
         raise SurveyError("has no point", where=str(path), remedy="export the scans again")
     stations = tuple(
-        Station(f"scan{k}", one.transform[3, :3].copy())
-        for k, one in enumerate(scans, start=1)
-        if not np.array_equal(one.transform, np.eye(4))  # an identity says nothing of where the scanner stood
+        Station(f"scan{k}", scan.transform[3, :3].copy())
+        for k, scan in enumerate(scans, start=1)
+        if not np.array_equal(
+            scan.transform, np.eye(4)
+        )  # an identity says nothing of where the scanner stood
     )
 
     def chunks(origin: Array, colours: bool) -> Iterator[Chunk]:

@@ -86,7 +86,7 @@ def find_wall(clouds: Sequence[PointCloud], progress: Progress) -> Wall:
         raise SurveyError("no upright plane among its points", where=str(clouds[0].path), remedy=remedy)
     normal = np.linalg.svd(sample[kept] - sample[kept].mean(axis=0), full_matrices=False)[2][2]
     middle = sample[kept].mean(axis=0)
-    seen = [one.position - origin for cloud in clouds for one in cloud.stations]
+    seen = [station.position - origin for cloud in clouds for station in cloud.stations]
     towards = normal @ (np.mean(seen, axis=0) - middle) if seen else _front(sample, kept, middle, normal)
     if towards < 0.0:
         normal = -normal

@@ -228,11 +228,11 @@ class HeadReader:
 
     def _finished_photographs(self) -> tuple[Photograph, ...]:
         marks: dict[str, list[PhotoMark]] = {name: [] for name in self._photographs}
-        for one in self._marks:
-            if one.photograph not in marks:
-                raise missing("photo", one.photograph, self._photographs, one.where)
-            sigma = one.mark.sigma or self._common_sigma("the mark", one.where)
-            marks[one.photograph].append(replace(one.mark, sigma=sigma))
+        for mark in self._marks:
+            if mark.photograph not in marks:
+                raise missing("photo", mark.photograph, self._photographs, mark.where)
+            sigma = mark.mark.sigma or self._common_sigma("the mark", mark.where)
+            marks[mark.photograph].append(replace(mark.mark, sigma=sigma))
         for name, photograph in self._photographs.items():
             where = self._places[f"photo {name}"]
             if len(marks[name]) < _FEWEST_MARKS:
@@ -243,7 +243,9 @@ class HeadReader:
                 )
             if photograph.station is not None and photograph.station not in self._stations:
                 raise missing("station", photograph.station, self._stations, where)
-        return tuple(replace(one, marks=tuple(marks[name])) for name, one in self._photographs.items())
+        return tuple(
+            replace(photograph, marks=tuple(marks[name])) for name, photograph in self._photographs.items()
+        )
 
     def _common_sigma(self, what: str, where: str) -> float:
         if self.sigma is None:

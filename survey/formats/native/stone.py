@@ -89,7 +89,7 @@ class StoneReader:
                 self._take_note(cursor)
             case "photo":
                 cursor.check_first(self._photograph, word)
-                known = [one.name for one in self._head.photographs]
+                known = [photograph.name for photograph in self._head.photographs]
                 if self._head.orientation is None:
                     self._photograph = self._known("photo", known, cursor)
                 else:  # the result of the orientation, which is not read here, names more of them
@@ -102,10 +102,14 @@ class StoneReader:
                 self._take_mark(cursor, line)
             case "on":
                 cursor.check_first(self._surface, word)
-                self._surface = self._known("surface", [one.name for one in self._head.surfaces], cursor)
+                self._surface = self._known(
+                    "surface", [surface.name for surface in self._head.surfaces], cursor
+                )
             case "station":
                 cursor.check_first(self._station, word)
-                self._station = self._known("station", [one.name for one in self._head.stations], cursor)
+                self._station = self._known(
+                    "station", [station.name for station in self._head.stations], cursor
+                )
             case _:
                 cursor.check_first(self._extrusion, word)
                 self._extrusion = read_extrusion(cursor)
@@ -167,14 +171,14 @@ class StoneReader:
         image = np.array(cursor.row("mark", "xy"))
         sigma = cursor.sigma("mark")
         cursor.end(remedy)
-        for one in self._marks:
-            if one.name == name and one.role != role:
+        for mark in self._marks:
+            if mark.name == name and mark.role != role:
                 raise cursor.fail(
-                    f"point {name} is a {role} here and a {one.role} on line {one.line}", "keep one role"
+                    f"point {name} is a {role} here and a {mark.role} on line {mark.line}", "keep one role"
                 )
-            if one.name == name and one.photograph == photograph:
+            if mark.name == name and mark.photograph == photograph:
                 raise cursor.fail(
-                    f"point {name} is marked twice on {photograph}, first on line {one.line}", "keep one"
+                    f"point {name} is marked twice on {photograph}, first on line {mark.line}", "keep one"
                 )
         self._marks.append(PointMark(name, role, photograph, image, sigma, line))
 
@@ -195,7 +199,7 @@ class StoneReader:
 
     def _check_corners(self, cursor: Cursor) -> None:
         corners = len(self._places["vertex"])
-        marked = len({one.name for one in self._marks if one.role == "vertex"})
+        marked = len({mark.name for mark in self._marks if mark.role == "vertex"})
         if marked and (corners or self._pixels):
             raise cursor.fail(
                 f"stone {self.code} has marked vertices and {'pixels' if self._pixels else 'vertices in space'}",

@@ -89,9 +89,9 @@ def _head_lines(head: SurveyHead) -> Iterator[str]:
     for photograph in head.photographs:
         yield from _photograph_lines(photograph)
     yield from map(_rule_line, head.depth_rules)
-    for one in head.canons:
-        size = f"{_number(one.length)} {_number(one.height)} sigma {_number(one.sigma)}"
-        yield f"canon {one.kind} {size} source {_text(one.source)}"
+    for canon in head.canons:
+        size = f"{_number(canon.length)} {_number(canon.height)} sigma {_number(canon.sigma)}"
+        yield f"canon {canon.kind} {size} source {_text(canon.source)}"
     if head.orientation is not None:
         yield f"orientation {_text(head.orientation)}"
     if head.roughness is not None:
@@ -156,8 +156,10 @@ def _stone_lines(block: BlockRecord, common_sigma: float) -> list[str]:
     if block.sigmas is not None:
         precisions = [f" sigma {_number(sigma)}" for sigma in block.sigmas]
     count = len(block.points)
-    lines += [f"  vertex {_row(one)}{p}" for one, p in zip(block.vertices, precisions[count:], strict=True)]
-    lines += [f"  point {_row(one)}{p}" for one, p in zip(block.points, precisions[:count], strict=True)]
+    lines += [
+        f"  vertex {_row(vertex)}{p}" for vertex, p in zip(block.vertices, precisions[count:], strict=True)
+    ]
+    lines += [f"  point {_row(point)}{p}" for point, p in zip(block.points, precisions[:count], strict=True)]
     return [*lines, "end"]
 
 

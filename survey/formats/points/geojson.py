@@ -42,16 +42,16 @@ def open_geojson(path: Path, options: ReadingOptions | None = None) -> SurveyStr
     # stations are in a header file
     left_out = {*COORDINATES, *(() if options is not None and options.head is not None else ("station",))}
     names = [name for name in named if kind_of_column(name) not in left_out]
-    known = {kind_of_column(one) for one in names}
+    known = {kind_of_column(name) for name in names}
     ids = not known & {"block", "description", "name"}
     rows: list[tuple[int, list[str]]] = [(0, [*names, *(["block"] if ids else []), "outline"])]
     corners: list[Any] = []
-    for number, one in enumerate(features, start=1):
-        values = _properties(one)
-        ring = _ring(one, f"{path}:{number}")
+    for number, feature in enumerate(features, start=1):
+        values = _properties(feature)
+        ring = _ring(feature, f"{path}:{number}")
         corners.append(ring)
         text = ", ".join(" ".join(map(repr, corner)) for corner in ring.tolist())
-        own = [cell_text(one.get("id", ""))] if ids else []
+        own = [cell_text(feature.get("id", ""))] if ids else []
         rows.append(
             (number, [*(cell_text(values.get(name, "")) for name in names), *own, f"POLYGON Z (({text}))"])
         )
@@ -121,8 +121,8 @@ def _is_nested(found: Any) -> bool:
 
 def _check_degrees(corners: Sequence[Any], path: Path) -> None:
     """Refuse longitudes and latitudes."""
-    extents = np.array([np.ptp(one, axis=0) for one in corners if len(one)]).reshape(-1, 3)
-    inside = all((np.abs(one[:, :2]) <= (180.0, 90.0)).all() for one in corners)
+    extents = np.array([np.ptp(corner, axis=0) for corner in corners if len(corner)]).reshape(-1, 3)
+    inside = all((np.abs(corner[:, :2]) <= (180.0, 90.0)).all() for corner in corners)
     if (
         len(extents)
         and inside

@@ -108,7 +108,7 @@ def _words(text: str, number: int, lines: TextLines) -> dict[str, str]:
 
 
 def _place(words: dict[str, str], *indices: str) -> Place | None:
-    if not all(one in words for one in indices):
+    if not all(index in words for index in indices):
         return None
-    x, y, z = (float(words[one]) for one in indices)
+    x, y, z = (float(words[index]) for index in indices)
     return x, y, z

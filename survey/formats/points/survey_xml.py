@@ -46,7 +46,7 @@ def open_landxml(path: Path, options: ReadingOptions | None = None) -> SurveyStr
                     line, f"a point of {len(words)} numbers", "give northing, easting and elevation"
                 )
             at = f"{path}:{line}"
-            north, east, up = (unit[0] * parse_number(one, "coordinate", at) for one in words)
+            north, east, up = (unit[0] * parse_number(word, "coordinate", at) for word in words)
             number = given.get("name") or given.get("oID") or ""
             count[0] += 1
             collector.add(number, given.get("code") or given.get("desc") or number, (east, north, up), line)

@@ -42,12 +42,12 @@ def body_groups(vertices: Array, polygons: list[Polygon]) -> list[list[Polygon]]
     for k, polygon in enumerate(polygons):
         for a, b in _edges(polygon):
             owners[min(a, b), max(a, b)].append(k)
-    single = sum(len(one) == 1 for one in owners.values())
+    single = sum(len(owner) == 1 for owner in owners.values())
     if single:
         raise GeometryError(f"the solid is not closed: {single} edges have one face", remedy="close it")
-    if any(len(one) > 2 for one in owners.values()):
+    if any(len(owner) > 2 for owner in owners.values()):
         if signed_volume(vertices, polygons) < 0.0:
-            polygons = [one[::-1] for one in polygons]
+            polygons = [polygon[::-1] for polygon in polygons]
         mates = _mates_by_angle(vertices, polygons, owners)
     else:
         mates = {(edge, k): pair[k == pair[0]] for edge, pair in owners.items() for k in pair}
@@ -62,7 +62,9 @@ def body_groups(vertices: Array, polygons: list[Polygon]) -> list[list[Polygon]]
 
 def signed_volume(vertices: Array, polygons: list[Polygon]) -> float:
     """Compute the volume of closed bodies, negative if they are inside out [m³]."""
-    fans = [(one[0], one[k], one[k + 1]) for one in polygons for k in range(1, len(one) - 1)]
+    fans = [
+        (polygon[0], polygon[k], polygon[k + 1]) for polygon in polygons for k in range(1, len(polygon) - 1)
+    ]
     a, b, c = (vertices[list(ids)] - vertices[polygons[0][0]] for ids in zip(*fans, strict=True))
     return float((a * np.cross(b, c)).sum()) / 6.0
 

@@ -46,8 +46,8 @@ def merge_flat(
     used : indices of their vertices
     resolution : of the coordinates [m]
     """
-    triangles = np.array([one for one in polygons if len(one) == 3], dtype=np.intp).reshape(-1, 3)
-    kept = [one for one in polygons if len(one) != 3]
+    triangles = np.array([polygon for polygon in polygons if len(polygon) == 3], dtype=np.intp).reshape(-1, 3)
+    kept = [polygon for polygon in polygons if len(polygon) != 3]
     if not len(triangles):
         return kept
     tolerance = _SAME_PLANE * float(np.linalg.norm(np.ptp(vertices[used], axis=0))) + resolution
@@ -67,7 +67,7 @@ def _regions(vertices: Array, triangles: NDArray[np.intp], tolerance: float) -> 
     normals = np.cross(b - a, c - a)
     areas = np.linalg.norm(normals, axis=1)
     normals /= np.maximum(areas, 1e-300)[:, None]
-    owner = {edge: k for k, one in enumerate(triangles.tolist()) for edge in _edges(one)}
+    owner = {edge: k for k, triangle in enumerate(triangles.tolist()) for edge in _edges(triangle)}
     regions, taken = [], np.zeros(len(triangles), dtype=bool)
     for seed in np.argsort(-areas, kind="stable").tolist():
         if taken[seed]:
@@ -92,7 +92,7 @@ def _edges(polygon: Sequence[int]) -> list[tuple[int, int]]:
 
 def _outline(triangles: list[list[int]]) -> Polygon | None:
     """Return the loop around a region; None if there are several, or it touches itself."""
-    inside = {edge for one in triangles for edge in _edges(one)}
+    inside = {edge for triangle in triangles for edge in _edges(triangle)}
     after = {p: q for p, q in inside if (q, p) not in inside}
     if len(after) != sum((q, p) not in inside for p, q in inside):
         return None  # a corner from which two edges leave

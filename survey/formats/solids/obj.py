@@ -101,7 +101,7 @@ class _ObjReader:
         try:
             if len(words) not in (3, 4, 6, 7):  # with a weight, with colours
                 raise SurveyError(f"a vertex of {len(words)} numbers", where=where, remedy="write: v X Y Z")
-            numbers = [parse_number(one, "coordinate", where) for one in words[:3]]
+            numbers = [parse_number(word, "coordinate", where) for word in words[:3]]
             if len(words) in (4, 7) and parse_number(words[3], "weight", where) != 1.0:
                 raise SurveyError(f"weight {words[3]}", where=where, remedy="write: v X Y Z")
             self._places.extend(numbers)

@@ -190,7 +190,7 @@ class _BinaryRows:
         self._at += element.length * row.itemsize
         place = {one.name: k for k, one in enumerate(element.properties)}
         columns = [table[f"v{place[name]}"].reshape(element.length, -1).tolist() for name in names]
-        return [[tuple(one) for one in values] for values in zip(*columns, strict=True)]
+        return [[tuple(value) for value in values] for values in zip(*columns, strict=True)]
 
     def _row(self, properties: Sequence[_Property], names: Sequence[str]) -> list[tuple[float, ...]]:
         row = dict[str, tuple[float, ...]]()

@@ -47,7 +47,7 @@ class ScannedStone:
 
 def is_scanned(vertices: Array, polygons: Sequence[tuple[int, ...]]) -> bool:
     """Return True for many small facets, most of them bent against their neighbours."""
-    if len(polygons) < _MANY or any(len(one) != 3 for one in polygons):
+    if len(polygons) < _MANY or any(len(polygon) != 3 for polygon in polygons):
         return False
     triangles = np.array(polygons)
     normals, areas, _ = _facets(vertices, triangles)
@@ -101,7 +101,7 @@ def plane_faces(
             f"it keeps its {len(triangles)} facets: not convex, a point stands {rise:.0f} mm above a plane face",
         )
     room = np.full(3, 2.0 * float(np.ptp(used, axis=0).max()))
-    solid = intersection(code, [tuple(one.tolist()) for one in planes], -room, room, _CUT)
+    solid = intersection(code, [tuple(plane.tolist()) for plane in planes], -room, room, _CUT)
     if solid is None or (np.abs(solid.vertices) >= room - _CUT).any():
         return ScannedStone(None, f"it keeps its {len(triangles)} facets: its plane faces do not enclose it")
     before = volume_of(Solid(code, local, tuple(map(tuple, triangles.tolist()))))

@@ -98,4 +98,4 @@ def _text_bodies(lines: TextLines, stem: str) -> Iterator[RawBody]:
 def _corner(words: list[str], where: str) -> tuple[float, ...]:
     if len(words) != 4:
         raise SurveyError(f"a vertex of {len(words) - 1} numbers", where=where, remedy="write: vertex X Y Z")
-    return tuple(parse_number(one, "coordinate", where) for one in words[1:])
+    return tuple(parse_number(word, "coordinate", where) for word in words[1:])

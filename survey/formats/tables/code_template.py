@@ -30,7 +30,7 @@ ROLES: Mapping[str, str] = {
 }  # fmt: skip
 """Roles of points by the words for them."""
 
-_ROLE_WORDS = "|".join(sorted((re.escape(one) for one in ROLES if " " not in one), key=len, reverse=True))
+_ROLE_WORDS = "|".join(sorted((re.escape(role) for role in ROLES if " " not in role), key=len, reverse=True))
 _ROLE_LETTERS = re.escape("".join(sorted(set("".join(ROLES)) - {" "})))
 _CODE, _CODE_LETTERS = r"[^\W_][\w.+/:-]{0,63}", r"\w.+/:-"
 _FREE, _FREE_LETTERS = r"[^\W_][^\t%s]{0,63}", r"^\t%s"  # all but what separates fields
@@ -108,7 +108,7 @@ class CodeTemplate:
         self.fields = tuple(one.removesuffix("?") for one in parts[1::2])
         self._literals = parts[::2]
         self._optional = [one.endswith("?") for one in parts[1::2]]
-        if any("{" in one or "}" in one for one in self._literals):
+        if any("{" in literal or "}" in literal for literal in self._literals):
             raise UsageError(f"code template {text!r} has a brace without its other", remedy=_REMEDY)
         self._check_fields()
         self._matches = [self._compiled(kept) for kept in self._variants()]
@@ -133,13 +133,13 @@ class CodeTemplate:
         rows = [description, *others]
         for text in _USUAL:
             other = CodeTemplate(text)
-            found = [other.parse(one) for one in rows]
+            found = [other.parse(row) for row in rows]
             if all(one is not None and code_of(one.block) for one in found) and text != self.text:
                 return f'it would be read by --codes "{text}"'
         return 'correct it, or give the template of its codes, such as --codes "{block} {kind} {role}"'
 
     def _check_fields(self) -> None:
-        named = [one for one in self.fields if one != _IGNORED]
+        named = [field for field in self.fields if field != _IGNORED]
         for name in named:
             if name not in _FIELDS:
                 known = ", ".join((*_FIELDS, _IGNORED))
@@ -179,7 +179,9 @@ class CodeTemplate:
             names.append(name)
             last = after
         literals = set("".join(between) + last + first)
-        free = "".join(re.escape(one) for one in sorted(literals) if not re.match(f"[{_CODE_LETTERS}]", one))
+        free = "".join(
+            re.escape(literal) for literal in sorted(literals) if not re.match(f"[{_CODE_LETTERS}]", literal)
+        )
         wide = {**_FIELDS, "block": (_FREE % free, _FREE_LETTERS % free)}
         fields = wide if _is_clear(wide, names, between) else _FIELDS
         if not _is_clear(fields, names, between):
@@ -230,4 +232,4 @@ def _ends(fields: Fields, field: str, literal: str) -> bool:
 
 
 def _literal(text: str) -> str:
-    return r"[ \t]+".join(re.escape(one) for one in re.split(r"[ \t]+", text))
+    return r"[ \t]+".join(re.escape(word) for word in re.split(r"[ \t]+", text))

@@ -119,7 +119,7 @@ class ColumnMap:
     @property
     def numbered(self) -> bool:
         """True if all columns are given by number, so that the table may have no names."""
-        return bool(self.names) and all(one.isascii() and one.isdigit() for one in self.names.values())
+        return bool(self.names) and all(name.isascii() and name.isdigit() for name in self.names.values())
 
 
 @dataclass(frozen=True)
@@ -174,8 +174,8 @@ def read_map(text: str | None) -> ColumnMap:
 _KNOWN: Mapping[str, str] = {
     spelling: what
     for what, names in reversed(list(ALIASES.items()))
-    for one in (*names, what)
-    for spelling in spellings(one)
+    for name in (*names, what)
+    for spelling in spellings(name)
 }
 
 
@@ -241,7 +241,7 @@ def _place(names: Sequence[str], name: str, what: str, where: str, numbered: boo
         found = [k for k, one in enumerate(names) if spelling(one) == (name if spelling is str else wanted)]
         if len(found) == 1:
             return found[0]
-    shown_names = ", ".join(one or "(none)" for one in names)
+    shown_names = ", ".join(name or "(none)" for name in names)
     raise SurveyError(
         f"no column {shown(name)} for {what}", where=where, remedy=f"the columns are: {shown_names[:300]}"
     )
@@ -274,7 +274,7 @@ def _check_missing(names: Sequence[str], at: Mapping[str, int], where: str) -> N
     for what in needed:
         if what not in at:
             raise SurveyError(
-                f"no column {what!r} among {', '.join(one or '(none)' for one in names)[:200]}",
+                f"no column {what!r} among {', '.join(name or '(none)' for name in names)[:200]}",
                 where=where,
                 remedy=f'name it with --columns "{what}=…", or begin the table with e.g. '
                 "block,kind,course,role,x,y,z",

@@ -87,7 +87,7 @@ def read_kinds(text: str) -> Mapping[str, str]:
     """
     rows: list[list[str]] = []
     if "=" in text:
-        rows = [[one.strip() for one in part.split("=", 1)] for part in text.split(",") if part.strip()]
+        rows = [[word.strip() for word in part.split("=", 1)] for part in text.split(",") if part.strip()]
     else:
         path = Path(text)
         if not path.is_file():
@@ -100,7 +100,7 @@ def read_kinds(text: str) -> Mapping[str, str]:
         row: Any
         for number, row in table:
             table.delimiter = table.delimiter if table.delimiter is not None else table.delimiters(row)[0]
-            rows.append([one for one in table.cells(row, number) if one])
+            rows.append([cell for cell in table.cells(row, number) if cell])
         if rows and plain(rows[0][-1]) in ("kind", "art", "tipo", "genre"):
             del rows[0]
     found: dict[str, str] = {}

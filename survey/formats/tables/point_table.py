@@ -209,7 +209,7 @@ def check_station(name: str, head: SurveyHead, where: str) -> None:
     SurveyError
         if it has none
     """
-    names = [one.name for one in head.stations]
+    names = [station.name for station in head.stations]
     if name not in names:
         raise SurveyError(
             f"no station {shown(name)}",

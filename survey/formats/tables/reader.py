@@ -69,7 +69,7 @@ _LONGEST_NAME = 64
 _UNKNOWN = EMPTY | {""}
 _NOTHING = float("nan")
 _ROLE_WORDS = frozenset(
-    one for one in ROLES if len(one) > 1 or one in "vp"
+    role for role in ROLES if len(role) > 1 or role in "vp"
 )  # other letters may number points
 
 AnyRows = TextRows | ListRows
@@ -190,7 +190,7 @@ def _find_header(
             rows.delimiter, known = delimiter, 0
             try:
                 names = rows.cells(row, number)
-                known = sum(kind_of_column(one) is not None for one in names if one)
+                known = sum(kind_of_column(name) is not None for name in names if name)
                 where = f"{rows.path}:{number}" if number else rows.path
                 columns = find_columns(names, given, where, codes)
             except SurveyError as error:
@@ -227,7 +227,7 @@ def _with_roles(
     if len(roles) != 1:
         return columns
     at = {what: k for what, k in columns.at.items() if k != roles[0]} | {"role": roles[0]}
-    return replace(columns, at=at, notes=tuple(one for one in columns.notes if one[0] != roles[0]))
+    return replace(columns, at=at, notes=tuple(note for note in columns.notes if note[0] != roles[0]))
 
 
 def _is_data(rows: AnyRows, names: Sequence[str], columns: Columns, number: int) -> bool:
@@ -281,7 +281,7 @@ def _check_axes(rows: AnyRows, header: tuple[int, Any], form: str) -> None:
         names = rows.cells(row, number, 5)
     except SurveyError:
         return
-    found = [kind_of_column(one) if plain(one) not in ("x", "y") else None for one in names[1:3]]
+    found = [kind_of_column(name) if plain(name) not in ("x", "y") else None for name in names[1:3]]
     other = "penzd" if form == "pnezd" else "pnezd"
     if found == list(_LIST[other][1:3]):
         raise rows.fail(
@@ -323,7 +323,7 @@ class PointCollector:
         self.template = CodeTemplate(options.codes or CODES)
         self.table = PointTable(str(path), options.sigma, options.kind)
         self._head = options.head_for(path)
-        self._known = {one.name: one for one in self._head.stations}
+        self._known = {station.name: station for station in self._head.stations}
         self._stations: dict[str, Station] = {}
         self._lines_of: dict[str, int] = {}
         self._misfits: list[tuple[int, str]] | None = []  # until a description fits
@@ -337,11 +337,13 @@ class PointCollector:
         """Check that the template fits any description, and that most kinds are known."""
         if self._misfits and not self._stations:
             self._refuse_template(self._misfits)
-        stones = [one for one in self.table.stones.values() if one.kind is not None and one.error is None]
-        unknown = [one for one in stones if one.kind not in self._options.known_kinds]
+        stones = [
+            stone for stone in self.table.stones.values() if stone.kind is not None and stone.error is None
+        ]
+        unknown = [stone for stone in stones if stone.kind not in self._options.known_kinds]
         if self._options.known_kinds and 2 * len(unknown) > len(stones):
             words = list(dict.fromkeys(str(one.kind) for one in unknown))
-            table = ",".join(f"{one}={meant(one, self._options.known_kinds)}" for one in words[:_LISTED])
+            table = ",".join(f"{word}={meant(word, self._options.known_kinds)}" for word in words[:_LISTED])
             raise self.fail(
                 unknown[0].line,
                 f"unknown kinds: {', '.join(words[:_LISTED])}",

@@ -40,7 +40,7 @@ def outline_of(text: str, where: str) -> Array:
     if (found[2] or "").upper() == "M":
         raise SurveyError(f"{found[1]} M has measures instead of z", where=where, remedy=FLAT)
     rings = _RING.findall(found[3])
-    corners = [[one.split() for one in ring.split(",")] for ring in rings]
+    corners = [[word.split() for word in ring.split(",")] for ring in rings]
     return ring_of(corners, where)
 
 

@@ -58,12 +58,12 @@ def simple_polygons(vertices: Array, polygon: Polygon) -> list[Polygon]:
     sides = set(zip(polygon, polygon[1:] + polygon[:1], strict=True))
     if any((b, a) in sides for a, b in sides):
         triangles = triangulate(Solid("", vertices, (polygon,))).tolist()
-        return [tuple(one) for one in triangles if len(set(one)) == 3]
+        return [tuple(triangle) for triangle in triangles if len(set(triangle)) == 3]
     seen: dict[int, int] = {}
     for k, corner in enumerate(polygon):
         if corner in seen:
             start = seen[corner]
             parts = (polygon[start:k], polygon[:start] + polygon[k:])
-            return [one for part in parts if len(part) > 2 for one in simple_polygons(vertices, part)]
+            return [polygon for part in parts if len(part) > 2 for polygon in simple_polygons(vertices, part)]
         seen[corner] = k
     return [polygon]

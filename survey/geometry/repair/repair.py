@@ -104,7 +104,7 @@ def repair(vertices: Array, polygons: Sequence[Polygon], tolerance: float) -> Re
     if left or covers:
         size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
         slits = holes_of(vertices, found)
-        widest = max(one.slit for one in slits)
+        widest = max(slit.slit for slit in slits)
         if 0.0 < widest <= _SLIT * size:
             zipped, more = _joined(vertices, found, _REACH * widest)
             if not open_edges(zipped) and _crossings(zipped) == 0:
@@ -287,7 +287,7 @@ def holes_of(vertices: Array, polygons: Sequence[Polygon]) -> list[Hole]:
     loops = _loops(polygons)
     if loops is None:
         loops = [sorted({i for edge in open_edges(polygons) for i in edge})]
-    total = sum(float(np.linalg.norm(area_vector(vertices[list(one)]))) for one in polygons)
+    total = sum(float(np.linalg.norm(area_vector(vertices[list(polygon)]))) for polygon in polygons)
     found = []
     for loop in loops:
         places = vertices[loop]
@@ -311,7 +311,7 @@ def _covers(
         return [], holes, None
     covers, left, largest = [], [], None
     directed = set(open_edges(polygons))
-    taken = {(min(edge), max(edge)) for one in polygons for edge in _edges(one)}
+    taken = {(min(edge), max(edge)) for polygon in polygons for edge in _edges(polygon)}
     for loop, hole in zip(loops, holes, strict=True):
         if hole.share > _SMALL or len(loop) > _CORNERS or len(loop) < 3:
             left.append(hole)
@@ -336,7 +336,7 @@ def _cover(vertices: Array, ring: list[int], taken: set[Edge]) -> list[Polygon] 
     for start in range(len(ring)):
         turned = tuple(ring[start:] + ring[:start])
         triangles = [tuple(one) for one in triangulate(Solid("", vertices, (turned,))).tolist()]
-        inner = {(min(edge), max(edge)) for one in triangles for edge in _edges(one)} - own
+        inner = {(min(edge), max(edge)) for triangle in triangles for edge in _edges(triangle)} - own
         if inner.isdisjoint(taken):
             return triangles
     return None

@@ -66,28 +66,28 @@ def grow(leaf: Leaf, codes: Sequence[str], settings: JointSettings, fineness: fl
     GeometryError
         if an outline lies within another, or outlines cross so much that they cannot be told apart
     """
-    areas = np.array([abs(ring_area(one)) for one in leaf.outlines])
+    areas = np.array([abs(ring_area(outline)) for outline in leaf.outlines])
     step = min(float(np.sqrt(np.median(areas))) / _SAMPLES, settings.max_width / _CLOSE) / fineness
     lines = medial_lines(leaf.outlines, leaf.frame, step, settings.max_width)
     found = partition(lines, leaf.outlines, settings.straightness, settings.min_overlap)
-    rings = [found.corners[list(one)] for one in found.rings]
+    rings = [found.corners[list(ring)] for ring in found.rings]
     grown = [
         prism(code, leaf.place(ring, 0.0), leaf.place(ring, leaf.depth))
         for code, ring in zip(codes, rings, strict=True)
     ]
     moved = [apart(outline, ring) for outline, ring in zip(leaf.outlines, rings, strict=True)]
     growth = [float(apart(ring, outline).max()) for outline, ring in zip(leaf.outlines, rings, strict=True)]
-    new = np.array([abs(ring_area(one)) for one in rings])
+    new = np.array([abs(ring_area(ring)) for ring in rings])
     low = leaf.frame[0]
     width, height = (leaf.frame[1] - low).tolist()
     farthest = int(np.argmax(growth))
     report = GrownLeaf(
         size=(width, height),
-        outlines={code: one - low for code, one in zip(codes, leaf.outlines, strict=True)},
-        grown={code: one - low for code, one in zip(codes, rings, strict=True)},
+        outlines={code: outline - low for code, outline in zip(codes, leaf.outlines, strict=True)},
+        grown={code: ring - low for code, ring in zip(codes, rings, strict=True)},
         thickness=_thickness(found, codes),
         stone_share=dict(zip(codes, np.minimum(areas / new, 1.0).tolist(), strict=True)),
-        edges=sum(_between_stones(one, codes) for one in found.edges),
+        edges=sum(_between_stones(edge, codes) for edge in found.edges),
         collapsed=found.collapsed,
         growth=growth[farthest],
         farthest=codes[farthest],
@@ -110,11 +110,11 @@ def _thickness(found: Partition, codes: Sequence[str]) -> dict[frozenset[str], f
     Edges count by their lengths.
     """
     sums: dict[frozenset[str], list[tuple[float, float]]] = defaultdict(list)
-    for one in found.edges:
-        stones = [k for k in (one.left, one.right) if 0 <= k < len(codes)]
-        if len(stones) == 2 or (len(stones) == 1 and min(one.left, one.right) in (_BELOW, _ABOVE)):
-            length = float(np.hypot(*(found.corners[one.ends[1]] - found.corners[one.ends[0]])))
-            sums[frozenset(codes[k] for k in stones)].append((one.thickness, length))
+    for edge in found.edges:
+        stones = [k for k in (edge.left, edge.right) if 0 <= k < len(codes)]
+        if len(stones) == 2 or (len(stones) == 1 and min(edge.left, edge.right) in (_BELOW, _ABOVE)):
+            length = float(np.hypot(*(found.corners[edge.ends[1]] - found.corners[edge.ends[0]])))
+            sums[frozenset(codes[k] for k in stones)].append((edge.thickness, length))
     return {
         stones: max(sum(own * length for own, length in of) / sum(length for _, length in of), _THINNEST)
         for stones, of in sums.items()
@@ -128,7 +128,7 @@ def _between_stones(edge: Edge, codes: Sequence[str]) -> bool:
 def _openings(leaf: Leaf, found: Partition, codes: Sequence[str]) -> Iterator[Opening]:
     """Yield what stays open in a leaf."""
     for number in range(len(codes), len(codes) + found.openings):
-        own = [one for one in found.edges if number in (one.left, one.right)]
+        own = [edge for edge in found.edges if number in (edge.left, edge.right)]
         # with the opening to their left, edges sum to its area whatever lies within it
         ends = np.array([one.ends if one.left == number else one.ends[::-1] for one in own])
         edges = found.corners[ends]
@@ -145,20 +145,20 @@ def _openings(leaf: Leaf, found: Partition, codes: Sequence[str]) -> Iterator[Op
 
 def _joints(leaf: Leaf, found: Partition, codes: Sequence[str]) -> tuple[StoneJoint, ...]:
     joints = []
-    for number, one in enumerate(found.edges):
-        if not _between_stones(one, codes):
+    for number, edge in enumerate(found.edges):
+        if not _between_stones(edge, codes):
             continue
-        start, stop = found.corners[list(one.ends)]
+        start, stop = found.corners[list(edge.ends)]
         way = stop - start
         length = float(np.hypot(*way))
         # square to the edge, to its left: into the first stone
         normal = (-way[1] * leaf.right + way[0] * leaf.up) / length
         joints.append(
             StoneJoint(
-                stones=(codes[one.left], codes[one.right]),
+                stones=(codes[edge.left], codes[edge.right]),
                 plane=number,
-                width=one.thickness,
-                opening=one.opening,
+                width=edge.thickness,
+                opening=edge.opening,
                 area=length * leaf.depth,
                 centroid=leaf.place(0.5 * (start + stop)[None], 0.5 * leaf.depth)[0],
                 normal=normal,

@@ -88,8 +88,8 @@ def find_leaves(stones: Sequence[Stone], settings: JointSettings) -> list[Leaf]:
     leaves = []
     while prisms:
         seed = prisms[0]
-        alike = [one for one in prisms if _alike(seed, one, within)]
-        prisms = [one for one in prisms if not any(one is other for other in alike)]
+        alike = [prism for prism in prisms if _alike(seed, prism, within)]
+        prisms = [prism for prism in prisms if not any(prism is other for other in alike)]
         if len(alike) > 1:
             leaves.append(_leaf(stones, alike, settings.margin))
     if not drawn and not leaves:
@@ -124,7 +124,7 @@ def _stated_frame(stone: Stone, right: Array, up: Array) -> Array | None:
     note = stone.face.record.notes.get(FRAME_NOTE)
     if note is None:
         return None
-    left, below, beyond, above = (float(one) for one in note.split())
+    left, below, beyond, above = (float(word) for word in note.split())
     flat = stone.face.record.vertices @ np.column_stack([right, up])
     return np.array(
         [flat.min(axis=0) - np.array([left, below]), flat.max(axis=0) + np.array([beyond, above])]
@@ -142,25 +142,25 @@ def _alike(seed: _Prism, other: _Prism, within: float) -> bool:
 
 
 def _leaf(stones: Sequence[Stone], prisms: Sequence[_Prism], margin: float) -> Leaf:
-    normal = np.mean([one.normal for one in prisms], axis=0)
+    normal = np.mean([prism.normal for prism in prisms], axis=0)
     if abs(normal[2]) < _LEVEL:
         normal[2] = 0.0
     normal /= np.linalg.norm(normal)
     right, up = _axes(normal)
-    flat = [stones[one.number].face.outline @ np.column_stack([right, up]) for one in prisms]
-    stated = [one.stated for one in prisms if one.stated is not None]
+    flat = [stones[prism.number].face.outline @ np.column_stack([right, up]) for prism in prisms]
+    stated = [prism.stated for prism in prisms if prism.stated is not None]
     if stated:
         frame = np.mean(np.array(stated), axis=0, dtype=np.float64)
     else:
         every = np.concatenate(flat)
         frame = np.array([every.min(axis=0) - margin, every.max(axis=0) + margin])
     return Leaf(
-        members=tuple(one.number for one in prisms),
+        members=tuple(prism.number for prism in prisms),
         right=right,
         up=up,
         normal=normal,
-        front=float(np.mean([one.front for one in prisms])),
-        depth=float(np.mean([one.depth for one in prisms])),
+        front=float(np.mean([prism.front for prism in prisms])),
+        depth=float(np.mean([prism.depth for prism in prisms])),
         frame=np.round(frame, _DECIMALS),
         outlines=tuple(flat),
     )

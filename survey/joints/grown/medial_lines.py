@@ -150,8 +150,8 @@ def _samples(
     near = _apart(places, owner, _NEAR * step)
     # each side of an outline is sampled as finely as its nearest neighbour asks for
     finest, at = [], 0
-    for one in outlines:
-        counts = _counts(one, np.full(len(one), step))
+    for outline in outlines:
+        counts = _counts(outline, np.full(len(outline), step))
         starts = at + np.concatenate([[0], np.cumsum(counts)[:-1]])
         closest = np.minimum.reduceat(near, starts)
         finest.append(np.clip(0.5 * closest, _FINEST * step, step))
@@ -196,7 +196,7 @@ def _sampled(outlines: Sequence[Array], steps: Sequence[Array], inset: float) ->
         inward /= np.maximum(np.hypot(*sides.T), 1e-12)[:, None]
         starts = np.repeat(ring + inward, counts, axis=0)
         places.append(starts + along[:, None] * np.repeat(sides, counts, axis=0))
-    owner = np.repeat(np.arange(len(outlines)), [len(one) for one in places])
+    owner = np.repeat(np.arange(len(outlines)), [len(place) for place in places])
     return np.concatenate(places), owner
 
 
@@ -289,7 +289,7 @@ def _walk(vertices: Array, ends: Ints, labels: Ints, beside: Array) -> MedialLin
     for ridge, (a, b) in enumerate(ends.tolist()):
         at[a].append(ridge)
         at[b].append(ridge)
-    pair = [tuple(one) for one in labels.tolist()]
+    pair = [tuple(label) for label in labels.tolist()]
 
     def is_node(vertex: int) -> bool:
         met = at[vertex]

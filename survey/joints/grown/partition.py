@@ -87,7 +87,7 @@ def partition(
     """
     for drawn in (_exact(lines, outlines), lines):  # those of the samples hold where outlines cross
         bound = [
-            min(straightness, _CHORD * _mean_thickness(one, outlines, lines.usual)) for one in drawn.lines
+            min(straightness, _CHORD * _mean_thickness(line, outlines, lines.usual)) for line in drawn.lines
         ]
         for least in (shortest, 0.5 * shortest, 0.25 * shortest, 0.0):
             network = _Network(drawn)
@@ -114,9 +114,9 @@ def _exact(lines: MedialLines, outlines: Sequence[Array]) -> MedialLines:
     beside an opening where they are, on outlines.
     """
     about: dict[int, set[int]] = defaultdict(set)
-    for one in lines.lines:
-        for node in one.ends:
-            about[node] |= {one.left, one.right}
+    for line in lines.lines:
+        for node in line.ends:
+            about[node] |= {line.left, line.right}
     nodes = np.array(
         [
             place if max(about[k], default=0) >= len(outlines) else _met(place, about[k], outlines)
@@ -124,12 +124,12 @@ def _exact(lines: MedialLines, outlines: Sequence[Array]) -> MedialLines:
         ]
     )
     moved = []
-    for one in lines.lines:
-        path = one.path.copy()
-        path[[0, -1]] = nodes[list(one.ends)]
-        if min(one.left, one.right) >= 0 and max(one.left, one.right) < len(outlines):
-            path[1:-1] = _halfway(path[1:-1], outlines[one.left], outlines[one.right])
-        moved.append(Line(one.ends, path, one.left, one.right))
+    for line in lines.lines:
+        path = line.path.copy()
+        path[[0, -1]] = nodes[list(line.ends)]
+        if min(line.left, line.right) >= 0 and max(line.left, line.right) < len(outlines):
+            path[1:-1] = _halfway(path[1:-1], outlines[line.left], outlines[line.right])
+        moved.append(Line(line.ends, path, line.left, line.right))
     return replace(lines, nodes=nodes, lines=tuple(moved))
 
 
@@ -155,7 +155,7 @@ def _met(place: Array, about: set[int], outlines: Sequence[Array]) -> Array:
         return place
     moved = place.copy()
     for _ in range(_STEPS):
-        found = [_signed(moved[None], outlines[one]) for one in stones]
+        found = [_signed(moved[None], outlines[stone]) for stone in stones]
         apart_by = np.array([found[0][0][0] - near[0] for near, _ in found[1:]])
         rise = np.array([(found[0][1][0] - out[0])[free] for _, out in found[1:]])
         if np.linalg.svd(rise, compute_uv=False).min() ** 2 < _FLATTEST:
@@ -187,13 +187,13 @@ class _Network:
         self.lines: dict[int, Line] = dict(enumerate(lines.lines))
         self.collapsed = 0
         self.about: dict[int, set[int]] = defaultdict(set)
-        for one in lines.lines:
-            for node in one.ends:
-                self.about[node] |= {one.left, one.right}
+        for line in lines.lines:
+            for node in line.ends:
+                self.about[node] |= {line.left, line.right}
         self.at: dict[int, set[int]] = defaultdict(set)
         self.sides = Counter(stone for one in lines.lines for stone in (one.left, one.right))
-        for number, one in self.lines.items():
-            for node in one.ends:
+        for number, line in self.lines.items():
+            for node in line.ends:
                 self.at[node].add(number)
 
     def collapse(self, shortest: float) -> None:

@@ -46,7 +46,7 @@ def find_matches(solids: Sequence[Solid], tolerance: float) -> tuple[Match, ...]
     solids : closed
     tolerance : distance of the corners of both faces from one plane [m]; faces up to twice as far apart match
     """
-    all_ = SolidArrays.gather((one.vertices, one.faces) for one in solids)
+    all_ = SolidArrays.gather((solid.vertices, solid.faces) for solid in solids)
     local = np.ascontiguousarray(all_.vertices - all_.vertices.min(axis=0))
     planes = face_planes(local, all_.corners, all_.face_starts)
     starts = all_.solid_starts[:-1]

@@ -60,18 +60,18 @@ class _Assembly:
 
     def __init__(self, solids: Sequence[Solid], tolerance: float) -> None:
         self._given, self._tolerance = solids, tolerance
-        starts = np.cumsum([0, *(len(one.vertices) for one in solids)])
+        starts = np.cumsum([0, *(len(solid.vertices) for solid in solids)])
         self._starts = starts
-        self._vertices = np.concatenate([one.vertices for one in solids])
+        self._vertices = np.concatenate([solid.vertices for solid in solids])
         self._size = float(np.abs(self._vertices - self._vertices.mean(axis=0)).max())
         self._faces: list[Polygon] = [
-            tuple(int(starts[k]) + i for i in face) for k, one in enumerate(solids) for face in one.faces
+            tuple(int(starts[k]) + i for i in face) for k, solid in enumerate(solids) for face in solid.faces
         ]
-        self._owner = [k for k, one in enumerate(solids) for _ in one.faces]
+        self._owner = [k for k, solid in enumerate(solids) for _ in solid.faces]
         self._folded: Counter[int] = Counter()
         self._gone: set[int] = set()  # faces that were folded: their pieces follow at the end
         self._matches = list(find_matches(solids, tolerance))
-        touching = {k for one in self._matches if one.area > 0.0 for k in one.faces}
+        touching = {k for match in self._matches if match.area > 0.0 for k in match.faces}
         self._folds = _meeting_corners(solids, touching, 2.0 * tolerance)
         self._open: list[tuple[Match, str]] = []
         self._plane: list[int] = []
@@ -138,16 +138,18 @@ class _Assembly:
         if folds:
             self._folds = {i: others for i, others in self._folds.items() if i not in folds}
             return
-        seams = [one for one in self._matches if not one.area > 0.0 and self._plane[one.faces[0]] in planes]
+        seams = [
+            match for match in self._matches if not match.area > 0.0 and self._plane[match.faces[0]] in planes
+        ]
         if seams:
-            self._matches = [one for one in self._matches if one not in seams]
+            self._matches = [match for match in self._matches if match not in seams]
             return
-        tied = {k for one in self._matches for k in one.faces}
+        tied = {k for match in self._matches for k in match.faces}
         free = [k for k in faces if k not in tied and len(self._faces[k]) > 3]
         if free:
             self._fold(max(free, key=lambda k: len(self._faces[k])))
             return
-        own = [one for one in self._matches if set(one.faces) & set(faces)]
+        own = [match for match in self._matches if set(match.faces) & set(faces)]
         worst = max(own, key=lambda one: one.spread)
         self._matches.remove(worst)
         self._open.append((worst, f"it would move a corner by {moved:.3g} m"))
@@ -176,10 +178,10 @@ class _Assembly:
     def report(self) -> Snapping:
         """Return a report of the changes."""
         moved = np.linalg.norm(self._settled.vertices - self._vertices, axis=1)
-        shared = {self._plane[one.faces[0]] for one in self._matches if one.area > 0.0}
+        shared = {self._plane[match.faces[0]] for match in self._matches if match.area > 0.0}
         return Snapping(
             self._tolerance,
-            sum(one.area > 0.0 for one in self._matches),
+            sum(match.area > 0.0 for match in self._matches),
             len(shared),
             {
                 one.code: float(moved[start:stop].max())
@@ -211,19 +213,19 @@ def _meeting_corners(solids: Sequence[Solid], touching: Set[int], reach: float) 
     -------
     for each corner of a fold, counted through all solids, the nearest corner of each other solid within reach
     """
-    starts = np.cumsum([0, *(len(one.vertices) for one in solids)])
-    first_face = np.cumsum([0, *(len(one.faces) for one in solids)])
+    starts = np.cumsum([0, *(len(solid.vertices) for solid in solids)])
+    first_face = np.cumsum([0, *(len(solid.faces) for solid in solids)])
     folds = {
         int(starts[k]) + i
-        for k, one in enumerate(solids)
-        if not is_convex(one)
-        for edge in reflex_edges(one)
+        for k, solid in enumerate(solids)
+        if not is_convex(solid)
+        for edge in reflex_edges(solid)
         if {int(first_face[k]) + edge.first, int(first_face[k]) + edge.second} <= touching
         for i in edge.corners
     }
     if not folds:
         return {}
-    vertices = np.concatenate([one.vertices for one in solids])
+    vertices = np.concatenate([solid.vertices for solid in solids])
     owner = np.repeat(np.arange(len(solids)), np.diff(starts))
     tree = cKDTree(vertices)
     found = {}
@@ -233,5 +235,5 @@ def _meeting_corners(solids: Sequence[Solid], touching: Set[int], reach: float) 
         nearest: dict[int, int] = {}
         for j in near:
             nearest.setdefault(int(owner[j]), j)
-        found[i] = tuple(j for one, j in nearest.items() if one != owner[i])
+        found[i] = tuple(j for key, j in nearest.items() if key != owner[i])
     return {i: others for i, others in found.items() if others}

@@ -103,8 +103,8 @@ def prepare(
     chosen = chosen[np.lexsort((network.photo[chosen], network.point[chosen]))]
     count = len(network.names)
     counts = np.bincount(network.point[chosen], minlength=count)
-    which = np.array([one.camera for one in photos], dtype=np.int64)
-    pixel = np.array([one.pixel for one in cameras])[which[network.photo[chosen]], None]
+    which = np.array([photo.camera for photo in photos], dtype=np.int64)
+    pixel = np.array([camera.pixel for camera in cameras])[which[network.photo[chosen]], None]
     rays = Rays(
         np.concatenate([[0], np.cumsum(counts)]),
         network.photo[chosen],
@@ -116,21 +116,21 @@ def prepare(
     if start is None:
         start = Unknowns(
             which,
-            np.array([one.forward for one in cameras]),
-            np.array([one.inner for one in cameras]),
-            np.array([np.eye(3) if one.rotation is None else one.rotation for one in photos]),
-            np.array([np.zeros(3) if one.station is None else one.station for one in photos]),
+            np.array([camera.forward for camera in cameras]),
+            np.array([camera.inner for camera in cameras]),
+            np.array([np.eye(3) if photo.rotation is None else photo.rotation for photo in photos]),
+            np.array([np.zeros(3) if photo.station is None else photo.station for photo in photos]),
             network.start.copy(),
             table,
             free,
         )
     start.point[~free] = place[~free]
-    observed = [one for one in photos if not one.fixed]
+    observed = [photo for photo in photos if not photo.fixed]
     stations = 3 * sum(
         (one.observed_station is not None) + (one.observed_rotation is not None) for one in observed
     )
-    held = weighted or bool(np.count_nonzero(~free)) or any(one.fixed for one in photos)
-    held = held or any(one.observed_station is not None for one in photos)
+    held = weighted or bool(np.count_nonzero(~free)) or any(photo.fixed for photo in photos)
+    held = held or any(photo.observed_station is not None for photo in photos)
     seen = free & ((counts > 0) | information.any(axis=(1, 2)))
     return Prepared(
         rays,

@@ -74,10 +74,10 @@ def control_remarks(network: Network, solution: Solution, photos: Sequence[Photo
             )
         out.append(f"{told}: are their coordinates in metres?")
     _, sizes, axes = np.linalg.svd(places - places.mean(axis=0), full_matrices=False)
-    found = zip((one.station for one in photos), solution.unknowns.station, strict=True)
+    found = zip((photo.station for photo in photos), solution.unknowns.station, strict=True)
     off = [float(np.linalg.norm(here - there)) for there, here in found if there is not None]
     placed = bool(off) and np.median(off) < _NEAR * np.linalg.norm(towards)
-    placed = placed or any(one.observed_station is not None or one.fixed for one in photos)
+    placed = placed or any(photo.observed_station is not None or photo.fixed for photo in photos)
     if sizes[2] < FLAT * sizes[0] and not placed:
         normal = axes[2] * np.sign(axes[2] @ towards)
         x, y, z = normal.round(2) + 0.0

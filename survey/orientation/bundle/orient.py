@@ -73,7 +73,8 @@ class Orientation:
         return replace(
             _only(network, used),
             cameras=tuple(
-                replace(one, inner=inner) for one, inner in zip(network.cameras, values.inner, strict=True)
+                replace(camera, inner=inner)
+                for camera, inner in zip(network.cameras, values.inner, strict=True)
             ),
             photos=tuple(replace(one, rotation=turn, station=place) for one, turn, place in pairs),
             start=values.point.copy(),
@@ -280,8 +281,8 @@ def _check_contradictions(
     """Refuse an orientation that contradicts its marks, its control points or its start values."""
     values = solution.unknowns
     photos = tuple(
-        replace(one, rotation=r, station=s)
-        for one, r, s in zip(found.photos, values.rotation, values.station, strict=True)
+        replace(photo, rotation=r, station=s)
+        for photo, r, s in zip(found.photos, values.rotation, values.station, strict=True)
     )
     pair = swapped(network, replace(found, photos=photos))
     if pair is not None:
@@ -344,7 +345,7 @@ def _minority(network: Network, alone: Solution) -> list[tuple[Control, float]]:
 
 def _check_stations(network: Network, solution: Solution) -> None:
     """Refuse observed stations that contradict the photographs, naming those that are swapped or one that is off."""
-    seen = [f for f, one in enumerate(network.photos) if one.observed_station is not None]
+    seen = [f for f, photo in enumerate(network.photos) if photo.observed_station is not None]
     if len(seen) < _STATIONS:
         return
     there = np.array([network.photos[f].observed_station for f in seen])
@@ -355,7 +356,9 @@ def _check_stations(network: Network, solution: Solution) -> None:
     free = replace(
         network,
         control=(),
-        photos=tuple(replace(one, observed_station=None, observed_rotation=None) for one in network.photos),
+        photos=tuple(
+            replace(photo, observed_station=None, observed_rotation=None) for photo in network.photos
+        ),
     )
     if (alone := _alone(free)) is None:
         return
@@ -434,10 +437,10 @@ def _check_hand(network: Network, alone: Solution) -> None:
 
 def _worst(network: Network, solution: Solution) -> Photo:
     values, off = solution.unknowns, list[float]()
-    for f, one in enumerate(network.photos):
+    for f, photo in enumerate(network.photos):
         mine = network.photo == f
         seen = project(
-            network.cameras[one.camera],
+            network.cameras[photo.camera],
             values.rotation[f],
             values.station[f],
             values.point[network.point[mine]],

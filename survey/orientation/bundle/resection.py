@@ -263,7 +263,7 @@ def _essential(first: Array, second: Array) -> Iterator[Array]:
         for j in range(3)
     ]
     equations.append(_sum(_times(e[0, j], minor[j]) for j in range(3)))
-    matrix = np.array([[one[power] for power in (*_CUBIC, *_BASIS)] for one in equations])
+    matrix = np.array([[equation[power] for power in (*_CUBIC, *_BASIS)] for equation in equations])
     try:
         rest = -np.linalg.solve(matrix[:, :10], matrix[:, 10:])
     except np.linalg.LinAlgError:

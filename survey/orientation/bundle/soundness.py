@@ -33,8 +33,8 @@ def check_network(network: Network) -> None:
                 where=photo.where or network.path,
                 remedy="mark points on it, or leave it out",
             )
-    size = np.array([one.size for one in network.cameras], dtype=float)
-    size = size[[one.camera for one in network.photos]][network.photo]
+    size = np.array([camera.size for camera in network.cameras], dtype=float)
+    size = size[[photo.camera for photo in network.photos]][network.photo]
     outside = ((network.image < -_OUTSIDE * size) | (network.image > (1.0 + _OUTSIDE) * size)).any(axis=1)
     for k in np.flatnonzero(outside)[:1]:
         width, height = network.camera_of(network.photo[k]).size
@@ -46,7 +46,7 @@ def check_network(network: Network) -> None:
             remedy="marks are in pixels, to the right and down from the upper left corner",
         )
     for m, camera in enumerate(network.cameras):
-        mine = np.array([one.camera == m for one in network.photos])[network.photo]
+        mine = np.array([photo.camera == m for photo in network.photos])[network.photo]
         reach = np.abs(network.image[mine]).max(axis=0, initial=0.0)
         if mine.any() and (reach < _TINY * np.array(camera.size)).all():
             raise SurveyError(
@@ -107,23 +107,23 @@ def _check_control(network: Network) -> None:
     """Check that control points and observed stations hold the network, if there are any."""
     marked = np.bincount(network.point, minlength=len(network.names))
     points = [one for one in network.control if not one.check]
-    for one in points:
-        if not marked[one.point]:
+    for point in points:
+        if not marked[point.point]:
             raise SurveyError(
-                f"control point {network.names[one.point]} is marked on no photograph",
-                where=one.where or network.path,
+                f"control point {network.names[point.point]} is marked on no photograph",
+                where=point.where or network.path,
                 remedy="mark it, or leave it out",
             )
     places = [one.place for one in points]
-    places += [one.observed_station for one in network.photos if one.observed_station is not None]
-    held = any(one.fixed or one.observed_station is not None for one in network.photos)
+    places += [photo.observed_station for photo in network.photos if photo.observed_station is not None]
+    held = any(photo.fixed or photo.observed_station is not None for photo in network.photos)
     if network.control and not points and not held:
         raise SurveyError(
             f"all {len(network.control)} control points only check the result: none holds the photographs",
             where=network.control[0].where or network.path,
             remedy="let three or more take part that are not on one line, or leave all out for a frame of its own",
         )
-    if not places or any(one.fixed for one in network.photos):
+    if not places or any(photo.fixed for photo in network.photos):
         return
     if len(places) < 3:
         names = listed([network.names[one.point] for one in points])

@@ -40,7 +40,9 @@ def without_start(network: Network) -> Network:
     for one in network.control:
         if not one.check:
             start[one.point] = one.place
-    photos = tuple(one if one.fixed else replace(one, station=None, rotation=None) for one in network.photos)
+    photos = tuple(
+        photo if photo.fixed else replace(photo, station=None, rotation=None) for photo in network.photos
+    )
     return replace(network, start=start, photos=photos)
 
 
@@ -59,9 +61,9 @@ def start_values(network: Network) -> Iterator[Network]:
     rays = _rays(network)
     control = {one.point: one.place for one in network.control if not one.check}
     oriented = {
-        f: (one.rotation, one.station)
-        for f, one in enumerate(network.photos)
-        if one.rotation is not None and one.station is not None
+        f: (photo.rotation, photo.station)
+        for f, photo in enumerate(network.photos)
+        if photo.rotation is not None and photo.station is not None
     }
     places = {i: place for i, place in enumerate(network.start) if np.isfinite(place).all()}
     if oriented or _resectable(network, control):
@@ -69,7 +71,7 @@ def start_values(network: Network) -> Iterator[Network]:
         return
     for first in _pairs(network, rays):
         found = _filled(network, rays, first, {}, strict=False)
-        if any(one.rotation is None for one in found.photos):
+        if any(photo.rotation is None for photo in found.photos):
             continue
         yield aligned(found, always=True)
     _filled(network, rays, {}, dict(control))  # names what cannot be oriented
@@ -119,11 +121,15 @@ def aligned(network: Network, always: bool = False) -> Network:
     control = [
         one for one in network.control if not one.check and np.isfinite(network.start[one.point]).all()
     ]
-    stations = [one for one in network.photos if one.observed_station is not None and one.station is not None]
+    stations = [
+        photo for photo in network.photos if photo.observed_station is not None and photo.station is not None
+    ]
     if len(control) + len(stations) < 3:
         return network
-    source = np.array([*(network.start[one.point] for one in control), *(one.station for one in stations)])
-    target = np.array([*(one.place for one in control), *(one.observed_station for one in stations)])
+    source = np.array(
+        [*(network.start[one.point] for one in control), *(station.station for station in stations)]
+    )
+    target = np.array([*(one.place for one in control), *(station.observed_station for station in stations)])
     if control:
         check_mirrored(source, target, network)
     extent = float(np.linalg.norm(np.std(target, axis=0)))
@@ -138,10 +144,12 @@ def aligned(network: Network, always: bool = False) -> Network:
             remedy="check the order and the signs of their coordinates: they must form a right-handed system",
         )
     photos = tuple(
-        one
-        if one.rotation is None or one.station is None or one.fixed
-        else replace(one, rotation=rotation @ one.rotation, station=scale * rotation @ one.station + shift)
-        for one in network.photos
+        photo
+        if photo.rotation is None or photo.station is None or photo.fixed
+        else replace(
+            photo, rotation=rotation @ photo.rotation, station=scale * rotation @ photo.station + shift
+        )
+        for photo in network.photos
     )
     start = scale * network.start @ rotation.T + shift
     return replace(network, photos=photos, start=start)
@@ -160,7 +168,7 @@ def _looks_mirrored(source: Array, target: Array) -> bool:
 def _rays(network: Network) -> Array:
     """Return the direction of each mark in the axes of its camera, (n, 3)."""
     out = np.empty((len(network.photo), 3))
-    which = np.array([one.camera for one in network.photos])[network.photo]
+    which = np.array([photo.camera for photo in network.photos])[network.photo]
     for m, camera in enumerate(network.cameras):
         out[which == m] = directions(camera, network.image[which == m])
     for k in np.flatnonzero(~np.isfinite(out).all(axis=1))[:1]:
@@ -205,15 +213,17 @@ def _filled(
         if not progress:
             break
     photos = list[Photo]()
-    for f, one in enumerate(network.photos):
+    for f, photo in enumerate(network.photos):
         if f in oriented:
             photos.append(
-                replace(one, rotation=oriented[f][0], station=oriented[f][1]) if one.rotation is None else one
+                replace(photo, rotation=oriented[f][0], station=oriented[f][1])
+                if photo.rotation is None
+                else photo
             )
         elif strict:
             raise _not_oriented(network, f, len(known.get(f, ())), f in misfits)
         else:
-            photos.append(one)
+            photos.append(photo)
     start = network.start.copy()
     for i, place in places.items():
         start[i] = place
@@ -295,10 +305,13 @@ def _pairs(network: Network, rays: Array) -> Iterator[dict[int, tuple[Array, Arr
 
 def swapped(network: Network, found: Network) -> tuple[int, int] | None:
     """Return two photographs of which each was oriented where the file has the other; None without such a pair."""
-    given = [one.station if one.observed_station is None else one.observed_station for one in network.photos]
+    given = [
+        photo.station if photo.observed_station is None else photo.observed_station
+        for photo in network.photos
+    ]
     if any(one is None for one in given):
         return None
-    there, here = np.array(given), np.array([one.station for one in found.photos])
+    there, here = np.array(given), np.array([photo.station for photo in found.photos])
     own = np.linalg.norm(here - there, axis=1)
     apart = np.linalg.norm(here[:, None] - there[None], axis=2)
     for a in range(len(given)):

@@ -145,8 +145,8 @@ def _inverse(normal: Array, network: Network, prepared: Prepared) -> Array:
                 out *= scale[:, None]
                 return out
     owner, parameter = names[worst]
-    places = {one.name: one.where for one in network.cameras} | {
-        one.name: one.where for one in network.photos
+    places = {camera.name: camera.where for camera in network.cameras} | {
+        photo.name: photo.where for photo in network.photos
     }
     raise GeometryError(
         f"the marks do not determine {owner} ({parameter}): there is no sound datum, or points lie on a line",

@@ -89,7 +89,7 @@ def read_colmap(folder: Path, sigma: float = 1.0) -> Network:
         Network(
             str(source),
             tuple(cameras.values()),
-            tuple(one.photo for one in images),
+            tuple(image.photo for image in images),
             tuple(map(str, places)),
             np.array(list(places.values())).reshape(-1, 3),
             (),
@@ -211,14 +211,14 @@ def _photo(name: str, camera: int, pose: Array, where: str) -> Photo:
 
 def _of_binary(path: Path, cameras: dict[int, int]) -> list[_Image]:
     out = list[_Image]()
-    for one in binary_images(path):
-        where = f"{path}, image {one.number}"
-        if one.camera not in cameras:
+    for image in binary_images(path):
+        where = f"{path}, image {image.number}"
+        if image.camera not in cameras:
             raise SurveyError(
-                f"camera {one.camera} is not in cameras.bin", where=where, remedy="export the model again"
+                f"camera {image.camera} is not in cameras.bin", where=where, remedy="export the model again"
             )
-        marks = [(int(point), place, 0) for point, place in zip(one.points, one.places, strict=True)]
-        out.append(_Image(one.number, _photo(one.name, cameras[one.camera], one.pose, where), marks))
+        marks = [(int(point), place, 0) for point, place in zip(image.points, image.places, strict=True)]
+        out.append(_Image(image.number, _photo(image.name, cameras[image.camera], image.pose, where), marks))
     if not out:
         raise SurveyError("the file has no images", where=str(path), remedy="export the model again")
     return out
@@ -279,7 +279,7 @@ def write_colmap(network: Network, folder: Path) -> None:
     SurveyError
         if the format has no place for something
     """
-    cameras = [_camera_line(k, one, folder) for k, one in enumerate(network.cameras, start=1)]
+    cameras = [_camera_line(k, camera, folder) for k, camera in enumerate(network.cameras, start=1)]
     for one in network.photos:
         if one.rotation is None or one.station is None:
             raise SurveyError(

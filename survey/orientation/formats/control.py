@@ -91,7 +91,7 @@ def _fits(table: Table, places: Mapping[str, int]) -> bool:
 
 
 def _is_row(cells: Sequence[str], commas: bool) -> bool:
-    return sum(is_number(one, commas) for one in cells[1:]) >= len("xyz")
+    return sum(is_number(cell, commas) for cell in cells[1:]) >= len("xyz")
 
 
 def _check_header(table: Table, header: TableRow, places: dict[str, int]) -> None:
@@ -160,7 +160,7 @@ def _by_place(table: Table, row: TableRow) -> ControlRow:
         raise SurveyError(f"a control point of {count} values", where=where, remedy=_REMEDY)
     number = table.name(row, 0, "the number of a control point")
     first = 2 if labelled else 1
-    values = [table.number(one, "a coordinate", row.line) for one in row.cells[first:]]
+    values = [table.number(cell, "a coordinate", row.line) for cell in row.cells[first:]]
     label = row.cells[1] if labelled else ""
     return ControlRow(number, label, np.array(values[:3]), _covariance(values[3:], where), where)
 

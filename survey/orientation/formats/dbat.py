@@ -56,7 +56,7 @@ def read_dbat(path: Path) -> Network:
     given = document.need("input")
     base = _base(path, given)
     free = _estimated(document)
-    cameras = tuple(_camera(one, free) for one in _cameras(given, base))
+    cameras = tuple(_camera(camera, free) for camera in _cameras(given, base))
     if len(cameras) != 1:
         raise given.fail(f"{len(cameras)} cameras", "scripts of one camera can be read")
     images = [row for file in given.all("images", "file") for row in _table(file, base, ("id", "path"))]
@@ -96,11 +96,11 @@ def read_dbat(path: Path) -> Network:
     control, checks = _filtered(given.find("ctrl_pts"), control), _filtered(given.find("check_pts"), checks)
     if not (control or checks):
         return network
-    rows = {one.number: one for one in (*checks, *control)}
+    rows = {check.number: check for check in (*checks, *control)}
     only = tuple(
-        one.number
-        for one in checks
-        if one.number not in {row.number for row in control} and one.number in network.names
+        check.number
+        for check in checks
+        if check.number not in {row.number for row in control} and check.number in network.names
     )
     return with_control(network, tuple(rows.values()), check=only)
 
@@ -142,15 +142,17 @@ def _placed(photo: Photo, row: Mapping[str, object], where: str, radian: float) 
 
     def three(names: tuple[str, str, str], *common: str) -> Array | None:
         texts = [row.get(name, next((row[one] for one in common if one in row), None)) for name in names]
-        if all(one is None for one in texts):
+        if all(text is None for text in texts):
             return None
-        if any(one is None for one in texts):
+        if any(text is None for text in texts):
             raise SurveyError(
                 f"some of {', '.join(names)} without the others",
                 where=where,
                 remedy="give all of them, or none",
             )
-        return np.array([parse_number(str(one), name, where) for one, name in zip(texts, names, strict=True)])
+        return np.array(
+            [parse_number(str(text), name, where) for text, name in zip(texts, names, strict=True)]
+        )
 
     station, station_sigma = three(("x", "y", "z")), three(("sx", "sy", "sz"), "sxyz")
     angles, angle_sigma = three(("omega", "phi", "kappa")), three(("so", "sp", "sk"))
@@ -177,7 +179,7 @@ def _placed(photo: Photo, row: Mapping[str, object], where: str, radian: float) 
 
 def _table(file: Element, base: Path, needed: tuple[str, ...]) -> list[Mapping[str, object]]:
     """Read a table by the names of its columns; `where` is added to each row."""
-    columns = [one.strip() for one in file.attribute("format").split(",")]
+    columns = [word.strip() for word in file.attribute("format").split(",")]
     missing = [one for one in needed if one not in columns]
     if missing:
         raise file.fail(
@@ -202,7 +204,10 @@ def _control(row: Mapping[str, object]) -> ControlRow:
     place = [parse_number(str(row[name]), name, where) for name in "xyz"]
     common = row.get("sxyz", row.get("sxy"))
     deviations = [row.get(f"s{axis}", common if axis != "z" or "sxyz" in row else None) for axis in "xyz"]
-    sigma = [0.0 if one is None else parse_number(str(one), "a deviation", where) for one in deviations]
+    sigma = [
+        0.0 if deviation is None else parse_number(str(deviation), "a deviation", where)
+        for deviation in deviations
+    ]
     if any(sigma) and not all(sigma):
         raise SurveyError("a deviation of 0 beside others", where=where, remedy="give all of them, or none")
     return ControlRow(
@@ -335,7 +340,7 @@ def write_dbat(network: Network, folder: Path) -> Path:
             tables.append(
                 f'<{tag}><file format="{_control_table(kinds[kind], folder / f"{kind}.txt")}">{kind}.txt</file></{tag}>'
             )
-    _lines(folder / "images.txt", [f"{k}, {one.name}" for k, one in enumerate(network.photos, start=1)])
+    _lines(folder / "images.txt", [f"{k}, {photo.name}" for k, photo in enumerate(network.photos, start=1)])
     prior = _prior_table(network, folder / "stations.txt")
     marks = [
         ", ".join(
@@ -391,15 +396,15 @@ def _prior_table(network: Network, path: Path) -> tuple[str, ...]:
     Photographs with different columns are in tables of their own: `path`, and others with a number behind its name.
     """
     tables: dict[str, list[str]] = {}
-    for k, one in enumerate(network.photos, start=1):
+    for k, photo in enumerate(network.photos, start=1):
         columns, values = ["id"], list[float]()
-        station = one.station if one.observed_station is None else one.observed_station
-        rotation = one.rotation if one.observed_rotation is None else one.observed_rotation
+        station = photo.station if photo.observed_station is None else photo.observed_station
+        rotation = photo.rotation if photo.observed_rotation is None else photo.observed_rotation
         for names, row in (
             ("x,y,z", station),
-            ("sx,sy,sz", None if one.observed_station is None else one.station_sigma),
+            ("sx,sy,sz", None if photo.observed_station is None else photo.station_sigma),
             ("omega,phi,kappa", None if rotation is None else np.degrees(angles(rotation))),
-            ("so,sp,sk", None if one.angle_sigma is None else np.degrees(one.angle_sigma)),
+            ("so,sp,sk", None if photo.angle_sigma is None else np.degrees(photo.angle_sigma)),
         ):
             if row is not None:
                 columns.append(names)

@@ -30,7 +30,7 @@ _COLUMNS: Mapping[str, Sequence[str]] = {
     "sigma": SIGMA,
 }
 _FEWEST = 3  # marks by which a photograph can be oriented
-_PLACES = {one: k for k, one in enumerate(_COLUMNS)}
+_PLACES = {column: k for k, column in enumerate(_COLUMNS)}
 _REMEDY = "write: photograph, point, x, y, sigma if it has one"
 
 
@@ -67,7 +67,7 @@ def read_marks(path: Path) -> tuple[MarkRow, ...]:
     header, places = table.columns(_COLUMNS, least=3)
     if header is not None:
         where = table.where(header.line)
-        missing = [one for one in _PLACES if one not in places and one != "sigma"]
+        missing = [place for place in _PLACES if place not in places and place != "sigma"]
         if missing:
             what = f"no column {missing[0]} among {', '.join(header.cells)[:200]}"
             raise SurveyError(what, where=where, remedy=_REMEDY)
@@ -78,7 +78,7 @@ def read_marks(path: Path) -> tuple[MarkRow, ...]:
 
 def _is_row(cells: Sequence[str], commas: bool) -> bool:
     """Return whether a line has two names and two numbers, in any order of its columns."""
-    return len(cells) >= 4 and sum(is_number(one, commas) for one in cells) >= 2
+    return len(cells) >= 4 and sum(is_number(cell, commas) for cell in cells) >= 2
 
 
 def _rows(table: Table, places: Mapping[str, int], count: int) -> Iterator[MarkRow]:
@@ -126,7 +126,7 @@ def network_of(
     SurveyError
         if a mark is on another photograph
     """
-    photo_of = {one.name: k for k, one in enumerate(photos)}
+    photo_of = {photo.name: k for k, photo in enumerate(photos)}
     index: dict[str, int] = {name: k for k, name in enumerate(start or {})}
     for row in rows:
         if row.photo not in photo_of:
@@ -187,10 +187,10 @@ def marked_well(network: Network) -> Network:
     if kept.all() or not kept.any():
         return network
     place, rays = np.cumsum(kept) - 1, kept[network.photo]
-    names = [one.name for one, stays in zip(network.photos, kept, strict=True) if not stays]
+    names = [photo.name for photo, stays in zip(network.photos, kept, strict=True) if not stays]
     return replace(
         network,
-        photos=tuple(one for one, stays in zip(network.photos, kept, strict=True) if stays),
+        photos=tuple(photo for photo, stays in zip(network.photos, kept, strict=True) if stays),
         photo=place[network.photo[rays]],
         point=network.point[rays],
         image=network.image[rays],
@@ -207,4 +207,4 @@ def marks_of_points(network: Network) -> list[list[int]]:
     """Return the indices of the marks of each point."""
     order = np.argsort(network.point, kind="stable")
     bounds = np.searchsorted(network.point[order], np.arange(1, len(network.names)))
-    return [one.tolist() for one in np.split(order, bounds)]
+    return [word.tolist() for word in np.split(order, bounds)]

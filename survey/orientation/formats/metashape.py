@@ -55,7 +55,7 @@ def read_metashape(path: Path, markers: Path | None = None, sigma: float = 1.0) 
     cameras = tuple(_camera(known[number]) for number in used)
     other = chunk if markers is None else read_xml(markers, "document").need("chunk")
     frame = _local_frame(chunk, other)
-    worlds = {name: frame.moved(one) if frame else one for name, one in _worlds(chunk).items()}
+    worlds = {name: frame.moved(world) if frame else world for name, world in _worlds(chunk).items()}
     photos = {
         one.attribute("id"): _photo(
             one,
@@ -160,7 +160,7 @@ def _worlds(chunk: Element) -> dict[str, tuple[Array, Array, float]]:
     outer = chunk.find("components")
     active = components.get("" if outer is None else outer.attributes.get("active_id", ""))
     default = chunk.find("transform") or active
-    found = {number: _world(one or default) for number, one in components.items()}
+    found = {number: _world(component or default) for number, component in components.items()}
     return found | {"": _world(default)}
 
 
@@ -196,9 +196,9 @@ def _network(
     sigma: float,
     remarks: tuple[str, ...],
 ) -> Network:
-    places = {one: k for k, one in enumerate(photos)}
+    places = {photo: k for k, photo in enumerate(photos)}
     markers = {one.attribute("id"): one for one in _grouped(chunk, "markers", "marker")}
-    names = [one.attributes.get("label") or number for number, one in markers.items()]
+    names = [marker.attributes.get("label") or number for number, marker in markers.items()]
     index = {number: k for k, number in enumerate(markers)}
     sigma = _setting(chunk, "accuracy_projections") or sigma
     common = _setting(chunk, "accuracy_markers")
@@ -210,8 +210,8 @@ def _network(
             check=found.attributes.get("enabled", "true").lower() in ("0", "false"),
             where=found.where,
         )
-        for number, one in markers.items()
-        if (found := one.find("reference")) is not None and "x" in found.attributes
+        for number, marker in markers.items()
+        if (found := marker.find("reference")) is not None and "x" in found.attributes
         for place, covariance in [_reference(found, common)]
     )
     photo, point, image, lines, seen = (

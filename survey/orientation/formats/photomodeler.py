@@ -139,7 +139,7 @@ def read_photomodeler(path: Path, size: tuple[int, int] | None = None) -> Networ
         lines.numbers(f"standard deviations of the camera of photograph {number}", (11,))
         numbers[int(number)] = len(photos)
         name = PurePosixPath(file.replace("\\", "/")).name
-        if name in {one.name for one in photos}:
+        if name in {photo.name for photo in photos}:
             name = f"{number} {name}"
         known = bool(orientation.any())
         kappa, phi, omega = np.radians(orientation[3:])
@@ -176,8 +176,8 @@ def _own_camera(cameras: list[Camera], own: Array, common: Array, size: Array, w
     if np.abs(own - common).max() <= _COARSE:
         return 0
     made = _camera(f"camera{len(cameras) + 1}", own, size, where)
-    for number, one in enumerate(cameras):
-        if np.array_equal(one.inner, made.inner) and one.pixel == made.pixel:
+    for number, camera in enumerate(cameras):
+        if np.array_equal(camera.inner, made.inner) and camera.pixel == made.pixel:
             return number
     cameras.append(made)
     return len(cameras) - 1
@@ -269,7 +269,7 @@ def write_photomodeler(network: Network, path: Path, title: str = "moma") -> Non
     names = numbered(network, path.with_name(f"{path.stem}-points.txt"))
 
     def row(values: Sequence[float] | Array) -> str:
-        return " ".join(repr(float(one)) for one in values)
+        return " ".join(repr(float(value)) for value in values)
 
     def of(one: Camera) -> list[float]:
         inner = one.inner.tolist()

@@ -40,25 +40,25 @@ def orientation_values(result: Orientation, *, name: str = "") -> dict[str, Any]
     values = result.solution.unknowns
     scaled = result.scale**2
     deviations = result.scale * np.sqrt(np.maximum(np.diag(statistics.cameras), 0.0))
-    column = {one: k for k, one in enumerate(result.prepared.columns)}
+    column = {column: k for k, column in enumerate(result.prepared.columns)}
     cameras = [
         {
-            "name": one.name,
-            "model": one.model,
-            "unit": one.unit,
-            "size": list(one.size),
-            "pixel": one.pixel,
+            "name": camera.name,
+            "model": camera.model,
+            "unit": camera.unit,
+            "size": list(camera.size),
+            "pixel": camera.pixel,
             "parameters": {
                 parameter: {
                     "value": float(values.inner[m, k]),
-                    "sigma": float(deviations[column[one.name, parameter]])
-                    if (one.name, parameter) in column
+                    "sigma": float(deviations[column[camera.name, parameter]])
+                    if (camera.name, parameter) in column
                     else 0.0,
                 }
                 for k, parameter in enumerate(INTERIOR)
             },
         }
-        for m, one in enumerate(network.cameras)
+        for m, camera in enumerate(network.cameras)
     ]
     return {
         "name": name or network.path,
@@ -85,7 +85,7 @@ def orientation_values(result: Orientation, *, name: str = "") -> dict[str, Any]
         "correlations": _correlations(result),
         "remarks": list(result.remarks),
         "covariance": {
-            "columns": [list(one) for one in result.prepared.columns],
+            "columns": [list(column) for column in result.prepared.columns],
             "lower": _packed(scaled * statistics.cameras),
         },
         "mark_sigma": float(np.sqrt((network.sigma**2).mean())) * result.scale,
@@ -98,13 +98,13 @@ def _photos(result: Orientation) -> list[dict[str, Any]]:
     deviations = result.scale * np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0))
     deviations[:, :3] = np.degrees(deviations[:, :3])
     residuals, out = result.residuals, []
-    for f, one in enumerate(network.photos):
+    for f, photo in enumerate(network.photos):
         mine = residuals[(network.photo == f) & np.isfinite(residuals).all(axis=1)]
         place = [*np.degrees(angles(values.rotation[f])).tolist(), *values.station[f].tolist()]
         out.append(
             {
-                "name": one.name,
-                "camera": network.cameras[one.camera].name,
+                "name": photo.name,
+                "camera": network.cameras[photo.camera].name,
                 **dict(zip(_ANGLES, place, strict=True)),
                 "sigma": dict(zip(_ANGLES, deviations[f].tolist(), strict=True)),
                 "marks": len(mine),
@@ -245,37 +245,37 @@ def read_orientation(path: Path) -> Oriented:
 def _oriented(path: Path, values: dict[str, Any]) -> Oriented:
     cameras = tuple(
         Camera(
-            one["name"],
-            np.array([float(one["parameters"][name]["value"]) for name in INTERIOR]),
-            (int(one["size"][0]), int(one["size"][1])),
-            float(one["pixel"]),
-            str(one["unit"]),
-            one["model"] == "forward",
+            camera["name"],
+            np.array([float(camera["parameters"][name]["value"]) for name in INTERIOR]),
+            (int(camera["size"][0]), int(camera["size"][1])),
+            float(camera["pixel"]),
+            str(camera["unit"]),
+            camera["model"] == "forward",
         )
-        for one in values["cameras"]
+        for camera in values["cameras"]
     )
-    index = {one.name: k for k, one in enumerate(cameras)}
+    index = {camera.name: k for k, camera in enumerate(cameras)}
     photos = tuple(
         Photo(
-            one["name"],
-            index[one["camera"]],
-            from_angles(*np.radians([one["omega"], one["phi"], one["kappa"]])),
-            np.array([one["x"], one["y"], one["z"]], dtype=float),
+            photo["name"],
+            index[photo["camera"]],
+            from_angles(*np.radians([photo["omega"], photo["phi"], photo["kappa"]])),
+            np.array([photo["x"], photo["y"], photo["z"]], dtype=float),
         )
-        for one in values["photos"]
+        for photo in values["photos"]
     )
-    columns = [tuple(one) for one in values["covariance"]["columns"]]
+    columns = [tuple(column) for column in values["covariance"]["columns"]]
     lower = np.frombuffer(base64.b64decode(values["covariance"]["lower"]), dtype="<f8")
     covariance = np.zeros((len(columns), len(columns)))
     covariance[np.tril_indices(len(columns))] = lower
     covariance += np.tril(covariance, -1).T
-    place = {one: k for k, one in enumerate(columns)}
+    place = {column: k for k, column in enumerate(columns)}
     exterior = ("rx", "ry", "rz", "x", "y", "z")
     table = np.array(
         [
-            [place.get((one.name, name), -1) for name in exterior]
-            + [place.get((cameras[one.camera].name, name), -1) for name in INTERIOR]
-            for one in photos
+            [place.get((photo.name, name), -1) for name in exterior]
+            + [place.get((cameras[photo.camera].name, name), -1) for name in INTERIOR]
+            for photo in photos
         ],
         dtype=np.int64,
     )

@@ -57,21 +57,21 @@ def intersect(oriented: Oriented, name: str, marks: Sequence[Mark]) -> Located:
         )
     for _ in range(_MOST):
         rows = [line_up(oriented, one, place) for one in marks]
-        by_point = np.concatenate([one[2] for one in rows])
+        by_point = np.concatenate([row[2] for row in rows])
         inverse = np.linalg.inv(by_point.T @ by_point)
-        step = inverse @ by_point.T @ np.concatenate([one[0] for one in rows])
+        step = inverse @ by_point.T @ np.concatenate([row[0] for row in rows])
         place = place + step
         if np.linalg.norm(step) < _STILL * np.linalg.norm(place - stations[0]):
             break
-    for one, station in zip(marks, stations, strict=True):
-        if not (place - station) @ oriented.rotation(one.photo)[:, 2] < 0.0:
+    for mark, station in zip(marks, stations, strict=True):
+        if not (place - station) @ oriented.rotation(mark.photo)[:, 2] < 0.0:
             raise GeometryError(
-                f"point {name} would lie behind photograph {oriented.photos[one.photo].name}",
+                f"point {name} would lie behind photograph {oriented.photos[mark.photo].name}",
                 remedy="check its marks: one of them is of another point",
             )
     rows = [line_up(oriented, one, place) for one in marks]
     gain = inverse @ by_point.T
-    by_camera = np.concatenate([one[1] for one in rows])
+    by_camera = np.concatenate([row[1] for row in rows])
     # the residuals are those of the marks, and of the photographs' orientation
     rest = np.eye(len(by_point)) - by_point @ gain
     spread = rest @ (np.eye(len(by_point)) + by_camera @ oriented.covariance @ by_camera.T) @ rest

@@ -96,13 +96,13 @@ def joint_covariance(points: Sequence[Located], oriented: Oriented, *, shared: b
         by = by[:, used]
         out += by @ oriented.covariance[np.ix_(used, used)] @ by.T
     widths: dict[str, int] = {}
-    for one in points:
-        for name, slopes in one.by_source.items():
+    for point in points:
+        for name, slopes in point.by_source.items():
             widths[name] = slopes.shape[1]
     offsets = dict(zip(widths, np.cumsum([0, *widths.values()]).tolist(), strict=False))
     own = np.zeros((count, sum(widths.values())))
-    for k, one in enumerate(points):
-        for name, slopes in one.by_source.items():
+    for k, point in enumerate(points):
+        for name, slopes in point.by_source.items():
             own[3 * k : 3 * k + 3, offsets[name] : offsets[name] + widths[name]] = slopes
     return out + own @ own.T
 

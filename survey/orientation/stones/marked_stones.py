@@ -40,7 +40,7 @@ def located_stones(items: Iterator[Item], head: SurveyHead) -> Iterator[Item]:
     """
     assert head.orientation is not None
     oriented = read_orientation(Path(head.path).parent / head.orientation)
-    homographies = {one.name for one in head.photographs}
+    homographies = {photograph.name for photograph in head.photographs}
     marked = list[BlockRecord]()
     for item in items:
         if isinstance(item, BlockRecord) and (
@@ -77,8 +77,8 @@ def _located(records: Sequence[BlockRecord], head: SurveyHead, oriented: Oriente
 def _marks(record: BlockRecord) -> dict[str, list[PointMark]]:
     """Group the marks of a stone by their points; corners drawn on one photograph are points of their own."""
     out: dict[str, list[PointMark]] = {}
-    for one in record.marks:
-        out.setdefault(one.name, []).append(one)
+    for mark in record.marks:
+        out.setdefault(mark.name, []).append(mark)
     for number, image in enumerate(record.image, start=1):
         name = f"corner {number}"
         out[name] = [PointMark(name, "vertex", record.photograph or "", image, None, record.line)]
@@ -196,12 +196,12 @@ def _in_space(
     own = [joint_covariance([one], oriented, shared=False) for one in every]
     normal = np.linalg.svd(places - places.mean(axis=0))[2][2]
     sigmas = np.maximum([np.sqrt(normal @ one @ normal) for one in own], _LEAST)
-    photos = {one.photo for each in every for one in each.sights}
-    stations = [oriented.station(f) for f, one in enumerate(oriented.photos) if one.name in photos]
+    photos = {sight.photo for each in every for sight in each.sights}
+    stations = [oriented.station(f) for f, photo in enumerate(oriented.photos) if photo.name in photos]
     return replace(
         record,
         points=np.array([one.place for one in located]).reshape(-1, 3),
-        vertices=np.array([one.place for one in corners]).reshape(-1, 3),
+        vertices=np.array([corner.place for corner in corners]).reshape(-1, 3),
         sigma=float(np.sqrt((sigmas**2).mean())),
         sigmas=sigmas,
         names=tuple(one.name for one in every),

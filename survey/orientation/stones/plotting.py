@@ -57,9 +57,9 @@ def plot(oriented: Oriented, name: str, mark: Mark, surface: Surface) -> Located
     pull = surface.pull(place)
     by_orientation = -inverse[:, :2] @ by_camera
     sources: dict[str, Array] = {f"mark {mark.photo} {mark.image[0]!r} {mark.image[1]!r}": inverse[:, :2]}
-    for one, gain in zip(surface.points, pull, strict=True):
-        by_orientation = by_orientation + np.outer(inverse[:, 2], gain @ one.by_orientation)
-        for source, slopes in one.by_source.items():
+    for point, gain in zip(surface.points, pull, strict=True):
+        by_orientation = by_orientation + np.outer(inverse[:, 2], gain @ point.by_orientation)
+        for source, slopes in point.by_source.items():
             more = np.outer(inverse[:, 2], gain @ slopes)
             sources[source] = sources[source] + more if source in sources else more
     if surface.scatter > 0.0:

@@ -82,7 +82,7 @@ class Plane:
 
     def pull(self, place: Array) -> Array:
         """Return the pull of each point on the plane at a place."""
-        places = np.array([one.place for one in self.points])
+        places = np.array([point.place for point in self.points])
         rows = np.column_stack([(places - self.fit.centroid) @ self.fit.axes.T, np.ones(len(places))])
         weights = np.where(self.sound, self.sigma**-2.0, 0.0)
         at = np.append((place - self.fit.centroid) @ self.fit.axes.T, 1.0)
@@ -124,7 +124,7 @@ class Cylinder:
         found = [
             origin + one * direction for one in ((-b - root**0.5) / a, (-b + root**0.5) / a) if one > 0.0
         ]
-        middle = np.mean([one.place for one in self.points], axis=0)
+        middle = np.mean([point.place for point in self.points], axis=0)
         return min(found, key=lambda one: float(np.linalg.norm(one - middle))) if found else None
 
     def normal(self, place: Array) -> Array:
@@ -136,7 +136,7 @@ class Cylinder:
 
     def pull(self, place: Array) -> Array:
         """Return the pull of each point on the cylinder at a place."""
-        places = np.array([one.place for one in self.points])
+        places = np.array([point.place for point in self.points])
         _, rows = _slopes(places, self.centre, self.axis, self.across)
         outward = rows[:, :2] @ self.across
         at = _slopes(place[None], self.centre, self.axis, self.across)[1][0]
@@ -163,7 +163,7 @@ def fit_surface(
     GeometryError
         if there are too few points, or they define no such surface
     """
-    own = np.array([joint_covariance([one], oriented, shared=False) for one in points]).reshape(-1, 3, 3)
+    own = np.array([joint_covariance([point], oriented, shared=False) for point in points]).reshape(-1, 3, 3)
     return (_plane if kind == "plane" else _cylinder)(tuple(points), own, towards, scatter)
 
 
@@ -173,7 +173,7 @@ def _plane(points: tuple[Located, ...], own: Array, towards: Array, scatter: flo
             f"{len(points)} points define no plane",
             remedy="mark 3 or more points of the face on two photographs",
         )
-    places = np.array([one.place for one in points])
+    places = np.array([point.place for point in points])
     normal = np.linalg.svd(places - places.mean(axis=0))[2][2]
     for _ in range(2):
         sigma = np.sqrt(np.einsum("a,nab,b->n", normal, own, normal))
@@ -192,7 +192,7 @@ def _cylinder(points: tuple[Located, ...], own: Array, towards: Array, scatter: 
             f"{len(points)} points define no cylinder",
             remedy=f"mark {_FEWEST} or more points of the faces on two photographs",
         )
-    places = np.array([one.place for one in points])
+    places = np.array([point.place for point in points])
     best = min((_refined(places, own, axis) for axis in _starts(places)), key=lambda one: one[0])
     square, centre, axis, across, radius, normal, sigma = best
     if not np.isfinite(square) or np.linalg.pinv(normal)[4, 4] > (_VAGUE * radius) ** 2:

@@ -221,13 +221,17 @@ class WallBeds:
 
     def finding(self, course: int) -> str:
         """Verdict on one course."""
-        own = [one for one in self.movements if one.first <= course <= one.last]
+        own = [movement for movement in self.movements if movement.first <= course <= movement.last]
         if own:
             return "; ".join(self._in_course(one, course) for one in own)
         bound = self.excluded_in.get(course)
         if bound is None:
             return "not tested: too few stones"
-        dated = [one for one in self.movements if one.older_than is not None and course >= one.older_than]
+        dated = [
+            movement
+            for movement in self.movements
+            if movement.older_than is not None and course >= movement.older_than
+        ]
         level = "laid level above older movement; " if dated else ""
         return f"{level}no movement found; more than {bound * 1e3:.0f} mm is excluded"
 
@@ -278,10 +282,10 @@ def find_bed_movements(
     together = _scatter(list(beds.values()))
     share = alpha / max(len(walls), 1)
     found = []
-    for (facade, zone), one in beds.items():
-        own = _scatter([one])
+    for (facade, zone), bed in beds.items():
+        own = _scatter([bed])
         scatter = own if own[2] >= _ENOUGH else together
-        found.append(_wall(facade, zone, one, scatter, lengths, share, rows or {}))
+        found.append(_wall(facade, zone, bed, scatter, lengths, share, rows or {}))
     return tuple(found)
 
 
@@ -295,9 +299,14 @@ def measure_beds(
     stones, facades, tilts : as of `measure_courses`
     """
     lines = measure_courses(stones, facades, tilts)
-    lengths, rows = {one.code: one.length for one in stones}, {one.code: one.line for one in stones}
+    lengths, rows = (
+        {stone.code: stone.length for stone in stones},
+        {stone.code: stone.line for stone in stones},
+    )
     walls = find_bed_movements(lines, lengths, CHANCE, rows)
-    return with_scatter(lines, {(one.facade, one.zone): (one.scatter, one.freedom) for one in walls}), walls
+    return with_scatter(
+        lines, {(wall.facade, wall.zone): (wall.scatter, wall.freedom) for wall in walls}
+    ), walls
 
 
 def _beds(lines: Sequence[CourseLine]) -> _Beds:
@@ -379,7 +388,7 @@ def _wall(
     tau, freedom = _left(sample, sound.measured, first, tau, freedom)
     sample = replace(sample, variance=sound.measured + tau**2, freedom=freedom)
     movements, limit = fit_shapes(sample, shapes, fields, runs, 2.0 * alpha / 3.0, follow)
-    told = tuple(_told(facade, zone, sound, sample, one) for one in movements)
+    told = tuple(_told(facade, zone, sound, sample, movement) for movement in movements)
     bounds = _bounds(sample, shapes, fields, limit, [*((k, k) for k in range(len(sound.numbers))), runs[-1]])
     single = {
         number: bound for number, bound in zip(sound.numbers, bounds, strict=False) if bound is not None

@@ -67,7 +67,7 @@ def doubtful_depths(
     rules : depth rules of the survey
     alpha : probability that a survey with sound depths is given one doubt
     """
-    known = [i for i, one in enumerate(stones) if one.depth is not None and one.source != "solid"]
+    known = [i for i, stone in enumerate(stones) if stone.depth is not None and stone.source != "solid"]
     limit = critical(alpha, 3 * len(known), max(float(len(known)), 2.0))
     thickness = dict(_thickness(stones, known, facades))
     through = {i for i, thick in thickness.items() if _reaches(stones[i], thick)}
@@ -94,7 +94,7 @@ def _against_rules(
         stone = stones[i]
         if stone.depth_origin != "stone":
             continue
-        rule = next((one for one in rules if _holds(one, stone)), None)
+        rule = next((rule for rule in rules if _holds(rule, stone)), None)
         if rule is not None:
             sigma = (
                 _relative(stone, rule.depth) ** 2
@@ -170,7 +170,7 @@ def _thickness(
     stones: Sequence[StoneQuality], known: Sequence[int], facades: Sequence[Facade]
 ) -> Iterator[tuple[int, float]]:
     """Yield the distance of stones to the face on the other side of the wall [m]."""
-    upright = [one for one in facades if one.azimuth is not None]
+    upright = [facade for facade in facades if facade.azimuth is not None]
     for facade in upright:
         behind = [
             i

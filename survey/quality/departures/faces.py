@@ -309,7 +309,10 @@ def _wall(name: str, zone: str | None, face: _Face, alpha: float, tilt: float) -
     odd: list[OddStone] = []
     for _ in range(_ROUNDS):
         # what the wall has taken is taken out: a stone beside a crack is no odd one
-        moved = sum((one.amount * _field(one.shape, face) for one in movements), np.zeros(len(face.codes)))
+        moved = sum(
+            (movement.amount * _field(movement.shape, face) for movement in movements),
+            np.zeros(len(face.codes)),
+        )
         away, away_sigma, scatter = _beside(replace(face, out=face.out - moved))
         crossing = _crossing(face, movements, away, limit * away_sigma)
         before, odd = odd, _odd(face, limit, (np.where(crossing, 0.0, away), away_sigma), _turned(face))
@@ -321,7 +324,7 @@ def _wall(name: str, zone: str | None, face: _Face, alpha: float, tilt: float) -
             break
     if len(movements) >= MOST:  # as many shapes as are looked for leave some still: these faces make no plane
         movements, lower = [], None
-    told = tuple(_told(name, zone, kept, one) for one in movements)
+    told = tuple(_told(name, zone, kept, movement) for movement in movements)
     plane, plumb, lean, sigma = _departures(face, sound, scatter)
     return WallFace(
         name,
@@ -342,17 +345,19 @@ def _wall(name: str, zone: str | None, face: _Face, alpha: float, tilt: float) -
 def _crossing(face: _Face, movements: Sequence[Found], away: Array, limit: Array) -> NDArray[np.bool_]:
     """Return the stones beside the joint of a part that moved with its other side: cracks zigzag around stones."""
     crossing = np.zeros(len(face.codes), dtype=bool)
-    for one in movements:
-        if one.shape.name not in ("leaning part", "offset"):
+    for movement in movements:
+        if movement.shape.name not in ("leaning part", "offset"):
             continue
-        inside = _field(one.shape, face) != 0.0
-        for edge in one.shape.places[:2]:
+        inside = _field(movement.shape, face) != 0.0
+        for edge in movement.shape.places[:2]:
             beside = np.abs(face.along - edge) <= _BESIDE * face.size
-            if one.shape.name == "offset":
-                change = np.where(inside, one.amount, -one.amount)
+            if movement.shape.name == "offset":
+                change = np.where(inside, movement.amount, -movement.amount)
             else:
-                share = (face.up - one.shape.places[2]) / (one.shape.places[3] - one.shape.places[2])
-                change = np.where(inside, one.amount, -one.amount) * share
+                share = (face.up - movement.shape.places[2]) / (
+                    movement.shape.places[3] - movement.shape.places[2]
+                )
+                change = np.where(inside, movement.amount, -movement.amount) * share
             crossing |= beside & (np.abs(away) > limit) & (np.abs(away + change) <= limit)
     return crossing
 
@@ -466,7 +471,7 @@ def _movements(
     )
     found, limit = fit_shapes(sample, shapes, columns, [(0, 0)], alpha, _sharpener(face))
     sigma = powers(
-        sample, columns[:, [k for k, one in enumerate(shapes) if one.name in ("lean", "bulge")]], (0, 0)
+        sample, columns[:, [k for k, shape in enumerate(shapes) if shape.name in ("lean", "bulge")]], (0, 0)
     )
     sigma = sigma[np.isfinite(sigma)]
     return found, (limit + LIKELY) * float(sigma.max()) if len(sigma) else None

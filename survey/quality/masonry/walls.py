@@ -347,8 +347,10 @@ def _reach(boxes: Array, height: float) -> float:
 def _boxes(stones: Sequence[WallStone], facade: Facade) -> Array:
     """Return left, low, right, high, place outwards and depth of faces in a facade's frame, (m, 6)."""
     rows = []
-    for one in stones:
-        flat = facade.frame.flatten(one.outline)
-        out = float(((one.outline - facade.frame.origin) @ facade.frame.axes[2]).mean())
-        rows.append([*flat.min(axis=0), *flat.max(axis=0), out, math.nan if one.depth is None else one.depth])
+    for stone in stones:
+        flat = facade.frame.flatten(stone.outline)
+        out = float(((stone.outline - facade.frame.origin) @ facade.frame.axes[2]).mean())
+        rows.append(
+            [*flat.min(axis=0), *flat.max(axis=0), out, math.nan if stone.depth is None else stone.depth]
+        )
     return np.array(rows)

@@ -233,7 +233,7 @@ def _grid(
         for j, (lower, upper) in enumerate(pairwise(lines)):
             height = 0.5 * (height_of(lower.plane, middle) + height_of(upper.plane, middle))
             row = next(
-                k for k, one in enumerate(rows) if k + 1 == len(rows) or height < height_of(one.upper, middle)
+                k for k, row in enumerate(rows) if k + 1 == len(rows) or height < height_of(row.upper, middle)
             )
             filled[i, j] = any(start <= middle <= stop for start, stop in covered[row])
             reach = np.minimum(along[:, 1], right) - np.maximum(along[:, 0], left)
@@ -252,11 +252,11 @@ def _covered(wall: FacingWall, row: Strip, settings: InfillSettings) -> list[Int
 
 def _spans(row: Strip, stones: Sequence[FacingStone], settings: InfillSettings) -> list[Interval]:
     spans: list[Interval] = []
-    for one in stretches(row, stones, settings):
-        if spans and one.start - spans[-1][1] < settings.max_joint:
-            spans[-1] = (spans[-1][0], max(spans[-1][1], one.stop))
+    for stretch in stretches(row, stones, settings):
+        if spans and stretch.start - spans[-1][1] < settings.max_joint:
+            spans[-1] = (spans[-1][0], max(spans[-1][1], stretch.stop))
         else:
-            spans.append((one.start, one.stop))
+            spans.append((stretch.start, stretch.stop))
     return spans
 
 

@@ -119,9 +119,9 @@ def find_holes(gaps: Sequence[CourseGap]) -> tuple[Hole, ...]:
     """Group gaps that lie on one another."""
     pairs = [
         (i, j)
-        for i, one in enumerate(gaps)
+        for i, gap in enumerate(gaps)
         for j, other in enumerate(gaps)
-        if i != j and _lies_on(other, one)
+        if i != j and _lies_on(other, gap)
     ]
     rows, columns = ([pair[k] for pair in pairs] for k in (0, 1))
     graph = coo_array((np.ones(len(pairs)), (rows, columns)), shape=(len(gaps), len(gaps)))

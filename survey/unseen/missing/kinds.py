@@ -131,7 +131,7 @@ def split(
     Their usual lengths are stretched to fill the gap; the order is chosen whose joints stay farthest from the head
     joints of the courses above and below.
     """
-    lengths = {one.kind: one.length for one in kinds}
+    lengths = {kind.kind: kind.length for kind in kinds}
     avoid = _joints_around(gap, elevation)
 
     def cuts(order: tuple[str, ...]) -> Array:

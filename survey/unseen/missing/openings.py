@@ -54,7 +54,7 @@ def frame_gaps(
     right = _reveal([gap.stop for gap in hole.gaps if gap.right.block.kind == "jamb"])
     if left is None or right is None or right <= left:
         return
-    lengths = [float(np.ptp(one.outline[:, 0])) for one in elevation.stones if one.block.kind == "jamb"]
+    lengths = [float(np.ptp(stone.outline[:, 0])) for stone in elevation.stones if stone.block.kind == "jamb"]
     longest = _LONGEST * max(lengths)
     for number, gap in enumerate(hole.gaps):
         before, after = left - gap.start, gap.stop - right

@@ -134,7 +134,7 @@ def _is_there(proposal: SurveyedBlock, others: Sequence[SurveyedBlock]) -> bool:
         corners = other.solid.vertices
         if (corners.min(axis=0) <= middle).all() and (middle <= corners.max(axis=0)).all():
             polygons = [corners[list(face)] for face in other.solid.faces]
-            inside = [((places - one.mean(axis=0)) @ area_vector(one) <= 0.0) for one in polygons]
+            inside = [((places - polygon.mean(axis=0)) @ area_vector(polygon) <= 0.0) for polygon in polygons]
             if 2 * int(np.all(inside, axis=0).sum()) > len(places):
                 return True
     return False
@@ -151,7 +151,9 @@ def _voussoirs(elevation: Elevation, settings: MissingSettings, codes: _FreeCode
         left, right = gap.left.block.code, gap.right.block.code
         before = left
         outlines = voussoir_outlines(gap, joint)
-        there = any(stone.contains(one.mean(axis=0)) for one in outlines for stone in elevation.stones)
+        there = any(
+            stone.contains(outline.mean(axis=0)) for outline in outlines for stone in elevation.stones
+        )
         if there or not all(map(is_plausible, outlines)):
             continue
         for k, outline in enumerate(outlines):
@@ -324,8 +326,8 @@ class _Fill:
                 Line(np.array([cut + by, 0.0]), _UPRIGHT) for by in (-0.5 * self.joint, 0.5 * self.joint)
             ]
         lines.append(last)
-        for one, other in zip(lines[::2], lines[1::2], strict=True):
-            yield _quadrilateral(one, other, self.gap.lower, self.upper)
+        for line, other in zip(lines[::2], lines[1::2], strict=True):
+            yield _quadrilateral(line, other, self.gap.lower, self.upper)
 
     def _evidence(self, kind: str) -> str:
         gap = self.gap

@@ -143,7 +143,7 @@ class Elevation:
     @cached_property
     def boxes(self) -> Array:
         """Lower left and upper right corner of each stone's outline, (n, 2, 2) [m]."""
-        return np.array([[one.outline.min(axis=0), one.outline.max(axis=0)] for one in self.stones])
+        return np.array([[stone.outline.min(axis=0), stone.outline.max(axis=0)] for stone in self.stones])
 
 
 def elevations(blocks: Sequence[SurveyedBlock]) -> tuple[Elevation, ...]:

@@ -44,13 +44,13 @@ def msh_bodies(path: Path) -> Iterator[RawBody]:
 def _volumes(mesh: MshFile) -> dict[str, Cells]:
     """Collect the elements of each volume, by type."""
     volumes: dict[str, Cells] = defaultdict(list)
-    for one in mesh.elements:
-        if one.type not in _FACES:
+    for element in mesh.elements:
+        if element.type not in _FACES:
             continue
-        both = np.column_stack([one.physical, one.entity])
+        both = np.column_stack([element.physical, element.entity])
         for group, entity in np.unique(both, axis=0).tolist():
             name = mesh.names.get(group) or (f"physical-{group}" if group else f"volume-{entity}")
-            volumes[name].append((one.type, one.nodes[(both == (group, entity)).all(axis=1)]))
+            volumes[name].append((element.type, element.nodes[(both == (group, entity)).all(axis=1)]))
     return volumes
 
 
@@ -64,4 +64,6 @@ def _boundary(blocks: Cells) -> list[tuple[int, ...]]:
                 key = frozenset(polygon)
                 once[key] = None if key in once else polygon
     polygons = [polygon for polygon in once.values() if polygon is not None]
-    return [(one[0], one[k], one[k + 1]) for one in polygons for k in range(1, len(one) - 1)]
+    return [
+        (polygon[0], polygon[k], polygon[k + 1]) for polygon in polygons for k in range(1, len(polygon) - 1)
+    ]

@@ -174,7 +174,7 @@ class MshNumbers:
             raise self.fail("the section has fewer numbers than it states")
         self._word += count
         try:
-            return np.array([float(one) if kind == "f8" else int(one) for one in words], dtype=kind)
+            return np.array([float(word) if kind == "f8" else int(word) for word in words], dtype=kind)
         except (ValueError, OverflowError) as error:
             raise self.fail("a number that is not whole, or too large") from error
 

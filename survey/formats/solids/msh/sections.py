@@ -140,7 +140,7 @@ class MshFile:
             rows = numbers.sizes(count * width).reshape(count, width)
             group = self._physical.get((dimension, entity), 0)
             self._add(kind, rows[:, 1:], np.full(count, entity), np.full(count, group))
-        if sum(len(one.nodes) for one in self.elements) != total:
+        if sum(len(element.nodes) for element in self.elements) != total:
             raise numbers.fail(f"other than the {total} elements that it states")
 
     def _read_elements_2(self) -> None:
