@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,7 +11,16 @@ import typer
 
 from ground.errors import UsageError
 from moma.cli.console import reporting, say
-from moma.cli.options import DEFAULT_DB, AcceptUnsound, Db, Json, Out, Overwrite, SceneArgument, Verbose
+from moma.cli.options import (
+    DEFAULT_DB,
+    AcceptUnsound,
+    Common,
+    Db,
+    Json,
+    Out,
+    Overwrite,
+    SceneArgument,
+)
 from moma.cli.progress import progress_bars
 
 __all__ = ["assess", "compare", "diagnose", "pushover", "study"]
@@ -27,9 +37,10 @@ def _going_on(folder: Path) -> Iterator[None]:
         raise
 
 
-@reporting
-def assess(
-    scene: SceneArgument,
+@dataclass(frozen=True)
+class _AssessChoices:
+    """What is asked of a scene."""
+
     load: Annotated[
         list[str] | None,
         typer.Option(
@@ -39,7 +50,7 @@ def assess(
             '"weight CODE,CODE", "thrust CODE x", "settlement CODE -z" or "thickness"; also several. '
             "Default: [[assess]] of the scene, which may ask more, or horizontal: square to each façade and along it.",
         ),
-    ] = None,
+    ] = None
     code: Annotated[
         str | None,
         typer.Option(
@@ -47,14 +58,14 @@ def assess(
             metavar="CODE",
             help="Check mechanisms of accelerations by a code, ntc2008 or ntc2018, for the [site] of the scene.",
         ),
-    ] = None,
+    ] = None
     confirm: Annotated[
         bool,
         typer.Option("--confirm", help="Confirm each candidate by runs: which loads are held, which lost."),
-    ] = False,
+    ] = False
     weakest: Annotated[
         bool, typer.Option("--weakest", help="Seek the direction of the weakest horizontal push, too.")
-    ] = False,
+    ] = False
     at: Annotated[
         float | None,
         typer.Option(
@@ -62,18 +73,23 @@ def assess(
             metavar="SECONDS",
             help="Instant at which loads that change are taken. Default: from which they are constant.",
         ),
-    ] = None,
+    ] = None
     leave_out_loose: Annotated[
         bool,
         typer.Option(
             "--leave-out-loose", help="Leave out, and list, stones that fall under their own weight."
         ),
-    ] = False,
+    ] = False
+
+
+@reporting
+def assess(
+    *,
+    scene: SceneArgument,
+    asked: _AssessChoices,
     out: Out = None,
     overwrite: Overwrite = False,
-    db: Db = DEFAULT_DB,
-    json: Json = False,
-    verbose: Verbose = False,
+    common: Common,
 ) -> None:
     """Find how far a scene is from falling: limit load, bound and candidate, and mechanism of each load."""
     from moma.cli.text.assessments import assessment_lines
@@ -84,20 +100,20 @@ def assess(
     with progress_bars() as listener, _going_on(folder):
         done = answered(
             scene,
-            db,
+            common.db,
             folder,
-            load or (),
+            asked.load or (),
             listener,
-            confirm,
-            code,
+            asked.confirm,
+            asked.code,
             overwrite,
-            weakest=weakest,
-            instant=at,
-            leave_out_loose=leave_out_loose,
+            weakest=asked.weakest,
+            instant=asked.at,
+            leave_out_loose=asked.leave_out_loose,
         )
     for warning in done.warnings:
         say(f"warning: {warning}")
-    print(as_json(done.summary) if json else "\n".join(assessment_lines(done, verbose)))
+    print(as_json(done.summary) if common.json else "\n".join(assessment_lines(done, common.verbose)))
     if not done.decided:
         raise typer.Exit(1)
 
@@ -123,6 +139,7 @@ def pushover(
 
 @reporting
 def compare(
+    *,
     scene: SceneArgument,
     battered: Annotated[
         bool,
@@ -133,9 +150,7 @@ def compare(
     out: Out = None,
     overwrite: Overwrite = False,
     accept_unsound: AcceptUnsound = False,
-    db: Db = DEFAULT_DB,
-    json: Json = False,
-    verbose: Verbose = False,
+    common: Common,
 ) -> None:
     """Run a scene; compare the movement of its courses and faces with their measured departure from level and plumb."""
     from moma.cli.text.assessments import comparison_lines
@@ -144,12 +159,13 @@ def compare(
 
     folder = out or Path("out") / f"{scene.stem}-compare"
     with progress_bars() as listener:
-        done = compared(scene, db, folder, listener, accept_unsound, battered, overwrite)
-    print(as_json(done.summary) if json else "\n".join(comparison_lines(done, verbose)))
+        done = compared(scene, common.db, folder, listener, accept_unsound, battered, overwrite)
+    print(as_json(done.summary) if common.json else "\n".join(comparison_lines(done, common.verbose)))
 
 
 @reporting
 def diagnose(
+    *,
     file: Annotated[
         Path,
         typer.Argument(
@@ -160,9 +176,7 @@ def diagnose(
     out: Out = None,
     overwrite: Overwrite = False,
     accept_unsound: AcceptUnsound = False,
-    db: Db = DEFAULT_DB,
-    json: Json = False,
-    verbose: Verbose = False,
+    common: Common,
 ) -> None:
     """Find which of several causes explains the measured deformation, by how much of each, and when it acted."""
     from moma.cli.text.diagnoses import diagnosis_lines
@@ -171,12 +185,13 @@ def diagnose(
 
     folder = out or Path("out") / f"{file.stem}-diagnose"
     with progress_bars() as listener, _going_on(folder):
-        done = diagnosed(file, db, folder, listener, jobs, accept_unsound, overwrite=overwrite)
-    print(as_json(done.summary) if json else "\n".join(diagnosis_lines(done, verbose)))
+        done = diagnosed(file, common.db, folder, listener, jobs, accept_unsound, overwrite=overwrite)
+    print(as_json(done.summary) if common.json else "\n".join(diagnosis_lines(done, common.verbose)))
 
 
 @reporting
 def study(
+    *,
     file: Annotated[
         Path,
         typer.Argument(metavar="STUDY.toml", help="File with [study], [[inputs]] and [[quantities]]."),
@@ -201,9 +216,7 @@ def study(
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Use the folder of another study; its samples stay there.")
     ] = False,
-    db: Db = DEFAULT_DB,
-    json: Json = False,
-    verbose: Verbose = False,
+    common: Common,
 ) -> None:
     """Find how probable it is that a scene falls, as much of it is not known, and what to measure next."""
     from moma.cli.text.formats import as_json
@@ -213,14 +226,14 @@ def study(
     folder = out or Path("out") / f"{file.stem}-study"
     with progress_bars() as listener:
         try:
-            done = run_study(file, db, folder, listener, workers, _part(part), resume, overwrite)
+            done = run_study(file, common.db, folder, listener, workers, _part(part), resume, overwrite)
         except KeyboardInterrupt:
             say(f"stopped; its samples are kept in {folder}, and the same command goes on from there")
             raise
-    if json:
+    if common.json:
         print(as_json(dict(done.summary)))
     else:
-        print("\n".join(study_lines(done, verbose)) if done.run is not None else part_line(done))
+        print("\n".join(study_lines(done, common.verbose)) if done.run is not None else part_line(done))
 
 
 def _part(words: str | None) -> Any:

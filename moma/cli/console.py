@@ -2,6 +2,7 @@
 
 import codecs
 import gc
+import inspect
 import io
 import os
 import sys
@@ -10,8 +11,9 @@ import unicodedata
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import fields, is_dataclass
 from functools import wraps
-from typing import Any, ParamSpec, TextIO
+from typing import Any, TextIO
 
 import typer
 from typer.core import HAS_RICH, TyperCommand, TyperGroup
@@ -20,7 +22,6 @@ from ground.errors import MomaError, storage_error
 
 __all__ = ["PlainCommand", "PlainGroup", "open_streams", "reporting", "say", "short_lived"]
 
-P = ParamSpec("P")
 _CLOSEST = "moma.closest"  # name of the error handler
 # what decomposes into no ASCII
 _ASCII = str.maketrans({
@@ -106,15 +107,26 @@ def say(message: str) -> None:
     print(f"moma: {message}", file=sys.stderr)
 
 
-def reporting(command: Callable[P, None]) -> Callable[P, None]:
-    """Decorate a command to fail with one line and an exit code; with ``-v``, the traceback too."""
+def reporting(command: Callable[..., None]) -> Callable[..., None]:
+    """Decorate a command to fail with one line and an exit code; with ``-v``, the traceback too.
+
+    The fields of a dataclass among its parameters become options in its place: the command receives the dataclass.
+    """
+    signature = inspect.signature(command)
+    groups = {
+        name: parameter.annotation
+        for name, parameter in signature.parameters.items()
+        if is_dataclass(parameter.annotation)
+    }
 
     @wraps(command)
-    def run(*arguments: P.args, **options: P.kwargs) -> None:
+    def run(**options: Any) -> None:
         verbose = bool(options.get("verbose"))
+        for name, group in groups.items():
+            options[name] = group(**{field.name: options.pop(field.name) for field in fields(group)})
         try:
             with _short_warnings(), _flushed():
-                command(*arguments, **options)
+                command(**options)
         except (typer.Exit, typer.Abort, BrokenPipeError):
             raise  # typer handles its own exceptions, which end a command, and broken pipes
         except KeyboardInterrupt:
@@ -134,6 +146,18 @@ def reporting(command: Callable[P, None]) -> Callable[P, None]:
             say(f"error: {' '.join(str(foreseen).split())}")
             raise typer.Exit(foreseen.exit_code) from None
 
+    parameters = [
+        option
+        for parameter in signature.parameters.values()
+        for option in (
+            inspect.signature(groups[parameter.name]).parameters.values()
+            if parameter.name in groups
+            else (parameter,)
+        )
+    ]
+    listed = [option.replace(kind=option.KEYWORD_ONLY) for option in parameters]
+    run.__signature__ = signature.replace(parameters=listed)  # type: ignore[attr-defined]
+    run.__annotations__ = {option.name: option.annotation for option in listed}
     return run
 
 

@@ -9,22 +9,21 @@ import typer
 
 from ground.errors import UsageError
 from moma.cli.console import reporting, say
-from moma.cli.options import DEFAULT_DB, Db, Json, Verbose, check_ending
+from moma.cli.options import DEFAULT_DB, Common, Db, Verbose, check_ending
 
 __all__ = ["export", "import_", "migrate", "serve", "view"]
 
 
 @reporting
 def migrate(
+    *,
     to: Annotated[
         int | None, typer.Option("--to", metavar="N", help="Version of the layout; default: the newest.")
     ] = None,
     yes: Annotated[
         bool, typer.Option("--yes", help="Going to an older version, drop what it cannot hold.")
     ] = False,
-    db: Db = DEFAULT_DB,
-    json: Json = False,
-    verbose: Verbose = False,
+    common: Common,
 ) -> None:
     """Migrate a database to the newest layout, or to an older one: completely or not at all."""
     from archmodel.migrations.migrate import migrate as change
@@ -32,8 +31,8 @@ def migrate(
 
     if yes and to is None:
         raise UsageError("--yes without --to", remedy="name the older version with --to")
-    done = change(db, to, lossy=yes)
-    if json:
+    done = change(common.db, to, lossy=yes)
+    if common.json:
         print(as_json(asdict(done)))
         return
     if done.before == done.after:
@@ -67,6 +66,7 @@ Target = Annotated[
 
 @reporting
 def export(
+    *,
     document: Target,
     run: Annotated[
         int | None,
@@ -78,9 +78,7 @@ def export(
             "--crs", metavar="NAME", help="Reference system of the site for IFC and GeoPackage: EPSG:25832."
         ),
     ] = None,
-    db: Db = DEFAULT_DB,
-    json: Json = False,
-    verbose: Verbose = False,
+    common: Common,
 ) -> None:
     """Export the database as one JSON document, or its stones into a file for another program."""
     from moma.cli.text.formats import as_json
@@ -89,8 +87,8 @@ def export(
 
     name = document.name.lower()
     if name.endswith(ENDINGS):
-        done = export_file(db, document, run, crs)
-        print(as_json(asdict(done)) if json else _told(done))
+        done = export_file(common.db, document, run, crs)
+        print(as_json(asdict(done)) if common.json else _told(done))
         return
     check_ending(document if name != "-" else None, ".json", ".json.gz", *ENDINGS)
     for option, given in (("--run", run), ("--crs", crs)):
@@ -98,10 +96,10 @@ def export(
             remedy = "leave it out: the document has all runs"
             raise UsageError(f"{option} with a JSON document", where=str(document), remedy=remedy)
     if str(document) == "-":
-        export_to_stream(db, sys.stdout.buffer)
+        export_to_stream(common.db, sys.stdout.buffer)
         return
-    report = export_database(db, document)
-    print(as_json(asdict(report)) if json else "\n".join(_lines(report, "from", verbose)))
+    report = export_database(common.db, document)
+    print(as_json(asdict(report)) if common.json else "\n".join(_lines(report, "from", common.verbose)))
 
 
 def _told(done: "Exported") -> str:
@@ -112,13 +110,13 @@ def _told(done: "Exported") -> str:
 
 
 @reporting
-def import_(document: Document, db: Db = DEFAULT_DB, json: Json = False, verbose: Verbose = False) -> None:
+def import_(document: Document, common: Common) -> None:
     """Create a database from an exported document: completely, or not at all if anything is wrong."""
     from moma.cli.text.formats import as_json
     from pipelines.ingest.exchange import import_database
 
-    report = import_database(document, db)
-    print(as_json(asdict(report)) if json else "\n".join(_lines(report, "into", verbose)))
+    report = import_database(document, common.db)
+    print(as_json(asdict(report)) if common.json else "\n".join(_lines(report, "into", common.verbose)))
 
 
 def _lines(report: "ExchangeReport", way: str, verbose: bool) -> list[str]:
@@ -130,6 +128,7 @@ def _lines(report: "ExchangeReport", way: str, verbose: bool) -> list[str]:
 
 @reporting
 def view(
+    *,
     pages: Annotated[
         list[Path] | None,
         typer.Argument(
@@ -166,9 +165,7 @@ def view(
             "--scale", metavar="N", min=1, help="1 : N of the elevation; default: fits a sheet of A4."
         ),
     ] = None,
-    db: Db = DEFAULT_DB,
-    json: Json = False,
-    verbose: Verbose = False,
+    common: Common,
 ) -> None:
     """Write one page, without network, in which the stones can be turned, searched and coloured."""
     from moma.cli.text.formats import as_json
@@ -182,8 +179,8 @@ def view(
                 raise UsageError(f"{name} with pages", remedy="it is for the stones of a database")
         done = write_comparison_view(pages, out)
     else:
-        done = write_view(db, out, kind, where or (), run, title, elevation, scale)
-    if json:
+        done = write_view(common.db, out, kind, where or (), run, title, elevation, scale)
+    if common.json:
         print(as_json({"page": str(done.path), "stones": done.stones, "scale": done.scale}))
         return
     print(

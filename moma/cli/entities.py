@@ -1,12 +1,13 @@
 """Commands that query the database."""
 
+from dataclasses import dataclass
 from typing import Annotated
 
 import typer
 
 from ground.errors import UsageError
 from moma.cli.console import reporting, say, short_lived
-from moma.cli.options import DEFAULT_DB, At, Db, Json, ListFormat, Verbose
+from moma.cli.options import DEFAULT_DB, At, Common, Json, ListFormat, Verbose
 
 __all__ = ["query", "schema", "show"]
 
@@ -20,8 +21,48 @@ Columns = Annotated[
 ]
 
 
+@dataclass(frozen=True)
+class _ListChoices:
+    """How entities are listed, or counted."""
+
+    format: Annotated[ListFormat | None, typer.Option(help="Format of the list; default: table.")] = None
+    flat: Annotated[
+        bool, typer.Option("--flat", help="GeoJSON in the plane of the wall: along it, and up.")
+    ] = False
+    sort: Annotated[
+        str | None,
+        typer.Option(
+            "--sort", metavar="NAMES", help="Order by attributes, e.g. phase,-depth; -: largest first."
+        ),
+    ] = None
+    top: Annotated[int | None, typer.Option("--top", metavar="N", min=1, help="Only the first N.")] = None
+    count_by: Annotated[
+        str | None,
+        typer.Option("--count-by", metavar="NAMES", help="Count by attributes, e.g. phase or mark,phase."),
+    ] = None
+    share_of: Annotated[
+        str | None,
+        typer.Option(
+            "--share-of", metavar="NAME", help="With --count-by: sum and share of a number, e.g. area."
+        ),
+    ] = None
+    only_in: Annotated[
+        str | None,
+        typer.Option(
+            "--only-in",
+            metavar="EXPR",
+            help="With --count-by: only groups of which it is true throughout, e.g. 'phase = 2'.",
+        ),
+    ] = None
+    excel: Annotated[
+        bool,
+        typer.Option("--excel", help="CSV for spreadsheets: marked as UTF-8, with ; and decimal commas."),
+    ] = False
+
+
 @reporting
 def query(
+    *,
     kind: Annotated[
         str,
         typer.Argument(
@@ -37,42 +78,8 @@ def query(
     run: RunNumber = None,
     at: At = None,
     columns: Columns = None,
-    format: Annotated[ListFormat | None, typer.Option(help="Format of the list; default: table.")] = None,
-    flat: Annotated[
-        bool, typer.Option("--flat", help="GeoJSON in the plane of the wall: along it, and up.")
-    ] = False,
-    sort: Annotated[
-        str | None,
-        typer.Option(
-            "--sort", metavar="NAMES", help="Order by attributes, e.g. phase,-depth; -: largest first."
-        ),
-    ] = None,
-    top: Annotated[int | None, typer.Option("--top", metavar="N", min=1, help="Only the first N.")] = None,
-    count_by: Annotated[
-        str | None,
-        typer.Option("--count-by", metavar="NAMES", help="Count by attributes, e.g. phase or mark,phase."),
-    ] = None,
-    share_of: Annotated[
-        str | None,
-        typer.Option(
-            "--share-of", metavar="NAME", help="With --count-by: sum and share of a number, e.g. area."
-        ),
-    ] = None,
-    only_in: Annotated[
-        str | None,
-        typer.Option(
-            "--only-in",
-            metavar="EXPR",
-            help="With --count-by: only groups of which it is true throughout, e.g. 'phase = 2'.",
-        ),
-    ] = None,
-    excel: Annotated[
-        bool,
-        typer.Option("--excel", help="CSV for spreadsheets: marked as UTF-8, with ; and decimal commas."),
-    ] = False,
-    db: Db = DEFAULT_DB,
-    json: Json = False,
-    verbose: Verbose = False,
+    shown: _ListChoices,
+    common: Common,
 ) -> None:
     """List the stones or structures of a kind that satisfy conditions, or count them."""
     with short_lived():
@@ -80,32 +87,34 @@ def query(
         from archmodel.database.session import open_database
         from moma.cli.text.query import Question, answer, listed
 
-        if json and format not in (None, ListFormat.JSON):
-            raise UsageError(f"--json and --format {format} request two formats", remedy="give one of them")
-        wanted = ListFormat.JSON if json else format or ListFormat.TABLE
-        if excel and (json or format not in (None, ListFormat.CSV)):
+        if common.json and shown.format not in (None, ListFormat.JSON):
+            raise UsageError(
+                f"--json and --format {shown.format} request two formats", remedy="give one of them"
+            )
+        wanted = ListFormat.JSON if common.json else shown.format or ListFormat.TABLE
+        if shown.excel and (common.json or shown.format not in (None, ListFormat.CSV)):
             raise UsageError("--excel is CSV for spreadsheets", remedy="leave out the other format")
-        if (share_of or only_in) and count_by is None:
+        if (shown.share_of or shown.only_in) and shown.count_by is None:
             raise UsageError("--share-of and --only-in need --count-by", remedy="give --count-by phase, say")
-        if flat and wanted is not ListFormat.GEOJSON:
+        if shown.flat and wanted is not ListFormat.GEOJSON:
             raise UsageError("--flat is for faces", remedy="give --format geojson too")
         question = Question(
             kind,
             tuple(where or ()),
             run,
             listed(columns),
-            everything=verbose,
-            flat=flat,
-            sort=listed(sort) or (),
-            top=top,
-            count_by=listed(count_by),
-            share_of=share_of,
-            only_in=only_in,
+            everything=common.verbose,
+            flat=shown.flat,
+            sort=listed(shown.sort) or (),
+            top=shown.top,
+            count_by=listed(shown.count_by),
+            share_of=shown.share_of,
+            only_in=shown.only_in,
         )
-        with open_database(db, create=False) as database, database.session(read_only=True) as session:
+        with open_database(common.db, create=False) as database, database.session(read_only=True) as session:
             entry = None if at is None else entry_named(session, at)
             with as_known(session, entry) as then:
-                text, note = answer(then, question, "excel" if excel else str(wanted))
+                text, note = answer(then, question, "excel" if shown.excel else str(wanted))
         if text:
             print(text)
         if note:
@@ -152,14 +161,13 @@ def schema(
 
 @reporting
 def show(
+    *,
     code: Annotated[str, typer.Argument(metavar="CODE", help="Code of a stone or structure.")],
     history: Annotated[
         bool, typer.Option("--history", help="Show everything recorded about it, in order.")
     ] = False,
     at: At = None,
-    db: Db = DEFAULT_DB,
-    json: Json = False,
-    verbose: Verbose = False,
+    common: Common,
 ) -> None:
     """Show one stone or structure: kind, knowledge, measurements and results."""
     from dataclasses import asdict
@@ -173,10 +181,10 @@ def show(
 
     if history and at is not None:
         raise UsageError("--history and --at exclude each other", remedy="give one of them")
-    with open_database(db, create=False) as database, database.session(read_only=True) as session:
+    with open_database(common.db, create=False) as database, database.session(read_only=True) as session:
         if history:
             events = [asdict(event) for event in past.history(session, code)]
-            print(as_json(events) if json else history_lines(code, events))
+            print(as_json(events) if common.json else history_lines(code, events))
             return
         description = describe(session, code, None if at is None else entry_named(session, at))
-    print(as_json(description) if json else entity_lines(description))
+    print(as_json(description) if common.json else entity_lines(description))

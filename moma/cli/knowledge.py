@@ -7,21 +7,21 @@ from typing import Annotated
 import typer
 
 from moma.cli.console import reporting
-from moma.cli.options import DEFAULT_DB, At, Db, Json, Sheet, Verbose
+from moma.cli.options import At, Common, Sheet
 
 __all__ = ["entries", "matrix", "record"]
 
 
 @reporting
-def entries(db: Db = DEFAULT_DB, json: Json = False, verbose: Verbose = False) -> None:
+def entries(common: Common) -> None:
     """List the acts of recording: number, time, author and grounds; `--at` takes their numbers."""
     from archmodel.database.session import open_database
     from archmodel.describe.entries import list_entries
     from moma.cli.text.formats import as_json, as_table
 
-    with open_database(db, create=False) as database, database.session(read_only=True) as session:
+    with open_database(common.db, create=False) as database, database.session(read_only=True) as session:
         rows = list_entries(session)
-    if json:
+    if common.json:
         print(as_json(rows))
     elif rows:
         print(as_table(dict.fromkeys(rows[0]), rows))
@@ -29,6 +29,7 @@ def entries(db: Db = DEFAULT_DB, json: Json = False, verbose: Verbose = False) -
 
 @reporting
 def record(
+    *,
     files: Annotated[
         list[Path],
         typer.Argument(
@@ -59,9 +60,7 @@ def record(
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Report what would be recorded; change nothing.")
     ] = False,
-    db: Db = DEFAULT_DB,
-    json: Json = False,
-    verbose: Verbose = False,
+    common: Common,
 ) -> None:
     """Record knowledge of a building: materials, phases, structures, marks, observations, corrections, …"""
     from moma.cli.text.formats import as_json
@@ -69,13 +68,14 @@ def record(
     from pipelines.record.record import record as record_files
 
     report = record_files(
-        files, db, author=author, source=source, columns=columns, sheet=sheet, dry_run=dry_run
+        files, common.db, author=author, source=source, columns=columns, sheet=sheet, dry_run=dry_run
     )
-    print(as_json(asdict(report)) if json else "\n".join(record_lines(report, verbose)))
+    print(as_json(asdict(report)) if common.json else "\n".join(record_lines(report, common.verbose)))
 
 
 @reporting
 def matrix(
+    *,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -92,9 +92,7 @@ def matrix(
         ),
     ] = None,
     at: At = None,
-    db: Db = DEFAULT_DB,
-    json: Json = False,
-    verbose: Verbose = False,
+    common: Common,
 ) -> None:
     """Order stratigraphic units in time: matrix of Harris, relative dates, contradictions with phases."""
     from archmodel.database.as_known import as_known, entry_named
@@ -103,12 +101,12 @@ def matrix(
     from moma.cli.text.formats import as_json
     from moma.cli.text.matrix import matrix_lines
 
-    with open_database(db, create=False) as database, database.session(read_only=True) as session:
+    with open_database(common.db, create=False) as database, database.session(read_only=True) as session:
         entry = None if at is None else entry_named(session, at)
         with as_known(session, entry) as then:
             report = study(then, author)
     if out is not None:
         out.write_text(draw(report, out), encoding="utf-8")
-    print(as_json(report.as_values()) if json else "\n".join(matrix_lines(report, verbose)))
+    print(as_json(report.as_values()) if common.json else "\n".join(matrix_lines(report, common.verbose)))
     if check and report.contradictions:
         raise typer.Exit(1)

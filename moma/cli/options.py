@@ -1,5 +1,6 @@
-"""Options and arguments shared by several commands."""
+"""Options and arguments shared by several commands; a command takes a group of them as one dataclass."""
 
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -12,46 +13,25 @@ __all__ = [
     "DEFAULT_DB",
     "AcceptUnsound",
     "At",
-    "CloudFiles",
-    "Codes",
-    "Columns",
+    "CloudChoices",
+    "Common",
     "Db",
-    "Depth",
-    "Fields",
-    "Format",
-    "Header",
+    "DrawnChoices",
     "Json",
-    "Kind",
-    "KindWhere",
-    "Kinds",
-    "Layer",
     "ListFormat",
-    "Margin",
-    "Masks",
     "Out",
-    "OutlineSigma",
-    "Outlines",
     "Overwrite",
-    "Planes",
     "Profile",
     "ProfileName",
-    "Repair",
     "Resume",
     "SceneArgument",
     "Sheet",
-    "Sigma",
-    "Size",
-    "Slab",
-    "Snap",
+    "SolidChoices",
     "StoreDb",
-    "Support",
+    "SurveyChoices",
     "SurveyFormat",
-    "SurveyOrCloud",
-    "Unit",
-    "Up",
     "UpAxis",
     "Verbose",
-    "Wall",
     "check_ending",
 ]
 
@@ -139,60 +119,8 @@ Profile = Annotated[
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")]
 Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Print more; show the traceback of an error.")]
-SurveyOrCloud = Annotated[
-    list[Path] | None,
-    typer.Argument(
-        metavar="FILE…",
-        help="Survey files, or folders of them; see docs/formats.md. None with --cloud or --masks.",
-    ),
-]
-Format = Annotated[
-    SurveyFormat | None,
-    typer.Option(help="Format of the survey files; default: by their endings.", show_default=False),
-]
-Columns = Annotated[
-    str | None,
-    typer.Option(
-        "--columns",
-        metavar="MAP",
-        help="Columns of a table that are not recognised, e.g. 'block=Stein,x=Rechts,ignore=Datum'.",
-    ),
-]
 Sheet = Annotated[
     str | None, typer.Option("--sheet", metavar="NAME", help="Sheet of a workbook (XLSX, ODS) with several.")
-]
-Kinds = Annotated[
-    str | None,
-    typer.Option(
-        "--kinds",
-        metavar="TABLE",
-        help="Abbreviations of kinds, e.g. 'SPR=springer,VOU=voussoir', or a file.",
-    ),
-]
-Up = Annotated[
-    UpAxis | None,
-    typer.Option("--up", help="Axis that points upwards in files of solids; default: z.", show_default=False),
-]
-Repair = Annotated[
-    float | None,
-    typer.Option(
-        "--repair",
-        metavar="T",
-        help="Repair open edges and the like of solids within T metres; 0: nothing; default: 10⁻⁵ of their size.",
-    ),
-]
-Header = Annotated[
-    Path | None,
-    typer.Option(
-        "--header", metavar="FILE", help="Header (stations, control, depths) for formats without one."
-    ),
-]
-Codes = Annotated[
-    str | None,
-    typer.Option("--codes", metavar="TEMPLATE", help="Parts of a point code, e.g. '{block}:{role}'."),
-]
-Kind = Annotated[
-    str | None, typer.Option("--kind", metavar="KIND", help="Kind of stones without one; default: ashlar.")
 ]
 At = Annotated[
     str | None,
@@ -200,54 +128,6 @@ At = Annotated[
         "--at",
         metavar="WHEN",
         help="As it was known when an entry was made, by its number, or at the end of a day: 2024-03-15.",
-    ),
-]
-Sigma = Annotated[
-    float | None,
-    typer.Option(
-        "--sigma",
-        metavar="S",
-        help="Standard deviation of a coordinate in metres, where the file gives none.",
-    ),
-]
-KindWhere = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--kind-where",
-        metavar="RULE",
-        help="Kind of solids by rule, e.g. 'voussoir: z > 0.5'; may be repeated, the last match counts.",
-    ),
-]
-Support = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--support",
-        metavar="EXPR",
-        help="Solids that are supports, e.g. 'z < 0.01', z being the lowest corner; may be repeated.",
-    ),
-]
-Unit = Annotated[
-    str | None,
-    typer.Option(
-        "--unit",
-        metavar="UNIT",
-        help="Unit of coordinates: m, dm, cm, mm, ft or in; default: m, or what the columns say.",
-    ),
-]
-Snap = Annotated[
-    float | None,
-    typer.Option(
-        "--snap",
-        metavar="T",
-        help="Bring matching faces of neighbouring solids within T metres into one plane, e.g. 0.002.",
-    ),
-]
-Planes = Annotated[
-    float | None,
-    typer.Option(
-        "--planes",
-        metavar="T",
-        help="Facets of a scanned solid within T metres of a plane are one face; 0: keep all; default: 0.005.",
     ),
 ]
 SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene file; see docs/scene.md.")]
@@ -274,100 +154,241 @@ AcceptUnsound = Annotated[
 
 _PANEL = "Point clouds and masks"
 
-CloudFiles = Annotated[
-    list[Path] | None,
-    typer.Option(
-        "--cloud",
-        metavar="FILE",
-        help="Point cloud: LAS, LAZ, E57, PTX, PLY, PCD, XYZ or PTS; may be repeated.",
-        rich_help_panel=_PANEL,
-    ),
-]
-Outlines = Annotated[
-    Path | None,
-    typer.Option(
-        "--outlines",
-        metavar="FILE",
-        help="Outlines of its stones: GeoPackage, GeoJSON, Shapefile, DXF, CSV, label PNG or TIFF, COCO or plain "
-        "JSON; with --depth, without a cloud.",
-        rich_help_panel=_PANEL,
-    ),
-]
-Wall = Annotated[
-    str | None,
-    typer.Option(
-        "--wall",
-        metavar="FRAME",
-        help='Frame of the plane of the outlines: FILE.toml, or two points on the wall\'s foot, "X,Y X,Y".',
-        rich_help_panel=_PANEL,
-    ),
-]
-Layer = Annotated[
-    str | None,
-    typer.Option(
-        "--layer",
-        metavar="NAME",
-        help="Layer of the outlines, if the file has several; number or colour of the stones in a picture of classes.",
-        rich_help_panel=_PANEL,
-    ),
-]
-Fields = Annotated[
-    str | None,
-    typer.Option(
-        "--fields",
-        metavar="MAP",
-        help="Attributes of outlines by meaning, e.g. 'code=Stein_Nr,course=Lage'.",
-        rich_help_panel=_PANEL,
-    ),
-]
-OutlineSigma = Annotated[
-    float | None,
-    typer.Option(
-        "--outline-sigma",
-        metavar="S",
-        help="Standard deviation of a drawn corner in metres; default: 0.005, or 0.001 without a cloud.",
-        rich_help_panel=_PANEL,
-    ),
-]
-Margin = Annotated[
-    float | None,
-    typer.Option(
-        "--margin",
-        metavar="T",
-        help="Points nearer to an outline than this are left out; default: three times its sigma.",
-        rich_help_panel=_PANEL,
-    ),
-]
-Slab = Annotated[
-    float | None,
-    typer.Option(
-        "--slab",
-        metavar="T",
-        help="Points farther from the plane of an outline are not of its stone; default: 0.15.",
-        rich_help_panel=_PANEL,
-    ),
-]
-Masks = Annotated[
-    Path | None,
-    typer.Option(
-        "--masks",
-        metavar="FILE",
-        help="Label picture or COCO JSON without a cloud: one plane face for each stone.",
-        rich_help_panel=_PANEL,
-    ),
-]
-Size = Annotated[
-    str | None,
-    typer.Option(
-        "--size",
-        metavar="WxH",
-        help="Width and height in metres, e.g. 1.0x1.2: of the picture, or of the wall from the origin of outlines.",
-        rich_help_panel=_PANEL,
-    ),
-]
-Depth = Annotated[
-    float | None,
-    typer.Option(
-        "--depth", metavar="D", help="Depth in metres of all stones without a cloud.", rich_help_panel=_PANEL
-    ),
-]
+
+@dataclass(frozen=True)
+class Common:
+    """Options of most commands: the database, and how much is printed, for whom."""
+
+    db: Db = DEFAULT_DB
+    json: Json = False
+    verbose: Verbose = False
+
+
+@dataclass(frozen=True)
+class SurveyChoices:
+    """Survey files, and how tables and lists of points are read."""
+
+    files: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            metavar="FILE…",
+            help="Survey files, or folders of them; see docs/formats.md. None with --cloud or --masks.",
+        ),
+    ] = None
+    format: Annotated[
+        SurveyFormat | None,
+        typer.Option(help="Format of the survey files; default: by their endings.", show_default=False),
+    ] = None
+    header: Annotated[
+        Path | None,
+        typer.Option(
+            "--header", metavar="FILE", help="Header (stations, control, depths) for formats without one."
+        ),
+    ] = None
+    columns: Annotated[
+        str | None,
+        typer.Option(
+            "--columns",
+            metavar="MAP",
+            help="Columns of a table that are not recognised, e.g. 'block=Stein,x=Rechts,ignore=Datum'.",
+        ),
+    ] = None
+    sheet: Sheet = None
+    codes: Annotated[
+        str | None,
+        typer.Option("--codes", metavar="TEMPLATE", help="Parts of a point code, e.g. '{block}:{role}'."),
+    ] = None
+    kind: Annotated[
+        str | None,
+        typer.Option("--kind", metavar="KIND", help="Kind of stones without one; default: ashlar."),
+    ] = None
+    kinds: Annotated[
+        str | None,
+        typer.Option(
+            "--kinds",
+            metavar="TABLE",
+            help="Abbreviations of kinds, e.g. 'SPR=springer,VOU=voussoir', or a file.",
+        ),
+    ] = None
+    sigma: Annotated[
+        float | None,
+        typer.Option(
+            "--sigma",
+            metavar="S",
+            help="Standard deviation of a coordinate in metres, where the file gives none.",
+        ),
+    ] = None
+    unit: Annotated[
+        str | None,
+        typer.Option(
+            "--unit",
+            metavar="UNIT",
+            help="Unit of coordinates: m, dm, cm, mm, ft or in; default: m, or what the columns say.",
+        ),
+    ] = None
+
+
+@dataclass(frozen=True)
+class SolidChoices:
+    """How files of solids are read."""
+
+    up: Annotated[
+        UpAxis | None,
+        typer.Option(
+            "--up", help="Axis that points upwards in files of solids; default: z.", show_default=False
+        ),
+    ] = None
+    repair: Annotated[
+        float | None,
+        typer.Option(
+            "--repair",
+            metavar="T",
+            help="Repair open edges and the like of solids within T metres; 0: nothing; default: 10⁻⁵ of their size.",
+        ),
+    ] = None
+    snap: Annotated[
+        float | None,
+        typer.Option(
+            "--snap",
+            metavar="T",
+            help="Bring matching faces of neighbouring solids within T metres into one plane, e.g. 0.002.",
+        ),
+    ] = None
+    planes: Annotated[
+        float | None,
+        typer.Option(
+            "--planes",
+            metavar="T",
+            help="Facets of a scanned solid within T metres of a plane are one face; 0: keep all; default: 0.005.",
+        ),
+    ] = None
+    kind_where: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--kind-where",
+            metavar="RULE",
+            help="Kind of solids by rule, e.g. 'voussoir: z > 0.5'; may be repeated, the last match counts.",
+        ),
+    ] = None
+    support: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--support",
+            metavar="EXPR",
+            help="Solids that are supports, e.g. 'z < 0.01', z being the lowest corner; may be repeated.",
+        ),
+    ] = None
+
+
+@dataclass(frozen=True)
+class CloudChoices:
+    """Point clouds with outlines of their stones."""
+
+    cloud: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--cloud",
+            metavar="FILE",
+            help="Point cloud: LAS, LAZ, E57, PTX, PLY, PCD, XYZ or PTS; may be repeated.",
+            rich_help_panel=_PANEL,
+        ),
+    ] = None
+    outlines: Annotated[
+        Path | None,
+        typer.Option(
+            "--outlines",
+            metavar="FILE",
+            help="Outlines of its stones: GeoPackage, GeoJSON, Shapefile, DXF, CSV, label PNG or TIFF, COCO or plain "
+            "JSON; with --depth, without a cloud.",
+            rich_help_panel=_PANEL,
+        ),
+    ] = None
+    wall: Annotated[
+        str | None,
+        typer.Option(
+            "--wall",
+            metavar="FRAME",
+            help='Frame of the plane of the outlines: FILE.toml, or two points on the wall\'s foot, "X,Y X,Y".',
+            rich_help_panel=_PANEL,
+        ),
+    ] = None
+    layer: Annotated[
+        str | None,
+        typer.Option(
+            "--layer",
+            metavar="NAME",
+            help="Layer of the outlines, if the file has several; "
+            "number or colour of the stones in a picture of classes.",
+            rich_help_panel=_PANEL,
+        ),
+    ] = None
+    chosen: Annotated[
+        str | None,
+        typer.Option(
+            "--fields",
+            metavar="MAP",
+            help="Attributes of outlines by meaning, e.g. 'code=Stein_Nr,course=Lage'.",
+            rich_help_panel=_PANEL,
+        ),
+    ] = None
+    outline_sigma: Annotated[
+        float | None,
+        typer.Option(
+            "--outline-sigma",
+            metavar="S",
+            help="Standard deviation of a drawn corner in metres; default: 0.005, or 0.001 without a cloud.",
+            rich_help_panel=_PANEL,
+        ),
+    ] = None
+    margin: Annotated[
+        float | None,
+        typer.Option(
+            "--margin",
+            metavar="T",
+            help="Points nearer to an outline than this are left out; default: three times its sigma.",
+            rich_help_panel=_PANEL,
+        ),
+    ] = None
+    slab: Annotated[
+        float | None,
+        typer.Option(
+            "--slab",
+            metavar="T",
+            help="Points farther from the plane of an outline are not of its stone; default: 0.15.",
+            rich_help_panel=_PANEL,
+        ),
+    ] = None
+
+
+@dataclass(frozen=True)
+class DrawnChoices(CloudChoices):
+    """Point clouds with outlines, and masks or outlines alone."""
+
+    masks: Annotated[
+        Path | None,
+        typer.Option(
+            "--masks",
+            metavar="FILE",
+            help="Label picture or COCO JSON without a cloud: one plane face for each stone.",
+            rich_help_panel=_PANEL,
+        ),
+    ] = None
+    size: Annotated[
+        str | None,
+        typer.Option(
+            "--size",
+            metavar="WxH",
+            help="Width and height in metres, e.g. 1.0x1.2: "
+            "of the picture, or of the wall from the origin of outlines.",
+            rich_help_panel=_PANEL,
+        ),
+    ] = None
+    depth: Annotated[
+        float | None,
+        typer.Option(
+            "--depth",
+            metavar="D",
+            help="Depth in metres of all stones without a cloud.",
+            rich_help_panel=_PANEL,
+        ),
+    ] = None

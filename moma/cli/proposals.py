@@ -1,7 +1,7 @@
 """Commands that propose stones: unseen ones, and outlines from a picture."""
 
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,7 +10,7 @@ import typer
 
 from ground.errors import UsageError
 from moma.cli.console import reporting, say
-from moma.cli.options import DEFAULT_DB, Db, Json, Verbose
+from moma.cli.options import Common, Json
 from moma.cli.progress import progress_bars
 
 if TYPE_CHECKING:
@@ -33,8 +33,29 @@ class CoreShape(StrEnum):
     STOREYS = "storeys"
 
 
+@dataclass(frozen=True)
+class _CoreChoices:
+    """How the core of a wall is filled."""
+
+    shape: Annotated[
+        CoreShape | None,
+        typer.Option("--as", help="The core as blocks, or as one continuum per storey; default: blocks."),
+    ] = None
+    storey_height: Annotated[
+        float | None,
+        typer.Option(
+            "--storey-height", metavar="M", help="Height of a storey in metres; default: the whole wall."
+        ),
+    ] = None
+    facings: Annotated[
+        tuple[str, str] | None,
+        typer.Option("--facings", metavar="EXPR EXPR", help="Two facings of one wall; default: recognised."),
+    ] = None
+
+
 @reporting
 def propose(
+    *,
     what: Annotated[
         Subject, typer.Argument(metavar="missing|infill", help="Missing stones, or the core of walls.")
     ],
@@ -46,20 +67,7 @@ def propose(
             help="Only with stones for which this holds; if repeated, all must hold.",
         ),
     ] = None,
-    shape: Annotated[
-        CoreShape | None,
-        typer.Option("--as", help="The core as blocks, or as one continuum per storey; default: blocks."),
-    ] = None,
-    storey_height: Annotated[
-        float | None,
-        typer.Option(
-            "--storey-height", metavar="M", help="Height of a storey in metres; default: the whole wall."
-        ),
-    ] = None,
-    facings: Annotated[
-        tuple[str, str] | None,
-        typer.Option("--facings", metavar="EXPR EXPR", help="Two facings of one wall; default: recognised."),
-    ] = None,
+    core: _CoreChoices,
     record: Annotated[
         bool, typer.Option("--record", help="Record them in the database, as hypotheses.")
     ] = False,
@@ -69,29 +77,29 @@ def propose(
     source: Annotated[
         str | None, typer.Option("--source", metavar="TEXT", help="Grounds; default: those of each proposal.")
     ] = None,
-    db: Db = DEFAULT_DB,
-    json: Json = False,
-    verbose: Verbose = False,
+    common: Common,
 ) -> None:
     """Propose missing stones, or the core between two facings; see docs/unseen.md."""
     from moma.cli.text.formats import as_json
     from pipelines.propose.propose import Recording, propose_core, propose_stones
     from survey.unseen.core.settings import InfillSettings, InfillShape
 
-    given = {"--as": shape, "--storey-height": storey_height, "--facings": facings}
-    _refuse_others(what, given, shape, record, author, source)
+    given = {"--as": core.shape, "--storey-height": core.storey_height, "--facings": core.facings}
+    _refuse_others(what, given, core.shape, record, author, source)
     recording = Recording(author, source) if record else None
     if what is Subject.MISSING:
-        report = propose_stones(db, where or (), recording=recording)
+        report = propose_stones(common.db, where or (), recording=recording)
     else:
-        settings = InfillSettings(shape=InfillShape(shape or CoreShape.BLOCKS), storey_height=storey_height)
-        report = propose_core(db, where or (), settings, recording, facings=facings)
-    if json:
+        settings = InfillSettings(
+            shape=InfillShape(core.shape or CoreShape.BLOCKS), storey_height=core.storey_height
+        )
+        report = propose_core(common.db, where or (), settings, recording, facings=core.facings)
+    if common.json:
         print(as_json(asdict(report)))
         return
     if report.proposals:
         print(_table(report))
-    if verbose:
+    if common.verbose:
         for one in report.proposals:
             print("\n".join([f"{one.code}: {one.evidence}", f"  depth: {one.depth_source}"]))
     say(_summary(report, record))
@@ -157,27 +165,26 @@ class MasonryKind(StrEnum):
     RUBBLE = "rubble"
 
 
-@reporting
-def outlines(
-    picture: Annotated[
-        Path, typer.Argument(metavar="PICTURE", help="Orthophoto: PNG, JPEG, TIFF; wall.png of moma cloud.")
-    ],
+@dataclass(frozen=True)
+class _PictureChoices:
+    """What is asked of a picture."""
+
     pixel: Annotated[
         float | None,
         typer.Option("--pixel", metavar="T", help="Side of a pixel in metres, without a world file."),
-    ] = None,
+    ] = None
     size: Annotated[
         str | None,
         typer.Option(
             "--size", metavar="WxH", help="Width and height of the picture in metres, e.g. 4.8x3.9."
         ),
-    ] = None,
+    ] = None
     mask: Annotated[
         Path | None,
         typer.Option(
             "--mask", metavar="FILE", help="Picture of the same size, white where there is no wall."
         ),
-    ] = None,
+    ] = None
     depth_map: Annotated[
         Path | None,
         typer.Option(
@@ -185,12 +192,12 @@ def outlines(
             metavar="FILE",
             help="Depth map of moma cloud; default: the one beside its wall.png.",
         ),
-    ] = None,
+    ] = None
     joint: Annotated[
         float | None,
         typer.Option("--joint", metavar="T", help="Width of the joints in metres; default: by itself."),
-    ] = None,
-    masonry: Annotated[MasonryKind, typer.Option(help="Kind of masonry.")] = MasonryKind.AUTO,
+    ] = None
+    masonry: Annotated[MasonryKind, typer.Option(help="Kind of masonry.")] = MasonryKind.AUTO
     review: Annotated[
         Path | None,
         typer.Option(
@@ -198,11 +205,20 @@ def outlines(
             metavar="FILE",
             help="Open these outlines instead, and mark what the picture contradicts.",
         ),
-    ] = None,
+    ] = None
     corrected: Annotated[
         Path | None,
         typer.Option("--corrected", metavar="FILE", help="Take back what the page saved."),
-    ] = None,
+    ] = None
+
+
+@reporting
+def outlines(
+    *,
+    picture: Annotated[
+        Path, typer.Argument(metavar="PICTURE", help="Orthophoto: PNG, JPEG, TIFF; wall.png of moma cloud.")
+    ],
+    asked: _PictureChoices,
     out: Annotated[
         Path | None,
         typer.Option("--out", metavar="DIR", help="Folder for the files; default: out/outlines-PICTURE."),
@@ -216,14 +232,14 @@ def outlines(
 
     request = OutlineRequest(
         picture,
-        pixel,
-        None if size is None else size_of(size),
-        mask,
-        depth_map,
-        joint,
-        masonry.value,
-        review,
-        corrected,
+        asked.pixel,
+        None if asked.size is None else size_of(asked.size),
+        asked.mask,
+        asked.depth_map,
+        asked.joint,
+        asked.masonry.value,
+        asked.review,
+        asked.corrected,
     )
     folder = out or Path("out") / f"outlines-{picture.stem}"
     with progress_bars() as listener:
@@ -237,7 +253,7 @@ def outlines(
         if drawn.refused
         else f"{picture}: {drawn.stones} stones{courses} ({kinds})",
         f"  {drawn.masonry}, joints {drawn.joint * 1e3:.0f} mm, openings: {drawn.openings}, doubtful: {drawn.doubtful}",
-        *([f"  by hand: {drawn.corrected}, superseded: {len(drawn.superseded)}"] if corrected else []),
+        *([f"  by hand: {drawn.corrected}, superseded: {len(drawn.superseded)}"] if asked.corrected else []),
         *(f"  {path}" for path in drawn.files),
     ]
     print(as_json(asdict(drawn)) if json else "\n".join(lines))

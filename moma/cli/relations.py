@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from moma.cli.console import reporting, say
-from moma.cli.options import DEFAULT_DB, At, Db, Json, Verbose
+from moma.cli.options import At, Common
 
 if TYPE_CHECKING:
     from pipelines.ingest.relate import RelationReport
@@ -16,6 +16,7 @@ __all__ = ["load_path", "relate"]
 
 @reporting
 def relate(
+    *,
     width: Annotated[
         float | None,
         typer.Option(
@@ -30,9 +31,7 @@ def relate(
             help="Largest angle between the faces of a joint; default: as last time, initially 12.",
         ),
     ] = None,
-    db: Db = DEFAULT_DB,
-    json: Json = False,
-    verbose: Verbose = False,
+    common: Common,
 ) -> None:
     """Recompute the relations between stones, the courses and the arches; see docs/relations.md."""
     from archmodel.database.session import open_database
@@ -41,9 +40,9 @@ def relate(
     from pipelines.ingest.relate import relate as compute
 
     given = {name: value for name, value in (("width", width), ("angle", angle)) if value is not None}
-    with open_database(db, create=False) as database, database.session() as session:
+    with open_database(common.db, create=False) as database, database.session() as session:
         report = compute(session, replace(held_settings(session), **given))
-    if json:
+    if common.json:
         print(as_json(asdict(report)))
         return
     columns = dict.fromkeys(("what", "new", "as before", "no longer"))
@@ -65,14 +64,13 @@ def _changes(report: "RelationReport") -> list[dict[str, object]]:
 
 @reporting
 def load_path(
+    *,
     code: Annotated[str, typer.Argument(metavar="CODE", help="Code of a stone.")],
     up: Annotated[
         bool, typer.Option("--up", help="Show the stones that it carries, not those that carry it.")
     ] = False,
     at: At = None,
-    db: Db = DEFAULT_DB,
-    json: Json = False,
-    verbose: Verbose = False,
+    common: Common,
 ) -> None:
     """Show all stones that carry a stone, directly or through others; with --up, all that it carries."""
     from archmodel.database.as_known import entry_named
@@ -80,9 +78,9 @@ def load_path(
     from archmodel.relations.graph import load_path as follow
     from moma.cli.text.formats import as_json, as_table, some
 
-    with open_database(db, create=False) as database, database.session(read_only=True) as session:
+    with open_database(common.db, create=False) as database, database.session(read_only=True) as session:
         path = follow(session, code, up=up, as_of=None if at is None else entry_named(session, at))
-    if json:
+    if common.json:
         print(as_json(asdict(path)))
         return
     if not path.stones:

@@ -7,7 +7,7 @@ import typer
 
 from ground.errors import UsageError
 from moma.cli.console import reporting, say
-from moma.cli.options import DEFAULT_DB, Db, Json, Verbose, check_ending
+from moma.cli.options import Common, Json, Verbose, check_ending
 
 __all__ = ["report", "runs"]
 
@@ -63,13 +63,12 @@ _TABLES = {
 
 @reporting
 def runs(
+    *,
     number: Annotated[
         int | None, typer.Argument(metavar="[N]", help="Number of a run to show in full; default: list all.")
     ] = None,
     against: Annotated[int | None, typer.Option("--against", metavar="M", help="Compare with run M.")] = None,
-    db: Db = DEFAULT_DB,
-    json: Json = False,
-    verbose: Verbose = False,
+    common: Common,
 ) -> None:
     """List the simulation runs, or show one in full, or compare two."""
     from archmodel.database.session import open_database
@@ -78,23 +77,23 @@ def runs(
 
     if number is None and against is not None:
         raise UsageError("--against needs a run to compare", remedy=f"moma runs N --against {against}")
-    with open_database(db, create=False) as database, database.session(read_only=True) as session:
+    with open_database(common.db, create=False) as database, database.session(read_only=True) as session:
         if number is not None and against is not None:
             found: Any = compare_runs(session, number, against)
         else:
             found = list_runs(session) if number is None else describe_run(session, number)
-    if json:
+    if common.json:
         print(as_json(found))
     elif number is None and found:
         marked = [
             row | {"outcome": row["outcome"] + (" (caution)" if row["cautions"] else "")} for row in found
         ]
-        print(as_table(_LIST | _MORE if verbose else _LIST, marked))
+        print(as_table(_LIST | _MORE if common.verbose else _LIST, marked))
         say(f"{len(found)} found")
     elif number is None:
         say("no run found; simulate with moma run SCENE.toml")
     else:
-        print(_comparison(found) if against is not None else _full(found, verbose))
+        print(_comparison(found) if against is not None else _full(found, common.verbose))
 
 
 def _full(run: dict[str, Any], verbose: bool) -> str:

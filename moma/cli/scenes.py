@@ -1,6 +1,6 @@
 """Commands that check and simulate scenes."""
 
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -9,16 +9,13 @@ import typer
 from mechanics.dynamics.outcome import Outcome
 from moma.cli.console import reporting, say, short_lived
 from moma.cli.options import (
-    DEFAULT_DB,
     AcceptUnsound,
-    Db,
-    Json,
+    Common,
     Out,
     Overwrite,
     Profile,
     Resume,
     SceneArgument,
-    Verbose,
 )
 from moma.cli.progress import Interruption, progress_bars
 
@@ -27,6 +24,7 @@ __all__ = ["check", "run", "trade"]
 
 @reporting
 def check(
+    *,
     scene: SceneArgument,
     pictures: Annotated[
         Path | None,
@@ -41,9 +39,7 @@ def check(
     ] = False,
     profile: Profile = None,
     overwrite: Overwrite = False,
-    db: Db = DEFAULT_DB,
-    json: Json = False,
-    verbose: Verbose = False,
+    common: Common,
 ) -> None:
     """Check whether a scene is sound, and estimate its cost; run nothing."""
     from moma.cli.text.checks import check_lines
@@ -52,23 +48,23 @@ def check(
     from pipelines.run.check import check_scene
 
     with progress_bars() as listener:
-        report = check_scene(scene, db, pictures, profile, listener, overwrite)
+        report = check_scene(scene, common.db, pictures, profile, listener, overwrite)
     for warning in report.warnings:
         say(f"warning: {warning}")
-    lines = check_lines(report, verbose, explain)
+    lines = check_lines(report, common.verbose, explain)
     if profile is not None:
         lines[1:1] = profile_lines(profile)
     if pictures is not None:
         lines += [f"  {pictures / name}" for name in report.files]
-    print(as_json(asdict(report)) if json else "\n".join(lines))
+    print(as_json(asdict(report)) if common.json else "\n".join(lines))
     if report.problems:
         raise typer.Exit(1)
 
 
-@reporting
-def run(
-    scene: SceneArgument,
-    out: Out = None,
+@dataclass(frozen=True)
+class _RunChoices:
+    """How a scene is run."""
+
     meshes: Annotated[
         Path | None,
         typer.Option(
@@ -76,24 +72,30 @@ def run(
             metavar="FILE",
             help="Write the meshes of deformable stones for Gmsh, Code_Aster, Abaqus, …; see docs/runs.md.",
         ),
-    ] = None,
+    ] = None
     animate: Annotated[
         bool, typer.Option("--animate", help="Draw the motion as motion.gif too, of up to 60 pictures.")
-    ] = False,
+    ] = False
     repeat: Annotated[
         bool,
         typer.Option(
             "--repeat-half-step",
             help="Run it once more at half the step: how far peaks of stones that rock lie apart.",
         ),
-    ] = False,
-    resume: Resume = None,
-    overwrite: Overwrite = False,
-    accept_unsound: AcceptUnsound = False,
-    profile: Profile = None,
-    db: Db = DEFAULT_DB,
-    json: Json = False,
-    verbose: Verbose = False,
+    ] = False
+    resume: Resume = None
+    overwrite: Overwrite = False
+    accept_unsound: AcceptUnsound = False
+    profile: Profile = None
+
+
+@reporting
+def run(
+    *,
+    scene: SceneArgument,
+    out: Out = None,
+    choices: _RunChoices,
+    common: Common,
 ) -> None:
     """Simulate a scene; write tables, pictures and a report, and store the results in the database."""
     with short_lived():
@@ -105,28 +107,28 @@ def run(
         from pipelines.scene.file import read_scene
 
     folder, stop = out or Path("out") / scene.stem, Interruption()
-    if resume and (summary := finished_run(folder, read_scene(scene).text)) is not None:
+    if choices.resume and (summary := finished_run(folder, read_scene(scene).text)) is not None:
         say(f"{folder}: the run there has finished; leave out --resume to run the scene again")
-        print(as_json(summary) if json else f"{summary['scene']}: {summary['headline']}")
+        print(as_json(summary) if common.json else f"{summary['scene']}: {summary['headline']}")
         return
     with compiling_beside("run"), progress_bars() as listener, stop.handled():
         done = run_scene(
             scene,
-            db,
+            common.db,
             folder,
             stop.listening(listener),
-            profile,
-            meshes,
-            accept_unsound,
+            choices.profile,
+            choices.meshes,
+            choices.accept_unsound,
             stop,
-            resume,
-            overwrite,
-            animate,
-            repeat,
+            choices.resume,
+            choices.overwrite,
+            choices.animate,
+            choices.repeat,
         )
     for warning in done.warnings:
         say(f"warning: {warning}")
-    print(as_json(done.summary) if json else "\n".join(run_lines(done, verbose)))
+    print(as_json(done.summary) if common.json else "\n".join(run_lines(done, common.verbose)))
     if done.summary["outcome"] == "interrupted":
         say(f"the same command with --resume goes on after step {done.summary['steps']}")
     if not Outcome(done.summary["outcome"]).decided:
@@ -135,6 +137,7 @@ def run(
 
 @reporting
 def trade(
+    *,
     scene: SceneArgument,
     budget: Annotated[
         float,
@@ -161,9 +164,7 @@ def trade(
         typer.Option("--out", metavar="DIR", help="Folder of the study; default: out/SCENE-trade."),
     ] = None,
     accept_unsound: AcceptUnsound = False,
-    db: Db = DEFAULT_DB,
-    json: Json = False,
-    verbose: Verbose = False,
+    common: Common,
 ) -> None:
     """Run a scene at many settings; compare the cost and the error of each with the finest."""
     from moma.cli.text.formats import as_json
@@ -174,10 +175,10 @@ def trade(
     folder = out or Path("out") / f"{scene.stem}-trade"
     try:
         with progress_bars() as listener:
-            done = run_trade(scene, db, folder, asked, listener)
+            done = run_trade(scene, common.db, folder, asked, listener)
     except KeyboardInterrupt:
         say(f"stopped; completed runs are kept in {folder}, and the same command resumes from there")
         raise typer.Exit(1) from None
-    print(as_json(done.record) if json else "\n".join(trade_lines(done, verbose)))
+    print(as_json(done.record) if common.json else "\n".join(trade_lines(done, common.verbose)))
     if done.record["reference"] is None:
         raise typer.Exit(1)

@@ -1,7 +1,7 @@
 """Commands that read survey files, or write one to start from."""
 
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,39 +11,14 @@ import typer
 from ground.errors import UsageError
 from moma.cli.console import reporting, say
 from moma.cli.options import (
-    DEFAULT_DB,
-    CloudFiles,
-    Codes,
-    Columns,
-    Db,
-    Depth,
-    Fields,
-    Format,
-    Header,
+    CloudChoices,
+    Common,
+    DrawnChoices,
     Json,
-    Kind,
-    Kinds,
-    KindWhere,
-    Layer,
-    Margin,
-    Masks,
-    Outlines,
-    OutlineSigma,
     Overwrite,
-    Planes,
-    Repair,
-    Sheet,
-    Sigma,
-    Size,
-    Slab,
-    Snap,
-    Support,
-    SurveyFormat,
-    SurveyOrCloud,
-    Unit,
-    Up,
+    SolidChoices,
+    SurveyChoices,
     Verbose,
-    Wall,
     check_ending,
 )
 from moma.cli.progress import progress_bars
@@ -51,7 +26,7 @@ from moma.cli.progress import progress_bars
 if TYPE_CHECKING:
     from survey.formats.options import ReadingOptions
 
-__all__ = ["Blunders", "Level", "Moved", "cloud", "ingest", "orient", "outlined", "sample", "survey_report"]
+__all__ = ["Blunders", "Level", "Moved", "cloud", "ingest", "orient", "sample", "survey_report"]
 
 
 class Level(StrEnum):
@@ -77,39 +52,47 @@ class Blunders(StrEnum):
     REMOVE = "remove"
 
 
+@dataclass(frozen=True)
+class _SampleChoices:
+    """Variant of a sample."""
+
+    moved: Annotated[
+        Moved | None,
+        typer.Option(
+            help="Move its stones by a simulation: the wall by any cause, facings and tower by settlement."
+        ),
+    ] = None
+    small: Annotated[
+        bool, typer.Option("--small", help="Smaller: the tower, and the wall with --moved settlement.")
+    ] = False
+    phases: Annotated[
+        bool,
+        typer.Option("--phases", help="Upper courses were laid later: the wall with --moved settlement."),
+    ] = False
+    scan: Annotated[
+        bool, typer.Option("--scan", help="With a scan and outlines of the stones: the window.")
+    ] = False
+    courses: Annotated[
+        int | None, typer.Option(help="Courses of the tower; default: 40, or 12 with --small.")
+    ] = None
+    photographs: Annotated[
+        bool, typer.Option("--photographs", help="Twelve photographs of the window too, to orient.")
+    ] = False
+    pictures: Annotated[
+        bool, typer.Option("--pictures", help="With --photographs: render the pictures themselves.")
+    ] = False
+
+
 @reporting
 def sample(
+    *,
     kind: Annotated[
         str,
         typer.Argument(
             help="arch, block, corner, facings, ribvault, tower, vault, wall, window, rubble-wall or granite-wall."
         ),
     ],
-    moved: Annotated[
-        Moved | None,
-        typer.Option(
-            help="Move its stones by a simulation: the wall by any cause, facings and tower by settlement."
-        ),
-    ] = None,
-    small: Annotated[
-        bool, typer.Option("--small", help="Smaller: the tower, and the wall with --moved settlement.")
-    ] = False,
-    phases: Annotated[
-        bool,
-        typer.Option("--phases", help="Upper courses were laid later: the wall with --moved settlement."),
-    ] = False,
-    scan: Annotated[
-        bool, typer.Option("--scan", help="With a scan and outlines of the stones: the window.")
-    ] = False,
-    courses: Annotated[
-        int | None, typer.Option(help="Courses of the tower; default: 40, or 12 with --small.")
-    ] = None,
-    photographs: Annotated[
-        bool, typer.Option("--photographs", help="Twelve photographs of the window too, to orient.")
-    ] = False,
-    pictures: Annotated[
-        bool, typer.Option("--pictures", help="With --photographs: render the pictures themselves.")
-    ] = False,
+    variant: _SampleChoices,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="DIR", help="Folder for the files; default: KIND.")
     ] = None,
@@ -120,18 +103,7 @@ def sample(
     from pipelines.samples.write import write_sample
 
     with progress_bars() as listener:
-        written = write_sample(
-            kind,
-            out or Path(kind),
-            listener,
-            moved=moved,
-            small=small,
-            phases=phases,
-            scan=scan,
-            courses=courses,
-            photographs=photographs,
-            pictures=pictures,
-        )
+        written = write_sample(kind, out or Path(kind), listener, **vars(variant))
     lines = [
         f"{written.title}: {'a synthetic survey of ' if written.synthetic else ''}{written.stones} stones",
         *(f"  {path}" for path in written.files),
@@ -141,22 +113,20 @@ def sample(
     print(as_json(asdict(written)) if json else "\n".join(lines))
 
 
-@reporting
-def orient(
-    project: Annotated[
-        Path | None,
-        typer.Argument(metavar="PROJECT.toml", help="Project file; see docs/howto/photographs.md."),
-    ] = None,
+@dataclass(frozen=True)
+class _ExportChoices:
+    """What a project file states, for an export without one."""
+
     photomodeler: Annotated[
         Path | None,
         typer.Option(
             "--photomodeler", metavar="FILE", help="Text export of PhotoModeler, without a project file."
         ),
-    ] = None,
+    ] = None
     control: Annotated[
         Path | None,
         typer.Option("--control", metavar="FILE", help="Control points: number, name, X, Y, Z, deviations."),
-    ] = None,
+    ] = None
     calibrate: Annotated[
         str | None,
         typer.Option(
@@ -164,14 +134,14 @@ def orient(
             metavar="LIST",
             help="Parameters of the camera that are estimated, e.g. c,xp,yp,K1,K2.",
         ),
-    ] = None,
+    ] = None
     fixed_control: Annotated[
         bool,
         typer.Option("--fixed-control", help="Control points keep their places, whatever their deviations."),
-    ] = False,
+    ] = False
     check: Annotated[
         str | None, typer.Option("--check", metavar="LIST", help="Control points that only check the result.")
-    ] = None,
+    ] = None
     size: Annotated[
         str | None,
         typer.Option(
@@ -179,11 +149,21 @@ def orient(
             metavar="WIDTHxHEIGHT",
             help="Size of the photographs in pixels, where the export does not state it.",
         ),
-    ] = None,
+    ] = None
     blunders: Annotated[
         Blunders | None,
         typer.Option(help="Whether marks that the test finds wrong are left out; default: report."),
+    ] = None
+
+
+@reporting
+def orient(
+    *,
+    project: Annotated[
+        Path | None,
+        typer.Argument(metavar="PROJECT.toml", help="Project file; see docs/howto/photographs.md."),
     ] = None,
+    export: _ExportChoices,
     out: Annotated[
         Path | None,
         typer.Option("--out", metavar="DIR", help="Folder for the results; default: out/PROJECT."),
@@ -198,28 +178,26 @@ def orient(
     from pipelines.reports.photographs.orient import orient_photographs, photomodeler_project
     from pipelines.reports.photographs.project import read_project
 
-    if (project is None) == (photomodeler is None):
+    if (project is None) == (export.photomodeler is None):
         raise UsageError("neither or both of PROJECT.toml and --photomodeler", remedy="give one of them")
     if project is not None:
-        for name, given in (
-            ("--control", control), ("--calibrate", calibrate), ("--fixed-control", fixed_control or None),
-            ("--check", check), ("--size", size), ("--blunders", blunders),
-        ):  # fmt: skip
-            if given is not None:
-                raise UsageError(f"{name} with a project file", remedy="write it into the project file")
+        for name, value in vars(export).items():
+            if value not in (None, False):
+                option = f"--{name.replace('_', '-')}"
+                raise UsageError(f"{option} with a project file", remedy="write it into the project file")
         read = read_project(project)
     else:
-        assert photomodeler is not None
+        assert export.photomodeler is not None
         read = photomodeler_project(
-            photomodeler,
-            control,
-            _names(calibrate),
-            fixed_control,
-            _names(check),
-            (blunders or Blunders.REPORT).value,
-            None if size is None else _pixels(size),
+            export.photomodeler,
+            export.control,
+            _names(export.calibrate),
+            export.fixed_control,
+            _names(export.check),
+            (export.blunders or Blunders.REPORT).value,
+            None if export.size is None else _pixels(export.size),
         )
-    folder = out or Path("out") / (project or photomodeler or Path("photographs")).stem
+    folder = out or Path("out") / (project or export.photomodeler or Path("photographs")).stem
     with compiling_beside("orient"):
         report = orient_photographs(read, folder)
     for remark in report.values["remarks"]:
@@ -242,22 +220,9 @@ def _names(text: str | None) -> tuple[str, ...]:
 
 @reporting
 def ingest(
-    files: SurveyOrCloud = None,
-    format: Format = None,
-    header: Header = None,
-    columns: Columns = None,
-    sheet: Sheet = None,
-    codes: Codes = None,
-    kind: Kind = None,
-    kinds: Kinds = None,
-    sigma: Sigma = None,
-    unit: Unit = None,
-    up: Up = None,
-    repair: Repair = None,
-    snap: Snap = None,
-    planes: Planes = None,
-    kind_where: KindWhere = None,
-    support: Support = None,
+    *,
+    survey: SurveyChoices,
+    solids: SolidChoices,
     keep_going: Annotated[
         bool,
         typer.Option(
@@ -276,24 +241,12 @@ def ingest(
             "--again", help="Accept new measurements of stones in the database; earlier ones are kept."
         ),
     ] = False,
-    cloud: CloudFiles = None,
-    outlines: Outlines = None,
-    wall: Wall = None,
-    layer: Layer = None,
-    fields: Fields = None,
-    outline_sigma: OutlineSigma = None,
-    margin: Margin = None,
-    slab: Slab = None,
-    masks: Masks = None,
-    size: Size = None,
-    depth: Depth = None,
+    drawn: DrawnChoices,
     review: Annotated[
         Path | None,
         typer.Option("--review", metavar="FILE.csv", help="List of the outlines that should be looked at."),
     ] = None,
-    db: Db = DEFAULT_DB,
-    json: Json = False,
-    verbose: Verbose = False,
+    common: Common,
 ) -> None:
     """Ingest survey files into the database: all of them, or none if anything is wrong."""
     from ground.kernels.beside import compiling_beside
@@ -301,48 +254,18 @@ def ingest(
     from moma.cli.text.runs_and_surveys import ingest_lines
     from pipelines.ingest.ingest import ingest as ingest_files
     from pipelines.ingest.kind_rules import kind_rules
-    from pipelines.ingest.reading_options import format_of_all, reading_options
 
     check_ending(review, ".csv")
     if rejects is not None and not keep_going:
         raise UsageError("--rejects without --keep-going", remedy="give --keep-going too")
-    options = reading_options(
-        *(header, codes, kind, sigma, unit, snap, planes, columns, sheet, kinds, up and up.value, repair)
-    )
-    rules = kind_rules(kind_where or (), support or ())
-    drawn = outlined(
-        options,
-        files,
-        cloud,
-        masks,
-        format=format,
-        outlines=outlines,
-        wall=wall,
-        layer=layer,
-        fields=fields,
-        outline_sigma=outline_sigma,
-        margin=margin,
-        slab=slab,
-        size=size,
-        depth=depth,
-    )
-    if review is not None and drawn is None:
+    rules = kind_rules(solids.kind_where or (), solids.support or ())
+    name, paths, options = _sources(survey, drawn, solids)
+    if review is not None and name not in ("cloud", "masks"):
         raise UsageError("--review without --cloud or --masks", remedy="it lists outlines")
-    name, paths, options = drawn or (
-        format.value if format else format_of_all(files or ()),
-        files or [],
-        options,
-    )
-    _check_fitting(
-        name,
-        unit,
-        {"--columns": columns, "--sheet": sheet, "--kinds": kinds},
-        {"--snap": snap, "--planes": planes, "--up": up, "--repair": repair},
-    )
     with compiling_beside("ingest"), progress_bars() as listener:
         report = ingest_files(
             paths,
-            db,
+            common.db,
             name,
             listener,
             options=options,
@@ -353,30 +276,15 @@ def ingest(
     if review is not None:
         from pipelines.ingest.outlined import write_review
 
-        write_review(review, [one for file in report.files for one in file.review])
-    print(as_json(asdict(report)) if json else "\n".join(ingest_lines(report, verbose)))
+        write_review(review, [outline for file in report.files for outline in file.review])
+    print(as_json(asdict(report)) if common.json else "\n".join(ingest_lines(report, common.verbose)))
 
 
 @reporting
 def survey_report(
-    files: SurveyOrCloud = None,
-    format: Format = None,
-    header: Header = None,
-    columns: Columns = None,
-    sheet: Sheet = None,
-    codes: Codes = None,
-    kind: Kind = None,
-    kinds: Kinds = None,
-    sigma: Sigma = None,
-    unit: Unit = None,
-    cloud: CloudFiles = None,
-    outlines: Outlines = None,
-    wall: Wall = None,
-    layer: Layer = None,
-    fields: Fields = None,
-    outline_sigma: OutlineSigma = None,
-    margin: Margin = None,
-    slab: Slab = None,
+    *,
+    survey: SurveyChoices,
+    drawn: CloudChoices,
     orthophoto: Annotated[
         Path | None,
         typer.Option(
@@ -401,34 +309,11 @@ def survey_report(
 ) -> None:
     """Judge survey files without a database: precision, what has moved, masonry, kinds, stones to measure again."""
     from moma.cli.text.runs_and_surveys import survey_report_lines
-    from pipelines.ingest.reading_options import format_of_all, reading_options
     from pipelines.reports.survey.report import INDEX, report_surveys
     from survey.quality.masonry.index import given_grade
 
-    options = reading_options(header, codes, kind, sigma, unit, columns=columns, sheet=sheet, kinds=kinds)
-    drawn = outlined(
-        options,
-        files,
-        cloud,
-        None,
-        format=format,
-        outlines=outlines,
-        wall=wall,
-        layer=layer,
-        fields=fields,
-        outline_sigma=outline_sigma,
-        margin=margin,
-        slab=slab,
-    )
-    name, paths, options = drawn or (
-        format.value if format else format_of_all(files or ()),
-        files or [],
-        options,
-    )
-    if not paths:
-        raise UsageError("no survey file", remedy="name at least one")
-    _check_fitting(name, unit, {"--columns": columns, "--sheet": sheet, "--kinds": kinds}, {})
-    folder = out or Path("out") / f"survey-{(outlines or paths[0]).resolve().stem}"
+    name, paths, options = _sources(survey, drawn)
+    folder = out or Path("out") / f"survey-{(drawn.outlines or paths[0]).resolve().stem}"
     levels = {"MM": mortar, "SM": state}
     given = {name: given_grade(level.value) for name, level in levels.items() if level is not None}
     with progress_bars() as listener:
@@ -499,82 +384,102 @@ def cloud(
     print(as_json(asdict(drawn)) if json else "\n".join(lines))
 
 
-def outlined(
-    base: "ReadingOptions",
-    files: list[Path] | None,
-    clouds: list[Path] | None,
-    masks: Path | None,
-    *,
-    format: SurveyFormat | None,
-    **given: object,
-) -> "tuple[str, list[Path], ReadingOptions] | None":
-    """Return format, files and options of a cloud with outlines, or of masks or outlines alone; None without any.
-
-    Outlines without a cloud are known by the size or depth that goes with them.
+def _sources(
+    survey: SurveyChoices, drawn: CloudChoices, solids: SolidChoices | None = None
+) -> "tuple[str, list[Path], ReadingOptions]":
+    """Return the format of survey files, the files, and the options with which they are read.
 
     Raises
     ------
     UsageError
         if options contradict each other, or are of another format
     """
-    named = {f"--{name.replace('_', '-')}": value for name, value in given.items() if value is not None}
-    alone = masks
-    if clouds is None and masks is None and ("--depth" in named or "--size" in named):
-        alone = given["outlines"]  # type: ignore[assignment]
+    from pipelines.ingest.reading_options import format_of_all, reading_options
+
+    choices = {**vars(survey), **(vars(solids) if solids else {})}
+    for name in ("files", "format", "kind_where", "support"):
+        choices.pop(name, None)
+    if (axis := choices.get("up")) is not None:
+        choices["up"] = axis.value
+    options = reading_options(**choices)
+    if (outlines := _outlined(options, survey, drawn)) is not None:
+        _check_fitting(outlines[0], choices)
+        return outlines
+    if not survey.files:
+        raise UsageError("no survey file", remedy="name at least one")
+    name = survey.format.value if survey.format else format_of_all(survey.files)
+    _check_fitting(name, choices)
+    return name, survey.files, options
+
+
+def _outlined(
+    base: "ReadingOptions", survey: SurveyChoices, drawn: CloudChoices
+) -> "tuple[str, list[Path], ReadingOptions] | None":
+    """Return format, files and options of a cloud with outlines, or of masks or outlines alone; None without any.
+
+    Outlines without a cloud are known by the size or depth that goes with them.
+    """
+    given = dict(vars(drawn))
+    clouds, masks = given.pop("cloud"), given.pop("masks", None)
+    named = {
+        f"--{'fields' if name == 'chosen' else name.replace('_', '-')}": name
+        for name in given
+        if given[name] is not None
+    }
+    alone = (
+        given["outlines"]
+        if clouds is None and masks is None and {"--depth", "--size"} & named.keys()
+        else masks
+    )
     if clouds is None and alone is None:
-        for name in named:
-            what = f"{name} without --cloud" + (" or --masks" if name in ("--wall", "--fields") else "")
-            remedy = (
-                "give --masks or --outlines too"
-                if name in ("--size", "--depth")
-                else "give --cloud FILE and --outlines FILE"
-                + ("; or --depth, for outlines alone" if name == "--outlines" else "")
+        for option in named:
+            sizes = option in ("--size", "--depth")
+            lacking = (
+                "--masks"
+                if sizes
+                else "--cloud or --masks"
+                if option in ("--wall", "--fields")
+                else "--cloud"
             )
-            raise UsageError(
-                what if name not in ("--size", "--depth") else f"{name} without --masks", remedy=remedy
-            )
+            files = "--masks or --outlines too" if sizes else "--cloud FILE and --outlines FILE"
+            alternative = "; or --depth, for outlines alone" if option == "--outlines" else ""
+            raise UsageError(f"{option} without {lacking}", remedy=f"give {files}{alternative}")
         return None
     main = "--cloud" if clouds else "--masks" if masks else "--outlines"
-    if files or (clouds and masks):
+    if survey.files or (clouds and masks):
         other = "--masks" if clouds and masks else "survey files"
         raise UsageError(f"{other} beside {main}", remedy="ingest one after the other")
-    if format is not None:
+    if survey.format is not None:
         raise UsageError(f"--format beside {main}", remedy="leave it out")
     from pipelines.ingest.outlined import cloud_options, mask_options
 
     fitting = _OF_CLOUDS if clouds else _OF_MASKS if masks else _OF_OUTLINES
-    for name in named:
-        if name.strip("-").replace("-", "_") not in fitting and name != main:
-            raise UsageError(f"{name} with {main}", remedy="leave it out")
+    for option, name in named.items():
+        if name not in fitting and option != main:
+            raise UsageError(f"{option} with {main}", remedy="leave it out")
+    choices = {name: given[name] for name in fitting}
     if alone is not None:
-        chosen = {"chosen" if name == "fields" else name: given[name] for name in fitting}
-        return "masks", [alone], mask_options(base, **chosen)  # type: ignore[arg-type]
+        return "masks", [alone], mask_options(base, **choices)
     if given["outlines"] is None:
         raise UsageError(
             "--cloud without --outlines", remedy="name the outlines of its stones: --outlines FILE"
         )
-    chosen = {"chosen" if name == "fields" else name: given[name] for name in fitting}
-    return "cloud", list(clouds or ()), cloud_options(base, **chosen)  # type: ignore[arg-type]
+    return "cloud", list(clouds or ()), cloud_options(base, **choices)
 
 
-def _check_fitting(
-    name: str,
-    unit: str | None,
-    tables: Mapping[str, str | None],
-    solids: Mapping[str, object],
-) -> None:
+def _check_fitting(name: str, choices: Mapping[str, object]) -> None:
     """Refuse options of tables and of solids with other formats, and a unit where lengths are metres."""
-    for option, given in solids.items():
-        if given is not None and name != "solids":
-            raise UsageError(f"{option} with format {name}", remedy="it is for --format solids")
-    for option, text in tables.items():
-        unfit = ("moma", "solids") if option == "--kinds" else ("moma", "solids", "cloud", "masks")
-        if text is not None and name in unfit:
-            raise UsageError(f"{option} with format {name}", remedy="it is for tables and lists of points")
-    if unit is not None and name in ("moma", "cloud"):
+    for option in ("snap", "planes", "up", "repair"):
+        if choices.get(option) is not None and name != "solids":
+            raise UsageError(f"--{option} with format {name}", remedy="it is for --format solids")
+    for option in ("columns", "sheet", "kinds"):
+        unfit = ("moma", "solids") if option == "kinds" else ("moma", "solids", "cloud", "masks")
+        if choices[option] is not None and name in unfit:
+            raise UsageError(f"--{option} with format {name}", remedy="it is for tables and lists of points")
+    if choices["unit"] is not None and name in ("moma", "cloud"):
         raise UsageError(f"--unit with format {name}", remedy="its lengths are metres")
 
 
-_OF_MASKS = ("size", "depth", "wall", "fields", "layer")
+_OF_MASKS = ("size", "depth", "wall", "chosen", "layer")
 _OF_OUTLINES = (*_OF_MASKS, "outline_sigma")
-_OF_CLOUDS = ("outlines", "wall", "layer", "fields", "outline_sigma", "margin", "slab")
+_OF_CLOUDS = ("outlines", "wall", "layer", "chosen", "outline_sigma", "margin", "slab")

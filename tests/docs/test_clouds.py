@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from moma.cli.options import CloudFiles
+from moma.cli.options import CloudChoices
 from tests.docs.pages import blocks, ran
 from tests.paths import ROOT
 
@@ -49,4 +49,4 @@ def test_every_reason_of_the_review_is_explained():
     assert {"overlap", "leak", "rejected", "in pieces", "specks"} <= given
     explained = set(re.findall(r"`([a-z ]+)`", TEXT.split("| reason |")[1].split("Stones without")[0]))
     assert given - {"stretched"} <= explained
-    assert "may be repeated" in CloudFiles.__metadata__[0].help
+    assert "may be repeated" in CloudChoices.__annotations__["cloud"].__metadata__[0].help

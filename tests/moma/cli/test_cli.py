@@ -6,12 +6,15 @@ import json
 import os
 import subprocess
 import sys
-from typing import get_args, get_type_hints
+from dataclasses import dataclass
+from typing import Annotated, get_args, get_type_hints
 
 import pytest
+import typer
 
 import moma
 from moma.cli import app
+from moma.cli.console import reporting
 from moma.cli.options import SurveyFormat
 from survey.formats.reading import FORMATS
 from tests.moma.commands import answer, fails, invoke, prints
@@ -32,6 +35,37 @@ def database(tmp_path_factory):
 
 def test_the_formats_that_can_be_named_are_those_that_are_read():
     assert [one.value for one in SurveyFormat] == list(FORMATS)
+
+
+@dataclass(frozen=True)
+class Choices:
+    """A group of options."""
+
+    width: Annotated[float, typer.Option("--wide", min=0.0, help="Width [m].")] = 0.5
+    marks: Annotated[list[str] | None, typer.Option("--mark")] = None
+
+
+def test_the_fields_of_a_dataclass_are_options_in_its_place():
+    received = []
+
+    @reporting
+    def measure(
+        *,
+        code: Annotated[str, typer.Argument()],
+        choices: Choices,
+        verbose: Annotated[bool, typer.Option("-v")] = False,
+    ) -> None:
+        received.append((code, choices, verbose))
+
+    single = typer.Typer(add_completion=False)
+    single.command()(measure)
+    command = typer.main.get_command(single)
+    assert [option.opts for option in command.params] == [["code"], ["--wide"], ["--mark"], ["-v"]]
+    for line in (["A1"], ["A1", "--wide", "2", "--mark", "a", "--mark", "b", "-v"]):
+        command.main(line, standalone_mode=False)
+    assert received == [("A1", Choices(), False), ("A1", Choices(2.0, ["a", "b"]), True)]
+    with pytest.raises(Exception, match="greater than or equal to 0"):
+        command.main(["A1", "--wide", "-1"], standalone_mode=False)
 
 
 @pytest.mark.slow
