@@ -39,7 +39,7 @@ def _going_on(folder: Path) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class _AssessChoices:
-    """What is asked of a scene."""
+    """Loads of an assessment, and how far it goes."""
 
     load: Annotated[
         list[str] | None,

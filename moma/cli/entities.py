@@ -23,7 +23,7 @@ Columns = Annotated[
 
 @dataclass(frozen=True)
 class _ListChoices:
-    """How entities are listed, or counted."""
+    """Form of a list or count of entities."""
 
     format: Annotated[ListFormat | None, typer.Option(help="Format of the list; default: table.")] = None
     flat: Annotated[

@@ -230,7 +230,7 @@ class SurveyChoices:
 
 @dataclass(frozen=True)
 class SolidChoices:
-    """How files of solids are read."""
+    """Options of files of solids."""
 
     up: Annotated[
         UpAxis | None,

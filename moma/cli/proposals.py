@@ -35,7 +35,7 @@ class CoreShape(StrEnum):
 
 @dataclass(frozen=True)
 class _CoreChoices:
-    """How the core of a wall is filled."""
+    """Form of the core of a wall."""
 
     shape: Annotated[
         CoreShape | None,
@@ -167,7 +167,7 @@ class MasonryKind(StrEnum):
 
 @dataclass(frozen=True)
 class _PictureChoices:
-    """What is asked of a picture."""
+    """Scale, kind and corrections of a picture."""
 
     pixel: Annotated[
         float | None,

@@ -63,7 +63,7 @@ def check(
 
 @dataclass(frozen=True)
 class _RunChoices:
-    """How a scene is run."""
+    """Options of a run."""
 
     meshes: Annotated[
         Path | None,

@@ -115,7 +115,7 @@ def sample(
 
 @dataclass(frozen=True)
 class _ExportChoices:
-    """What a project file states, for an export without one."""
+    """Statements of a project file, for an export without one."""
 
     photomodeler: Annotated[
         Path | None,

@@ -15,7 +15,7 @@ MOST = {
     "numbers of mechanics": 740,
     "numbers of pipelines": 915,
     "long functions": 55,
-    "wide functions": 16,
+    "wide functions": 5,
     "undocumented functions": 176,
 }
 """Today's figures: whoever lowers one lowers its bound, and nobody raises one."""
