@@ -52,9 +52,9 @@ class Carrier:
     def restore(self, carried: Carried) -> None:
         """Take over the values of another run of the same scene; arrays are taken over, not copied."""
         for name in self.CARRIED:
-            own = getattr(self, name)
-            if isinstance(own, Carrier):
-                own.restore(carried[name])
+            value = getattr(self, name)
+            if isinstance(value, Carrier):
+                value.restore(carried[name])
             else:
                 setattr(self, name, carried[name])
 

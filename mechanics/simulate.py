@@ -172,15 +172,15 @@ def _confirmed(result: Result, run: Callable[[], Result]) -> Result:
     clock = Clock()
     with clock("confirm"):
         try:
-            told = run().outcome
+            outcome = run().outcome
         except SolverError:
             result = replace(result, cautions=(*result.cautions, _UNTRIED))
-            told = result.outcome
-    if told is Outcome.COLLAPSED:
+            outcome = result.outcome
+    if outcome is Outcome.COLLAPSED:
         result = _instead(result, Outcome.UNDECIDED, _CLAMPED)
-    elif told is Outcome.INTERRUPTED:
+    elif outcome is Outcome.INTERRUPTED:
         # a rest that is not confirmed is no verdict
-        result = _instead(result, told, "")
+        result = _instead(result, outcome, "")
     seconds = result.wall_time.get("confirm", 0.0) + clock.seconds["confirm"]
     return replace(result, wall_time={**result.wall_time, "confirm": seconds})
 
@@ -225,13 +225,13 @@ def _simulate(
             outcome = watch(step, balance)
         if outcome.rests and (settings.stop_at_equilibrium or count == total):
             with clock("confirm"):
-                other, surely = disproof(run.simulation)
-            if other is not None:
+                disproved, surely = disproof(run.simulation)
+            if disproved is not None:
                 outcome = watch.disproved(outcome, run.simulation.state, surely)
                 if outcome is Outcome.MOVING:
                     if settings.relaxation:
                         log.energy.halted(run.simulation.state)
-                    run.simulation = other
+                    run.simulation = disproved
         text = f"balance {balance.max():.1e}, η {step.solution.natural_map:.1e}"
         report(Progress("step", count, total, text))
         done = watch.hopeless or (settings.stop_at_equilibrium and outcome is not Outcome.MOVING)
@@ -372,33 +372,33 @@ class _Building:
         why = "was interrupted" if last.outcome == Outcome.INTERRUPTED else "did not come to rest"
         unbuilt = (f"{left} of {count} stages were not built, as stage {last.name!r} {why}",)
         earlier = (
-            f"in stage {end.name!r}, {said}"
+            f"in stage {end.name!r}, {caution}"
             for end in self.ends[:-1]
-            for said in filter(None, (end.reason, *end.cautions))
+            for caution in filter(None, (end.reason, *end.cautions))
         )
         return (*(unbuilt if left else ()), *last.cautions, *earlier)
 
     def carried(self) -> dict[str, Any]:
         """Return what the next stage must know of those before."""
-        kept = {"ends": self.ends, "seconds": dict(self.seconds)}
+        carried = {"ends": self.ends, "seconds": dict(self.seconds)}
         if self.before is None:
-            return kept
-        return kept | {"state": self.before.state, "memory": self.before.memory.carried()}
+            return carried
+        return carried | {"state": self.before.state, "memory": self.before.memory.carried()}
 
     def _resumed(self) -> Carried | None:
         """Go on where another run of the same stages stood; return what its stage carried, None if it had not begun."""
-        found = None if self.archive is None else self.archive.earlier()
-        if found is None:
+        archived = None if self.archive is None else self.archive.earlier()
+        if archived is None:
             return None
-        self.ends, self.seconds = tuple(found["ends"]), dict(found["seconds"])
+        self.ends, self.seconds = tuple(archived["ends"]), dict(archived["seconds"])
         number = len(self.ends)
         if number:
             model, drawn = build_model(self.stages[number - 1].scene, meshed=self.whole)
             memory = Memory()
-            memory.restore(found["memory"])
-            self.before = Handover(model, drawn, found["state"], memory)
-        own: Carried | None = found.get(f"run {number}")
-        return own
+            memory.restore(archived["memory"])
+            self.before = Handover(model, drawn, archived["state"], memory)
+        carried: Carried | None = archived.get(f"run {number}")
+        return carried
 
 
 class _StageArchive:

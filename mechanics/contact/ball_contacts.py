@@ -102,13 +102,13 @@ def ball_contacts(
     shapes, key, limit : pairs, their first key and alert distance
     gap : (np,) between ball and undeformed shape [m]
     """
-    seen, found = np.zeros(len(shapes), dtype=bool), []
+    seen, ball_pairs = np.zeros(len(shapes), dtype=bool), []
     for p, pair in enumerate(shapes):
-        ball, other = pair if surfaces.radius[pair[0]] > 0 else pair[::-1]
-        rows = _face_rows(surfaces, placed, cells, ball, other)
+        ball, antagonist = pair if surfaces.radius[pair[0]] > 0 else pair[::-1]
+        rows = _face_rows(surfaces, placed, cells, ball, antagonist)
         radius, centre = surfaces.radius[ball], placed.centre[surfaces.body[ball]]
-        own = surfaces.body[other]
-        at = (centre - placed.centre[own]) @ placed.rotation[own]
+        body = surfaces.body[antagonist]
+        at = (centre - placed.centre[body]) @ placed.rotation[body]
         before, _ = _gaps(cells.middle[rows], cells.spread[rows], at, radius)
         if len(before) == 0:
             continue
@@ -116,13 +116,15 @@ def ball_contacts(
         curved = abs(cells.spread[rows][nearest]) / (2.0 * radius)
         seen[p] = max(before[nearest] - gap[p], curved) <= _UNSEEN * radius
         if seen[p]:
-            found.append(_pair(surfaces, placed, state, cells, rows, (ball, other), key[p], limit[p]))
-    return found, seen
+            ball_pairs.append(
+                _pair(surfaces, placed, state, cells, rows, (ball, antagonist), key[p], limit[p])
+            )
+    return ball_pairs, seen
 
 
-def _face_rows(surfaces: Surfaces, placed: Placed, cells: FaceCells, ball: int, other: int) -> slice:
+def _face_rows(surfaces: Surfaces, placed: Placed, cells: FaceCells, ball: int, shape: int) -> slice:
     """Return the cells of the face over which the centre of a ball lies highest."""
-    faces = slice(surfaces.shapes.fptr[other], surfaces.shapes.fptr[other + 1])
+    faces = slice(surfaces.shapes.fptr[shape], surfaces.shapes.fptr[shape + 1])
     corner = placed.shapes.vertex[surfaces.shapes.corner[surfaces.shapes.cptr[faces]]]
     height = np.einsum("fi,fi->f", placed.centre[surfaces.body[ball]] - corner, placed.shapes.normal[faces])
     face = int(faces.start + height.argmax())

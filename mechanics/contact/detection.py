@@ -134,25 +134,25 @@ class Detector:
 
     def _touching(self, placed: Placed, reach: Array) -> Pairs:
         """Find the pairs of shapes nearer than their alert distance."""
-        own = self.surfaces
+        surfaces = self.surfaces
         # a thin part of a stone is watched like the whole stone
-        size = own.size[own.body]
+        size = surfaces.size[surfaces.body]
         margin = np.maximum(self.alert * size, self.distance) + reach
-        low, high = boxes(own.shapes.vptr, placed.shapes.vertex, margin)
-        round_ = own.radius > 0
-        around = placed.centre[own.body[round_]], (own.radius + margin)[round_, None]
+        low, high = boxes(surfaces.shapes.vptr, placed.shapes.vertex, margin)
+        round_ = surfaces.radius > 0
+        around = placed.centre[surfaces.body[round_]], (surfaces.radius + margin)[round_, None]
         low[round_], high[round_] = around[0] - around[1], around[0] + around[1]
-        fixed, grid = self.fixed[own.body], grid_of(low, high)
+        fixed, grid = self.fixed[surfaces.body], grid_of(low, high)
         (shapes,) = self._in_parts(
-            len(low), lambda a, b: (close_pairs(low, high, own.body, fixed, grid, a, b),)
+            len(low), lambda a, b: (close_pairs(low, high, surfaces.body, fixed, grid, a, b),)
         )
-        key = _pair_key(shapes, len(own.body))
+        key = _pair_key(shapes, len(surfaces.body))
         order = np.argsort(key)
         shapes, key = shapes[order], key[order]
-        one, other = shapes.T
-        limit = np.maximum(self.alert * np.minimum(size[one], size[other]), self.distance)
-        limit = limit + (reach[one] + reach[other])
-        balls = round_[one] | round_[other]
+        first, second = shapes.T
+        limit = np.maximum(self.alert * np.minimum(size[first], size[second]), self.distance)
+        limit = limit + (reach[first] + reach[second])
+        balls = round_[first] | round_[second]
         hint = self._hints.of(key)
         near = np.where(balls, -np.inf, limit)
 
@@ -184,21 +184,21 @@ class Detector:
         self, pairs: Pairs, weighted: Bools, balls: _Singles | None, placed: Placed, nodes: int
     ) -> Contacts:
         """Make contacts in single points: those of polyhedra, except the `weighted` pairs, and those of balls."""
-        own = self.surfaces
+        surfaces = self.surfaces
         points = self._interfaces(pairs._replace(kind=np.where(weighted, SEPARATED, pairs.kind)), placed)
         count = len(points[0])
         if balls is not None:
             points = _joined([points, self._of_bodies(pairs, balls, placed)])
-        found, frame, area, body, arm = points
-        pair = found[:, 0]
-        key = _pair_key(pairs.shapes, len(own.body))[pair] + found[:, 2]
+        index, frame, area, body, arm = points
+        pair = index[:, 0]
+        key = _pair_key(pairs.shapes, len(surfaces.body))[pair] + index[:, 2]
         if not nodes:
             return Contacts(body, key, frame, area, arm, csr_array((2 * len(pair), 0)))
         # the antagonist owns the reference face; edges lie on the faces that face along the axis, balls on none
         faces = (pairs.kind[pair] != EDGES) & (np.arange(len(pair)) < count)
         feature = np.where(faces[:, None], pairs.feature[pair][:, ::-1], -1)
-        sides = pairs.shapes[pair[:, None], np.column_stack([found[:, 1], 1 - found[:, 1]])]
-        weights, outside = surface_weights(own, placed, sides, feature, frame[:, 0], arm, nodes)
+        sides = pairs.shapes[pair[:, None], np.column_stack([index[:, 1], 1 - index[:, 1]])]
+        weights, outside = surface_weights(surfaces, placed, sides, feature, frame[:, 0], arm, nodes)
         return take(Contacts(body, key, frame, area, arm, weights), np.flatnonzero(outside))
 
     def _interfaces(self, pairs: Pairs, placed: Placed) -> tuple[Any, ...]:
@@ -214,7 +214,7 @@ class Detector:
         def part(a: int, b: int) -> tuple[Any, ...]:
             some = Pairs._make(pair[a:b] for pair in pairs)
             try:
-                found, *points = interface_points(
+                index, *points = interface_points(
                     some, self.points, inner, middle, spacing, FLAT, THIN, placed.shapes
                 )
             except ValueError as error:
@@ -223,8 +223,8 @@ class Detector:
                     where="contact",
                     remedy="give a larger spacing",
                 ) from error
-            found[:, 0] += a
-            return self._of_bodies(pairs, _Singles(found, *points), placed)
+            index[:, 0] += a
+            return self._of_bodies(pairs, _Singles(index, *points), placed)
 
         return self._in_parts(len(pairs.kind), part)
 
@@ -245,13 +245,13 @@ class Detector:
 
     def _balls(self, pairs: Pairs, placed: Placed) -> _Singles:
         """Find the single points of pairs with a ball."""
-        own, balls = self.surfaces, np.flatnonzero(pairs.balls)
+        surfaces, balls = self.surfaces, np.flatnonzero(pairs.balls)
         place, frame, nearest, area = ball_points(
             pairs.shapes[balls],
             pairs.limit[balls],
-            own.radius,
-            placed.centre[own.body],
-            placed.rotation[own.body],
+            surfaces.radius,
+            placed.centre[surfaces.body],
+            placed.rotation[surfaces.body],
             placed.shapes,
         )
         place[:, 0] = balls[place[:, 0]]
@@ -261,27 +261,32 @@ class Detector:
         """Return weighted contacts of balls with meshes that see them, and single points of the other balls."""
         if not pairs.balls.any():
             return [], None
-        own, points = self.surfaces, self._balls(pairs, placed)
-        meshed = own.meshes.of_face[own.shapes.fptr[:-1]][pairs.shapes[points.place[:, 0]]].max(axis=1) >= 0
+        surfaces, points = self.surfaces, self._balls(pairs, placed)
+        meshed = (
+            surfaces.meshes.of_face[surfaces.shapes.fptr[:-1]][pairs.shapes[points.place[:, 0]]].max(axis=1)
+            >= 0
+        )
         rows = np.flatnonzero(meshed)
         if len(rows) == 0:
             return [], points
         pair = points.place[rows, 0]
         shapes = pairs.shapes[pair]
         gap = np.einsum("ci,ci->c", points.frame[rows, 0], points.nearest[rows, 0] - points.nearest[rows, 1])
-        key = _pair_key(shapes, len(own.body))
+        key = _pair_key(shapes, len(surfaces.body))
         if not self._cells:
-            self._cells.append(face_cells(own, len(state.node)))
-        found, seen = ball_contacts(own, placed, state, self._cells[0], shapes, key, pairs.limit[pair], gap)
+            self._cells.append(face_cells(surfaces, len(state.node)))
+        found, seen = ball_contacts(
+            surfaces, placed, state, self._cells[0], shapes, key, pairs.limit[pair], gap
+        )
         return found, points.without(rows[seen])
 
 
 def _place(surfaces: Surfaces, state: State) -> Placed:
     """Put all shapes where their bodies are."""
-    own, centre, turn = surfaces.shapes, state.centre[surfaces.body], state.rotation[surfaces.body]
-    vertex = place(own.vptr, own.vertex, centre, turn)
-    normal = place(own.fptr, own.normal, np.zeros_like(centre), turn)
-    shapes = own._replace(vertex=vertex, normal=normal, inside=middles(own.vptr, vertex))
+    packed, centre, turn = surfaces.shapes, state.centre[surfaces.body], state.rotation[surfaces.body]
+    vertex = place(packed.vptr, packed.vertex, centre, turn)
+    normal = place(packed.fptr, packed.normal, np.zeros_like(centre), turn)
+    shapes = packed._replace(vertex=vertex, normal=normal, inside=middles(packed.vptr, vertex))
     return Placed(shapes, state.centre, state.rotation)
 
 

@@ -34,22 +34,22 @@ class FaceMesh:
 
 def packed_meshes(meshes: Sequence[FaceMesh | None]) -> FacetMeshes:
     """Pack the meshes of all faces."""
-    own = [mesh for mesh in meshes if mesh is not None]
+    present = [mesh for mesh in meshes if mesh is not None]
     has = np.array([mesh is not None for mesh in meshes], dtype=bool)
     of_face = np.where(has, np.cumsum(has) - 1, -1).astype(np.int64)
-    covered = np.array([_area(mesh) for mesh in own])
-    triangles = np.array([len(mesh.facet) * (_corners(mesh) - 2) for mesh in own], dtype=float)
+    covered = np.array([_area(mesh) for mesh in present])
+    triangles = np.array([len(mesh.facet) * (_corners(mesh) - 2) for mesh in present], dtype=float)
     fineness = np.full(len(meshes), -1.0)
     fineness[has] = triangles / np.where(covered > 0, covered, 1.0)
     return FacetMeshes(
         of_face=of_face,
-        node_ptr=_pointer([len(mesh.node) for mesh in own]),
-        node=np.concatenate([*(mesh.node for mesh in own), np.zeros(0)]).astype(np.int64),
-        reference=np.vstack([*(mesh.reference for mesh in own), np.zeros((0, 3))]),
-        facet_ptr=_pointer([len(mesh.facet) for mesh in own]),
-        facet=np.vstack([*map(_padded, own), np.zeros((0, _WIDEST))]).astype(np.int64),
-        kind=np.array([mesh.facet.shape[1] for mesh in own], dtype=np.int64),
-        cut=np.array([mesh.cut for mesh in own], dtype=bool),
+        node_ptr=_pointer([len(mesh.node) for mesh in present]),
+        node=np.concatenate([*(mesh.node for mesh in present), np.zeros(0)]).astype(np.int64),
+        reference=np.vstack([*(mesh.reference for mesh in present), np.zeros((0, 3))]),
+        facet_ptr=_pointer([len(mesh.facet) for mesh in present]),
+        facet=np.vstack([*map(_padded, present), np.zeros((0, _WIDEST))]).astype(np.int64),
+        kind=np.array([mesh.facet.shape[1] for mesh in present], dtype=np.int64),
+        cut=np.array([mesh.cut for mesh in present], dtype=bool),
         fineness=fineness,
     )
 

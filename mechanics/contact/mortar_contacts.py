@@ -84,13 +84,13 @@ def mortar_contacts(
     # where a face lies on a single other face, all its nodes have contacts
     plane = surfaces.plane[face[:, 0]]
     several = np.flatnonzero(np.bincount(plane)[plane] > 1)
-    own = FacePairs._make(array[several] for array in interfaces)
-    pointer = _starts(meshes, own.mesh[:, 0])
+    face_pairs = FacePairs._make(array[several] for array in interfaces)
+    pointer = _starts(meshes, face_pairs.mesh[:, 0])
     share = np.zeros(int(pointer[-1]))
-    mortar_rows(pointer, np.empty(0, dtype=bool), own, bodies, meshes, placed.shapes, share)
-    start, kept = _kept(surfaces, face[:, 0], several, pointer, share)
+    mortar_rows(pointer, np.empty(0, dtype=bool), face_pairs, bodies, meshes, placed.shapes, share)
+    start, mask = _kept(surfaces, face[:, 0], several, pointer, share)
     interface, node, area, middle, pointer, column, value = mortar_rows(
-        start, kept, interfaces, bodies, meshes, placed.shapes, np.empty(len(kept))
+        start, mask, interfaces, bodies, meshes, placed.shapes, np.empty(len(mask))
     )
     arm = np.zeros((len(interface), 2, 3))
     rigid = np.flatnonzero(meshes.of_face[face[interface, 1]] < 0)
@@ -145,9 +145,9 @@ def _kept(surfaces: Surfaces, face: Ints, several: Ints, start: Ints, share: Arr
     meshes = surfaces.meshes
     size = np.diff(meshes.node_ptr)[meshes.of_face[face]]
     pointer = _starts(meshes, meshes.of_face[face])
-    kept = np.ones(int(pointer[-1]), dtype=bool)
+    mask = np.ones(int(pointer[-1]), dtype=bool)
     if len(share) == 0:
-        return pointer, kept
+        return pointer, mask
     within = np.arange(len(share)) - np.repeat(start[:-1], size[several])
     node = meshes.node[within + np.repeat(meshes.node_ptr[meshes.of_face[face[several]]], size[several])]
     plane = np.repeat(surfaces.plane[face[several]], size[several])
@@ -155,8 +155,8 @@ def _kept(surfaces: Surfaces, face: Ints, several: Ints, start: Ints, share: Arr
     new = np.flatnonzero((np.diff(plane[order], prepend=-1) != 0) | (np.diff(node[order], prepend=-1) != 0))
     largest = np.repeat(np.maximum.reduceat(share[order], new), np.diff(new, append=len(share)))
     place = within + np.repeat(pointer[several], size[several])
-    kept[place[order]] = share[order] >= (1.0 - _ALIKE) * largest
-    return pointer, kept
+    mask[place[order]] = share[order] >= (1.0 - _ALIKE) * largest
+    return pointer, mask
 
 
 def _starts(meshes: FacetMeshes, mesh: Ints) -> Ints:

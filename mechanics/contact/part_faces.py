@@ -34,14 +34,14 @@ def part_face_meshes(mesh: SolidMesh, vertices: Array, faces: Faces, start: int)
     normal = np.cross(x[:, 1] - x[:, 0], x[:, -1] - x[:, 0])
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     near = _NEAR * float(np.ptp(mesh.nodes, axis=0).max())
-    found = []
+    cut_meshes = []
     for face in faces:
         polygon = vertices[list(face)]
         n, origin = face_plane(polygon)
         inside = (np.abs((x - origin) @ n).max(axis=1) < near) & (normal @ n > 0.5)
         inside[inside], cut = _overlaps(x[inside], polygon, n)
-        found.append(_face_mesh(mesh, inside, start, cut))
-    return found
+        cut_meshes.append(_face_mesh(mesh, inside, start, cut))
+    return cut_meshes
 
 
 def _overlaps(facets: Array, polygon: Array, n: Array) -> tuple[Bools, bool]:
@@ -56,6 +56,6 @@ def _overlaps(facets: Array, polygon: Array, n: Array) -> tuple[Bools, bool]:
 
 
 def _face_mesh(mesh: SolidMesh, rows: Bools, start: int, cut: bool = False) -> FaceMesh:
-    own = mesh.facets[rows]
-    node, facet = np.unique(own, return_inverse=True)
-    return FaceMesh(start + node, mesh.nodes[node], facet.reshape(own.shape).astype(np.int64), cut)
+    facets = mesh.facets[rows]
+    node, facet = np.unique(facets, return_inverse=True)
+    return FaceMesh(start + node, mesh.nodes[node], facet.reshape(facets.shape).astype(np.int64), cut)

@@ -86,11 +86,11 @@ class Recess:
 def recess_at(find: Detector, state: State) -> Recess:
     """Return the recess of the pairs that touch at a state, to the error of a survey, without a common area."""
     corners = replace(find, points=4, placement=Placement.CORNERS, spacing=None)
-    near = replace(corners, alert=SLACK, distance=0.0)
+    search = replace(corners, alert=SLACK, distance=0.0)
     size = find.surfaces.size
-    contacts = near(state, np.zeros(len(size)))
+    contacts = search(state, np.zeros(len(size)))
     pair, _, width, least = _overlaps(contacts, state, size, np.arange(len(contacts)))
-    touching, bodies = near.face_pairs(state)
+    touching, bodies = search.face_pairs(state)
     without = np.flatnonzero(~np.isin(touching, pair[width > least]))
     order = without[np.argsort(touching[without])]
     return Recess(touching[order], SLACK * size[bodies[order]].min(axis=1, initial=np.inf))

@@ -155,11 +155,11 @@ def _planes(body: Ints, count: Ints, normal: Array, corner: Array) -> Ints:
     plane, start = np.arange(len(normal)), np.cumsum(count) - count
     for b in np.flatnonzero(np.bincount(body) > 1):
         shapes = np.flatnonzero(body == b)
-        own = np.arange(start[shapes[0]], start[shapes[-1]] + count[shapes[-1]])
-        size = np.ptp(corner[own], axis=0).max()
-        alike = normal[own] @ normal[own].T > _SAME_WAY
-        off = np.abs(np.einsum("fgi,fi->fg", corner[own] - corner[own][:, None], normal[own]))
-        plane[own] = own[(alike & (off < _SAME_PLANE * size)).argmax(axis=1)]
+        rows = np.arange(start[shapes[0]], start[shapes[-1]] + count[shapes[-1]])
+        size = np.ptp(corner[rows], axis=0).max()
+        alike = normal[rows] @ normal[rows].T > _SAME_WAY
+        off = np.abs(np.einsum("fgi,fi->fg", corner[rows] - corner[rows][:, None], normal[rows]))
+        plane[rows] = rows[(alike & (off < _SAME_PLANE * size)).argmax(axis=1)]
     return plane
 
 
@@ -172,10 +172,10 @@ def _edges(faces: tuple[tuple[int, ...], ...], vertex: Array, normal: Array) -> 
         (a, b): n for n, face in enumerate(faces) for a, b in zip(face, (*face[1:], face[0]), strict=True)
     }
     sides = [(a, b, one, face_of[b, a]) for (a, b), one in sorted(face_of.items()) if a < b]
-    a, b, one, other = np.array(sides, dtype=np.int64).T
-    turned = np.cross(normal[:, other], normal[:, one])
+    a, b, first, second = np.array(sides, dtype=np.int64).T
+    turned = np.cross(normal[:, second], normal[:, first])
     forward = np.einsum("nei,nei->ne", vertex[:, b] - vertex[:, a], turned) >= 0
     return np.stack(
-        [np.where(forward, a, b), np.where(forward, b, a), *np.broadcast_arrays(one, other, forward)[:2]],
+        [np.where(forward, a, b), np.where(forward, b, a), *np.broadcast_arrays(first, second, forward)[:2]],
         axis=2,
     )

@@ -73,14 +73,14 @@ def mixed_delassus(
     # all at once: slicing the rows of a stone costs SciPy more than its block does
     weights = contacts.weights[sides]
     drag = np.ones(len(model.mass))
-    for group, own in zip(model.elastic_stones.groups, compliance, strict=True):
-        drag[group.bodies] = own.drag
+    for group, elastic in zip(model.elastic_stones.groups, compliance, strict=True):
+        drag[group.bodies] = elastic.drag
         for b in group.bodies[count[group.bodies] > 0]:
             rows, pointer = sides[first[b] : first[b + 1]], weights.indptr[first[b] : first[b + 1] + 1]
             entries = slice(pointer[0], pointer[-1])
             touched = _Touched(weights.indices[entries], weights.data[entries], np.diff(pointer))
             turn = contacts.frame[rows // 2] @ state.rotation[b]
-            square = _compliance_block(touched, turn, own, int(model.elastic_stones.start[b]))
+            square = _compliance_block(touched, turn, elastic, int(model.elastic_stones.start[b]))
             block[bptr[b] : bptr[b + 1]] = square.ravel()
             n = np.arange(len(rows))
             diagonal[rows] = square.reshape(len(rows), 3, len(rows), 3)[n, :, n]

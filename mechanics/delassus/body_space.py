@@ -55,11 +55,11 @@ class BodyForm(SparseForm):
 
     def scaled(self, unit: Array) -> "BodyForm":
         """Return D W D with the units (nc,) on the diagonal of D; the pattern is shared."""
-        other = BodyForm.__new__(BodyForm)
-        other._contacts = self._contacts._replace(geometry=scaled_frames(self._contacts.geometry, unit))
-        other._moving, other._mass = self._moving, self._mass
-        other.__dict__["_pattern"] = self._pattern
-        return other
+        scaled = BodyForm.__new__(BodyForm)
+        scaled._contacts = self._contacts._replace(geometry=scaled_frames(self._contacts.geometry, unit))
+        scaled._moving, scaled._mass = self._moving, self._mass
+        scaled.__dict__["_pattern"] = self._pattern
+        return scaled
 
     @cached_property
     def inertia(self) -> "csc_array[np.float64]":
@@ -93,8 +93,8 @@ class BodyForm(SparseForm):
 
     @cached_property
     def _pattern(self) -> kernel.Pattern:
-        own = self._places(self._moving)[self._contacts.body]
-        pairs = own[(own >= 0).all(axis=1)]
+        places = self._places(self._moving)[self._contacts.body]
+        pairs = places[(places >= 0).all(axis=1)]
         rank = elimination(pairs, self._moving, self._contacts.centre)
         order = self._moving[np.argsort(rank)]
         side, count = np.ascontiguousarray(self._places(order)[self._contacts.body]), len(order)

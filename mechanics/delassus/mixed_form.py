@@ -136,10 +136,10 @@ class MixedForm:
         """Blocks of the deformable bodies, and of the rigid ones with their soft contacts."""
         jacobian = self._jacobian[self._pattern.soft].reshape(-1, 3, 6)
         blocks = list(self._elastic.blocks)
-        for mass, own in zip(self._mass, self._pattern.own, strict=True):
-            many = 3 * len(own)
+        for mass, unknowns in zip(self._mass, self._pattern.own, strict=True):
+            many = 3 * len(unknowns)
             block = np.zeros((many + 6, many + 6))
-            block[:many, many:] = -jacobian[own].reshape(-1, 6)
+            block[:many, many:] = -jacobian[unknowns].reshape(-1, 6)
             block[many:, :many] = block[:many, many:].T
             block[many:, many:] = -mass
             blocks.append(block)

@@ -88,14 +88,14 @@ class Fronts:
     def _split(self) -> tuple[list[list[int]], list[int]]:
         """Fronts of small independent subtrees, largest first, and the fronts above them."""
         width, whole = self.layout.width.astype(float), np.diff(self.layout.dptr).astype(float)
-        own = width**3 / 1.5 + 2.0 * width * (whole - width) * whole
-        work, above = own.copy(), np.full(len(own), -1)
+        front_work = width**3 / 1.5 + 2.0 * width * (whole - width) * whole
+        work, above = front_work.copy(), np.full(len(front_work), -1)
         for f in self.layout.order:
             for child, _ in self.children[f]:
                 work[f] += work[child]
                 above[child] = f
-        small = work <= _SUBTREE * own.sum()
-        root = np.arange(len(own))
+        small = work <= _SUBTREE * front_work.sum()
+        root = np.arange(len(front_work))
         for f in self.layout.order[::-1]:
             if small[f] and above[f] >= 0 and small[above[f]]:
                 root[f] = root[above[f]]
@@ -193,10 +193,10 @@ def fronts(pairs: Ints, cliques: Sequence[Ints]) -> Fronts:
 def fronts_of_graph(group: Ints, cliques: Sequence[Ints], place: Array) -> Fronts:
     """Analyse the pattern of many groups (n,) of unknowns, three each, by their graph and their `place` (ng, 3) [m]."""
     edges = [np.zeros(0, dtype=np.int64)]
-    around = [np.unique(group[own]) for own in cliques]
+    around = [np.unique(group[clique]) for clique in cliques]
     for groups in around:
-        one, other = np.triu_indices(len(groups), 1)
-        edges.append(groups[one] * len(place) + groups[other])
+        first, second = np.triu_indices(len(groups), 1)
+        edges.append(groups[first] * len(place) + groups[second])
     key = np.unique(np.concatenate(edges))
     pairs = np.column_stack([key // len(place), key % len(place)])
     rank = elimination(pairs, np.arange(len(place)), place)
@@ -219,11 +219,11 @@ def _fronts_in_order(
         rank[pivots[f]] = f
     width = np.array([3 * size[groups].sum() for groups in pivots], dtype=np.int64)
     unknowns = [_unknowns([members[g] for g in (*pivots[f], *later[f])]) for f in range(len(pivots))]
-    own: list[list[tuple[int, Ints]]] = [[] for _ in pivots]
+    entries: list[list[tuple[int, Ints]]] = [[] for _ in pivots]
     for clique, groups in enumerate(around):
         if len(groups):
             f = int(rank[groups].min())
-            own[f].append((clique, _runs(_places(unknowns[f], _unknowns([cliques[clique]])), width[f])))
+            entries[f].append((clique, _runs(_places(unknowns[f], _unknowns([cliques[clique]])), width[f])))
     children: list[list[tuple[int, Ints]]] = [[] for _ in pivots]
     for f in order:
         if later[f]:
@@ -239,7 +239,7 @@ def _fronts_in_order(
         fptr=np.concatenate([[0], np.cumsum(width * (2 * lengths - width))]).astype(np.int64),
         pptr=np.concatenate([[0], np.cumsum(width)]).astype(np.int64),
     )
-    return Fronts(layout, tuple(map(tuple, own)), tuple(map(tuple, children)))
+    return Fronts(layout, tuple(map(tuple, entries)), tuple(map(tuple, children)))
 
 
 def _runs(place: Ints, width: int) -> Ints:

@@ -56,8 +56,8 @@ def schedule(bodies: Ints, moving: Bools) -> Schedule:
     if count == 0:
         empty = np.zeros(0, dtype=np.int64)
         return Schedule(empty, np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64))
-    one, other = bodies.T
-    pair = 2 * (np.minimum(one, other) * len(moving) + np.maximum(one, other)) + (one > other)
+    first, second = bodies.T
+    pair = 2 * (np.minimum(first, second) * len(moving) + np.maximum(first, second)) + (first > second)
     order = np.argsort(pair, kind="stable")
     starts = np.flatnonzero(np.diff(pair[order], prepend=-1))
     sizes = np.diff(starts, append=count)
@@ -146,15 +146,15 @@ class RigidDelassus:
 
         The result, with its factors, is kept for the next call with the same units.
         """
-        kept: tuple[Array, RigidDelassus] | None = self.__dict__.get("_scaled")
-        if kept is not None and np.array_equal(kept[0], unit):
-            return kept[1]
-        other = replace(self, geometry=scaled_frames(self.geometry, unit))
+        cached: tuple[Array, RigidDelassus] | None = self.__dict__.get("_scaled")
+        if cached is not None and np.array_equal(cached[0], unit):
+            return cached[1]
+        scaled = replace(self, geometry=scaled_frames(self.geometry, unit))
         # the kernel of the diagonal assumes frames of unit length
-        other.__dict__["diagonal"] = self.diagonal * (unit**2)[:, None, None]
-        other.__dict__["form"] = self.form.scaled(unit)
-        self.__dict__["_scaled"] = unit, other
-        return other
+        scaled.__dict__["diagonal"] = self.diagonal * (unit**2)[:, None, None]
+        scaled.__dict__["form"] = self.form.scaled(unit)
+        self.__dict__["_scaled"] = unit, scaled
+        return scaled
 
     def gauss_seidel(self, shift: Array, friction: Array, cohesion: Array) -> GaussSeidel:
         """Return sweeps in the order of the schedule; the same bits for any number of threads.

@@ -127,7 +127,7 @@ _RIGID = JointCompliance()
 def contact_problem(
     model: Model,
     predicted: State,
-    found: Detection,
+    detection: Detection,
     free: Kick,
     internal: Array,
     begin: Beginning | None,
@@ -144,7 +144,7 @@ def contact_problem(
     Parameters
     ----------
     model, predicted : the bodies at the instant of the kick
-    found : their contacts
+    detection : their contacts
     free : velocities without contact impulses
     internal : (nc, STATE) internal variables of the laws
     begin : how the run begins, in its first step; None in later ones
@@ -157,14 +157,14 @@ def contact_problem(
     problem : for a solver; its impulses are r̃
     approach : the contacts as the laws see them before the step
     """
-    contacts, operator, time = found.contacts, found.operator, model.scene.time
+    contacts, operator, time = detection.contacts, detection.operator, model.scene.time
     # stones without a common area touch once they lie in each other by their recess
-    gap = gaps(contacts, predicted) + found.recess
+    gap = gaps(contacts, predicted) + detection.recess
     motion = local_velocity(contacts, operator, predicted.velocity, predicted.node_velocity)
     size = np.minimum(*model.surfaces.size[contacts.bodies.T])
     if begin is not None:
-        initial, meets = gaps(contacts, begin.state) + found.recess, begin.meets(contacts.bodies)
-        closed = begin.closed(initial, gaps(contacts, begin.drawn) + found.recess)
+        initial, meets = gaps(contacts, begin.state) + detection.recess, begin.meets(contacts.bodies)
+        closed = begin.closed(initial, gaps(contacts, begin.drawn) + detection.recess)
         elastic = model.elastic[contacts.bodies].any(axis=1)
         # a ball dents a meshed face by what the mesh does not see of it
         round_ = model.surfaces.radius[model.surfaces.sptr[:-1]][contacts.bodies].any(axis=1)
@@ -190,17 +190,17 @@ def contact_problem(
         else np.zeros_like(contacts.key),
         first=meets,
         state=internal,
-        thickness=_thickness(model, found),
+        thickness=_thickness(model, detection),
     )
     before = np.zeros((len(gap), 3)) if last is None else last
     if model.laws.sprung:
         approach = replace(approach, state=turned_springs(approach.state, spring_axes(contacts, predicted)))
     if model.laws.crushes:
-        guess = model.laws.crushing(found.law, approach) if crushing is None else crushing
+        guess = model.laws.crushing(detection.law, approach) if crushing is None else crushing
         approach = replace(approach, crushing=guess)
     if not joints.rigid:
         approach = _explained(approach, joints.value, before)
-    terms = model.laws.terms(found.law, approach)
+    terms = model.laws.terms(detection.law, approach)
     u_free = local_velocity(contacts, operator, free.velocity, free.node_velocity)
     if terms.adhesion.any():
         pull = np.zeros_like(u_free)
@@ -219,22 +219,22 @@ def contact_problem(
     return problem if joints.rigid else _compliant(problem, joints.value, before), approach
 
 
-def _thickness(model: Model, found: Detection) -> Array | None:
+def _thickness(model: Model, detection: Detection) -> Array | None:
     """Return the thickness of mortar (nc,) of contacts, zero where no law needs it [m].
 
     Raises
     ------
     SceneError : two stones whose joint has no thickness, although its law needs it
     """
-    contacts = found.contacts
-    thickness = model.laws.thickness(found.law, contacts.bodies)
+    contacts = detection.contacts
+    thickness = model.laws.thickness(detection.law, contacts.bodies)
     if thickness is None:
         return None
     lacks = np.flatnonzero(np.isnan(thickness) & (contacts.area > 0))
     if len(lacks):
-        one, other = sorted(model.scene.blocks[b].code for b in contacts.bodies[lacks[0]])
+        first, second = sorted(model.scene.blocks[b].code for b in contacts.bodies[lacks[0]])
         raise SceneError(
-            f"no thickness of the mortar between {one} and {other}",
+            f"no thickness of the mortar between {first} and {second}",
             where=model.scene.name,
             remedy="give thickness beside mortar_young in the law of this joint, for pairs of which none is known",
         )
@@ -281,12 +281,14 @@ def _sprung(problem: ContactProblem, springs: Springs) -> ContactProblem:
 def _compliant(problem: ContactProblem, compliance: float, last: Array) -> ContactProblem:
     """Return the problem with W + E; the gaps are signed already."""
     assert problem.adhesion is not None
-    known = last.copy()
+    joint_state = last.copy()
     # of a shifted impulse r̃ = r + s n the joint feels r
-    known[:, 0] = problem.adhesion
+    joint_state[:, 0] = problem.adhesion
     each = np.full_like(last, compliance)
     return replace(
-        problem, delassus=CompliantDelassus(problem.delassus, each), u_free=problem.u_free - each * known
+        problem,
+        delassus=CompliantDelassus(problem.delassus, each),
+        u_free=problem.u_free - each * joint_state,
     )
 
 

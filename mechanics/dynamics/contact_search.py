@@ -165,11 +165,11 @@ class ContactSearch:
 
     def continued(self, model: Model, compliance: Sequence[Compliance]) -> "ContactSearch":
         """Return the search for other settings of time; it knows the last result where ŵ is still the same."""
-        other = copy(self)
-        other._compliance = compliance
+        copied = copy(self)
+        copied._compliance = compliance
         if self._last is not None:
-            other._last = replace(self._last, model=model) if compliance is self._compliance else None
-        return other
+            copied._last = replace(self._last, model=model) if compliance is self._compliance else None
+        return copied
 
     def follow(self, other: "ContactSearch", model: Model) -> None:
         """Know the last result of another search of the same rigid bodies, with steps as long.

@@ -121,8 +121,8 @@ def _elastic_dissipation(model: Model, step: Step, theta: float, duration: float
 
 def _in_axes(group: ElasticGroup, state: State, nodal: Array, origin: Array | None = None) -> Array:
     """Return nodal vectors (k, n, 3) of equal stones in their own axes."""
-    own = nodal[group.nodes]
+    local = nodal[group.nodes]
     if origin is not None:
-        own = own - origin[group.bodies, None]
-    turned: Array = own @ state.rotation[group.bodies]
+        local = local - origin[group.bodies, None]
+    turned: Array = local @ state.rotation[group.bodies]
     return turned

@@ -37,8 +37,8 @@ class Beginning:
 
     def meets(self, bodies: Ints) -> Bools:
         """Return the contacts (nc,) between bodies (nc, 2) that were not possible before."""
-        one, other = bodies[:, 0], bodies[:, 1]
-        knew = self.standing[one] & self.standing[other] & ~(self.held[one] & self.held[other])
+        first, second = bodies[:, 0], bodies[:, 1]
+        knew = self.standing[first] & self.standing[second] & ~(self.held[first] & self.held[second])
         met: Bools = ~knew
         return met
 
@@ -125,8 +125,8 @@ class Handover:
 
 def _numbers(before: Model, after: Model) -> Ints:
     """Return the number of each body (nb,) in the model before; -1 where it is not there."""
-    known = {block.code: number for number, block in enumerate(before.scene.blocks)}
-    return np.array([known.get(block.code, -1) for block in after.scene.blocks], dtype=np.int64)
+    numbers = {block.code: number for number, block in enumerate(before.scene.blocks)}
+    return np.array([numbers.get(block.code, -1) for block in after.scene.blocks], dtype=np.int64)
 
 
 def _renamed(key: Ints, before: Model, after: Model, new: Ints) -> Ints:
@@ -143,9 +143,11 @@ def _renamed(key: Ints, before: Model, after: Model, new: Ints) -> Ints:
 
 def _shape(shape: Ints, before: Model, after: Model, new: Ints) -> Ints:
     """Return the new numbers of shapes; -1 for those of bodies that are gone."""
-    own, other = before.surfaces, after.surfaces
-    body = new[own.body[shape]]
-    found: Ints = np.where(body < 0, -1, other.sptr[body] + shape - own.sptr[own.body[shape]])
+    surfaces_before, surfaces_after = before.surfaces, after.surfaces
+    body = new[surfaces_before.body[shape]]
+    found: Ints = np.where(
+        body < 0, -1, surfaces_after.sptr[body] + shape - surfaces_before.sptr[surfaces_before.body[shape]]
+    )
     return found
 
 

@@ -112,9 +112,9 @@ class Simulation(Carrier):
 
         The bodies have the velocities with which this run begins.
         """
-        own = self.state
+        state = self.state
         self.state = replace(
-            other.state, time=own.time, velocity=own.velocity, node_velocity=own.node_velocity
+            other.state, time=state.time, velocity=state.velocity, node_velocity=state.node_velocity
         )
         pace = self._step / other._step
         self._memory = other._memory.at_rest(pace)
@@ -144,23 +144,28 @@ class Simulation(Carrier):
         time = self.model.scene.time
         free = replace(time, relaxation=False, theta=1.0 if time.relaxation else time.theta)
         model = replace(self.model, scene=replace(self.model.scene, time=free))
-        other = copy(self)
-        other.model, other._theta, other._relax, other._first = model, free.theta, Relaxation(model), False
-        other._freed = True
-        if other._solve is not self._given:
+        copied = copy(self)
+        copied.model, copied._theta, copied._relax, copied._first = (
+            model,
+            free.theta,
+            Relaxation(model),
+            False,
+        )
+        copied._freed = True
+        if copied._solve is not self._given:
             # some methods press stones against what they only touch
-            other._solve = _solver_of(model, replace(model.scene.solver, method=Method.AUTO))
-        other._joints = self._joints.released()
+            copied._solve = _solver_of(model, replace(model.scene.solver, method=Method.AUTO))
+        copied._joints = self._joints.released()
         if time.relaxation:
-            other.state = halted(self.state)
+            copied.state = halted(self.state)
         if free.theta != time.theta:
             with self.clock("assemble"):
-                other._compliance = compliances(model, self._step, free.theta)
-        other._detect = self._detect.continued(model, other._compliance)
+                copied._compliance = compliances(model, self._step, free.theta)
+        copied._detect = self._detect.continued(model, copied._compliance)
         # forces of elastic stones come from their strain, which stays
-        other._memory = self._memory.at_rest(0.0 if forgets and model.inertia.moving.any() else 1.0)
-        other._sleepers = Sleepers(model, other.state, other._memory)
-        return other
+        copied._memory = self._memory.at_rest(0.0 if forgets and model.inertia.moving.any() else 1.0)
+        copied._sleepers = Sleepers(model, copied.state, copied._memory)
+        return copied
 
     def rests_from_nothing(self) -> bool | None:
         """Return whether rigid stones at rest are so by forces that arise from nothing; None: release them to see.
@@ -172,18 +177,18 @@ class Simulation(Carrier):
             return None
         still = halted(self.state)
         predicted = predict(model, self.start, still, h * (1 - self._theta))
-        found = self._detect(model, predicted)
-        if not len(found.contacts.key):
+        detection = self._detect(model, predicted)
+        if not len(detection.contacts.key):
             return None
-        _, internal = self._memory.recall(found.contacts.key, found.place)
+        _, internal = self._memory.recall(detection.contacts.key, detection.place)
         free = free_kick(model, self.start, predicted, self._compliance, h, self._theta)
-        problem, approach = contact_problem(model, predicted, found, free, internal, None)
+        problem, approach = contact_problem(model, predicted, detection, free, internal, None)
         near = problem.bias <= CLOSED_BIAS * float(np.abs(problem.u_free).max())
         problem = replace(problem, bias=np.where(near, 0.0, problem.bias))
         rests, impulse = rests_from_nothing(problem)
         if not rests:
             begin = ContactSolution(unshifted(problem, impulse), np.zeros_like(impulse), 0, np.inf, False)
-            self._memory.store(found.contacts.key, begin, approach.state, found.place)
+            self._memory.store(detection.contacts.key, begin, approach.state, detection.place)
         return rests
 
     def carried(self) -> dict[str, Any]:
@@ -200,12 +205,12 @@ class Simulation(Carrier):
 
     def resumed(self, carried: Carried) -> "Simulation":
         """Return the simulation that goes on where another one of the same scene stood; self must not have moved."""
-        other = self.released() if carried["_freed"] else self
-        other.restore(carried)
-        for compliance, batches in zip(other._compliance, carried["condensed"], strict=True):
+        simulation = self.released() if carried["_freed"] else self
+        simulation.restore(carried)
+        for compliance, batches in zip(simulation._compliance, carried["condensed"], strict=True):
             compliance.condense_again(batches)
-        other._detect.repeat(other._sleepers.model, carried["detected"], carried["recess"])
-        return other
+        simulation._detect.repeat(simulation._sleepers.model, carried["detected"], carried["recess"])
+        return simulation
 
     def step(self) -> Step:
         """Advance by one step of the Moreau–Jean θ-scheme (Moreau 1988, Jean 1999; docs/theory.md §2).
@@ -229,28 +234,28 @@ class Simulation(Carrier):
             sleepers.begin(before, predicted)
         disturbed = True
         while disturbed:
-            found = self._detect(sleepers.model, predicted)
+            detection = self._detect(sleepers.model, predicted)
             with clock("assemble"):
-                warm, internal = self._memory.recall(found.contacts.key, found.place)
+                warm, internal = self._memory.recall(detection.contacts.key, detection.place)
                 free = sleepers.hold(free_kick(model, start, predicted, self._compliance, h, theta))
-            given = predicted, found, free, internal, self._begin if self._first else None
+            given = predicted, detection, free, internal, self._begin if self._first else None
             problem, approach, solution = self._solved(given, warm)
             with clock("advance"):
                 r = unshifted(problem, solution.impulse)
-                kick = kicked(model, free, found, r, self._compliance)
-                disturbed = sleepers.wake_disturbed(predicted, kick, found.contacts, r)
+                kick = kicked(model, free, detection, r, self._compliance)
+                disturbed = sleepers.wake_disturbed(predicted, kick, detection.contacts, r)
         with clock("advance"):
             after = advance(model, start, predicted, kick, h * theta)
             asleep = sleepers.forces, sleepers.wrench
             return self._conclude(
-                Step(before, predicted, after, kick, found, approach, problem, solution, *asleep)
+                Step(before, predicted, after, kick, detection, approach, problem, solution, *asleep)
             )
 
-    def _solved(self, given: _Given, warm: ContactStart) -> _Solved:
+    def _solved(self, inputs: _Given, warm: ContactStart) -> _Solved:
         """Return the problem of a step and its solution: with rigid joints, or compliant ones where these fail."""
         joints, rigid = self._joints, None
         if joints.rigid:
-            rigid = self._try(given, joints, warm, warm)
+            rigid = self._try(inputs, joints, warm, warm)
             if rigid[2].converged or not self._may_yield or joints.left < 0:
                 self._joints = joints.passed()
                 return rigid
@@ -260,25 +265,25 @@ class Simulation(Carrier):
             if factor < joints.softness:
                 # so hard they could not be solved in the last step
                 continue
-            problem, approach, solution = self._try(given, joints.softer(factor), warm, begin)
+            problem, approach, solution = self._try(inputs, joints.softer(factor), warm, begin)
             if solution.converged:
                 self._joints = joints.used(factor)
                 return problem, approach, solution
             begin = ContactStart(unshifted(problem, solution.impulse), solution.velocity)
         self._joints = self._joints.failed()
-        return rigid or self._try(given, self._joints, warm, warm)
+        return rigid or self._try(inputs, self._joints, warm, warm)
 
     def _try(
-        self, given: _Given, joints: JointCompliance, warm: ContactStart, begin: ContactStart
+        self, inputs: _Given, joints: JointCompliance, warm: ContactStart, begin: ContactStart
     ) -> _Solved:
         """State the problem after a step with the impulses of `warm`, and solve it from `begin`.
 
         Which joints crush is known once it is solved; then it is solved again with these, until they stay the same.
         """
-        found, laws, crushing = given[1], self.model.laws, None
+        found, laws, crushing = inputs[1], self.model.laws, None
         for _ in range(_CRUSHING):
             with self.clock("assemble"):
-                problem, approach = contact_problem(self.model, *given, joints, warm.impulse, crushing)
+                problem, approach = contact_problem(self.model, *inputs, joints, warm.impulse, crushing)
             with self.clock("solve"):
                 solution = self._solve(problem, shifted(problem, begin))
             if approach.crushing is None:
@@ -291,7 +296,7 @@ class Simulation(Carrier):
 
     def _conclude(self, step: Step) -> Step:
         """Remember a step for the next one, and halt the bodies that relaxation or sleep halts after it."""
-        after, found = step.after, step.found
+        after, detection = step.after, step.found
         if not (np.isfinite(after.velocity).all() and np.isfinite(after.node_velocity).all()):
             raise SolverError(
                 f"the velocities are not finite at t = {after.time:.6g} s",
@@ -299,7 +304,7 @@ class Simulation(Carrier):
                 remedy="use a smaller time step",
             )
         solution = replace(step.solution, impulse=step.active.impulse)
-        self._memory.store(found.contacts.key, solution, step.active.internal, found.place)
+        self._memory.store(detection.contacts.key, solution, step.active.internal, detection.place)
         self._first = False
         self.state = self._relax(self._sleepers.settle(step))
         if self.state is after:

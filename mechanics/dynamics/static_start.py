@@ -81,13 +81,13 @@ def static_start(
 
 def _ways(model: Model) -> Iterator[_Way]:
     """Yield the ways to search, each for where the one before has failed."""
-    own = model.scene.time.step
+    step = model.scene.time.step
     if model.rigid_only:
         if model.laws.sprung:
             yield _YIELDING
             return
-        yield _Way(own, 1)
-        yield replace(_SETTLING, step=max(own, _SETTLING.step))
+        yield _Way(step, 1)
+        yield replace(_SETTLING, step=max(step, _SETTLING.step))
         return
     if model.mostly_rigid:
         yield _AMONG_RIGID
@@ -108,18 +108,18 @@ class _Search:
         model: Model,
         start: State,
         report: Callable[[Progress], None],
-        way: _Way,
+        attempt: _Way,
         count: int,
         iterations: int,
     ) -> None:
-        self._model, self._start, self._report, self._way = model, start, report, way
+        self._model, self._start, self._report, self._way = model, start, report, attempt
         self.count, self.iterations, self.found = count, iterations, False
         self._balance: Array = np.full(1, np.inf)
         self._eta, self._first = 0.0, count
         asked = model.scene.solver
         self._goal = max(asked.tolerance, _ROUNDING)
         self._search = Simulation(
-            _still(model, way.step, self._settings(asked)), start, elastic_scale=self._long
+            _still(model, attempt.step, self._settings(asked)), start, elastic_scale=self._long
         )
 
     @property
@@ -145,32 +145,32 @@ class _Search:
 
     def run(self) -> None:
         """Take steps until an equilibrium is found, stones fall, or the way ends."""
-        way, unsolved, before = self._way, 0, np.inf
-        while self.count - self._first < way.most and not self.found and self._settles():
+        attempt, unsolved, before = self._way, 0, np.inf
+        while self.count - self._first < attempt.most and not self.found and self._settles():
             # the loads stay those of the first instant
             self._search.state = replace(self._search.state, time=self._start.time)
             made = self._step()
             unsolved = 0 if made.solution.converged else unsolved + 1
             self.found = self._at_rest(made)
-            if self._largest <= way.halts * before:
+            if self._largest <= attempt.halts * before:
                 self._search.halt(self._start.time)
-            if way.unsolved is not None and unsolved >= way.unsolved:
+            if attempt.unsolved is not None and unsolved >= attempt.unsolved:
                 break
             before = self._largest
         self.found = self.found and self._settles()
 
     def ended(self) -> Simulation:
         """Return the simulation with which the run begins, its last gaps closed if an equilibrium was found."""
-        own, still = self._model.scene.time.step, self._model.inertia.moving.any()
+        step, still = self._model.scene.time.step, self._model.inertia.moving.any()
         if not self.found:
             return self._search
-        if self._way == _Way(own, 1):
+        if self._way == _Way(step, 1):
             # the very step with which a run from rest begins
             return self._search
         self._search.halt(self._start.time)
-        if not still or (self._way == _AMONG_RIGID and own == self._way.step):
+        if not still or (self._way == _AMONG_RIGID and step == self._way.step):
             return self._search
-        last = Simulation(_still(self._model, own, self._model.scene.solver), self._search.start)
+        last = Simulation(_still(self._model, step, self._model.scene.solver), self._search.start)
         last.take_over(self._search)
         # over long steps small errors of velocity leave gaps between rigid stones
         for _ in range(_CLOSING):

@@ -106,23 +106,23 @@ class Step:
     @cached_property
     def relative(self) -> Array:
         """u (nc, 3) of the contacts of the awake bodies just after the kick, local frame [m/s]."""
-        found, kick = self.found, self.kick
-        return local_velocity(found.contacts, found.operator, kick.velocity, kick.node_velocity)
+        detection, kick = self.found, self.kick
+        return local_velocity(detection.contacts, detection.operator, kick.velocity, kick.node_velocity)
 
     @cached_property
     def active(self) -> ContactForces:
         """Contact points of the awake bodies, those of the problem, with their forces."""
-        found, problem, solution = self.found, self.problem, self.solution
-        contacts, laws = found.contacts, found.model.laws
+        detection, problem, solution = self.found, self.problem, self.solution
+        contacts, laws = detection.contacts, detection.model.laws
         impulse = unshifted(problem, solution.impulse)
-        internal = laws.after(found.law, self.approach, solution.impulse, self.relative)
+        internal = laws.after(detection.law, self.approach, solution.impulse, self.relative)
         if laws.sprung:
             back = spring_axes(contacts, self.predicted).transpose(0, 2, 1)
             internal = turned_springs(internal, back)
         return ContactForces(
             contacts=contacts,
             terms=terms_of(problem),
-            place=found.place,
+            place=detection.place,
             impulse=impulse,
             shifted=solution.impulse,
             dual=solution.velocity,

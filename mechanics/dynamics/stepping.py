@@ -102,11 +102,11 @@ def free_kick(
         vector = Rotation.from_matrix(turn @ predicted.rotation[bodies].transpose(0, 2, 1)).as_rotvec()
         velocity[bodies, 3:] = vector / step
     node_velocity = predicted.node_velocity.copy()
-    for group, own in zip(model.elastic_stones.groups, compliance, strict=True):
+    for group, elastic in zip(model.elastic_stones.groups, compliance, strict=True):
         turn = predicted.rotation[group.bodies]
         inner, outer = _elastic_forces(group, predicted, gravity, step, theta)
         # inner forces must not move a stone as a whole, not even by their rounding
-        answer = own.deform(step * (inner + outer)) + own.shift(step * outer)
+        answer = elastic.deform(step * (inner + outer)) + elastic.shift(step * outer)
         node_velocity[group.nodes] += answer @ turn.transpose(0, 2, 1)
     return Kick(velocity, node_velocity, load)
 
@@ -150,17 +150,17 @@ def _loads(model: Model, state: State, gravity: Array) -> Array:
 
 
 def kicked(
-    model: Model, free: Kick, found: Detection, impulse: Array, compliance: Sequence[Compliance]
+    model: Model, free: Kick, detection: Detection, impulse: Array, compliance: Sequence[Compliance]
 ) -> Kick:
     """Return v_{i+1} = v_free + ŵ H r, with ŵ and H of the configuration in which the contacts were found."""
-    velocity = free.velocity + found.operator.rigid_change(impulse)
+    velocity = free.velocity + detection.operator.rigid_change(impulse)
     node_velocity = free.node_velocity
     if compliance:
-        world = world_impulse(found.contacts, impulse)
-        nodal = found.contacts.weights.T @ np.stack([world, -world], axis=1).reshape(-1, 3)
+        world = world_impulse(detection.contacts, impulse)
+        nodal = detection.contacts.weights.T @ np.stack([world, -world], axis=1).reshape(-1, 3)
         node_velocity = node_velocity.copy()
         for group, own in zip(model.elastic_stones.groups, compliance, strict=True):
-            turn = found.configuration.rotation[group.bodies]
+            turn = detection.configuration.rotation[group.bodies]
             node_velocity[group.nodes] += own.respond(nodal[group.nodes] @ turn) @ turn.transpose(0, 2, 1)
     return Kick(velocity, node_velocity, free.load)
 

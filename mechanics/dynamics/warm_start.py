@@ -63,10 +63,10 @@ class Memory(Carrier):
             values = np.zeros((len(key), self._values.shape[1]))
             order = np.argsort(self._key, kind="stable")
             if len(order):
-                at, known = _places(self._key, key, order)
-                values[known] = self._values[at[known]]
+                at, present = _places(self._key, key, order)
+                values[present] = self._values[at[present]]
                 if place is not None and self._place is not None:
-                    self._inherit(values, np.flatnonzero(~known), key, place, order)
+                    self._inherit(values, np.flatnonzero(~present), key, place, order)
                 self._share(values, key, order)
         d = self._dimension
         motion = self._motion if self.follows else None
@@ -79,13 +79,13 @@ class Memory(Carrier):
         """Return r and û of the next step, linear through the last two where a contact was there in both."""
         d = self._dimension
         if np.array_equal(key, self._key_before):
-            before, known = self._before, np.ones(len(key), dtype=bool)
+            before, present = self._before, np.ones(len(key), dtype=bool)
         else:
-            at, known = _places(self._key_before, key, np.argsort(self._key_before, kind="stable"))
+            at, present = _places(self._key_before, key, np.argsort(self._key_before, kind="stable"))
             before = self._before[at]
         # one that closed or opened has no line
-        known &= _any(last[:, :d]) == _any(before[:, :d])
-        ahead = last + (_AHEAD * known)[:, None] * (last - before)
+        present &= _any(last[:, :d]) == _any(before[:, :d])
+        ahead = last + (_AHEAD * present)[:, None] * (last - before)
         return ContactStart(ahead[:, :d], ahead[:, d:])
 
     def _inherit(self, values: Array, new: Ints, key: Ints, place: Array, order: Ints) -> None:
@@ -109,11 +109,11 @@ class Memory(Carrier):
     def _share(self, values: Array, key: Ints, order: Ints) -> None:
         """Share what the springs of each pair of shapes hold evenly over the contacts that it has now."""
         column = 2 * self._dimension + ENERGY
-        held = self._values[order, column]
-        if not held.any():
+        stored = self._values[order, column]
+        if not stored.any():
             return
         pair, first = np.unique(self._key[order] >> PAIR_BIT, return_index=True)
-        total = np.add.reduceat(held, first)
+        total = np.add.reduceat(stored, first)
         now, row, count = np.unique(key >> PAIR_BIT, return_inverse=True, return_counts=True)
         at, known = _places(pair, now, np.arange(len(pair)))
         values[:, column] = (np.where(known, total[at], 0.0) / count)[row]
@@ -133,20 +133,20 @@ class Memory(Carrier):
 
     def at_rest(self, factor: float) -> "Memory":
         """Return the forces for a step `factor` times as long, of bodies that have come to rest; none with 0."""
-        d, other = self._dimension, Memory(self._dimension, self.follows)
-        other._key, other._place, other._values = self._key, self._place, self._values.copy()
-        other._values[:, :d] *= factor
-        other._values[:, d : 2 * d] = 0.0
-        return other
+        d, memory = self._dimension, Memory(self._dimension, self.follows)
+        memory._key, memory._place, memory._values = self._key, self._place, self._values.copy()
+        memory._values[:, :d] *= factor
+        memory._values[:, d : 2 * d] = 0.0
+        return memory
 
     def renamed(self, names: Callable[[Ints], Ints]) -> "Memory":
         """Return the memory of the same contacts under other keys; those whose new key is negative are forgotten."""
         key = names(self._key)
-        kept = np.flatnonzero(key >= 0)
-        other = Memory(self._dimension, self.follows)
-        other._key, other._values = key[kept], self._values[kept]
-        other._place = None if self._place is None else self._place[kept]
-        return other
+        rows = np.flatnonzero(key >= 0)
+        memory = Memory(self._dimension, self.follows)
+        memory._key, memory._values = key[rows], self._values[rows]
+        memory._place = None if self._place is None else self._place[rows]
+        return memory
 
 
 def _any(values: Array) -> Bools:

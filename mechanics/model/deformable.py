@@ -177,9 +177,9 @@ class Compliance:
         return velocity
 
     def _deforming(self, columns: Array) -> Array:
-        own = columns - self._projector.T @ (self._modes.T @ columns)
-        velocity = np.empty_like(own)
-        velocity[self._order] = self._factor.solve(own[self._order])
+        deforming = columns - self._projector.T @ (self._modes.T @ columns)
+        velocity = np.empty_like(deforming)
+        velocity[self._order] = self._factor.solve(deforming[self._order])
         velocity -= self._modes @ (self._projector @ velocity)
         return velocity
 
@@ -215,12 +215,12 @@ class Compliance:
         unit = np.zeros((len(self._modes), len(added)))
         unit[added, np.arange(len(added))] = 1.0
         columns = self._deforming(unit)[dofs] + self._modes[dofs] @ self._whole @ self._modes[added].T
-        old, own = (np.searchsorted(dofs, _dofs(part)) for part in (self._nodes, new))
+        old, new_dofs = (np.searchsorted(dofs, _dofs(part)) for part in (self._nodes, new))
         square = np.empty((len(dofs), len(dofs)))
         square[np.ix_(old, old)] = self._condensed
-        square[:, own] = columns
-        square[np.ix_(own, old)] = columns[old].T
-        square[np.ix_(own, own)] = 0.5 * (columns[own] + columns[own].T)
+        square[:, new_dofs] = columns
+        square[np.ix_(new_dofs, old)] = columns[old].T
+        square[np.ix_(new_dofs, new_dofs)] = 0.5 * (columns[new_dofs] + columns[new_dofs].T)
         self._nodes, self._batch, self._condensed = nodes, batch, square
 
 
@@ -242,16 +242,16 @@ def dissection(mesh: SolidMesh) -> Ints:
     return order
 
 
-def _parts(place: Array, adjacent: "csr_array[np.int32]", own: Ints) -> list[Ints]:
-    if len(own) <= _LEAF:
-        return [own]
-    along = place[own, int(np.ptp(place[own], axis=0).argmax())]
+def _parts(place: Array, adjacent: "csr_array[np.int32]", nodes: Ints) -> list[Ints]:
+    if len(nodes) <= _LEAF:
+        return [nodes]
+    along = place[nodes, int(np.ptp(place[nodes], axis=0).argmax())]
     low = along < np.median(along)
     if not low.any():
-        return [own]
+        return [nodes]
     inside = np.zeros(len(place), dtype=np.int32)
-    inside[own[low]] = 1
-    high = own[~low]
+    inside[nodes[low]] = 1
+    high = nodes[~low]
     between = adjacent[high] @ inside > 0
-    parts = _parts(place, adjacent, own[low]) + _parts(place, adjacent, high[~between])
+    parts = _parts(place, adjacent, nodes[low]) + _parts(place, adjacent, high[~between])
     return [*parts, high[between]]

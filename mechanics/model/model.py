@@ -193,12 +193,12 @@ def _known(model: Model, start: State) -> dict[str, tuple[Deformable, Array]]:
 def _flight(inertia: RigidInertia, stones: list[Deformable | None]) -> RigidInertia:
     """Return the inertia of all bodies that fly."""
     mass, inverse = inertia.mass.copy(), inertia.inverse_mass.copy()
-    own, inverted = inertia.inertia.copy(), inertia.inverse_inertia.copy()
+    moments, inverted = inertia.inertia.copy(), inertia.inverse_inertia.copy()
     for b, stone in enumerate(stones):
         if stone is not None:
             mass[b], inverse[b] = stone.mass, 1.0 / stone.mass
-            own[b], inverted[b] = stone.inertia, np.linalg.inv(stone.inertia)
-    return RigidInertia(mass, inverse, own, inverted)
+            moments[b], inverted[b] = stone.inertia, np.linalg.inv(stone.inertia)
+    return RigidInertia(mass, inverse, moments, inverted)
 
 
 def _parts(block: Block) -> tuple[Part, ...]:
@@ -210,12 +210,17 @@ def _mass_properties(blocks: Sequence[Block]) -> tuple[Array, Array, Array]:
     count = len(blocks)
     volume, centroid, inertia = np.empty(count), np.empty((count, 3)), np.empty((count, 3, 3))
     plain = [b for b, block in enumerate(blocks) if block.radius is None and not block.parts]
-    own = [blocks[b] for b in plain]
-    for faces, rows in alike([block.vertices for block in own], [block.faces for block in own]):
+    plain_blocks = [blocks[b] for b in plain]
+    for faces, rows in alike(
+        [block.vertices for block in plain_blocks], [block.faces for block in plain_blocks]
+    ):
         bodies = np.array(plain, dtype=np.int64)[rows]
-        corners, where = np.stack([own[row].vertices for row in rows]), [own[row].code for row in rows]
-        found = mass_properties_alike(corners, faces, [f"stone {code}" for code in where])
-        volume[bodies], centroid[bodies], inertia[bodies] = found
+        corners, where = (
+            np.stack([plain_blocks[row].vertices for row in rows]),
+            [plain_blocks[row].code for row in rows],
+        )
+        properties = mass_properties_alike(corners, faces, [f"stone {code}" for code in where])
+        volume[bodies], centroid[bodies], inertia[bodies] = properties
     for b in sorted(set(range(count)).difference(plain)):
         whole = ball_properties(blocks[b]) if blocks[b].radius is not None else _of_parts(blocks[b])
         volume[b], centroid[b], inertia[b] = whole.volume, whole.centroid, whole.inertia
@@ -294,7 +299,7 @@ def _beds(scene: Scene) -> dict[tuple[int, int], float]:
         if len(ends) == 2:
             beds[min(ends), max(ends)] = thickness
         elif len(pair) == 1:
-            beds |= {(min(end, other), max(end, other)): thickness for end in ends for other in others}
+            beds |= {(min(end, partner), max(end, partner)): thickness for end in ends for partner in others}
     return beds
 
 
@@ -333,10 +338,10 @@ def _check_loads(model: Model) -> None:
             )
         driven.update(bodies.tolist())
     for _, bodies in model.forces:
-        held = [codes[b] for b in bodies if model.fixed[b] or model.elastic[b]]
-        if held:
+        constrained = [codes[b] for b in bodies if model.fixed[b] or model.elastic[b]]
+        if constrained:
             raise SceneError(
-                f"a force acts on {held[0]}, which is not rigid",
+                f"a force acts on {constrained[0]}, which is not rigid",
                 where=model.scene.name,
                 remedy="forces act on rigid stones",
             )

@@ -55,16 +55,16 @@ def elastic_stones(stones: Sequence[Deformable | None]) -> ElasticStones:
             members.setdefault(id(stone), []).append(b)
     groups = []
     for bodies in members.values():
-        one = stones[bodies[0]]
-        assert one is not None
-        rows = start[bodies][:, None] + np.arange(len(one.mesh.nodes))
-        groups.append(ElasticGroup(one, np.array(bodies, dtype=np.int64), rows))
-    own = [stone for stone in stones if stone is not None]
+        first_stone = stones[bodies[0]]
+        assert first_stone is not None
+        rows = start[bodies][:, None] + np.arange(len(first_stone.mesh.nodes))
+        groups.append(ElasticGroup(first_stone, np.array(bodies, dtype=np.int64), rows))
+    meshed = [stone for stone in stones if stone is not None]
     return ElasticStones(
         tuple(groups),
         start,
-        np.concatenate([np.zeros((0, 3)), *(stone.mesh.nodes for stone in own)]),
-        np.concatenate([np.zeros((0, 6, 3)), *(_by_node(stone) for stone in own)]),
+        np.concatenate([np.zeros((0, 3)), *(stone.mesh.nodes for stone in meshed)]),
+        np.concatenate([np.zeros((0, 6, 3)), *(_by_node(stone) for stone in meshed)]),
     )
 
 

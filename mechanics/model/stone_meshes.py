@@ -96,7 +96,7 @@ class StoneWorkshop:
         own = classes(
             [key(b) for b in order],
             [self._blocks[b].vertices for b in order],
-            lambda one, other: same(order[one], order[other]),
+            lambda first, second: same(order[first], order[second]),
         )
         return {b: order[k] for b, k in zip(order, own, strict=True)}
 
@@ -113,13 +113,13 @@ class StoneWorkshop:
     def _moved(self, first: int, other: int) -> bool:
         return translation(self._blocks[first].vertices, self._blocks[other].vertices)
 
-    def _turned(self, first: int, other: int) -> bool:
-        one, two = self._blocks[first], self._blocks[other]
-        contact = self._contact.get(first, ()), self._contact.get(other, ())
-        found = motion(one.vertices, one.faces, two.vertices, two.faces, *contact)
-        if found is not None:
-            self._motions[other] = found
-        return found is not None
+    def _turned(self, first: int, second: int) -> bool:
+        first_block, two = self._blocks[first], self._blocks[second]
+        contact = self._contact.get(first, ()), self._contact.get(second, ())
+        congruence = motion(first_block.vertices, first_block.faces, two.vertices, two.faces, *contact)
+        if congruence is not None:
+            self._motions[second] = congruence
+        return congruence is not None
 
 
 def _is_graded(block: Block) -> bool:
@@ -134,14 +134,16 @@ def _sizes(block: Block) -> tuple[object, ...]:
     return block.mesh_size, block.element, block.contact_size, block.growth, block.mesher
 
 
-def touching_faces(blocks: Sequence[Block], wanted: Sequence[int], near: float) -> dict[int, tuple[int, ...]]:
-    """Return the faces of the wanted blocks that another block faces, nearer than `near` times the smaller one's size.
+def touching_faces(
+    blocks: Sequence[Block], wanted: Sequence[int], reach: float
+) -> dict[int, tuple[int, ...]]:
+    """Return the faces of the wanted blocks that another block faces, nearer than `reach` times the smaller one's size.
 
     Parameters
     ----------
     blocks : of a scene
     wanted : indices of blocks
-    near : distance over size, like that at which contacts are watched [-]
+    reach : distance over size, like that at which contacts are watched [-]
     """
     low = np.array([block.vertices.min(axis=0) for block in blocks])
     high = np.array([block.vertices.max(axis=0) for block in blocks])
@@ -160,22 +162,22 @@ def touching_faces(blocks: Sequence[Block], wanted: Sequence[int], near: float) 
     touching: dict[int, tuple[int, ...]] = {}
     largest = float(radius.max())
     for index in wanted:
-        around = tree.query_ball_point(tree.data[index], radius[index] + largest * (1.0 + near))
+        around = tree.query_ball_point(tree.data[index], radius[index] + largest * (1.0 + reach))
         found: set[int] = set()
-        for other in around:
-            gap = near * min(size[index], size[other])
-            apart = (low[index] > high[other] + gap).any() or (low[other] > high[index] + gap).any()
-            if other != index and not apart:
-                found.update(_facing(blocks[index], planes(index), blocks[other], planes(other), gap))
+        for neighbour in around:
+            gap = reach * min(size[index], size[neighbour])
+            apart = (low[index] > high[neighbour] + gap).any() or (low[neighbour] > high[index] + gap).any()
+            if neighbour != index and not apart:
+                found.update(_facing(blocks[index], planes(index), blocks[neighbour], planes(neighbour), gap))
         touching[index] = tuple(sorted(found))
     return touching
 
 
 def _facing(
-    block: Block, own: tuple[Array, Array], other: Block, its: tuple[Array, Array], gap: float
+    block: Block, own: tuple[Array, Array], neighbour: Block, its: tuple[Array, Array], gap: float
 ) -> list[int]:
     """Return the faces of a block over which a face of the other lies, nearer than a gap [m]."""
-    if block.radius is not None or other.radius is not None:
+    if block.radius is not None or neighbour.radius is not None:
         return []
     (normals, origins), (facing, places) = own, its
     distance = ((places - origins[:, None]) * normals[:, None]).sum(axis=-1)
@@ -184,7 +186,9 @@ def _facing(
         {
             int(k)
             for k, j in pairs
-            if _over(block.vertices[list(block.faces[k])], other.vertices[list(other.faces[j])], normals[k])
+            if _over(
+                block.vertices[list(block.faces[k])], neighbour.vertices[list(neighbour.faces[j])], normals[k]
+            )
         }
     )
 
@@ -195,9 +199,10 @@ def _over(polygon: Array, other: Array, normal: Array) -> bool:
     u = u / np.linalg.norm(u)
     axes = np.column_stack([u, np.cross(normal, u)])
     first, second = (polygon - polygon[0]) @ axes, (other[::-1] - polygon[0]) @ axes
-    one, two = np.array([len(first)]), np.array([len(second)])
-    common, count = overlaps(first[None], one, second[None], two)
+    first_count, two = np.array([len(first)]), np.array([len(second)])
+    common, count = overlaps(first[None], first_count, second[None], two)
     areas = [
-        float(moments(*given)[0][0]) for given in ((common, count), (first[None], one), (second[None], two))
+        float(moments(*given)[0][0])
+        for given in ((common, count), (first[None], first_count), (second[None], two))
     ]
     return areas[0] > _SHARED * min(areas[1:])

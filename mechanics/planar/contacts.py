@@ -108,16 +108,16 @@ class PlanarDetector:
         to_point = radius[first] + 0.5 * gap
         point = state.centre[first] - to_point[:, None] * normal
         arm = point - state.centre[second]
-        other = radius[np.where(on_wall, 0, second)]
+        second_radius = radius[np.where(on_wall, 0, second)]
         lever = np.zeros((len(gap), 4))
         # of a disk the arm runs along n exactly
         lever[:, 1] = -to_point
         lever[:, 2] = np.where(on_wall, arm[:, 0] * normal[:, 1] - arm[:, 1] * normal[:, 0], 0.0)
         along = arm[:, 0] * normal[:, 0] + arm[:, 1] * normal[:, 1]
-        lever[:, 3] = np.where(on_wall, along, other + 0.5 * gap)
+        lever[:, 3] = np.where(on_wall, along, second_radius + 0.5 * gap)
         # what pushes a wall with a mass does not turn it
         lever[~self._model.fixed[second] & on_wall, 2:] = 0.0
-        size = 2.0 * np.where(on_wall, radius[first], np.minimum(radius[first], other))
+        size = 2.0 * np.where(on_wall, radius[first], np.minimum(radius[first], second_radius))
         key = (first * len(self._model.fixed) + second) * 3 + names[:, 2]
         return PlanarContacts(
             bodies, key, normal, gap, point, lever, size * self._model.scene.thickness, size

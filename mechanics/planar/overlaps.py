@@ -154,11 +154,11 @@ class Overlaps(Carrier):
         return Apart(place, gap + apart, moved)
 
 
-def _recalled(known: Ints, values: Array, key: Ints) -> Array:
+def _recalled(stored: Ints, values: Array, key: Ints) -> Array:
     """Return the values of contacts by sorted keys; zero for those that are not known."""
-    found = np.zeros((len(key), *values.shape[1:]))
-    if len(known):
-        at = np.minimum(np.searchsorted(known, key), len(known) - 1)
-        same = known[at] == key
-        found[same] = values[at[same]]
-    return found
+    recalled = np.zeros((len(key), *values.shape[1:]))
+    if len(stored):
+        at = np.minimum(np.searchsorted(stored, key), len(stored) - 1)
+        same = stored[at] == key
+        recalled[same] = values[at[same]]
+    return recalled

@@ -194,8 +194,8 @@ class PlanarScene:
         if not self.disks:
             raise SceneError("the scene has no disks", where=self.name, remedy="give at least one")
         codes = self.codes
-        known = set(codes)
-        if len(known) < len(codes):
+        distinct = set(codes)
+        if len(distinct) < len(codes):
             repeated = sorted(code for code, times in Counter(codes).items() if times > 1)
             raise SceneError(f"codes used twice: {', '.join(repeated)}", where=self.name)
         for quantity, value, ok, remedy in (
@@ -220,7 +220,7 @@ class PlanarScene:
             if not ok:
                 raise SceneError(f"{quantity} = {value!r}", where=self.name, remedy=remedy)
         check_settings(self.name, self)
-        self._check_named(known)
+        self._check_named(distinct)
 
     def _check_named(self, known: set[str]) -> None:
         """Check that rules and loads name bodies of the scene, and motions only fixed ones."""

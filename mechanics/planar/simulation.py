@@ -135,12 +135,12 @@ class PlanarSimulation(Carrier):
                 wider = self._overlooked(kick, solved)
             if wider is None:
                 break
-            found = Memory(2)
-            found.store(
+            memory = Memory(2)
+            memory.store(
                 contacts.key, replace(solved.solution, impulse=solved.impulse), solved.stated.approach.state
             )
             contacts = wider
-            solved = self._solve(kick, free, contacts, found)
+            solved = self._solve(kick, free, contacts, memory)
         with self.clock("advance"):
             after = self._drive.place(fly(replace(kick, velocity=solved.velocity), h * theta))
             if not (np.isfinite(after.velocity).all() and np.isfinite(after.centre).all()):
@@ -323,8 +323,8 @@ class PlanarSimulation(Carrier):
         )
 
 
-def _among(key: Ints, known: Ints) -> Bools:
+def _among(key: Ints, stored: Ints) -> Bools:
     """Return the keys (n,) that are among others; both are in order, as contacts are."""
-    at = np.minimum(np.searchsorted(known, key), len(known) - 1)
-    same: Bools = known[at] == key if len(known) else np.zeros(len(key), dtype=bool)
+    at = np.minimum(np.searchsorted(stored, key), len(stored) - 1)
+    same: Bools = stored[at] == key if len(stored) else np.zeros(len(key), dtype=bool)
     return same

@@ -46,19 +46,19 @@ def check_problem(diagonal: Array, u_free: Array, **each: Array | None) -> None:
     ------
     SolverError : with the number of the contact, the value and a remedy
     """
-    given = {name: values for name, values in each.items() if values is not None}
-    _check_shapes(diagonal, u_free, given)
+    arrays = {name: values for name, values in each.items() if values is not None}
+    _check_shapes(diagonal, u_free, arrays)
     if len(u_free) == 0:
         return
-    require_finite(u_free=u_free, **given)
-    for name, values in given.items():
+    require_finite(u_free=u_free, **arrays)
+    for name, values in arrays.items():
         if name != "bias" and values.min() < 0:
             contact = int(values.argmin())
             raise SolverError(
                 f"{name} of contact {contact} is {values[contact]:g}", where=_WHERE, remedy="give 0 or more"
             )
     check_compliance(diagonal)
-    fastest = max(float(np.abs(u_free).max()), float(np.abs(given["bias"]).max()))
+    fastest = max(float(np.abs(u_free).max()), float(np.abs(arrays["bias"]).max()))
     if not (fastest == 0 or SMALLEST <= fastest <= LARGEST):
         raise SolverError(f"velocities of {fastest:.3g} m/s at most", where=_WHERE, remedy=_UNITS)
 
@@ -72,16 +72,18 @@ def check_compliance(diagonal: Array) -> None:
             where=_WHERE,
             remedy="correct its bodies: masses and moments of inertia greater than 0, places that are numbers",
         )
-    own = np.einsum("cii->ci", diagonal)
-    if not (own > 0).all():
-        contact, axis = (int(i) for i in np.argwhere(~(own > 0))[0])
+    diagonals = np.einsum("cii->ci", diagonal)
+    if not (diagonals > 0).all():
+        contact, axis = (int(i) for i in np.argwhere(~(diagonals > 0))[0])
         raise SolverError(
-            f"contact {contact} does not give way along axis {axis} (W = {own[contact, axis]:g})",
+            f"contact {contact} does not give way along axis {axis} (W = {diagonals[contact, axis]:g})",
             where=_WHERE,
             remedy="a contact needs a body that moves, of a mass greater than 0; leave others out",
         )
-    if own.max() > LARGEST or own.min() < SMALLEST:
-        raise SolverError(f"W of {own.min():.3g} to {own.max():.3g} 1/kg", where=_WHERE, remedy=_UNITS)
+    if diagonals.max() > LARGEST or diagonals.min() < SMALLEST:
+        raise SolverError(
+            f"W of {diagonals.min():.3g} to {diagonals.max():.3g} 1/kg", where=_WHERE, remedy=_UNITS
+        )
 
 
 def _check_shapes(diagonal: Array, u_free: Array, each: Mapping[str, Array]) -> None:

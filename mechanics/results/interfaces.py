@@ -69,9 +69,9 @@ def placed_faces(model: Model, state: State) -> Faces:
     vertex = np.einsum("vij,vj->vi", state.rotation[owner], surfaces.shapes.vertex) + state.centre[owner]
     for b, stone in enumerate(model.stones):
         if stone is not None:
-            own = slice(surfaces.body_vptr[b], surfaces.body_vptr[b + 1])
-            away = np.linalg.norm(surfaces.shapes.vertex[own, None] - stone.mesh.nodes, axis=2)
-            vertex[own] = state.node[model.nodes_of(b)][away.argmin(axis=1)]
+            corners = slice(surfaces.body_vptr[b], surfaces.body_vptr[b + 1])
+            away = np.linalg.norm(surfaces.shapes.vertex[corners, None] - stone.mesh.nodes, axis=2)
+            vertex[corners] = state.node[model.nodes_of(b)][away.argmin(axis=1)]
     count = np.diff(surfaces.shapes.cptr)
     place = np.arange(int(count.max()))
     chosen = surfaces.shapes.cptr[:-1, None] + np.where(place < count[:, None], place, 0)
@@ -91,15 +91,17 @@ def placed_faces(model: Model, state: State) -> Faces:
     )
 
 
-def find_interfaces(faces: Faces, contacts: Contacts, state: State, known: Ints | None = None) -> Interfaces:
+def find_interfaces(
+    faces: Faces, contacts: Contacts, state: State, known_pairs: Ints | None = None
+) -> Interfaces:
     """Return the pairs of faces to which contacts belong.
 
     Parameters
     ----------
     faces, contacts, state : at one instant
-    known : (n, 2) pairs that are kept with or without contacts, numbered first: those of the start
+    known_pairs : (n, 2) pairs that are kept with or without contacts, numbered first: those of the start
     """
-    known = np.zeros((0, 2), dtype=np.int64) if known is None else known
+    known_pairs = np.zeros((0, 2), dtype=np.int64) if known_pairs is None else known_pairs
     # contiguous as its opposite is: a kernel is compiled once more for views
     point, normal = material_points(contacts, state), np.ascontiguousarray(contacts.frame[:, 0])
     face = np.column_stack(
@@ -110,7 +112,7 @@ def find_interfaces(faces: Faces, contacts: Contacts, state: State, known: Ints 
     )
     face = np.sort(face, axis=1)  # faces are numbered body after body
     angle = -np.einsum("ci,ci->c", faces.normal[face[:, 0]], faces.normal[face[:, 1]])
-    key, known_key = face @ [len(faces.body), 1], known @ [len(faces.body), 1]
+    key, known_key = face @ [len(faces.body), 1], known_pairs @ [len(faces.body), 1]
     is_known = np.isin(key, known_key)
     valid = (contacts.area > 0) & faces.flat[face].all(axis=1) & (angle > np.where(is_known, _HINGED, FLAT))
     new = np.unique(key[valid & ~is_known])

@@ -66,14 +66,16 @@ def sections(faces: Faces, pair: Ints) -> JointPolygons:
     n = n / np.linalg.norm(n, axis=1, keepdims=True)
     flat = _axes_across(n)
     origin = 0.5 * (faces.centre[a] + faces.centre[b])
-    own = np.einsum("jki,jdi->jkd", faces.corner[a] - origin[:, None], flat)
-    other = np.einsum("jki,jdi->jkd", faces.corner[b] - origin[:, None], flat)
+    candidate = np.einsum("jki,jdi->jkd", faces.corner[a] - origin[:, None], flat)
+    antagonist = np.einsum("jki,jdi->jkd", faces.corner[b] - origin[:, None], flat)
     # seen along n, the faces of the first bodies run clockwise
-    place, count = np.arange(own.shape[1]), faces.corners[a]
-    own = own[np.arange(len(a))[:, None], np.where(place < count[:, None], count[:, None] - 1 - place, 0)]
-    corner, left = overlaps(own, count, other, faces.corners[b])
+    place, count = np.arange(candidate.shape[1]), faces.corners[a]
+    candidate = candidate[
+        np.arange(len(a))[:, None], np.where(place < count[:, None], count[:, None] - 1 - place, 0)
+    ]
+    corner, left = overlaps(candidate, count, antagonist, faces.corners[b])
     area, middle, second = moments(corner, left)
-    smaller = np.minimum(moments(own, count)[0], moments(other, faces.corners[b])[0])
+    smaller = np.minimum(moments(candidate, count)[0], moments(antagonist, faces.corners[b])[0])
     values, axes = np.linalg.eigh(second)
     axes = np.swapaxes(axes, 1, 2)[:, ::-1]
     axes[:, 1] *= np.sign(np.linalg.det(axes))[:, None]

@@ -126,19 +126,24 @@ def joint_results(
     step, contacts : the step of the forces, and its contact points
     """
     count, bodies = len(face), faces.body[face]
-    own = np.flatnonzero(contacts.joint >= 0)
-    joint = contacts.joint[own]
+    in_joint = np.flatnonzero(contacts.joint >= 0)
+    joint = contacts.joint[in_joint]
     away = np.bincount(joint, minlength=count) == 0
     section = _with_parted(sections(faces, face), start, bodies, step.after, np.flatnonzero(away))
     force, moment = resultants(
-        section, bodies, joint, contacts.bodies[own, 0], contacts.point[own], contacts.force[own]
+        section,
+        bodies,
+        joint,
+        contacts.bodies[in_joint, 0],
+        contacts.point[in_joint],
+        contacts.force[in_joint],
     )
-    n, status = section.frame[:, 0], contacts.status[own]
+    n, status = section.frame[:, 0], contacts.status[in_joint]
     # a force below the tolerance of the solver counts as none
     least = model.scene.solver.tolerance * float(np.linalg.norm(force, axis=1).max(initial=0.0))
     place, kern, edge = eccentricity(section, force, moment, least)
-    opening, sliding = _movement(section, start, bodies, step.after, contacts, own)
-    capacity = _sums(joint, _shear_capacity(step)[own], count)
+    opening, sliding = _movement(section, start, bodies, step.after, contacts, in_joint)
+    capacity = _sums(joint, _shear_capacity(step)[in_joint], count)
     shear = np.linalg.norm(_across(n, force), axis=1)
     return JointResult(
         bodies=bodies,
@@ -156,12 +161,12 @@ def joint_results(
         kern=kern,
         edge=edge,
         pressure_mean=_ratio(np.einsum("ji,ji->j", force, n), section.area),
-        pressure_max=_largest(joint, _patches(contacts, own), count),
-        gap=np.maximum(_at_most(section, section.gap), _largest(joint, contacts.gap[own], count)),
+        pressure_max=_largest(joint, _patches(contacts, in_joint), count),
+        gap=np.maximum(_at_most(section, section.gap), _largest(joint, contacts.gap[in_joint], count)),
         opening=opening,
         sliding=sliding,
-        slipping=_share(joint, contacts.area[own], status == "slip", count),
-        open=np.where(away, 1.0, _share(joint, contacts.area[own], np.isin(status, _IDLE), count)),
+        slipping=_share(joint, contacts.area[in_joint], status == "slip", count),
+        open=np.where(away, 1.0, _share(joint, contacts.area[in_joint], np.isin(status, _IDLE), count)),
         friction_use=_ratio(shear, np.where(capacity > least, capacity, 0.0)),
     )
 
@@ -172,18 +177,18 @@ def _movement(
     bodies: Ints,
     state: State,
     contacts: ContactResult,
-    own: Ints,
+    in_joint: Ints,
 ) -> tuple[Array, Array]:
     """Return opening and sliding (nj,) since the start, the largest of corners and contact points [m]."""
-    joint, count = contacts.joint[own], len(bodies)
+    joint, count = contacts.joint[in_joint], len(bodies)
     opened, slid = _moved_apart(section, start.state, state, bodies)
     # new joints have no start to refer to
     opened[len(start.face) :] = _at_most(section, section.gap)[len(start.face) :]
     # contact points, where there are any, include the deformation of the stones
     slid[np.bincount(joint, minlength=count) > 0] = 0.0
     return (
-        np.maximum(opened, _largest(joint, contacts.opening[own], count)),
-        np.maximum(slid, _largest(joint, contacts.slide[own], count)),
+        np.maximum(opened, _largest(joint, contacts.opening[in_joint], count)),
+        np.maximum(slid, _largest(joint, contacts.slide[in_joint], count)),
     )
 
 
@@ -210,10 +215,12 @@ def resultants(
     )
 
 
-def _patches(contacts: ContactResult, own: Ints) -> Array:
+def _patches(contacts: ContactResult, in_joint: Ints) -> Array:
     """Return the pressure (n,) around each contact point of a joint [Pa]."""
-    area = contacts.area[own]
-    return patch_pressure(contacts.point[own], contacts.pressure[own] * area, area, contacts.joint[own])
+    area = contacts.area[in_joint]
+    return patch_pressure(
+        contacts.point[in_joint], contacts.pressure[in_joint] * area, area, contacts.joint[in_joint]
+    )
 
 
 def _shear_capacity(step: Step) -> Array:
@@ -294,17 +301,17 @@ def _moved(start: State, state: State, body: Ints, point: Array) -> Array:
     return moved
 
 
-def _merged(section: JointPolygons, other: JointPolygons, rows: Ints) -> JointPolygons:
+def _merged(section: JointPolygons, added: JointPolygons, rows: Ints) -> JointPolygons:
     """Return a section with some rows of another one."""
-    most = max(section.corner.shape[1], other.corner.shape[1])
+    most = max(section.corner.shape[1], added.corner.shape[1])
     wide, narrow = (
         replace(
-            one,
-            corner=_padded(one.corner, most),
-            gap=_padded(one.gap, most),
-            middle=_padded(one.middle, most),
+            polygons,
+            corner=_padded(polygons.corner, most),
+            gap=_padded(polygons.gap, most),
+            middle=_padded(polygons.middle, most),
         )
-        for one in (section, other)
+        for polygons in (section, added)
     )
     values: dict[str, Any] = {
         field.name: _put(getattr(wide, field.name), rows, getattr(narrow, field.name)[rows])

@@ -34,10 +34,10 @@ def patch_pressure(point: Array, force: Array, area: Array, joint: Ints) -> Arra
     np.minimum.at(first, joint, np.arange(len(joint)))
     # in units of the radius; a fourth coordinate keeps joints apart
     place = np.column_stack([(point - point[first[joint]]) / radius[joint, None], 2.0 * joint])
-    near = cKDTree(place).query_pairs(1.0, output_type="ndarray")
-    one, other = np.concatenate([near[:, 0], near[:, 1]]), np.concatenate([near[:, 1], near[:, 0]])
+    pairs = cKDTree(place).query_pairs(1.0, output_type="ndarray")
+    source, target = np.concatenate([pairs[:, 0], pairs[:, 1]]), np.concatenate([pairs[:, 1], pairs[:, 0]])
     count = len(joint)
-    pressure: Array = (force + np.bincount(one, force[other], count)) / (
-        area + np.bincount(one, area[other], count)
+    pressure: Array = (force + np.bincount(source, force[target], count)) / (
+        area + np.bincount(source, area[target], count)
     )
     return pressure

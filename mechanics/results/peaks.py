@@ -92,10 +92,10 @@ class PeakTracker(Carrier):
         """Return the peaks of the run, with the stresses of its frames and its joints at the end."""
         model, time = self._model, end.time
         for frame in frames:
-            own = np.flatnonzero(frame.contacts.joint >= 0)
-            bodies = frame.contacts.bodies[own]
-            keep_largest(bodies, frame.contacts.opening[own], frame.time, self._opening)
-            keep_largest(bodies, frame.contacts.slide[own], frame.time, self._sliding)
+            in_joint = np.flatnonzero(frame.contacts.joint >= 0)
+            bodies = frame.contacts.bodies[in_joint]
+            keep_largest(bodies, frame.contacts.opening[in_joint], frame.time, self._opening)
+            keep_largest(bodies, frame.contacts.slide[in_joint], frame.time, self._sliding)
         whole = np.flatnonzero(~joints.sliver)
         for record, values in (
             (self._opening, joints.opening),

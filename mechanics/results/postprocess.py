@@ -55,8 +55,12 @@ def positions(model: Model, state: State) -> tuple[Array, ...]:
 
 def velocities(model: Model, state: State) -> tuple[Array, ...]:
     """Return the velocities of the same points [m/s]."""
-    own = np.repeat(state.velocity, np.diff(model.outline.first), axis=0)
-    return _by_body(model, own[:, :3] + np.cross(own[:, 3:], _arms(model, state)), state.node_velocity)
+    corner_velocity = np.repeat(state.velocity, np.diff(model.outline.first), axis=0)
+    return _by_body(
+        model,
+        corner_velocity[:, :3] + np.cross(corner_velocity[:, 3:], _arms(model, state)),
+        state.node_velocity,
+    )
 
 
 def _arms(model: Model, state: State) -> Array:
@@ -68,10 +72,10 @@ def _arms(model: Model, state: State) -> Array:
 
 def _by_body(model: Model, corner: Array, node: Array) -> tuple[Array, ...]:
     """Return the rows of each body: of its corners, or of its nodes if it is deformable."""
-    own = [corner[a:b] for a, b in pairwise(model.outline.first.tolist())]
+    by_body = [corner[a:b] for a, b in pairwise(model.outline.first.tolist())]
     for b in np.flatnonzero(model.elastic).tolist():
-        own[b] = node[model.nodes_of(b)]
-    return tuple(own)
+        by_body[b] = node[model.nodes_of(b)]
+    return tuple(by_body)
 
 
 class Observer(Carrier):

@@ -46,11 +46,11 @@ class Recorder(Carrier):
 
     def __call__(self, step: Step, opening: Array, sliding: Array) -> None:
         """Record one step; `opening` and `sliding` (nj,) are those of all joints of the start."""
-        state, own = step.after, self._body
+        state, body = step.after, self._body
         velocity = state.velocity
         if self._model.elastic_stones.groups:
             velocity = np.where(self._model.elastic[:, None], self._elastic_motion(state), velocity)
-        self._rows.append((state.time, state.centre[own], state.rotation[own], velocity[own]))
+        self._rows.append((state.time, state.centre[body], state.rotation[body], velocity[body]))
         self._of_joints.append((opening[self._joint], sliding[self._joint], *self._forces(step)))
 
     def series(self) -> Series:
@@ -82,9 +82,9 @@ class Recorder(Carrier):
         # forces act on the candidate; in a joint, on the first stone
         sign = np.where(contacts.bodies[rows, 0] == pair[rows, 0], 1.0, -1.0)
         alike = np.where(same, (sign[:, None] * contacts.frame[rows, 0]) @ normal.T, -np.inf)
-        known = same.any(axis=1)
+        recorded = same.any(axis=1)
         total = np.zeros_like(normal)
-        if known.any():
-            np.add.at(total, alike[known].argmax(axis=1), (sign[:, None] * step.force[rows])[known])
+        if recorded.any():
+            np.add.at(total, alike[recorded].argmax(axis=1), (sign[:, None] * step.force[rows])[recorded])
         across = np.einsum("ji,ji->j", total, normal)
         return across, np.linalg.norm(total - across[:, None] * normal, axis=1)

@@ -175,7 +175,7 @@ def rigged(scene: Scene, rig: Rig, motion: Motion) -> Scene:
         # between edges at the height of the push, or faces that the beam's moment hardly turns
         jaw = (at - _EDGE * rise, at + _EDGE * rise) if turns else (under + tall * _CLEAR, lug[1][2])
         mass = _BEAM * max(rig.load, weight) / fall
-        volume = sum(float(np.prod(np.subtract(one[1], one[0]))) for one in (beam, lug))
+        volume = sum(float(np.prod(np.subtract(box[1], box[0]))) for box in (beam, lug))
         shop.make(BEAM, beam, lug, density=mass / volume)
         shop.make(JAWS[0], ((a, c, jaw[0]), (middle - half, d, jaw[1])))
         shop.make(JAWS[1], ((middle + half, c, jaw[0]), (b, d, jaw[1])))
@@ -195,11 +195,11 @@ def rigged(scene: Scene, rig: Rig, motion: Motion) -> Scene:
         if rig.head is Head.HELD:
             shop.make(HOLD, ((b, c, top - edge), (b + wide, d, top + wide)))
     stiffness = max(rig.load, weight) / (yields * tall * width * (d - c))
-    own = frozenset(block.code for block in shop.made)
-    driven = own & {*JAWS, HOLD}
+    codes = frozenset(block.code for block in shop.made)
+    driven = codes & {*JAWS, HOLD}
     rule = LawRule(
         driven,
-        frozenset(block.code for block in scene.blocks) | (own - driven),
+        frozenset(block.code for block in scene.blocks) | (codes - driven),
         ElasticJoint(0.0, stiffness, stiffness),
     )
     return replace(

@@ -20,9 +20,9 @@ def at_once(threads: int) -> Callable[..., list[Any]]:
     def each(work: Callable[..., Any], *given: Any) -> list[Any]:
         parts = list(zip(*given, strict=True))
         waiting = [_pool(threads - 1).submit(work, *part) for part in parts[1:]]
-        found = [work(*part) for part in parts[:1]]
+        results = [work(*part) for part in parts[:1]]
         # the last first, as the other threads take the first
         own = {k: work(*parts[k + 1]) for k in reversed(range(len(waiting))) if waiting[k].cancel()}
-        return found + [own[k] if k in own else one.result() for k, one in enumerate(waiting)]
+        return results + [own[k] if k in own else one.result() for k, one in enumerate(waiting)]
 
     return each

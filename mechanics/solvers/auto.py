@@ -58,24 +58,28 @@ class Auto:
         asked = self._in_motion(problem) if moving else limits
         links = chain_of(problem, follows, moving, asked[1], warm)
         closed = problem if moving else self._closed(problem)
-        found = follow(links, closed, start, asked, most)
+        solution = follow(links, closed, start, asked, most)
         if closed is not problem:
-            found = _judged(problem, found, asked)
-            if not found.converged:
-                count = found.iterations
-                other = follow(links, problem, start, asked, most - count)
-                found = min(found, other, key=lambda one: (not one.converged, one.natural_map))
-                found = replace(found, iterations=count + other.iterations)
+            solution = _judged(problem, solution, asked)
+            if not solution.converged:
+                count = solution.iterations
+                alternative = follow(links, problem, start, asked, most - count)
+                solution = min(
+                    solution,
+                    alternative,
+                    key=lambda candidate: (not candidate.converged, candidate.natural_map),
+                )
+                solution = replace(solution, iterations=count + alternative.iterations)
         if moving:
-            found = self._as_at_rest(problem, found, asked, warm)
+            solution = self._as_at_rest(problem, solution, asked, warm)
         if not follows or steps is None:
-            return found
-        if not (found.converged and self._rests(problem, found)):
-            return replace(found, motion=_MOTION)
+            return solution
+        if not (solution.converged and self._rests(problem, solution)):
+            return replace(solution, motion=_MOTION)
         if not moving:
             # what forces lack that are kept for hundreds of steps would add up
-            found = self._exact(problem, closed, found)
-        return replace(found, motion=steps - 1 if steps else _MOTION * warm)
+            solution = self._exact(problem, closed, solution)
+        return replace(solution, motion=steps - 1 if steps else _MOTION * warm)
 
     def _closed(self, problem: ContactProblem) -> ContactProblem:
         """Return the problem of a rest of rigid stones with gaps closed that are below the tolerance.
@@ -91,7 +95,7 @@ class Auto:
         return replace(problem, bias=np.where(ajar, 0.0, problem.bias)) if ajar.any() else problem
 
     def _as_at_rest(
-        self, problem: ContactProblem, found: ContactSolution, asked: tuple[float, float], warm: bool
+        self, problem: ContactProblem, solution: ContactSolution, asked: tuple[float, float], warm: bool
     ) -> ContactSolution:
         """Return a step of a motion solved as exactly as a rest asks, if nothing moves faster than errors may let it.
 
@@ -99,27 +103,27 @@ class Auto:
         """
         limits = self.tolerance, min(self.velocity_tolerance, self.rest_tolerance)
         exact_already = asked[0] <= limits[0] and asked[1] <= limits[1]
-        if exact_already or not found.converged or not self._within(problem, found, _UNTOLD * asked[1]):
-            return found
+        if exact_already or not solution.converged or not self._within(problem, solution, _UNTOLD * asked[1]):
+            return solution
         links = chain_of(problem, True, True, limits[1], warm)
         exact = follow(
-            links, problem, ContactStart(found.impulse, found.velocity), limits, self.max_iterations
+            links, problem, ContactStart(solution.impulse, solution.velocity), limits, self.max_iterations
         )
-        count = found.iterations + exact.iterations
-        return replace(exact if exact.converged else found, iterations=count)
+        count = solution.iterations + exact.iterations
+        return replace(exact if exact.converged else solution, iterations=count)
 
     def _exact(
-        self, problem: ContactProblem, closed: ContactProblem, found: ContactSolution
+        self, problem: ContactProblem, closed: ContactProblem, solution: ContactSolution
     ) -> ContactSolution:
         """Return the forces of a rest solved further, with its gaps closed; or as they are."""
         limits = EXACT * self.tolerance, EXACT * self.velocity_tolerance
-        start = ContactStart(found.impulse, np.zeros_like(found.velocity))
+        start = ContactStart(solution.impulse, np.zeros_like(solution.velocity))
         exact = follow((POLISH,), closed, start, limits, self.max_iterations)
-        count = found.iterations + exact.iterations
+        count = solution.iterations + exact.iterations
         judged = _judged(problem, exact, (self.tolerance, self.velocity_tolerance))
         if not judged.converged:
-            return replace(found, iterations=count)
-        return replace(judged, iterations=count, why=found.why)
+            return replace(solution, iterations=count)
+        return replace(judged, iterations=count, why=solution.why)
 
     def _in_motion(self, problem: ContactProblem) -> tuple[float, float]:
         """Return the tolerances of a step of a motion, of η and of velocities."""
@@ -130,17 +134,19 @@ class Auto:
         # η says next to nothing of a motion: the forces of the step before have one of 10⁻⁴
         return max(self.tolerance, velocity), velocity
 
-    def _rests(self, problem: ContactProblem, found: ContactSolution) -> bool:
+    def _rests(self, problem: ContactProblem, solution: ContactSolution) -> bool:
         """Return whether no contact moves, neither one that carries a force nor one that opens."""
-        return self._within(problem, found, min(_MOVES * self.velocity_tolerance, _LOOSEST))
+        return self._within(problem, solution, min(_MOVES * self.velocity_tolerance, _LOOSEST))
 
-    def _within(self, problem: ContactProblem, found: ContactSolution, share: float) -> bool:
+    def _within(self, problem: ContactProblem, solution: ContactSolution, share: float) -> bool:
         """Return whether no contact is faster than a share of the largest u_free."""
-        u = problem.delassus.apply(found.impulse) + problem.u_free
+        u = problem.delassus.apply(solution.impulse) + problem.u_free
         return bool(np.abs(u).max() <= share * float(np.abs(problem.u_free).max()))
 
 
-def _judged(problem: ContactProblem, found: ContactSolution, limits: tuple[float, float]) -> ContactSolution:
+def _judged(
+    problem: ContactProblem, solution: ContactSolution, limits: tuple[float, float]
+) -> ContactSolution:
     """Return a solution of a problem with closed gaps, as the problem itself judges it."""
-    left = residual(problem, found.impulse)
-    return replace(found, velocity=left.dual, natural_map=left.natural_map, converged=left.within(*limits))
+    left = residual(problem, solution.impulse)
+    return replace(solution, velocity=left.dual, natural_map=left.natural_map, converged=left.within(*limits))

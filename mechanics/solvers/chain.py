@@ -86,20 +86,20 @@ def follow(
         tight = link.further * limits[0], link.further * limits[1]
         solver = link.method(*tight, int(min(link.iterations, most - count)))
         try:
-            found = solver(problem, _begun(link.begin, problem, start, best))
+            solution = solver(problem, _begun(link.begin, problem, start, best))
         except SolverError as error:
             before = f"{link.name} failed: {error.what}"
             continue
-        count += found.iterations
-        left = residual(problem, found.impulse)
-        found = replace(
-            found,
+        count += solution.iterations
+        left = residual(problem, solution.impulse)
+        solution = replace(
+            solution,
             natural_map=left.natural_map,
             converged=left.within(*limits),
             why=f"{link.name}: {before}",
         )
-        before = f"{link.name} stood at η {found.natural_map:.0e}"
-        best = min(found, best, key=lambda one: (not one.converged, one.natural_map))
+        before = f"{link.name} stood at η {solution.natural_map:.0e}"
+        best = min(solution, best, key=lambda candidate: (not candidate.converged, candidate.natural_map))
         if best.converged:
             break
     return replace(best, iterations=count)
@@ -124,8 +124,12 @@ class Chain:
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from `start`."""
         limits = self.tolerance, self.velocity_tolerance
-        kept = follow((), problem, start, limits, 0)
-        return kept if kept.converged else follow(self.links, problem, start, limits, self.max_iterations)
+        solution = follow((), problem, start, limits, 0)
+        return (
+            solution
+            if solution.converged
+            else follow(self.links, problem, start, limits, self.max_iterations)
+        )
 
 
 def _begun(begin: Begin, problem: ContactProblem, start: ContactStart, best: ContactSolution) -> ContactStart:

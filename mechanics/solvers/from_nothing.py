@@ -52,10 +52,10 @@ def rests_from_nothing(problem: ContactProblem) -> tuple[bool | None, Array]:
         # to a tenth of what slips come down to where they vanish with E
         exact = _SMALL * JOINTS[1] / JOINTS[0] * slips[-1] / (pace or 1.0)
         looser = max(1.0, exact / _LIMITS[1])
-        found = follow(links, yielding, start, (looser * _LIMITS[0], looser * _LIMITS[1]), np.inf)
-        start = ContactStart(found.impulse, found.velocity)
-        errors.append(pace * residual(yielding, found.impulse).velocity)
-        moved = operator.apply(found.impulse) + yields * found.impulse + problem.u_free
+        solution = follow(links, yielding, start, (looser * _LIMITS[0], looser * _LIMITS[1]), np.inf)
+        start = ContactStart(solution.impulse, solution.velocity)
+        errors.append(pace * residual(yielding, solution.impulse).velocity)
+        moved = operator.apply(solution.impulse) + yields * solution.impulse + problem.u_free
         slips.append(float(np.abs(moved).max(initial=0.0)))
     (*_, softer, harder), (*_, unsure, error) = slips, errors
     if harder + error <= max(_SMALL * (softer - unsure), _LIMITS[1] * pace):

@@ -42,9 +42,9 @@ def _clipped(polygon: Array, count: Ints, a: Array, b: Array, wanted: Bools) -> 
     crossing = polygon + part[..., None] * (polygon[rows, after] - polygon)
     # each corner gives itself, if it is kept, and then the point where its edge crosses the line
     found = np.stack([polygon, crossing], axis=2).reshape(number, 2 * most, 2)
-    kept = np.stack([meant & (left >= 0), crosses], axis=2).reshape(number, 2 * most)
-    order = np.argsort(~kept, axis=1, kind="stable")
-    left_over = kept.sum(axis=1)
+    inside = np.stack([meant & (left >= 0), crosses], axis=2).reshape(number, 2 * most)
+    order = np.argsort(~inside, axis=1, kind="stable")
+    left_over = inside.sum(axis=1)
     return found[rows, order][:, : max(int(left_over.max(initial=0)), 1)], left_over
 
 

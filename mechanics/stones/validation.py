@@ -60,17 +60,17 @@ def check_corners(where: str, vertices: Array) -> None:
             where=where,
             remedy="give numbers",
         )
-    far = float(np.abs(vertices).max())
-    wide = float(np.ptp(vertices, axis=0).max()) if far <= _WIDEST else far
+    farthest = float(np.abs(vertices).max())
+    wide = float(np.ptp(vertices, axis=0).max()) if farthest <= _WIDEST else farthest
     if not _NARROWEST <= wide <= _WIDEST:
         raise SceneError(
             f"it is {wide:.3g} m wide",
             where=where,
             remedy="give lengths in metres, of stones that can be built",
         )
-    if np.finfo(float).eps * far > _ROUNDED * wide:
+    if np.finfo(float).eps * farthest > _ROUNDED * wide:
         raise SceneError(
-            f"it is {wide:.3g} m wide, {far:.3g} m from the origin: rounding would move its corners",
+            f"it is {wide:.3g} m wide, {farthest:.3g} m from the origin: rounding would move its corners",
             where=where,
             remedy="shift the scene to the origin",
         )

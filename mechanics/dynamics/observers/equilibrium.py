@@ -138,9 +138,9 @@ def seen_from_supports(model: Model, start: State, state: State) -> State:
 
 def displacement(model: Model, start: State, state: State) -> Array:
     """Return the largest displacement of a corner or node of each body since `start` (nb,) [m]."""
-    own = model.surfaces
+    surfaces = model.surfaces
     largest = largest_displacement(
-        own.body_vptr, own.shapes.vertex, state.centre, state.rotation, start.centre, start.rotation
+        surfaces.body_vptr, surfaces.shapes.vertex, state.centre, state.rotation, start.centre, start.rotation
     )
     return _with_nodes(model, largest, np.linalg.norm(state.node - start.node, axis=1))
 
@@ -161,8 +161,8 @@ def tilt(model: Model, start: State, state: State) -> Array:
 
 def speed(model: Model, state: State) -> Array:
     """Return the largest speed of a corner or node of each body (nb,) [m/s]."""
-    own = model.surfaces
-    largest = largest_speed(own.body_vptr, own.shapes.vertex, state.rotation, state.velocity)
+    surfaces = model.surfaces
+    largest = largest_speed(surfaces.body_vptr, surfaces.shapes.vertex, state.rotation, state.velocity)
     return _with_nodes(model, largest, np.linalg.norm(state.node_velocity, axis=1))
 
 

@@ -165,15 +165,15 @@ class Sleepers(Carrier):
         """Wake bodies (nb,); the memory takes up the forces that they kept."""
         if not bodies.any():
             return
-        kept, woken = self.forces, self.asleep & bodies
+        forces, woken = self.forces, self.asleep & bodies
         self.asleep = self.asleep & ~bodies
-        if kept is not None:
-            rows = woken[kept.contacts.bodies].any(axis=1)
-            again = kept.take(np.flatnonzero(rows))
+        if forces is not None:
+            rows = woken[forces.contacts.bodies].any(axis=1)
+            again = forces.take(np.flatnonzero(rows))
             solution = np.hstack([again.impulse, again.dual])
             self._memory.take_up(again.contacts.key, solution, again.internal, again.place)
-            kept = kept.take(np.flatnonzero(~rows))
-        self._keep(kept, state)
+            forces = forces.take(np.flatnonzero(~rows))
+        self._keep(forces, state)
 
     def _keep(self, forces: ContactForces | None, state: State) -> None:
         """Keep the forces among sleeping stones; the awake ones see these as fixed."""

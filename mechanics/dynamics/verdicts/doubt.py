@@ -47,10 +47,10 @@ class UnsolvedSteps(Carrier):
         fastest = float(np.abs(problem.u_free).max(initial=0.0)) or float(
             np.abs(problem.bias).max(initial=0.0)
         )
-        found = residual(problem, step.solution.impulse)
-        broken = np.nan_to_num(found.error * problem.delassus.scale)
+        residuals = residual(problem, step.solution.impulse)
+        broken = np.nan_to_num(residuals.error * problem.delassus.scale)
         np.maximum.at(self._stones, step.found.contacts.bodies, broken[:, None])
-        error = found.velocity * fastest
+        error = residuals.velocity * fastest
         self.count += 1
         self.total += error
         self.worst = max(self.worst, error)

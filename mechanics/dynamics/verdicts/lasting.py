@@ -41,10 +41,10 @@ def disproof(simulation: Simulation) -> tuple[Simulation | None, bool]:
     nothing carries. So the stones forget all contact forces, and must find those of their rest again without leaving
     it: rigid ones from forces that arise from nothing.
     """
-    other = simulation.released()
-    found = other.rests_from_nothing()
-    lasting = _lasts(other.released(forgets=False)) if found is None else found
-    return None if lasting else other, found is False
+    released = simulation.released()
+    at_rest = released.rests_from_nothing()
+    lasting = _lasts(released.released(forgets=False)) if at_rest is None else at_rest
+    return None if lasting else released, at_rest is False
 
 
 def _lasts(simulation: Simulation) -> bool:

@@ -225,11 +225,11 @@ class Watch(Carrier):
         """Return a caution that states the compliance of the joints, if any step needed it."""
         if not self._compliant:
             return []
-        one, other = (self._model.scene.blocks[body].code for body in self._pair)
+        first, second = (self._model.scene.blocks[body].code for body in self._pair)
         end = f"{length(self._depth)} at the end" if self._depth > 0 else "rigid again at the end"
         return [
             f"joints gave way elastically in {self._compliant} of {self._steps} steps, which rigid joints did not "
-            f"solve: stones overlap by at most {length(self._deepest)} for it ({one} and {other}; {end})"
+            f"solve: stones overlap by at most {length(self._deepest)} for it ({first} and {second}; {end})"
         ]
 
     def _sinking(self, step: Step, seen: State) -> Array:
@@ -266,10 +266,10 @@ def _unbonded(model: Model, step: Step) -> tuple[str, ...]:
     if share < _UNFILLED:
         return ()
     gap = np.abs(step.gap[wide])
-    one, other = (model.scene.blocks[body].code for body in sorted(contacts.bodies[wide[gap.argmax()]]))
+    first, second = (model.scene.blocks[body].code for body in sorted(contacts.bodies[wide[gap.argmax()]]))
     return (
         f"mortar does not hold {_percent(share)} of the area of its joints, where gaps or overlaps exceed a hundredth "
-        f"of the smaller stone's width ({one} and {other}: {length(float(gap.max()))})",
+        f"of the smaller stone's width ({first} and {second}: {length(float(gap.max()))})",
     )
 
 

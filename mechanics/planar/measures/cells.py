@@ -68,14 +68,14 @@ def members(cell: Cell, centre: Array) -> Ints:
     SceneError : the cell has too few disks, as one outside the sample has
     """
     away = np.linalg.norm(centre - np.array(cell.centre), axis=1)
-    found = np.flatnonzero(away <= cell.radius)
-    if len(found) < _FEWEST:
+    disks = np.flatnonzero(away <= cell.radius)
+    if len(disks) < _FEWEST:
         raise SceneError(
-            f"holds {len(found)} disks",
+            f"holds {len(disks)} disks",
             where=f"cell {cell.name!r}",
             remedy=f"place it within the sample, with a radius that holds {_FEWEST} or more",
         )
-    return found
+    return disks
 
 
 def layer_members(layer: Ints) -> dict[str, Ints]:

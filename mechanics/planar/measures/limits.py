@@ -63,11 +63,11 @@ def shear_limits(now: Array, share: Array) -> ShearLimits:
         chosen = [group for group in chosen if len(group) >= _FEWEST]
         splits = [_split(now[group, 0], share[group] > least) for group in chosen]
         middles = [float(height[group].mean()) for group in chosen]
-        known = np.isfinite(splits)
-        if known.sum() < 3:
+        finite = np.isfinite(splits)
+        if finite.sum() < 3:
             angles.append(float("nan"))
             continue
-        slope = theilslopes(np.array(splits)[known], np.array(middles)[known])[0]
+        slope = theilslopes(np.array(splits)[finite], np.array(middles)[finite])[0]
         angles.append(float(np.arctan2(1.0, slope)))
     return ShearLimits(*angles)
 

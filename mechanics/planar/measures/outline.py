@@ -43,9 +43,9 @@ def sides_of(centre: Array, radius: Array) -> tuple[Ints, Ints]:
     after: dict[int, list[int]] = {}
     for first, second in rim.tolist():
         after.setdefault(first, []).append(second)
-    there, near = np.unique(rim), _TOUCHES * radius.min()
+    there, margin = np.unique(rim), _TOUCHES * radius.min()
     low, high = (centre[:, 1] - radius)[there], (centre[:, 1] + radius)[there]
-    floor, top = there[low < low.min() + near], there[high > high.max() - near]
+    floor, top = there[low < low.min() + margin], there[high > high.max() - margin]
     corners = [platen[np.argsort(centre[platen, 0])[[0, -1]]] for platen in (floor, top)]
     (bottom_left, bottom_right), (top_left, top_right) = corners
     right = _walk(centre, after, int(bottom_right), int(top_right), np.array([1.0, 0.0]))

@@ -47,11 +47,11 @@ def moments(count: int, centre: Array, bodies: Ints, point: Array, force: Array)
     total = np.zeros((count, 4))
     for side, sign in ((0, -1.0), (1, 1.0)):
         body = bodies[:, side]
-        own = body < count
-        arm = point[own] - centre[body[own]]
-        dyad = (sign * force[own])[:, :, None] * arm[:, None, :]
+        acting = body < count
+        arm = point[acting] - centre[body[acting]]
+        dyad = (sign * force[acting])[:, :, None] * arm[:, None, :]
         for part, values in enumerate(dyad.reshape(-1, 4).T):
-            total[:, part] += np.bincount(body[own], values, minlength=count)
+            total[:, part] += np.bincount(body[acting], values, minlength=count)
     return total.reshape(count, 2, 2)
 
 

@@ -44,10 +44,10 @@ def rise(start: Array, now: Array, radius: Array, length: float, width: float) -
     edges = np.arange(0.0, length + width, width)
     places = np.arange(0.0, length, width / _STEPS)
     risen = profile(now, radius, places) - profile(start, radius, places)
-    known = np.isfinite(risen)
-    number = np.digitize(places[known], edges) - 1
+    finite = np.isfinite(risen)
+    number = np.digitize(places[finite], edges) - 1
     count = np.bincount(number, minlength=len(edges))
-    mean = np.bincount(number, risen[known], minlength=len(edges)) / np.maximum(count, 1)
+    mean = np.bincount(number, risen[finite], minlength=len(edges)) / np.maximum(count, 1)
     return edges + 0.5 * width, mean
 
 
@@ -66,7 +66,7 @@ def slope(places: Array, height: Array) -> float:
     >>> round(float(np.degrees(slope(np.arange(3.0), np.arange(3.0)))), 6)
     45.0
     """
-    known = np.isfinite(height)
-    if known.sum() < 2:
+    finite = np.isfinite(height)
+    if finite.sum() < 2:
         return float("nan")
-    return float(np.arctan(np.polyfit(places[known], height[known], 1)[0]))
+    return float(np.arctan(np.polyfit(places[finite], height[finite], 1)[0]))

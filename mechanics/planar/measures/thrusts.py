@@ -51,8 +51,8 @@ def thrusts_of(start: Array, now: Array, shear: Array, radius: Array, layer: flo
     radius : (nd,) [m]
     layer : thickness; disks that started above are left out [m]
     """
-    known = np.isfinite(shear)
-    middle = known & (np.abs(start[:, 1] - 0.5 * layer) < 0.5 * _MIDDLE * layer)
+    finite = np.isfinite(shear)
+    middle = finite & (np.abs(start[:, 1] - 0.5 * layer) < 0.5 * _MIDDLE * layer)
     if not middle.any():
         return Thrusts(np.zeros(0), np.zeros(0))
     x, values = start[middle, 0], shear[middle]
@@ -66,10 +66,10 @@ def thrusts_of(start: Array, now: Array, shear: Array, radius: Array, layer: flo
     place = x.min() + width * (peaks + 0.5)
     dips = []
     for at in place:
-        near = known & (np.abs(start - [at, 0.5 * layer]) < [_BESIDE * layer, 0.5 * _TALL * layer]).all(
+        beside = finite & (np.abs(start - [at, 0.5 * layer]) < [_BESIDE * layer, 0.5 * _TALL * layer]).all(
             axis=1
         )
-        dips.append(_dip(now[near], shear[near], 0.5 * width) if near.sum() >= _FEWEST else np.nan)
+        dips.append(_dip(now[beside], shear[beside], 0.5 * width) if beside.sum() >= _FEWEST else np.nan)
     return Thrusts(place, np.array(dips))
 
 

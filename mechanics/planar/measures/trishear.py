@@ -106,7 +106,7 @@ def trishear_fit(
     costs = [float(np.sum(misfit(start) ** 2)) for start in starts]
     best = None
     for number in np.argsort(costs)[:3]:
-        found = least_squares(
+        fit = least_squares(
             misfit,
             starts[number],
             bounds=([np.radians(1.0), 0.0], [_MOST_HALF_ANGLE, _MOST_RATIO]),
@@ -115,8 +115,8 @@ def trishear_fit(
             loss="soft_l1",  # a disk that the tip just passes, or just not, jumps by the whole slip
             f_scale=_FAR * abs(slip),
         )
-        if best is None or found.cost < best.cost:
-            best = found
+        if best is None or fit.cost < best.cost:
+            best = fit
     assert best is not None
     left, whole = float(np.sum(misfit(best.x) ** 2)), float(np.sum((moved - place) ** 2))
     residual = float(np.sqrt(left / len(place)))

@@ -80,7 +80,7 @@ def _misfit(model: Trishear, place: Array, motion: Array, slip: float) -> Array:
 def _plain_misfit(place: Array, motion: Array, step: Array) -> Array:
     """Return the squared misfit (n,) of the best rigid step along a line of any angle and place [m²]."""
     moves, rests = ((motion - step) ** 2).sum(axis=1), (motion**2).sum(axis=1)
-    best, found = np.inf, np.array(rests)
+    best, best_moves = np.inf, np.array(rests)
     for turn in _TURNS:
         order = np.argsort(place @ np.array([-np.sin(turn), np.cos(turn)]))
         # disks below the line rest, those above it move
@@ -88,9 +88,9 @@ def _plain_misfit(place: Array, motion: Array, step: Array) -> Array:
         cost += np.concatenate([np.cumsum(moves[order][::-1])[::-1], [0.0]])
         split = int(np.argmin(cost))
         if cost[split] < best:
-            best, found = float(cost[split]), moves.copy()
-            found[order[:split]] = rests[order[:split]]
-    return found
+            best, best_moves = float(cost[split]), moves.copy()
+            best_moves[order[:split]] = rests[order[:split]]
+    return best_moves
 
 
 def _by_block(values: Array, block: Ints) -> Array:
@@ -107,21 +107,21 @@ def _not_excluded(
     block : (n,) of each disk, which shear together and so are not independent
     least : misfit of the fit in each block [m²]
     """
-    kept = np.zeros((len(_HALF_ANGLES), len(_RATIOS)), dtype=bool)
+    accepted = np.zeros((len(_HALF_ANGLES), len(_RATIOS)), dtype=bool)
     for row, half in enumerate(_HALF_ANGLES):
         for column, ratio in enumerate(_RATIOS):
-            other = Trishear(model.tip, model.dip, float(half), float(ratio))
-            worse = _by_block(_misfit(other, place, motion, slip), block) - least
-            kept[row, column] = worse.sum() <= _WORSE * np.sqrt(len(worse)) * worse.std(ddof=1)
+            trial = Trishear(model.tip, model.dip, float(half), float(ratio))
+            worse = _by_block(_misfit(trial, place, motion, slip), block) - least
+            accepted[row, column] = worse.sum() <= _WORSE * np.sqrt(len(worse)) * worse.std(ddof=1)
     return (
-        _range(_HALF_ANGLES[kept.any(axis=1)], _HALF_ANGLES, model.half_angle),
-        _range(_RATIOS[kept.any(axis=0)], _RATIOS, model.ratio),
+        _range(_HALF_ANGLES[accepted.any(axis=1)], _HALF_ANGLES, model.half_angle),
+        _range(_RATIOS[accepted.any(axis=0)], _RATIOS, model.ratio),
     )
 
 
-def _range(kept: Array, tried: Array, fitted: float) -> tuple[float, float] | None:
+def _range(accepted: Array, tried: Array, fitted: float) -> tuple[float, float] | None:
     """Return the least and the largest; None if all that was tried remains."""
-    if len(kept) == len(tried):
+    if len(accepted) == len(tried):
         return None
-    values = np.append(kept, fitted)
+    values = np.append(accepted, fitted)
     return float(values.min()), float(values.max())

@@ -95,7 +95,7 @@ def expected_cost(plan: Plan, scene: Scene, slowness: float = 1.0) -> ExpectedCo
         seconds = slowness * rate(work)
         by_stage[stage] = seconds
         low, likely, high = low + seconds / rate.below, likely + seconds, high + seconds * rate.above
-    one, likely_step = slowness * step(work), slowness * usual(work)
+    step_cost, likely_step = slowness * step(work), slowness * usual(work)
     by_stage["steps"] = steps[1] * likely_step
     total = time_.steps
     moving = high + total * slowness * RATES[kind, "moving"](work)
@@ -105,9 +105,9 @@ def expected_cost(plan: Plan, scene: Scene, slowness: float = 1.0) -> ExpectedCo
     if unknown:
         moving = high + total * slowness * _hardest(kind, scene, work)
     seconds_range = (
-        low + steps[0] * one / step.below,
+        low + steps[0] * step_cost / step.below,
         likely + steps[1] * likely_step,
-        max(high + steps[2] * one * step.above, moving if unknown else 0.0),
+        max(high + steps[2] * step_cost * step.above, moving if unknown else 0.0),
     )
     return ExpectedCost(
         seconds_range,
@@ -131,8 +131,8 @@ def _hardest(kind: str, scene: Scene, work: Mapping[str, float]) -> float:
 
 def measures(amounts: Amounts) -> dict[str, float]:
     """Return the quantities that rates refer to: the amounts; *one*; *tangle*, contacts · √stones."""
-    own = {name: float(value) for name, value in asdict(amounts).items()}
-    return own | {"one": 1.0, "tangle": own["contacts"] * own["stones"] ** 0.5}
+    values = {name: float(value) for name, value in asdict(amounts).items()}
+    return values | {"one": 1.0, "tangle": values["contacts"] * values["stones"] ** 0.5}
 
 
 def _asleep(kind: str, time_: TimeSettings, rest: float, steps: float) -> float | None:

@@ -97,7 +97,7 @@ def plan(scene: Scene) -> Plan:
     fidelities = [block.fidelity for block in scene.blocks]
     rigid = fidelities.count(Fidelity.RIGID)
     return Plan(
-        bodies={one: fidelities.count(one) for one in Fidelity},
+        bodies={fidelity: fidelities.count(fidelity) for fidelity in Fidelity},
         pairs=tuple((codes[a], codes[b]) for a, b in pairs),
         open_pairs=(len(ajar), float(ajar.max(initial=0.0))),
         contacts=len(contacts),

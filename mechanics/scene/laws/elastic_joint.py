@@ -250,7 +250,9 @@ class ElasticJoint(Joint):
         terms, begin = self._terms(contacts, springs), springs.begin
         step, theta, has = contacts.step, contacts.theta, contacts.area > 0
         area = np.where(has, contacts.area, np.inf)
-        way = step * ((1.0 - theta) * np.column_stack([contacts.speed, contacts.slide]) + theta * velocity)
+        displacement = step * (
+            (1.0 - theta) * np.column_stack([contacts.speed, contacts.slide]) + theta * velocity
+        )
         traction = -impulse / (step * area)[:, None]
         traction[:, 0] += terms.adhesion / (step * area)
         along = begin[:, 1:] + step * (
@@ -258,23 +260,23 @@ class ElasticJoint(Joint):
             / self._hold(contacts, springs.along)[:, None]
         )
         slip = velocity.copy()
-        slip[has, 1:] = ((way[:, 1:] - along + begin[:, 1:]) / step)[has]
+        slip[has, 1:] = ((displacement[:, 1:] - along + begin[:, 1:]) / step)[has]
         if self.softens:
-            state = self._damaged(contacts, terms, impulse, slip, begin[:, 0] + way[:, 0])
+            state = self._damaged(contacts, terms, impulse, slip, begin[:, 0] + displacement[:, 0])
         else:
             state = self._strength.after(contacts, impulse, slip)
         closed: Bools = has & (impulse[:, 0] > 0)
         limit = traction[:, 1:] / springs.along[:, None]
         ends = at_limit(terms, impulse) & (_square(limit) < _square(along))
         # a brittle bond is whole or broken, one that softens holds where it is drawn to its limit
-        kept = closed | (_holds(state) & has) if self.softens else closed
-        along = np.where(ends[:, None], limit, along) * kept[:, None]
-        across, crushed = self._across(contacts, state, springs, way[:, 0], traction[:, 0], closed)
+        holding = closed | (_holds(state) & has) if self.softens else closed
+        along = np.where(ends[:, None], limit, along) * holding[:, None]
+        across, crushed = self._across(contacts, state, springs, displacement[:, 0], traction[:, 0], closed)
         state[:, REST] -= crushed
         state[:, CRUSHED] += crushed
         gap = contacts.gap - state[:, REST] + step * theta * velocity[:, 0]
         most = np.where(_holds(state), terms.adhesion / (step * area * self._stiff(contacts)[0]), np.inf)
-        across = np.where(kept, across, np.minimum(np.maximum(gap, 0.0), most))
+        across = np.where(holding, across, np.minimum(np.maximum(gap, 0.0), most))
         along = along * self._restiffened(contacts, springs, across)[:, None]
         state[:, SPRING] = np.column_stack([across - gap, along]) * has[:, None]
         state[:, ENERGY] = self._energy(contacts, np.column_stack([across, along]), state)
@@ -287,9 +289,9 @@ class ElasticJoint(Joint):
         area = np.where(has, contacts.area, 1.0)
         for columns, stiffness in ((slice(0, 1), springs.across), (slice(1, 3), springs.along)):
             compliance[:, columns] = (has / (step * theta * self._hold(contacts, stiffness) * area))[:, None]
-        held = self._hold(contacts, springs.across), self._hold(contacts, springs.along)
-        across = (springs.pull / held[0] + (1.0 - theta) * contacts.speed) / theta
-        part = (springs.along / held[1])[:, None]
+        hold = self._hold(contacts, springs.across), self._hold(contacts, springs.along)
+        across = (springs.pull / hold[0] + (1.0 - theta) * contacts.speed) / theta
+        part = (springs.along / hold[1])[:, None]
         along = (part * springs.begin[:, 1:] + (1.0 - theta) * contacts.slide) / theta
         shift[has] = along[has]
         return replace(
@@ -302,8 +304,8 @@ class ElasticJoint(Joint):
         if self.mortar_young is None:
             across, along = np.full(count, self.normal_stiffness), np.full(count, self.shear_stiffness)
         else:
-            own = np.zeros(count) if contacts.thickness is None else contacts.thickness
-            across = self.mortar_young / np.where(own > 0, own, self.thickness or _ANY)
+            thickness = np.zeros(count) if contacts.thickness is None else contacts.thickness
+            across = self.mortar_young / np.where(thickness > 0, thickness, self.thickness or _ANY)
             along = across / (2.0 * (1.0 + self.mortar_poisson))
         part = FLOOR**self.stiffening
         return part * across, part * along
@@ -354,7 +356,7 @@ class ElasticJoint(Joint):
         contacts: Approach,
         state: Array,
         springs: _Springs,
-        way: Array,
+        displacement: Array,
         traction: Array,
         closed: Bools,
     ) -> tuple[Array, Array]:
@@ -364,10 +366,14 @@ class ElasticJoint(Joint):
         before and the work of its force; and no more than its strength.
         """
         begin, closure = springs.begin[:, 0], self._closure(contacts)
-        end, soft = begin + way, _holds(state) & self.softens
-        held = self._energy_across(contacts, begin, contacts.state)
-        work = np.where(soft, way * traction, way * (springs.pull + contacts.theta * springs.across * way))
-        most = np.maximum(held + work, 0.0)
+        end, soft = begin + displacement, _holds(state) & self.softens
+        energy = self._energy_across(contacts, begin, contacts.state)
+        work = np.where(
+            soft,
+            displacement * traction,
+            displacement * (springs.pull + contacts.theta * springs.across * displacement),
+        )
+        most = np.maximum(energy + work, 0.0)
         limited = ((begin > 0) & ~_holds(state)) | soft | (closure.power > 1.0)
         end = np.where(limited & (end < 0), np.maximum(end, -closure.at_energy(most)), end)
         drawn = np.sqrt(2.0 * most / self._tensile(contacts, state))

@@ -46,24 +46,26 @@ class LawTable:
 
         Not a number where it is needed, but not known.
         """
-        own = [law if law.by_thickness else None for law in self.laws]
-        if not any(own):
+        by_thickness = [law if law.by_thickness else None for law in self.laws]
+        if not any(by_thickness):
             return None
-        otherwise = np.array([0.0 if one is None else one.thickness or np.nan for one in own])[law]
-        needed = np.array([one is not None for one in own])[law]
+        otherwise = np.array(
+            [0.0 if joint_law is None else joint_law.thickness or np.nan for joint_law in by_thickness]
+        )[law]
+        needed = np.array([one is not None for one in by_thickness])[law]
         if not self.beds:
             return otherwise
         pairs, wide = self._wide
         count = int(max(bodies.max(initial=0), pairs.max())) + 1
-        known, asked = pairs @ [count, 1], np.sort(bodies, axis=1) @ [count, 1]
-        at = np.minimum(np.searchsorted(known, asked), len(known) - 1)
-        return np.where(needed & (known[at] == asked), wide[at], otherwise)
+        stored, asked = pairs @ [count, 1], np.sort(bodies, axis=1) @ [count, 1]
+        at = np.minimum(np.searchsorted(stored, asked), len(stored) - 1)
+        return np.where(needed & (stored[at] == asked), wide[at], otherwise)
 
     @cached_property
     def _wide(self) -> tuple[Ints, Array]:
         """Pairs of bodies (n, 2) in order, and the thickness of the mortar between them (n,) [m]."""
         pairs = np.array(sorted(self.beds), dtype=np.int64)
-        return pairs, np.array([self.beds[one, other] for one, other in pairs.tolist()])
+        return pairs, np.array([self.beds[first, second] for first, second in pairs.tolist()])
 
     def crushing(self, law: Ints, contacts: Approach, impulse: Array | None = None) -> Bools:
         """Return the contacts (nc,) whose joints crush in a step with r̃, as `Law.crushing` does."""
@@ -80,9 +82,9 @@ class LawTable:
     def of(self, bodies: Ints) -> Ints:
         """Return the index of the law of each contact between bodies (nc, 2); of two rules, the later holds."""
         law = np.zeros(len(bodies), dtype=np.int64)
-        one, other = bodies[:, 0], bodies[:, 1]
+        candidate, antagonist = bodies[:, 0], bodies[:, 1]
         for rule, (first, second) in enumerate(self.groups):
-            law[(first[one] & second[other]) | (first[other] & second[one])] = rule + 1
+            law[(first[candidate] & second[antagonist]) | (first[antagonist] & second[candidate])] = rule + 1
         return law
 
     def terms(self, law: Ints, contacts: Approach) -> Terms:

@@ -170,12 +170,12 @@ class Loads:
         """Courses of the loads that change with time."""
         gravity, forces = (one.course for one in self.gravity), (force.course for force in self.forces)
         found = (*gravity, *forces, *(motion.course for motion in self.motions))
-        return tuple(one for one in found if one is not None)
+        return tuple(course for course in found if course is not None)
 
     def unfinished(self, end: float, missed: bool) -> tuple[str, ...]:
         """Return in words the loads that are not over at the `end` of a run [s].
 
         With `missed` those alone of which it misses the peak or strong part, otherwise the other ones.
         """
-        found = (course.beyond(end) for course in self.courses if course.missed(end) is missed)
-        return tuple(dict.fromkeys(filter(None, found)))
+        beyond = (course.beyond(end) for course in self.courses if course.missed(end) is missed)
+        return tuple(dict.fromkeys(filter(None, beyond)))

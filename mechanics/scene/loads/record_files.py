@@ -61,14 +61,14 @@ def read_accelerogram(
     ------
     SceneError : with file and line
     """
-    found = read_accelerograms(path, unit, dt)
-    if len(found) == 1:
-        return found[0]
-    alike = [one for one in found if one.direction == _AXES[axis]]
+    accelerograms = read_accelerograms(path, unit, dt)
+    if len(accelerograms) == 1:
+        return accelerograms[0]
+    alike = [accelerogram for accelerogram in accelerograms if accelerogram.direction == _AXES[axis]]
     if len(alike) != 1:
-        names = ", ".join(one.name for one in found)
+        names = ", ".join(one.name for one in accelerograms)
         raise SceneError(
-            f"{len(found)} components ({names}), and {len(alike)} of them along {axis}",
+            f"{len(accelerograms)} components ({names}), and {len(alike)} of them along {axis}",
             where=str(path),
             remedy="give one component per file, or name the columns x, y, z or E, N, Z",
         )
@@ -79,15 +79,15 @@ def read_accelerograms(
     path: str | Path, unit: str | None = None, dt: float | None = None
 ) -> tuple[Accelerogram, ...]:
     """Read all components of a file; see `read_accelerogram`."""
-    found = _records(path, unit, dt)
-    peak = max((float(np.abs(one.acceleration).max()) for one in found), default=0.0)
+    records = _records(path, unit, dt)
+    peak = max((float(np.abs(one.acceleration).max()) for one in records), default=0.0)
     if peak > _LARGEST:
         raise SceneError(
             f"a peak of {peak / UNITS['g']:.3g} g, more than was ever recorded",
             where=str(path),
             remedy="correct the unit (cm/s2?), or name the columns; if it is meant, write smaller values and a factor",
         )
-    return found
+    return records
 
 
 def _records(path: str | Path, unit: str | None, dt: float | None) -> tuple[Accelerogram, ...]:
@@ -130,44 +130,44 @@ def read_station(
     """
     folder = Path(Path(pattern).anchor or ".") if Path(pattern).is_absolute() else Path()
     rest = str(Path(pattern).relative_to(folder)) if Path(pattern).is_absolute() else str(pattern)
-    files = sorted(one for one in folder.glob(rest) if one.is_file())
+    files = sorted(path for path in folder.glob(rest) if path.is_file())
     if not files:
         raise SceneError("no such file", where=str(pattern), remedy="name files, with * for what differs")
-    found = [accelerogram for file in files for accelerogram in read_accelerograms(file, unit, dt)]
-    for one in found:
-        if one.direction is None:
+    accelerograms = [accelerogram for file in files for accelerogram in read_accelerograms(file, unit, dt)]
+    for record in accelerograms:
+        if record.direction is None:
             raise SceneError(
-                f"the direction of {one.name!r} is not stated",
-                where=one.source,
+                f"the direction of {record.name!r} is not stated",
+                where=record.source,
                 remedy="give its files by x, y and z instead of station",
             )
-    for k, one in enumerate(found):
-        for other in found[k + 1 :]:
-            if abs(float(np.dot(one.direction or (), other.direction or ()))) > _SQUARE:
+    for k, record in enumerate(accelerograms):
+        for later in accelerograms[k + 1 :]:
+            if abs(float(np.dot(record.direction or (), later.direction or ()))) > _SQUARE:
                 raise SceneError(
-                    f"{one.name!r} and {other.name!r} are not square to each other",
-                    where=other.source,
+                    f"{record.name!r} and {later.name!r} are not square to each other",
+                    where=later.source,
                     remedy="name the three components of one instrument",
                 )
-            if abs(one.dt - other.dt) > 1e-9 or len(one) != len(other):
+            if abs(record.dt - later.dt) > 1e-9 or len(record) != len(later):
                 raise SceneError(
-                    f"{len(other)} values at {other.dt:g} s, but {len(one)} at {one.dt:g} s of {one.name!r}",
-                    where=other.source,
+                    f"{len(later)} values at {later.dt:g} s, but {len(record)} at {record.dt:g} s of {record.name!r}",
+                    where=later.source,
                     remedy="cut the components to the same time, or give them by x, y and z",
                 )
-    return tuple(found)
+    return tuple(accelerograms)
 
 
 def read_csv(path: str | Path, unit: str | None, dt: float | None = None) -> Accelerogram:
     """Read a table with one component; see `read_accelerogram`."""
-    found = _of_table(path, unit, dt)
-    if len(found) > 1:
+    accelerograms = _of_table(path, unit, dt)
+    if len(accelerograms) > 1:
         raise SceneError(
-            f"{len(found)} components",
+            f"{len(accelerograms)} components",
             where=str(path),
             remedy="give time, acceleration, or name it by station",
         )
-    return found[0]
+    return accelerograms[0]
 
 
 def _of_table(path: str | Path, unit: str | None, dt: float | None) -> tuple[Accelerogram, ...]:
@@ -209,13 +209,13 @@ def _of_table(path: str | Path, unit: str | None, dt: float | None) -> tuple[Acc
 
 def _accelerations(path: str | Path, table: Table) -> Table:
     """Return a table without its columns that are named as velocities or displacements, or state such a unit."""
-    kept = [k for k, name in enumerate(table.names) if k == 0 or not _is_other(name)]
-    if len(kept) == len(table.names):
+    columns = [k for k, name in enumerate(table.names) if k == 0 or not _is_other(name)]
+    if len(columns) == len(table.names):
         return table
-    if len(kept) == 1 and _bare(table.names[0]) in _TIMES:
+    if len(columns) == 1 and _bare(table.names[0]) in _TIMES:
         what = f"no acceleration among {', '.join(table.names)}"
         fail_at(path, int(table.lines[0]) - 1, what, "give a column of accelerations")
-    return replace(table, names=tuple(table.names[k] for k in kept), rows=table.rows[:, kept])
+    return replace(table, names=tuple(table.names[k] for k in columns), rows=table.rows[:, columns])
 
 
 def _is_other(name: str) -> bool:
@@ -242,10 +242,10 @@ def _rises(column: Array) -> bool:
     return bool((steps > 0.0).all() and steps.max() < 1.5 * steps.min())
 
 
-def _step(path: str | Path, table: Table, given: float | None) -> float:
+def _step(path: str | Path, table: Table, stated: float | None) -> float:
     """Return the step of the times of a table [s]."""
-    found = _unit_in(table.names[0]) if table.names else None
-    time = table.rows[:, 0] * (1e-3 if found == "ms" else 1.0)
+    unit = _unit_in(table.names[0]) if table.names else None
+    time = table.rows[:, 0] * (1e-3 if unit == "ms" else 1.0)
     dt = float((time[-1] - time[0]) / (len(time) - 1))
     uneven = np.flatnonzero(~(np.abs(time - time[0] - dt * np.arange(len(time))) < _UNEVEN * dt))
     if len(uneven):
@@ -253,9 +253,9 @@ def _step(path: str | Path, table: Table, given: float | None) -> float:
         at = int(np.abs(steps - np.median(steps)).argmax()) + 1  # where the step differs most
         what = f"time {time[at]:g} s is not at equal steps of {dt:g} s"
         fail_at(path, int(table.lines[at]), what, "resample the record")
-    if given is not None and abs(given - dt) > 1e-3 * dt:
+    if stated is not None and abs(stated - dt) > 1e-3 * dt:
         raise SceneError(
-            f"the times are {dt:g} s apart, but dt = {given:g} s", where=str(path), remedy="leave dt out"
+            f"the times are {dt:g} s apart, but dt = {stated:g} s", where=str(path), remedy="leave dt out"
         )
     return dt
 
@@ -265,8 +265,8 @@ def _bare(name: str) -> str:
 
 
 def _unit_in(text: str) -> str | None:
-    found = _UNIT.search(text)
-    return None if found is None else next(group for group in found.groups() if group).casefold()
+    match = _UNIT.search(text)
+    return None if match is None else next(group for group in match.groups() if group).casefold()
 
 
 def _size(path: str | Path, unit: str | None, table: Table | None) -> float:
@@ -281,22 +281,22 @@ def _size(path: str | Path, unit: str | None, table: Table | None) -> float:
         raise SceneError(
             f"two units: {', '.join(map(str, stated.values()))}", where=str(path), remedy="keep one"
         )
-    given = None if unit is None else unit_of(unit)
-    if unit is not None and given is None:
+    scale = None if unit is None else unit_of(unit)
+    if unit is not None and scale is None:
         raise SceneError(f"unknown unit {unit!r}", where=str(path), remedy=f"give {', '.join(UNITS)}")
     for size, word in stated.items():
-        if given is not None and given != size:
+        if scale is not None and scale != size:
             raise SceneError(
                 f"the file states {word!r}, but unit = {unit!r}",
                 where=str(path),
                 remedy="leave 'unit' out, or correct it",
             )
         return size
-    if given is None:
+    if scale is None:
         raise SceneError(
             "the unit of the acceleration is not known", where=str(path), remedy=f"give {', '.join(UNITS)}"
         )
-    return given
+    return scale
 
 
 def _directions(names: Sequence[str], count: int) -> list[Direction | None]:

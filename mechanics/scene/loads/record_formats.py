@@ -63,8 +63,8 @@ def unit_of(text: str) -> float | None:
     [1.0, 1.0, 0.01, 0.001, 0.01, None]
     """
     bare = unicodedata.normalize("NFKC", text).casefold().translate(_MARKS).replace("sec", "s")
-    found = _PER_SECOND.fullmatch(bare)
-    return {**UNITS, **_MORE}.get(bare if found is None else f"{found['length']}/s2")
+    match = _PER_SECOND.fullmatch(bare)
+    return {**UNITS, **_MORE}.get(bare if match is None else f"{match['length']}/s2")
 
 
 def direction_of(text: str) -> Direction | None:
@@ -133,9 +133,9 @@ def _steps(path: str | Path, lines: Lines) -> tuple[int, float]:
     if not re.search(r"ACCELERATION.*\bG\b", header[2], re.IGNORECASE):
         fail_at(path, 3, f"not an acceleration in units of g: {header[2].strip()!r}", "give the .AT2 file")
     for pattern in _STEPS:
-        found = pattern.search(header[3])
-        if found and int(found[1]) > 1 and float(found[2]) > 0:
-            return int(found[1]), float(found[2])
+        match = pattern.search(header[3])
+        if match and int(match[1]) > 1 and float(match[2]) > 0:
+            return int(match[1]), float(match[2])
     raise SceneError(
         f"no number of samples and step of time: {header[3].strip()!r}",
         where=f"{path}:4",
@@ -158,9 +158,9 @@ def read_esm(path: str | Path) -> Accelerogram:
         if not text:
             continue
         last = number
-        found = _ESM_KEY.match(text) if not values else None
-        if found:
-            keys.setdefault(found[1], (number, found[2].strip()))
+        match = _ESM_KEY.match(text) if not values else None
+        if match:
+            keys.setdefault(match[1], (number, match[2].strip()))
         elif values or text[0] in "+-.0123456789":
             values += [number_at(path, number, word) for word in text.split()]
     kind = keys.get("DATA_TYPE", (1, "ACCELERATION"))
@@ -179,7 +179,7 @@ def read_esm(path: str | Path) -> Accelerogram:
             fail_at(path, last, what, "the file is cut off: get it again, or correct NDATA")
     stream = keys.get("STREAM", keys.get("COMPONENT", (0, "")))[1].upper()
     direction = direction_of(stream) or (direction_of(stream[-1:]) if stream[-1:].isalpha() else None)
-    station = " ".join(keys[one][1] for one in ("NETWORK", "STATION_CODE", "EVENT_ID") if one in keys)
+    station = " ".join(keys[key][1] for key in ("NETWORK", "STATION_CODE", "EVENT_ID") if key in keys)
     name = f"{station} {stream}".strip() or Path(path).stem
     return Accelerogram(dt, size * np.array(values), name, str(path), direction)
 
@@ -218,10 +218,10 @@ def _header_numbers(
 ) -> tuple[float, ...]:
     """Return the numbers of one line of a header."""
     line, text = header.get(key, (1, ""))
-    found = re.match(pattern, text, re.IGNORECASE)
-    if found is None:
+    match = re.match(pattern, text, re.IGNORECASE)
+    if match is None:
         fail_at(path, line, f"no {key} in the header", "give the file of K-NET as it is")
-    numbers = tuple(number_at(path, line, group) for group in found.groups())
+    numbers = tuple(number_at(path, line, group) for group in match.groups())
     if not all(number > 0.0 for number in numbers):
         fail_at(path, line, f"{key} is {text!r}", "give the file of K-NET as it is")
     return numbers

@@ -47,18 +47,18 @@ def read_table(path: str | Path, columns: str = "numbers in columns") -> Table:
     SceneError : with file and line
     """
     with _scene_errors():
-        found = read_rows(Path(path), _is_row, f"give {columns}", comments=True)
+        table = read_rows(Path(path), _is_row, f"give {columns}", comments=True)
     lines: list[int] = []
     rows: list[list[float]] = []
-    for row in found.rows:
+    for row in table.rows:
         if rows and len(row.cells) != len(rows[0]):
             fail_at(path, row.line, f"{len(row.cells)} columns", f"give {columns}")
-        rows.append([number_at(path, row.line, found.pointed(cell)) for cell in row.cells])
+        rows.append([number_at(path, row.line, table.pointed(cell)) for cell in row.cells])
         lines.append(row.line)
     if len(rows) < 2:
         raise SceneError(f"{len(rows)} rows of numbers", where=str(path), remedy=f"give {columns}")
-    notes = tuple(" ".join(one.cells) for one in (*found.comments, *found.titles))
-    return Table(found.names, notes, np.array(lines), np.array(rows))
+    notes = tuple(" ".join(one.cells) for one in (*table.comments, *table.titles))
+    return Table(table.names, notes, np.array(lines), np.array(rows))
 
 
 def _is_row(cells: Sequence[str], commas: bool) -> bool:

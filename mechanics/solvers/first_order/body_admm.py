@@ -239,10 +239,10 @@ class _Run:
 
     def _broken(self) -> tuple[float, float, float]:
         iterate, scale = self._iterate, self._problem.delassus.scale
-        found: tuple[float, float, float] = kernel.broken_laws(
+        broken_laws: tuple[float, float, float] = kernel.broken_laws(
             iterate.x, self._touching, self._free, self._bodies.inertia, 1.0 / scale, self._z
         )
-        return found
+        return broken_laws
 
     def look(self) -> None:
         """Measure the iterate, and remember it if it is the best so far."""
@@ -430,10 +430,10 @@ def _groups(panels: cholesky.Panels, parts: Parts, runs: kernel.Runs, threads: i
     numbers = np.append(np.diff(panels.start[parts.panel], axis=1)[:, 0], 0)
     # a block of contacts costs as much as the numbers that it reads and writes
     work = numbers + kernel.ROWS * kernel.BLOCK * np.diff(runs.block[runs.part])
-    given: list[list[int]] = [[] for _ in range(threads)]
+    shares: list[list[int]] = [[] for _ in range(threads)]
     for part in np.argsort(-work, kind="stable"):
-        min(given, key=lambda one: work[one].sum()).append(int(part))
-    return [np.array(one, dtype=np.int64) for one in given]
+        min(shares, key=lambda one: work[one].sum()).append(int(part))
+    return [np.array(one, dtype=np.int64) for one in shares]
 
 
 def _kinds(x: Array, z: Array) -> Ints:

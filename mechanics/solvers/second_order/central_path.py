@@ -94,7 +94,7 @@ class CentralPath:
     level : complementarity with which it begins there; as small as the impulses are right [-]
     """
 
-    def __init__(self, problem: ContactProblem, near: Array | None = None, level: float = 1.0) -> None:
+    def __init__(self, problem: ContactProblem, start: Array | None = None, level: float = 1.0) -> None:
         self._problem, form = problem, problem.form(NAME)
         # a direction a little wrong costs less than another factorisation
         self._system = partial(form.shifted, exact=False)
@@ -104,10 +104,10 @@ class CentralPath:
         self._smooth = np.flatnonzero((mu <= ROUNDING) & (k <= 0))
         self._hold = np.zeros((len(mu), 3, 3))
         self._hold[self._smooth[:, None], [1, 2], [1, 2]] = problem.delassus.scale / ROUNDING
-        if near is None:
+        if start is None:
             self._begin_far(cone, side)
         else:
-            self._begin_near(cone, side, near, level)
+            self._begin_near(cone, side, start, level)
 
     def _begin_far(self, cone: Ints, side: Ints) -> None:
         """Begin well inside the cones, with the impulses of contacts that all hold a little."""
@@ -124,7 +124,7 @@ class CentralPath:
         self._cone = _Cone(cone, mu[cone], k[cone], slack, dual)
         self._side = _Side(side, np.maximum(self._r[side, 0], inside), np.full(len(side), inside * scale))
 
-    def _begin_near(self, cone: Ints, side: Ints, near: Array, level: float) -> None:
+    def _begin_near(self, cone: Ints, side: Ints, start: Array, level: float) -> None:
         """Begin on the path itself: with s - z of these impulses and their velocities, and s ∘ z = level e."""
         problem, scale, mu, k = (
             self._problem,
@@ -132,20 +132,20 @@ class CentralPath:
             self._problem.friction,
             self._problem.cohesion,
         )
-        self._r = near.copy()
-        size = float(np.sqrt((near**2).mean())) or 1.0
+        self._r = start.copy()
+        size = float(np.sqrt((start**2).mean())) or 1.0
         self._unit = size * size * scale
-        dual = problem.delassus.apply(near) + self._free
+        dual = problem.delassus.apply(start) + self._free
         normal = dual[side, 0]
         dual[:, 0] += mu * tangential(dual)
         diagonal = np.column_stack([mu[cone], np.ones((len(cone), 2))])
-        point = diagonal * near[cone]
+        point = diagonal * start[cone]
         point[:, 0] += k[cone]
         slack, other = central(
             point - dual[cone] / (np.maximum(diagonal, ROUNDING) * scale), level * size * size
         )
         self._cone = _Cone(cone, mu[cone], k[cone], slack, scale * other)
-        point = near[side, 0] - normal / scale
+        point = start[side, 0] - normal / scale
         root = np.sqrt(point**2 + 4.0 * level * size * size)
         self._side = _Side(side, 0.5 * (root + point), 0.5 * scale * (root - point))
 
@@ -181,16 +181,16 @@ class CentralPath:
             if length >= _BACK_OFF:
                 break
             right = newton.recentred(step, level)
-            other = tuple(a + b for a, b in zip(step, newton.direction(right, 0.0), strict=True))
-            farther = min(1.0, _BACK_OFF * self._reach(other))
+            direction = tuple(a + b for a, b in zip(step, newton.direction(right, 0.0), strict=True))
+            farther = min(1.0, _BACK_OFF * self._reach(direction))
             if farther <= length:
                 break
-            step, length = other, farther
+            step, length = direction, farther
         if length < _SHORT:
-            other = newton.direction(newton.centred(0.5 * self._gap), 0.5)
-            farther = min(1.0, _BACK_OFF * self._reach(other))
+            direction = newton.direction(newton.centred(0.5 * self._gap), 0.5)
+            farther = min(1.0, _BACK_OFF * self._reach(direction))
             if farther > length:
-                step, length = other, farther
+                step, length = direction, farther
         r, slack, dual, slack_n, dual_n = step
         self._r += length * r
         self._cone.slack += length * slack
@@ -261,8 +261,8 @@ class _Newton:
         low, high = level / _CENTRAL, _CENTRAL * level
         primal = self._scaling.inverse(cone.slack + slack)
         pairs = product(primal, self._scaling(cone.dual + dual))
-        own = (side.slack + slack_n) * (side.dual + dual_n)
-        change = np.maximum(np.clip(own, low, high) - own, -high)
+        products = (side.slack + slack_n) * (side.dual + dual_n)
+        change = np.maximum(np.clip(products, low, high) - products, -high)
         return divide(self._lambda, to_bounds(pairs, low, high)), change / side.dual
 
     def direction(self, right: tuple[Array, Array], share: float) -> tuple[Array, ...]:

@@ -71,10 +71,10 @@ class InteriorPoint:
             impulse = path.impulse
             if not (np.isfinite(path.complementarity) and np.isfinite(impulse).all()):
                 break
-            found = self._looked(problem, impulse * units)
-            idle = 0 if found.left.natural_map < _PROGRESS * least else idle + 1
-            least = min(least, found.left.natural_map)
-            best = found if found.excess < best.excess else best
+            solution = self._looked(problem, impulse * units)
+            idle = 0 if solution.left.natural_map < _PROGRESS * least else idle + 1
+            least = min(least, solution.left.natural_map)
+            best = solution if solution.excess < best.excess else best
         return _solution(best, count)
 
     def _looked(self, problem: ContactProblem, impulse: Array) -> "_Look":

@@ -94,22 +94,22 @@ class _Run:
     exact : the last one had the least α
     """
 
-    def __init__(self, given: ContactProblem, impulse: Array) -> None:
-        self.exact, self._given = False, given
-        problem, each = equilibrated(given)
+    def __init__(self, unscaled: ContactProblem, impulse: Array) -> None:
+        self.exact, self._given = False, unscaled
+        problem, each = equilibrated(unscaled)
         self.unit = each[:, None]
         impulse = impulse / self.unit
         self._problem, self._delassus = problem, problem.delassus
         self._free = problem.biased
         self._scale = problem.delassus.scale
-        own = np.einsum("cii->ci", problem.delassus.diagonal)
-        across, along = own[:, 0], own[:, 1:].mean(axis=1)
-        if self._scale < own.min():
+        diagonals = np.einsum("cii->ci", problem.delassus.diagonal)
+        across, along = diagonals[:, 0], diagonals[:, 1:].mean(axis=1)
+        if self._scale < diagonals.min():
             # W is measured against its elastic part: with the far larger motion of whole stones in ρ, impulses alone
             # would tell which contacts are open
-            across = along = np.full(len(own), self._scale)
+            across = along = np.full(len(diagonals), self._scale)
         self._rho = 1.0 / np.column_stack([across, along])
-        size = own.shape[1]
+        size = diagonals.shape[1]
         self._first, self._second = np.zeros((2, len(impulse), size, size))
         self._merits: list[float] = []
         self.iterations, self._share = 0, _SHARE
@@ -169,13 +169,13 @@ class _Run:
 
     def _look(self, r: Array, u: Array, error: Array) -> float:
         problem = self._problem
-        given = problem.friction, problem.cohesion, self._rho
+        laws = problem.friction, problem.cohesion, self._rho
         if r.shape[1] == _SPACE:
-            merit: float = alart_curnier(r, u, *given, error, self._first, self._second)
+            merit: float = alart_curnier(r, u, *laws, error, self._first, self._second)
             return merit
         # the plane is space without its second tangent
         wide = [np.pad(values, ((0, 0), (0, 1))) for values in (r, u, error)]
         derivative = np.zeros((2, len(r), _SPACE, _SPACE))
-        merit = alart_curnier(*wide[:2], *given, wide[2], *derivative)
+        merit = alart_curnier(*wide[:2], *laws, wide[2], *derivative)
         error[:], self._first[:], self._second[:] = wide[2][:, :2], *derivative[:, :, :2, :2]
         return merit

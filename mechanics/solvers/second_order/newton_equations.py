@@ -141,18 +141,18 @@ class _YieldingEquations(_BodyEquations):
     def step(self, first: Array, second: Array, error: Array, alpha: float) -> Array | None:
         """Return Δr (nc, 3); None if the equations are singular."""
         if self._lasts and self._led is not None and np.abs(first - self._led[0]).max() <= _UNLIKE:
-            found, products = self._found(first, second, error, alpha, _AGAIN)
+            change, products = self._found(first, second, error, alpha, _AGAIN)
             if products <= _AGAIN:
-                return found
+                return change
             self._lasts = False
         self._led = None
         if self._factorise(first, second, alpha):
             self._led = first.copy(), second.copy()
-            found, products = self._found(first, second, error, alpha, _PRODUCTS)
+            change, products = self._found(first, second, error, alpha, _PRODUCTS)
             self._lasts &= products <= _AGAIN
             # the matrix may be too badly conditioned for single precision, as where joints hardly yield
             self._single &= products <= _PRODUCTS
-            return found
+            return change
         if not self._single:
             return None
         self._single = False
@@ -187,15 +187,15 @@ def _pattern(side: Ints, count: int) -> tuple[Ints, Ints, Ints, Ints]:
     """
     s, t = np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1])
     row, column = side[:, s], side[:, t]
-    known = (row >= 0) & (column >= 0)
+    valid = (row >= 0) & (column >= 0)
     own = np.arange(count) * (count + 1)
-    keys, where = np.unique(np.concatenate([own, (row * count + column)[known]]), return_inverse=True)
+    keys, where = np.unique(np.concatenate([own, (row * count + column)[valid]]), return_inverse=True)
     degree = np.bincount(keys // count, minlength=count)
     before = np.concatenate([[0], np.cumsum(degree)[:-1]]).astype(np.int64)
     within = np.arange(len(keys)) - before[keys // count]
     at = 4 * before[keys // count] + 2 * within
     blocks = np.full((len(side), 4), -1)
-    blocks[known] = at[where[count:]]
+    blocks[valid] = at[where[count:]]
     width = np.column_stack([2 * degree, at[where[:count]]]).astype(np.int64)
     columns = 2 * (keys % count)
     both = np.column_stack([columns, columns + 1]).ravel()

@@ -25,10 +25,10 @@ def equilibrated(problem: ContactProblem) -> tuple[ContactProblem, Array]:
     An operator that is measured against a part of W alone keeps the proportions of its contacts.
     """
     operator = problem.delassus
-    own = np.einsum("cii->c", operator.diagonal) / operator.diagonal.shape[1]
-    if abs(operator.scale / own.mean() - 1.0) > ROUNDING:
-        own = np.full(len(own), operator.scale)
-    unit = 1.0 / np.sqrt(own)
+    diagonals = np.einsum("cii->c", operator.diagonal) / operator.diagonal.shape[1]
+    if abs(operator.scale / diagonals.mean() - 1.0) > ROUNDING:
+        diagonals = np.full(len(diagonals), operator.scale)
+    unit = 1.0 / np.sqrt(diagonals)
     return replace(
         problem,
         delassus=operator.scaled(unit),

@@ -51,8 +51,8 @@ def to_bounds(x: Array, low: float, high: float) -> Array:
 
 def _spectral(first: Array, second: Array, along: Array, level: float) -> Array:
     """Return the elements (nc, 3) whose eigenvalues are the positive roots of λ² - p λ = level for two p (nc,)."""
-    one, two = _root(first, level), _root(second, level)
-    return np.column_stack([0.5 * (one + two), 0.5 * (one - two)[:, None] * along])
+    first_root, two = _root(first, level), _root(second, level)
+    return np.column_stack([0.5 * (first_root + two), 0.5 * (first_root - two)[:, None] * along])
 
 
 def _root(p: Array, level: float) -> Array:
@@ -139,7 +139,7 @@ def scaling(s: Array, z: Array) -> Scaling:
     inside = _determinant(s), _determinant(z)
     if not (np.minimum(*inside) > 0).all():
         raise SolverError("rounding has left the cones", where="interior point", remedy="ask for less")
-    own, other = np.sqrt(inside[0]), np.sqrt(inside[1])
-    unit, dual = s / own[:, None], z / other[:, None]
+    slack_scale, dual_scale = np.sqrt(inside[0]), np.sqrt(inside[1])
+    unit, dual = s / slack_scale[:, None], z / dual_scale[:, None]
     gamma = np.sqrt(0.5 * (1.0 + unit[:, 0] * dual[:, 0] + _dot(unit, dual)))
-    return Scaling((unit + _MIRROR * dual) / (2.0 * gamma[:, None]), np.sqrt(own / other))
+    return Scaling((unit + _MIRROR * dual) / (2.0 * gamma[:, None]), np.sqrt(slack_scale / dual_scale))

@@ -35,15 +35,15 @@ class SofterJoints:
         for k, operator in enumerate(_softened(problem.delassus, self.factors)):
             most = int(np.ceil((self.max_iterations - count) / (others + 1 - k)))
             newton = Newton(self.tolerance, self.velocity_tolerance, most)
-            found = newton(replace(problem, delassus=operator), start)
-            count += found.iterations
+            solution = newton(replace(problem, delassus=operator), start)
+            count += solution.iterations
             # the softest lead on even where they are not quite solved
-            if found.converged or count == found.iterations:
-                start = ContactStart(found.impulse, found.velocity)
+            if solution.converged or count == solution.iterations:
+                start = ContactStart(solution.impulse, solution.velocity)
             if count >= self.max_iterations:
                 break
-        if found.converged and operator is problem.delassus:
-            return replace(found, iterations=count)
+        if solution.converged and operator is problem.delassus:
+            return replace(solution, iterations=count)
         return ContactSolution(start.impulse, start.velocity, count, float("inf"), False)
 
 

@@ -112,20 +112,20 @@ def _weights(
 ) -> tuple[Ints, Ints, Array]:
     """Return node, sampling point and weight of some patches, fitted to the points (nc, s, 3) of their cells."""
     samples = points.shape[1]
-    cell, held = _rows(cells, chosen)
+    cell, used = _rows(cells, chosen)
     number = (samples * cell[:, :, None] + np.arange(samples)).reshape(len(chosen), -1)
-    held = np.repeat(held, samples, axis=1)
+    used = np.repeat(used, samples, axis=1)
     place, wanted = _rows(patches.targets, chosen)
     node = patches.target[place]
     size = (cells[chosen] @ spread).reshape(-1, 3, 3) / np.diff(cells.indptr)[chosen][:, None, None]
     corner = mesh.nodes[patches.corner[chosen]]
-    found = _fit(points.reshape(-1, 3)[number], held, size, corner, mesh.nodes[node], mesh.element.order)
-    kept = wanted[:, :, None] & held[:, None, :]
+    found = _fit(points.reshape(-1, 3)[number], used, size, corner, mesh.nodes[node], mesh.element.order)
+    used_pairs = wanted[:, :, None] & used[:, None, :]
     row, column = (
-        np.broadcast_to(node[:, :, None], kept.shape),
-        np.broadcast_to(number[:, None, :], kept.shape),
+        np.broadcast_to(node[:, :, None], used_pairs.shape),
+        np.broadcast_to(number[:, None, :], used_pairs.shape),
     )
-    return row[kept], column[kept], found[kept]
+    return row[used_pairs], column[used_pairs], found[used_pairs]
 
 
 def _spread(mesh: SolidMesh) -> Array:
@@ -140,11 +140,11 @@ def _rows(matrix: "csr_array[np.float64]", rows: Ints) -> tuple[Ints, Bools]:
     """Return the columns (nr, m) of some rows, padded with the first of each, and a mask of the row's own."""
     start, count = matrix.indptr[rows], np.diff(matrix.indptr)[rows]
     place = np.arange(count.max())
-    held = place < count[:, None]
-    return matrix.indices[start[:, None] + np.where(held, place, 0)].astype(np.int64), held
+    used = place < count[:, None]
+    return matrix.indices[start[:, None] + np.where(used, place, 0)].astype(np.int64), used
 
 
-def _fit(points: Array, held: Bools, size: Array, corner: Array, target: Array, order: int) -> Array:
+def _fit(points: Array, used: Bools, size: Array, corner: Array, target: Array, order: int) -> Array:
     """Return weights (np, nt, m) of the values at points (np, m, 3) of patches for targets (np, nt, 3).
 
     Coordinates are turned and stretched so that the points of each patch have unit variance along each axis: the
@@ -152,8 +152,8 @@ def _fit(points: Array, held: Bools, size: Array, corner: Array, target: Array, 
     size of the cells, its mean square (np, 3, 3), as in a single layer of cells with one point each.
     """
     distance = ((points - corner[:, None]) ** 2).sum(axis=2)
-    mean_square = (distance * held).sum(axis=1, keepdims=True) / held.sum(axis=1, keepdims=True)
-    part = held * (_FLAT + distance / mean_square) ** -_POWER[order]
+    mean_square = (distance * used).sum(axis=1, keepdims=True) / used.sum(axis=1, keepdims=True)
+    part = used * (_FLAT + distance / mean_square) ** -_POWER[order]
     part = (part / part.sum(axis=1, keepdims=True))[:, :, None]
     mean = (part * points).sum(axis=1, keepdims=True)
     local = points - mean

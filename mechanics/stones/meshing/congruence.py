@@ -53,17 +53,19 @@ def classes(keys: Sequence[Hashable], shapes: Sequence[Array], same: Callable[[i
     same : True for two shapes if they are the same
     """
     found: dict[Hashable, list[tuple[float, int]]] = {}
-    own = []
+    labels = []
     for index, shape in enumerate(shapes):
         local = shape - shape.mean(axis=0)
         spread = float(np.linalg.norm(local, axis=1).sum())  # does not depend on rotation
         slack = len(local) * _tolerance(shape)
-        known = found.setdefault(keys[index], [])
-        near = known[bisect_left(known, (spread - slack, -1)) : bisect_left(known, (spread + slack, -1))]
-        own.append(next((one for _, one in near if same(one, index)), index))
-        if own[index] == index:
-            insort(known, (spread, index))
-    return own
+        candidates = found.setdefault(keys[index], [])
+        near = candidates[
+            bisect_left(candidates, (spread - slack, -1)) : bisect_left(candidates, (spread + slack, -1))
+        ]
+        labels.append(next((candidate for _, candidate in near if same(candidate, index)), index))
+        if labels[index] == index:
+            insort(candidates, (spread, index))
+    return labels
 
 
 def translation(first: Array, second: Array) -> bool:
@@ -138,10 +140,10 @@ def _frame(corners: Array, face: tuple[int, ...], place: int) -> Array:
 def _turns(start: Array, face: tuple[int, ...], corners: Array, faces: Faces) -> list[Array]:
     """Return the rotations that take the first edge of a face to any edge of any face with as many corners."""
     return [
-        _frame(corners, other, place) @ start.T
-        for other in faces
-        if len(other) == len(face)
-        for place in range(len(other))
+        _frame(corners, target, place) @ start.T
+        for target in faces
+        if len(target) == len(face)
+        for place in range(len(target))
     ]
 
 

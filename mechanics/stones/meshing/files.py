@@ -162,32 +162,32 @@ def read_meshes(path: str | Path) -> dict[str, VolumeMesh]:
     meshio = _meshio(path)
     path, form = Path(path), _format(path)
     try:
-        found = meshio.read(path, file_format=form.writer.removesuffix("22"))
+        mesh_file = meshio.read(path, file_format=form.writer.removesuffix("22"))
     except (OSError, meshio.ReadError) as error:
         raise UsageError(f"cannot be read: {error}", where=str(path), remedy="check the file") from error
-    blocks = [(_ELEMENTS.get(block.type), block.data.astype(np.int64)) for block in found.cells]
+    blocks = [(_ELEMENTS.get(block.type), block.data.astype(np.int64)) for block in mesh_file.cells]
     if form.writer == "med":
         blocks = [
             (element, cells if element is None else cells[:, _turned(element)]) for element, cells in blocks
         ]
     stones: dict[str, VolumeMesh] = {}
-    for code, members in _sets(found, form, path).items():
-        own = [
+    for code, members in _sets(mesh_file, form, path).items():
+        supported = [
             (element, cells[chosen])
             for (element, cells), chosen in zip(blocks, members, strict=True)
             if element is not None and len(chosen)
         ]
-        kinds = {element for element, _ in own}
+        kinds = {element for element, _ in supported}
         if len(kinds) > 1:
             raise MeshError(
                 f"it has cells of two kinds: {_listed(sorted(kinds))}",
                 where=f"{path}, stone {code}",
                 remedy="mesh it with one kind of element",
             )
-        if own:
-            used, cells = np.unique(np.concatenate([cells for _, cells in own]), return_inverse=True)
-            element = own[0][0]
-            stones[code] = VolumeMesh(element, found.points[used], cells.reshape(-1, element.cell_nodes))
+        if supported:
+            used, cells = np.unique(np.concatenate([cells for _, cells in supported]), return_inverse=True)
+            element = supported[0][0]
+            stones[code] = VolumeMesh(element, mesh_file.points[used], cells.reshape(-1, element.cell_nodes))
     if not stones:
         raise MeshError(
             "no named set of volume cells",
@@ -236,10 +236,10 @@ def _write(path: Path, form: _Format, stones: Mapping[str, VolumeMesh]) -> None:
         order = _turned(mesh.element) if form.writer == "med" else slice(None)
         cells.setdefault(mesh.element, []).append(mesh.cells[:, order] + start)
         numbers.setdefault(mesh.element, []).append(np.full(len(mesh.cells), number))
-    number_of = [np.concatenate(own) for own in numbers.values()]
+    number_of = [np.concatenate(arrays) for arrays in numbers.values()]
     whole = meshio.Mesh(
         np.concatenate([mesh.nodes for mesh in stones.values()]),
-        [(_NAMED_BY_MESHIO[element], np.concatenate(own)) for element, own in cells.items()],
+        [(_NAMED_BY_MESHIO[element], np.concatenate(arrays)) for element, arrays in cells.items()],
     )
     if form.writer == "abaqus":
         whole.cell_sets = {
@@ -293,23 +293,23 @@ def _turned(element: Element) -> list[int]:
     return [number[frozenset(corner[k] for k in corners)] for corners in element.node_corners]
 
 
-def _sets(found: Any, form: _Format, path: Path) -> dict[str, list[Ints]]:
+def _sets(mesh_file: Any, form: _Format, path: Path) -> dict[str, list[Ints]]:
     """Return by code the cells of each block that belong to a stone."""
     if form.writer == "abaqus":
         return {
             code: [np.asarray(member, dtype=np.int64) for member in members]
-            for code, members in found.cell_sets.items()
+            for code, members in mesh_file.cell_sets.items()
         }
-    numbers: list[Array] = found.cell_data.get(
-        form.number, [np.zeros(len(cell.data)) for cell in found.cells]
+    numbers: list[Array] = mesh_file.cell_data.get(
+        form.number, [np.zeros(len(cell.data)) for cell in mesh_file.cells]
     )
     if form.writer == "gmsh22":
         codes = {
-            int(number): code for code, (number, dimension) in found.field_data.items() if dimension == 3
+            int(number): code for code, (number, dimension) in mesh_file.field_data.items() if dimension == 3
         }
     elif form.writer == "med":
         # the file has them in the order of their names
-        codes = {number: names[0] for number, names in sorted(found.cell_tags.items(), reverse=True)}
+        codes = {number: names[0] for number, names in sorted(mesh_file.cell_tags.items(), reverse=True)}
     else:
         codes = dict(enumerate(_codes(_codes_file(path)), 1))
     return {code: [np.flatnonzero(own == number) for own in numbers] for number, code in codes.items()}

@@ -38,26 +38,26 @@ class MeshQuality:
 
 def mesh_quality(meshes: Sequence[SolidMesh]) -> tuple[MeshQuality, ...]:
     """Return the quality of each mesh; many meshes of a kind are computed at once."""
-    found: dict[int, MeshQuality] = {}
+    qualities: dict[int, MeshQuality] = {}
     for element in sorted({mesh.element.linear for mesh in meshes}):
-        own = [k for k, mesh in enumerate(meshes) if mesh.element.linear is element]
-        cells = np.cumsum([len(meshes[k].cells) for k in own])
-        for batch in np.split(own, np.flatnonzero(np.diff(cells // _BATCH)) + 1):
-            found |= _batch_quality(element, meshes, batch.tolist())
-    return tuple(found[k] for k in range(len(meshes)))
+        indices = [k for k, mesh in enumerate(meshes) if mesh.element.linear is element]
+        cells = np.cumsum([len(meshes[k].cells) for k in indices])
+        for batch in np.split(indices, np.flatnonzero(np.diff(cells // _BATCH)) + 1):
+            qualities |= _batch_quality(element, meshes, batch.tolist())
+    return tuple(qualities[k] for k in range(len(meshes)))
 
 
 def _batch_quality(
-    element: Element, meshes: Sequence[SolidMesh], own: Sequence[int]
+    element: Element, meshes: Sequence[SolidMesh], indices: Sequence[int]
 ) -> dict[int, MeshQuality]:
-    corners = [meshes[k].nodes[meshes[k].cells[:, : element.corners]] for k in own]
+    corners = [meshes[k].nodes[meshes[k].cells[:, : element.corners]] for k in indices]
     starts = np.cumsum([0, *(len(corner) for corner in corners[:-1])])
     angle, jacobian = cell_quality(element, np.concatenate(corners))
     angles = np.minimum.reduceat(angle, starts).tolist()
     worst = np.minimum.reduceat(jacobian, starts).tolist()
     return {
         k: MeshQuality(len(meshes[k].nodes), len(meshes[k].cells), *least)
-        for k, *least in zip(own, angles, worst, strict=True)
+        for k, *least in zip(indices, angles, worst, strict=True)
     }
 
 

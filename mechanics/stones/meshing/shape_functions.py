@@ -124,11 +124,11 @@ def reference_points(element: Element) -> Array:
 
 def _evaluate(element: Element, points: Array) -> tuple[Array, Array]:
     """Return values (nq, k) and derivatives (nq, k, 3) at reference points (3, nq), nodes in VTK's order."""
-    one = _SKFEM[element]()
-    place = {tuple(point): number for number, point in enumerate(one.doflocs.tolist())}
+    skfem_element = _SKFEM[element]()
+    place = {tuple(point): number for number, point in enumerate(skfem_element.doflocs.tolist())}
     values, slopes = [], []
     for point in reference_points(element).tolist():
-        value, slope = one.lbasis(points.copy(), place[tuple(point)])
+        value, slope = skfem_element.lbasis(points.copy(), place[tuple(point)])
         values.append(np.broadcast_to(value, points.shape[1:]))
         slopes.append(np.broadcast_to(np.array([*np.broadcast_arrays(*slope)]), points.shape))
     return np.array(values, dtype=float).T, np.array(slopes, dtype=float).transpose(2, 0, 1)

@@ -28,7 +28,7 @@ def mesh_at_corners(vertices: Array, faces: Faces, size: SizeField | float, code
     """
     blocks, members = _blocks(vertices, faces, code)
     # every point is a mean of corners: of one, of an edge, of a face, or of all
-    base = np.array([vertices[list(own)].mean(axis=0) for own in members])
+    base = np.array([vertices[list(member)].mean(axis=0) for member in members])
     lengths = np.linalg.norm(base[blocks[:, [1, 3, 4]]] - base[blocks[:, :1]], axis=-1)
     n = max(1, round(float((lengths / as_field(size)(base[blocks[:, 0]])[:, None]).mean())))
     cells, weights = _refined(blocks, len(base), n)
@@ -39,7 +39,7 @@ def _blocks(vertices: Array, faces: Faces, code: str) -> tuple[Ints, list[tuple[
     """Return one hexahedron for each corner (nv, 8), between points that are means of the stone's corners."""
     used = sorted({corner for face in faces for corner in face})
     members: list[tuple[int, ...]] = [(corner,) for corner in used]
-    number: dict[tuple[int, ...], int] = {own: k for k, own in enumerate(members)}
+    number: dict[tuple[int, ...], int] = {member: k for k, member in enumerate(members)}
 
     def point(*own: int) -> int:
         key = tuple(sorted(own))

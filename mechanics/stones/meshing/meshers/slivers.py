@@ -48,8 +48,8 @@ def _freedom(mesh: SolidMesh, vertices: Array, faces: Faces) -> Array:
     first, last = on_face.argmax(axis=1), len(faces) - 1 - on_face[:, ::-1].argmax(axis=1)
     free = np.tile(np.eye(3), (len(mesh.nodes), 1, 1))
     free[count > 2] = 0.0
-    one = count == 1
-    free[one] -= normals[first[one], :, None] * normals[first[one], None]
+    single = count == 1
+    free[single] -= normals[first[single], :, None] * normals[first[single], None]
     two = count == 2
     along = np.cross(normals[first[two]], normals[last[two]])
     sine = np.linalg.norm(along, axis=1)
