@@ -99,8 +99,8 @@ def _pulls(scene: GeologyScene) -> str:
 
 def _cohesions(scene: GeologyScene) -> list[float]:
     """Return the pull of the contacts within each layer [N]."""
-    own = scene.contact.cohesion
-    return [own if layer.cohesion is None else layer.cohesion for layer in scene.layers] or [own]
+    cohesion = scene.contact.cohesion
+    return [cohesion if layer.cohesion is None else layer.cohesion for layer in scene.layers] or [cohesion]
 
 
 def write_results(

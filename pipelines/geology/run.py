@@ -140,10 +140,10 @@ def _between_layers(
     friction = [contact.friction if layer.friction is None else layer.friction for layer in layers]
     cohesion = [contact.cohesion if layer.cohesion is None else layer.cohesion for layer in layers]
     rules = []
-    for one, other in combinations_with_replacement(range(len(layers)), 2):
-        if groups[one] and groups[other]:
-            law = _law(scene, min(friction[one], friction[other]), min(cohesion[one], cohesion[other]))
-            rules.append(LawRule(groups[one], groups[other], law))
+    for first, second in combinations_with_replacement(range(len(layers)), 2):
+        if groups[first] and groups[second]:
+            law = _law(scene, min(friction[first], friction[second]), min(cohesion[first], cohesion[second]))
+            rules.append(LawRule(groups[first], groups[second], law))
     return rules
 
 
@@ -191,14 +191,14 @@ def run_geology(
         planar = planar_scene(scene, sample)
         observation = _observation(scene, sample, planar, folder / UNFINISHED)
         drawn = frozenset(round(time / scene.time.step) for time in scene.output.figures_at)
-        kept = PlanarObserver(scene.output.fields_every, observation.fields, drawn)
-        observers = (PlanarObserver(scene.output.every, observation.row), kept)
+        observer = PlanarObserver(scene.output.fields_every, observation.fields, drawn)
+        observers = (PlanarObserver(scene.output.every, observation.row), observer)
 
         def write(fresh: Path, result: PlanarResult, archive: UnfinishedRun) -> None:
             progress(Progress("write", 0, 1, "results"))
             rows.update(observation.rows(scene.output.every))
             observed = Observations(
-                rows, observation.experiment_rows(scene.output.every), observation.instants(kept.wants)
+                rows, observation.experiment_rows(scene.output.every), observation.instants(observer.wants)
             )
             summary.update(write_results(fresh, scene, sample, result, observed, archive))
 

@@ -45,8 +45,8 @@ def prepare(scene: GeologyScene, cache: Path, progress: Listener = silent) -> Pr
     UsageError : the cache cannot be written; said before anything is deposited
     SceneError : the sample cannot be deposited
     """
-    asked, own = scene.sample, scene.experiment
-    x = np.linspace(0.0, own.length, 1001)
+    asked, experiment = scene.sample, scene.experiment
+    x = np.linspace(0.0, experiment.length, 1001)
     settings = {
         "version": _VERSION,
         "sample": {
@@ -57,19 +57,19 @@ def prepare(scene: GeologyScene, cache: Path, progress: Listener = silent) -> Pr
         "friction": scene.contact.friction,
         "rolling": scene.contact.rolling,
         "gravity": scene.time.gravity,
-        "profile": hashlib.sha256(np.append(x, own.top(x)).tobytes()).hexdigest(),
+        "profile": hashlib.sha256(np.append(x, experiment.top(x)).tobytes()).hexdigest(),
     }
     digest = hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()[:_DIGITS]
     path = cache / f"{digest}.npz"
-    found = _stored(path)
-    if found is None:
+    stored = _stored(path)
+    if stored is None:
         _make(cache)
         with scene.document.at("sample"):
-            found = deposit(
+            stored = deposit(
                 Deposit(
-                    own.length,
-                    own.top,
-                    own.highest,
+                    experiment.length,
+                    experiment.top,
+                    experiment.highest,
                     asked.smallest,
                     asked.largest,
                     asked.density,
@@ -83,10 +83,10 @@ def prepare(scene: GeologyScene, cache: Path, progress: Listener = silent) -> Pr
                 progress,
             )
         fresh = path.with_suffix(".new.npz")
-        np.savez(fresh, centre=found[0], radius=found[1])
+        np.savez(fresh, centre=stored[0], radius=stored[1])
         fresh.replace(path)
-    centre, radius = found
-    tops = asked.layer_tops or own.highest * np.arange(1, asked.layers) / asked.layers
+    centre, radius = stored
+    tops = asked.layer_tops or experiment.highest * np.arange(1, asked.layers) / asked.layers
     layer = np.searchsorted(tops, centre[:, 1], side="right").astype(np.int64)
     return PreparedSample(centre, radius, layer, digest)
 

@@ -103,8 +103,8 @@ def _disks(centres: Array, radius: Array) -> Stones:
 
 
 def _cells(cells: Sequence[Cell], start: Array) -> list[str | None]:
-    found: list[str | None] = [None] * len(start)
+    names: list[str | None] = [None] * len(start)
     for cell in cells:
         for number in members(cell, start).tolist():
-            found[number] = cell.name
-    return found
+            names[number] = cell.name
+    return names

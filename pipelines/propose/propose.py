@@ -137,9 +137,9 @@ def propose_stones(
         records = _stones(session, ())
         chosen = {record.code for record in _stones(session, where)} if where else None
         blocks = [surveyed_block(record) for record in records]
-        found = propose_missing(blocks, settings, taken=_codes(session))
-        kept = _beside(chosen, [(one.block.code, one.beside) for one in found])
-        pairs = [(stone_record(one.block), one.notes) for one in found if one.block.code in kept]
+        missing = propose_missing(blocks, settings, taken=_codes(session))
+        kept = _beside(chosen, [(stone.block.code, stone.beside) for stone in missing])
+        pairs = [(stone_record(stone.block), stone.notes) for stone in missing if stone.block.code in kept]
         return _report("missing", session, len(records), pairs, asdict(settings), recording)
 
 
@@ -181,9 +181,9 @@ def propose_core(
             if block.kind not in vaults
         ]
         named = None if facings is None else _named(session, where, facings)
-        found = propose_infill(stones, settings, facings=named, taken=_codes(session))
-        known = _measured(session, find(session, "infill"))
-        new = [one for one in found if not _is_known(one, known)]
+        infill_proposals = propose_infill(stones, settings, facings=named, taken=_codes(session))
+        measured = _measured(session, find(session, "infill"))
+        new = [proposal for proposal in infill_proposals if not _is_known(proposal, measured)]
         pairs: list[tuple[StoneRecord, tuple[str, ...]]] = [(core_record(one), ()) for one in new]
         given = {**asdict(settings), "facings": None if facings is None else list(facings)}
         return _report("infill", session, len(records), pairs, given, recording)
@@ -218,11 +218,11 @@ def _named(session: Session, where: Sequence[str], facings: Facings) -> tuple[se
 
 def _beside(chosen: Collection[str] | None, found: Sequence[tuple[str, tuple[str, str]]]) -> set[str]:
     """Find the codes of the proposals between two chosen stones, or beside such proposals."""
-    kept: set[str] = set()
+    codes: set[str] = set()
     for code, beside in found:
-        if chosen is None or all(one in chosen or one in kept for one in beside):
-            kept.add(code)
-    return kept
+        if chosen is None or all(code in chosen or code in codes for code in beside):
+            codes.add(code)
+    return codes
 
 
 def _report(
@@ -276,19 +276,19 @@ def _record_volume(record: StoneRecord) -> float:
     return volume_of(Solid(record.code, record.solid_vertices, record.solid_faces))
 
 
-def _is_known(proposal: InfillProposal, known: Sequence[StoneRecord]) -> bool:
+def _is_known(proposal: InfillProposal, known_records: Sequence[StoneRecord]) -> bool:
     """Return True if a part of the core is already in the database, or another part shares its middle."""
     middle = proposal.solid.vertices.mean(axis=0)
     low, high = proposal.solid.vertices.min(axis=0), proposal.solid.vertices.max(axis=0)
-    for record in known:
+    for record in known_records:
         corners = record.solid_vertices
         if (corners.min(axis=0) >= high).any() or (corners.max(axis=0) <= low).any():
             continue
-        other = Solid(record.code, corners, record.solid_faces)
+        solid = Solid(record.code, corners, record.solid_faces)
         near = float(np.abs(corners.mean(axis=0) - middle).max()) < _SAME
-        if near and abs(volume_of(other) / proposal.volume - 1.0) < _SAME:
+        if near and abs(volume_of(solid) / proposal.volume - 1.0) < _SAME:
             return True
-        if _contains(other, middle) or _contains(proposal.solid, corners.mean(axis=0)):
+        if _contains(solid, middle) or _contains(proposal.solid, corners.mean(axis=0)):
             return True
     return False
 

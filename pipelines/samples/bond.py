@@ -210,7 +210,7 @@ def _next(
     for _ in range(200):
         kind = rng.choice(("header", "stretcher"))
         end = start + rng.uniform(*WIDTHS[kind])
-        near = bisect_left(below, end - clearance)
-        if last != [kind, kind] and (near == len(below) or below[near] > end + clearance):
+        at = bisect_left(below, end - clearance)
+        if last != [kind, kind] and (at == len(below) or below[at] > end + clearance):
             return kind, end
     raise GeometryError(f"no stone fits at s = {start:.3f} m", remedy="allow joints nearer to those below")

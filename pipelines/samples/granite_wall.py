@@ -61,12 +61,12 @@ measured = "measured.csv"
 
 def units() -> dict[str, tuple[float, float, float, float]]:
     """Return left, bottom, right and top of each unit by its code [m]: half-unit bond, odd courses of whole units."""
-    found = {}
+    stones = {}
     for course, lengths in enumerate(bond(_UNITS, _COURSES)):
         ends = _LENGTH * np.concatenate([[0.0], np.cumsum(lengths)])
         for number, (left, right) in enumerate(pairwise(ends.tolist()), start=1):
-            found[f"{course + 1}-{number}"] = (left, _HEIGHT * course, right, _HEIGHT * (course + 1))
-    return found
+            stones[f"{course + 1}-{number}"] = (left, _HEIGHT * course, right, _HEIGHT * (course + 1))
+    return stones
 
 
 def units_text() -> str:

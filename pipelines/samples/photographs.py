@@ -307,9 +307,9 @@ def _stones(bay: WindowBay, cameras: list[TrueCamera], rng: Random) -> str:
             )
         shown = rng.sample(range(len(cameras)), len(cameras))
         if number % _DRAWN == 4:
-            one = next(cameras[k] for k in shown if _inside(cameras[k].see(corners)).all())
-            lines.append(f"  photo {one.photo.name}")
-            lines += [f"  pixel {x:.2f} {y:.2f}" for x, y in _marked(one, corners, rng).tolist()]
+            camera = next(cameras[k] for k in shown if _inside(cameras[k].see(corners)).all())
+            lines.append(f"  photo {camera.photo.name}")
+            lines += [f"  pixel {x:.2f} {y:.2f}" for x, y in _marked(camera, corners, rng).tolist()]
         else:
             for k, corner in enumerate(corners, start=1):
                 single = number % _SINGLE == 3 and k == 2
@@ -333,7 +333,7 @@ def _point(
     return [f"  mark {name} {role} {cameras[k].photo.name} {x:.2f} {y:.2f}" for k, (x, y) in seen.items()]
 
 
-def _apart(one: TrueCamera, other: TrueCamera) -> float:
-    assert one.photo.station is not None
-    assert other.photo.station is not None
-    return float(np.linalg.norm(one.photo.station - other.photo.station))
+def _apart(first: TrueCamera, second: TrueCamera) -> float:
+    assert first.photo.station is not None
+    assert second.photo.station is not None
+    return float(np.linalg.norm(first.photo.station - second.photo.station))

@@ -128,16 +128,16 @@ def make_rubble_wall(seed: int = _SEED) -> RubbleWall:
         i, j = min(i, j), max(i, j)
         if i >= count:
             continue
-        one, other = diagram.points[i], diagram.points[j]
+        first, second = diagram.points[i], diagram.points[j]
         inner = j < count
         thickness = float(chance.uniform(*(_JOINTS if inner else _EDGES)))
         if inner and min(ends) >= 0:
             joints[i, j] = thickness
-        for stone, near, far in ((i, one, other), *(((j, other, one),) if inner else ())):
+        for stone, near, far in ((i, first, second), *(((j, second, first),) if inner else ())):
             normal = (far - near) * _STRETCH
             normal /= np.linalg.norm(normal)
             away = 0.5 * thickness if inner else thickness
-            cuts[stone].append((normal, float(normal @ (0.5 * (one + other) / _STRETCH)) - away))
+            cuts[stone].append((normal, float(normal @ (0.5 * (first + second) / _STRETCH)) - away))
     cells, stones = [], []
     for stone in range(count):
         cell = diagram.vertices[diagram.regions[diagram.point_region[stone]]] / _STRETCH

@@ -133,10 +133,10 @@ def recipe_of(
 def _places(building: SyntheticBuilding) -> Iterator[str]:
     """Yield corrections that give modelled stones of the walls their zones and courses, which files of solids lack."""
     rows: dict[tuple[str, int], list[str]] = {}
-    for one in building.modelled:
-        if one.course is None:
+    for block in building.modelled:
+        if block.course is None:
             continue
-        rows.setdefault((f"{one.code[0]} inner", one.course), []).append(one.code)
+        rows.setdefault((f"{block.code[0]} inner", block.course), []).append(block.code)
     for (zone, course), codes in rows.items():
         yield _PLACE.format(stones='", "'.join(codes), zone=zone, course=course)
 

@@ -109,17 +109,17 @@ def _surface(
     depth, colours = np.full(len(flat), np.nan), np.full((len(flat), 3), (70, 75, 85))
     rough = _roughness(flat, spacing, rng)
     for stone, measured, visible in zip(bay.stones, bay.measured, corners, strict=True):
-        near = np.flatnonzero(_within(flat, stone.plan.corners))
-        depth[near] = -rng.uniform(*_MORTAR) + 2.0 * rough[near]
-        colours[near] = (188, 180, 165)
-        own = near[_within(flat[near], visible)]
-        out = _on_face(stone, bay.frame, flat[own]) + rough[own]
+        close = np.flatnonzero(_within(flat, stone.plan.corners))
+        depth[close] = -rng.uniform(*_MORTAR) + 2.0 * rough[close]
+        colours[close] = (188, 180, 165)
+        visible_rows = close[_within(flat[close], visible)]
+        out = _on_face(stone, bay.frame, flat[visible_rows]) + rough[visible_rows]
         if measured.worn_corner is not None:
             radius, back = _WORN
-            apart = np.linalg.norm(flat[own] - visible[measured.worn_corner], axis=1)
+            apart = np.linalg.norm(flat[visible_rows] - visible[measured.worn_corner], axis=1)
             out -= back * np.clip(1.0 - apart / radius, 0.0, 1.0)
-        depth[own] = out
-        colours[own] = np.array([170, 155, 130]) + rng.integers(-25, 25)
+        depth[visible_rows] = out
+        colours[visible_rows] = np.array([170, 155, 130]) + rng.integers(-25, 25)
     shade = rng.integers(-8, 9, len(flat))[:, None]
     return depth, np.clip(colours + shade, 0, 255).astype(np.uint8)
 
@@ -173,14 +173,14 @@ def outlines_text(scan: Scan) -> str:
     features = []
     for ring, measured in zip(scan.outlines, scan.bay.measured, strict=True):
         record = measured.record
-        said: dict[str, object] = {"code": record.code, "kind": record.kind}
+        attributes: dict[str, object] = {"code": record.code, "kind": record.kind}
         if record.course is not None:
-            said["course"] = record.course
+            attributes["course"] = record.course
         if record.depth is not None:
-            said |= {"depth": record.depth, "depth_sigma": record.depth_sigma}
+            attributes |= {"depth": record.depth, "depth_sigma": record.depth_sigma}
         rounded = (np.round(ring, 4) + 0.0).tolist()
         shape = {"type": "Polygon", "coordinates": [[*rounded, rounded[0]]]}
-        features.append(json.dumps({"type": "Feature", "properties": said, "geometry": shape}))
+        features.append(json.dumps({"type": "Feature", "properties": attributes, "geometry": shape}))
     about = json.dumps("synthetic: outlines of the stones of a window bay, drawn with 5 mm of jitter")
     return (
         f'{{"type": "FeatureCollection", "about": {about}, "features": [\n' + ",\n".join(features) + "\n]}\n"

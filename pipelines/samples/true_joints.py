@@ -91,12 +91,12 @@ def _near(faces: Sequence[_Faces]) -> Iterator[tuple[int, int]]:
     axis = int(np.argmax(high.max(axis=0) - low.min(axis=0)))
     order = np.argsort(low[:, axis], kind="stable")
     starts = low[order, axis]
-    found = []
+    pairs = []
     for place, i in enumerate(order):
         others = order[place + 1 : int(np.searchsorted(starts, high[i, axis], side="right"))]
         touching = (low[others] <= high[i]).all(axis=1) & (low[i] <= high[others]).all(axis=1)
-        found += [(min(int(i), int(j)), max(int(i), int(j))) for j in others[touching]]
-    yield from sorted(found)
+        pairs += [(min(int(i), int(j)), max(int(i), int(j))) for j in others[touching]]
+    yield from sorted(pairs)
 
 
 def _shared(first: _Faces, second: _Faces) -> Iterator[tuple[int, int, float, Array]]:
@@ -121,17 +121,17 @@ def _common(polygon: list[Point], cutter: list[Point]) -> list[Point]:
     for k, (x, y) in enumerate(cutter):
         to_x, to_y = cutter[(k + 1) % len(cutter)]
         heights = [(to_x - x) * (q - y) - (to_y - y) * (p - x) for p, q in polygon]
-        kept: list[Point] = []
+        points: list[Point] = []
         for i, here in enumerate(polygon):
             before, h, g = polygon[i - 1], heights[i], heights[i - 1]
             if (h > 0.0) != (g > 0.0):
                 share = g / (g - h)
-                kept.append(
+                points.append(
                     (before[0] + share * (here[0] - before[0]), before[1] + share * (here[1] - before[1]))
                 )
             if h > 0.0:
-                kept.append(here)
-        polygon = kept
+                points.append(here)
+        polygon = points
     return polygon
 
 

@@ -55,7 +55,7 @@ def true_movement(cause: Cause, progress: Listener = silent) -> Movement:
     )
     core = _core(site)
     blocks += tuple(
-        Block(one.code, one.vertices - middle, one.faces, limestone, Fidelity.FIXED) for one in core
+        Block(block.code, block.vertices - middle, block.faces, limestone, Fidelity.FIXED) for block in core
     )
     motions = [
         settlement([one.code for one in core] or [code], (0.0, 0.0, z), cause.true_duration)
@@ -99,7 +99,7 @@ def _core(site: MovedBuilding) -> list[Solid]:
         FacingStone(record.code, record.course, solid, planes_of_solid(solid)[0, :3])
         for record, solid in zip(site.building.survey.blocks, site.building.solids, strict=True)
     ]
-    return [one.solid for one in propose_infill(stones) if one.course == site.core]
+    return [proposal.solid for proposal in propose_infill(stones) if proposal.course == site.core]
 
 
 def _contact(cause: Cause) -> ContactSettings:

@@ -383,7 +383,7 @@ def _diagnosis(kind: str, fixed: str, cause: Cause, commands: Sequence[str]) -> 
         hypotheses.append(_hypothesis(name, "thrust", "N", values, "".join(thrusts)))
     else:
         top = max(
-            site.building.survey.blocks, key=lambda one: one.course or 0
+            site.building.survey.blocks, key=lambda block: block.course or 0
         ).code  # the first of its course
         load = _FORCE.format(code=top, force='[0.0, 0.0, "= -load"]')
         name = "a load stood on the upper left corner"

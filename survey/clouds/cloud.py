@@ -99,7 +99,9 @@ def open_cloud(
 
 def _check_sides(placed: Sequence[PlacedOutline], path: Path) -> None:
     """Refuse stations of a scan that see most outlines from behind: these run counter-clockwise from outside."""
-    behind = sum(float(one.axes[2] @ area_vector(one.corners - one.origin)) < 0.0 for one in placed)
+    behind = sum(
+        float(outline.axes[2] @ area_vector(outline.corners - outline.origin)) < 0.0 for outline in placed
+    )
     if 2 * behind > len(placed):
         raise SurveyError(
             f"{behind} of {len(placed)} outlines run clockwise seen from where the scanner is said to have stood",
@@ -108,8 +110,8 @@ def _check_sides(placed: Sequence[PlacedOutline], path: Path) -> None:
         )
 
 
-def _outline_sigma(one: PlacedOutline, drawing: Drawing, options: CloudOptions) -> float:
-    sigma = one.outline.said.sigma or options.outline_sigma
+def _outline_sigma(outline: PlacedOutline, drawing: Drawing, options: CloudOptions) -> float:
+    sigma = outline.outline.said.sigma or options.outline_sigma
     return max(sigma, drawing.pixel or 0.0)
 
 
@@ -176,7 +178,7 @@ def _correlation(fitted: Sequence[_Fitted]) -> float:
     1 + Σ r^d over the patches around, 1 + 4 r + 4 r^√2 + 4 r² + … in the middle of a large face.
     """
     products, hat, pairs = sum(
-        (one.numbers[4:7] for one in fitted if one.status == FINE), np.array([0, 0, _PRIOR])
+        (plane.numbers[4:7] for plane in fitted if plane.status == FINE), np.array([0, 0, _PRIOR])
     )
     correlation = 0.0
     for _ in range(_ROUNDS):
@@ -198,34 +200,34 @@ def _stones(
     fitted = [_Fitted(*fit_patches(*collected.of(k), rules)) for k in range(len(placed))]
     correlation = _correlation(fitted)
     first = first_codes([one.outline.code for one in placed])
-    for k, one in enumerate(placed):
+    for k, outline in enumerate(placed):
         try:
             if first[k] != k:
                 earlier = placed[first[k]].outline.where
-                what, remedy = f"a second stone {one.outline.code}", f"the first is {earlier}"
-                raise SurveyError(what, where=one.outline.where, remedy=remedy)
-            if CODE.fullmatch(one.outline.code) is None:
-                what, remedy = f"code {one.outline.code!r}", "begin it with a letter or digit"
-                raise SurveyError(what, where=one.outline.where, remedy=remedy)
+                what, remedy = f"a second stone {outline.outline.code}", f"the first is {earlier}"
+                raise SurveyError(what, where=outline.outline.where, remedy=remedy)
+            if CODE.fullmatch(outline.outline.code) is None:
+                what, remedy = f"code {outline.outline.code!r}", "begin it with a letter or digit"
+                raise SurveyError(what, where=outline.outline.where, remedy=remedy)
             if fitted[k].status != FINE:
-                raise _no_plane(fitted[k], one, options)
-            review += measured_doubts(one, fitted[k].plane, fitted[k].numbers)
-            station = None if options.wall is not None else facing_station(one.origin, head.stations)
-            record = _record(one, float(sigmas[k]), fitted[k], correlation, options)
+                raise _no_plane(fitted[k], outline, options)
+            review += measured_doubts(outline, fitted[k].plane, fitted[k].numbers)
+            station = None if options.wall is not None else facing_station(outline.origin, head.stations)
+            record = _record(outline, float(sigmas[k]), fitted[k], correlation, options)
             notes = {"cloud": name, **record.notes}
             yield replace(record, notes=notes, station=None if station is None else station.name)
         except (SurveyError, GeometryError) as error:
-            review.append(Doubtful(one.outline.code, "rejected", error.what, one.outline.where))
-            yield Reject(one.outline.code, error, (_span(one),))
+            review.append(Doubtful(outline.outline.code, "rejected", error.what, outline.outline.where))
+            yield Reject(outline.outline.code, error, (_span(outline),))
 
 
 def _record(
-    one: PlacedOutline, sigma: float, fitted: _Fitted, correlation: float, options: CloudOptions
+    outline: PlacedOutline, sigma: float, fitted: _Fitted, correlation: float, options: CloudOptions
 ) -> BlockRecord:
     """Make the record of a stone whose plane is found."""
-    said, rows = one.outline.said, fitted.rows
+    attributes, rows = outline.outline.said, fitted.rows
     patch_sigma, worth = patch_sigmas(rows, fitted.cells, fitted.numbers, correlation)
-    local = np.column_stack([one.ring, one.ring @ fitted.plane[:2] + fitted.plane[2]])
+    local = np.column_stack([outline.ring, outline.ring @ fitted.plane[:2] + fitted.plane[2]])
     sigmas = np.concatenate([np.maximum(patch_sigma, _LEAST), np.full(len(local), sigma)])
     clear, count = fitted.numbers[2:4].tolist()
     notes = {
@@ -233,31 +235,31 @@ def _record(
         "noise": f"{fitted.noise * 1e3:.1f} mm for one point; {clear:.0%} of the patches are clear, neighbours "
         f"correlated by {correlation:.2f}",
     }
-    if said.score is not None:
-        notes["score"] = f"{said.score:g}"
+    if attributes.score is not None:
+        notes["score"] = f"{attributes.score:g}"
     return BlockRecord(
-        code=one.outline.code,
-        kind=said.kind or options.kind,
-        course=said.course,
-        vertices=one.origin + local @ one.axes,
-        points=one.origin + rows[:, :3] @ one.axes,
+        code=outline.outline.code,
+        kind=attributes.kind or options.kind,
+        course=attributes.course,
+        vertices=outline.origin + local @ outline.axes,
+        points=outline.origin + rows[:, :3] @ outline.axes,
         sigma=float(np.sqrt((sigmas**2).mean())),
-        depth=said.depth,
-        depth_sigma=said.depth_sigma,
-        depth_source=None if said.depth is None else f"attribute of {one.outline.where}",
-        line=one.outline.number,
-        notes={**said.notes, **notes},
-        zone=said.zone,
+        depth=attributes.depth,
+        depth_sigma=attributes.depth_sigma,
+        depth_source=None if attributes.depth is None else f"attribute of {outline.outline.where}",
+        line=outline.outline.number,
+        notes={**attributes.notes, **notes},
+        zone=attributes.zone,
         sigmas=sigmas,
-        spans=(_span(one),),
+        spans=(_span(outline),),
     )
 
 
-def _span(one: PlacedOutline) -> range:
-    return range(one.outline.number, one.outline.number + 1)
+def _span(outline: PlacedOutline) -> range:
+    return range(outline.outline.number, outline.outline.number + 1)
 
 
-def _no_plane(fitted: _Fitted, one: PlacedOutline, options: CloudOptions) -> GeometryError:
+def _no_plane(fitted: _Fitted, outline: PlacedOutline, options: CloudOptions) -> GeometryError:
     count = int(fitted.numbers[3])
     if fitted.status == FEW:
         what = f"too few points: {count} within its outline and {options.slab:g} m of its plane"
@@ -267,4 +269,4 @@ def _no_plane(fitted: _Fitted, one: PlacedOutline, options: CloudOptions) -> Geo
         remedy = "check the outline; something may cover the stone"
     else:
         what, remedy = f"no plane: {count} points on a line", "check the outline"
-    return GeometryError(what, where=one.outline.where, remedy=remedy)
+    return GeometryError(what, where=outline.outline.where, remedy=remedy)

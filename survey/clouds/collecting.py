@@ -70,10 +70,10 @@ def _coarser(
     new_places = np.zeros((wide * high, 4 * places.shape[1], 3), np.float32)
     for p in range(rows * columns):
         target = (p // columns // 2) * wide + p % columns // 2
-        held = min(int(counts[p]), places.shape[1])
+        count = min(int(counts[p]), places.shape[1])
         start = int(new_counts[target])
-        new_places[target, start : start + held] = places[p, :held]
-        new_counts[target] += held
+        new_places[target, start : start + count] = places[p, :count]
+        new_counts[target] += count
     return new_counts, new_places, wide
 
 
@@ -154,17 +154,17 @@ def _grid(placed: Sequence[PlacedOutline], origin: Array, slab: float) -> Grid:
     cubes, members = [], []
     for k, (a, b) in enumerate(zip(first, last, strict=True)):
         x, y, z = (np.arange(a[j], b[j] + 1) for j in range(3))
-        own = ((x[:, None, None] * shape[1] + y[:, None]) * shape[2] + z).ravel()
-        cubes.append(own)
-        members.append(np.full(len(own), k, dtype=np.int32))
+        cells = ((x[:, None, None] * shape[1] + y[:, None]) * shape[2] + z).ravel()
+        cubes.append(cells)
+        members.append(np.full(len(cells), k, dtype=np.int32))
     cube, member = np.concatenate(cubes), np.concatenate(members)
     order = np.argsort(cube, kind="stable")
     start = np.concatenate([[0], np.cumsum(np.bincount(cube, minlength=int(shape.prod())))]).astype(np.int64)
     return Grid(low, side, shape, start, member[order])
 
 
-def _box(one: PlacedOutline, slab: float) -> Array:
+def _box(outline: PlacedOutline, slab: float) -> Array:
     """Return the lowest and highest corner (2, 3) of the slab of an outline."""
-    flat = one.origin + one.ring @ one.axes[:2]
-    reach = slab * np.abs(one.axes[2])
+    flat = outline.origin + outline.ring @ outline.axes[:2]
+    reach = slab * np.abs(outline.axes[2])
     return np.array([flat.min(axis=0) - reach, flat.max(axis=0) + reach])

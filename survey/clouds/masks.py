@@ -109,7 +109,7 @@ def _spatial(drawing: Drawing, options: MaskOptions) -> SurveyStream:
     placed = place_outlines(outlines, None, head.stations)
     if not head.stations:
         normal = np.mean([one.axes[2] for one in placed], axis=0)
-        against = next((one for one in placed if one.axes[2] @ normal < _AGREE), None)
+        against = next((outline for outline in placed if outline.axes[2] @ normal < _AGREE), None)
         if against is not None:
             remedy = "draw all counter-clockwise as seen from outside, or give stations in a file: --header"
             what = "the outline runs around another side than the others, and no station tells from where it is seen"
@@ -178,7 +178,7 @@ def _stones(
     frame: Array | None,
     options: MaskOptions,
 ) -> Iterator[BlockRecord | Reject]:
-    first = first_codes([one.code for one in outlines])
+    first = first_codes([outline.code for outline in outlines])
     for k, outline in enumerate(outlines):
         span = (range(outline.number, outline.number + 1),)
         if first[k] != k:
@@ -186,32 +186,32 @@ def _stones(
             error = SurveyError(f"a second stone {outline.code}", where=outline.where, remedy=remedy)
             yield Reject(outline.code, error, span)
             continue
-        said = outline.said
+        attributes = outline.said
         corners = _distinct(outline.corners, max(_TWICE * sigma, _NEAREST))
-        notes = dict(said.notes) | {OUTLINE_NOTE: how}
+        notes = dict(attributes.notes) | {OUTLINE_NOTE: how}
         if frame is not None:
             beyond = np.concatenate([corners.min(axis=0) - frame[0], frame[1] - corners.max(axis=0)])
             notes[FRAME_NOTE] = " ".join(f"{value:.9f}" for value in beyond.tolist())
-        if said.score is not None:
-            notes["score"] = f"{said.score:g}"
+        if attributes.score is not None:
+            notes["score"] = f"{attributes.score:g}"
         yield BlockRecord(
             code=outline.code,
-            kind=said.kind or options.kind,
-            course=said.course,
+            kind=attributes.kind or options.kind,
+            course=attributes.course,
             vertices=corners if wall is None else wall.origin + corners @ wall.axes[:2],
             points=np.empty((0, 3)),
-            sigma=max(sigma, said.sigma or 0.0),
-            depth=said.depth,
-            depth_sigma=said.depth_sigma,
-            depth_source=None if said.depth is None else f"attribute of {outline.where}",
+            sigma=max(sigma, attributes.sigma or 0.0),
+            depth=attributes.depth,
+            depth_sigma=attributes.depth_sigma,
+            depth_source=None if attributes.depth is None else f"attribute of {outline.where}",
             line=outline.number,
             notes=notes,
-            zone=said.zone,
+            zone=attributes.zone,
             spans=span,
         )
 
 
 def _distinct(corners: Array, nearest: float) -> Array:
     """Return corners (n, 2) or (n, 3) without those that are as good as the one before them: a worn corner has two."""
-    kept = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1) >= nearest
-    return corners[kept] if np.count_nonzero(kept) >= 3 else corners
+    distinct = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1) >= nearest
+    return corners[distinct] if np.count_nonzero(distinct) >= 3 else corners

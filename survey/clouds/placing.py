@@ -92,7 +92,7 @@ def levelled(outlines: Sequence[Outline]) -> tuple[Outline, ...]:
 
 def facing_station(origin: Array, stations: Sequence[Station]) -> Station | None:
     """Return the station nearest to a place; None if there is none."""
-    return min(stations, key=lambda one: float(np.linalg.norm(one.position - origin)), default=None)
+    return min(stations, key=lambda station: float(np.linalg.norm(station.position - origin)), default=None)
 
 
 def _on_wall(outline: Outline, wall: Wall) -> PlacedOutline:

@@ -43,10 +43,10 @@ def drawn_doubts(placed: Sequence[PlacedOutline], drawing: Drawing) -> list[Doub
     drawing : the file that they come from
     """
     outlines = [one.outline for one in placed]
-    found = list(_shape_doubts(outlines, [one.ring for one in placed], drawing))
+    doubts = list(_shape_doubts(outlines, [one.ring for one in placed], drawing))
     if drawing.path.suffix.lower() not in PICTURES:
-        found += _overlaps_in_space(placed)
-    return found
+        doubts += _overlaps_in_space(placed)
+    return doubts
 
 
 def flat_doubts(outlines: Sequence[Outline], rings: Sequence[Array], drawing: Drawing) -> Iterator[Doubtful]:
@@ -97,24 +97,24 @@ def _seams(
     upright = [ring if ring_area(ring) > 0.0 else ring[::-1] for ring in rings]
     near = _near_pairs(low - 0.5 * _JOINT, high + 0.5 * _JOINT)
     for pair in seamless(upright, [(int(i), int(j)) for i, j in near]):
-        other = outlines[pair.second]
+        second = outlines[pair.second]
         text = (
-            f"no joint parts it from {other.code} ({pair.gap * 1e3:.0f} mm; others are {pair.usual * 1e3:.0f} mm "
+            f"no joint parts it from {second.code} ({pair.gap * 1e3:.0f} mm; others are {pair.usual * 1e3:.0f} mm "
             "wide): one stone drawn as two?"
         )
         yield Doubtful(outlines[pair.first].code, "no joint", text, outlines[pair.first].where)
 
 
-def measured_doubts(one: PlacedOutline, plane: Array, numbers: Array) -> Iterator[Doubtful]:
+def measured_doubts(outline: PlacedOutline, plane: Array, numbers: Array) -> Iterator[Doubtful]:
     """Yield what is odd about the points of a stone.
 
     Parameters
     ----------
-    one : its outline
+    outline : its outline
     plane : (3,) slopes and height of its face in the frame of the outline
     numbers : as `fit_patches` returns them
     """
-    code, where = one.outline.code, one.outline.where
+    code, where = outline.outline.code, outline.outline.where
     clear, count = numbers[2:4].tolist()
     if count < _FEW:
         yield Doubtful(code, "few points", f"{int(count)} points", where)
@@ -152,8 +152,11 @@ def _overlaps(
     if not len(pairs):
         return
     shapely = optional("shapely", "overlaps of outlines")
-    one, other = _polygons(shapely, first), _polygons(shapely, second)
-    shared, areas = shapely.area(shapely.intersection(one, other)), (shapely.area(one), shapely.area(other))
+    first_polygons, second_polygons = _polygons(shapely, first), _polygons(shapely, second)
+    shared, areas = (
+        shapely.area(shapely.intersection(first_polygons, second_polygons)),
+        (shapely.area(first_polygons), shapely.area(second_polygons)),
+    )
     smaller = np.minimum(*areas)
     within = shared > _WITHIN * smaller
     larger = np.where(areas[0] > areas[1], pairs[:, 0], pairs[:, 1])
@@ -176,9 +179,9 @@ def _near_pairs(low: Array, high: Array) -> Ints:
     found = [np.empty((0, 2), dtype=np.int64)]
     for place, k in enumerate(order):
         others = order[place + 1 : ends[place]]
-        near = others[((low[others] <= high[k]) & (high[others] >= low[k])).all(axis=1)]
-        if len(near):
-            found.append(np.sort(np.column_stack([np.full(len(near), k), near]), axis=1))
+        close = others[((low[others] <= high[k]) & (high[others] >= low[k])).all(axis=1)]
+        if len(close):
+            found.append(np.sort(np.column_stack([np.full(len(close), k), close]), axis=1))
     pairs = np.concatenate(found)
     return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
 

@@ -133,12 +133,12 @@ def common_plane(fits: Sequence[FaceFit], place: Array) -> CommonPlane:
     frame = _frame(mean / np.linalg.norm(mean))
     places = np.array([fit.centroid for fit in fits]) - place
     normals = np.array([fit.normal for fit in fits]) @ frame.T
-    own = np.array([np.diagonal(fit.covariance) for fit in fits])
+    variances = np.array([np.diagonal(fit.covariance) for fit in fits])
     faces = _Faces(
         arms=np.column_stack([places @ frame[:2].T, np.ones(len(fits))]),
         heights=places @ frame[2],
         slopes=-normals[:, :2] / normals[:, 2:],
-        variances=np.column_stack([own[:, 2], own[:, :2].mean(axis=1)]),
+        variances=np.column_stack([variances[:, 2], variances[:, :2].mean(axis=1)]),
     )
     members, best = _without_outliers(faces)
     normal, axes = _tilted(frame[2], frame[:2], best.step)
@@ -198,7 +198,7 @@ def _without_outliers(faces: _Faces) -> tuple[Indices, _Adjusted]:
     """
     everything = np.arange(len(faces.heights))
     members, best = everything, _adjust(faces)
-    found = members, best
+    answer = members, best
     most = len(members) // 3 if len(members) <= _FEW else len(members)
     for _ in range(most):
         some = faces.only(members)
@@ -213,10 +213,10 @@ def _without_outliers(faces: _Faces) -> tuple[Indices, _Adjusted]:
         limit = float(stdtrit(best.freedom[0], 1.0 - 0.5 * _LEVEL / len(members)))
         members = members[rest]
         if tests.min() > limit:
-            found = members, best
+            answer = members, best
         elif len(members) > _FEW:
             break
-    return found
+    return answer
 
 
 def _studentised(faces: _Faces, best: _Adjusted) -> Array:

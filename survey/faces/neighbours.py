@@ -67,21 +67,23 @@ class Neighbours:
         centre = outline.mean(axis=0)
         reach = _REACH * float(np.linalg.norm(outline[:, None] - outline[None], axis=2).max())
         around = float(np.linalg.norm(outline - centre, axis=1).max()) + reach
-        found = np.sort(self._tree.query_ball_point(centre, around + float(self._radii.max()))).astype(
+        candidates = np.sort(self._tree.query_ball_point(centre, around + float(self._radii.max()))).astype(
             np.intp
         )
-        apart = np.linalg.norm(self._centres[found] - centre, axis=1)
-        found = found[(apart <= around + self._radii[found]) & (self._normals[found] @ normal >= _SAME_WAY)]
-        if len(found) < _ENOUGH:
+        apart = np.linalg.norm(self._centres[candidates] - centre, axis=1)
+        candidates = candidates[
+            (apart <= around + self._radii[candidates]) & (self._normals[candidates] @ normal >= _SAME_WAY)
+        ]
+        if len(candidates) < _ENOUGH:
             return np.empty(0, dtype=np.intp)
-        near: Indices = found[self._distances(outline, found) <= reach]
-        return near if len(near) >= _ENOUGH else near[:0]
+        indices: Indices = candidates[self._distances(outline, candidates) <= reach]
+        return indices if len(indices) >= _ENOUGH else indices[:0]
 
-    def _distances(self, outline: Array, found: Indices) -> Array:
+    def _distances(self, outline: Array, indices: Indices) -> Array:
         """Compute the distance of some faces from an outline: of the nearest corner from an edge, (k,) [m]."""
-        counts = self._counts[found]
+        counts = self._counts[indices]
         first = np.cumsum(counts) - counts
-        rows = np.repeat(self._starts[found] - first, counts) + np.arange(counts.sum())
+        rows = np.repeat(self._starts[indices] - first, counts) + np.arange(counts.sum())
         one = _to_segments(outline, self._corners[rows], self._next[rows]).min(axis=0)
         other = _to_segments(self._corners[rows], outline, np.roll(outline, -1, axis=0)).min(axis=1)
         out: Array = np.minimum.reduceat(np.minimum(one, other), first)
@@ -93,17 +95,17 @@ class Neighbours:
         heights = np.abs(arms @ normal)
         along = np.sqrt(np.maximum((arms**2).sum(axis=1) - heights**2, 0.0))
         same = (self._normals @ normal >= _SAME_WAY) & (heights <= np.maximum(size, _LEANING * along))
-        found: Indices = np.flatnonzero(same)
-        return found if len(found) >= _ENOUGH else found[:0]
+        indices: Indices = np.flatnonzero(same)
+        return indices if len(indices) >= _ENOUGH else indices[:0]
 
     def outward(self, centre: Array, normal: Array, size: float) -> Array:
         """Turn the normal of a wall through a place to the side that most of its faces look to."""
         ahead, behind = self.on_wall(centre, normal, size), self.on_wall(centre, -normal, size)
         return -normal if len(behind) > len(ahead) else normal
 
-    def fits(self, found: Indices) -> list[FaceFit]:
+    def fits(self, indices: Indices) -> list[FaceFit]:
         """Return the planes of some faces."""
-        return [self._fits[i] for i in found]
+        return [self._fits[i] for i in indices]
 
 
 def _to_segments(points: Array, starts: Array, ends: Array) -> Array:

@@ -69,13 +69,13 @@ Measured = tuple[Array, Array, Array | None]
 
 def _fits(places: Sequence[Measured], rough: float) -> list[FaceFit]:
     """Return the planes of faces with some roughness, of those that have one."""
-    found = []
+    fits = []
     for points, sigma, observer in places:
         try:
-            found.append(fit_plane(points, np.hypot(sigma, rough), observer))
+            fits.append(fit_plane(points, np.hypot(sigma, rough), observer))
         except GeometryError:
             continue  # it is refused, and told, when its stone is made
-    return found
+    return fits
 
 
 def _ratio(fits: Sequence[FaceFit]) -> float:
@@ -94,16 +94,16 @@ def _without_curvature(places: Sequence[Measured], rough: float) -> float:
             fit = fit_plane(points, np.hypot(sigma, rough), observer)
         except GeometryError:
             continue
-        kept = np.setdiff1d(np.arange(len(points)), fit.rejected)
-        if len(kept) < _CURVED:
+        inliers = np.setdiff1d(np.arange(len(points)), fit.rejected)
+        if len(inliers) < _CURVED:
             continue
-        u, v = ((points[kept] - fit.centroid) @ fit.axes.T).T
-        design = np.column_stack([np.ones(len(kept)), u, v, u * u, u * v, v * v])
-        root = 1.0 / np.hypot(sigma[kept], rough)
-        solved = np.linalg.lstsq(root[:, None] * design, root * fit.residuals[kept], rcond=None)[0]
-        squares.append((fit.residuals[kept] - design @ solved) ** 2)
-        variances.append(sigma[kept] ** 2)
-        freedom += len(kept) - 6
+        u, v = ((points[inliers] - fit.centroid) @ fit.axes.T).T
+        design = np.column_stack([np.ones(len(inliers)), u, v, u * u, u * v, v * v])
+        root = 1.0 / np.hypot(sigma[inliers], rough)
+        solved = np.linalg.lstsq(root[:, None] * design, root * fit.residuals[inliers], rcond=None)[0]
+        squares.append((fit.residuals[inliers] - design @ solved) ** 2)
+        variances.append(sigma[inliers] ** 2)
+        freedom += len(inliers) - 6
     if freedom < _FEWEST:
         return math.inf
     square, variance = np.concatenate(squares), np.concatenate(variances)

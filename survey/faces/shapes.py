@@ -93,9 +93,9 @@ def explain_heights(fit: FaceFit, points: ArrayLike, sigma: ArrayLike | None) ->
     if not fit.sigma0 > _EXACT * fit.singular_values[0]:
         return FaceShape(ShapeKind.PLANE, f"plane: {len(fit.residuals) - len(fit.rejected)} points, exactly")
     scene = _heights(fit, points, sigma)
-    verdicts = [one for one in (_curved(scene), _bevelled(scene)) if one is not None]
+    verdicts = [verdict for verdict in (_curved(scene), _bevelled(scene)) if verdict is not None]
     if verdicts:
-        return min(verdicts, key=lambda one: one[0])[1]
+        return min(verdicts, key=lambda verdict: verdict[0])[1]
     return _eroded(scene) or _plane_or_rough(fit, scene)
 
 
@@ -133,26 +133,26 @@ def _curved(face: _Heights) -> tuple[float, FaceShape] | None:
     u, v = face.u / size, face.v / size
     design = np.column_stack([np.ones(count), u, v, u * u, u * v, v * v])
     chosen, score = _best_start(design, face)
-    held = int(chosen.sum())
+    used = int(chosen.sum())
     enough = _CURVED if face.off.sum() < 2 else _CURVED_BEYOND_TWO
-    if held < max(7, count - max(1, count // 10)):
+    if used < max(7, count - max(1, count // 10)):
         return None
     flat, _, flat_without = _squares(design[:, :3].copy(), face, chosen)
-    bent, found, bent_without = _squares(design, face, chosen)
-    if found is None:
+    bent, solution, bent_without = _squares(design, face, chosen)
+    if solution is None:
         return None
-    excess = bent / (held - 6)
-    rough = not face.known or excess > likely_ratio(held - 6, 3.0902)
+    excess = bent / (used - 6)
+    rough = not face.known or excess > likely_ratio(used - 6, 3.0902)
     scale = max(excess, 1e-300) if rough else 1.0
-    critical = 3.0 * fdtri(3, held - 6, 0.999) if rough else _CURVED
+    critical = 3.0 * fdtri(3, used - 6, 0.999) if rough else _CURVED
     if not (flatness - score) / scale > enough:
         return None
     least = (flat_without - bent_without)[chosen].min()  # one outlier at a corner bends a quadric by itself
     if (flat - bent) / scale <= critical or least / scale <= _CURVED_WITHOUT:
         return None
-    coefficients, covariance = found
+    coefficients, covariance = solution
     unit = size ** np.array([0, 1, 1, 2, 2, 2])
-    return score, _curvature(coefficients / unit, covariance * scale / np.outer(unit, unit), held, count)
+    return score, _curvature(coefficients / unit, covariance * scale / np.outer(unit, unit), used, count)
 
 
 def _best_start(design: Array, face: _Heights) -> tuple[Bools, float]:
@@ -208,22 +208,22 @@ def _bevelled(face: _Heights) -> tuple[float, FaceShape] | None:
     flat = truncated_sum(face.root, face.z)
     if face.off.sum() < 2 or flat <= _STRIP:
         return None
-    score, within, far, way, plane = fit_two_planes(face.u, face.v, face.z, face.root)
+    score, within, second_side, direction, plane = fit_two_planes(face.u, face.v, face.z, face.root)
     redundancy = max(len(face.z) - 6, 1)
     scale = max(within / redundancy, 1.0 if face.known else 0.0)
     enough = _STRIP if math.isnan(plane[2]) else _SECOND_PLANE
     if not flat - score > enough * max(scale, 1e-300):
         return None
     score += _SEARCH
-    beyond = tuple(np.flatnonzero(far).tolist())
-    count, height = len(face.z), float(face.z[far].mean())
+    beyond = tuple(np.flatnonzero(second_side).tolist())
+    count, height = len(face.z), float(face.z[second_side].mean())
     if math.isnan(plane[2]):
         return score, _strip(beyond, face)
     angle = math.atan(math.hypot(plane[1], plane[2]))
     if angle > _STEEPEST:
         return None
-    across = way[0] * face.u[far] + way[1] * face.v[far]
-    deviation = 1.0 / math.sqrt(float(((face.root[far] * (across - across.mean())) ** 2).sum()))
+    across = direction[0] * face.u[second_side] + direction[1] * face.v[second_side]
+    deviation = 1.0 / math.sqrt(float(((face.root[second_side] * (across - across.mean())) ** 2).sum()))
     text = (
         f"bevelled: {len(beyond)} of {count} points on a second plane turned {math.degrees(angle):.1f}° "
         f"± {math.degrees(deviation):.1f}°, {_side(height)}"

@@ -73,14 +73,14 @@ class PolyhedraBuilder:
 
     def add(self, vertices: Array, faces: tuple[tuple[int, ...], ...]) -> None:
         """Add a solid: vertices (nv, 3), and faces counter-clockwise seen from outside."""
-        if (known := self._known.get(faces)) is None:
+        if (topology := self._known.get(faces)) is None:
             corners = np.fromiter(chain.from_iterable(faces), dtype=np.int64)
-            known = corners, np.array([len(face) for face in faces], dtype=np.int64).tobytes()
-            self._known[faces] = known
+            topology = corners, np.array([len(face) for face in faces], dtype=np.int64).tobytes()
+            self._known[faces] = topology
         start = len(self._vertices) // 24
         self._vertices += np.ascontiguousarray(vertices, dtype=np.float64).tobytes()
-        self._corners += (known[0] + start).tobytes()
-        self._face_counts += known[1]
+        self._corners += (topology[0] + start).tobytes()
+        self._face_counts += topology[1]
         self._solid_counts.append(len(faces))
 
     def build(self) -> SolidArrays:
@@ -151,10 +151,10 @@ def find_touching(
     solid = (local, solids.corners, solids.face_starts, solids.solid_starts)
     limits = (width, overlap, float(np.cos(np.radians(angle))), share, False)
     pairs, rows = [np.zeros((0, 2), np.int64)], [np.zeros((0, 8))]
-    for near in near_pairs(boxes_of(planes[2], solids.solid_starts, width), wanted):
-        room = GROUPS * len(near)
+    for pair in near_pairs(boxes_of(planes[2], solids.solid_starts, width), wanted):
+        room = GROUPS * len(pair)
         found, values = np.empty((room, 2), np.int64), np.empty((room, 8))
-        count = touching_faces(near, solid, planes, limits, found, values)
+        count = touching_faces(pair, solid, planes, limits, found, values)
         pairs.append(found[:count].copy())
         rows.append(values[:count].copy())
     all_pairs, all_rows = np.concatenate(pairs), np.concatenate(rows)
@@ -227,7 +227,7 @@ def near_pairs(boxes: Array, wanted: Bools) -> Iterator[Ints]:
     while start < len(order):
         stop = int(np.searchsorted(before, before[start] + _PAIRS, side="right")) - 1
         stop = min(max(stop, start + 1), len(order))
-        found = np.empty((int(before[stop] - before[start]), 2), np.int64)
-        list_near(tree, size, order, wanted, start, stop, found)
-        yield found
+        pairs = np.empty((int(before[stop] - before[start]), 2), np.int64)
+        list_near(tree, size, order, wanted, start, stop, pairs)
+        yield pairs
         start = stop

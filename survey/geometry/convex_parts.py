@@ -87,12 +87,14 @@ class _Cutter:
         ranked = sorted(self._ranked(whole), key=lambda one: one[0])
         beginnings = [cut for rank, cut in ranked if rank[0] == ranked[0][0][0]][:_BEGINNINGS]
         starts: list[Plane | None] = [*beginnings] or [None]
-        found = [parts for parts in (self._follow(whole, first) for first in starts) if parts is not None]
-        filling = [parts for parts in found if self._is_filled(parts)]
+        candidates = [
+            parts for parts in (self._follow(whole, first) for first in starts) if parts is not None
+        ]
+        filling = [parts for parts in candidates if self._is_filled(parts)]
         if not filling:
             pyramids = self._pyramids()
             filling = [pyramids] if pyramids is not None and self._is_filled(pyramids) else []
-        if not filling and found:
+        if not filling and candidates:
             raise GeometryError(
                 "its convex parts do not fill it: its faces are not quite planar, or cross each other",
                 where=f"stone {self._solid.code}",
@@ -198,26 +200,26 @@ class _Cutter:
         """Yield planes through two reflex edges, continuations of faces, and bisectors."""
         edges = region.edges
         for k, edge in enumerate(edges):
-            for other in edges[k + 1 :]:
-                plane = self._through(edge, other)
-                if plane is not None and self._divides(plane, edge) and self._divides(plane, other):
+            for second in edges[k + 1 :]:
+                plane = self._through(edge, second)
+                if plane is not None and self._divides(plane, edge) and self._divides(plane, second):
                     yield plane
         if edges:
-            yield from dict.fromkeys(self._planes[k] for one in edges for k in (one.first, one.second))
+            yield from dict.fromkeys(self._planes[k] for edge in edges for k in (edge.first, edge.second))
             for edge in edges:
                 normal = np.array(self._planes[edge.first][:3]) - self._planes[edge.second][:3]
                 yield _plane_through(normal, edge.start)
         else:  # pieces that are not connected
             yield from (self._planes[k] for k in dict(region.pieces))
 
-    def _through(self, one: ReflexEdge, other: ReflexEdge) -> Plane | None:
+    def _through(self, first: ReflexEdge, second: ReflexEdge) -> Plane | None:
         """Return the plane of two edges if they are coplanar."""
-        places = np.array([one.start, one.stop, other.start, other.stop])
+        places = np.array([first.start, first.stop, second.start, second.stop])
         centred = places - places.mean(axis=0)
         _, extents, axes = np.linalg.svd(centred)
         if extents[2] > self._on or extents[1] < self._flat:
             return None
-        return _plane_through(axes[2], one.start)
+        return _plane_through(axes[2], first.start)
 
     def _divides(self, plane: Plane, edge: ReflexEdge) -> bool:
         """Return whether a plane through an edge leaves at most 180° on either side."""
@@ -265,10 +267,10 @@ class _Cutter:
 def _farthest_behind(planes: Array) -> Array | None:
     """Return the place (3,) whose least distance behind planes (n, 4) is the largest; None if there is none."""
     rows = np.column_stack([planes[:, :3], np.ones(len(planes))])
-    found = linprog(
+    optimum = linprog(
         [0.0, 0.0, 0.0, -1.0], A_ub=rows, b_ub=planes[:, 3], bounds=[(None, None)] * 3 + [(0.0, None)]
     )
-    return None if found.x is None else np.asarray(found.x[:3], dtype=np.float64)
+    return None if optimum.x is None else np.asarray(optimum.x[:3], dtype=np.float64)
 
 
 def _place(row: Sequence[float]) -> Place:

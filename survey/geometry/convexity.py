@@ -64,16 +64,16 @@ def reflex_edges(solid: Solid) -> tuple[ReflexEdge, ...]:
     owner = {
         edge: k for k, face in enumerate(solid.faces) for edge in zip(face, (*face[1:], face[0]), strict=True)
     }
-    found = []
+    edges = []
     for (i, j), k in owner.items():
-        other = owner[j, i]
+        neighbour = owner[j, i]
         if i > j:
             continue
-        heights = solid.vertices[list(solid.faces[other])] @ planes[k, :3] - planes[k, 3]
+        heights = solid.vertices[list(solid.faces[neighbour])] @ planes[k, :3] - planes[k, 3]
         # at the edge the neighbour rises above this face's plane
         edge = solid.vertices[j] - solid.vertices[i]
-        rises = float(np.cross(planes[k, :3], planes[other, :3]) @ edge) < 0.0
+        rises = float(np.cross(planes[k, :3], planes[neighbour, :3]) @ edge) < 0.0
         if rises and heights.max() > tolerance:
             start, stop = solid.vertices[i].tolist(), solid.vertices[j].tolist()
-            found.append(ReflexEdge((i, j), tuple(start), tuple(stop), k, other))
-    return tuple(found)
+            edges.append(ReflexEdge((i, j), tuple(start), tuple(stop), k, neighbour))
+    return tuple(edges)

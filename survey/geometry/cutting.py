@@ -53,7 +53,7 @@ def cut_stones(
     others were added; None where the planes leave nothing or do not close
     """
     out: dict[int, CutStone | None] = {}
-    cut = {i: own for i, own in planes.items() if i not in notched}
+    cut = {i: stone_planes for i, stone_planes in planes.items() if i not in notched}
     for i in (i for i in planes if i not in cut):
         out[i] = _with_faces_moved(solids[i], planes[i][: len(solids[i].faces)])
     for faces, members in _alike(solids, cut).items():
@@ -104,16 +104,16 @@ def common_part(first: Array, second: Array, centre: Array, reach: float) -> Sol
     first, second : planes
     centre, reach : of a box that holds both [m]
     """
-    found = _intersect(np.vstack([first, second]), centre, reach, "")
-    return None if found is None else found.solid
+    common = _intersect(np.vstack([first, second]), centre, reach, "")
+    return None if common is None else common.solid
 
 
 def _alike(solids: Sequence[Solid], planes: Mapping[int, Array]) -> dict[Faces, list[int]]:
     """Group stones that may keep their faces by these: one plane for each face, three faces at each corner."""
     groups: dict[Faces, list[int]] = {}
-    for i, own in planes.items():
+    for i, stone_planes in planes.items():
         faces = solids[i].faces
-        if len(own) == len(faces):
+        if len(stone_planes) == len(faces):
             groups.setdefault(faces, []).append(i)
     return {faces: members for faces, members in groups.items() if _meeting(faces) is not None}
 
@@ -135,9 +135,9 @@ def _moved(faces: Faces, planes: Array) -> tuple[Array, Bools]:
     meeting = _meeting(faces)
     assert meeting is not None
     height = np.einsum("nfk,nvk->nvf", planes[:, :, :3], corners) - planes[:, None, :, 3]
-    own = np.zeros((len(meeting), len(faces)), np.bool_)
-    own[np.arange(len(meeting))[:, None], meeting] = True
-    below = np.where(own, -np.inf, height).max(axis=(1, 2)) < -_CLEAR
+    incidence = np.zeros((len(meeting), len(faces)), np.bool_)
+    incidence[np.arange(len(meeting))[:, None], meeting] = True
+    below = np.where(incidence, -np.inf, height).max(axis=(1, 2)) < -_CLEAR
     return corners, below & wide.all(axis=1)
 
 

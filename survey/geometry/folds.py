@@ -50,9 +50,9 @@ def fold(vertices: Array, polygon: Polygon, tolerance: float) -> list[Polygon]:
     for halves in _halves(vertices, polygon):
         left = max(warp(vertices[list(half)]) for half in halves)
         across = float(np.linalg.norm(vertices[halves[0][0]] - vertices[halves[0][-1]]))
-        own = (_ALIKE * size * round(left / (_ALIKE * size)) if np.isfinite(left) else left, across)
-        if own < score:
-            best, score = halves, own
+        candidate = (_ALIKE * size * round(left / (_ALIKE * size)) if np.isfinite(left) else left, across)
+        if candidate < score:
+            best, score = halves, candidate
     if best is None:  # no diagonal lies within it: it crosses itself, or is seen from the side everywhere
         return [(polygon[0], polygon[k], polygon[k + 1]) for k in range(1, len(polygon) - 1)]
     return [one for half in best for one in fold(vertices, half, tolerance)]

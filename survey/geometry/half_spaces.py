@@ -65,15 +65,15 @@ def _cut(corners: list[Place], faces: list[Polygon], plane: Plane, tolerance: fl
         return []
     cut: dict[tuple[int, int], int] = {}
     after: dict[int, int] = {}
-    kept = []
+    pieces = []
     for face in faces:
         polygon = _behind(corners, face, heights, side, cut)
         if len(polygon) > 2 and any(side.get(i, 0) < 0 for i in polygon):
-            kept.append(tuple(polygon))
+            pieces.append(tuple(polygon))
             edges = zip(polygon, (*polygon[1:], polygon[0]), strict=True)
             after.update({j: i for i, j in edges if side.get(i, 0) == 0 and side.get(j, 0) == 0})
     lid = _loop(after)
-    return [*kept, lid] if len(lid) > 2 else kept
+    return [*pieces, lid] if len(lid) > 2 else pieces
 
 
 def _behind(

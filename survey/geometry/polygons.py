@@ -50,27 +50,27 @@ def seamless(rings: Sequence[Array], pairs: Iterable[tuple[int, int]]) -> list[S
     widths = np.array([width for *_, width, _ in gaps])
     usual = float(np.median(widths))
     limit = min(_NONE * usual, usual - _CLEAR * deviation(widths, usual))
-    found = [
+    seams = [
         Seamless(i, j, max(width, 0.0), usual)
         for i, j, width, ends in gaps
         if abs(width) < limit or ends < _SNAPPED * usual
     ]
     # where many touch it is how the wall is built or drawn
-    return found if len(found) <= max(1.0, _RARE * len(gaps)) else []
+    return seams if len(seams) <= max(1.0, _RARE * len(gaps)) else []
 
 
-def _gap(one: Array, other: Array) -> tuple[float, float] | None:
+def _gap(first: Array, second: Array) -> tuple[float, float] | None:
     """Return the width of the longest joint between two polygons, and the distance of the ends of its sides [m].
 
     None stands for two that have no joint.
     """
-    runs = [np.roll(ring, -1, axis=0) - ring for ring in (one, other)]
+    runs = [np.roll(ring, -1, axis=0) - ring for ring in (first, second)]
     lengths = [np.maximum(np.linalg.norm(run, axis=1), 1e-300) for run in runs]
     ways = runs[0] / lengths[0][:, None]
     facing = -(ways @ (runs[1] / lengths[1][:, None]).T) >= _PARALLEL
     best: tuple[float, float, float] | None = None
     for a, b in zip(*np.nonzero(facing), strict=True):
-        ends = np.array([other[b], other[b] + runs[1][b]]) - one[a]
+        ends = np.array([second[b], second[b] + runs[1][b]]) - first[a]
         along, across = ends @ ways[a], ends @ np.array([ways[a][1], -ways[a][0]])
         common = min(float(along.max()), float(lengths[0][a])) - max(float(along.min()), 0.0)
         width = float(across.mean())

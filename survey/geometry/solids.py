@@ -53,9 +53,11 @@ def area_vectors(vertices: Array, faces: tuple[tuple[int, ...], ...]) -> Array:
     """
     vectors = np.empty((*vertices.shape[:-2], len(faces), 3))
     for rows, corners in _faces_by_size(faces):
-        own = np.take(vertices, corners, axis=-2)
-        x, y, z = np.moveaxis(own - own[..., :1, :], -1, 0)
-        u, v, w = (np.concatenate([one[..., 1:], one[..., :1]], axis=-1) for one in (x, y, z))
+        points = np.take(vertices, corners, axis=-2)
+        x, y, z = np.moveaxis(points - points[..., :1, :], -1, 0)
+        u, v, w = (
+            np.concatenate([coordinate[..., 1:], coordinate[..., :1]], axis=-1) for coordinate in (x, y, z)
+        )
         across = np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-1)
         vectors[..., rows, :] = 0.5 * across.sum(axis=-2)
     return vectors

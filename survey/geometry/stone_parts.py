@@ -79,7 +79,7 @@ def _families(solid: Solid) -> list[Array] | None:
             groups.append(group := [])
         elif group[0][:3] @ plane[:3] < 0.0:
             plane = -plane
-        if not any(np.abs(polygon @ one[:3] - one[3]).max() < _SAME for one in group):
+        if not any(np.abs(polygon @ plane[:3] - plane[3]).max() < _SAME for plane in group):
             group.append(plane)
     if len(groups) != 3:
         return None

@@ -87,8 +87,8 @@ def _closes(faces: tuple[tuple[int, ...], ...]) -> bool:
     The stones of a building share a few lists of faces. Where more faces share a side, it takes trimesh to tell.
     """
     sides = [(a, b) for face in faces for a, b in zip(face, (*face[1:], face[0]), strict=True)]
-    found = set(sides)
-    return len(found) == len(sides) and all((b, a) in found for a, b in sides)
+    distinct = set(sides)
+    return len(distinct) == len(sides) and all((b, a) in distinct for a, b in sides)
 
 
 def triangulate(solid: Solid) -> NDArray[np.intp]:

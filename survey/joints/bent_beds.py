@@ -175,7 +175,7 @@ def _squares(x: Array, y: Array) -> Array:
     """Return the sum of squares (n + 1, n + 1) off the line of links i to j - 1; infinite for too few links."""
     x, y = x - x.mean(), y - y.mean()
     sums = [np.concatenate([[0.0], np.cumsum(term)]) for term in (np.ones_like(x), x, y, x * x, x * y, y * y)]
-    n, sx, sy, sxx, sxy, syy = (one[None, :] - one[:, None] for one in sums)
+    n, sx, sy, sxx, sxy, syy = (total[None, :] - total[:, None] for total in sums)
     safe = np.maximum(n, 1.0)
     xx, xy, yy = sxx - sx * sx / safe, sxy - sx * sy / safe, syy - sy * sy / safe
     off = yy - np.where(xx > 1e-12, xy * xy / np.maximum(xx, 1e-12), 0.0)

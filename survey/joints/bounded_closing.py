@@ -86,13 +86,13 @@ def as_building(stones: Sequence[BlockyStone]) -> LocalStones:
     ------
     GeometryError : if two stones have one code
     """
-    known: set[str] = set()
+    codes: set[str] = set()
     for stone in stones:
-        if stone.code in known:
+        if stone.code in codes:
             raise GeometryError(
                 "two stones have this code", where=f"stone {stone.code}", remedy="rename one of them"
             )
-        known.add(stone.code)
+        codes.add(stone.code)
     origin = stones[0].solid.vertices.mean(axis=0)
     solids = tuple(replace(stone.solid, vertices=stone.solid.vertices - origin) for stone in stones)
     gathered = SolidArrays.gather((solid.vertices, solid.faces) for solid in solids)
@@ -151,8 +151,8 @@ def close_within_bounds(
 
 def _sound(stone: BlockyStone) -> Bools:
     """Return the corners known from measurement; a hidden one counts if the one in front of it does."""
-    count, known = len(stone.solid.vertices), np.array(stone.sound, np.bool_)
-    return np.tile(known, -(-count // len(known)))[:count]
+    count, sound = len(stone.solid.vertices), np.array(stone.sound, np.bool_)
+    return np.tile(sound, -(-count // len(sound)))[:count]
 
 
 def _slack(stone: BlockyStone) -> Array:
@@ -180,7 +180,7 @@ def _stone_planes(
     building: LocalStones,
     facing: FacingFaces,
     contact: ContactPlanes,
-    known: Sequence[Solid],
+    solids: Sequence[Solid],
     settings: JointSettings,
 ) -> tuple[dict[int, Array], dict[int, Bools]]:
     """Return the planes of each convex stone: of its faces in order, from joints or its own, then further joints'."""
@@ -188,7 +188,7 @@ def _stone_planes(
     taken[facing.faces[contact.of_link >= 0]] = True
     neighbours = building.faces.planes.owner[facing.faces[contact.of_link >= 0]]
     rows = mended_planes(
-        building.faces, building.planes, ~taken, neighbours, known, settings.max_displacement
+        building.faces, building.planes, ~taken, neighbours, solids, settings.max_displacement
     )
     taken[:] = False
     further: dict[int, list[Array]] = {}
@@ -241,7 +241,7 @@ def _leave_open(
 ) -> None:
     """Leave open the joint of a stone whose plane is farthest from the face it replaces, or all its joints."""
     mine = building.faces.planes.owner[facing.faces] == stone
-    own = np.flatnonzero(mine.any(axis=1) & (contact.of_link >= 0))
+    rows = np.flatnonzero(mine.any(axis=1) & (contact.of_link >= 0))
     if np.isinf(moved):
         why = f"closing its joints would leave nothing of {building.stones[stone].code}"
     else:
@@ -249,12 +249,12 @@ def _leave_open(
             f"it would move a corner of {building.stones[stone].code} by {moved * 1e3:.0f} mm, more than "
             f"{settings.max_displacement * 1e3:.0f} mm"
         )
-    distance = np.zeros(len(own))
-    for n, k in enumerate(own.tolist()):
+    distance = np.zeros(len(rows))
+    for n, k in enumerate(rows.tolist()):
         face = int(facing.faces[k][mine[k]][0])
         corners = building.faces.solids.vertices[building.faces.corners(face)]
         plane = int(contact.of_link[k])
         distance[n] = np.abs(corners @ contact.normals[plane] - contact.offsets[plane]).max()
     least = 0.0 if all_of_it else float(distance.max()) - 1e-12
-    for k in own[distance >= least].tolist():
+    for k in rows[distance >= least].tolist():
         reasons[k] = why

@@ -100,43 +100,43 @@ def contact_planes(faces: StoneFaces, facing: FacingFaces, settings: JointSettin
     facing : pairs of facing faces
     settings : tolerance of a corner from its side of a straight joint
     """
-    found = _Found(faces, facing, [], [], np.full(len(facing), -1))
-    kept = faces.kept[facing.faces]
-    movable, core = ~kept.any(axis=1), faces.core[facing.faces]
+    builder = _Found(faces, facing, [], [], np.full(len(facing), -1))
+    stays = faces.kept[facing.faces]
+    movable, core = ~stays.any(axis=1), faces.core[facing.faces]
     _add_joints(
-        found,
+        builder,
         np.flatnonzero(movable & ~core.any(axis=1)),
         settings,
         np.flatnonzero(movable & core.any(axis=1)),
     )
     for link in np.flatnonzero(~movable).tolist():
-        found.add_kept(link, kept[link])
+        builder.add_kept(link, stays[link])
     beside = np.flatnonzero(movable & (core[:, 0] != core[:, 1]))
-    _add_hidden_sides(found, beside, settings)
+    _add_hidden_sides(builder, beside, settings)
     for link in beside.tolist():
-        found.add_beside_core(link, int(facing.faces[link, int(core[link, 0])]))
+        builder.add_beside_core(link, int(facing.faces[link, int(core[link, 0])]))
     alone = np.flatnonzero(movable & core.all(axis=1)).tolist()
     count = -1
     while len(alone) != count:
         # a plane goes on from block to block, to those that touch no stone
         count = len(alone)
-        alone = [link for link in alone if not found.add_in_core(link)]
-    _add_joints(found, np.array(alone, np.int64), settings)
-    return found.planes()
+        alone = [link for link in alone if not builder.add_in_core(link)]
+    _add_joints(builder, np.array(alone, np.int64), settings)
+    return builder.planes()
 
 
-def _add_hidden_sides(found: "_Found", links: Ints, settings: JointSettings) -> None:
+def _add_hidden_sides(builder: "_Found", links: Ints, settings: JointSettings) -> None:
     """Add one plane for all hidden sides that continue each other, among those that touch nothing but the core."""
-    faces, facing = found.faces, found.facing
+    faces, facing = builder.faces, builder.facing
     side = facing.faces[links, faces.core[facing.faces[links]].argmin(axis=1)]
     taken = np.zeros(len(faces.slack), np.bool_)
-    taken[facing.faces[found.of_link >= 0]] = True
+    taken[facing.faces[builder.of_link >= 0]] = True
     hidden = np.unique(side[(faces.slack[side] > 0.0) & ~taken[side]])
     if not len(hidden):
         return
     place = np.full(len(faces.slack), -1)
     place[hidden] = np.arange(len(hidden))
-    between = facing.faces[found.of_link >= 0]
+    between = facing.faces[builder.of_link >= 0]
     between = between[~faces.core[between].any(axis=1)]
     pairs = place[_continuing(faces, between, place >= 0, settings)]
     planes = np.column_stack([faces.planes.normals[hidden], faces.planes.offsets[hidden]])
@@ -144,16 +144,16 @@ def _add_hidden_sides(found: "_Found", links: Ints, settings: JointSettings) -> 
     starts = np.cumsum([0, *map(len, corners)])
     slack = np.minimum(faces.slack[hidden], settings.straightness)
     common, number = common_planes(HiddenSides(np.concatenate(corners), starts, planes, slack), pairs)
-    own = np.flatnonzero(place[side] >= 0)
-    found.add_many(common, links[own], number[place[side[own]]])
+    rows = np.flatnonzero(place[side] >= 0)
+    builder.add_many(common, links[rows], number[place[side[rows]]])
 
 
-def _add_joints(found: "_Found", links: Ints, settings: JointSettings, core: Ints | None = None) -> None:
+def _add_joints(builder: "_Found", links: Ints, settings: JointSettings, core: Ints | None = None) -> None:
     """Add the planes of the joints of these links; beds that links of the `core` tie are one if that is straight."""
-    faces, facing = found.faces, some_links(found.facing, links)
+    faces, facing = builder.faces, some_links(builder.facing, links)
     label = _joints(faces, facing, settings)
     if core is not None and len(core) and len(links):
-        label = _through_core(faces, facing, label, found.facing.faces[core], settings)
+        label = _through_core(faces, facing, label, builder.facing.faces[core], settings)
     count = int(label.max()) + 1 if len(label) else 0
     groups = _gathered(faces, facing, label, count)
     planes, values = _fitted(faces, groups, -1.0, settings)
@@ -162,19 +162,19 @@ def _add_joints(found: "_Found", links: Ints, settings: JointSettings, core: Int
     planes[few], values[few] = _fitted(faces, _some_groups(groups, few), usual, settings)
     few_are_odd = (values[:, 3] <= _FEW) & (values[:, 4] <= _FINE * settings.straightness)
     straight = (values[:, 2] <= settings.straightness) | few_are_odd
-    found.add_many(
+    builder.add_many(
         planes[straight], links[straight[label]], (np.cumsum(straight)[label] - 1)[straight[label]]
     )
     order = np.argsort(label, kind="stable")
     first = np.searchsorted(label[order], np.arange(count + 1))
     for joint in np.flatnonzero(~straight).tolist():
-        own = links[order[first[joint] : first[joint + 1]]]
-        if found.add_bent(own, settings, float(values[joint, 3])):
+        joint_links = links[order[first[joint] : first[joint + 1]]]
+        if builder.add_bent(joint_links, settings, float(values[joint, 3])):
             continue
         if values[joint, 3] <= _FEW:
-            found.add_many(planes[[joint]], own, np.zeros(len(own), np.int64))
+            builder.add_many(planes[[joint]], joint_links, np.zeros(len(joint_links), np.int64))
         else:
-            found.add_each(own, usual, settings)
+            builder.add_each(joint_links, usual, settings)
 
 
 @dataclass
@@ -195,12 +195,12 @@ class _Found:
 
     def add_bent(self, links: Ints, settings: JointSettings, off: float) -> bool:
         """Add several planes for a bent joint; return False if no chain of planes fits it."""
-        found = fit_bent_bed(
+        bed = fit_bent_bed(
             self.faces.solids, self.faces.planes, self.faces.sound, self.facing, links, settings, off
         )
-        if found is None:
+        if bed is None:
             return False
-        self.add_many(found[0], links, found[1])
+        self.add_many(bed[0], links, bed[1])
         return True
 
     def add_each(self, links: Ints, usual: float, settings: JointSettings) -> None:
@@ -209,17 +209,17 @@ class _Found:
         planes, _ = _fitted(self.faces, _gathered(self.faces, part, number, len(links)), usual, settings)
         self.add_many(planes, links, number)
 
-    def add_kept(self, link: int, kept: Bools) -> None:
+    def add_kept(self, link: int, keeps: Bools) -> None:
         """Add a pair with a face that must stay: its plane, if the other face lies in it or has no other joint."""
         first, second = self.facing.faces[link].tolist()
-        stays, other = (first, second) if kept[0] else (second, first)
+        stays, moves = (first, second) if keeps[0] else (second, first)
         plane = np.array([*self.faces.planes.normals[stays], self.faces.planes.offsets[stays]])
-        if kept.all():
-            theirs = -np.array([*self.faces.planes.normals[other], self.faces.planes.offsets[other]])
+        if keeps.all():
+            theirs = -np.array([*self.faces.planes.normals[moves], self.faces.planes.offsets[moves]])
             if self._same(plane, theirs, stays):
                 self.add_many(plane[None], np.array([link]), np.zeros(1, np.int64))
             return
-        beside = np.flatnonzero((self.facing.faces == other).any(axis=1) & (self.of_link >= 0))
+        beside = np.flatnonzero((self.facing.faces == moves).any(axis=1) & (self.of_link >= 0))
         planes = {int(self.of_link[k]) for k in beside}
         if not planes:
             self.add_many(plane[None], np.array([link]), np.zeros(1, np.int64))
@@ -241,12 +241,12 @@ class _Found:
 
     def add_in_core(self, link: int) -> bool:
         """Add a pair of faces of the core: the plane that one has beside a stone; return False if none has."""
-        one, other = self.facing.faces[link].tolist()
-        nearest = self._nearest(link, (one, other))
+        first, second = self.facing.faces[link].tolist()
+        nearest = self._nearest(link, (first, second))
         if nearest is None:
             return False
         self.of_link[link] = nearest
-        for face in (one, other):
+        for face in (first, second):
             self._of_face.setdefault(face, {nearest})
         return True
 
@@ -265,11 +265,11 @@ class _Found:
                 planes.setdefault(face, set()).add(int(self.of_link[link]))
         return planes
 
-    def _same(self, plane: Array, other: Array, face: int) -> bool:
+    def _same(self, plane: Array, second: Array, face: int) -> bool:
         """Return whether a face also lies in another plane, within rounding."""
         corners = self.faces.solids.vertices[self.faces.corners(face)]
-        alike = float(plane[:3] @ other[:3]) > 0.0
-        return alike and bool(np.abs(corners @ other[:3] - other[3]).max() <= _SAME)
+        alike = float(plane[:3] @ second[:3]) > 0.0
+        return alike and bool(np.abs(corners @ second[:3] - second[3]).max() <= _SAME)
 
     def planes(self) -> ContactPlanes:
         """Return all planes found, with the side of each on which the first face of each pair lies."""

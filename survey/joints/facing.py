@@ -88,11 +88,11 @@ def find_facing(solids: SolidArrays, planes: FacePlanes, settings: JointSettings
     kernel_planes = (planes.normals, planes.areas, planes.boxes, planes.convex)
     faces, rows = [np.zeros((0, 2), np.int64)], [np.zeros((0, 8))]
     everyone = np.ones(len(solids), np.bool_)
-    for near in near_pairs(boxes_of(planes.boxes, solids.solid_starts, settings.max_width), everyone):
-        room = 4 * len(near)
+    for pair in near_pairs(boxes_of(planes.boxes, solids.solid_starts, settings.max_width), everyone):
+        room = 4 * len(pair)
         while True:
             found, values = np.empty((room, 2), np.int64), np.empty((room, 8))
-            count = facing_faces(near, solid, kernel_planes, limits, found, values)
+            count = facing_faces(pair, solid, kernel_planes, limits, found, values)
             if count <= room:
                 break
             room = count

@@ -69,9 +69,9 @@ def _grown(sides: HiddenSides, graph: "coo_array[np.float64]", seed: int, free: 
     alone = sides.planes[seed], np.array([seed])
     plane, members = alone
     for _ in range(_ROUNDS):
-        near = free & (_off(sides, plane) <= sides.slack)
-        near[seed] = True
-        grown = _linked(graph, near, seed)
+        on_plane = free & (_off(sides, plane) <= sides.slack)
+        on_plane[seed] = True
+        grown = _linked(graph, on_plane, seed)
         if np.array_equal(grown, members):
             break
         members, plane = grown, _fitted(sides, grown)
@@ -86,13 +86,13 @@ def _off(sides: HiddenSides, plane: Array) -> Array:
     return np.where(sides.planes[:, :3] @ plane[:3] > 0.0, out, np.inf)
 
 
-def _linked(graph: "coo_array[np.float64]", near: Bools, seed: int) -> Ints:
+def _linked(graph: "coo_array[np.float64]", members: Bools, seed: int) -> Ints:
     """Return the sides that are linked with one of them by sides near its plane."""
     row, column = graph.coords
-    kept = near[row] & near[column]
-    some = coo_array((graph.data[kept], (row[kept], column[kept])), shape=graph.shape)
+    linked = members[row] & members[column]
+    some = coo_array((graph.data[linked], (row[linked], column[linked])), shape=graph.shape)
     _, label = connected_components(some, directed=False)
-    return np.flatnonzero(near & (label == label[seed]))
+    return np.flatnonzero(members & (label == label[seed]))
 
 
 def _fitted(sides: HiddenSides, members: Ints) -> Array:

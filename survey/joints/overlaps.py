@@ -57,15 +57,15 @@ def find_overlaps(solids: Sequence[Solid], planes: Mapping[int, Array]) -> list[
     plane_starts = np.cumsum([0, *map(len, rows)])
     all_vertices, all_planes = np.concatenate(vertices), np.concatenate(rows)
     out = []
-    for near in near_pairs(boxes_of(boxes, starts, 0.0), np.ones(len(chosen), np.bool_)):
-        depth = deepest_overlaps(near, all_vertices, vertex_starts, all_planes, plane_starts, _LEAST)
+    for pair in near_pairs(boxes_of(boxes, starts, 0.0), np.ones(len(chosen), np.bool_)):
+        depth = deepest_overlaps(pair, all_vertices, vertex_starts, all_planes, plane_starts, _LEAST)
         for k in np.flatnonzero(depth > _LEAST):
-            i, j = sorted((chosen[near[k, 0]], chosen[near[k, 1]]))
+            i, j = sorted((chosen[pair[k, 0]], chosen[pair[k, 1]]))
             if solids[i].code == solids[j].code:
                 continue
-            found = _overlapping(i, j, solids[i], solids[j], planes, float(depth[k]))
-            if found is not None:
-                out.append(found)
+            overlap = _overlapping(i, j, solids[i], solids[j], planes, float(depth[k]))
+            if overlap is not None:
+                out.append(overlap)
     return sorted(out, key=lambda one: one.pair)
 
 
@@ -90,15 +90,15 @@ class _Parting:
     free: dict[int, Bools]
     bound: float
 
-    def part(self, found: Overlapping) -> None:
+    def part(self, overlap: Overlapping) -> None:
         """Separate two stones by the cheapest method that moves no corner farther than the bound."""
-        i, j = found.pair
-        current = _overlapping(i, j, self.solids[i], self.solids[j], self.planes, found.depth)
+        i, j = overlap.pair
+        current = _overlapping(i, j, self.solids[i], self.solids[j], self.planes, overlap.depth)
         if current is None:
             return
         ways = [*self._retreats(i, j, current), *self._retreats(j, i, current)]
         for _, stone, plane, row in sorted(
-            (way for way in ways if way[0] <= _SHALLOW), key=lambda way: way[:3]
+            (retreat for retreat in ways if retreat[0] <= _SHALLOW), key=lambda way: way[:3]
         ):
             new = self.planes[stone].copy()
             new[plane] = row
@@ -106,38 +106,38 @@ class _Parting:
                 return
         self._divide(current)
 
-    def _retreats(self, one: int, other: int, found: Overlapping) -> list[tuple[float, int, int, Array]]:
+    def _retreats(self, first: int, other: int, overlap: Overlapping) -> list[tuple[float, int, int, Array]]:
         """Return moves of a stone's free faces that clear another: (distance, stone, plane, its new place).
 
         A face moves back as a whole, or turns about one of its edges, as an intrados does at the foot of an arch.
         """
         out = []
-        for p in np.flatnonzero(self.free[one]).tolist() if one in self.free else ():
-            row = self.planes[one][p]
+        for p in np.flatnonzero(self.free[first]).tolist() if first in self.free else ():
+            row = self.planes[first][p]
             low = float((self.solids[other].vertices @ row[:3]).min())
-            out.append((float(row[3]) - low, one, p, np.array([*row[:3], low])))
-            polygon = _face_on(self.solids[one], row)
-            out += [(far, one, p, turned) for far, turned in _turns(row, polygon, found.part.vertices)]
+            out.append((float(row[3]) - low, first, p, np.array([*row[:3], low])))
+            polygon = _face_on(self.solids[first], row)
+            out += [(far, first, p, turned) for far, turned in _turns(row, polygon, overlap.part.vertices)]
         return out
 
-    def _divide(self, found: Overlapping) -> None:
+    def _divide(self, overlap: Overlapping) -> None:
         """Cut one along a face of the other, or both through the middle of their overlap: the least volume lost."""
-        i, j = found.pair
-        ways = [*self._beside(i, j), *self._beside(j, i), *self._between(found)]
+        i, j = overlap.pair
+        ways = [*self._beside(i, j), *self._beside(j, i), *self._between(overlap)]
         for _, cuts in sorted(ways, key=lambda way: way[0]):
             if self._cut({k: np.vstack([self.planes[k], plane]) for k, plane in cuts.items()}):
                 return
 
-    def _beside(self, one: int, other: int) -> list[tuple[float, dict[int, Array]]]:
+    def _beside(self, first: int, other: int) -> list[tuple[float, dict[int, Array]]]:
         """Return cuts of one stone along each face of another: volume lost [m³], and plane."""
-        if one not in self.free:
+        if first not in self.free:
             return []
-        return [(self._lost(one, -plane), {one: -plane}) for plane in self.planes[other]]
+        return [(self._lost(first, -plane), {first: -plane}) for plane in self.planes[other]]
 
-    def _between(self, found: Overlapping) -> list[tuple[float, dict[int, Array]]]:
+    def _between(self, overlap: Overlapping) -> list[tuple[float, dict[int, Array]]]:
         """Return cuts of both along a plane half-way between a face of each."""
-        i, j = found.pair
-        middle, ways = found.part.vertices.mean(axis=0), []
+        i, j = overlap.pair
+        middle, ways = overlap.part.vertices.mean(axis=0), []
         if i not in self.free or j not in self.free:
             return []
         for a in self.planes[i]:
@@ -193,11 +193,11 @@ def part_stones(
     -------
     the stones, and the pairs that still overlap
     """
-    own = {i: rows.copy() for i, rows in planes.items()}
-    state = _Parting(originals, list(solids), own, dict(free), bound)
-    for found in find_overlaps(state.solids, own):
-        state.part(found)
-    return state.solids, find_overlaps(state.solids, own)
+    moved = {i: rows.copy() for i, rows in planes.items()}
+    state = _Parting(originals, list(solids), moved, dict(free), bound)
+    for overlap in find_overlaps(state.solids, moved):
+        state.part(overlap)
+    return state.solids, find_overlaps(state.solids, moved)
 
 
 def _face_on(solid: Solid, plane: Array) -> Array:

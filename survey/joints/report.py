@@ -164,11 +164,11 @@ def closing_report(
     )
 
 
-def _overlaps(building: LocalStones, found: list[Overlapping]) -> tuple[Overlap, ...]:
+def _overlaps(building: LocalStones, overlapping: list[Overlapping]) -> tuple[Overlap, ...]:
     """Return one entry for each pair of stones, summed over their parts."""
     together: dict[tuple[str, str], list[Overlapping]] = defaultdict(list)
-    for one in found:
-        together[one.codes].append(one)
+    for overlap in overlapping:
+        together[overlap.codes].append(overlap)
     out = []
     for codes, parts in together.items():
         volume = sum(one.volume for one in parts)
@@ -237,10 +237,10 @@ def _width(building: LocalStones, facing: FacingFaces, cut: Cut, link: int) -> f
         corners = faces.corners(face)
         sound = corners[faces.sound[corners]]
         seen = sound[sound < first + len(building.stones[stone].sound)]
-        known = seen if len(seen) else sound
-        if not len(known):
+        measured = seen if len(seen) else sound
+        if not len(measured):
             return float(facing.gap[link])
-        heights = faces.solids.vertices[known] @ cut.contact.normals[plane] - cut.contact.offsets[plane]
+        heights = faces.solids.vertices[measured] @ cut.contact.normals[plane] - cut.contact.offsets[plane]
         total -= out * float(heights.mean())
     return total
 
@@ -248,10 +248,10 @@ def _width(building: LocalStones, facing: FacingFaces, cut: Cut, link: int) -> f
 def _contacts(solids: SolidArrays, planes: FacePlanes, settings: JointSettings) -> _Contacts:
     """Return all current contacts of faces."""
     close = replace(settings, max_width=_MEETS, max_angle=0.01, min_overlap=0.0)
-    found = find_facing(solids, planes, close)
+    facing = find_facing(solids, planes, close)
     out = defaultdict(list)
-    for k, (i, j) in enumerate(planes.owner[found.faces].tolist()):
-        out[i, j].append((float(found.area[k]), found.centroid[k], found.normal[k]))
+    for k, (i, j) in enumerate(planes.owner[facing.faces].tolist()):
+        out[i, j].append((float(facing.area[k]), facing.centroid[k], facing.normal[k]))
     return out
 
 

@@ -42,18 +42,18 @@ def mended_planes(
     """
     worn = np.add.reduceat(~faces.sound[faces.solids.corners], faces.solids.face_starts[:-1]) > 0
     beside: dict[int, list[int]] = {}
-    for one, two in neighbours.tolist():
-        beside.setdefault(one, []).append(two)
-        beside.setdefault(two, []).append(one)
+    for first, two in neighbours.tolist():
+        beside.setdefault(first, []).append(two)
+        beside.setdefault(two, []).append(first)
     out = rows.copy()
     for face in np.flatnonzero(worn & free & ~faces.kept).tolist():
-        near = sorted(set(beside.get(int(faces.planes.owner[face]), [])))
+        around = sorted(set(beside.get(int(faces.planes.owner[face]), [])))
         points = _sound(faces, face)
         if len(points) not in (1, 2):  # three define the plane as it was measured, and none leaves it unknown
             continue
-        points = np.vstack([points, _nearest(faces, face, [solids[i].vertices for i in near], reach)])
+        points = np.vstack([points, _nearest(faces, face, [solids[i].vertices for i in around], reach)])
         if _through(points, rows[face]) is None:
-            points = np.vstack([points, _continuing(faces, rows, free, face, near)])
+            points = np.vstack([points, _continuing(faces, rows, free, face, around)])
         mended = _through(points, rows[face])
         if mended is None:
             mended = _parallel(faces, rows, face, points)
@@ -64,25 +64,25 @@ def mended_planes(
 
 def _continuing(faces: StoneFaces, rows: Array, free: Bools, face: int, beside: list[int]) -> Array:
     """Return sound corners (n, 3) of neighbours' free sides in the plane of a side's own sound corners."""
-    own, starts = _sound(faces, face), faces.solids.solid_starts
-    found = [np.zeros((0, 3))]
+    sound, starts = _sound(faces, face), faces.solids.solid_starts
+    points = [np.zeros((0, 3))]
     for stone in beside:
-        for other in range(int(starts[stone]), int(starts[stone + 1])):
-            alike = free[other] and rows[other, :3] @ rows[face, :3] > _ALIKE
-            if alike and np.abs(own @ rows[other, :3] - rows[other, 3]).max() <= _NEAR:
-                found.append(_sound(faces, other))
-    return np.concatenate(found)
+        for candidate in range(int(starts[stone]), int(starts[stone + 1])):
+            alike = free[candidate] and rows[candidate, :3] @ rows[face, :3] > _ALIKE
+            if alike and np.abs(sound @ rows[candidate, :3] - rows[candidate, 3]).max() <= _NEAR:
+                points.append(_sound(faces, candidate))
+    return np.concatenate(points)
 
 
 def _nearest(faces: StoneFaces, face: int, beside: list[Array], reach: float) -> Array:
     """Return the neighbour's corner (n, 3) nearest to each worn corner of a side."""
     corners = faces.corners(face)
     worn = faces.solids.vertices[corners[~faces.sound[corners]]]
-    known = np.concatenate([np.zeros((0, 3)), *beside])
-    if not len(known):
-        return known
-    apart = np.linalg.norm(worn[:, None] - known[None], axis=2)
-    out: Array = known[apart.argmin(axis=1)][apart.min(axis=1) <= reach]
+    points = np.concatenate([np.zeros((0, 3)), *beside])
+    if not len(points):
+        return points
+    apart = np.linalg.norm(worn[:, None] - points[None], axis=2)
+    out: Array = points[apart.argmin(axis=1)][apart.min(axis=1) <= reach]
     return out
 
 

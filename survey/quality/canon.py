@@ -78,17 +78,17 @@ def standards(stones: Sequence[StoneQuality], canons: Iterable[Canon]) -> dict[s
     stones : all stones of the survey
     canons : usual dimensions according to archaeologists
     """
-    found = {
+    kind_standards = {
         canon.kind: KindStandard(
             canon.kind, canon.length, canon.height, canon.sigma, canon.sigma, canon.source, 0
         )
         for canon in canons
     }
-    for kind in sorted({stone.kind for stone in stones} - set(found)):
-        own = [stone for stone in stones if stone.kind == kind]
-        if len(own) >= ENOUGH:
-            found[kind] = _median(kind, own)
-    return found
+    for kind in sorted({stone.kind for stone in stones} - set(kind_standards)):
+        same_kind = [stone for stone in stones if stone.kind == kind]
+        if len(same_kind) >= ENOUGH:
+            kind_standards[kind] = _median(kind, same_kind)
+    return kind_standards
 
 
 def deviations(stones: Sequence[StoneQuality], usual: Mapping[str, KindStandard]) -> tuple[Deviation, ...]:

@@ -97,12 +97,12 @@ def contradictions(stones: Sequence[StoneQuality], facades: Sequence[Facade]) ->
     """
     measured = wedges(stones, facades)
     around = _Around(_stretchers_beside(stones, facades), measured, _least_convergence(measured))
-    found = []
+    signs = []
     for index, stone in enumerate(stones):
         for rule in _RULES.get(stone.kind, ()):
             finding = rule(index, stone, around)
             if finding is not None and finding.excess > SIGNIFICANT * finding.sigma:
-                found.append(
+                signs.append(
                     Contradiction(
                         stone.code,
                         stone.kind,
@@ -112,7 +112,7 @@ def contradictions(stones: Sequence[StoneQuality], facades: Sequence[Facade]) ->
                         finding.excess / finding.sigma,
                     )
                 )
-    return tuple(sorted(found, key=lambda one: -one.significance))
+    return tuple(sorted(signs, key=lambda one: -one.significance))
 
 
 def _longer_than_stretchers(index: int, stone: StoneQuality, around: _Around) -> _Finding | None:
@@ -175,7 +175,7 @@ def _stretchers_beside(
     stones: Sequence[StoneQuality], facades: Sequence[Facade]
 ) -> dict[int, tuple[float, float, str]]:
     """Return for every header the median length of the stretchers next to it in its course, or of the survey."""
-    found = {}
+    expected = {}
     every = [stone for stone in stones if stone.kind == "stretcher"]
     whole = _middle(every, "stretchers of the survey have") if len(every) >= _FEWEST else None
     for headers, stretchers, places in _courses(stones, facades):
@@ -184,12 +184,12 @@ def _stretchers_beside(
         at = places[1][order]
         for index, place in zip(headers, places[0].tolist(), strict=True):
             k = int(np.searchsorted(at, place))
-            near = beside[max(k - _BESIDE // 2, 0) : k + _BESIDE // 2].tolist()
-            if len(near) >= 2:
-                found[index] = _middle([stones[i] for i in near], "stretchers beside it are")
+            neighbours = beside[max(k - _BESIDE // 2, 0) : k + _BESIDE // 2].tolist()
+            if len(neighbours) >= 2:
+                expected[index] = _middle([stones[i] for i in neighbours], "stretchers beside it are")
             elif whole is not None:
-                found[index] = whole
-    return found
+                expected[index] = whole
+    return expected
 
 
 def _courses(

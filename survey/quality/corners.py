@@ -102,16 +102,22 @@ def misplaced_corners(faces: Sequence[SeenFace]) -> tuple[Misplaced, ...]:
     for face in faces:
         kinds[face.kind].append(face)
     askew = {kind: _least_askew(members) for kind, members in kinds.items()}
-    found = [finding for members in kinds.values() for finding in _odd_sizes(members)]
+    findings = [finding for members in kinds.values() for finding in _odd_sizes(members)]
     middles = np.array([face.outline.mean(axis=0) for face in faces]).reshape(-1, 3)
     normals = np.array([face.normal for face in faces]).reshape(-1, 3)
     for facade in find_facades(normals, np.array([face.area for face in faces]), middles):
         members = [faces[i] for i in facade.members.tolist()]
         flat = [facade.frame.flatten(member.outline) for member in members]
         away = (middles[facade.members] - facade.frame.origin) @ facade.frame.axes[2]
-        found += [*_overlaps(members, flat, away), *_odd_angles(members, flat, askew), *_seams(members, flat)]
+        findings += [
+            *_overlaps(members, flat, away),
+            *_odd_angles(members, flat, askew),
+            *_seams(members, flat),
+        ]
     order = list(Sign)
-    return tuple(sorted(found, key=lambda one: (order.index(one.sign), -one.severity, one.code)))
+    return tuple(
+        sorted(findings, key=lambda finding: (order.index(finding.sign), -finding.severity, finding.code))
+    )
 
 
 def _overlaps(members: Sequence[SeenFace], flat: Sequence[Array], away: Array) -> Iterator[Misplaced]:
@@ -122,20 +128,20 @@ def _overlaps(members: Sequence[SeenFace], flat: Sequence[Array], away: Array) -
         common = _common(flat[i], flat[j])
         depth = _thickness(common)
         if depth > _DEEP:
-            for one, other in ((members[i], members[j]), (members[j], members[i])):
-                text = f"its face overlaps that of {other.code} by {ring_area(common) * 1e4:.0f} cm²"
-                yield Misplaced(one.code, one.line, Sign.OVERLAP, depth, text)
+            for first, second in ((members[i], members[j]), (members[j], members[i])):
+                text = f"its face overlaps that of {second.code} by {ring_area(common) * 1e4:.0f} cm²"
+                yield Misplaced(first.code, first.line, Sign.OVERLAP, depth, text)
 
 
 def _seams(members: Sequence[SeenFace], flat: Sequence[Array]) -> Iterator[Misplaced]:
     """Yield the first of two stones without a joint between them, where others have one."""
     for pair in seamless(flat, _near(flat, -_JOINT)):
-        one, other = members[pair.first], members[pair.second]
+        first, second = members[pair.first], members[pair.second]
         text = (
-            f"no joint parts it from {other.code} ({pair.gap * 1e3:.0f} mm; others are {pair.usual * 1e3:.0f} mm "
+            f"no joint parts it from {second.code} ({pair.gap * 1e3:.0f} mm; others are {pair.usual * 1e3:.0f} mm "
             "wide): one stone drawn as two?"
         )
-        yield Misplaced(one.code, one.line, Sign.SEAM, pair.usual - pair.gap, text)
+        yield Misplaced(first.code, first.line, Sign.SEAM, pair.usual - pair.gap, text)
 
 
 def _near(flat: Sequence[Array], deep: float = _DEEP) -> Iterator[tuple[int, int]]:
@@ -149,10 +155,10 @@ def _near(flat: Sequence[Array], deep: float = _DEEP) -> Iterator[tuple[int, int
         yield from ((i, j) for j in later[common.min(axis=1, initial=np.inf) > deep].tolist())
 
 
-def _common(one: Array, other: Array) -> Array:
+def _common(one: Array, second: Array) -> Array:
     """Cut a polygon (n, 2) by the sides of another (m, 2), which is taken as convex; return what is left (k, 2)."""
     left = one
-    for start, end in zip(other, np.roll(other, -1, axis=0), strict=True):
+    for start, end in zip(second, np.roll(second, -1, axis=0), strict=True):
         if len(left) < 3:
             break
         run = end - start
@@ -262,6 +268,6 @@ def _outliers(values: Array, least: float) -> Bools:
     """Find the values (n,) that lie alone, far from the median and by at least `least` from it."""
     off = values - np.median(values)
     far = np.abs(off) > max(least, _ODD * deviation(off, 0.0))
-    alike = np.array([(off * np.sign(one) > _ALIKE * abs(one)).sum() - 1 for one in off])
+    alike = np.array([(off * np.sign(offset) > _ALIKE * abs(offset)).sum() - 1 for offset in off])
     out: Bools = far & (alike < _COMPANY)
     return out

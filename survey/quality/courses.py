@@ -168,9 +168,11 @@ def measure_courses(
     """
     standing = [facade for facade in facades if facade.azimuth is not None]
     courses = [course for facade in standing for course in _courses(stones, facade, _tilt(facade, tilts))]
-    own = {k: scatter_of(course.bed, 2) for k, course in enumerate(courses) if course.bed.count >= ENOUGH}
-    pooled = pool(list(own.values()))
-    return tuple(_line(course, own.get(k), pooled) for k, course in enumerate(courses))
+    scatters = {
+        k: scatter_of(course.bed, 2) for k, course in enumerate(courses) if course.bed.count >= ENOUGH
+    }
+    pooled = pool(list(scatters.values()))
+    return tuple(_line(course, scatters.get(k), pooled) for k, course in enumerate(courses))
 
 
 def with_scatter(
@@ -199,7 +201,7 @@ def with_scatter(
 
 def course_heights(lines: Sequence[CourseLine]) -> tuple[CourseHeight, ...]:
     """Return the height of every course whose next one lies above part of it."""
-    found = []
+    heights = []
     by_place = {(line.facade, line.zone, line.course): line for line in lines}
     for (facade, zone, course), line in by_place.items():
         above = by_place.get((facade, zone, course + 1))
@@ -211,8 +213,8 @@ def course_heights(lines: Sequence[CourseLine]) -> tuple[CourseHeight, ...]:
         place = float(left + right) / 2.0
         (low, low_variance), (high, high_variance) = (_at(one, place) for one in (line, above))
         sigma = math.sqrt(low_variance + high_variance)
-        found.append(CourseHeight(facade, zone, course, place, high - low, sigma))
-    return tuple(found)
+        heights.append(CourseHeight(facade, zone, course, place, high - low, sigma))
+    return tuple(heights)
 
 
 def lower_corners(outline: Array, frame: WallPlane, arches: Side | None = None) -> list[int]:

@@ -80,8 +80,8 @@ class DeformationGroup:
         rows: dict[str, list[int]] = {}
         for k, code in enumerate(self.codes):
             rows.setdefault(code, []).append(k)
-        for code, own in rows.items():
-            moved[own] = displacement(code, self.places[own]) @ self.direction
+        for code, row in rows.items():
+            moved[row] = displacement(code, self.places[row]) @ self.direction
         return moved
 
     def residuals(self, displacement: Displacement) -> Array:

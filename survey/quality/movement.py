@@ -168,8 +168,8 @@ def _bed_of(
     bed: BedCorners, rows: Sequence[int], measured: Array, simulated: Array, scatter: BedScatter
 ) -> StoneMovement:
     weights = 1.0 / (scatter.kappa * bed.sigma[rows]) ** 2
-    own = [float(np.average(heights[rows], weights=weights)) for heights in (measured, simulated)]
-    return StoneMovement(own[0], own[1], math.sqrt(1.0 / float(weights.sum()) + scatter.tau**2))
+    levels = [float(np.average(heights[rows], weights=weights)) for heights in (measured, simulated)]
+    return StoneMovement(levels[0], levels[1], math.sqrt(1.0 / float(weights.sum()) + scatter.tau**2))
 
 
 def compare_plumb(
@@ -191,7 +191,7 @@ def compare_plumb(
     -------
     One for each facade and zone of several courses. The scatter of single faces is that within courses.
     """
-    found = []
+    plumb_walls = []
     for facade in facades:
         if facade.azimuth is None:
             continue
@@ -201,8 +201,8 @@ def compare_plumb(
                 zones.setdefault(stones[i].zone or None, []).append(stones[i])
         for zone, members in zones.items():
             if len({stone.course for stone in members}) > 1 and len(members) >= ENOUGH:
-                found.append(_wall(members, facade, zone, displacement, battered))
-    return tuple(found)
+                plumb_walls.append(_wall(members, facade, zone, displacement, battered))
+    return tuple(plumb_walls)
 
 
 def _wall(

@@ -223,18 +223,20 @@ def _left_out(block: SurveyedBlock) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 def judge_survey(stones: Sequence[StoneQuality]) -> SurveyQuality:
     """Summarise the stones of a survey; stones without points of their own contribute no residual."""
-    own = [stone for stone in stones if stone.measured]
-    squares = sum(one.redundancy * one.sigma0**2 for one in own if one.sigma0 is not None)
-    redundancy = sum(one.redundancy for one in own)
+    measured = [stone for stone in stones if stone.measured]
+    squares = sum(stone.redundancy * stone.sigma0**2 for stone in measured if stone.sigma0 is not None)
+    redundancy = sum(one.redundancy for one in measured)
     sigma0 = math.sqrt(squares / redundancy) if redundancy else None
     error = 1.0 / math.sqrt(2.0 * redundancy) if redundancy else None
     sigma, rough = (
-        math.sqrt(sum(one**2 for one in ones) / len(own)) if own else math.nan
-        for ones in ([one.sigma for one in own], [one.roughness for one in own])
+        math.sqrt(sum(one**2 for one in ones) / len(measured)) if measured else math.nan
+        for ones in ([one.sigma for one in measured], [one.roughness for one in measured])
     )
-    counts = [one.redundancy + 3 for one in own]
-    total = sum(n * one.rms**2 for n, one in zip(counts, own, strict=True))
-    residuals = np.concatenate([one.standardised for one in own]) if own else np.empty(0, np.float32)
+    counts = [one.redundancy + 3 for one in measured]
+    total = sum(n * one.rms**2 for n, one in zip(counts, measured, strict=True))
+    residuals = (
+        np.concatenate([one.standardised for one in measured]) if measured else np.empty(0, np.float32)
+    )
     return SurveyQuality(
         stones=len(stones),
         points=sum(stone.points for stone in stones),
@@ -244,8 +246,8 @@ def judge_survey(stones: Sequence[StoneQuality]) -> SurveyQuality:
         sigma0=sigma0,
         sigma0_sigma=error,
         sigma=sigma,
-        verdict=_verdict(sigma0, error, sigma, rough) if own or not stones else _NOTHING,
-        rms=math.sqrt(total / sum(counts)) if own else math.nan,
+        verdict=_verdict(sigma0, error, sigma, rough) if measured or not stones else _NOTHING,
+        rms=math.sqrt(total / sum(counts)) if measured else math.nan,
         residuals=_histogram(residuals),
         kinds=_count(stone.kind for stone in stones),
         shapes=_count(stone.shape for stone in stones),
@@ -263,13 +265,13 @@ def _verdict(sigma0: float | None, error: float | None, sigma: float, rough: flo
             f"their planes beyond the {sigma * 1e3:.2g} mm stated, which counts as roughness; "
             f"with both they scatter {sigma0:.2f} ± {error:.2f} times as far"
         )
-    found = f"the points scatter {sigma0:.2f} ± {error:.2f} times as far as stated"
+    statement = f"the points scatter {sigma0:.2f} ± {error:.2f} times as far as stated"
     if abs(sigma0 - 1.0) <= max(TOLERANCE, SIGNIFICANT * error):
-        return f"the stated sigma is right: {found}"
+        return f"the stated sigma is right: {statement}"
     better = f"{sigma0 * sigma * 1e3:.2g} mm would be right instead of {sigma * 1e3:.2g} mm"
     if sigma0 > 1.0:
-        return f"the stated sigma is too small, or the faces are rough: {found}; {better}"
-    return f"the stated sigma is too large: {found}; {better}"
+        return f"the stated sigma is too small, or the faces are rough: {statement}; {better}"
+    return f"the stated sigma is too large: {statement}; {better}"
 
 
 def _histogram(residuals: NDArray[np.float32]) -> Histogram:

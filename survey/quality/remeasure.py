@@ -196,11 +196,11 @@ def list_remeasures(
     depths : depths that contradict other evidence
     """
     made = {stone.code for stone in stones}
-    found = [_missing(reject, made) for reject in rejects]
+    remeasures = [_missing(reject, made) for reject in rejects]
     scale = quality.sigma0 or 1.0
     for stone in stones:
-        found += _reasons(stone, scale, _UNLIKELY / len(stones))
-    found += [
+        remeasures += _reasons(stone, scale, _UNLIKELY / len(stones))
+    remeasures += [
         Remeasure(
             depth.code,
             depth.line,
@@ -212,12 +212,19 @@ def list_remeasures(
         for depth in depths
     ]
     of_wrong_kind = {contradiction.code for contradiction in contradictions}
-    found += [
-        Remeasure(one.code, one.line, _URGENCIES[one.sign], one.severity, one.text, _CORNER_ACTIONS[one.sign])
-        for one in misplaced
-        if one.sign is not Sign.SIZE or one.code not in of_wrong_kind
+    remeasures += [
+        Remeasure(
+            corner.code,
+            corner.line,
+            _URGENCIES[corner.sign],
+            corner.severity,
+            corner.text,
+            _CORNER_ACTIONS[corner.sign],
+        )
+        for corner in misplaced
+        if corner.sign is not Sign.SIZE or corner.code not in of_wrong_kind
     ]
-    found += [
+    remeasures += [
         Remeasure(
             contradiction.code,
             contradiction.line,
@@ -228,45 +235,49 @@ def list_remeasures(
         )
         for contradiction in contradictions
     ]
-    return tuple(sorted(found, key=lambda one: (one.urgency, -one.severity)))
+    return tuple(sorted(remeasures, key=lambda remeasure: (remeasure.urgency, -remeasure.severity)))
 
 
 def short_list(
-    found: Sequence[Remeasure], stones: int, verdicts: Callable[[str], str | None] = lambda code: None
+    remeasures: Sequence[Remeasure], stones: int, verdicts: Callable[[str], str | None] = lambda code: None
 ) -> ShortList:
     """Choose what is worth a way back to the wall.
 
     Parameters
     ----------
-    found : all reasons, most urgent first
+    remeasures : all reasons, most urgent first
     stones : number of stones of the survey, with those that could not be made
     verdicts : what changes in the verdicts on the wall without the stone of a code; None if nothing does. Called for
         few stones, since each may take a while
     """
-    counts = Counter(one.urgency for one in found)
+    counts = Counter(remeasure.urgency for remeasure in remeasures)
     common = {urgency for urgency, count in counts.items() if count >= _MANY and count > _COMMON * stones}
-    own = [one for one in found if one.urgency not in common]
+    individual = [remeasure for remeasure in remeasures if remeasure.urgency not in common]
     asked: dict[str, str | None] = {}
-    doubted = (one for one in own if one.urgency is not Urgency.EDGE)
+    doubted = (one for one in individual if one.urgency is not Urgency.EDGE)
     for code in dict.fromkeys(one.code for one in doubted if one.code is not None):
         asked[code] = verdicts(code) if len(asked) < _ASKED else None
     rows: dict[object, Remeasure] = {}
-    for one in own:
-        changes = _ALWAYS.get(one.urgency) or asked.get(one.code or "")
-        if changes is None and one.urgency not in _WRONG:
+    for remeasure in individual:
+        changes = _ALWAYS.get(remeasure.urgency) or asked.get(remeasure.code or "")
+        if changes is None and remeasure.urgency not in _WRONG:
             continue
-        key = one.code if one.code is not None else one
+        key = remeasure.code if remeasure.code is not None else remeasure
         if key in rows:
             first = rows[key]
-            reason, action = f"{first.reason}; {one.reason}", first.action
-            if one.action not in action:
-                action = f"{action}; {one.action}"
+            reason, action = f"{first.reason}; {remeasure.reason}", first.action
+            if remeasure.action not in action:
+                action = f"{action}; {remeasure.action}"
             rows[key] = replace(first, reason=reason, action=action)
         else:
-            rows[key] = replace(one, changes=changes)
-    ordered = sorted(rows.values(), key=lambda one: (one.changes is None, one.urgency, -one.severity))
+            rows[key] = replace(remeasure, changes=changes)
+    ordered = sorted(rows.values(), key=lambda row: (row.changes is None, row.urgency, -row.severity))
     listed = {one.code for one in ordered}
-    left = Counter(one.urgency for one in found if one.urgency in common or one.code not in listed)
+    left = Counter(
+        remeasure.urgency
+        for remeasure in remeasures
+        if remeasure.urgency in common or remeasure.code not in listed
+    )
     texts = tuple(_left(urgency, left[urgency], stones, urgency in common) for urgency in sorted(left))
     return ShortList(tuple(ordered[:_ROWS]), max(len(ordered) - _ROWS, 0), texts)
 

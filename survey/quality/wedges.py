@@ -56,7 +56,7 @@ def wedges(stones: Sequence[StoneQuality], facades: Sequence[Facade]) -> dict[in
     is on the side where it rises over the chord between them. Stones whose sides have worn corners are left out, and
     those whose intrados cannot be identified.
     """
-    found = {}
+    convergences = {}
     for facade in facades:
         members = [i for i in facade.members.tolist() if stones[i].kind in _ARCH]
         if facade.azimuth is None or not members:
@@ -68,8 +68,8 @@ def wedges(stones: Sequence[StoneQuality], facades: Sequence[Facade]) -> dict[in
             radial = _radial(k, centres, tree, _REACH * float(np.ptp(flats[k], axis=0).max()))
             wedge = None if radial is None else _wedge(flats[k], radial, stones[index])
             if wedge is not None:
-                found[index] = wedge
-    return found
+                convergences[index] = wedge
+    return convergences
 
 
 class Side(NamedTuple):
@@ -92,8 +92,8 @@ class Side(NamedTuple):
 
     def without(self, stone: int) -> "Side":
         """Return the sides of all stones but one."""
-        kept = self.stone != stone
-        return Side(self.stone[kept], self.start[kept], self.run[kept])
+        rest = self.stone != stone
+        return Side(self.stone[rest], self.start[rest], self.run[rest])
 
     def of(self, stones: Collection[int]) -> "Side":
         """Return the sides of some stones."""
@@ -133,8 +133,8 @@ def spanning_stones(stones: Sequence[StoneQuality], sides: Side) -> frozenset[in
         if fan is not None:
             angles[i] = fan[0]
             radial.update(fan[1])
-    kept = np.isin(joints.side, list(radial)) & np.isin(joints.opposite, list(radial))
-    links = list(zip(joints.stone[kept].tolist(), joints.neighbour[kept].tolist(), strict=True))
+    between = np.isin(joints.side, list(radial)) & np.isin(joints.opposite, list(radial))
+    links = list(zip(joints.stone[between].tolist(), joints.neighbour[between].tolist(), strict=True))
     fans: set[int] = set()
     for group in _connected(angles, links):
         if len(group) >= _FEWEST and sum(angles[i] for i in group) >= _FAN:
@@ -151,22 +151,22 @@ def lies_along(start: Array, run: Array, sides: Side) -> NDArray[np.bool_]:
     start, run : (m, 2) of the stone [m]
     sides : of other stones
     """
-    found = np.zeros(len(start), dtype=bool)
+    lying = np.zeros(len(start), dtype=bool)
     if len(sides.stone) == 0:
-        return found
-    length, other = np.linalg.norm(run, axis=1), sides.length
+        return lying
+    length, lengths = np.linalg.norm(run, axis=1), sides.length
     for k in range(len(start)):
         if length[k] <= 0.0:
             continue
-        way = run[k] / length[k]
-        parallel = -(sides.run @ way) >= math.cos(_ALONG) * other
+        direction = run[k] / length[k]
+        parallel = -(sides.run @ direction) >= math.cos(_ALONG) * lengths
         first = sides.start - start[k]
         ends = np.stack([first, first + sides.run])
-        along, across = ends @ way, ends @ np.array([-way[1], way[0]])
+        along, across = ends @ direction, ends @ np.array([-direction[1], direction[0]])
         common = np.minimum(along.max(axis=0), length[k]) - np.maximum(along.min(axis=0), 0.0)
         close = (np.abs(across.mean(axis=0)) <= _JOINT) & (np.abs(across).min(axis=0) <= _JOINT)
-        found[k] = bool((parallel & close & (common >= _SOME * np.minimum(length[k], other))).any())
-    return found
+        lying[k] = bool((parallel & close & (common >= _SOME * np.minimum(length[k], lengths))).any())
+    return lying
 
 
 class _Joints(NamedTuple):
@@ -187,19 +187,19 @@ def _radial_joints(sides: Side) -> _Joints:
         else np.zeros((0, 2), int)
     )
     a, b = pairs[:, 0], pairs[:, 1]
-    way = sides.run[a] / length[a][:, None]
+    direction = sides.run[a] / length[a][:, None]
     gap = middle[b] - middle[a]
-    shift = np.abs((gap * way).sum(axis=1))
-    apart = np.abs(gap[:, 0] * way[:, 1] - gap[:, 1] * way[:, 0])
+    shift = np.abs((gap * direction).sum(axis=1))
+    apart = np.abs(gap[:, 0] * direction[:, 1] - gap[:, 1] * direction[:, 0])
     common = 0.5 * (length[a] + length[b]) - shift
     facing = -(sides.run[a] * sides.run[b]).sum(axis=1) >= math.cos(_ALONG) * length[a] * length[b]
-    kept = (
+    chosen = (
         (sides.stone[a] != sides.stone[b])
         & facing
         & (apart <= _JOINT)
         & (common >= _OVERLAP * np.maximum(length[a], length[b]))
     )
-    here, there = np.concatenate([a[kept], b[kept]]), np.concatenate([b[kept], a[kept]])
+    here, there = np.concatenate([a[chosen], b[chosen]]), np.concatenate([b[chosen], a[chosen]])
     return _Joints(here, there, sides.stone[here], sides.stone[there])
 
 

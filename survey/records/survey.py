@@ -262,9 +262,9 @@ class SurveyHead:
             if there is no station of that name
         """
         wanted = station or OBSERVER
-        for one in self.stations:
-            if one.name == wanted:
-                return one.position
+        for candidate in self.stations:
+            if candidate.name == wanted:
+                return candidate.position
         if station is not None:
             known = ", ".join(station.name for station in self.stations) or "none"
             raise SurveyError(f"no station {station!r}", remedy=f"stations of this survey: {known}")

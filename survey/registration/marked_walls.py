@@ -139,27 +139,31 @@ def _tied(photograph: Photograph, viewpoint: Array | None, observer: Array | Non
     image = np.array([mark.image for mark in marks], dtype=np.float64)
     names = [f"mark at line {mark.line}" if mark.line else f"mark {i + 1}" for i, mark in enumerate(marks)]
     fit = _plane(positions, sigmas, viewpoint if viewpoint is not None else observer)
-    kept = np.arange(len(marks))
+    inliers = np.arange(len(marks))
     if viewpoint is None:
-        kept = np.setdiff1d(kept, fit.rejected)
+        inliers = np.setdiff1d(inliers, fit.rejected)
         flat = positions - fit.centroid
         # the distance of each from the plane is itself uncertain by the relief
-        relief = np.sqrt(np.mean(fit.residuals[kept] ** 2))
+        relief = np.sqrt(np.mean(fit.residuals[inliers] ** 2))
         sigmas = np.hypot(sigmas, OFF_SQUARE * np.hypot(fit.residuals, relief))
     else:
         flat, slant = _along_sight(positions, fit, viewpoint)
         # an error along the plane's normal shifts the mark along the plane by tan of the slant
         sigmas = sigmas * np.sqrt(1.0 + 0.5 * slant**2)
-    if len(kept) < 4:
+    if len(inliers) < 4:
         raise GeometryError(
-            f"{len(marks) - len(kept)} of {len(marks)} marks do not lie on the plane of the others",
+            f"{len(marks) - len(inliers)} of {len(marks)} marks do not lie on the plane of the others",
             where=", ".join(names[i] for i in fit.rejected),
             remedy="mark four points of one plane, or give the photograph's station",
         )
     homography = fit_homography(
-        image[kept], photograph.sigma, (flat @ fit.axes.T)[kept], sigmas[kept], [names[i] for i in kept]
+        image[inliers],
+        photograph.sigma,
+        (flat @ fit.axes.T)[inliers],
+        sigmas[inliers],
+        [names[i] for i in inliers],
     )
-    used = np.delete(image[kept], homography.rejected, axis=0)
+    used = np.delete(image[inliers], homography.rejected, axis=0)
     size = float(np.linalg.norm(used[:, None] - used[None], axis=2).max())
     return MarkedWall(
         name=photograph.name,

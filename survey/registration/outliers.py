@@ -96,8 +96,8 @@ def point_tests(
     tests, limits : (n,) square root of T, nan if the other points do not control it; its limit at `LEVEL`
     """
     whiten = np.linalg.inv(np.linalg.cholesky(covariances))
-    own = whiten @ effects
-    carried = own @ parameters @ own.transpose(0, 2, 1)
+    whitened = whiten @ effects
+    carried = whitened @ parameters @ whitened.transpose(0, 2, 1)
     shares, directions = np.linalg.eigh(
         np.eye(residuals.shape[1]) + np.where(accepted, -1.0, 1.0)[:, None, None] * carried
     )

@@ -122,20 +122,21 @@ def lift(
 
 def plane_of_wall(wall: MarkedWall, neighbours: Neighbours) -> CommonPlane | None:
     """Fit the common plane of all faces on the wall of a photograph that face its way; None without three."""
-    found = neighbours.on_wall(wall.fit.centroid, wall.fit.normal, wall.relief)
-    if not len(found):
+    indices = neighbours.on_wall(wall.fit.centroid, wall.fit.normal, wall.relief)
+    if not len(indices):
         return None
-    return common_plane(neighbours.fits(found), wall.fit.centroid)
+    return common_plane(neighbours.fits(indices), wall.fit.centroid)
 
 
 def _wall(
-    name: str, known: dict[str, Photograph], neighbours: Neighbours, head: SurveyHead
+    name: str, photographs: dict[str, Photograph], neighbours: Neighbours, head: SurveyHead
 ) -> tuple[MarkedWall, CommonPlane | None] | MomaError:
-    if name not in known:
+    if name not in photographs:
         return SurveyError(
-            f"no photograph {name!r}", remedy=f"photographs of this survey: {', '.join(known) or 'none'}"
+            f"no photograph {name!r}",
+            remedy=f"photographs of this survey: {', '.join(photographs) or 'none'}",
         )
-    photograph = known[name]
+    photograph = photographs[name]
     try:
         viewpoint = None if photograph.station is None else head.viewpoint(photograph.station)
         wall = wall_of_marks(photograph, viewpoint, head.viewpoint(None))
@@ -151,10 +152,10 @@ def _predicted(
 ) -> PlaneEstimate:
     """Predict the plane of one face from its neighbours, otherwise from the wall, otherwise from the marks."""
     place = on_marks.mean(axis=0)
-    near = neighbours.near(on_marks, wall.fit.normal)
-    if len(near):
-        plane = common_plane(neighbours.fits(near), place)
-        names = [neighbours.codes[i] for i in near[list(plane.members)]]
+    close = neighbours.near(on_marks, wall.fit.normal)
+    if len(close):
+        plane = common_plane(neighbours.fits(close), place)
+        names = [neighbours.codes[i] for i in close[list(plane.members)]]
         return plane.face_at(place, f"in the plane of {_listed(names)}")
     if whole is not None:
         return whole.face_at(place, f"in the plane of the wall ({len(whole.members)} faces)")

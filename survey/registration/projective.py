@@ -62,10 +62,10 @@ def mapped_points(matrix: Array, u: Array) -> tuple[Array, Array, Array]:
     mapped = (u @ matrix[:2, :2].T + matrix[:2, 2]) / below[..., None]
     by_point = (matrix[:2, :2] - mapped[..., :, None] * matrix[2, :2]) / below[..., None, None]
     by_parameter = np.zeros((*u.shape[:-1], 2, 8))
-    own = np.concatenate([u, np.ones((*u.shape[:-1], 1))], axis=-1) / below[..., None]
-    by_parameter[..., 0, :3] = own
-    by_parameter[..., 1, 3:6] = own
-    by_parameter[..., 6:] = -mapped[..., :, None] * own[..., None, :2]
+    direct = np.concatenate([u, np.ones((*u.shape[:-1], 1))], axis=-1) / below[..., None]
+    by_parameter[..., 0, :3] = direct
+    by_parameter[..., 1, 3:6] = direct
+    by_parameter[..., 6:] = -mapped[..., :, None] * direct[..., None, :2]
     return mapped, by_point, by_parameter
 
 

@@ -80,10 +80,10 @@ def unfold(solid: Solid) -> FlatSolid | None:
     normals = np.array([vectors[group].sum(axis=0) for group in groups])
     normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
     width = float(np.ptp(solid.vertices @ normals.T, axis=0).min())
-    found = _with_planes(solid, vectors, groups, _WARP * width)
+    flat = _with_planes(solid, vectors, groups, _WARP * width)
     # a curved face has corners that only divide its edge, and would lose them
-    kept = found is not None and len(found.solid.vertices) == len({i for face in solid.faces for i in face})
-    return found if found is not None and kept and is_convex(found.solid) else None
+    kept = flat is not None and len(flat.solid.vertices) == len({i for face in solid.faces for i in face})
+    return flat if flat is not None and kept and is_convex(flat.solid) else None
 
 
 def _with_planes(solid: Solid, vectors: Array, groups: list[list[int]], tolerance: float) -> FlatSolid | None:
@@ -130,12 +130,12 @@ def _plane_groups(solid: Solid, vectors: Array, tolerance: float) -> list[list[i
         normal, origin = normals[seed], polygons[seed].mean(axis=0)
         for k in group:
             for p, q in _edges(solid.faces[k]):
-                other = owner.get((q, p), seed)
-                if taken[other] or (normals[other] @ normal < _SAME_SIDE and areas[other] > 0.0):
+                neighbour = owner.get((q, p), seed)
+                if taken[neighbour] or (normals[neighbour] @ normal < _SAME_SIDE and areas[neighbour] > 0.0):
                     continue
-                if np.abs((polygons[other] - origin) @ normal).max() <= tolerance:
-                    taken[other] = True
-                    group.append(other)
+                if np.abs((polygons[neighbour] - origin) @ normal).max() <= tolerance:
+                    taken[neighbour] = True
+                    group.append(neighbour)
         groups.append(group)
     return groups
 
@@ -147,11 +147,11 @@ def _folded_groups(solid: Solid, vectors: Array) -> list[list[int]]:
     owner = {edge: k for k, face in enumerate(solid.faces) for edge in _edges(face)}
     group = list(range(len(solid.faces)))
     for (p, q), k in owner.items():
-        other = owner.get((q, p), k)
-        if min(count[p], count[q]) > 3 and normals[k] @ normals[other] > _SAME_SIDE:
-            old, new = group[other], group[k]
-            group = [new if one == old else one for one in group]
-    return [[k for k, own in enumerate(group) if own == one] for one in dict.fromkeys(group)]
+        neighbour = owner.get((q, p), k)
+        if min(count[p], count[q]) > 3 and normals[k] @ normals[neighbour] > _SAME_SIDE:
+            old, new = group[neighbour], group[k]
+            group = [new if number == old else number for number in group]
+    return [[k for k, own in enumerate(group) if own == number] for number in dict.fromkeys(group)]
 
 
 def _edges(face: Face) -> list[tuple[int, int]]:

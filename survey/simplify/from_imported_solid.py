@@ -33,25 +33,23 @@ def simplify_solid(block: SurveyedBlock, bounds: SimplifyBounds) -> SimpleSolid:
     origin = block.solid.vertices.mean(axis=0)
     old, tolerance = about(block.solid, origin), bounds.least_tolerance
     _check_full(old)
-    found = flatten(old, tolerance)
-    if found is None:
-        found = unfold(old)
-    new = (
-        None if found is None else _prism(found.solid, block.face.fit.normal, block.face.outline[0] - origin)
-    )
-    if found is not None and new is not None:
-        shape, reason = prism_shape(len(new.faces) - 2), _describe(old, new, found)
-    elif found is not None and found.moved.max() > tolerance:
-        shape, new = BlockShape.POLYHEDRON, found.solid
-        reason = _describe(old, new, found)
+    flat = flatten(old, tolerance)
+    if flat is None:
+        flat = unfold(old)
+    new = None if flat is None else _prism(flat.solid, block.face.fit.normal, block.face.outline[0] - origin)
+    if flat is not None and new is not None:
+        shape, reason = prism_shape(len(new.faces) - 2), _describe(old, new, flat)
+    elif flat is not None and flat.moved.max() > tolerance:
+        shape, new = BlockShape.POLYHEDRON, flat.solid
+        reason = _describe(old, new, flat)
     else:
         shape, new = BlockShape.POLYHEDRON, _general(old, tolerance)
         reason = _why_general(old, new)
     same = new is old
-    if found is None or shape is BlockShape.POLYHEDRON:
+    if flat is None or shape is BlockShape.POLYHEDRON:
         left = np.linalg.norm(new.vertices - old.vertices, axis=1)
     else:
-        left = found.moved
+        left = flat.moved
     hexahedron = new if shape is BlockShape.HEXAHEDRON else _box_around(old, block.face.fit.normal)
     report = Simplified(
         displacement=left if same else moved_corners(old, new, left),
@@ -112,12 +110,12 @@ def _size(solid: Solid) -> float:
     return float(np.ptp(solid.vertices, axis=0).max())
 
 
-def _describe(old: Solid, new: Solid, found: FlatSolid) -> str:
+def _describe(old: Solid, new: Solid, flat: FlatSolid) -> str:
     words = [f"{len(new.faces)} plane faces"]
     if len(old.faces) > len(new.faces):
         words.append(f"{len(old.faces)} faces lie in their planes, or were folded from them")
-    if found.moved.max() > 0.0:
-        words.append(f"corners moved by up to {found.moved.max() * 1e3:.2g} mm to make them plane")
+    if flat.moved.max() > 0.0:
+        words.append(f"corners moved by up to {flat.moved.max() * 1e3:.2g} mm to make them plane")
     return "; ".join(words)
 
 

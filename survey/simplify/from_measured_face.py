@@ -75,7 +75,9 @@ def _tolerance(block: SurveyedBlock, bounds: SimplifyBounds) -> float:
     # of a corner's three variances, two lie in the face, where it was measured; the plane's own is small
     variances = 0.5 * (block.vertex_sigma[: len(block.face.outline)] ** 2).sum(axis=1)
     known = [*np.sqrt(variances).tolist(), block.face.fit.rms]
-    return float(max([bounds.least_tolerance, *(3.0 * one for one in known if np.isfinite(one))]))
+    return float(
+        max([bounds.least_tolerance, *(3.0 * deviation for deviation in known if np.isfinite(deviation))])
+    )
 
 
 def _check_flat(block: SurveyedBlock, squared: SquaredFace) -> None:

@@ -119,11 +119,11 @@ def _direction(
     reach = step @ run / length
     inward = 1.0 if np.median(reach) > 0.0 else -1.0  # -1: the sound end is the last of the side
     reach, height = inward * reach, _cross(run, step) / length
-    near = (np.abs(height) <= farthest) & (reach > 0.0) & (reach < length + farthest)
-    near &= np.hypot(reach, height) > abs(margin) + tolerance
-    if not near.any():
+    close = (np.abs(height) <= farthest) & (reach > 0.0) & (reach < length + farthest)
+    close &= np.hypot(reach, height) > abs(margin) + tolerance
+    if not close.any():
         return None
-    distance, angle = np.hypot(reach[near], height[near]), np.arctan2(height[near], reach[near])
+    distance, angle = np.hypot(reach[close], height[close]), np.arctan2(height[close], reach[close])
     # each point gives one line through the end; the one that fits most points counts
     turns = angle - np.arcsin(margin / distance)
     misses = distance * np.sin(angle - turns[:, None]) - margin
@@ -132,7 +132,7 @@ def _direction(
     worth = fits.sum(axis=1) - 2 * (misses < -tolerance).sum(axis=1)
     best = min(range(len(turns)), key=lambda i: (-int(worth[i]), float(np.abs(misses[i][fits[i]]).sum())))
     chosen = fits[best]
-    reaching = distance[chosen & clear[near]].max(initial=0.0)
+    reaching = distance[chosen & clear[close]].max(initial=0.0)
     distance, angle = distance[chosen], angle[chosen] - turns[best]
     if len(distance) < _FEWEST_BESIDE_WORN or reaching < _REACH * length:
         return None

@@ -41,8 +41,8 @@ def deviation(values: Array, about: float | None = None) -> float:
 def spread(values: Array) -> float:
     """Return the standard deviation of values (n,) about 0: by their median, then by those within `OUTLIER` of it."""
     first = deviation(values, 0.0)
-    kept = values[np.abs(values) <= OUTLIER * first]
-    return math.sqrt(float((kept**2).mean()) / WITHIN) if len(kept) else first
+    inliers = values[np.abs(values) <= OUTLIER * first]
+    return math.sqrt(float((inliers**2).mean()) / WITHIN) if len(inliers) else first
 
 
 def scatter_beyond(values: Array, measured: Array, share: Array | float = 1.0) -> tuple[float, int]:
@@ -64,10 +64,10 @@ def scatter_beyond(values: Array, measured: Array, share: Array | float = 1.0) -
     first = root_of(
         lambda one: CONSISTENT * float(np.median(size / np.sqrt(measured + part * one))) - 1.0, high
     )
-    kept = size <= OUTLIER * np.sqrt(measured + part * first)
-    count = int(kept.sum())
+    inliers = size <= OUTLIER * np.sqrt(measured + part * first)
+    count = int(inliers.sum())
 
     def excess(one: float) -> float:
-        return float((size[kept] ** 2 / (measured[kept] + part[kept] * one)).sum()) - WITHIN * count
+        return float((size[inliers] ** 2 / (measured[inliers] + part[inliers] * one)).sum()) - WITHIN * count
 
     return math.sqrt(root_of(excess, high)), count

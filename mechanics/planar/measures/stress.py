@@ -50,8 +50,8 @@ def moments(count: int, centre: Array, bodies: Ints, point: Array, force: Array)
         acting = body < count
         arm = point[acting] - centre[body[acting]]
         dyad = (sign * force[acting])[:, :, None] * arm[:, None, :]
-        for part, values in enumerate(dyad.reshape(-1, 4).T):
-            total[:, part] += np.bincount(body[acting], values, minlength=count)
+        for index, values in enumerate(dyad.reshape(-1, 4).T):
+            total[:, index] += np.bincount(body[acting], values, minlength=count)
     return total.reshape(count, 2, 2)
 
 

@@ -66,7 +66,7 @@ def read_accelerogram(
         return accelerograms[0]
     alike = [accelerogram for accelerogram in accelerograms if accelerogram.direction == _AXES[axis]]
     if len(alike) != 1:
-        names = ", ".join(one.name for one in accelerograms)
+        names = ", ".join(accelerogram.name for accelerogram in accelerograms)
         raise SceneError(
             f"{len(accelerograms)} components ({names}), and {len(alike)} of them along {axis}",
             where=str(path),
@@ -80,7 +80,7 @@ def read_accelerograms(
 ) -> tuple[Accelerogram, ...]:
     """Read all components of a file; see `read_accelerogram`."""
     records = _records(path, unit, dt)
-    peak = max((float(np.abs(one.acceleration).max()) for one in records), default=0.0)
+    peak = max((float(np.abs(record.acceleration).max()) for record in records), default=0.0)
     if peak > _LARGEST:
         raise SceneError(
             f"a peak of {peak / UNITS['g']:.3g} g, more than was ever recorded",

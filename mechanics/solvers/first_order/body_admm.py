@@ -403,15 +403,15 @@ def _runs(side: Ints, geometry: Array, parts: Parts, count: int) -> tuple[Ints, 
     body, many, shared = side[first], len(parts.body), len(parts.shared)
     # bodies that do not move belong to no part; -1 takes the last place
     part_of, rank = np.full(count + 1, many), np.zeros(count + 1, dtype=np.int64)
-    for part, (begin, end) in enumerate(parts.body):
-        part_of[begin:end] = part
+    for index, (begin, end) in enumerate(parts.body):
+        part_of[begin:end] = index
     part_of[parts.shared] = many
     rank[parts.shared] = np.arange(shared)
-    part = part_of[body].min(axis=1)
-    place = np.where(part_of[body] < many, body, count + part[:, None] * shared + rank[body])
-    order = np.argsort(part, kind="stable")
+    index = part_of[body].min(axis=1)
+    place = np.where(part_of[body] < many, body, count + index[:, None] * shared + rank[body])
+    order = np.argsort(index, kind="stable")
     sizes = np.diff(first, append=len(side))
-    begin, block, of_part = kernel.packed(sizes[order], part[order], many + 1)
+    begin, block, of_part = kernel.packed(sizes[order], index[order], many + 1)
     runs = kernel.Runs(
         begin, begin + sizes[order], body[order], place[order], offset[first[order]], block, of_part
     )
@@ -433,7 +433,7 @@ def _groups(panels: cholesky.Panels, parts: Parts, runs: kernel.Runs, threads: i
     shares: list[list[int]] = [[] for _ in range(threads)]
     for part in np.argsort(-work, kind="stable"):
         min(shares, key=lambda one: work[one].sum()).append(int(part))
-    return [np.array(one, dtype=np.int64) for one in shares]
+    return [np.array(share, dtype=np.int64) for share in shares]
 
 
 def _kinds(x: Array, z: Array) -> Ints:

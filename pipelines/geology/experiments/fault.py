@@ -142,15 +142,15 @@ class Fault:
         fit = self.trishear(start, last)
         if fit is None or not np.isfinite(seen[_FRONT]):
             return {_SLIP: seen[_SLIP]}
-        found = trishear_gain(fit, start, now, seen[_SLIP], 2.0 * float(radius.mean()))
+        gain = trishear_gain(fit, start, now, seen[_SLIP], 2.0 * float(radius.mean()))
         seen["trishear: residual over slip [-]"] = fit.relative
-        if found is None:
+        if gain is None:
             return seen
-        seen["trishear: gain over a plain fault [-]"] = found.gain
-        seen["trishear: gain, from [-]"], seen["trishear: gain, to [-]"] = found.interval
+        seen["trishear: gain over a plain fault [-]"] = gain.gain
+        seen["trishear: gain, from [-]"], seen["trishear: gain, to [-]"] = gain.interval
         for name, value, unit, limits in (
-            (_APICAL, fit.model.half_angle, 2.0 * float(np.degrees(1.0)), found.half_angles),
-            (_RATIO, fit.model.ratio, 1.0, found.ratios),
+            (_APICAL, fit.model.half_angle, 2.0 * float(np.degrees(1.0)), gain.half_angles),
+            (_RATIO, fit.model.ratio, 1.0, gain.ratios),
         ):
             if limits is not None:
                 kind, _, symbol = name.rpartition(" ")

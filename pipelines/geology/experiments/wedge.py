@@ -149,10 +149,12 @@ class Wedge:
     def _basal(self, instants: Sequence[Fields]) -> float:
         """Return the friction angle of the base where disks slide over it, of the forces in the late instants [°]."""
         force = np.zeros(2)
-        for one in self._late(instants):
-            count = len(one.pressure)
-            slides = one.velocity[:, 0] > _SLIDES * one.velocity[count + _WALL, 0]
-            force += one.force[(one.bodies[:, 1] == count + _BASE) & slides[one.bodies[:, 0]]].sum(axis=0)
+        for frame in self._late(instants):
+            count = len(frame.pressure)
+            slides = frame.velocity[:, 0] > _SLIDES * frame.velocity[count + _WALL, 0]
+            force += frame.force[(frame.bodies[:, 1] == count + _BASE) & slides[frame.bodies[:, 0]]].sum(
+                axis=0
+            )
         return float(np.degrees(np.arctan2(-force[0], force[1]))) if force.any() else np.nan
 
     @staticmethod
@@ -162,8 +164,8 @@ class Wedge:
     def _wall_force(self, instants: Sequence[Fields]) -> float:
         """Return the mean over the late instants of the force that disks press on the wall with."""
         pressed = [
-            one.force_normal[one.bodies[:, 1] == len(one.pressure) + _WALL].sum()
-            for one in self._late(instants)
+            frame.force_normal[frame.bodies[:, 1] == len(frame.pressure) + _WALL].sum()
+            for frame in self._late(instants)
         ]
         return float(np.mean(pressed))
 

@@ -87,12 +87,12 @@ def two_facings(
     drafts: list[Draft] = []
     for letter, frame in (("F", front), ("B", back)):
         top = courses - upper[0]
-        given = through if letter == "F" else [[_mirrored(piece) for piece in row] for row in through]
-        for number, course in enumerate(plan_courses(rng, heights, ends, through=given), start=1):
+        mirrored = through if letter == "F" else [[_mirrored(piece) for piece in row] for row in through]
+        for number, course in enumerate(plan_courses(rng, heights, ends, through=mirrored), start=1):
             beds = Bed(heights[number - 1]), Bed(heights[number])
             zone = f"{letter} storey {next(k for k, s in enumerate(spans, start=1) if number <= s[1])}"
             for k, piece in enumerate(course.pieces, start=1):
-                passes = piece in given[number - 1]
+                passes = piece in mirrored[number - 1]
                 if letter == "B" and (passes or number > top):
                     continue
                 depth = upper[1] if number > top else thickness if passes else None

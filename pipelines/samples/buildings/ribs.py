@@ -236,8 +236,8 @@ def vault_drafts(
         for stone in _web(name, _turn(turns), beds, shape, rng)
     ]
     ribs = [
-        SolidDraft(Solid(code, one.vertices @ axes + foot, one.faces), kind)
-        for code, (kind, one) in _ribs(beds, shape)
+        SolidDraft(Solid(code, rib.vertices @ axes + foot, rib.faces), kind)
+        for code, (kind, rib) in _ribs(beds, shape)
     ]
     return webs, ribs
 
@@ -290,9 +290,9 @@ def _web(
             heads = _heads(course, low.end, seat, shape.reach, rng)
             yield from _course(f"{name}{course:02d}{half}", course, (low, high), heads, into, shape)
     last, course = beds[-1], len(beds)
-    other = _mirrored(last)
+    mirrored = _mirrored(last)
     heads = _heads(course, last.end, beds[-2].end, shape.reach, rng)
-    yield from _course(f"{name}{course:02d}", course, (last, other), heads, turn, shape)
+    yield from _course(f"{name}{course:02d}", course, (last, mirrored), heads, turn, shape)
 
 
 def _heads(course: int, end: float, seat: float, wall: float, rng: Random) -> list[float]:

@@ -60,12 +60,12 @@ class StoreyVault:
 
     def corbels(self, tail: float) -> list[SolidDraft]:
         """Draft the corbels in the corners left and right of wall A, whose tails are squares in the walls [m]."""
-        near, far = self.shape.half - PROJECTION, self.shape.half + tail
+        inner, outer = self.shape.half - PROJECTION, self.shape.half + tail
         low, high = self.beds
         out = []
-        for number, left in enumerate((-far, near), start=1):
-            right = left + far - near
-            plan = np.array([(left, -far), (right, -far), (right, -near), (left, -near)])
+        for number, left in enumerate((-outer, inner), start=1):
+            right = left + outer - inner
+            plan = np.array([(left, -outer), (right, -outer), (right, -inner), (left, -inner)])
             top, bottom = (
                 np.column_stack([plan, np.full(4, z)]) @ self.axes + self.middle for z in (high, low)
             )

@@ -213,10 +213,10 @@ def _wall(
         given[corbel_course - 1] += corbel_pieces(wall, (ends[0], ends[1]), 0.5 * sum(vault.beds))
     courses = plan_courses(rng, heights, (ends[0], ends[1]), inner, through=given)
     pieces = _with_springers(courses, inner, heights)
-    own = [[p for p in piece if p not in row] for piece, row in zip(pieces, given, strict=True)]
+    partial = [[p for p in piece if p not in row] for piece, row in zip(pieces, given, strict=True)]
     splay = halves if elaborate and not wall.passage else None
     flush = (0, 0) if vault is None else vault.flush
-    for draft in _facing(wall, "I", own, [[]] * len(own), inner, heights, rng, flush):
+    for draft in _facing(wall, "I", partial, [[]] * len(partial), inner, heights, rng, flush):
         yield _splayed(draft, *splay) if splay is not None and draft.stone.plan.kind == "jamb" else draft
 
 

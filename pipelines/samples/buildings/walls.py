@@ -144,10 +144,10 @@ def plan_courses(
     below: list[float] = []
     for number, (low, high) in enumerate(pairwise(heights), start=1):
         middle = 0.5 * (low + high)
-        given = list(through[number - 1]) if number <= len(through) else []
+        through_stones = list(through[number - 1]) if number <= len(through) else []
         before = courses[-1] if courses else LaidCourse((), frozenset())
-        blocked = [before.pieces[k] for k in sorted(before.tall)] + given
-        pieces = list(given)
+        blocked = [before.pieces[k] for k in sorted(before.tall)] + through_stones
+        pieces = list(through_stones)
         if opening is not None and number == opening.jambs[0] - 1:  # no jamb on a sliver of the next stone
             below = sorted({*below, -opening.half, opening.half})
         for start, stop in _runs(blocked, opening, number, middle, ends):

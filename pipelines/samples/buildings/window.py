@@ -74,10 +74,11 @@ def make_window(seed: int = SEED) -> WindowBay:
     """
     rng = Random(seed)
     frame = wall_frame()
-    plans, own = _plan(rng), Random(f"depths of {seed}")
+    plans, depths_random = _plan(rng), Random(f"depths of {seed}")
     seen = [plan.kind == "header" and not all(plan.joint[1::2]) for plan in plans]
     depths = [
-        DEPTHS[p.kind][0] + (own.randint(-4, 4) / 100 if s else 0.0) for p, s in zip(plans, seen, strict=True)
+        DEPTHS[p.kind][0] + (depths_random.randint(-4, 4) / 100 if s else 0.0)
+        for p, s in zip(plans, seen, strict=True)
     ]
     stones = [build_stone(plan, round(d, 2), frame, rng) for plan, d in zip(plans, depths, strict=True)]
     measured = [measure_stone(stone, frame, rng) for stone in stones]

@@ -47,11 +47,11 @@ def _via_images(content: object) -> list[Mapping[str, Any]] | None:
     if not isinstance(content, Mapping):
         return None
     images = content.get("_via_img_metadata", content)
-    found = list(images.values()) if isinstance(images, Mapping) else []
-    fits = bool(found) and all(
-        isinstance(one, Mapping) and {"filename", "regions"} <= set(one) for one in found
+    listed = list(images.values()) if isinstance(images, Mapping) else []
+    fits = bool(listed) and all(
+        isinstance(image, Mapping) and {"filename", "regions"} <= set(image) for image in listed
     )
-    return found if fits else None
+    return listed if fits else None
 
 
 def read_annotations(
@@ -106,8 +106,8 @@ def _size_of(picture: Path) -> tuple[int, int] | None:
     from PIL import Image
 
     try:
-        with Image.open(picture) as found:
-            return int(found.size[0]), int(found.size[1])
+        with Image.open(picture) as photograph:
+            return int(photograph.size[0]), int(photograph.size[1])
     except OSError:
         return None
 
@@ -115,25 +115,27 @@ def _size_of(picture: Path) -> tuple[int, int] | None:
 def _outlines(
     path: Path, shapes: list[_Shape], tolerance: float, chosen: Mapping[str, str], label: str | None
 ) -> Iterator[Outline]:
-    found = [(shape, attributes_of(shape.values, chosen, shape.where)) for shape in shapes]
-    counts = Counter(said.code for _, said in found)
+    outlines = [(shape, attributes_of(shape.values, chosen, shape.where)) for shape in shapes]
+    counts = Counter(said.code for _, said in outlines)
     classes = max(counts.values(), default=0) > 1
     if classes:
-        found = _of_class(path, found, counts, label)
-    for number, (one, said) in enumerate(found, start=1):
-        code = f"S{number:03d}" if classes else made_code(said.code or "") or f"S{number:03d}"
+        outlines = _of_class(path, outlines, counts, label)
+    for number, (one, attributes) in enumerate(outlines, start=1):
+        code = f"S{number:03d}" if classes else made_code(attributes.code or "") or f"S{number:03d}"
         if classes:
-            kind = said.kind or (said.code if said.code and kind_of(said.code, {}) in KINDS else None)
-            notes = dict(said.notes) | ({"label": said.code} if said.code else {})
-            said = replace(said, code=code, kind=kind, notes=notes)
+            kind = attributes.kind or (
+                attributes.code if attributes.code and kind_of(attributes.code, {}) in KINDS else None
+            )
+            notes = dict(attributes.notes) | ({"label": attributes.code} if attributes.code else {})
+            attributes = replace(attributes, code=code, kind=kind, notes=notes)
         # both count from the corner of the first pixel, not from its middle
         ring = one.ring - 0.5
         corners = few_corners(ring, tolerance) if len(ring) > _DENSE else ring
-        yield Outline(number, f"S{int(code):03d}" if code.isdigit() else code, corners, said, one.where)
+        yield Outline(number, f"S{int(code):03d}" if code.isdigit() else code, corners, attributes, one.where)
 
 
 def _of_class(
-    path: Path, found: list[tuple[_Shape, Attributes]], counts: Counter[str | None], label: str | None
+    path: Path, outlines: list[tuple[_Shape, Attributes]], counts: Counter[str | None], label: str | None
 ) -> list[tuple[_Shape, Attributes]]:
     """Return the shapes of the class of stones."""
     names = {str(key): count for key, count in counts.items()}
@@ -141,11 +143,11 @@ def _of_class(
     if label is not None and label not in names:
         raise UsageError(f"no label {label!r}", where=str(path), remedy=f"labels are: {listed}")
     if label is not None:
-        return [one for one in found if str(one[1].code) == label]
+        return [outline for outline in outlines if str(outline[1].code) == label]
     if len(names) > 1 and not all(kind_of(name, {}) in KINDS for name in names):
         remedy = f"name that of the stones, e.g. --layer {max(names, key=names.__getitem__)}"
         raise UsageError(f"{len(names)} labels: {listed}", where=str(path), remedy=remedy)
-    return found
+    return outlines
 
 
 def _of_labelme(path: Path, shapes: list[Any]) -> Iterator[_Shape]:
@@ -174,10 +176,10 @@ def _of_labelme(path: Path, shapes: list[Any]) -> Iterator[_Shape]:
 
 def _of_via(path: Path, regions: Any) -> Iterator[_Shape]:
     listed = list(regions.values()) if isinstance(regions, Mapping) else list(regions)
-    for number, one in enumerate(listed, start=1):
+    for number, region in enumerate(listed, start=1):
         where = f"{path}, region {number}"
         try:
-            shape, said = one["shape_attributes"], one.get("region_attributes") or {}
+            shape, said = region["shape_attributes"], region.get("region_attributes") or {}
             yield _Shape(
                 _via_ring(shape), {k: v for k, v in said.items() if isinstance(v, str | int | float)}, where
             )

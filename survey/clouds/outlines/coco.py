@@ -51,18 +51,18 @@ def read_coco(
     """
     annotations = content if isinstance(content, list) else content["annotations"]
     head = {} if isinstance(content, list) else content
-    images = {one.get("id"): one for one in head.get("images", [])}
+    images = {image.get("id"): image for image in head.get("images", [])}
     shown = {annotation.get("image_id") for annotation in annotations}
     if len(shown) > 1:
         names = ", ".join(
-            str(images.get(one, {}).get("file_name", one)) for one in sorted(shown, key=str)[:5]
+            str(images.get(image, {}).get("file_name", image)) for image in sorted(shown, key=str)[:5]
         )
         raise UsageError(
             f"masks of {len(shown)} pictures: {names}", where=str(path), remedy="give a file for each picture"
         )
     image = images.get(next(iter(shown), None), {})
     size = (int(image["width"]), int(image["height"])) if {"width", "height"} <= set(image) else None
-    kinds = {one.get("id"): str(one.get("name")) for one in head.get("categories", [])}
+    kinds = {category.get("id"): str(category.get("name")) for category in head.get("categories", [])}
     outlines = tuple(_outlines(path, annotations, kinds, size, tolerance, chosen))
     name = Path(str(image.get("file_name", path.name))).name
     places = world_of(path.with_name(name)) or world_of(path)
@@ -87,25 +87,25 @@ def _outlines(
         }
         if annotation.get("category_id") in kinds:
             values["category"] = kinds[annotation["category_id"]]
-        said = attributes_of(values, chosen, where)
-        code = made_code(said.code or "") or f"S{number:03d}"
+        attributes = attributes_of(values, chosen, where)
+        code = made_code(attributes.code or "") or f"S{number:03d}"
         if code.isdigit():
             code = f"S{int(code):03d}"
         segmentation = annotation.get("segmentation")
         if isinstance(segmentation, dict):
             mask, column = _columns(segmentation, where)
-            found = outline_of_mask(number, mask, (column, 0), tolerance, where, said)
-            if found is None:
+            outline = outline_of_mask(number, mask, (column, 0), tolerance, where, attributes)
+            if outline is None:
                 raise SurveyError("the mask is empty", where=where, remedy="leave it out")
-            yield Outline(number, code, found.corners, said, where, found.doubts)
+            yield Outline(number, code, outline.corners, attributes, where, outline.doubts)
         elif isinstance(segmentation, list) and segmentation:
-            yield _polygon(number, code, segmentation, said, tolerance, where)
+            yield _polygon(number, code, segmentation, attributes, tolerance, where)
         else:
             raise SurveyError("has no segmentation", where=where, remedy=_REMEDY)
 
 
 def _polygon(
-    number: int, code: str, parts: list[Any], said: Attributes, tolerance: float, where: str
+    number: int, code: str, parts: list[Any], attributes: Attributes, tolerance: float, where: str
 ) -> Outline:
     try:
         # COCO counts from the corner of the first pixel, not from its middle
@@ -125,7 +125,9 @@ def _polygon(
         )
     ring = rings[best]
     dense = len(ring) > 12
-    return Outline(number, code, few_corners(ring, tolerance) if dense else ring, said, where, tuple(doubts))
+    return Outline(
+        number, code, few_corners(ring, tolerance) if dense else ring, attributes, where, tuple(doubts)
+    )
 
 
 def run_lengths(coded: Mapping[str, Any], where: str = "") -> NDArray[np.bool_]:

@@ -55,7 +55,7 @@ def read_dxf(
     ezdxf = optional("ezdxf", "DXF files")
     try:
         drawing = ezdxf.readfile(path)
-        found = entities_of(drawing, layer)
+        entities = entities_of(drawing, layer)
     except Exception as error:  # ezdxf raises OSError or its own classes
         what = f"cannot be read as DXF: {' '.join(str(error).split())[:120]}"
         raise SurveyError(what, where=str(path), remedy="save it as DXF R2000 or later") from error
@@ -67,29 +67,29 @@ def read_dxf(
             remedy="state the unit of its lengths, e.g. --unit m",
         )
     scale = unit or _UNITS.get(code, 1.0)
-    if not found.curves:
-        raise _empty(path, layer, found)
-    curves = [replace(curve, ring=_flat(curve.ring * scale)) for curve in found.curves]
-    texts = [replace(text, places=tuple(scale * place for place in text.places)) for text in found.texts]
-    return tuple(_coded(curves, texts, chosen, path)), tuple(_left_out(found))
+    if not entities.curves:
+        raise _empty(path, layer, entities)
+    curves = [replace(curve, ring=_flat(curve.ring * scale)) for curve in entities.curves]
+    texts = [replace(text, places=tuple(scale * place for place in text.places)) for text in entities.texts]
+    return tuple(_coded(curves, texts, chosen, path)), tuple(_left_out(entities))
 
 
-def _empty(path: Path, layer: str | None, found: Entities) -> SurveyError:
+def _empty(path: Path, layer: str | None, entities: Entities) -> SurveyError:
     what = f"no closed curve{'' if layer is None else f' on layer {layer}'}"
-    if found.left:
-        what += f", but {_listed(found.left)}"
+    if entities.left:
+        what += f", but {_listed(entities.left)}"
     remedy = "draw each stone as a closed polyline"
-    if found.hidden:
-        what += f"; {_listed(found.hidden)} on layers that are frozen or off"
-        remedy = f"show the layer, or name it, e.g. --layer {next(iter(found.hidden))}"
+    if entities.hidden:
+        what += f"; {_listed(entities.hidden)} on layers that are frozen or off"
+        remedy = f"show the layer, or name it, e.g. --layer {next(iter(entities.hidden))}"
     return SurveyError(what, where=str(path), remedy=remedy)
 
 
-def _left_out(found: Entities) -> Iterator[tuple[str, str]]:
-    if found.left:
-        yield "left out", f"{_listed(found.left)}: neither closed curves nor texts"
-    if found.hidden:
-        yield "hidden", f"outlines on layers that are frozen or off are left out: {_listed(found.hidden)}"
+def _left_out(entities: Entities) -> Iterator[tuple[str, str]]:
+    if entities.left:
+        yield "left out", f"{_listed(entities.left)}: neither closed curves nor texts"
+    if entities.hidden:
+        yield "hidden", f"outlines on layers that are frozen or off are left out: {_listed(entities.hidden)}"
 
 
 def _listed(counts: Counter[str]) -> str:
@@ -110,18 +110,18 @@ def _coded(
     tags = {meaning: name for meaning, name in chosen.items() if name not in ("layer", "text")}
     areas = [float(np.linalg.norm(area_vector(_in_space(curve.ring)))) for curve in curves]
     smallest = sorted(range(len(curves)), key=lambda k: areas[k])
-    own: dict[int, list[DrawnText]] = {}
+    labels: dict[int, list[DrawnText]] = {}
     around: Counter[int] = Counter()
     for text in texts:
         holders = next((h for place in text.places if (h := _holders(place, curves, smallest))), [])
         if holders:
-            own.setdefault(holders[0], []).append(text)
+            labels.setdefault(holders[0], []).append(text)
             around.update(holders[1:])
     for k, curve in enumerate(curves):
         where = f"{path}, {curve.where}"
         if around[k] >= _FRAMED:
-            _refuse_frame(curve, around[k], [curves[i].layer for i in own if i != k], where)
-        yield _outline(k + 1, curve, own.get(k, []), by_layer, tags, where)
+            _refuse_frame(curve, around[k], [curves[i].layer for i in labels if i != k], where)
+        yield _outline(k + 1, curve, labels.get(k, []), by_layer, tags, where)
 
 
 def _refuse_frame(curve: Curve, count: int, layers: Sequence[str], where: str) -> None:
@@ -138,15 +138,17 @@ def _outline(
     number: int, curve: Curve, texts: Sequence[DrawnText], by_layer: bool, tags: Mapping[str, str], where: str
 ) -> Outline:
     values = {tag: text for one in texts for tag, text in one.values.items()}
-    said = attributes_of(values, {m: name for m, name in tags.items() if name in values}, where)
-    names = [text.text or said.code or next(iter(text.values.values()), "") for text in texts]
+    attributes = attributes_of(values, {m: name for m, name in tags.items() if name in values}, where)
+    names = [text.text or attributes.code or next(iter(text.values.values()), "") for text in texts]
     name = curve.layer if by_layer else names[0] if names else f"S{number}"
     doubts = []
     if not by_layer and len(names) > 1:
         doubts.append(("texts", f"{len(names)} texts inside: {', '.join(names[:4])}"))
     code = made_code(name) or f"S{number}"
-    notes = dict(said.notes) | ({"layer": curve.layer} if curve.layer != "0" else {})
-    return Outline(number, code, curve.ring, replace(said, code=code, notes=notes), where, tuple(doubts))
+    notes = dict(attributes.notes) | ({"layer": curve.layer} if curve.layer != "0" else {})
+    return Outline(
+        number, code, curve.ring, replace(attributes, code=code, notes=notes), where, tuple(doubts)
+    )
 
 
 def _holders(place: Array, curves: Sequence[Curve], smallest: Sequence[int]) -> list[int]:

@@ -77,35 +77,35 @@ def entities_of(drawing: Any, layer: str | None) -> Entities:
     drawing : of ezdxf
     layer : on which outlines lie, which may be hidden; None: all that are shown
     """
-    found = Entities()
+    entities = Entities()
     hidden = {layer.dxf.name.lower() for layer in drawing.layers if layer.is_frozen() or layer.is_off()}
     hatches = list[Curve]()
-    for entity, on in _resolved(drawing.modelspace(), None, found, 0):
+    for entity, on in _resolved(drawing.modelspace(), None, entities, 0):
         kind = entity.dxftype()
         if kind in ("TEXT", "MTEXT"):
-            found.texts.append(_text(entity))
+            entities.texts.append(_text(entity))
             continue
         if kind in _SILENT or (layer is not None and on.lower() != layer.lower()):
             continue
         where = f"{kind} {entity.dxf.handle or 'of a block'} on layer {on}"
         rings = _rings(entity)
         if not rings:
-            found.left[f"open {kind}" if kind in _CURVES else kind] += 1
+            entities.left[f"open {kind}" if kind in _CURVES else kind] += 1
         elif layer is None and (on.lower() in hidden or entity.dxf.get("invisible", 0)):
-            found.hidden[on] += len(rings)
+            entities.hidden[on] += len(rings)
         else:
-            (hatches if kind == "HATCH" else found.curves).extend(Curve(ring, on, where) for ring in rings)
-    boxes = [_box(curve.ring) for curve in found.curves]
+            (hatches if kind == "HATCH" else entities.curves).extend(Curve(ring, on, where) for ring in rings)
+    boxes = [_box(curve.ring) for curve in entities.curves]
     # the filling of an outline is not a second stone
-    found.curves += [hatch for hatch in hatches if not any(_alike(_box(hatch.ring), box) for box in boxes)]
-    return found
+    entities.curves += [hatch for hatch in hatches if not any(_alike(_box(hatch.ring), box) for box in boxes)]
+    return entities
 
 
 def _resolved(entities: Any, layer: str | None, found: Entities, depth: int) -> Iterator[tuple[Any, str]]:
     """Yield entities with their layers, those of blocks at their places; labels become texts."""
     for entity in entities:
-        own = str(entity.dxf.get("layer", "0"))
-        on = layer if layer is not None and own == "0" else own
+        name = str(entity.dxf.get("layer", "0"))
+        on = layer if layer is not None and name == "0" else name
         if entity.dxftype() != "INSERT":
             yield entity, on
             continue
@@ -191,10 +191,10 @@ def _box(ring: Array) -> Array:
     return np.concatenate([ring.min(axis=0)[:2], ring.max(axis=0)[:2]])
 
 
-def _alike(one: Array, other: Array) -> bool:
-    size = float((other[2:] - other[:2]).max())
-    return bool(np.abs(one - other).max() <= _SAME * size)
+def _alike(one: Array, second: Array) -> bool:
+    size = float((second[2:] - second[:2]).max())
+    return bool(np.abs(one - second).max() <= _SAME * size)
 
 
-def _within(one: Array, other: Array) -> bool:
-    return bool((one[:2] > other[:2]).all() and (one[2:] < other[2:]).all())
+def _within(inner: Array, outer: Array) -> bool:
+    return bool((inner[:2] > outer[:2]).all() and (inner[2:] < outer[2:]).all())

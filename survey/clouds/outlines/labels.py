@@ -109,14 +109,14 @@ def outlines_of(labels: Labels, tolerance: float) -> Iterator[Outline]:
         mask = labels.numbers[box] == number
         if np.count_nonzero(mask) < _SMALLEST:
             continue
-        own = number if labels.values is None else int(labels.values[number])
-        where = f"{labels.path}, label {own}"
+        value = number if labels.values is None else int(labels.values[number])
+        where = f"{labels.path}, label {value}"
         outline = outline_of_mask(number, mask, (box[1].start, box[0].start), tolerance, where)
         if outline is not None:
             share = np.count_nonzero(mask) / labels.numbers.size
             whole = ("whole wall", f"it fills {share:.0%} of the picture: joints may be missing in the mask")
             doubts = (*outline.doubts, *([whole] if share > _MOST else []))
-            yield replace(outline, code=f"S{own:03d}", doubts=doubts)
+            yield replace(outline, code=f"S{value:03d}", doubts=doubts)
 
 
 def outline_of_mask(
@@ -125,7 +125,7 @@ def outline_of_mask(
     corner: tuple[int, int],
     tolerance: float,
     where: str,
-    said: Attributes | None = None,
+    attributes: Attributes | None = None,
 ) -> Outline | None:
     """Trace a mask, whose upper left pixel has this column and row; None if it has no area."""
     ring, pieces, share = trace(mask)
@@ -137,7 +137,7 @@ def outline_of_mask(
     if (bridged := neck(mask)) is not None:
         doubts.append(bridged)
     corners = few_corners(ring, tolerance) + corner
-    return Outline(number, f"S{number:03d}", corners, said or Attributes(), where, tuple(doubts))
+    return Outline(number, f"S{number:03d}", corners, attributes or Attributes(), where, tuple(doubts))
 
 
 def _pixels(path: Path) -> tuple[NDArray[Any], dict[int, tuple[float, ...]]]:
@@ -148,8 +148,8 @@ def _pixels(path: Path) -> tuple[NDArray[Any], dict[int, tuple[float, ...]]]:
     try:
         Image.MAX_IMAGE_PIXELS = None  # pictures of walls are large, and come from the user
         with Image.open(path) as picture:
-            found = getattr(picture, "tag_v2", {})
-            tags = {tag: tuple(found[tag]) for tag in (33550, 33922, 34264) if tag in found}
+            tiff_tags = getattr(picture, "tag_v2", {})
+            tags = {tag: tuple(tiff_tags[tag]) for tag in (33550, 33922, 34264) if tag in tiff_tags}
             plain = {"RGBA": "RGB", "PA": "RGB", "CMYK": "RGB", "YCbCr": "RGB", "LA": "L"}.get(picture.mode)
             return np.asarray(picture if plain is None else picture.convert(plain)), tags
     except (OSError, ValueError, SyntaxError) as error:

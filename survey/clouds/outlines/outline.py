@@ -94,12 +94,12 @@ def field_map(text: str | None) -> dict[str, str]:
         if it is written otherwise, or names an attribute that there is not
     """
     out = {}
-    for part in (text or "").split(","):
-        if not part.strip():
+    for word in (text or "").split(","):
+        if not word.strip():
             continue
-        name, _, column = (one.strip() for one in part.partition("="))
+        name, _, column = (one.strip() for one in word.partition("="))
         if name not in FIELDS or not column:
-            what = f"cannot be read at {part.strip()!r}"
+            what = f"cannot be read at {word.strip()!r}"
             remedy = f"write e.g. code=Stein_Nr,course=Lage with {', '.join(FIELDS)}"
             raise UsageError(what, where="--fields", remedy=remedy)
         out[name] = column
@@ -121,24 +121,24 @@ def attributes_of(values: Mapping[str, Any], chosen: Mapping[str, str], where: s
         if a chosen attribute is missing, or a value cannot be read
     """
     columns = _columns(tuple(values), chosen, where)
-    found = {meaning: _text(values[name]) for meaning, name in columns.items()}
+    texts = {meaning: _text(values[name]) for meaning, name in columns.items()}
     used = set(columns.values())
     notes = {
         _key(name): text[:200]
         for name, value in values.items()
         if name not in used and (text := _text(value)) is not None
     }
-    sigma = _number(found, "sigma", where)
-    depth = _number(found, "depth", where)
+    sigma = _number(texts, "sigma", where)
+    depth = _number(texts, "depth", where)
     return Attributes(
-        code=found.get("code"),
-        kind=found.get("kind"),
-        course=_course(found.get("course"), where),
-        zone=found.get("zone"),
+        code=texts.get("code"),
+        kind=texts.get("kind"),
+        course=_course(texts.get("course"), where),
+        zone=texts.get("zone"),
         depth=None if depth is None else _positive(depth, "depth", where),
-        depth_sigma=_number(found, "depth_sigma", where),
+        depth_sigma=_number(texts, "depth_sigma", where),
         sigma=None if sigma is None else _positive(sigma, "sigma", where),
-        score=_number(found, "score", where),
+        score=_number(texts, "score", where),
         notes=notes,
     )
 

@@ -38,12 +38,12 @@ def _is_ring(value: object) -> bool:
     )
 
 
-def _ring_of(one: object) -> list[Any] | None:
+def _ring_of(point: object) -> list[Any] | None:
     """Return the corners in an entry of a list: itself, or the one value of an object that is a list of places."""
-    if isinstance(one, Mapping):
-        rings = [value for value in one.values() if _is_ring(value)]
+    if isinstance(point, Mapping):
+        rings = [value for value in point.values() if _is_ring(value)]
         return rings[0] if len(rings) == 1 else None
-    return one if isinstance(one, list) and _is_ring(one) else None
+    return point if isinstance(point, list) and _is_ring(point) else None
 
 
 def read_plain_json(path: Path, content: Any, chosen: Mapping[str, str]) -> tuple[Outline, ...]:
@@ -66,18 +66,18 @@ def read_plain_json(path: Path, content: Any, chosen: Mapping[str, str]) -> tupl
 
 
 def _entries(path: Path, content: list[Any], chosen: Mapping[str, str]) -> Iterator[Outline]:
-    for number, one in enumerate(content, start=1):
+    for number, entry in enumerate(content, start=1):
         where = f"{path}, stone {number}"
-        values = dict(one) if isinstance(one, Mapping) else {}
-        ring = _ring_of(one)
+        values = dict(entry) if isinstance(entry, Mapping) else {}
+        ring = _ring_of(entry)
         if ring is None:
             raise SurveyError("has no outline", where=where, remedy=_JSON)
-        said = attributes_of(
+        attributes = attributes_of(
             {name: value for name, value in values.items() if isinstance(value, str | int | float)},
             chosen,
             where,
         )
-        yield Outline(number, _code(said.code, number), _open(ring), said, where)
+        yield Outline(number, _code(attributes.code, number), _open(ring), attributes, where)
 
 
 def read_table(path: Path, chosen: Mapping[str, str], unit: float | None = None) -> tuple[Outline, ...]:
@@ -99,7 +99,7 @@ def read_table(path: Path, chosen: Mapping[str, str], unit: float | None = None)
     titles = [unit_of(cell)[0] for cell in header.cells]
     places = {name.lower(): k for k, name in reversed(list(enumerate(titles)))}
     across, upward, code = (
-        next((places[one] for one in alike if one in places), None) for alike in _corners(chosen)
+        next((places[alias] for alias in alike if alias in places), None) for alike in _corners(chosen)
     )
     if across is None or upward is None or code is None:
         names = ", ".join(header.cells or table.rows[0].cells)
@@ -139,8 +139,8 @@ def _of_rows(
     for number, (name, places) in enumerate(corners.items(), start=1):
         line, values = first[name]
         where = f"{path}:{line}"
-        said = attributes_of(values, chosen, where)
-        yield Outline(number, _code(name, number), _open(places), said, where)
+        attributes = attributes_of(values, chosen, where)
+        yield Outline(number, _code(name, number), _open(places), attributes, where)
 
 
 def _code(said: str | None, number: int) -> str:
@@ -151,5 +151,5 @@ def _code(said: str | None, number: int) -> str:
 def _open(places: list[Any]) -> Array:
     """Return the corners (n, 2), without repetitions."""
     ring = np.array(places, dtype=np.float64)
-    kept = np.any(ring != np.roll(ring, 1, axis=0), axis=1)
-    return ring[kept] if kept.any() else ring[:1]
+    distinct = np.any(ring != np.roll(ring, 1, axis=0), axis=1)
+    return ring[distinct] if distinct.any() else ring[:1]

@@ -93,10 +93,12 @@ def read_outlines(
     if not drawing.outlines:
         raise SurveyError("has no outlines", where=str(path), remedy="draw each stone as a polygon")
     if drawing.pixel is None and not drawing.pixels:
-        drawing = replace(drawing, outlines=tuple(_sparse(one, _LIKELY * sigma) for one in drawing.outlines))
+        drawing = replace(
+            drawing, outlines=tuple(_sparse(outline, _LIKELY * sigma) for outline in drawing.outlines)
+        )
     for outline in drawing.outlines:
         _check(outline)
-    return replace(drawing, outlines=tuple(_of_kind(one, kinds or {}) for one in drawing.outlines))
+    return replace(drawing, outlines=tuple(_of_kind(outline, kinds or {}) for outline in drawing.outlines))
 
 
 def _read(

@@ -46,23 +46,23 @@ def _lines(features: Iterable[Mapping[str, object]]) -> Iterable[str]:
     return (json.dumps(feature, ensure_ascii=False) for feature in features)
 
 
-def _feature(one: Outline, reason: str) -> dict[str, object]:
-    said = one.said
+def _feature(outline: Outline, reason: str) -> dict[str, object]:
+    attributes = outline.said
     known = {
-        "code": one.code,
-        "kind": said.kind,
-        "course": said.course,
-        "zone": said.zone,
-        "depth": said.depth,
-        "depth_sigma": said.depth_sigma,
-        "sigma": said.sigma,
-        "score": said.score,
+        "code": outline.code,
+        "kind": attributes.kind,
+        "course": attributes.course,
+        "zone": attributes.zone,
+        "depth": attributes.depth,
+        "depth_sigma": attributes.depth_sigma,
+        "sigma": attributes.sigma,
+        "score": attributes.score,
     }
-    ring = [*one.corners.tolist(), one.corners[0].tolist()]
+    ring = [*outline.corners.tolist(), outline.corners[0].tolist()]
     return {
         "type": "Feature",
         "properties": {key: value for key, value in known.items() if value is not None}
-        | dict(said.notes)
+        | dict(attributes.notes)
         | {"reason": reason},
         "geometry": {"type": "Polygon", "coordinates": [ring]},
     }

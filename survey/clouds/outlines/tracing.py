@@ -70,20 +70,20 @@ def few_corners(ring: Array, tolerance: float) -> Array:
     if len(ring) <= _FEWEST:
         return ring
     for finer in (1.0, 0.5, 0.25):
-        kept = _douglas_peucker(ring, finer * tolerance)
-        if len(kept) < _FEWEST:
+        douglas_peucker = _douglas_peucker(ring, finer * tolerance)
+        if len(douglas_peucker) < _FEWEST:
             return ring[_extreme(ring)]
-        for corners in (_met(ring, kept, tolerance), ring[kept]):
+        for corners in (_met(ring, douglas_peucker, tolerance), ring[douglas_peucker]):
             if not _crosses(corners):
                 return corners
     return ring
 
 
-def _met(ring: Array, kept: list[int], tolerance: float) -> Array:
+def _met(ring: Array, corners: list[int], tolerance: float) -> Array:
     """Return the corners where lines fitted to neighbouring sides meet, near those of the ring."""
-    lines = [_line(_side(ring, kept[k], kept[(k + 1) % len(kept)])) for k in range(len(kept))]
-    out = ring[kept].copy()
-    for k, index in enumerate(kept):
+    lines = [_line(_side(ring, corners[k], corners[(k + 1) % len(corners)])) for k in range(len(corners))]
+    out = ring[corners].copy()
+    for k, index in enumerate(corners):
         (p, a), (q, b) = lines[k - 1], lines[k]
         turn = a[0] * b[1] - a[1] * b[0]
         if abs(turn) < _SHARP:
@@ -108,13 +108,13 @@ def _crosses(ring: Array) -> bool:
 
 def _extreme(ring: Array) -> NDArray[np.intp]:
     """Return three or more indices that span a small ring."""
-    found = {
+    extremes = {
         int(np.argmin(ring[:, 0])),
         int(np.argmax(ring[:, 0])),
         int(np.argmin(ring[:, 1])),
         int(np.argmax(ring[:, 1])),
     }
-    return np.array(sorted(found) if len(found) >= _FEWEST else range(len(ring)))
+    return np.array(sorted(extremes) if len(extremes) >= _FEWEST else range(len(ring)))
 
 
 def _douglas_peucker(ring: Array, tolerance: float) -> list[int]:
@@ -122,8 +122,8 @@ def _douglas_peucker(ring: Array, tolerance: float) -> list[int]:
     first = int(np.argmax(((ring - ring.mean(axis=0)) ** 2).sum(axis=1)))
     turned = np.roll(ring, -first, axis=0)
     closed = np.concatenate([turned, turned[:1]])
-    far = int(np.argmax(((turned - turned[0]) ** 2).sum(axis=1)))
-    kept, stack = {0, far}, [(0, far), (far, len(ring))]
+    farthest = int(np.argmax(((turned - turned[0]) ** 2).sum(axis=1)))
+    corners, stack = {0, farthest}, [(0, farthest), (farthest, len(ring))]
     while stack:
         start, stop = stack.pop()
         if stop - start < 2:
@@ -138,9 +138,9 @@ def _douglas_peucker(ring: Array, tolerance: float) -> list[int]:
         worst = int(np.argmax(apart))
         if apart[worst] > tolerance:
             middle = start + 1 + worst
-            kept.add(middle)
+            corners.add(middle)
             stack += [(start, middle), (middle, stop)]
-    return [(k + first) % len(ring) for k in sorted(kept)]
+    return [(k + first) % len(ring) for k in sorted(corners)]
 
 
 def _side(ring: Array, start: int, stop: int) -> Array:

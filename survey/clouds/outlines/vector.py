@@ -56,20 +56,20 @@ def read_vector(path: Path, layer: str | None, chosen: Mapping[str, str]) -> tup
     out = []
     for k, shape in enumerate(shapes):
         where = f"{path}, feature {int(fids[k])}"
-        said = attributes_of(
+        attributes = attributes_of(
             {name: column[k] for name, column in zip(names, columns, strict=True)}, chosen, where
         )
-        out.append(_outline(k + 1, int(fids[k]), shape, said, where))
+        out.append(_outline(k + 1, int(fids[k]), shape, attributes, where))
     return tuple(out)
 
 
 def _check_degrees(path: Path, bounds: Array) -> None:
     """Refuse longitudes and latitudes, in which all outlines are specks far from zero."""
-    found = bounds[np.isfinite(bounds).all(axis=1)]
-    if not len(found) or np.abs(found[:, [0, 2]]).max() > 180.0 or np.abs(found[:, [1, 3]]).max() > 90.0:
+    finite = bounds[np.isfinite(bounds).all(axis=1)]
+    if not len(finite) or np.abs(finite[:, [0, 2]]).max() > 180.0 or np.abs(finite[:, [1, 3]]).max() > 90.0:
         return
-    extent = float((found[:, 2:] - found[:, :2]).max())
-    if extent < _DEGREES and np.abs(found).max() > 1.0:
+    extent = float((finite[:, 2:] - finite[:, :2]).max())
+    if extent < _DEGREES and np.abs(finite).max() > 1.0:
         raise SurveyError(
             f"its coordinates are longitudes and latitudes: the largest outline is {extent:.1g} wide",
             where=str(path),
@@ -77,7 +77,7 @@ def _check_degrees(path: Path, bounds: Array) -> None:
         )
 
 
-def _outline(number: int, fid: int, shape: Any, said: Attributes, where: str) -> Outline:
+def _outline(number: int, fid: int, shape: Any, attributes: Attributes, where: str) -> Outline:
     if shape is None or shape.is_empty or shape.geom_type not in ("Polygon", "MultiPolygon", "LineString"):
         found = "no geometry" if shape is None or shape.is_empty else f"a {shape.geom_type}"
         raise SurveyError(f"{found}, not a polygon", where=where, remedy="draw each stone as a polygon")
@@ -86,14 +86,14 @@ def _outline(number: int, fid: int, shape: Any, said: Attributes, where: str) ->
             raise SurveyError("the line is not closed", where=where, remedy="draw each stone as a polygon")
         rings, doubts = [_ring(shape.coords)], []
     else:
-        parts = [shape] if shape.geom_type == "Polygon" else sorted(shape.geoms, key=lambda one: -one.area)
+        parts = [shape] if shape.geom_type == "Polygon" else sorted(shape.geoms, key=lambda geom: -geom.area)
         rings = [_ring(one.exterior.coords) for one in parts]
-        large = [one for one in parts[1:] if one.area > _SMALL * parts[0].area]
+        large = [polygon for polygon in parts[1:] if polygon.area > _SMALL * parts[0].area]
         doubts = [("in pieces", f"{len(large) + 1} pieces; the largest is taken")] if large else []
         if any(parts[0].interiors):
             doubts.append(("holes", f"{len(parts[0].interiors)} holes, which are ignored"))
-    code = made_code(said.code or f"S{fid}") or f"S{fid}"
-    return Outline(number, code, rings[0], said, where, tuple(doubts))
+    code = made_code(attributes.code or f"S{fid}") or f"S{fid}"
+    return Outline(number, code, rings[0], attributes, where, tuple(doubts))
 
 
 def _ring(coordinates: Any) -> Array:

@@ -41,12 +41,12 @@ def mark_outlines(rings: Sequence[Array], proposal: Proposal) -> list[Mark]:
     marks = _overlaps(shapely, drawn)
     if not proposal.stones:
         return marks
-    own = shapely.make_valid(
+    polygons = shapely.make_valid(
         np.array([shapely.polygons(stone.ring) for stone in proposal.stones], dtype=object)
     )
-    first, second = shapely.STRtree(own).query(drawn, predicate="intersects")
-    shared = shapely.area(shapely.intersection(drawn[first], own[second]))
-    holds = shared > _PART * shapely.area(own[second])
+    first, second = shapely.STRtree(polygons).query(drawn, predicate="intersects")
+    shared = shapely.area(shapely.intersection(drawn[first], polygons[second]))
+    holds = shared > _PART * shapely.area(polygons[second])
     lies = shared > _MOST * shapely.area(drawn[first])
     joints = {tuple(sorted(border.stones)): border for border in proposal.borders}
     for k in np.unique(first[holds]).tolist():
@@ -60,10 +60,10 @@ def mark_outlines(rings: Sequence[Array], proposal: Proposal) -> list[Mark]:
     for b in np.unique(second[lies]).tolist():
         parts = first[lies & (second == b)].tolist()
         for i, a in enumerate(parts):
-            for other in parts[i + 1 :]:
-                middle = 0.5 * (rings[a].mean(axis=0) + rings[other].mean(axis=0))
+            for further in parts[i + 1 :]:
+                middle = 0.5 * (rings[a].mean(axis=0) + rings[further].mean(axis=0))
                 text = "two outlines on one stone: no joint shows between them"
-                marks.append(Mark((a, other), "split", text, (float(middle[0]), float(middle[1]))))
+                marks.append(Mark((a, further), "split", text, (float(middle[0]), float(middle[1]))))
     return marks
 
 

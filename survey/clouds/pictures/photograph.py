@@ -80,13 +80,13 @@ def open_photograph(
     index = path.parent / _INDEX
     if depth is None and path.name == "wall.png" and beside.is_file() and index.is_file():
         depth = beside
-    found = None
+    depths = None
     if depth is not None:
         numbers = np.asarray(_opened(depth)[0]).astype(np.float32)
         _check_same(numbers.shape, (height, width), depth)
         lowest = _lowest(depth.parent / _INDEX)
-        found = filled(np.where(numbers > 0, lowest + (numbers - 1.0) * STEP, np.nan).astype(np.float32))
-    return Photograph(path, pixels, found, left_out, places, stated)
+        depths = filled(np.where(numbers > 0, lowest + (numbers - 1.0) * STEP, np.nan).astype(np.float32))
+    return Photograph(path, pixels, depths, left_out, places, stated)
 
 
 def _opened(path: Path) -> tuple[Any, dict[int, tuple[float, ...]]]:
@@ -105,8 +105,8 @@ def _opened(path: Path) -> tuple[Any, dict[int, tuple[float, ...]]]:
         raise SurveyError(what, where=str(path), remedy="save it as PNG, JPEG or TIFF") from error
     finally:
         Image.MAX_IMAGE_PIXELS = limit
-    found = getattr(picture, "tag_v2", {})
-    return picture, {tag: tuple(found[tag]) for tag in (33550, 33922, 34264) if tag in found}
+    tiff_tags = getattr(picture, "tag_v2", {})
+    return picture, {tag: tuple(tiff_tags[tag]) for tag in (33550, 33922, 34264) if tag in tiff_tags}
 
 
 def _places(
@@ -119,11 +119,11 @@ def _places(
     """Return where the pixels lie, and whether anything says so."""
     width, height = shape
     world = world_of(path, tags)
-    given = [name for name, one in (("--pixel", pixel), ("--size", size)) if one is not None]
-    if world is not None and given:
-        what = f"{given[0]} with a picture whose world file or tags say where it lies"
+    names = [name for name, one in (("--pixel", pixel), ("--size", size)) if one is not None]
+    if world is not None and names:
+        what = f"{names[0]} with a picture whose world file or tags say where it lies"
         raise UsageError(what, where=str(path), remedy="leave it out, or move the world file away")
-    if len(given) == 2:
+    if len(names) == 2:
         raise UsageError("--pixel and --size", where=str(path), remedy="give one of them")
     if world is not None:
         return world, True

@@ -29,7 +29,7 @@ def joint_width(pixels: NDArray[np.uint8], depth: Field | None = None) -> tuple[
     width [px], and the contrast of joints over grain at it
     """
     parts = list(_parts(pixels.shape))
-    found = []
+    widths = []
     for width in _WIDTHS:
         if min(pixels.shape[:2]) * WIDTH / width < 40:
             break
@@ -39,11 +39,11 @@ def joint_width(pixels: NDArray[np.uint8], depth: Field | None = None) -> tuple[
             channels, _, _ = channels_of(resized(pixels[part], width / WIDTH), heights)
             grain, contrast = grain_and_contrast(combined(channels))
             ratios.append(contrast / grain)
-        found.append((width, float(np.mean(sorted(ratios)[-_BEST:]))))
-    if not found:
+        widths.append((width, float(np.mean(sorted(ratios)[-_BEST:]))))
+    if not widths:
         return WIDTH, 0.0
-    best = max(ratio for _, ratio in found)
-    return next((one, ratio) for one, ratio in found if ratio >= _GOOD * best)
+    best = max(ratio for _, ratio in widths)
+    return next((one, ratio) for one, ratio in widths if ratio >= _GOOD * best)
 
 
 def _parts(shape: tuple[int, ...]) -> Iterator[tuple[slice, slice]]:

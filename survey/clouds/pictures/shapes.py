@@ -55,13 +55,13 @@ def without_mortar(regions: Ints, image: Field, reach: float) -> Bools:
         change = np.diff(regions, axis=axis) != 0
         border[tuple(slice(None, -1) if k == axis else slice(None) for k in (0, 1))] |= change
         border[tuple(slice(1, None) if k == axis else slice(None) for k in (0, 1))] |= change
-    far = distance_transform_edt(~border)
-    inside = (far > 1.3 * WIDTH) & (regions > 0)
+    distance = distance_transform_edt(~border)
+    inside = (distance > 1.3 * WIDTH) & (regions > 0)
     smooth = gaussian_filter(image, 0.6)
     stone = _spread(smooth, inside, 4.0 * WIDTH)
     joint = _spread(maximum_filter(smooth, 3), border & (regions > 0), 2.5 * WIDTH)
     contrast = joint - stone
-    mortar = (smooth - stone > 0.5 * contrast) & (contrast > _SEEN) & (far <= reach * WIDTH)
+    mortar = (smooth - stone > 0.5 * contrast) & (contrast > _SEEN) & (distance <= reach * WIDTH)
     return np.asarray((regions > 0) & ~border & ~mortar, dtype=np.bool_)
 
 
@@ -112,17 +112,17 @@ def _sharp(ring: Array) -> Array:
     k = 0
     while k < len(ring) > _FEWEST:
         before, start, stop, after = (ring[(k + n) % len(ring)] for n in (-1, 0, 1, 2))
-        one, other = start - before, after - stop
-        lengths = np.linalg.norm(one), np.linalg.norm(other)
-        turn = float(one[0] * other[1] - one[1] * other[0]) / max(float(lengths[0] * lengths[1]), 1e-12)
+        first, second = start - before, after - stop
+        lengths = np.linalg.norm(first), np.linalg.norm(second)
+        turn = float(first[0] * second[1] - first[1] * second[0]) / max(float(lengths[0] * lengths[1]), 1e-12)
         short = float(np.linalg.norm(stop - start))
         if short > _BEVEL * WIDTH or min(lengths) < 2.0 * short or abs(turn) < _SQUARE:
             k += 1
             continue
-        along = float((stop - start)[0] * other[1] - (stop - start)[1] * other[0]) / (
+        along = float((stop - start)[0] * second[1] - (stop - start)[1] * second[0]) / (
             turn * lengths[0] * lengths[1]
         )
-        meet = start + along * one
+        meet = start + along * first
         if not 0.0 <= along * lengths[0] <= _BEVEL * WIDTH:
             k += 1
             continue

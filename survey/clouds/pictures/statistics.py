@@ -28,14 +28,14 @@ def bond_statistics(
     rows: list[tuple[str, str]] = [
         ("Usual length and height", f"{np.median(size[:, 0]):.2f} × {np.median(size[:, 1]):.2f} m")
     ]
-    found = sorted({course for course in courses if course is not None})
-    if found:
+    numbers = sorted({course for course in courses if course is not None})
+    if numbers:
         heights = [
             float(np.median([size[k, 1] for k, course in enumerate(courses) if course == number]))
-            for number in found
+            for number in numbers
         ]
         rows.append(("Height of courses", f"{min(heights):.2f} to {max(heights):.2f} m"))
-        staggered, joints = _staggered(rings, courses, found)
+        staggered, joints = _staggered(rings, courses, numbers)
         if joints:
             rows.append(("Staggered head joints", f"{staggered / joints:.0%} of {joints}"))
     headers, stretchers = (sum(one == kind for one in kinds) for kind in ("header", "stretcher"))

@@ -77,8 +77,8 @@ def _detail(pixels: NDArray[np.uint8]) -> float:
 
     height, width = pixels.shape[:2]
     light = lightness(pixels[height // 4 : height // 4 + 600, width // 4 : width // 4 + 600])[0]
-    one, two = gaussian_filter(light, 1.0), gaussian_filter(light, 2.0)
-    return float((light - one).std() / max(float((one - two).std()), 1e-6))
+    fine, two = gaussian_filter(light, 1.0), gaussian_filter(light, 2.0)
+    return float((light - fine).std() / max(float((fine - two).std()), 1e-6))
 
 
 def judge_result(
@@ -130,13 +130,13 @@ def _directions(rings: Sequence[Array], upright: bool) -> tuple[float, float]:
     middle = 0.5 * (ends[use, :2] + ends[use, 2:])
     span = np.ptp(middle, axis=0)
     terms = np.column_stack([np.ones(use.sum()), (middle - middle.mean(axis=0)) / np.maximum(span, 1e-9)])
-    found = np.zeros(3)
+    angles = np.zeros(3)
     scale = np.sqrt(weight[use])
     for _ in range(10):  # least absolute deviations: sides of arches and repairs have other directions
-        found = np.linalg.lstsq(terms * scale[:, None], angle[use] * scale, rcond=None)[0]
-        scale = np.sqrt(weight[use] / np.maximum(np.abs(angle[use] - terms @ found), 0.2))
-    spread = 1.4826 * float(np.median(np.abs(angle[use] - terms @ found)))
+        angles = np.linalg.lstsq(terms * scale[:, None], angle[use] * scale, rcond=None)[0]
+        scale = np.sqrt(weight[use] / np.maximum(np.abs(angle[use] - terms @ angles), 0.2))
+    spread = 1.4826 * float(np.median(np.abs(angle[use] - terms @ angles)))
     share = weight[use] / weight[use].mean()
     error = spread * np.sqrt(np.diag(np.linalg.pinv((terms * share[:, None]).T @ terms)))
-    change = np.where(np.abs(found) > _CERTAIN * error, np.abs(found), 0.0)
-    return float(found[0]), float(change[1:].max())
+    change = np.where(np.abs(angles) > _CERTAIN * error, np.abs(angles), 0.0)
+    return float(angles[0]), float(change[1:].max())

@@ -38,8 +38,10 @@ def open_e57(path: Path) -> PointCloud:
     try:
         file = pye57.E57(str(path))
         headers = [file.get_header(k) for k in range(file.scan_count)]
-        count = sum(int(one.point_count) for one in headers)
-        stations = tuple(_station(k, one) for k, one in enumerate(headers, start=1) if _is_placed(one))
+        count = sum(int(header.point_count) for header in headers)
+        stations = tuple(
+            _station(k, header) for k, header in enumerate(headers, start=1) if _is_placed(header)
+        )
         near = _near(headers)
         warnings = _warnings(pye57, path, headers)
         for header in headers:

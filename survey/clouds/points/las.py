@@ -39,11 +39,11 @@ def open_las(path: Path) -> PointCloud:
     try:
         with laspy.open(path) as file:
             header = file.header
-            count, near = int(header.point_count), (np.array(header.mins) + np.array(header.maxs)) / 2.0
+            count, middle = int(header.point_count), (np.array(header.mins) + np.array(header.maxs)) / 2.0
     except BaseException as error:  # laspy lets through what lazrs, struct and numpy raise
         raise _damaged(path, error) from error
-    if count and not np.isfinite(near).all():
-        near = np.zeros(3)
+    if count and not np.isfinite(middle).all():
+        middle = np.zeros(3)
 
     def chunks(origin: Array, colours: bool) -> Iterator[Chunk]:
         try:
@@ -61,7 +61,7 @@ def open_las(path: Path) -> PointCloud:
                 remedy="export it again",
             )
 
-    return PointCloud(path, count, near, chunks)
+    return PointCloud(path, count, middle, chunks)
 
 
 def _places(points: Any, header: Any, origin: Array) -> Array:
@@ -76,11 +76,11 @@ def _places(points: Any, header: Any, origin: Array) -> Array:
 def _colours(points: Any) -> Any:
     names = set(points.array.dtype.names)
     if {"red", "green", "blue"} <= names:
-        found = np.column_stack([points.array[name] for name in ("red", "green", "blue")])
-        return (found >> 8 if found.max(initial=0) > 255 else found).astype(np.uint8)
-    found = points.array["intensity"].astype(np.float64)
-    top = max(float(np.quantile(found, 0.99)) if len(found) else 1.0, 1.0)
-    return np.repeat(np.clip(found * (255.0 / top), 0.0, 255.0).astype(np.uint8)[:, None], 3, axis=1)
+        colours = np.column_stack([points.array[name] for name in ("red", "green", "blue")])
+        return (colours >> 8 if colours.max(initial=0) > 255 else colours).astype(np.uint8)
+    colours = points.array["intensity"].astype(np.float64)
+    top = max(float(np.quantile(colours, 0.99)) if len(colours) else 1.0, 1.0)
+    return np.repeat(np.clip(colours * (255.0 / top), 0.0, 255.0).astype(np.uint8)[:, None], 3, axis=1)
 
 
 def _selection(laspy: Any, path: Path, colours: bool) -> dict[str, Any]:

@@ -43,14 +43,14 @@ def open_pcd(path: Path) -> PointCloud:
     first = next((rows for rows in _rows(path, head, CHUNK) if len(rows)), None)
     if first is None:
         raise SurveyError("has no point", where=str(path), remedy="export it again")
-    near = _places(first)[0]
+    place = _places(first)[0]
 
     def chunks(origin: Array, colours: bool) -> Iterator[Chunk]:
         for rows in _rows(path, head, CHUNK):
             yield Chunk(_places(rows) - origin, _tints(rows) if colours else None)
 
-    warnings = lost_digits(path, float(np.abs(near).max())) if single else ()
-    return PointCloud(path, None, near, chunks, _stations(words), warnings)
+    warnings = lost_digits(path, float(np.abs(place).max())) if single else ()
+    return PointCloud(path, None, place, chunks, _stations(words), warnings)
 
 
 def _head(file: BufferedReader, path: Path) -> tuple[_Head, Mapping[str, list[str]]]:
@@ -136,7 +136,7 @@ def _places(rows: NDArray[np.void]) -> Array:
 
 def _tints(rows: NDArray[np.void]) -> NDArray[np.uint8] | None:
     """Return colours, which are packed into four bytes of a number: blue, green, red."""
-    name = next((one for one in ("rgb", "rgba") if one in (rows.dtype.names or ())), None)
+    name = next((name for name in ("rgb", "rgba") if name in (rows.dtype.names or ())), None)
     if name is None or rows.dtype[name].itemsize != struct.calcsize("I"):
         return None
     packed = np.ascontiguousarray(rows[name]).view(np.uint32)

@@ -56,9 +56,9 @@ def open_ply(path: Path) -> PointCloud:
     except OSError as error:
         raise unreadable(path, error) from error
     first = next(_rows(path, head, 1), np.zeros((1, 3)))
-    near = first[0, :3] if len(first) else np.zeros(3)
+    place = first[0, :3] if len(first) else np.zeros(3)
     single = head.record["x"] == np.dtype("f4").newbyteorder(head.record["x"].byteorder)
-    warnings = lost_digits(path, float(np.abs(near).max())) if single else ()
+    warnings = lost_digits(path, float(np.abs(place).max())) if single else ()
 
     def chunks(origin: Array, colours: bool) -> Iterator[Chunk]:
         for rows in _rows(path, head, CHUNK):
@@ -67,7 +67,7 @@ def open_ply(path: Path) -> PointCloud:
             places -= origin
             yield Chunk(np.ascontiguousarray(places), tints)
 
-    return PointCloud(path, head.count, near, chunks, warnings=warnings)
+    return PointCloud(path, head.count, place, chunks, warnings=warnings)
 
 
 def _head(file: BufferedReader, path: Path) -> _Head:
@@ -122,8 +122,8 @@ def _rows(path: Path, head: _Head, most: int) -> Iterator[Array]:
         file.seek(head.start)
         while left > 0:
             if head.text:
-                found = _text_rows(file, path, head, min(most, left), head.count - left)
-                rows = found[:, [head.names.index(name) for name in wanted]]
+                text_rows = _text_rows(file, path, head, min(most, left), head.count - left)
+                rows = text_rows[:, [head.names.index(name) for name in wanted]]
             else:
                 raw = np.fromfile(file, head.record, min(most, left))
                 rows = np.column_stack([raw[name].astype(np.float64) for name in wanted])

@@ -48,8 +48,8 @@ def open_ptx(path: Path) -> PointCloud:
     """
     with path.open(encoding="ascii", errors="replace") as file:
         scans = tuple(_scans(file, path))
-    near = next((scan.near for scan in scans if scan.near is not None), None)
-    if near is None:
+    place = next((scan.near for scan in scans if scan.near is not None), None)
+    if place is None:
         raise SurveyError("has no point", where=str(path), remedy="export the scans again")
     stations = tuple(
         Station(f"scan{k}", scan.transform[3, :3].copy())
@@ -70,7 +70,7 @@ def open_ptx(path: Path) -> PointCloud:
                     left -= min(left, _LINES)
                     yield _chunk(rows, scan, origin, colours)
 
-    return PointCloud(path, None, near, chunks, stations)
+    return PointCloud(path, None, place, chunks, stations)
 
 
 def _scans(file: TextIO, path: Path) -> Iterator[_Scan]:
@@ -93,25 +93,25 @@ def _scans(file: TextIO, path: Path) -> Iterator[_Scan]:
         turn = matrix[:3, :3]
         if not np.isfinite(matrix).all() or np.abs(turn @ turn.T - np.eye(3)).max() > _AFFINE:
             raise SurveyError("the transform of a scan is no rotation", where=where, remedy="export it again")
-        near, read = None, 0
+        place, read = None, 0
         for text in islice(file, count):
             read += 1
-            if near is None and not text.startswith(("0 0 0 ", "0.0")):
+            if place is None and not text.startswith(("0 0 0 ", "0.0")):
                 places = _rows([text], path, line + _HEAD + read)[:, :3]
-                near = places[0] @ turn + matrix[3, :3] if places.any() else None
+                place = places[0] @ turn + matrix[3, :3] if places.any() else None
         if read < count:
             what = f"a scan announces {count} points and holds {read}"
             raise SurveyError(what, where=where, remedy="export it again")
-        yield _Scan(count, matrix, line + _HEAD + 1, near)
+        yield _Scan(count, matrix, line + _HEAD + 1, place)
         line += _HEAD + count
 
 
 def _rows(lines: list[str], path: Path, first: int) -> Array:
     try:
-        found = np.loadtxt(lines, ndmin=2)
-        if found.shape[1] in (3, 4, 7):
-            return found
-        what = f"{found.shape[1]} values of a point"
+        block = np.loadtxt(lines, ndmin=2)
+        if block.shape[1] in (3, 4, 7):
+            return block
+        what = f"{block.shape[1]} values of a point"
     except ValueError as error:
         what = str(error).split(";")[0]
     raise SurveyError(

@@ -71,7 +71,7 @@ def find_wall(clouds: Sequence[PointCloud], progress: Progress) -> Wall:
     origin = np.floor(clouds[0].near)
     sample = _sample(clouds, origin, progress)
     rng = np.random.default_rng(1)
-    best, kept = 0, np.zeros(len(sample), dtype=bool)
+    best, on_wall = 0, np.zeros(len(sample), dtype=bool)
     for _ in range(_TRIES if len(sample) > 3 else 0):
         a, b, c = sample[rng.integers(len(sample), size=3)]
         normal = np.cross(b - a, c - a)
@@ -80,45 +80,45 @@ def find_wall(clouds: Sequence[PointCloud], progress: Progress) -> Wall:
             continue
         close = np.abs((sample - a) @ normal) <= _CLOSE * length
         if (count := int(np.count_nonzero(close))) > best:
-            best, kept = count, close
+            best, on_wall = count, close
     if best < 20:
         remedy = 'state it: --wall FILE.toml, or two points on its foot: --wall "X,Y X,Y"'
         raise SurveyError("no upright plane among its points", where=str(clouds[0].path), remedy=remedy)
-    normal = np.linalg.svd(sample[kept] - sample[kept].mean(axis=0), full_matrices=False)[2][2]
-    middle = sample[kept].mean(axis=0)
+    normal = np.linalg.svd(sample[on_wall] - sample[on_wall].mean(axis=0), full_matrices=False)[2][2]
+    middle = sample[on_wall].mean(axis=0)
     seen = [station.position - origin for cloud in clouds for station in cloud.stations]
-    towards = normal @ (np.mean(seen, axis=0) - middle) if seen else _front(sample, kept, middle, normal)
+    towards = normal @ (np.mean(seen, axis=0) - middle) if seen else _front(sample, on_wall, middle, normal)
     if towards < 0.0:
         normal = -normal
     flat = np.array([normal[0], normal[1], 0.0]) / np.hypot(normal[0], normal[1])
     frame = upright_frame(flat, middle)
-    start = middle + float(((sample[kept] - middle) @ frame.axes[0]).min()) * frame.axes[0] + origin
+    start = middle + float(((sample[on_wall] - middle) @ frame.axes[0]).min()) * frame.axes[0] + origin
     return Wall(np.array([start[0], start[1], 0.0]), frame.axes)
 
 
-def _front(sample: Array, kept: Bools, middle: Array, normal: Array) -> float:
+def _front(sample: Array, on_wall: Bools, middle: Array, normal: Array) -> float:
     """Return a number that is positive if a wall is seen from the side of its normal.
 
     The ground before it was scanned too; without ground, joints lie behind the faces of stones, which are more.
     """
     apart = (sample - middle) @ normal
-    ground = (np.abs(apart) > _BEFORE) & (sample[:, 2] < np.quantile(sample[kept, 2], _FOOT))
+    ground = (np.abs(apart) > _BEFORE) & (sample[:, 2] < np.quantile(sample[on_wall, 2], _FOOT))
     if np.count_nonzero(ground) > _GROUND * len(sample):
         return float(np.median(apart[ground]))
-    return float(np.median(apart[kept]) - apart[kept].mean())
+    return float(np.median(apart[on_wall]) - apart[on_wall].mean())
 
 
 def _sample(clouds: Sequence[PointCloud], origin: Array, progress: Progress) -> Array:
     """Return some points from all parts of the clouds."""
-    found: list[Array] = []
+    samples: list[Array] = []
     read, rng = 0, np.random.default_rng(0)
     for cloud in clouds:
         for chunk in cloud.chunks(origin, False):
             read += len(chunk.places)
             progress("look for the wall", read, None)
             few = min(len(chunk.places), _SAMPLE)
-            found.append(chunk.places[rng.integers(len(chunk.places), size=few)] if few else chunk.places)
-    points = np.concatenate(found) if found else np.empty((0, 3))
+            samples.append(chunk.places[rng.integers(len(chunk.places), size=few)] if few else chunk.places)
+    points = np.concatenate(samples) if samples else np.empty((0, 3))
     return points[rng.permutation(len(points))[:_SAMPLE]] if len(points) > _SAMPLE else points
 
 
@@ -152,13 +152,13 @@ def paint_wall(
     for cloud in clouds:
         for chunk in cloud.chunks(origin, False):
             flat = (chunk.places - local) @ wall.axes.T
-            near = flat[np.abs(flat[:, 2]) <= slab]
+            close = flat[np.abs(flat[:, 2]) <= slab]
             read += len(flat)
             progress("measure the wall", read, None)
-            if len(near):
+            if len(close):
                 low, high = (
-                    np.minimum(low, near[:, :2].min(axis=0)),
-                    np.maximum(high, near[:, :2].max(axis=0)),
+                    np.minimum(low, close[:, :2].min(axis=0)),
+                    np.maximum(high, close[:, :2].max(axis=0)),
                 )
     if not np.isfinite(low).all():
         remedy = "check --wall, or widen --slab"
@@ -204,22 +204,26 @@ def filled(values: NDArray[np.float32]) -> NDArray[np.float32]:
     """
     out: NDArray[np.float32] = values.reshape(*values.shape[:2], -1).copy()
     for _ in range(_FILLED):
-        known = ~np.isnan(out[..., 0])
-        total, number = np.zeros_like(out), np.zeros(known.shape, np.float32)
+        painted = ~np.isnan(out[..., 0])
+        total, number = np.zeros_like(out), np.zeros(painted.shape, np.float32)
         for axis, step in ((0, 1), (0, -1), (1, 1), (1, -1)):
-            there = np.roll(known, step, axis)
+            there = np.roll(painted, step, axis)
             total += np.where(there[..., None], np.roll(out, step, axis), 0.0)
             number += there
-        gaps = ~known & (number >= 2)
+        gaps = ~painted & (number >= 2)
         out[gaps] = total[gaps] / number[gaps][:, None]
     return out.reshape(values.shape)
 
 
 def _relief(depths: NDArray[np.float32], pixel: float) -> NDArray[np.uint8]:
     """Shade a depth map as if lit from the upper left."""
-    known = np.where(np.isfinite(depths), depths, np.nanmedian(depths))
-    down, right = np.gradient(known, pixel) if min(known.shape) > 1 else (known * 0.0, known * 0.0)
-    normal = np.stack([-right, down, np.ones_like(known)], axis=-1)
+    depths_filled = np.where(np.isfinite(depths), depths, np.nanmedian(depths))
+    down, right = (
+        np.gradient(depths_filled, pixel)
+        if min(depths_filled.shape) > 1
+        else (depths_filled * 0.0, depths_filled * 0.0)
+    )
+    normal = np.stack([-right, down, np.ones_like(depths_filled)], axis=-1)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     shade = np.clip(normal @ _LIGHT / np.linalg.norm(_LIGHT), 0.0, 1.0) * 230.0
     shade[~np.isfinite(depths)] = 0.0
@@ -233,9 +237,11 @@ def write_picture(picture: Picture, photo: Path, depth: Path) -> float:
     """
     from PIL import Image
 
-    known = np.isfinite(picture.depths)
+    finite = np.isfinite(picture.depths)
     lowest = float(np.floor(np.nanmin(picture.depths) / STEP) * STEP)
-    numbers = np.where(known, np.round((np.where(known, picture.depths, lowest) - lowest) / STEP) + 1.0, 0.0)
+    numbers = np.where(
+        finite, np.round((np.where(finite, picture.depths, lowest) - lowest) / STEP) + 1.0, 0.0
+    )
     Image.fromarray(np.clip(numbers, 0, 65535).astype(np.uint16)).save(depth)
     Image.fromarray(picture.colours).save(photo)
     height = len(picture.counts)

@@ -53,11 +53,11 @@ def section_plane(text: str, wall: Wall) -> SectionPlane:
     >>> section_plane("z=1.5", read_wall("0,0 1,0")).axes.tolist()
     [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
     """
-    found = _PLANE.fullmatch(text)
-    if found is None:
+    match = _PLANE.fullmatch(text)
+    if match is None:
         remedy = "write z=1.5 for a level section, s=2.0 for one across the wall, d=-0.01 for one along it"
         raise UsageError(f"cannot be read: {text!r}", where="--section", remedy=remedy)
-    which, value = found[1], float(found[2].replace(",", "."))
+    which, value = match[1], float(match[2].replace(",", "."))
     right, up, out = wall.axes
     name = f"{which}={value:g}"
     if which == "z":
@@ -130,21 +130,21 @@ def _drawn_together(places: Array, weights: Array, cell: float) -> Array:
 
     pairs = cKDTree(places).query_pairs(1.2 * cell, output_type="ndarray")
     sums, total = places * weights[:, None], weights.copy()
-    for one, other in ((0, 1), (1, 0)):
-        np.add.at(sums, pairs[:, one], places[pairs[:, other]] * weights[pairs[:, other], None])
-        np.add.at(total, pairs[:, one], weights[pairs[:, other]])
+    for first, second in ((0, 1), (1, 0)):
+        np.add.at(sums, pairs[:, first], places[pairs[:, second]] * weights[pairs[:, second], None])
+        np.add.at(total, pairs[:, first], weights[pairs[:, second]])
     moved = sums / total[:, None]
-    near: list[list[int]] = [[] for _ in moved]
-    for one, other in cKDTree(moved).query_pairs(0.7 * cell):
-        near[one].append(other)
-        near[other].append(one)
+    linked: list[list[int]] = [[] for _ in moved]
+    for first, second in cKDTree(moved).query_pairs(0.7 * cell):
+        linked[first].append(second)
+        linked[second].append(first)
     free = np.ones(len(moved), dtype=bool)
-    kept = []
+    chosen = []
     for k in np.argsort(-total, kind="stable").tolist():
         if free[k]:
-            kept.append(k)
-            free[near[k]] = False
-    out: Array = moved[np.sort(kept)]
+            chosen.append(k)
+            free[linked[k]] = False
+    out: Array = moved[np.sort(chosen)]
     return out
 
 
@@ -202,12 +202,12 @@ def join(places: Array, reach: float, tolerance: float, shortest: int) -> list[A
         (np.maximum(apart, 1e-12), (pairs[:, 0], pairs[:, 1])), shape=(len(places), len(places))
     )
     tree = minimum_spanning_tree(graph.tocsr()).tocoo()
-    near: list[list[tuple[int, float]]] = [[] for _ in places]
+    links: list[list[tuple[int, float]]] = [[] for _ in places]
     for a, b, length in zip(tree.row.tolist(), tree.col.tolist(), tree.data.tolist(), strict=True):
-        near[a].append((b, length))
-        near[b].append((a, length))
+        links[a].append((b, length))
+        links[b].append((a, length))
     lines = []
-    for path in _paths(near, shortest):
+    for path in _paths(links, shortest):
         closed = (
             len(path) > 2 * shortest
             and float(np.linalg.norm(places[path[0]] - places[path[-1]])) <= 1.5 * reach
@@ -217,18 +217,18 @@ def join(places: Array, reach: float, tolerance: float, shortest: int) -> list[A
     return sorted(lines, key=lambda line: -float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum()))
 
 
-def _paths(near: list[list[tuple[int, float]]], shortest: int) -> Iterator[list[int]]:
+def _paths(links: list[list[tuple[int, float]]], shortest: int) -> Iterator[list[int]]:
     """Yield the longest paths of a forest, each without the places of those before."""
-    free = [True] * len(near)
-    stack = list(range(len(near)))
+    free = [True] * len(links)
+    stack = list(range(len(links)))
     while stack:
         start = stack.pop()
         if not free[start]:
             continue
-        one, _ = _farthest(near, free, start)
-        other, before = _farthest(near, free, one)
+        end, _ = _farthest(links, free, start)
+        other, before = _farthest(links, free, end)
         path = [other]
-        while path[-1] != one:
+        while path[-1] != end:
             path.append(before[path[-1]])
         if len(path) < shortest:
             for place in before:
@@ -236,7 +236,7 @@ def _paths(near: list[list[tuple[int, float]]], shortest: int) -> Iterator[list[
             continue
         for place in path:
             free[place] = False
-        stack += [next_ for place in path for next_, _ in near[place] if free[next_]]
+        stack += [next_ for place in path for next_, _ in links[place] if free[next_]]
         yield path
 
 
@@ -244,22 +244,22 @@ def _farthest(
     near: list[list[tuple[int, float]]], free: list[bool], start: int
 ) -> tuple[int, dict[int, int]]:
     """Return the place farthest from another along the tree, and the place before each."""
-    before, far, best = {start: start}, start, 0.0
+    before, farthest, best = {start: start}, start, 0.0
     stack = [(start, 0.0)]
     while stack:
         place, length = stack.pop()
         if length > best:
-            far, best = place, length
+            farthest, best = place, length
         for next_, step in near[place]:
             if free[next_] and next_ not in before:
                 before[next_] = place
                 stack.append((next_, length + step))
-    return far, before
+    return farthest, before
 
 
 def _thinned(line: Array, tolerance: float) -> Array:
     """Leave out places of an open line that its other places describe (Douglas and Peucker 1973)."""
-    kept, stack = {0, len(line) - 1}, [(0, len(line) - 1)]
+    corners, stack = {0, len(line) - 1}, [(0, len(line) - 1)]
     while stack:
         start, stop = stack.pop()
         if stop - start < 2:
@@ -269,6 +269,6 @@ def _thinned(line: Array, tolerance: float) -> Array:
         apart = np.abs(inner @ [-side[1], side[0]]) / length if length > 0.0 else np.hypot(*inner.T)
         worst = int(np.argmax(apart))
         if apart[worst] > tolerance:
-            kept.add(start + 1 + worst)
+            corners.add(start + 1 + worst)
             stack += [(start, start + 1 + worst), (start + 1 + worst, stop)]
-    return line[sorted(kept)]
+    return line[sorted(corners)]

@@ -93,41 +93,43 @@ def repair(vertices: Array, polygons: Sequence[Polygon], tolerance: float) -> Re
     polygons : simple, vertex indices of each
     tolerance : distance of corners that are the same, and of corners from an edge that they divide [m]
     """
-    found, deeds = _joined(vertices, list(polygons), tolerance)
-    covers, left, largest = _covers(vertices, found)
+    joined, deeds = _joined(vertices, list(polygons), tolerance)
+    covers, left, largest = _covers(vertices, joined)
     if covers and not left and largest is not None:
-        covered = found + [one for cover in covers for one in cover]
+        covered = joined + [one for cover in covers for one in cover]
         if _crossings(covered) <= _crossings(polygons):
             holes = "1 hole" if len(covers) == 1 else f"{len(covers)} holes"
             text = f"{holes} covered, the largest {largest.text.removeprefix('a hole ')}"
             return Repaired(vertices, covered, (*deeds, text), ())
     if left or covers:
         size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
-        slits = holes_of(vertices, found)
+        slits = holes_of(vertices, joined)
         widest = max(slit.slit for slit in slits)
         if 0.0 < widest <= _SLIT * size:
-            zipped, more = _joined(vertices, found, _REACH * widest)
+            zipped, more = _joined(vertices, joined, _REACH * widest)
             if not open_edges(zipped) and _crossings(zipped) == 0:
                 return Repaired(vertices, zipped, (*deeds, *more), ())
         left = slits
-    return Repaired(vertices, found, deeds, tuple(sorted(left, key=lambda one: -one.width)))
+    return Repaired(vertices, joined, deeds, tuple(sorted(left, key=lambda one: -one.width)))
 
 
-def _joined(vertices: Array, found: list[Polygon], tolerance: float) -> tuple[list[Polygon], tuple[str, ...]]:
+def _joined(
+    vertices: Array, polygons: list[Polygon], tolerance: float
+) -> tuple[list[Polygon], tuple[str, ...]]:
     """Weld and divide open edges within the tolerance; return the polygons, and what was done."""
     welded, dropped, divided, farthest = 0, 0, 0, [0.0, 0.0]
     for _ in range(_ROUNDS):
-        edges = open_edges(found)
+        edges = open_edges(polygons)
         if not edges:
             break
         same, moved = _welds(vertices, edges, tolerance)
         if same:
-            found, gone = _renumbered(vertices, found, same)
+            polygons, gone = _renumbered(vertices, polygons, same)
             welded, dropped = welded + len(same), dropped + gone
             farthest[0] = max(farthest[0], moved)
-        cuts, away = _divisions(vertices, open_edges(found), tolerance)
+        cuts, away = _divisions(vertices, open_edges(polygons), tolerance)
         if cuts:
-            found = [_divided(one, cuts) for one in found]
+            polygons = [_divided(polygon, cuts) for polygon in polygons]
             divided += sum(map(len, cuts.values()))
             farthest[1] = max(farthest[1], away)
         if not same and not cuts:
@@ -139,7 +141,7 @@ def _joined(vertices: Array, found: list[Polygon], tolerance: float) -> tuple[li
         deeds.append(f"{dropped} faces without area dropped")
     if divided:
         deeds.append(f"{divided} corners divide edges of other faces, up to {farthest[1] * 1e3:.2g} mm away")
-    return found, tuple(deeds)
+    return polygons, tuple(deeds)
 
 
 def _crossings(polygons: Sequence[Polygon]) -> int:
@@ -161,12 +163,12 @@ def _crossings(polygons: Sequence[Polygon]) -> int:
                 faces = owners[edge]
                 if len(faces) != 2:
                     continue
-                other = faces[k == faces[0]]
-                wanted = turned[k] ^ ((a, b) in set(_edges(polygons[other])))
-                if other not in turned:
-                    turned[other] = wanted
-                    members.append(other)
-                elif turned[other] != wanted:
+                neighbour = faces[k == faces[0]]
+                wanted = turned[k] ^ ((a, b) in set(_edges(polygons[neighbour])))
+                if neighbour not in turned:
+                    turned[neighbour] = wanted
+                    members.append(neighbour)
+                elif turned[neighbour] != wanted:
                     wrong.add(edge)
     return len(wrong)
 
@@ -275,8 +277,8 @@ def _loops(polygons: Sequence[Polygon]) -> list[list[int]] | None:
         here = after[start][0]
         while here != start:
             loop.append(here)
-            one, other = after[here]
-            before, here = here, other if one == before else one
+            first, second = after[here]
+            before, here = here, second if first == before else first
         taken.update(loop)
         loops.append(loop)
     return loops
@@ -288,7 +290,7 @@ def holes_of(vertices: Array, polygons: Sequence[Polygon]) -> list[Hole]:
     if loops is None:
         loops = [sorted({i for edge in open_edges(polygons) for i in edge})]
     total = sum(float(np.linalg.norm(area_vector(vertices[list(polygon)]))) for polygon in polygons)
-    found = []
+    holes = []
     for loop in loops:
         places = vertices[loop]
         x, y, z = places.mean(axis=0).tolist()
@@ -296,8 +298,8 @@ def holes_of(vertices: Array, polygons: Sequence[Polygon]) -> list[Hole]:
         width = float(np.linalg.norm(np.ptp(places, axis=0)))
         around = float(np.linalg.norm(places - np.roll(places, 1, axis=0), axis=1).sum())
         slit = 2.0 * area / around if around > 0.0 else 0.0
-        found.append(Hole(len(loop), (x, y, z), width, area / total if total > 0.0 else 1.0, slit))
-    return found
+        holes.append(Hole(len(loop), (x, y, z), width, area / total if total > 0.0 else 1.0, slit))
+    return holes
 
 
 def _covers(

@@ -14,11 +14,11 @@ __all__ = ["apart", "crosses", "is_simple"]
 def apart(places: Array, ring: Array, closed: bool = True) -> Array:
     """Return the distances (n,) of places (n, 2) from the sides of a polygon, or of an open chain [m]."""
     start, stop = (ring, np.roll(ring, -1, axis=0)) if closed else (ring[:-1], ring[1:])
-    way = stop - start
-    size = np.maximum((way**2).sum(axis=1), 1e-300)
+    run = stop - start
+    size = np.maximum((run**2).sum(axis=1), 1e-300)
     off = places[:, None] - start[None]
-    along = np.clip((off * way).sum(axis=2) / size, 0.0, 1.0)
-    out: Array = np.linalg.norm(off - along[..., None] * way, axis=2).min(axis=1)
+    along = np.clip((off * run).sum(axis=2) / size, 0.0, 1.0)
+    out: Array = np.linalg.norm(off - along[..., None] * run, axis=2).min(axis=1)
     return out
 
 
@@ -27,15 +27,15 @@ def is_simple(ring: Array) -> bool:
     count = len(ring)
     if count < 3 or not ring_area(ring) > 0.0:
         return False
-    way = np.roll(ring, -1, axis=0) - ring
-    met = _met_along(ring, way)
+    edges = np.roll(ring, -1, axis=0) - ring
+    met = _met_along(ring, edges)
     k = np.arange(count)
     met[k, k] = met[k, (k + 1) % count] = met[(k + 1) % count, k] = False
     if met.any():
         return False
-    back = np.roll(way, 1, axis=0)
-    folded = np.abs(back[:, 0] * way[:, 1] - back[:, 1] * way[:, 0]) < 1e-12
-    return not bool((folded & ((back * way).sum(axis=1) < 0.0)).any())
+    back = np.roll(edges, 1, axis=0)
+    folded = np.abs(back[:, 0] * edges[:, 1] - back[:, 1] * edges[:, 0]) < 1e-12
+    return not bool((folded & ((back * edges).sum(axis=1) < 0.0)).any())
 
 
 def crosses(places: Array, chains: Sequence[Sequence[int]]) -> bool:
@@ -47,12 +47,12 @@ def crosses(places: Array, chains: Sequence[Sequence[int]]) -> bool:
     return bool((_met_along(start, way) & ~common).any())
 
 
-def _met_along(start: Array, way: Array) -> Bools:
+def _met_along(start: Array, run: Array) -> Bools:
     """Return which of n segments meet which, (n, n)."""
     offset = start[None] - start[:, None]
-    turn = way[:, None, 0] * way[None, :, 1] - way[:, None, 1] * way[None, :, 0]
+    turn = run[:, None, 0] * run[None, :, 1] - run[:, None, 1] * run[None, :, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
-        along = (offset[..., 0] * way[None, :, 1] - offset[..., 1] * way[None, :, 0]) / turn
+        along = (offset[..., 0] * run[None, :, 1] - offset[..., 1] * run[None, :, 0]) / turn
     met = (along >= 0.0) & (along <= 1.0)
     out: Bools = met & met.T
     return out

@@ -69,8 +69,8 @@ def grow(leaf: Leaf, codes: Sequence[str], settings: JointSettings, fineness: fl
     areas = np.array([abs(ring_area(outline)) for outline in leaf.outlines])
     step = min(float(np.sqrt(np.median(areas))) / _SAMPLES, settings.max_width / _CLOSE) / fineness
     lines = medial_lines(leaf.outlines, leaf.frame, step, settings.max_width)
-    found = partition(lines, leaf.outlines, settings.straightness, settings.min_overlap)
-    rings = [found.corners[list(ring)] for ring in found.rings]
+    divided = partition(lines, leaf.outlines, settings.straightness, settings.min_overlap)
+    rings = [divided.corners[list(ring)] for ring in divided.rings]
     grown = [
         prism(code, leaf.place(ring, 0.0), leaf.place(ring, leaf.depth))
         for code, ring in zip(codes, rings, strict=True)
@@ -85,35 +85,35 @@ def grow(leaf: Leaf, codes: Sequence[str], settings: JointSettings, fineness: fl
         size=(width, height),
         outlines={code: outline - low for code, outline in zip(codes, leaf.outlines, strict=True)},
         grown={code: ring - low for code, ring in zip(codes, rings, strict=True)},
-        thickness=_thickness(found, codes),
+        thickness=_thickness(divided, codes),
         stone_share=dict(zip(codes, np.minimum(areas / new, 1.0).tolist(), strict=True)),
-        edges=sum(_between_stones(edge, codes) for edge in found.edges),
-        collapsed=found.collapsed,
+        edges=sum(_between_stones(edge, codes) for edge in divided.edges),
+        collapsed=divided.collapsed,
         growth=growth[farthest],
         farthest=codes[farthest],
         crossing=tuple((codes[i], codes[j]) for i, j in lines.crossing),
         filled=lines.filled,
-        openings=tuple(sorted(_openings(leaf, found, codes), key=lambda one: -one.area)),
+        openings=tuple(sorted(_openings(leaf, divided, codes), key=lambda opening: -opening.area)),
     )
     return GrownStones(
         solids=tuple(grown),
-        displacement=tuple(np.concatenate([one, one]) for one in moved),
+        displacement=tuple(np.concatenate([shift, shift]) for shift in moved),
         volume_change=tuple((new / areas - 1.0).tolist()),
-        joints=_joints(leaf, found, codes),
+        joints=_joints(leaf, divided, codes),
         report=report,
     )
 
 
-def _thickness(found: Partition, codes: Sequence[str]) -> dict[frozenset[str], float]:
+def _thickness(divided: Partition, codes: Sequence[str]) -> dict[frozenset[str], float]:
     """Return the mean thickness of the mortar of each pair of stones, and of each stone at foot and top of the frame.
 
     Edges count by their lengths.
     """
     sums: dict[frozenset[str], list[tuple[float, float]]] = defaultdict(list)
-    for edge in found.edges:
+    for edge in divided.edges:
         stones = [k for k in (edge.left, edge.right) if 0 <= k < len(codes)]
         if len(stones) == 2 or (len(stones) == 1 and min(edge.left, edge.right) in (_BELOW, _ABOVE)):
-            length = float(np.hypot(*(found.corners[edge.ends[1]] - found.corners[edge.ends[0]])))
+            length = float(np.hypot(*(divided.corners[edge.ends[1]] - divided.corners[edge.ends[0]])))
             sums[frozenset(codes[k] for k in stones)].append((edge.thickness, length))
     return {
         stones: max(sum(own * length for own, length in of) / sum(length for _, length in of), _THINNEST)
@@ -125,15 +125,15 @@ def _between_stones(edge: Edge, codes: Sequence[str]) -> bool:
     return min(edge.left, edge.right) >= 0 and max(edge.left, edge.right) < len(codes)
 
 
-def _openings(leaf: Leaf, found: Partition, codes: Sequence[str]) -> Iterator[Opening]:
+def _openings(leaf: Leaf, divided: Partition, codes: Sequence[str]) -> Iterator[Opening]:
     """Yield what stays open in a leaf."""
-    for number in range(len(codes), len(codes) + found.openings):
-        own = [edge for edge in found.edges if number in (edge.left, edge.right)]
+    for number in range(len(codes), len(codes) + divided.openings):
+        border = [edge for edge in divided.edges if number in (edge.left, edge.right)]
         # with the opening to their left, edges sum to its area whatever lies within it
-        ends = np.array([one.ends if one.left == number else one.ends[::-1] for one in own])
-        edges = found.corners[ends]
+        ends = np.array([edge.ends if edge.left == number else edge.ends[::-1] for edge in border])
+        edges = divided.corners[ends]
         start, stop = (edges - leaf.frame[0]).swapaxes(0, 1)
-        beside = {one.left + one.right - number for one in own}
+        beside = {edge.left + edge.right - number for edge in border}
         yield Opening(
             edges=edges - leaf.frame[0],
             front=leaf.place(edges.reshape(-1, 2), 0.0).reshape(-1, 2, 3),
@@ -143,16 +143,16 @@ def _openings(leaf: Leaf, found: Partition, codes: Sequence[str]) -> Iterator[Op
         )
 
 
-def _joints(leaf: Leaf, found: Partition, codes: Sequence[str]) -> tuple[StoneJoint, ...]:
+def _joints(leaf: Leaf, divided: Partition, codes: Sequence[str]) -> tuple[StoneJoint, ...]:
     joints = []
-    for number, edge in enumerate(found.edges):
+    for number, edge in enumerate(divided.edges):
         if not _between_stones(edge, codes):
             continue
-        start, stop = found.corners[list(edge.ends)]
-        way = stop - start
-        length = float(np.hypot(*way))
+        start, stop = divided.corners[list(edge.ends)]
+        run = stop - start
+        length = float(np.hypot(*run))
         # square to the edge, to its left: into the first stone
-        normal = (-way[1] * leaf.right + way[0] * leaf.up) / length
+        normal = (-run[1] * leaf.right + run[0] * leaf.up) / length
         joints.append(
             StoneJoint(
                 stones=(codes[edge.left], codes[edge.right]),

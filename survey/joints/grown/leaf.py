@@ -131,14 +131,14 @@ def _stated_frame(stone: Stone, right: Array, up: Array) -> Array | None:
     )
 
 
-def _alike(seed: _Prism, other: _Prism, within: float) -> bool:
-    if float(np.linalg.norm(seed.normal - other.normal)) > max(within, 1e-6):
+def _alike(seed: _Prism, candidate: _Prism, within: float) -> bool:
+    if float(np.linalg.norm(seed.normal - candidate.normal)) > max(within, 1e-6):
         return False
-    if max(abs(seed.front - other.front), abs(seed.depth - other.depth)) > within:
+    if max(abs(seed.front - candidate.front), abs(seed.depth - candidate.depth)) > within:
         return False
-    if seed.stated is None or other.stated is None:
-        return seed.stated is other.stated
-    return float(np.abs(seed.stated - other.stated).max()) <= _FRAME
+    if seed.stated is None or candidate.stated is None:
+        return seed.stated is candidate.stated
+    return float(np.abs(seed.stated - candidate.stated).max()) <= _FRAME
 
 
 def _leaf(stones: Sequence[Stone], prisms: Sequence[_Prism], margin: float) -> Leaf:

@@ -109,8 +109,8 @@ def medial_lines(outlines: Sequence[Array], frame: Array, step: float, widest: f
         points = np.concatenate([points, places])
         owner = np.concatenate([owner, len(outlines) + opening])
         diagram, original, side = _diagram(points, frame, step)
-    found = _divided(diagram, points, owner, frame, original, side)
-    return replace(found, crossing=crossing, openings=openings, usual=usual, filled=filled)
+    lines = _divided(diagram, points, owner, frame, original, side)
+    return replace(lines, crossing=crossing, openings=openings, usual=usual, filled=filled)
 
 
 def _diagram(points: Array, frame: Array, step: float) -> tuple[Voronoi, Ints, Ints]:
@@ -126,50 +126,50 @@ def _divided(
     count = len(points)
     pairs, ends = diagram.ridge_points, np.asarray(diagram.ridge_vertices)
     first, second = pairs.min(axis=1), pairs.max(axis=1)
-    own = second < count
-    owner = _in_one_piece(owner, pairs[own], _lengths(diagram)[own])
-    own[own] = owner[first[own]] != owner[second[own]]
+    inner = second < count
+    owner = _in_one_piece(owner, pairs[inner], _lengths(diagram)[inner])
+    inner[inner] = owner[first[inner]] != owner[second[inner]]
     bound = (first < count) & (second >= count)
     bound[bound] = original[second[bound] - count] == first[bound]
     vertices = _on_frame(diagram.vertices, ends[bound], side[second[bound] - count], frame)
-    kept = own | bound
-    kept &= (ends >= 0).all(axis=1)
-    labels = np.column_stack([owner[first[kept]], np.zeros(kept.sum(), np.int64)])
-    beside = second[kept]
+    chosen = inner | bound
+    chosen &= (ends >= 0).all(axis=1)
+    labels = np.column_stack([owner[first[chosen]], np.zeros(chosen.sum(), np.int64)])
+    beside = second[chosen]
     labels[:, 1] = np.where(
         beside < count, owner[np.minimum(beside, count - 1)], -1 - side[np.maximum(beside - count, 0)]
     )
-    return _walk(vertices, ends[kept], labels, points[first[kept]])
+    return _walk(vertices, ends[chosen], labels, points[first[chosen]])
 
 
 def _samples(
     outlines: Sequence[Array], frame: Array, step: float
 ) -> tuple[Array, Ints, tuple[tuple[int, int], ...]]:
     """Return samples (n, 2) of the outlines, the stones that they are of, and the pairs of stones that touch."""
-    places, owner = _sampled(outlines, [np.full(len(one), step) for one in outlines], _INSET * step)
-    near = _apart(places, owner, _NEAR * step)
+    places, owner = _sampled(outlines, [np.full(len(outline), step) for outline in outlines], _INSET * step)
+    too_close = _apart(places, owner, _NEAR * step)
     # each side of an outline is sampled as finely as its nearest neighbour asks for
     finest, at = [], 0
     for outline in outlines:
         counts = _counts(outline, np.full(len(outline), step))
         starts = at + np.concatenate([[0], np.cumsum(counts)[:-1]])
-        closest = np.minimum.reduceat(near, starts)
+        closest = np.minimum.reduceat(too_close, starts)
         finest.append(np.clip(0.5 * closest, _FINEST * step, step))
         at += int(counts.sum())
     places, owner = _sampled(outlines, finest, _INSET * step)
     crossing = set[tuple[int, int]]()
     free = np.ones(len(places), np.bool_)
-    low = np.array([one.min(axis=0) for one in outlines])
-    high = np.array([one.max(axis=0) for one in outlines])
+    low = np.array([outline.min(axis=0) for outline in outlines])
+    high = np.array([outline.max(axis=0) for outline in outlines])
     starts = np.searchsorted(owner, np.arange(len(outlines) + 1))
     for i, ring in enumerate(outlines):
         for j in np.flatnonzero(((low <= high[i]) & (high >= low[i])).all(axis=1)).tolist():
             if j == i:
                 continue
-            own = slice(starts[j], starts[j + 1])
-            within = inside(places[own], ring)
+            rows = slice(starts[j], starts[j + 1])
+            within = inside(places[rows], ring)
             if within.any():
-                free[own] &= ~within
+                free[rows] &= ~within
                 crossing.add((min(i, j), max(i, j)))
     tree = cKDTree(places)
     touching = tree.query_pairs(2.0 * (_INSET + _TOUCHING) * step, output_type="ndarray")
@@ -210,8 +210,8 @@ def _counts(ring: Array, step: Array) -> Ints:
 def _apart(places: Array, owner: Ints, most: float) -> Array:
     """Return the distance (n,) of each sample from the nearest of another stone, `most` if there is none nearer."""
     apart, found = cKDTree(places).query(places, k=min(_NEIGHBOURS, len(places)), distance_upper_bound=most)
-    other = np.append(owner, -1)[found]
-    foreign = (other >= 0) & (other != owner[:, None])
+    neighbour = np.append(owner, -1)[found]
+    foreign = (neighbour >= 0) & (neighbour != owner[:, None])
     out: Array = np.where(foreign, apart, most).min(axis=1)
     return out
 
@@ -229,12 +229,12 @@ def _images(points: Array, frame: Array, step: float) -> tuple[Array, Ints, Ints
         places = np.empty((len(along), 2))
         places[:, axis], places[:, 1 - axis] = frame[end, axis], along
         reach = float(np.max(tree.query(places)[0])) + step
-        near = np.flatnonzero(np.abs(points[:, axis] - frame[end, axis]) <= reach)
-        mirrored = points[near].copy()
+        close = np.flatnonzero(np.abs(points[:, axis] - frame[end, axis]) <= reach)
+        mirrored = points[close].copy()
         mirrored[:, axis] = 2.0 * frame[end, axis] - mirrored[:, axis]
         images.append(mirrored)
-        original.append(near)
-        sides.append(np.full(len(near), side))
+        original.append(close)
+        sides.append(np.full(len(close), side))
     return np.concatenate(images), np.concatenate(original), np.concatenate(sides)
 
 
@@ -266,9 +266,9 @@ def _in_one_piece(owner: Ints, pairs: Ints, lengths: Array) -> Ints:
         weights: dict[int, dict[int, float]] = defaultdict(lambda: defaultdict(float))
         across = pairs[~same]
         for (a, b), length in zip(across.tolist(), lengths[~same].tolist(), strict=True):
-            for one, other in ((a, b), (b, a)):
-                if stray[one]:
-                    weights[int(piece[one])][int(owner[other])] += length
+            for first, second in ((a, b), (b, a)):
+                if stray[first]:
+                    weights[int(piece[first])][int(owner[second])] += length
         for number, beside in weights.items():
             owner[piece == number] = max(beside, key=lambda stone: beside[stone])
     return owner
@@ -295,7 +295,7 @@ def _walk(vertices: Array, ends: Ints, labels: Ints, beside: Array) -> MedialLin
         met = at[vertex]
         return len(met) != 2 or set(pair[met[0]]) != set(pair[met[1]])
 
-    nodes = {vertex: k for k, vertex in enumerate(sorted(one for one in at if is_node(one)))}
+    nodes = {vertex: k for k, vertex in enumerate(sorted(node for node in at if is_node(node)))}
     lines, used = list[Line](), np.zeros(len(ends), np.bool_)
 
     def follow(start: int, ridge: int) -> None:
@@ -308,14 +308,14 @@ def _walk(vertices: Array, ends: Ints, labels: Ints, beside: Array) -> MedialLin
             ridges.append(ridge)
             if here in nodes:
                 break
-            ridge = next((one for one in at[here] if not used[one]), ridge)
+            ridge = next((candidate for candidate in at[here] if not used[candidate]), ridge)
         places = vertices[path]
         ways = np.diff(places, axis=0)
         longest = int(np.argmax((ways**2).sum(axis=1)))
-        way, off = ways[longest], beside[ridges[longest]] - places[longest]
-        one, other = pair[ridges[longest]]
-        left = way[0] * off[1] - way[1] * off[0] > 0.0
-        sides = (one, other) if left else (other, one)
+        run, off = ways[longest], beside[ridges[longest]] - places[longest]
+        first, second = pair[ridges[longest]]
+        left = run[0] * off[1] - run[1] * off[0] > 0.0
+        sides = (first, second) if left else (second, first)
         lines.append(Line((nodes[path[0]], nodes[path[-1]]), places, *sides))
 
     for vertex in list(nodes):
@@ -325,13 +325,13 @@ def _walk(vertices: Array, ends: Ints, labels: Ints, beside: Array) -> MedialLin
     for ridge, (a, _) in enumerate(ends.tolist()):  # rings about a stone with one neighbour
         if not used[ridge]:
             ring = _ring(a, ridge, ends, at)
-            far = max(ring, key=lambda one: float(((vertices[one] - vertices[a]) ** 2).sum()))
-            for vertex in (a, far):
+            farthest = max(ring, key=lambda one: float(((vertices[one] - vertices[a]) ** 2).sum()))
+            for vertex in (a, farthest):
                 nodes[vertex] = len(nodes)
-            for vertex in (a, far):
-                for other in at[vertex]:
-                    if not used[other]:
-                        follow(vertex, other)
+            for vertex in (a, farthest):
+                for edge in at[vertex]:
+                    if not used[edge]:
+                        follow(vertex, edge)
     return MedialLines(vertices[list(nodes)], tuple(lines), ())
 
 
@@ -343,4 +343,4 @@ def _ring(start: int, ridge: int, ends: Ints, at: dict[int, list[int]]) -> list[
         if here == start:
             return ring
         ring.append(here)
-        ridge = next(one for one in at[here] if one != ridge)
+        ridge = next(candidate for candidate in at[here] if candidate != ridge)

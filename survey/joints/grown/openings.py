@@ -116,6 +116,6 @@ def _middles(pairs: Ints, ends: Ints, count: int, sites: Array) -> Array:
 def _single(places: Array, of: Ints, nearest: float) -> tuple[Array, Ints]:
     """Return places without those that lie where an earlier one does."""
     twice = cKDTree(places).query_pairs(nearest, output_type="ndarray")
-    kept = np.ones(len(places), np.bool_)
-    kept[twice.max(axis=1)] = False
-    return places[kept], of[kept]
+    single = np.ones(len(places), np.bool_)
+    single[twice.max(axis=1)] = False
+    return places[single], of[single]

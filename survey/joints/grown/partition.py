@@ -92,9 +92,9 @@ def partition(
         for least in (shortest, 0.5 * shortest, 0.25 * shortest, 0.0):
             network = _Network(drawn)
             network.collapse(least)
-            found = _straightened(network, bound, least, len(outlines))
-            if found is not None:
-                corners, chains, rings = found
+            straight = _straightened(network, bound, least, len(outlines))
+            if straight is not None:
+                corners, chains, rings = straight
                 edges = tuple(
                     _edge(corners, (a, b), line, outlines)
                     for line, chain in chains
@@ -149,28 +149,31 @@ def _halfway(places: Array, first: Array, second: Array) -> Array:
 
 def _met(place: Array, about: set[int], outlines: Sequence[Array]) -> Array:
     """Return a node (2,) moved to where it is equally far from all stones about it, if these tell where that is."""
-    stones, sides = [one for one in about if one >= 0], {-one - 1 for one in about if one < 0}
+    stones, sides = (
+        [number for number in about if number >= 0],
+        {-number - 1 for number in about if number < 0},
+    )
     free = [axis for axis in (0, 1) if not sides & {axis, axis + 2}]
     if len(stones) <= len(free) or not free:
         return place
     moved = place.copy()
     for _ in range(_STEPS):
-        found = [_signed(moved[None], outlines[stone]) for stone in stones]
-        apart_by = np.array([found[0][0][0] - near[0] for near, _ in found[1:]])
-        rise = np.array([(found[0][1][0] - out[0])[free] for _, out in found[1:]])
+        distances = [_signed(moved[None], outlines[stone]) for stone in stones]
+        apart_by = np.array([distances[0][0][0] - near[0] for near, _ in distances[1:]])
+        rise = np.array([(distances[0][1][0] - out[0])[free] for _, out in distances[1:]])
         if np.linalg.svd(rise, compute_uv=False).min() ** 2 < _FLATTEST:
             return place
         moved[free] -= np.linalg.lstsq(rise, apart_by, rcond=None)[0]
-    return moved if float(np.hypot(*(moved - place))) < _SHIFT * float(abs(found[0][0][0])) else place
+    return moved if float(np.hypot(*(moved - place))) < _SHIFT * float(abs(distances[0][0][0])) else place
 
 
 def _signed(places: Array, ring: Array) -> tuple[Array, Array]:
     """Return the distances (n,) of places from a polygon, negative inside, and in what direction (n, 2) they grow."""
-    way = np.roll(ring, -1, axis=0) - ring
-    size = np.maximum((way**2).sum(axis=1), 1e-300)
+    run = np.roll(ring, -1, axis=0) - ring
+    size = np.maximum((run**2).sum(axis=1), 1e-300)
     off = places[:, None] - ring[None]
-    along = np.clip((off * way).sum(axis=2) / size, 0.0, 1.0)
-    gap = off - along[..., None] * way
+    along = np.clip((off * run).sum(axis=2) / size, 0.0, 1.0)
+    gap = off - along[..., None] * run
     lengths = np.linalg.norm(gap, axis=2)
     nearest = lengths.argmin(axis=1)
     rows = np.arange(len(places))
@@ -191,7 +194,7 @@ class _Network:
             for node in line.ends:
                 self.about[node] |= {line.left, line.right}
         self.at: dict[int, set[int]] = defaultdict(set)
-        self.sides = Counter(stone for one in lines.lines for stone in (one.left, one.right))
+        self.sides = Counter(stone for line in lines.lines for stone in (line.left, line.right))
         for number, line in self.lines.items():
             for node in line.ends:
                 self.at[node].add(number)
@@ -218,7 +221,7 @@ class _Network:
             return False
         if len(self.at[a] & self.at[b]) != 1:
             return False
-        sides_a, sides_b = ({one for one in self.about[node] if one < 0} for node in (a, b))
+        sides_a, sides_b = ({side for side in self.about[node] if side < 0} for node in (a, b))
         if not (sides_a <= sides_b or sides_b <= sides_a):
             return False
         if any(stone >= 0 and self.sides[stone] <= _FEWEST for stone in (line.left, line.right)):
@@ -231,11 +234,11 @@ class _Network:
         del self.lines[number]
         self.sides.subtract((line.left, line.right))
         self.at[a].discard(number)
-        for other in self.at.pop(b) - {number}:
-            one = self.lines[other]
-            start, stop = (a if node == b else node for node in one.ends)
-            self.lines[other] = Line((start, stop), one.path, one.left, one.right)
-            self.at[a].add(other)
+        for index in self.at.pop(b) - {number}:
+            branch = self.lines[index]
+            start, stop = (a if node == b else node for node in branch.ends)
+            self.lines[index] = Line((start, stop), branch.path, branch.left, branch.right)
+            self.at[a].add(index)
         self.collapsed += 1
         return True
 
@@ -278,10 +281,10 @@ def _straightened(
 
 def _few(path: Array, tolerance: float, shortest: float, ends: tuple[int, int]) -> list[int]:
     """Return the places along a path, its ends left out, that a chain of straight edges needs (Douglas & Peucker)."""
-    kept, stack = set[int](), [(0, len(path) - 1)]
+    corners, stack = set[int](), [(0, len(path) - 1)]
     if ends[0] == ends[1]:  # about a single stone: three corners at least
         third = len(path) // 3
-        kept = {third, 2 * third}
+        corners = {third, 2 * third}
         stack = [(0, third), (third, 2 * third), (2 * third, len(path) - 1)]
     while stack:
         start, stop = stack.pop()
@@ -291,9 +294,9 @@ def _few(path: Array, tolerance: float, shortest: float, ends: tuple[int, int]) 
         worst = int(np.argmax(off))
         if off[worst] > tolerance:
             middle = start + 1 + worst
-            kept.add(middle)
+            corners.add(middle)
             stack += [(start, middle), (middle, stop)]
-    chosen = [0, *sorted(kept), len(path) - 1]
+    chosen = [0, *sorted(corners), len(path) - 1]
     least = 4 if ends[0] == ends[1] else 2
     while len(chosen) > least:
         sides = np.linalg.norm(np.diff(path[chosen], axis=0), axis=1)
@@ -313,10 +316,10 @@ def _ring(stone: int, chains: Chains) -> tuple[int, ...] | None:
     """Return the corners around a stone, counter-clockwise; None unless its lines form one ring."""
     after: dict[int, tuple[int, ...]] = {}
     for line, chain in chains:
-        own = chain if line.left == stone else chain[::-1]
-        if own[0] in after:
+        directed = chain if line.left == stone else chain[::-1]
+        if directed[0] in after:
             return None
-        after[own[0]] = own
+        after[directed[0]] = directed
     if not after:
         return None
     start = here = next(iter(after))

@@ -90,7 +90,7 @@ class _Plane:
     def flattens(self, other: "_Plane") -> bool:
         """Return whether both sides of a stone would lie in the plane."""
         both = self.looks.keys() & other.looks.keys()
-        return any(float(self.looks[one] @ other.looks[one]) < 0.0 for one in both)
+        return any(float(self.looks[face] @ other.looks[face]) < 0.0 for face in both)
 
 
 def common_planes(
@@ -117,13 +117,13 @@ def common_planes(
         for face in match.faces:
             if face not in planes and root[face] == face:
                 planes[face] = _Plane(corners[face], {owner[face]: area_vector(corners[face])})
-        one, two = sorted(_find(root, face) for face in match.faces)
-        if one == two:
+        first, two = sorted(_find(root, face) for face in match.faces)
+        if first == two:
             continue
-        both = planes[one].joined(planes[two])
-        if not planes[one].flattens(planes[two]) and _spread(both.corners) <= tolerance:
-            root[two] = one
-            planes[one] = both
+        both = planes[first].joined(planes[two])
+        if not planes[first].flattens(planes[two]) and _spread(both.corners) <= tolerance:
+            root[two] = first
+            planes[first] = both
             del planes[two]
         elif match.area > 0.0:
             apart.append(match)

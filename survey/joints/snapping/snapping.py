@@ -109,8 +109,10 @@ class _Assembly:
                     planes.setdefault(i, set()).add(self._plane[k])
         for i, others in self._folds.items():
             planes[i] |= {p for j in others for p in planes.get(j, ()) if count[p] > 1}
-        known: dict[int, int] = {}
-        rows = [(i, known.setdefault(p, len(known))) for i in sorted(planes) for p in sorted(planes[i])]
+        column_of: dict[int, int] = {}
+        rows = [
+            (i, column_of.setdefault(p, len(column_of))) for i in sorted(planes) for p in sorted(planes[i])
+        ]
         table = np.array(rows, dtype=np.int64).reshape(-1, 2)
         return table[:, 0], table[:, 1]
 
@@ -149,8 +151,8 @@ class _Assembly:
         if free:
             self._fold(max(free, key=lambda k: len(self._faces[k])))
             return
-        own = [match for match in self._matches if set(match.faces) & set(faces)]
-        worst = max(own, key=lambda one: one.spread)
+        matches = [match for match in self._matches if set(match.faces) & set(faces)]
+        worst = max(matches, key=lambda one: one.spread)
         self._matches.remove(worst)
         self._open.append((worst, f"it would move a corner by {moved:.3g} m"))
 
@@ -189,8 +191,10 @@ class _Assembly:
             },
             {self._given[k].code: count for k, count in sorted(self._folded.items())},
             tuple(
-                OpenContact((self._given[one.solids[0]].code, self._given[one.solids[1]].code), one.area, why)
-                for one, why in self._open
+                OpenContact(
+                    (self._given[match.solids[0]].code, self._given[match.solids[1]].code), match.area, why
+                )
+                for match, why in self._open
             ),
         )
 
@@ -228,12 +232,12 @@ def _meeting_corners(solids: Sequence[Solid], touching: Set[int], reach: float) 
     vertices = np.concatenate([solid.vertices for solid in solids])
     owner = np.repeat(np.arange(len(solids)), np.diff(starts))
     tree = cKDTree(vertices)
-    found = {}
+    corners = {}
     for i in sorted(folds):
-        near = tree.query_ball_point(vertices[i], reach)
-        near.sort(key=lambda j: (float(np.linalg.norm(vertices[j] - vertices[i])), j))
+        close = tree.query_ball_point(vertices[i], reach)
+        close.sort(key=lambda j: (float(np.linalg.norm(vertices[j] - vertices[i])), j))
         nearest: dict[int, int] = {}
-        for j in near:
+        for j in close:
             nearest.setdefault(int(owner[j]), j)
-        found[i] = tuple(j for key, j in nearest.items() if key != owner[i])
-    return {i: others for i, others in found.items() if others}
+        corners[i] = tuple(j for key, j in nearest.items() if key != owner[i])
+    return {i: others for i, others in corners.items() if others}

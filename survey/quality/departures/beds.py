@@ -163,11 +163,11 @@ class BedMovement:
 
     @property
     def _courses(self) -> str:
-        own = [number for number in self.courses if self.first <= number <= self.last]
-        if len(own) < 2:
+        numbers = [number for number in self.courses if self.first <= number <= self.last]
+        if len(numbers) < 2:
             return f"course {self.first}"
         agree = self.chi2 <= self.dof + 3.0 * math.sqrt(2.0 * self.dof)
-        return f"{len(own)} courses ({self.first} to {self.last}), which {'agree' if agree else 'differ'}"
+        return f"{len(numbers)} courses ({self.first} to {self.last}), which {'agree' if agree else 'differ'}"
 
 
 @dataclass(frozen=True)
@@ -221,9 +221,9 @@ class WallBeds:
 
     def finding(self, course: int) -> str:
         """Verdict on one course."""
-        own = [movement for movement in self.movements if movement.first <= course <= movement.last]
-        if own:
-            return "; ".join(self._in_course(one, course) for one in own)
+        movements = [movement for movement in self.movements if movement.first <= course <= movement.last]
+        if movements:
+            return "; ".join(self._in_course(movement, course) for movement in movements)
         bound = self.excluded_in.get(course)
         if bound is None:
             return "not tested: too few stones"
@@ -236,11 +236,11 @@ class WallBeds:
         return f"{level}no movement found; more than {bound * 1e3:.0f} mm is excluded"
 
     @staticmethod
-    def _in_course(one: BedMovement, course: int) -> str:
-        amount = one.courses.get(course)
+    def _in_course(movement: BedMovement, course: int) -> str:
+        amount = movement.courses.get(course)
         size = "" if amount is None else f" {amount[0] * 1e3:+z.1f} ± {amount[1] * 1e3:.1f} mm"
-        words = {"sag": "sags" if one.amount < 0.0 else "hogs", "step": "settled", "part": "settled"}
-        return f"{words.get(one.kind, one.kind)}{size}"
+        words = {"sag": "sags" if movement.amount < 0.0 else "hogs", "step": "settled", "part": "settled"}
+        return f"{words.get(movement.kind, movement.kind)}{size}"
 
 
 @dataclass(frozen=True)
@@ -278,13 +278,13 @@ def find_bed_movements(
     walls: dict[tuple[str, str | None], list[CourseLine]] = defaultdict(list)
     for line in lines:
         walls[line.facade, line.zone].append(line)
-    beds = {key: _beds(own) for key, own in walls.items()}
+    beds = {key: _beds(lines) for key, lines in walls.items()}
     together = _scatter(list(beds.values()))
     share = alpha / max(len(walls), 1)
     found = []
     for (facade, zone), bed in beds.items():
-        own = _scatter([bed])
-        scatter = own if own[2] >= _ENOUGH else together
+        wall_scatter = _scatter([bed])
+        scatter = wall_scatter if wall_scatter[2] >= _ENOUGH else together
         found.append(_wall(facade, zone, bed, scatter, lengths, share, rows or {}))
     return tuple(found)
 
@@ -312,7 +312,7 @@ def measure_beds(
 def _beds(lines: Sequence[CourseLine]) -> _Beds:
     codes: list[str] = []
     table: list[tuple[int, float, float, float]] = []
-    for k, line in enumerate(sorted(lines, key=lambda one: one.course)):
+    for k, line in enumerate(sorted(lines, key=lambda line: line.course)):
         corners: dict[str, list[int]] = defaultdict(list)
         for i, code in enumerate(line.codes):
             corners[code].append(i)
@@ -333,13 +333,13 @@ def _scatter(walls: Sequence[_Beds]) -> tuple[float, float, int]:
     differences, variances = [], []
     for beds in walls:
         for k in range(len(beds.numbers)):
-            own = np.flatnonzero(beds.course == k)
-            step = np.diff(beds.height[own])
+            members = np.flatnonzero(beds.course == k)
+            step = np.diff(beds.height[members])
             if len(step) >= 3:
                 # without the slope of the course, which takes one difference
                 step = (step - np.median(step)) * math.sqrt(len(step) / (len(step) - 1.0))
             differences.append(step)
-            variances.append(beds.measured[own][1:] + beds.measured[own][:-1])
+            variances.append(beds.measured[members][1:] + beds.measured[members][:-1])
     step = np.concatenate([np.zeros(0), *differences])
     tau, count = scatter_beyond(step, np.concatenate([np.zeros(0), *variances]), 2.0)
     return tau, max(_PER_DIFFERENCE * count, 1.0) if count else 0.0, count
@@ -359,15 +359,15 @@ def _wall(
         return WallBeds(facade, zone, beds.numbers, tau, freedom, (), (), None, {})
     variance = beds.measured + tau**2
     odd = _odd_beds(beds, variance, lengths, critical(alpha / 3.0, len(beds.codes), freedom), rows)
-    kept = ~np.isin(beds.codes, [one.code for one in odd])
-    sound = _kept(beds, kept)
+    usual = ~np.isin(beds.codes, [one.code for one in odd])
+    sound = _kept(beds, usual)
     if len(sound.codes) < 4:
         return WallBeds(facade, zone, beds.numbers, tau, freedom, (), odd, None, {})
     length = float(np.median([lengths.get(code, 0.5) for code in sound.codes]))
     middle = 0.5 * float(sound.along.min() + sound.along.max())
     sample = Sample(
         sound.height,
-        variance[kept],
+        variance[usual],
         sound.along,
         np.zeros(len(sound.codes)),
         sound.course,
@@ -378,10 +378,10 @@ def _wall(
     shapes, fields = _shapes(sample, length)
     runs = _runs(len(sound.numbers))
 
-    def follow(one: Sample, found: Found) -> Found:
-        if found.shape.name.endswith("end"):
-            return _hinged(one, found, length)
-        return _extended(one, _follow(one, found, found.run, length), length)
+    def follow(sample: Sample, fit: Found) -> Found:
+        if fit.shape.name.endswith("end"):
+            return _hinged(sample, fit, length)
+        return _extended(sample, _follow(sample, fit, fit.run, length), length)
 
     first, _ = fit_shapes(sample, shapes, fields, runs, 2.0 * alpha / 3.0, follow)
     # what the first movements leave tells the scatter better than neighbours do, and holds slow waves of beds too
@@ -397,35 +397,35 @@ def _wall(
 
 
 def _left(
-    sample: Sample, measured: Array, found: Sequence[Found], tau: float, freedom: float
+    sample: Sample, measured: Array, fits: Sequence[Found], tau: float, freedom: float
 ) -> tuple[float, float]:
     """Return τ and its degrees of freedom from what movements leave; those before where few stones are left."""
-    rest = sample.values - sum((one.amount * one.field for one in found), np.zeros(len(sample.values)))
+    rest = sample.values - sum((fit.amount * fit.field for fit in fits), np.zeros(len(sample.values)))
     counts = np.bincount(sample.group)
-    free = len(rest) - sample.groups - len(found)
+    free = len(rest) - sample.groups - len(fits)
     means = np.bincount(sample.group, rest) / counts
     # a residual about the mean of its course has less variance than the bed
     share = (1.0 - 1.0 / counts)[sample.group]
     rest = rest - means[sample.group]
     if free < _ENOUGH:
         return tau, freedom
-    kept = (np.abs(rest) <= OUTLIER * np.sqrt(share * sample.variance)) & (share > 0.0)
+    inliers = (np.abs(rest) <= OUTLIER * np.sqrt(share * sample.variance)) & (share > 0.0)
 
     def excess(square: float) -> float:
-        return float((rest[kept] ** 2 / (share[kept] * (measured[kept] + square))).sum()) - WITHIN * int(
-            kept.sum()
-        )
+        return float(
+            (rest[inliers] ** 2 / (share[inliers] * (measured[inliers] + square))).sum()
+        ) - WITHIN * int(inliers.sum())
 
     square = root_of(excess, float(np.ptp(rest)) ** 2)
     return math.sqrt(square), max(_PER_RESIDUAL * free, 1.0)
 
 
-def _kept(beds: _Beds, kept: NDArray[np.bool_]) -> _Beds:
+def _kept(beds: _Beds, mask: NDArray[np.bool_]) -> _Beds:
     """Return the beds of some stones, and the courses that are left."""
-    left, course = np.unique(beds.course[kept], return_inverse=True)
-    codes = tuple(code for code, one in zip(beds.codes, kept, strict=True) if one)
+    left, course = np.unique(beds.course[mask], return_inverse=True)
+    codes = tuple(code for code, one in zip(beds.codes, mask, strict=True) if one)
     numbers = tuple(beds.numbers[k] for k in left.tolist())
-    return _Beds(codes, course, numbers, beds.along[kept], beds.height[kept], beds.measured[kept], beds.tilt)
+    return _Beds(codes, course, numbers, beds.along[mask], beds.height[mask], beds.measured[mask], beds.tilt)
 
 
 def _odd_beds(
@@ -434,29 +434,29 @@ def _odd_beds(
     """Return the stones whose beds lie off two neighbours on each side, alone: no stone above or below does as well."""
     amount, sigma = np.zeros(len(beds.codes)), np.ones(len(beds.codes))
     for k in range(len(beds.numbers)):
-        own = np.flatnonzero(beds.course == k)
-        if len(own) < 5:
+        members = np.flatnonzero(beds.course == k)
+        if len(members) < 5:
             continue
-        height, square = beds.height[own], variance[own]
-        for i in range(len(own)):
+        height, square = beds.height[members], variance[members]
+        for i in range(len(members)):
             sides = [s for s in (slice(max(i - 2, 0), i), slice(i + 1, i + 3)) if len(height[s])]
             gaps = [
                 (height[i] - height[s].mean(), square[i] + square[s].sum() / len(height[s]) ** 2)
                 for s in sides
             ]
             if len({gap > 0.0 for gap, _ in gaps}) == 1:
-                gap, both = min(gaps, key=lambda one: abs(one[0]) / math.sqrt(one[1]))
-                amount[own[i]], sigma[own[i]] = gap, math.sqrt(both)
+                gap, both = min(gaps, key=lambda gap: abs(gap[0]) / math.sqrt(gap[1]))
+                amount[members[i]], sigma[members[i]] = gap, math.sqrt(both)
     strange = np.flatnonzero(np.abs(amount) > np.maximum(limit * sigma, LEAST))
-    found = []
+    odd = []
     for i in strange.tolist():
         near = (np.abs(beds.along - beds.along[i]) < 0.75 * lengths.get(beds.codes[i], 0.5)) & (
             np.abs(beds.course - beds.course[i]) == 1
         )
         if not (near & (amount * np.sign(amount[i]) > 0.5 * abs(amount[i]))).any():
             code = beds.codes[i]
-            found.append(OddBed(code, rows.get(code, 0), float(amount[i]), float(sigma[i])))
-    return tuple(sorted(found, key=lambda one: -abs(one.amount) / one.sigma))
+            odd.append(OddBed(code, rows.get(code, 0), float(amount[i]), float(sigma[i])))
+    return tuple(sorted(odd, key=lambda bed: -abs(bed.amount) / bed.sigma))
 
 
 def _runs(courses: int) -> list[Run]:
@@ -491,9 +491,9 @@ def _shapes(sample: Sample, length: float) -> tuple[list[Shape], Array]:
         ]
     fewest = min(_FEWEST, max(1, len(along) // 4))
     supported = [
-        one
-        for one in named
-        if one[0] in ("tilt", "sag") or fewest <= int((one[2] != 0.0).sum()) <= len(along) - fewest
+        shape
+        for shape in named
+        if shape[0] in ("tilt", "sag") or fewest <= int((shape[2] != 0.0).sum()) <= len(along) - fewest
     ]
     shapes = [Shape(name, at, _RANKS[name]) for name, at, _ in supported]
     return shapes, np.column_stack([field for *_, field in supported])
@@ -503,27 +503,27 @@ def _places(sample: Sample, length: float) -> list[float]:
     """Return where a step can be: the middles between neighbours in a course, not closer than half a stone."""
     middles = []
     for k in range(sample.groups):
-        own = np.sort(sample.along[sample.group == k])
-        middles.append((own[1:] + own[:-1]) / 2.0)
+        ordered = np.sort(sample.along[sample.group == k])
+        middles.append((ordered[1:] + ordered[:-1]) / 2.0)
     every = np.sort(np.concatenate(middles)) if middles else np.zeros(0)
     if len(every) == 0:
         return []
     close = max(_CLOSE * length, float(np.ptp(every)) / _PLACES)
-    found: list[float] = []
+    places: list[float] = []
     for start in every.tolist():
-        if found and start < found[-1] + close:
+        if places and start < places[-1] + close:
             continue
-        found.append(start)
-    return found
+        places.append(start)
+    return places
 
 
-def _hinged(sample: Sample, found: Found, length: float) -> Found:
+def _hinged(sample: Sample, fit: Found, length: float) -> Found:
     """Move the place from which an end falls away to where it fits best."""
     left, right = float(sample.along.min()), float(sample.along.max())
-    inside = (sample.group >= found.run[0]) & (sample.group <= found.run[1])
+    inside = (sample.group >= fit.run[0]) & (sample.group <= fit.run[1])
     trials = []
-    for place in found.shape.places[0] + length * np.linspace(-0.6, 0.6, 13):
-        rising = found.shape.name == "right end"
+    for place in fit.shape.places[0] + length * np.linspace(-0.6, 0.6, 13):
+        rising = fit.shape.name == "right end"
         reach = right - place if rising else place - left
         if reach < length:
             continue
@@ -534,27 +534,27 @@ def _hinged(sample: Sample, found: Found, length: float) -> Found:
         amount, sigma = _amount(sample, field, inside)
         trials.append(((amount / sigma) ** 2, field, amount, (float(place),)))
     if not trials:
-        return found
-    _, field, amount, places = max(trials, key=lambda one: one[0])
-    return replace(found, field=field, amount=amount, shape=found.shape._replace(places=places))
+        return fit
+    _, field, amount, places = max(trials, key=lambda trial: trial[0])
+    return replace(fit, field=field, amount=amount, shape=fit.shape._replace(places=places))
 
 
-def _extended(sample: Sample, found: Found, length: float) -> Found:
+def _extended(sample: Sample, fit: Found, length: float) -> Found:
     """Add the courses next to a run which have the same step or part, their crack being a little farther off."""
-    if found.shape.name not in ("step", "part"):
-        return found
+    if fit.shape.name not in ("step", "part"):
+        return fit
     for step in (1, -1):
-        while 0 <= (k := found.run[step == 1] + step) < sample.groups:
-            own = sample.group == k
-            start = _shape_field(found.shape, sample.along)
-            tried = replace(found, field=np.where(own, start, found.field))
+        while 0 <= (k := fit.run[step == 1] + step) < sample.groups:
+            members = sample.group == k
+            start = _shape_field(fit.shape, sample.along)
+            tried = replace(fit, field=np.where(members, start, fit.field))
             tried = _follow(sample, tried, (k, k), length)
-            amount, sigma = _amount(sample, tried.field, own)
-            if not abs(amount - found.amount) < _EXCLUDES * sigma < abs(amount):
+            amount, sigma = _amount(sample, tried.field, members)
+            if not abs(amount - fit.amount) < _EXCLUDES * sigma < abs(amount):
                 break
-            run = (found.run[0], k) if step == 1 else (k, found.run[1])
-            found = replace(tried, run=run)
-    return found
+            run = (fit.run[0], k) if step == 1 else (k, fit.run[1])
+            fit = replace(tried, run=run)
+    return fit
 
 
 def _amount(sample: Sample, values: Array, own: NDArray[np.bool_]) -> tuple[float, float]:
@@ -576,35 +576,35 @@ def _shape_field(shape: Shape, along: Array) -> Array:
     return values.astype(float)
 
 
-def _follow(sample: Sample, found: Found, run: Run, length: float) -> Found:
+def _follow(sample: Sample, fit: Found, run: Run, length: float) -> Found:
     """Move the edges of a step or part in each course to the head joint that fits it best: cracks zigzag."""
-    if found.shape.name not in ("step", "part"):
-        return found
-    field = found.field.copy()
-    for edge in found.shape.places:
+    if fit.shape.name not in ("step", "part"):
+        return fit
+    field = fit.field.copy()
+    for edge in fit.shape.places:
         for k in range(run[0], run[1] + 1):
-            own = np.flatnonzero(sample.group == k)
-            along = sample.along[own]
+            members = np.flatnonzero(sample.group == k)
+            along = sample.along[members]
             order = np.argsort(along)
-            own, along = own[order], along[order]
+            members, along = members[order], along[order]
             gaps = (along[1:] + along[:-1]) / 2.0
             here = np.flatnonzero(np.abs(gaps - edge) <= _REACH * length)
             if len(here) < 2:
                 continue
-            rising = found.shape.name == "step" or edge == found.shape.places[0]
+            rising = fit.shape.name == "step" or edge == fit.shape.places[0]
             trials = []
             for gap in here.tolist():
-                trial = field[own].copy()
-                near = np.abs(along - edge) <= (_REACH + 1.0) * length
-                side = np.arange(len(own)) > gap
-                trial[near] = (side if rising else ~side)[near]
-                if found.shape.name == "part":
-                    trial[~near] = field[own][~near]
-                rest = sample.values[own] - found.amount * trial
-                rest = rest - np.average(rest, weights=1.0 / sample.variance[own])
-                trials.append((float((rest**2 / sample.variance[own]).sum()), trial))
-            field[own] = min(trials, key=lambda one: one[0])[1]
-    return replace(found, field=field)
+                trial = field[members].copy()
+                close = np.abs(along - edge) <= (_REACH + 1.0) * length
+                side = np.arange(len(members)) > gap
+                trial[close] = (side if rising else ~side)[close]
+                if fit.shape.name == "part":
+                    trial[~close] = field[members][~close]
+                rest = sample.values[members] - fit.amount * trial
+                rest = rest - np.average(rest, weights=1.0 / sample.variance[members])
+                trials.append((float((rest**2 / sample.variance[members]).sum()), trial))
+            field[members] = min(trials, key=lambda trial: trial[0])[1]
+    return replace(fit, field=field)
 
 
 def _bounds(
@@ -613,46 +613,54 @@ def _bounds(
     """Return the smallest settlement of a part of the wall that would have been found, for each run of courses [m]."""
     wanted = [k for k, shape in enumerate(shapes) if shape.name in ("step", "sag", "tilt")]
     names = [shapes[k].name for k in wanted]
-    found: list[float | None] = []
+    bounds: list[float | None] = []
     for run in runs:
         sigma = powers(sample, fields[:, wanted], run)
         steps = np.array(
-            [one for one, name in zip(sigma, names, strict=True) if name == "step" and np.isfinite(one)]
+            [
+                deviation
+                for deviation, name in zip(sigma, names, strict=True)
+                if name == "step" and np.isfinite(deviation)
+            ]
         )
-        others = [one for one, name in zip(sigma, names, strict=True) if name != "step" and np.isfinite(one)]
+        others = [
+            deviation
+            for deviation, name in zip(sigma, names, strict=True)
+            if name != "step" and np.isfinite(deviation)
+        ]
         worst = [*others, *([float(np.median(steps))] if len(steps) else [])]
-        found.append((limit + LIKELY) * max(worst) if worst and math.isfinite(limit) else None)
-    return found
+        bounds.append((limit + LIKELY) * max(worst) if worst and math.isfinite(limit) else None)
+    return bounds
 
 
-def _told(facade: str, zone: str | None, beds: _Beds, sample: Sample, one: Found) -> BedMovement:
-    low = one.field < 0.5 if one.shape.name == "step" and one.amount > 0.0 else one.field > 0.5
-    inside = (sample.group >= one.run[0]) & (sample.group <= one.run[1])
-    if one.shape.name in ("tilt", "sag"):
+def _told(facade: str, zone: str | None, beds: _Beds, sample: Sample, fit: Found) -> BedMovement:
+    low = fit.field < 0.5 if fit.shape.name == "step" and fit.amount > 0.0 else fit.field > 0.5
+    inside = (sample.group >= fit.run[0]) & (sample.group <= fit.run[1])
+    if fit.shape.name in ("tilt", "sag"):
         low = inside
-    elif one.shape.name in ("left end", "right end"):
-        low = one.field > 0.0
+    elif fit.shape.name in ("left end", "right end"):
+        low = fit.field > 0.0
     moved = np.flatnonzero(low & inside)
     left, right = (
         (float(beds.along[moved].min()), float(beds.along[moved].max())) if len(moved) else (0.0, 0.0)
     )
-    told = np.flatnonzero(np.isfinite(one.each[:, 0])).tolist()
-    courses = {beds.numbers[k]: (float(one.each[k, 0]), float(one.each[k, 1])) for k in told}
-    older, above = _age(one, told)
+    tested = np.flatnonzero(np.isfinite(fit.each[:, 0])).tolist()
+    courses = {beds.numbers[k]: (float(fit.each[k, 0]), float(fit.each[k, 1])) for k in tested}
+    older, above = _age(fit, tested)
     return BedMovement(
         facade=facade,
         zone=zone,
-        kind=BedKind(one.shape.name),
-        first=beds.numbers[one.run[0]],
-        last=beds.numbers[one.run[1]],
+        kind=BedKind(fit.shape.name),
+        first=beds.numbers[fit.run[0]],
+        last=beds.numbers[fit.run[1]],
         left=left,
         right=right,
-        amount=one.amount,
-        sigma=one.sigma,
-        probability=one.probability,
+        amount=fit.amount,
+        sigma=fit.sigma,
+        probability=fit.probability,
         courses=courses,
-        chi2=one.chi2,
-        dof=one.dof,
+        chi2=fit.chi2,
+        dof=fit.dof,
         older_than=None if older is None else beds.numbers[older],
         above=None if above is None else above[0],
         above_sigma=None if above is None else above[1],
@@ -660,18 +668,18 @@ def _told(facade: str, zone: str | None, beds: _Beds, sample: Sample, one: Found
     )
 
 
-def _age(one: Found, told: Sequence[int]) -> tuple[int | None, tuple[float, float] | None]:
+def _age(fit: Found, tested: Sequence[int]) -> tuple[int | None, tuple[float, float] | None]:
     """Return the first course that was laid level above a movement, with the amount from there on; None if none is.
 
     The movement must reach down to the lowest course that tells, and the courses above must differ from it by three
     standard deviations and from none by less.
     """
-    over = [k for k in told if k > one.run[1]]
-    if not over or any(k < one.run[0] for k in told):
+    over = [k for k in tested if k > fit.run[1]]
+    if not over or any(k < fit.run[0] for k in tested):
         return None, None
-    weights = 1.0 / one.each[over, 1] ** 2
-    mean, sigma = float(weights @ one.each[over, 0] / weights.sum()), 1.0 / math.sqrt(float(weights.sum()))
-    level = abs(mean) < _EXCLUDES * sigma or abs(mean) < 0.2 * abs(one.amount)
-    if level and abs(mean - one.amount) > _EXCLUDES * math.hypot(sigma, one.sigma):
+    weights = 1.0 / fit.each[over, 1] ** 2
+    mean, sigma = float(weights @ fit.each[over, 0] / weights.sum()), 1.0 / math.sqrt(float(weights.sum()))
+    level = abs(mean) < _EXCLUDES * sigma or abs(mean) < 0.2 * abs(fit.amount)
+    if level and abs(mean - fit.amount) > _EXCLUDES * math.hypot(sigma, fit.sigma):
         return over[0], (mean, sigma)
     return None, None

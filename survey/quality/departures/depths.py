@@ -67,23 +67,23 @@ def doubtful_depths(
     rules : depth rules of the survey
     alpha : probability that a survey with sound depths is given one doubt
     """
-    known = [i for i, stone in enumerate(stones) if stone.depth is not None and stone.source != "solid"]
-    limit = critical(alpha, 3 * len(known), max(float(len(known)), 2.0))
-    thickness = dict(_thickness(stones, known, facades))
+    with_depth = [i for i, stone in enumerate(stones) if stone.depth is not None and stone.source != "solid"]
+    limit = critical(alpha, 3 * len(with_depth), max(float(len(with_depth)), 2.0))
+    thickness = dict(_thickness(stones, with_depth, facades))
     through = {i for i, thick in thickness.items() if _reaches(stones[i], thick)}
-    known = [i for i in known if i not in through]
-    found = [
-        *_against_rules(stones, known, rules, limit),
-        *_against_kind(stones, known, limit),
-        *_against_neighbours(stones, known, facades, limit),
-        *_against_opposite(stones, known, thickness, limit),
+    with_depth = [i for i in with_depth if i not in through]
+    doubts = [
+        *_against_rules(stones, with_depth, rules, limit),
+        *_against_kind(stones, with_depth, limit),
+        *_against_neighbours(stones, with_depth, facades, limit),
+        *_against_opposite(stones, with_depth, thickness, limit),
     ]
-    doubted = {one.code for one in found}
-    found += [one for one in _against_face(stones, known) if one.code not in doubted]
+    doubted = {doubt.code for doubt in doubts}
+    doubts += [one for one in _against_face(stones, with_depth) if one.code not in doubted]
     order = ("opposite face", "rule", "kind", "neighbours", "own face")
     best: dict[str, DoubtfulDepth] = {}
-    for one in sorted(found, key=lambda one: (order.index(one.against), -one.score)):
-        best.setdefault(one.code, one)
+    for doubt in sorted(doubts, key=lambda one: (order.index(one.against), -one.score)):
+        best.setdefault(doubt.code, doubt)
     return tuple(sorted(best.values(), key=lambda one: (-one.score, one.code)))
 
 
@@ -118,9 +118,11 @@ def _against_kind(
     kinds: dict[str, list[int]] = defaultdict(list)
     for i in known:
         kinds[stones[i].kind].append(i)
-    for kind, own in kinds.items():
-        if len(own) >= _ENOUGH:
-            yield from _among(stones, own, own, limit, "kind", f"the other stones of its kind, {kind},")
+    for kind, members in kinds.items():
+        if len(members) >= _ENOUGH:
+            yield from _among(
+                stones, members, members, limit, "kind", f"the other stones of its kind, {kind},"
+            )
 
 
 def _among(
@@ -146,23 +148,23 @@ def _among(
 
 
 def _against_neighbours(
-    stones: Sequence[StoneQuality], known: Sequence[int], facades: Sequence[Facade], limit: float
+    stones: Sequence[StoneQuality], with_depth: Sequence[int], facades: Sequence[Facade], limit: float
 ) -> Iterator[DoubtfulDepth]:
     """Compare a stone with those beside it, where its kind has too few."""
     counts: dict[str, int] = defaultdict(int)
-    for i in known:
+    for i in with_depth:
         counts[stones[i].kind] += 1
-    there = set(known)
+    there = set(with_depth)
     for facade in facades:
-        own = [i for i in facade.members.tolist() if i in there]
-        rare = [i for i in own if counts[stones[i].kind] < _ENOUGH]
-        if len(own) <= _ENOUGH or not rare:
+        members = [i for i in facade.members.tolist() if i in there]
+        rare = [i for i in members if counts[stones[i].kind] < _ENOUGH]
+        if len(members) <= _ENOUGH or not rare:
             continue
-        places = np.array([facade.frame.flatten(stones[i].outline).mean(axis=0) for i in own])
+        places = np.array([facade.frame.flatten(stones[i].outline).mean(axis=0) for i in members])
         tree = cKDTree(places)
         for i in rare:
-            near = tree.query(places[own.index(i)], k=min(_BESIDE + 1, len(own)))[1]
-            beside = [own[k] for k in np.ravel(near).tolist() if own[k] != i]
+            near = tree.query(places[members.index(i)], k=min(_BESIDE + 1, len(members)))[1]
+            beside = [members[k] for k in np.ravel(near).tolist() if members[k] != i]
             yield from _among(stones, [i], beside, limit, "neighbours", "the stones beside it")
 
 
@@ -174,9 +176,9 @@ def _thickness(
     for facade in upright:
         behind = [
             i
-            for other in upright
-            if facade.frame.axes[2] @ other.frame.axes[2] <= -math.cos(math.radians(_PARALLEL))
-            for i in other.members.tolist()
+            for opposite in upright
+            if facade.frame.axes[2] @ opposite.frame.axes[2] <= -math.cos(math.radians(_PARALLEL))
+            for i in opposite.members.tolist()
         ]
         if not behind:
             continue

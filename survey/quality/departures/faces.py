@@ -105,23 +105,24 @@ class FaceMovement:
     def text(self) -> str:
         """The movement in a sentence."""
         size = millimetres(self.amount, self.sigma)
-        way = "outwards" if self.amount > 0.0 else "inwards"
+        direction = "outwards" if self.amount > 0.0 else "inwards"
         over = f"over {self.high - self.low:.2f} m"
         stands = f"stands {size} {'forward of' if self.amount > 0.0 else 'behind'}"
         bulges = f"{'bulges' if self.amount > 0.0 else 'is hollow'} by {size}"
         angle = math.degrees(math.atan2(abs(self.amount), max(self.high - self.low, 1e-9)))
         where = f"from {self.left:z.2f} to {self.right:z.2f} m"
         return {
-            "lean": f"it leans {way} by {size} {over} ({angle:.2f}°), or was built with a batter",
+            "lean": f"it leans {direction} by {size} {over} ({angle:.2f}°), or was built with a batter",
             "bulge": f"it {bulges} between base and top",
-            "bow": f"it bows {way} by {size} between its ends, or was built round",
-            "left end": f"its left end, {where}, comes {way} by {size}",
-            "right end": f"its right end, {where}, comes {way} by {size}",
-            "left corner": f"its left corner, {where}, leans {way} by {size} {over}",
-            "right corner": f"its right corner, {where}, leans {way} by {size} {over}",
+            "bow": f"it bows {direction} by {size} between its ends, or was built round",
+            "left end": f"its left end, {where}, comes {direction} by {size}",
+            "right end": f"its right end, {where}, comes {direction} by {size}",
+            "left corner": f"its left corner, {where}, leans {direction} by {size} {over}",
+            "right corner": f"its right corner, {where}, leans {direction} by {size} {over}",
             "offset": f"its right part, {where}, {stands} the left",
             "setback": f"from {self.low:.2f} m up it {stands} what is below: slid, or built so",
-            "leaning part": f"its part {where} leans {way} as one by {size} {over} ({angle:.2f}°), parted by a joint",
+            "leaning part": f"its part {where} leans {direction} as one by {size} {over} ({angle:.2f}°), "
+            "parted by a joint",
             "local bulge": f"it {bulges} {where} and {self.low:.2f} to {self.high:.2f} m up",
         }[self.kind]
 
@@ -201,13 +202,13 @@ class _Face:
     size: float = 0.5
     bottom: float = 0.0
 
-    def of(self, kept: NDArray[np.intp]) -> "_Face":
+    def of(self, rows: NDArray[np.intp]) -> "_Face":
         """Return some of the faces."""
         arrays = {
-            name: getattr(self, name)[kept]
+            name: getattr(self, name)[rows]
             for name in ("rows", "along", "up", "out", "sigma", "turn", "turn_sigma")
         }
-        chosen = kept.tolist()
+        chosen = rows.tolist()
         return replace(
             self, codes=[self.codes[i] for i in chosen], lines=[self.lines[i] for i in chosen], **arrays
         )
@@ -228,7 +229,7 @@ def find_face_departures(
     alpha : probability that a survey without any departure is given one
     tilts : standard deviation of the lean of the frame by facade, where control points levelled it [rad]
     """
-    faces = [part for facade in facades if facade.azimuth is not None for part in _faces(stones, facade)]
+    faces = [face for facade in facades if facade.azimuth is not None for face in _faces(stones, facade)]
     share = alpha / max(len(faces), 1)
     return tuple(_wall(name, zone, face, share, (tilts or {}).get(name, 0.0)) for name, zone, face in faces)
 
@@ -240,34 +241,36 @@ def _faces(stones: Sequence[StoneQuality], facade: Facade) -> Iterator[tuple[str
     axes[2] /= np.linalg.norm(axes[2])
     zones: dict[str | None, list[int]] = defaultdict(list)
     for i in facade.members.tolist():
-        one = stones[i]
-        known = one.source in ("points", "photograph") and math.isfinite(one.offset_sigma)
-        if known and one.kind not in _PROJECTING:
-            zones[one.zone].append(i)
+        stone = stones[i]
+        known = stone.source in ("points", "photograph") and math.isfinite(stone.offset_sigma)
+        if known and stone.kind not in _PROJECTING:
+            zones[stone.zone].append(i)
     for zone, members in zones.items():
-        own = [stones[i] for i in members]
-        centres = np.array([one.outline.mean(axis=0) for one in own]) - facade.frame.origin
-        normals = np.array([one.normal for one in own])
+        wall_stones = [stones[i] for i in members]
+        centres = (
+            np.array([wall_stone.outline.mean(axis=0) for wall_stone in wall_stones]) - facade.frame.origin
+        )
+        normals = np.array([wall_stone.normal for wall_stone in wall_stones])
         turn = np.column_stack([normals @ axes[0], normals[:, 2]]) / (normals @ axes[2])[:, None]
         straight = np.abs(turn - np.median(turn, axis=0)).max(axis=1) < math.tan(math.radians(_TURNED))
         face = _Face(
             np.array(members, dtype=np.intp),
-            [one.code for one in own],
-            [one.line for one in own],
+            [wall_stone.code for wall_stone in wall_stones],
+            [wall_stone.line for wall_stone in wall_stones],
             centres @ axes[0],
             centres[:, 2] + facade.frame.origin[2],
             centres @ axes[2],
-            np.array([_offset_sigma(one) for one in own]),
+            np.array([_offset_sigma(wall_stone) for wall_stone in wall_stones]),
             turn,
-            np.radians(np.array([one.tilt_sigma for one in own])),
-            float(np.median([math.sqrt(one.area) for one in own])),
-            min(float(one.outline[:, 2].min()) for one in own),
+            np.radians(np.array([wall_stone.tilt_sigma for wall_stone in wall_stones])),
+            float(np.median([math.sqrt(wall_stone.area) for wall_stone in wall_stones])),
+            min(float(wall_stone.outline[:, 2].min()) for wall_stone in wall_stones),
         )
         if straight.sum() < _WALL:
             continue
         face = face.of(np.flatnonzero(straight))
-        for part in _planes(face):
-            yield facade.name, zone, face.of(part)
+        for plane in _planes(face):
+            yield facade.name, zone, face.of(plane)
 
 
 def _offset_sigma(stone: StoneQuality) -> float:
@@ -282,9 +285,9 @@ def _planes(face: _Face) -> list[NDArray[np.intp]]:
     pairs = cKDTree(places).query_pairs(_REACH / 3.0 * face.size, output_type="ndarray")
     slope = np.median(face.turn, axis=0)
     level = face.out + places @ slope
-    near = pairs[np.abs(level[pairs[:, 0]] - level[pairs[:, 1]]) < _JOINED]
+    joined = pairs[np.abs(level[pairs[:, 0]] - level[pairs[:, 1]]) < _JOINED]
     size = len(places)
-    graph = coo_array((np.ones(len(near)), (near[:, 0], near[:, 1])), shape=(size, size))
+    graph = coo_array((np.ones(len(joined)), (joined[:, 0], joined[:, 1])), shape=(size, size))
     _, label = connected_components(graph, directed=False)
     counts = np.bincount(label)
     large = np.flatnonzero(counts >= _WALL)
@@ -292,12 +295,12 @@ def _planes(face: _Face) -> list[NDArray[np.intp]]:
         return []
     alone = np.flatnonzero(counts[label] < _WALL)
     walls = [np.flatnonzero(label == k) for k in large.tolist()]
-    own = np.concatenate(walls)
+    members = np.concatenate(walls)
     if len(alone):
         # an odd stone stands out of the wall that is beside it
-        nearest = np.asarray(cKDTree(places[own]).query(places[alone])[1])
+        nearest = np.asarray(cKDTree(places[members]).query(places[alone])[1])
         label = label.copy()
-        label[alone] = label[own][nearest]
+        label[alone] = label[members][nearest]
         walls = [np.flatnonzero(label == k) for k in large.tolist()]
     return walls
 
@@ -316,15 +319,15 @@ def _wall(name: str, zone: str | None, face: _Face, alpha: float, tilt: float) -
         away, away_sigma, scatter = _beside(replace(face, out=face.out - moved))
         crossing = _crossing(face, movements, away, limit * away_sigma)
         before, odd = odd, _odd(face, limit, (np.where(crossing, 0.0, away), away_sigma), _turned(face))
-        strange = np.isin(face.codes, [one.code for one in odd if one.sort != "turned"]) | crossing
+        strange = np.isin(face.codes, [stone.code for stone in odd if stone.sort != "turned"]) | crossing
         sound = np.flatnonzero(~strange)
-        kept = face.of(sound)
-        movements, lower = _movements(kept, scatter, alpha / 2.0, freedom, tilt)
+        sound_face = face.of(sound)
+        movements, lower = _movements(sound_face, scatter, alpha / 2.0, freedom, tilt)
         if not movements or len(movements) >= MOST or [o.code for o in odd] == [o.code for o in before]:
             break
     if len(movements) >= MOST:  # as many shapes as are looked for leave some still: these faces make no plane
         movements, lower = [], None
-    told = tuple(_told(name, zone, kept, movement) for movement in movements)
+    told = tuple(_told(name, zone, sound_face, movement) for movement in movements)
     plane, plumb, lean, sigma = _departures(face, sound, scatter)
     return WallFace(
         name,
@@ -336,7 +339,7 @@ def _wall(name: str, zone: str | None, face: _Face, alpha: float, tilt: float) -
         plane,
         plumb,
         told,
-        tuple(sorted(odd, key=lambda one: -abs(one.amount) / one.sigma)),
+        tuple(sorted(odd, key=lambda stone: -abs(stone.amount) / stone.sigma)),
         lower,
         (limit + LIKELY) * float(np.median(away_sigma)) if len(away) else None,
     )
@@ -390,15 +393,15 @@ def _beside(face: _Face) -> tuple[Array, Array, float]:
     places = np.column_stack([face.along, face.up])
     near = _NEAR if count > _NEAR else count - 1
     distance, index = _nearest(places, near + 1)
-    far = distance[:, 1:] > _REACH * face.size
-    far[:, :_FEW] = False
+    distant = distance[:, 1:] > _REACH * face.size
+    distant[:, :_FEW] = False
     index = index[:, 1:]
     rows = np.stack([np.ones(index.shape), *(places[index] - places[:, None]).transpose(2, 0, 1)], axis=2)
     values = face.out[index]
     scatter = 0.0
     # the first weights know no plane, only the median of the neighbours: one odd stone would turn a plane
     first = values - np.median(values, axis=1)[:, None]
-    weights = _bisquare(np.abs(first) / max(spread(first[~far]), 1e-9), far)
+    weights = _bisquare(np.abs(first) / max(spread(first[~distant]), 1e-9), distant)
     for _ in range(4):
         variance = face.sigma**2 + scatter**2
         normal = np.einsum("nki,nk,nkj->nij", rows, weights / variance[index], rows)
@@ -412,17 +415,17 @@ def _beside(face: _Face) -> tuple[Array, Array, float]:
         share = 1.0 + predicted / variance  # variance of the departure over that of a face
         found = spread(away / np.sqrt(share))
         scatter = math.sqrt(max(found**2 - float(np.median(face.sigma**2)), 0.0))
-        weights = _bisquare(np.abs(rest) / np.sqrt(face.sigma[index] ** 2 + scatter**2), far)
+        weights = _bisquare(np.abs(rest) / np.sqrt(face.sigma[index] ** 2 + scatter**2), distant)
     sigma = np.sqrt(face.sigma**2 + scatter**2 + predicted)
     return away, sigma, scatter
 
 
-def _bisquare(size: Array, far: NDArray[np.bool_]) -> Array:
+def _bisquare(size: Array, distant: NDArray[np.bool_]) -> Array:
     """Return Tukey's weights (n, k) of residuals over their σ; those of neighbours that are all far off stay equal."""
     share = np.minimum(size / _BISQUARE, 1.0)
-    weights = np.where(far, 0.0, (1.0 - share**2) ** 2)
+    weights = np.where(distant, 0.0, (1.0 - share**2) ** 2)
     lost = weights.sum(axis=1) < 3.0
-    weights[lost] = np.where(far[lost], 0.0, 1.0)
+    weights[lost] = np.where(distant[lost], 0.0, 1.0)
     return np.asarray(weights, dtype=np.float64)
 
 
@@ -436,17 +439,17 @@ def _turned(face: _Face) -> tuple[Array, Array]:
     """Return the turn of each face about the upright and the level axis against its neighbours, and its σ [rad]."""
     count = len(face.codes)
     places = np.column_stack([face.along, face.up])
-    near = _NEAR if count > _NEAR else count - 1
-    index = _nearest(places, near + 1)[1][:, 1:]
+    neighbours = _NEAR if count > _NEAR else count - 1
+    index = _nearest(places, neighbours + 1)[1][:, 1:]
     turned = face.turn - np.median(face.turn[index], axis=1)
     measured = np.where(np.isfinite(face.turn_sigma), face.turn_sigma, np.inf)
     # a median of k is by π/2 less certain than their mean
-    grown = math.sqrt(1.0 + 0.5 * math.pi / near)
-    known = np.isfinite(measured)
+    grown = math.sqrt(1.0 + 0.5 * math.pi / neighbours)
+    finite = np.isfinite(measured)
     sigma = np.full(turned.shape, np.inf)
     for k in range(2):
-        if known.any():
-            excess = max(spread(turned[known, k] / (grown * measured[known])), 1.0)
+        if finite.any():
+            excess = max(spread(turned[finite, k] / (grown * measured[finite])), 1.0)
             sigma[:, k] = grown * excess * measured
     return turned, sigma
 
@@ -561,7 +564,7 @@ def _field(shape: Shape, face: _Face) -> Array:
 def _sharpener(face: _Face) -> Callable[[Sample, Found], Found]:
     """Return what moves the places of a shape to where they fit best."""
 
-    def sharpen(sample: Sample, found: Found) -> Found:
+    def sharpen(sample: Sample, fit: Found) -> Found:
         free = {
             "offset": (0,),
             "setback": (0,),
@@ -570,22 +573,24 @@ def _sharpener(face: _Face) -> Callable[[Sample, Found], Found]:
             "left corner": (1,),
         }
         free |= {"right end": (0,), "right corner": (0,), "leaning part": (0, 1)}
-        if found.shape.name not in free:
-            return found
-        best, gain, step = found.shape, _gain(sample, found.field), 0.5 * face.size
+        if fit.shape.name not in free:
+            return fit
+        best, gain, step = fit.shape, _gain(sample, fit.field), 0.5 * face.size
         for _ in range(_TRIALS):
             tried = [
                 best._replace(places=tuple(p + sign * step * (i == k) for i, p in enumerate(best.places)))
                 for k in free[best.name]
                 for sign in (-1.0, 1.0)
             ]
-            scores = [(_gain(sample, _field(one, face)), one) for one in tried if _is_sound(one, face)]
+            scores = [
+                (_gain(sample, _field(trial, face)), trial) for trial in tried if _is_sound(trial, face)
+            ]
             top = max(scores, key=lambda pair: pair[0], default=(-1.0, best))
             if top[0] > gain:
                 gain, best = top
             else:
                 step *= 0.5
-        return replace(found, shape=best, field=_field(best, face))
+        return replace(fit, shape=best, field=_field(best, face))
 
     return sharpen
 
@@ -617,23 +622,23 @@ def _gain(sample: Sample, values: Array) -> float:
     return float(shape @ (root * sample.values)) ** 2 / square if square > 1e-9 else 0.0
 
 
-def _told(name: str, zone: str | None, face: _Face, one: Found) -> FaceMovement:
-    at = one.shape.places
+def _told(name: str, zone: str | None, face: _Face, fit: Found) -> FaceMovement:
+    at = fit.shape.places
     left, right = float(face.along.min()), float(face.along.max())
     low, high = float(face.up.min()), float(face.up.max())
-    if one.shape.name == "local bulge":
+    if fit.shape.name == "local bulge":
         left, right = max(left, at[0] - at[2]), min(right, at[0] + at[2])
         low, high = max(low, at[1] - at[2]), min(high, at[1] + at[2])
-    elif one.shape.name == "offset":
+    elif fit.shape.name == "offset":
         left = at[0]
-    elif one.shape.name == "setback":
+    elif fit.shape.name == "setback":
         low = at[0]
-    elif one.shape.name == "leaning part":
+    elif fit.shape.name == "leaning part":
         left, right, low = max(left, at[0]), min(right, at[1]), at[2]
-    elif one.shape.name not in ("lean", "bulge", "bow"):
+    elif fit.shape.name not in ("lean", "bulge", "bow"):
         left, right = max(left, at[0]), min(right, at[1])
     return FaceMovement(
-        name, zone, FaceKind(one.shape.name), left, right, low, high, one.amount, one.sigma, one.probability
+        name, zone, FaceKind(fit.shape.name), left, right, low, high, fit.amount, fit.sigma, fit.probability
     )
 
 
@@ -644,11 +649,11 @@ def _departures(face: _Face, sound: NDArray[np.intp], scatter: float) -> tuple[A
     middle = float(face.up.mean())
     columns = np.column_stack([np.ones(len(face.codes)), face.along - face.along.mean(), face.up - middle])
     root = np.sqrt(weights)
-    found = []
+    departures = []
     for free in (columns, columns[:, :2]):
         solved = np.linalg.lstsq(root[:, None] * free, root * face.out, rcond=None)[0]
-        found.append((face.out - free @ solved, solved))
-    (plane, solved), (plumb, _) = found
+        departures.append((face.out - free @ solved, solved))
+    (plane, solved), (plumb, _) = departures
     normal = columns.T @ (weights[:, None] * columns)
     tall = float(np.ptp(face.up)) > 1e-6
     sigma = (

@@ -145,8 +145,8 @@ class _Moments:
         share = np.divide(self.values**2, self.squares, out=np.zeros_like(self.squares), where=tells)
         first, last = run
         sums = []
-        for one in (self.squares, self.values, self.tilt, share, tells.astype(float)):
-            total = np.vstack([np.zeros(one.shape[1]), np.cumsum(one, axis=0)])
+        for column in (self.squares, self.values, self.tilt, share, tells.astype(float)):
+            total = np.vstack([np.zeros(column.shape[1]), np.cumsum(column, axis=0)])
             sums.append(total[last + 1] - total[first])
         squares, values, tilt, shares, count = sums
         whole = np.divide(values**2, squares, out=np.zeros_like(squares), where=squares > 0.0)
@@ -188,14 +188,14 @@ def fit_shapes(
     movements, the most significant first, and the critical value of |t|
     """
     ends = tuple(np.array(one, dtype=np.intp) for one in zip(*runs, strict=True))
-    found: list[Found] = []
+    fits: list[Found] = []
     rest, limit, tests = sample.values, math.inf, 0
     for _ in range(MOST):
         trials = _Trials.of(_moments(sample, fields, rest), (ends[0], ends[1]))
-        if not found:
+        if not fits:
             tests = int(trials.tells.sum())
             limit = critical(alpha, tests, sample.freedom)
-        enough = max(LEAST, _LEAST * max((abs(one.amount) for one in found), default=0.0))
+        enough = max(LEAST, _LEAST * max((abs(fit.amount) for fit in fits), default=0.0))
         score = np.where(np.abs(trials.amount) < enough, 0.0, trials.score)
         if float(score.max(initial=0.0)) <= limit**2:
             break
@@ -209,30 +209,30 @@ def fit_shapes(
             (one for one, gain in zip(best, gains, strict=True) if gain >= good),
             key=lambda one: one.shape.rank,
         )
-        found = _fitted(sample, [*found, chosen])
-        rest = _rest(sample, found)
-    while found:
-        judged = [_judged(sample, found, k, fields, tests) for k in range(len(found))]
+        fits = _fitted(sample, [*fits, chosen])
+        rest = _rest(sample, fits)
+    while fits:
+        judged = [_judged(sample, fits, k, fields, tests) for k in range(len(fits))]
         most = max(abs(one.amount) for one in judged)
-        weak = [one for one in judged if abs(one.amount) <= max(limit * one.sigma, LEAST, _LEAST * most)]
+        weak = [fit for fit in judged if abs(fit.amount) <= max(limit * fit.sigma, LEAST, _LEAST * most)]
         if not weak:
             return judged, limit
-        least = min(weak, key=lambda one: abs(one.amount) / one.sigma)
-        found = _fitted(sample, [one for one in found if one.field is not least.field])
+        least = min(weak, key=lambda fit: abs(fit.amount) / fit.sigma)
+        fits = _fitted(sample, [fit for fit in fits if fit.field is not least.field])
     return [], limit
 
 
-def _fitted(sample: Sample, found: Sequence[Found]) -> list[Found]:
+def _fitted(sample: Sample, fits: Sequence[Found]) -> list[Found]:
     """Return movements with the amounts that fit best together."""
-    if not found:
+    if not fits:
         return []
-    amounts = _amounts(sample, [one.field for one in found])
-    return [replace(one, amount=float(amount)) for one, amount in zip(found, amounts, strict=True)]
+    amounts = _amounts(sample, [fit.field for fit in fits])
+    return [replace(fit, amount=float(amount)) for fit, amount in zip(fits, amounts, strict=True)]
 
 
-def _rest(sample: Sample, found: Sequence[Found]) -> Array:
+def _rest(sample: Sample, fits: Sequence[Found]) -> Array:
     """Return what movements leave of the departures."""
-    rest: Array = sample.values - sum((one.amount * one.field for one in found), np.zeros(len(sample.values)))
+    rest: Array = sample.values - sum((fit.amount * fit.field for fit in fits), np.zeros(len(sample.values)))
     return rest
 
 
@@ -269,10 +269,12 @@ def _best_of_families(
 ) -> list[Found]:
     """Return of each family the shape and run that explain most: significant ones or, without any, all of them."""
     names = np.array([shape.name for shape in shapes])
-    found = []
+    fits = []
     for name in dict.fromkeys(names.tolist()):
-        own = names == name
-        allowed = own & (score > limit**2) if (score[:, own] > limit**2).any() else own & (score > 0.0)
+        members = names == name
+        allowed = (
+            members & (score > limit**2) if (score[:, members] > limit**2).any() else members & (score > 0.0)
+        )
         gain = np.where(allowed, trials.gain, 0.0)
         row, column = np.unravel_index(int(gain.argmax()), gain.shape)
         if gain[row, column] <= limit**2:
@@ -281,14 +283,14 @@ def _best_of_families(
         inside = (sample.group >= run[0]) & (sample.group <= run[1])
         field = np.where(inside, fields[:, column], 0.0)
         amount = float(trials.amount[row, column])
-        found.append(Found(shapes[int(column)], run, field, amount, 0.0, np.zeros((0, 2)), 0.0, 0, 0.0))
-    return found
+        fits.append(Found(shapes[int(column)], run, field, amount, 0.0, np.zeros((0, 2)), 0.0, 0, 0.0))
+    return fits
 
 
-def _gain(sample: Sample, found: Found) -> float:
+def _gain(sample: Sample, fit: Found) -> float:
     """Return the reduction of Σ r²/v by a shape in its run."""
-    moments = _moments(sample, found.field[:, None], sample.values)
-    ends = np.array([found.run[0]]), np.array([found.run[1]])
+    moments = _moments(sample, fit.field[:, None], sample.values)
+    ends = np.array([fit.run[0]]), np.array([fit.run[1]])
     return float(_Trials.of(moments, ends).gain[0, 0])
 
 
@@ -307,16 +309,16 @@ def _moments(sample: Sample, fields: Array, values: Array) -> _Moments:
     shape = (sample.groups, fields.shape[1])
     squares, products, tilts = np.zeros(shape), np.zeros(shape), np.zeros(shape)
     for k in range(sample.groups):
-        own = np.flatnonzero(sample.group == k)
-        root = 1.0 / np.sqrt(sample.variance[own])[:, None]
-        basis = _basis(root * sample.nuisance[own])
-        before = root * fields[own]
+        members = np.flatnonzero(sample.group == k)
+        root = 1.0 / np.sqrt(sample.variance[members])[:, None]
+        basis = _basis(root * sample.nuisance[members])
+        before = root * fields[members]
         after = before - basis @ (basis.T @ before)
         squares[k] = (after**2).sum(axis=0)
         squares[k][squares[k] <= _NOTHING * (before**2).sum(axis=0)] = 0.0
         after[:, squares[k] == 0.0] = 0.0
-        products[k] = after.T @ (root[:, 0] * values[own])
-        tilts[k] = after.T @ (root[:, 0] * sample.tilt[own])
+        products[k] = after.T @ (root[:, 0] * values[members])
+        tilts[k] = after.T @ (root[:, 0] * sample.tilt[members])
     return _Moments(squares, products, tilts)
 
 
@@ -343,42 +345,42 @@ def _amounts(sample: Sample, fields: Sequence[Array]) -> Array:
     return np.asarray(solved[: len(fields)], dtype=np.float64)
 
 
-def _variance(sample: Sample, found: Sequence[Found], k: int) -> float:
+def _variance(sample: Sample, fits: Sequence[Found], k: int) -> float:
     """Return the variance of the amount of one of the shapes that are fitted together."""
     root = 1.0 / np.sqrt(sample.variance)
-    fields = np.column_stack([one.field for one in found]) * root[:, None]
+    fields = np.column_stack([fit.field for fit in fits]) * root[:, None]
     basis = _basis(_design(sample) * root[:, None])
     fields = fields - basis @ (basis.T @ fields)
     return float(np.linalg.pinv(fields.T @ fields)[k, k])
 
 
-def _judged(sample: Sample, found: Sequence[Found], k: int, fields: Array, tests: int) -> Found:
+def _judged(sample: Sample, fits: Sequence[Found], k: int, fields: Array, tests: int) -> Found:
     """Return a movement with its standard deviation and the amounts of single groups, the others taken out."""
-    one = found[k]
-    inside = (sample.group >= one.run[0]) & (sample.group <= one.run[1])
-    others = [f for f in found if f is not one]
+    fit = fits[k]
+    inside = (sample.group >= fit.run[0]) & (sample.group <= fit.run[1])
+    others = [f for f in fits if f is not fit]
     # what other groups alone have is not taken out of them: what it has in common with this one tells its age
-    shared = [f for f in others if f.run[0] <= one.run[0] and one.run[1] <= f.run[1]]
+    shared = [f for f in others if f.run[0] <= fit.run[0] and fit.run[1] <= f.run[1]]
     rest = np.where(inside, _rest(sample, others), _rest(sample, shared))
     # outside of its run the shape is where its family puts it
-    everywhere = np.where(inside, one.field, _outside(sample, one, fields))
+    everywhere = np.where(inside, fit.field, _outside(sample, fit, fields))
     moments = _moments(sample, everywhere[:, None], rest)
     squares, values = moments.squares[:, 0], moments.values[:, 0]
     each = np.full((sample.groups, 2), np.nan)
     tells = squares > 0.0
     each[tells, 0] = values[tells] / squares[tells]
     each[tells, 1] = 1.0 / np.sqrt(squares[tells])
-    ends = np.array([one.run[0]]), np.array([one.run[1]])
+    ends = np.array([fit.run[0]]), np.array([fit.run[1]])
     total, _, tilt, chi2, count = (float(part[0, 0]) for part in moments.over(ends))
     dof = max(int(count) - 1, 0)
-    variance = max(_variance(sample, found, k), 1.0 / total) * max(1.0, chi2 / max(dof, 1))
+    variance = max(_variance(sample, fits, k), 1.0 / total) * max(1.0, chi2 / max(dof, 1))
     sigma = math.sqrt(variance + (tilt / total) ** 2)
-    chance = min(1.0, tests * 2.0 * float(stdtr(sample.freedom, -abs(one.amount) / sigma)))
-    return replace(one, sigma=sigma, each=each, chi2=chi2, dof=dof, probability=chance)
+    chance = min(1.0, tests * 2.0 * float(stdtr(sample.freedom, -abs(fit.amount) / sigma)))
+    return replace(fit, sigma=sigma, each=each, chi2=chi2, dof=dof, probability=chance)
 
 
-def _outside(sample: Sample, one: Found, fields: Array) -> Array:
-    inside = (sample.group >= one.run[0]) & (sample.group <= one.run[1])
-    gaps = np.abs(fields[inside] - one.field[inside, None]).sum(axis=0)
+def _outside(sample: Sample, fit: Found, fields: Array) -> Array:
+    inside = (sample.group >= fit.run[0]) & (sample.group <= fit.run[1])
+    gaps = np.abs(fields[inside] - fit.field[inside, None]).sum(axis=0)
     nearest: Array = fields[:, int(gaps.argmin())]
     return nearest

@@ -170,8 +170,8 @@ def mechanical_ranges(indices: Mapping[Direction, tuple[float, float]]) -> dict[
     ----------
     indices : lowest and highest index of each direction
     """
-    found = {}
+    ranges = {}
     for name, (k, lower, upper) in _CURVES.items():
         low, high = indices[DIRECTIONS[k]]
-        found[name] = (lower[0] * math.exp(lower[1] * low), upper[0] * math.exp(upper[1] * high))
-    return found
+        ranges[name] = (lower[0] * math.exp(lower[1] * low), upper[0] * math.exp(upper[1] * high))
+    return ranges

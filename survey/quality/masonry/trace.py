@@ -67,11 +67,11 @@ def minimum_traces(faces: Sequence[Array]) -> Array:
     order = np.lexsort((centres[:, 0], centres[:, 1].round(1)))
     chosen = order[np.unique(np.linspace(0, len(faces) - 1, _SAMPLES).round().astype(int))]
     near = _around(centres, centres[chosen])
-    own = np.flatnonzero(near)
-    number = {k: i for i, k in enumerate(own.tolist())}
-    network, uprights = _joints([faces[k] for k in own.tolist()], [number[k] for k in chosen.tolist()])
+    members = np.flatnonzero(near)
+    number = {k: i for i, k in enumerate(members.tolist())}
+    network, uprights = _joints([faces[k] for k in members.tolist()], [number[k] for k in chosen.tolist()])
     matrix = network.matrix()
-    found = []
+    means = []
     for start, stops in uprights:
         rise = np.array([network.places[stop][1] - network.places[start][1] for stop in stops])
         here = (rise >= _HEIGHTS[0]) & (rise <= _HEIGHTS[1])
@@ -82,8 +82,8 @@ def minimum_traces(faces: Sequence[Array]) -> Array:
         reach = dijkstra(matrix, directed=False, indices=start, limit=_LONGEST * float(rise[here].max()))
         ratios = reach[np.array(stops)[here]] / rise[here]
         if np.isfinite(ratios).all():  # a pile of single stones has no way up
-            found.append(float(ratios.mean()))
-    return np.array(found)
+            means.append(float(ratios.mean()))
+    return np.array(means)
 
 
 def _around(centres: Array, chosen: Array) -> NDArray[np.bool_]:
@@ -137,7 +137,7 @@ def _joints(faces: Sequence[Array], chosen: Sequence[int]) -> tuple[_Network, li
                     on_side.append((share, beds[-1][1]))
             on_side.sort()
             ways += [(one, other) for (_, one), (_, other) in pairwise(on_side)]
-        middles = [(network.places[one] + network.places[other]) / 2.0 for one, other in ways]
+        middles = [(network.places[first] + network.places[second]) / 2.0 for first, second in ways]
         asked = np.array([*middles, *(network.places[place] for _, place in beds)])
         joint = _distance(asked, *segments) <= _JOINT
         network.ways += [way for way, there in zip(ways, joint, strict=False) if there]

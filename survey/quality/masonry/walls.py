@@ -121,11 +121,11 @@ class MasonryQuality:
     @property
     def categories(self) -> dict[Direction, str]:
         """Categories of each direction, "B" or from the lowest to the highest, "C to A"."""
-        found = {}
+        categories = {}
         for direction, ends in self.indices.items():
             low, high = (category(end, direction) for end in ends)
-            found[direction] = low if low == high else f"{low} to {high}"
-        return found
+            categories[direction] = low if low == high else f"{low} to {high}"
+        return categories
 
     @property
     def strengths(self) -> dict[str, tuple[float, float]]:
@@ -134,7 +134,7 @@ class MasonryQuality:
 
 
 def judge_masonry(
-    stones: Sequence[WallStone], facades: Sequence[Facade], given: Mapping[str, Grade] | None = None
+    stones: Sequence[WallStone], facades: Sequence[Facade], grades: Mapping[str, Grade] | None = None
 ) -> tuple[MasonryQuality, ...]:
     """Judge the masonry of every wall: the stones of one facade and zone, without those of arches.
 
@@ -142,7 +142,7 @@ def judge_masonry(
     ----------
     stones : all stones of the survey
     facades : of the stones
-    given : grades that the survey does not tell, of "SM" and "MM"
+    grades : grades that the survey does not tell, of "SM" and "MM"
     """
     walls = [
         (facade, zone, rows)
@@ -151,7 +151,7 @@ def judge_masonry(
         for zone, rows in _zones(stones, facade).items()
         if len(rows) >= _FEWEST
     ]
-    return tuple(_judge(stones, facade, zone, rows, facades, given or {}) for facade, zone, rows in walls)
+    return tuple(_judge(stones, facade, zone, rows, facades, grades or {}) for facade, zone, rows in walls)
 
 
 def _zones(stones: Sequence[WallStone], facade: Facade) -> dict[str | None, list[int]]:
@@ -168,24 +168,24 @@ def _judge(
     zone: str | None,
     rows: Sequence[int],
     facades: Sequence[Facade],
-    given: Mapping[str, Grade],
+    stated: Mapping[str, Grade],
 ) -> MasonryQuality:
-    own = [stones[i] for i in rows]
-    area = float(sum(one.area for one in own))
-    traces = minimum_traces([facade.frame.flatten(one.outline) for one in own])
-    trace, trace_sigma = _typical(traces, float(np.median([one.sigma for one in own])))
-    sections = np.array(list(_sections(own, facade, _behind(stones, facade, facades))))
-    depth_sigma = float(np.median([one.depth_sigma or 0.0 for one in own]))
+    members = [stones[i] for i in rows]
+    area = float(sum(member.area for member in members))
+    traces = minimum_traces([facade.frame.flatten(member.outline) for member in members])
+    trace, trace_sigma = _typical(traces, float(np.median([member.sigma for member in members])))
+    sections = np.array(list(_sections(members, facade, _behind(stones, facade, facades))))
+    depth_sigma = float(np.median([member.depth_sigma or 0.0 for member in members]))
     section, section_sigma = _typical(sections, depth_sigma)
-    kinds = Counter(one.kind for one in own)
+    kinds = Counter(member.kind for member in members)
     told = kinds["header"] + kinds["stretcher"] > 0
     headers = kinds["header"] / area if told else None
     grades = {
-        Parameter.SM: given.get("SM", UNKNOWN),
-        Parameter.MM: given.get("MM", UNKNOWN),
-        Parameter.SD: _size(own),
-        Parameter.SS: _shape(own, facade),
-        Parameter.HJ: _level(own, facade),
+        Parameter.SM: stated.get("SM", UNKNOWN),
+        Parameter.MM: stated.get("MM", UNKNOWN),
+        Parameter.SD: _size(members),
+        Parameter.SS: _shape(members, facade),
+        Parameter.HJ: _level(members, facade),
         Parameter.VJ: UNKNOWN
         if trace is None or trace_sigma is None
         else graded(trace, trace_sigma, _TRACE, f"minimum trace {trace:.2f} ± {trace_sigma:.2f} on the face"),
@@ -222,11 +222,11 @@ def _share(share: float, count: int, bounds: tuple[float, float], text: str) -> 
     return graded(share, math.sqrt(even * (1.0 - even) / count), bounds, text)
 
 
-def _size(own: Sequence[WallStone]) -> Grade:
-    sides = np.array([_side(one) for one in own])
-    sigma = np.array([max(math.sqrt(2.0) * one.sigma, 1e-9) for one in own])
+def _size(stones: Sequence[WallStone]) -> Grade:
+    sides = np.array([_side(stone) for stone in stones])
+    sigma = np.array([max(math.sqrt(2.0) * stone.sigma, 1e-9) for stone in stones])
     above = [float((expit(1.702 * (sides - limit) / sigma)).mean()) for limit in _SIZES]
-    count = len(own)
+    count = len(stones)
     text = f"larger sides {np.median(sides):.2f} m, {100.0 * above[1]:.0f} % of them above 0.40 m"
     # fulfilled if most are large, not if most are small
     large = graded(above[1], _deviation(above[1], count), (0.5, 0.5), "")
@@ -242,10 +242,10 @@ def _deviation(share: float, count: int) -> float:
     return math.sqrt(even * (1.0 - even) / count)
 
 
-def _side(one: WallStone) -> float:
+def _side(stone: WallStone) -> float:
     """Return the larger of the level and the upright extent of a face."""
-    across = np.ptp(one.outline[:, :2] @ _along(one.normal))
-    return float(max(across, np.ptp(one.outline[:, 2])))
+    across = np.ptp(stone.outline[:, :2] @ _along(stone.normal))
+    return float(max(across, np.ptp(stone.outline[:, 2])))
 
 
 def _along(normal: Array) -> Array:
@@ -253,11 +253,13 @@ def _along(normal: Array) -> Array:
     return along / max(float(np.linalg.norm(along)), 1e-12)
 
 
-def _shape(own: Sequence[WallStone], facade: Facade) -> Grade:
-    cut = np.array([one.kind != "rubble" and _is_cut(facade.frame.flatten(one.outline)) for one in own])
-    area = np.array([one.area for one in own])
+def _shape(stones: Sequence[WallStone], facade: Facade) -> Grade:
+    cut = np.array(
+        [stone.kind != "rubble" and _is_cut(facade.frame.flatten(stone.outline)) for stone in stones]
+    )
+    area = np.array([stone.area for stone in stones])
     share = float(area[cut].sum() / area.sum())
-    return _share(share, len(own), _CUT_SHARES, f"{100.0 * share:.0f} % of the face is of cut stones")
+    return _share(share, len(stones), _CUT_SHARES, f"{100.0 * share:.0f} % of the face is of cut stones")
 
 
 def _is_cut(flat: Array) -> bool:
@@ -266,15 +268,15 @@ def _is_cut(flat: Array) -> bool:
     return ring_area(flat) >= _CUT * float(ConvexHull(flat, qhull_options="QJ").volume)
 
 
-def _level(own: Sequence[WallStone], facade: Facade) -> Grade:
+def _level(stones: Sequence[WallStone], facade: Facade) -> Grade:
     """Grade the beds by their steps at head joints."""
     courses: dict[int, list[tuple[float, float, str]]] = defaultdict(list)
-    for one in own:
-        if one.course is None:
+    for stone in stones:
+        if stone.course is None:
             continue
-        flat = facade.frame.flatten(one.outline)
-        places = lower_corners(one.outline, facade.frame)
-        courses[one.course] += [(float(flat[k, 0]), float(one.outline[k, 2]), one.code) for k in places]
+        flat = facade.frame.flatten(stone.outline)
+        places = lower_corners(stone.outline, facade.frame)
+        courses[stone.course] += [(float(flat[k, 0]), float(stone.outline[k, 2]), stone.code) for k in places]
     steps = [
         (abs(high - low), first, second)
         for corners in courses.values()
@@ -302,21 +304,21 @@ def _bond(
 def _behind(stones: Sequence[WallStone], facade: Facade, facades: Sequence[Facade]) -> list[WallStone]:
     """Return the stones of facades that look the other way."""
     others = [
-        one
-        for one in facades
-        if one.azimuth is not None and one.frame.axes[2] @ facade.frame.axes[2] <= _OPPOSITE
+        candidate
+        for candidate in facades
+        if candidate.azimuth is not None and candidate.frame.axes[2] @ facade.frame.axes[2] <= _OPPOSITE
     ]
     return [stones[i] for one in others for i in one.members.tolist()]
 
 
-def _sections(own: Sequence[WallStone], facade: Facade, behind: Sequence[WallStone]) -> Iterator[float]:
+def _sections(stones: Sequence[WallStone], facade: Facade, behind: Sequence[WallStone]) -> Iterator[float]:
     """Yield the line of minimum trace in sections along a wall of which both faces were surveyed."""
     if not behind:
         return
-    front, back = _boxes(own, facade), _boxes(behind, facade)
+    front, back = _boxes(stones, facade), _boxes(behind, facade)
     left, right = max(front[:, 0].min(), back[:, 0].min()), min(front[:, 2].max(), back[:, 2].max())
     for s in np.arange(left + _APART / 2.0, right, _APART).tolist():
-        here, there = (one[(one[:, 0] <= s) & (s <= one[:, 2])] for one in (front, back))
+        here, there = (boxes[(boxes[:, 0] <= s) & (s <= boxes[:, 2])] for boxes in (front, back))
         if not len(here) or not len(there):
             continue
         low, high = max(here[:, 1].min(), there[:, 1].min()), min(here[:, 3].max(), there[:, 3].max())

@@ -73,21 +73,21 @@ def core_blocks(wall: FacingWall, settings: InfillSettings) -> tuple[CoreBlock, 
 
 def _cuts(sides: Iterable[Sequence[Stretch]]) -> list[_Cut]:
     """Return the head joints of both facings, from left to right, without repetition."""
-    cuts = [_Cut(one.start, one.left) for side in sides for one in side]
-    cuts += [_Cut(one.stop, one.right) for side in sides for one in side]
+    cuts = [_Cut(stretch.start, stretch.left) for side in sides for stretch in side]
+    cuts += [_Cut(stretch.stop, stretch.right) for side in sides for stretch in side]
     cuts.sort(key=lambda cut: cut.place)
-    kept: list[_Cut] = []
+    distinct: list[_Cut] = []
     for cut in cuts:
-        if not kept or cut.place - kept[-1].place > _SAME:
-            kept.append(cut)
-    return kept
+        if not distinct or cut.place - distinct[-1].place > _SAME:
+            distinct.append(cut)
+    return distinct
 
 
 def _stretches_of_core(
     cuts: list[_Cut], cells: "_Cells", settings: InfillSettings
 ) -> list[tuple[_Cut, _Cut]]:
     """Yield pairs of cuts between which there may be a block."""
-    found: list[tuple[_Cut, _Cut]] = []
+    gaps: list[tuple[_Cut, _Cut]] = []
     waiting = cuts[:0:-1]
     left = cuts[0] if cuts else None
     while left is not None and waiting:
@@ -95,20 +95,20 @@ def _stretches_of_core(
         ends = (here, here)
         if len(waiting) >= 2 and waiting[-1].place - here.place < settings.merge:
             ends = _one_of(left, here, waiting.pop(), waiting[-1], cells)
-        found.append((left, ends[0]))
+        gaps.append((left, ends[0]))
         left = ends[1]
-    return found
+    return gaps
 
 
-def _one_of(left: _Cut, one: _Cut, other: _Cut, right: _Cut, cells: "_Cells") -> tuple[_Cut, _Cut]:
+def _one_of(left: _Cut, first: _Cut, second: _Cut, right: _Cut, cells: "_Cells") -> tuple[_Cut, _Cut]:
     """Return the end of the block left of two near cuts and the start of that right of them that fill the most."""
 
     def filled(ends: tuple[_Cut, _Cut]) -> float:
         return cells.volume(left, ends[0]) + cells.volume(ends[1], right)
 
-    choices = [(one, one), (other, other)]
-    if not cells.crossed(one, other):
-        choices.append((one, other))
+    choices = [(first, first), (second, second)]
+    if not cells.crossed(first, second):
+        choices.append((first, second))
     return max(choices, key=filled)
 
 
@@ -160,7 +160,8 @@ class _Cells:
     def _make(self, left: _Cut, right: _Cut) -> CoreBlock | None:
         middle = 0.5 * (left.place + right.place)
         over = [
-            next((one.stone for one in side if one.start <= middle <= one.stop), None) for side in self.sides
+            next((stretch.stone for stretch in side if stretch.start <= middle <= stretch.stop), None)
+            for side in self.sides
         ]
         front, back = over
         if front is None or back is None or self.crossed(left, right):

@@ -113,8 +113,8 @@ def _coarser(filled: Bools, planes: Array, axis: int) -> tuple[Bools, Array]:
     layers = np.moveaxis(filled, axis, 0)
     used = np.flatnonzero(layers.reshape(len(layers), -1).any(axis=1))
     layers, planes = layers[used[0] : used[-1] + 1], planes[used[0] : used[-1] + 2]
-    kept = [0, *(k for k in range(1, len(layers)) if (layers[k] != layers[k - 1]).any())]
-    return np.moveaxis(layers[kept], 0, axis), planes[[*kept, len(layers)]]
+    distinct = [0, *(k for k in range(1, len(layers)) if (layers[k] != layers[k - 1]).any())]
+    return np.moveaxis(layers[distinct], 0, axis), planes[[*distinct, len(layers)]]
 
 
 def _node(planes: list[Array], node: Node) -> Array:
@@ -137,7 +137,7 @@ def _without_edges(filled: Bools) -> Bools:
 
 def _touching(filled: Bools) -> Counter[Node]:
     """Count for each cell its forbidden contacts with others."""
-    found: Counter[Node] = Counter()
+    touching: Counter[Node] = Counter()
     padded = np.pad(filled, 1)
     for step in _DIAGONALS:
         moved = np.roll(padded, [-s for s in step], axis=(0, 1, 2))
@@ -145,9 +145,9 @@ def _touching(filled: Bools) -> Counter[Node]:
         for between in _between(step):
             both &= ~np.roll(padded, [-s for s in between], axis=(0, 1, 2))
         for cell in np.argwhere(both).tolist():
-            for one in (cell, [c + s for c, s in zip(cell, step, strict=True)]):
-                found[(one[0] - 1, one[1] - 1, one[2] - 1)] += 1
-    return found
+            for place in (cell, [c + s for c, s in zip(cell, step, strict=True)]):
+                touching[(place[0] - 1, place[1] - 1, place[2] - 1)] += 1
+    return touching
 
 
 _DIAGONALS = [
@@ -163,4 +163,4 @@ def _between(step: Node) -> list[Node]:
     """Return the steps to the cells around the edge, or the corner, that a diagonal step goes through."""
     choices = [(0,) if s == 0 else (0, s) for s in step]
     around = [(a, b, c) for a in choices[0] for b in choices[1] for c in choices[2]]
-    return [one for one in around if one not in ((0, 0, 0), step)]
+    return [shift for shift in around if shift not in ((0, 0, 0), step)]

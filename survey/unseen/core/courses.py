@@ -87,23 +87,23 @@ def stretches(strip: Strip, stones: Sequence[FacingStone], settings: InfillSetti
 
     Neighbours share the plane half-way between them; at a hole or an opening each ends at its own side.
     """
-    found = []
+    runs = []
     for stone in stones:
         if not _fills(stone, strip):
             continue
         left, right = -stone.support(-_ALONG), stone.support(_ALONG)
         start, stop = (place_of(plane, strip.middle) for plane in (left, right))
-        found.append(Stretch(stone, left, right, start, stop))
-    found.sort(key=lambda one: one.start + one.stop)
-    for k in range(len(found) - 1):
-        one, other = found[k], found[k + 1]
-        if other.start - one.stop >= settings.max_joint:
+        runs.append(Stretch(stone, left, right, start, stop))
+    runs.sort(key=lambda run: run.start + run.stop)
+    for k in range(len(runs) - 1):
+        first, second = runs[k], runs[k + 1]
+        if second.start - first.stop >= settings.max_joint:
             continue
-        shared = _between(one.right, other.left, 0.5 * (one.stop + other.start), strip.middle)
+        shared = _between(first.right, second.left, 0.5 * (first.stop + second.start), strip.middle)
         place = place_of(shared, strip.middle)
-        found[k] = Stretch(one.stone, one.left, shared, one.start, place)
-        found[k + 1] = Stretch(other.stone, shared, other.right, place, other.stop)
-    return [one for one in found if one.stop > one.start]
+        runs[k] = Stretch(first.stone, first.left, shared, first.start, place)
+        runs[k + 1] = Stretch(second.stone, shared, second.right, place, second.stop)
+    return [run for run in runs if run.stop > run.start]
 
 
 def height_of(plane: Array, along: float) -> float:
@@ -127,10 +127,10 @@ def _fills(stone: FacingStone, strip: Strip) -> bool:
 def _beds(stones: Sequence[FacingStone]) -> list[_Bed]:
     """Return lower and upper beds of each course of a facing, or of each stone if courses are unknown."""
     courses: dict[object, list[FacingStone]] = {}
-    known = any(stone.course is not None for stone in stones)
+    numbered = any(stone.course is not None for stone in stones)
     for stone in stones:
-        if stone.course is not None or not known:
-            courses.setdefault(stone.course if known else stone.code, []).append(stone)
+        if stone.course is not None or not numbered:
+            courses.setdefault(stone.course if numbered else stone.code, []).append(stone)
     beds = []
     for members in courses.values():
         for direction, course in ((-_UP, members[0].course), (_UP, None)):
@@ -144,14 +144,14 @@ def _beds(stones: Sequence[FacingStone]) -> list[_Bed]:
 
 def _plane(corners: Array) -> Array:
     """Fit the bed plane to corners (n, 3), without those of another bed."""
-    near = np.abs(corners[:, 1] - np.median(corners[:, 1])) <= 2.0 * _OFF_BED
+    typical = np.abs(corners[:, 1] - np.median(corners[:, 1])) <= 2.0 * _OFF_BED
     for _ in range(3):
-        some = corners[near]
+        some = corners[typical]
         middle = some.mean(axis=0)
         arms = some[:, [0, 2]] - middle[[0, 2]]
         slopes = np.linalg.lstsq(arms, some[:, 1] - middle[1], rcond=1e-9)[0]
         residuals = corners[:, 1] - middle[1] - (corners[:, [0, 2]] - middle[[0, 2]]) @ slopes
-        near = np.abs(residuals) <= _OFF_BED
+        typical = np.abs(residuals) <= _OFF_BED
     normal = np.array([-slopes[0], 1.0, -slopes[1]])
     normal /= np.linalg.norm(normal)
     return np.append(normal, float(normal @ middle))

@@ -141,14 +141,14 @@ def wall_between(front: Sequence[FacingStone], back: Sequence[FacingStone]) -> F
     """
     if not front or not back:
         raise GeometryError("a facing has no stones", remedy="name stones of both sides of the wall")
-    one, other = (_mean_normal(stones) for stones in (front, back))
-    if one @ other > -_LEANING:
-        angle = float(np.degrees(np.arccos(np.clip(-(one @ other), -1.0, 1.0))))
+    first, second = (_mean_normal(stones) for stones in (front, back))
+    if first @ second > -_LEANING:
+        angle = float(np.degrees(np.arccos(np.clip(-(first @ second), -1.0, 1.0))))
         raise GeometryError(
             f"the two facings are {angle:.0f}° out of parallel",
             remedy="name stones of the two sides of one wall",
         )
-    normal = (one - other) / np.linalg.norm(one - other)
+    normal = (first - second) / np.linalg.norm(first - second)
     centres = [
         np.mean([stone.solid.vertices.mean(axis=0) for stone in side], axis=0) for side in (front, back)
     ]
@@ -181,8 +181,8 @@ def _linked(stones: Sequence[FacingStone], settings: InfillSettings) -> Indices:
     centres = np.array([front.mean(axis=0) for front in fronts])
     radii = np.array([np.linalg.norm(face - face.mean(axis=0), axis=1).max() for face in fronts])
     reach = settings.max_thickness + 2.0 * float(radii.max())
-    near = cKDTree(centres).query_pairs(reach, output_type="ndarray")
-    i, j = near[:, 0], near[:, 1]
+    pairs = cKDTree(centres).query_pairs(reach, output_type="ndarray")
+    i, j = pairs[:, 0], pairs[:, 1]
     cosine = (normals[i] * normals[j]).sum(axis=1)
     between = centres[j] - centres[i]
     behind, before = -(between * normals[i]).sum(axis=1), (between * normals[j]).sum(axis=1)
@@ -192,13 +192,13 @@ def _linked(stones: Sequence[FacingStone], settings: InfillSettings) -> Indices:
     thin = (np.minimum(behind, before) > 0.0) & (np.maximum(behind, before) <= settings.max_thickness)
     across = (cosine < -parallel) & thin & close
     flush = (cosine > parallel) & (np.maximum(np.abs(behind), np.abs(before)) <= _FLUSH) & close
-    kept = [
+    facing_pairs = [
         pair
-        for pair, one in zip(near[across | flush].tolist(), across[across | flush].tolist(), strict=True)
+        for pair, one in zip(pairs[across | flush].tolist(), across[across | flush].tolist(), strict=True)
         if _overlap(fronts[pair[0]], fronts[pair[1]], normals[pair[0]])
         > (_SHARED if one else -settings.max_joint)
     ]
-    return np.array(kept, dtype=np.intp).reshape(-1, 2)
+    return np.array(facing_pairs, dtype=np.intp).reshape(-1, 2)
 
 
 def _front(stone: FacingStone) -> Array:
@@ -207,8 +207,8 @@ def _front(stone: FacingStone) -> Array:
     return stone.solid.vertices if face is None else stone.solid.vertices[face]
 
 
-def _overlap(one: Array, other: Array, normal: Array) -> float:
+def _overlap(first: Array, other: Array, normal: Array) -> float:
     """Return the least overlap of the boxes of two faces, along or up, seen square to the first [m]."""
-    frame = upright_frame(normal, one[0])
-    a, b = frame.flatten(one), frame.flatten(other)
+    frame = upright_frame(normal, first[0])
+    a, b = frame.flatten(first), frame.flatten(other)
     return float((np.minimum(a.max(axis=0), b.max(axis=0)) - np.maximum(a.min(axis=0), b.min(axis=0))).min())

@@ -71,24 +71,24 @@ def propose_infill(
     """
     settings = settings or InfillSettings()
     walls = find_walls(stones, settings) if facings is None else (_given(stones, facings),)
-    found: list[InfillProposal] = []
+    proposals: list[InfillProposal] = []
     number = 0
     for wall in walls:
         number += 1
         while any(code.startswith(f"I{number}-") for code in taken):
             number += 1
         make = _blocks if settings.shape is InfillShape.BLOCKS else _storeys
-        found += make(wall, f"I{number}", settings)
-    return tuple(found)
+        proposals += make(wall, f"I{number}", settings)
+    return tuple(proposals)
 
 
 def _given(stones: Sequence[FacingStone], facings: tuple[Collection[str], Collection[str]]) -> FacingWall:
-    one, other = (set(codes) for codes in facings)
-    if one & other:
+    first, second = (set(codes) for codes in facings)
+    if first & second:
         raise UsageError(
-            f"stone {min(one & other)} is in both facings", remedy="name each stone in one facing only"
+            f"stone {min(first & second)} is in both facings", remedy="name each stone in one facing only"
         )
-    front, back = ([stone for stone in stones if stone.code in codes] for codes in (one, other))
+    front, back = ([stone for stone in stones if stone.code in codes] for codes in (first, second))
     if not front or not back:
         raise UsageError("a facing has no stones", remedy="name stones of both sides of the wall")
     return wall_between(front, back)
@@ -96,20 +96,20 @@ def _given(stones: Sequence[FacingStone], facings: tuple[Collection[str], Collec
 
 def _blocks(wall: FacingWall, name: str, settings: InfillSettings) -> list[InfillProposal]:
     count: dict[int | None, int] = {}
-    found = []
+    proposals = []
     for block in core_blocks(wall, settings):
         count[block.course] = count.get(block.course, 0) + 1
         course = "00" if block.course is None else f"{block.course:02d}"
         front, back = block.between
         text = f"core between the hidden sides of {front} and {back}, which follow from their depths"
         code = f"{name}-{course}-{count[block.course]:02d}"
-        found.append(_proposal(code, block.solid, block.course, wall, text))
-    return found
+        proposals.append(_proposal(code, block.solid, block.course, wall, text))
+    return proposals
 
 
 def _storeys(wall: FacingWall, name: str, settings: InfillSettings) -> list[InfillProposal]:
     storeys = core_storeys(wall, settings)
-    found = []
+    proposals = []
     for k, storey in enumerate(storeys):
         part = sum(other.number == storey.number for other in storeys[:k])
         code = f"{name}-S{storey.number}" + (f"-{part + 1}" if part else "")
@@ -118,8 +118,8 @@ def _storeys(wall: FacingWall, name: str, settings: InfillSettings) -> list[Infi
             f"core between the hidden sides{where} of {len(wall.front)} and {len(wall.back)} stones of two facings, "
             f"which follow from their depths; depths within {settings.level * 1e3:.0f} mm are taken as one"
         )
-        found.append(_proposal(code, storey.solid, None, wall, text))
-    return found
+        proposals.append(_proposal(code, storey.solid, None, wall, text))
+    return proposals
 
 
 def _proposal(code: str, local: Solid, course: int | None, wall: FacingWall, text: str) -> InfillProposal:

@@ -91,20 +91,20 @@ def core_storeys(wall: FacingWall, settings: InfillSettings) -> tuple[CoreStorey
     planes, deep = _levels(wall, settings)
     if not rows or not planes:
         return ()
-    found = []
+    storeys = []
     beds = _beds(rows, deep)
     for number, group in enumerate(_storeys(rows, settings.storey_height), start=1):
         courses = [rows[k].course for k in group]
-        known = [course for course in courses if course is not None]
+        numbered = [course for course in courses if course is not None]
         lines = [
             beds[group[0]][-1],
             *(line for k in group[1:] for line in beds[k]),
             beds[group[-1] + 1][0],
         ]
         grid = _grid(wall, [rows[k] for k in group], lines, planes, deep, settings)
-        span = (min(known), max(known)) if known else None
-        found += [CoreStorey(solid, number, span) for solid in grid_solids(grid)]
-    return tuple(found)
+        span = (min(numbered), max(numbered)) if numbered else None
+        storeys += [CoreStorey(solid, number, span) for solid in grid_solids(grid)]
+    return tuple(storeys)
 
 
 def _storeys(rows: Sequence[Strip], height: float | None) -> list[list[int]]:
@@ -131,8 +131,8 @@ def _levels(wall: FacingWall, settings: InfillSettings) -> tuple[list[Array], li
     front, of_front = _facing_levels(wall.front, -_OUT, settings.level)
     back, of_back = _facing_levels(wall.back, _OUT, settings.level)
 
-    def meet(one: Array, other: Array) -> bool:
-        space = (other[3] - corners @ other[:3]) / other[2] - (one[3] - corners @ one[:3]) / one[2]
+    def meet(first: Array, second: Array) -> bool:
+        space = (second[3] - corners @ second[:3]) / second[2] - (first[3] - corners @ first[:3]) / first[2]
         return bool((space > -settings.min_thickness).any())
 
     while len(front) > 1 and any(meet(front[-1], other) for other in back):
@@ -182,17 +182,17 @@ def _beds(rows: Sequence[Strip], deep: Sequence[_Deep]) -> list[tuple[_Line, ...
         return [(_Line(plane, _TOUCHING),) for plane in planes]
     spans = np.array([[one.above(plane) for one in deep] for plane in planes])
     lowest, highest = np.abs(spans[:, :, 0]).argmin(axis=0), np.abs(spans[:, :, 1]).argmin(axis=0)
-    found: list[tuple[_Line, ...]] = []
+    beds: list[tuple[_Line, ...]] = []
     for k, plane in enumerate(planes):
         ups, downs = spans[k, highest == k, 1], spans[k, lowest == k, 0]
         below, above = _one_or_two(downs, ups, 0.0)
         if len(ups) and len(downs) and above - below < float(np.median(downs) - np.median(ups)):
             across = 0.5 * (above - below)
-            found.append((_Line(_moved(plane, below + across), across + _TOUCHING),))
+            beds.append((_Line(_moved(plane, below + across), across + _TOUCHING),))
         else:
             heights = sorted({below, above})
-            found.append(tuple(_Line(_moved(plane, height), _TOUCHING) for height in heights))
-    return found
+            beds.append(tuple(_Line(_moved(plane, height), _TOUCHING) for height in heights))
+    return beds
 
 
 def _one_or_two(begins: Array, ends: Array, otherwise: float) -> Interval:
@@ -247,7 +247,7 @@ def _covered(wall: FacingWall, row: Strip, settings: InfillSettings) -> list[Int
     """Return the intervals along a strip with stones in front and behind."""
     spans = [_spans(row, side, settings) for side in (wall.front, wall.back)]
     both = [(max(a, c), min(b, d)) for a, b in spans[0] for c, d in spans[1]]
-    return sorted(one for one in both if one[1] > one[0])
+    return sorted(interval for interval in both if interval[1] > interval[0])
 
 
 def _spans(row: Strip, stones: Sequence[FacingStone], settings: InfillSettings) -> list[Interval]:

@@ -62,7 +62,7 @@ class ArchGap:
 
 def arch_gaps(elevation: Elevation, settings: MissingSettings) -> tuple[ArchGap, ...]:
     """Return the gaps between the voussoirs of every arch, and between them and its springers, from left to right."""
-    found: list[ArchGap] = []
+    gaps: list[ArchGap] = []
     for wedges in _arches(elevation):
         centre = _centre(wedges)
         if centre is None:
@@ -70,9 +70,9 @@ def arch_gaps(elevation: Elevation, settings: MissingSettings) -> tuple[ArchGap,
         row = [sides for stone in wedges if (sides := _sides(stone, centre)) is not None]
         springers = [stone for stone in elevation.stones if stone.block.kind == "springer"]
         row += _springing(springers, centre, row) if row else []
-        row.sort(key=lambda one: one[1].angle + one[2].angle)
-        found += _gaps(row, centre, settings)
-    return tuple(found)
+        row.sort(key=lambda entry: entry[1].angle + entry[2].angle)
+        gaps += _gaps(row, centre, settings)
+    return tuple(gaps)
 
 
 def voussoir_outlines(gap: ArchGap, joint: float) -> list[Array]:
@@ -88,19 +88,24 @@ def voussoir_outlines(gap: ArchGap, joint: float) -> list[Array]:
     lines.append(last)
     outlines = []
     for k in range(gap.count):
-        one, other = lines[2 * k], lines[2 * k + 1]
-        corners = [_on(one, gap, False), _on(other, gap, False), _on(other, gap, True), _on(one, gap, True)]
+        first_line, second_line = lines[2 * k], lines[2 * k + 1]
+        corners = [
+            _on(first_line, gap, False),
+            _on(second_line, gap, False),
+            _on(second_line, gap, True),
+            _on(first_line, gap, True),
+        ]
         outlines.append(np.array(corners))
     return outlines
 
 
 def _on(line: Line, gap: ArchGap, outer: bool) -> Array:
     """Return the end of a joint: on the line between the neighbours' corners, or on their arc."""
-    one, other = ((side.outer if outer else side.inner) for side in gap.sides)
-    straight = meeting(line, line_through(one, other))
-    if gap.count == 1 or (outer and abs(other[1] - one[1]) < _LEVEL):
+    first, second = ((side.outer if outer else side.inner) for side in gap.sides)
+    straight = meeting(line, line_through(first, second))
+    if gap.count == 1 or (outer and abs(second[1] - first[1]) < _LEVEL):
         return straight
-    arms = [point - gap.centre for point in (one, other, straight)]
+    arms = [point - gap.centre for point in (first, second, straight)]
     angles = [float(np.arctan2(arm[0], arm[1])) for arm in arms]
     share = (angles[2] - angles[0]) / (angles[1] - angles[0])
     radius = (1.0 - share) * np.linalg.norm(arms[0]) + share * np.linalg.norm(arms[1])
@@ -152,14 +157,14 @@ def _centre(stones: Sequence[FlatStone]) -> Array | None:
             return None
         centre: Array = crowd + np.linalg.lstsq(rows, right, rcond=None)[0]
         radial = [(stone.centre - centre) / np.linalg.norm(stone.centre - centre) for stone in stones]
-        along = [np.array([one[1], -one[0]]) for one in radial]
+        along = [np.array([line[1], -line[0]]) for line in radial]
     return centre
 
 
 def _along(stone: FlatStone, stones: Sequence[FlatStone]) -> Array:
     """Return the direction of the row at a stone: from its nearest neighbour, or to it."""
     others = sorted(
-        (one for one in stones if one is not stone),
+        (neighbour for neighbour in stones if neighbour is not stone),
         key=lambda one: float(np.linalg.norm(one.centre - stone.centre)),
     )
     run = others[0].centre - stone.centre
@@ -200,19 +205,19 @@ def _side(stone: FlatStone, ends: Ends, opposite: Ends | None, centre: Array) ->
 
 def _by_distance(stone: FlatStone, ends: Ends, centre: Array) -> Ends:
     """Return the ends of a side, that at the intrados first."""
-    far = np.linalg.norm(stone.outline[list(ends)] - centre, axis=1)
-    return ends if far[0] < far[1] else (ends[1], ends[0])
+    distances = np.linalg.norm(stone.outline[list(ends)] - centre, axis=1)
+    return ends if distances[0] < distances[1] else (ends[1], ends[0])
 
 
-def _mended(worn: Array, other: Array, line: Line, centre: Array) -> Array:
+def _mended(worn: Array, end: Array, line: Line, centre: Array) -> Array:
     """Restore the end of a side whose corner is worn: as far out as the other end of its edge, or as high."""
     up = line.direction if line.direction @ (worn - centre) > 0.0 else -line.direction
     start = line.point - up * float((line.point - centre) @ up)
     beside = float(np.linalg.norm(start - centre))
-    reach = float(np.sqrt(max(float((other - centre) @ (other - centre)) - beside**2, 0.0)))
+    reach = float(np.sqrt(max(float((end - centre) @ (end - centre)) - beside**2, 0.0)))
     choices = [start + reach * up]
     if abs(up[1]) > 0.2:
-        choices.append(line.point + up * float((other[1] - line.point[1]) / up[1]))
+        choices.append(line.point + up * float((end[1] - line.point[1]) / up[1]))
     return min(choices, key=lambda point: float(np.linalg.norm(point - worn)))
 
 
@@ -220,9 +225,11 @@ def _springing(
     springers: Sequence[FlatStone], centre: Array, row: Sequence[tuple[FlatStone, _Side, _Side]]
 ) -> list[tuple[FlatStone, _Side, _Side]]:
     """Return the skewbacks on both sides of an arch: each one from all springers on top of one another."""
-    far = [float(np.linalg.norm(point - centre)) for _, one, _ in row for point in (one.inner, one.outer)]
+    radii = [
+        float(np.linalg.norm(point - centre)) for _, side, _ in row for point in (side.inner, side.outer)
+    ]
     middle = float(np.mean([stone.centre[0] for stone, _, _ in row]))
-    found = []
+    springing = []
     for sign in (1.0, -1.0):
         sides = []
         for stone in springers:
@@ -231,17 +238,17 @@ def _springing(
                 and (side := _skewback(stone, sign, centre)) is not None
             ):
                 reach = float(np.linalg.norm(0.5 * (side.inner + side.outer) - centre))
-                if 0.8 * min(far) <= reach <= 1.2 * max(far):
+                if 0.8 * min(radii) <= reach <= 1.2 * max(radii):
                     sides.append((reach, stone, side))
         if sides:
-            sides.sort(key=lambda one: one[0])
+            sides.sort(key=lambda side: side[0])
             nearest = sides[0][2]
-            same = [one for _, _, one in sides if abs(one.angle - nearest.angle) < _ONE_SKEWBACK]
+            same = [side for _, _, side in sides if abs(side.angle - nearest.angle) < _ONE_SKEWBACK]
             ends = nearest.inner, same[-1].outer
             about = 0.5 * (ends[0] + ends[1]) - centre
             whole = _Side(line_through(*ends), float(np.arctan2(about[0], about[1])), *ends)
-            found.append((sides[0][1], whole, whole))
-    return found
+            springing.append((sides[0][1], whole, whole))
+    return springing
 
 
 def _skewback(stone: FlatStone, sign: float, centre: Array) -> _Side | None:
@@ -266,7 +273,7 @@ def _gaps(
     """Return the gaps between the stones of a row."""
     turns = np.array([right.angle - left.angle for stone, left, right in row if stone.block.kind in _WEDGES])
     usual = float(np.median(turns))
-    found = []
+    gaps = []
     crown = 0.5 * (row[0][1].angle + row[-1][2].angle)
     has_keystone = any(stone.block.kind == "keystone" for stone, _, _ in row)
     for (left, _, end), (right, begin, _) in pairwise(row):
@@ -285,5 +292,5 @@ def _gaps(
         middles = end.angle + (np.arange(count) + 0.5) / count * (begin.angle - end.angle)
         nearest = int(np.abs(middles - crown).argmin())
         at_crown = not has_keystone and abs(float(middles[nearest]) - crown) < 0.25 * usual
-        found.append(ArchGap(left, right, (end, begin), count, nearest if at_crown else None, centre, usual))
-    return found
+        gaps.append(ArchGap(left, right, (end, begin), count, nearest if at_crown else None, centre, usual))
+    return gaps

@@ -85,11 +85,11 @@ def _plane(corners: Array, beside: Sequence[FlatStone], elevation: Elevation) ->
     """Return the common plane of the faces near an outline, or of all of the facade, or that of a neighbour."""
     faces = [stone.block.face for stone in elevation.stones]
     around = elevation.neighbours
-    near = around.near(corners, elevation.frame.axes[2])
+    neighbours = around.near(corners, elevation.frame.axes[2])
     place = corners.mean(axis=0)
-    if len(near) >= _ENOUGH:
-        text = f"the plane of {', '.join(around.codes[i] for i in near.tolist())}"
-        return common_plane(around.fits(near), place).face_at(place, text)
+    if len(neighbours) >= _ENOUGH:
+        text = f"the plane of {', '.join(around.codes[i] for i in neighbours.tolist())}"
+        return common_plane(around.fits(neighbours), place).face_at(place, text)
     if len(faces) >= _ENOUGH:
         return common_plane([face.fit for face in faces], place).face_at(place, "the plane of the facade")
     fit = beside[0].block.face.fit

@@ -101,7 +101,7 @@ def find_gaps(elevation: Elevation, settings: MissingSettings) -> Gaps:
             courses.setdefault((stone.block.face.record.zone or "", stone.block.course), []).append(stone)
     gaps: list[CourseGap] = []
     joints: list[float] = []
-    for (zone, course), members in sorted(courses.items(), key=lambda one: (one[0][1], one[0][0])):
+    for (zone, course), members in sorted(courses.items(), key=lambda item: (item[0][1], item[0][0])):
         middle = _middle(members)
         heights = [middle.at_place(place) for place in _ends(members)]
         near = np.flatnonzero((low < max(heights)) & (high > min(heights))).tolist()
@@ -141,10 +141,10 @@ def opening_signs(hole: Hole, elevation: Elevation) -> tuple[str, ...]:
     for gap in hole.gaps:
         signs += [f"{_FRAMES[kind]} on the left" for kind in [gap.left.block.kind] if kind in _FRAMES]
         signs += [f"{_FRAMES[kind]} on the right" for kind in [gap.right.block.kind] if kind in _FRAMES]
-        for found, known, where in ((gap.below, _BELOW, "below"), (gap.above, _ABOVE, "above")):
-            kinds = [elevation.stones[i].block.kind for i in found.tolist() if i >= 0]
+        for bordering, known, where in ((gap.below, _BELOW, "below"), (gap.above, _ABOVE, "above")):
+            kinds = [elevation.stones[i].block.kind for i in bordering.tolist() if i >= 0]
             framing = [known[kind] for kind in kinds if kind in known]
-            if 2 * len(framing) > len(found):
+            if 2 * len(framing) > len(bordering):
                 signs.append(f"{framing[0]} {where}")
     return tuple(dict.fromkeys(signs))
 
@@ -180,15 +180,15 @@ def _between(
     """Yield neighbours along a line, with the end of the one and the start of the other."""
     spans = [(span, stone) for stone in stones if (span := stone.crossing(middle)) is not None]
     spans = [(span, stone) for span, stone in spans if span[1] > ends[0] and span[0] < ends[1]]
-    spans.sort(key=lambda one: one[0])
-    found = []
+    spans.sort(key=lambda span: span[0])
+    gaps = []
     (_, reached), left = spans[0] if spans else ((0.0, 0.0), None)
     for (start, stop), right in spans[1:]:
         if left is not None:
-            found.append((left, right, reached, start))
+            gaps.append((left, right, reached, start))
         if stop > reached:
             reached, left = stop, right
-    return found
+    return gaps
 
 
 def _gap(
@@ -216,28 +216,28 @@ def _gap(
 def _bed(members: Sequence[FlatStone], towards: Array, start: float, stop: float) -> Line | None:
     """Fit the upper or lower bed of a course at a gap to sound corners of the nearest stones of the course."""
     sides = [(stone, stone.side_ends(towards)) for stone in members]
-    known = [(stone, ends) for stone, ends in sides if ends is not None and not stone.worn & set(ends)]
-    known.sort(key=lambda one: max(start - one[0].centre[0], one[0].centre[0] - stop))
-    near = [stone.outline[list(ends)] for stone, ends in known[: 2 * _AROUND]]
-    if not near:
+    usable = [(stone, ends) for stone, ends in sides if ends is not None and not stone.worn & set(ends)]
+    usable.sort(key=lambda entry: max(start - entry[0].centre[0], entry[0].centre[0] - stop))
+    edges = [stone.outline[list(ends)] for stone, ends in usable[: 2 * _AROUND]]
+    if not edges:
         return None
-    heights = np.array([ends[:, 1].mean() for ends in near])
+    heights = np.array([ends[:, 1].mean() for ends in edges])
     usual = np.abs(heights - np.median(heights)) <= _SAME_BED
-    return _fitted(np.concatenate([ends for ends, one in zip(near, usual, strict=True) if one][:_AROUND]))
+    return _fitted(np.concatenate([ends for ends, one in zip(edges, usual, strict=True) if one][:_AROUND]))
 
 
 def _stones_at(elevation: Elevation, places: Array, bed: Line, above: float) -> Ints:
     """Return the stone at each place at a height above a bed; -1 where there is none."""
-    found = np.full(len(places), -1, dtype=np.int64)
+    stone_at = np.full(len(places), -1, dtype=np.int64)
     points = np.array([[place, bed.at_place(place) + above] for place in places.tolist()])
     boxes = elevation.boxes
     near = (boxes[:, 0] < points.max(axis=0)) & (boxes[:, 1] > points.min(axis=0))
     for number in np.flatnonzero(near.all(axis=1)).tolist():
         stone = elevation.stones[number]
-        for k in np.flatnonzero(found < 0).tolist():
+        for k in np.flatnonzero(stone_at < 0).tolist():
             if stone.contains(points[k]):
-                found[k] = number
-    return found
+                stone_at[k] = number
+    return stone_at
 
 
 def _on_the_ground(elevation: Elevation, lower: Line, start: float, stop: float) -> bool:
@@ -263,8 +263,8 @@ def _bounded(gap: CourseGap, hole: Sequence[CourseGap]) -> float:
         (gap.below, [one for one in hole if _lies_on(gap, one)]),
         (gap.above, [one for one in hole if _lies_on(one, gap)]),
     ):
-        held = found != -1
-        for one in others:
-            held |= (places > one.start) & (places < one.stop)
-        parts.append(float(held.mean()))
+        filled = found != -1
+        for neighbour in others:
+            filled |= (places > neighbour.start) & (places < neighbour.stop)
+        parts.append(float(filled.mean()))
     return min(parts)

@@ -106,7 +106,7 @@ def likeliest(
     width: float, joint: float, kinds: Sequence[UsualKind], settings: MissingSettings
 ) -> Filling | None:
     """Return the most likely stones in a gap; None if no kind is known."""
-    found = []
+    candidates = []
     for count in range(1, settings.max_stones + 2):
         for some in combinations_with_replacement(kinds, count):
             sigma = math.sqrt(sum(one.sigma**2 for one in some))
@@ -115,11 +115,11 @@ def likeliest(
                 math.factorial(n) for n in Counter(one.kind for one in some).values()
             )
             prior = _FURTHER ** (count - 1) * orders * math.prod(one.share for one in some)
-            found.append((math.log(prior / sigma) - 0.5 * off**2, off, tuple(one.kind for one in some)))
-    if not found:
+            candidates.append((math.log(prior / sigma) - 0.5 * off**2, off, tuple(one.kind for one in some)))
+    if not candidates:
         return None
-    best = max(found)
-    total = sum(math.exp(one[0] - best[0]) for one in found)
+    best = max(candidates)
+    total = sum(math.exp(candidate[0] - best[0]) for candidate in candidates)
     return Filling(best[2], 1.0 / total, best[1])
 
 
@@ -162,10 +162,10 @@ def depth_of_kind(
     else:
         text = f"hypothesis: median of {len(blocks)} {kind}{'s' if len(blocks) > 1 else ''}{where}"
     depths = np.array([block.depth.value for block in blocks])
-    known = [block.depth.sigma for block in blocks if block.depth.sigma is not None]
+    sigmas = [block.depth.sigma for block in blocks if block.depth.sigma is not None]
     value = float(np.median(depths))
     spread = deviation(depths, value)
-    sigma = math.hypot(spread, float(np.median(known))) if known else None
+    sigma = math.hypot(spread, float(np.median(sigmas))) if sigmas else None
     return Depth(value, sigma, text, "kind", 0)
 
 

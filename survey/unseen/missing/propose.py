@@ -107,7 +107,7 @@ def propose_missing(
     """
     settings = settings or MissingSettings()
     codes = _FreeCodes({*taken, *(block.code for block in blocks)})
-    found: list[MissingStone] = []
+    missing: list[MissingStone] = []
     for elevation in elevations(blocks):
         mine = {id(stone.block) for stone in elevation.stones}
         others = [block for block in blocks if id(block) not in mine]
@@ -119,10 +119,10 @@ def propose_missing(
                 new += [stone for stone in proposed if not _is_there(stone.block, others)]
                 flat = [_flat(stone.block, elevation) for stone in proposed]
                 elevation = Elevation(elevation.frame, (*elevation.stones, *flat))
-            found += new
+            missing += new
             if not new:
                 break
-    return tuple(found)
+    return tuple(missing)
 
 
 def _is_there(proposal: SurveyedBlock, others: Sequence[SurveyedBlock]) -> bool:
@@ -213,10 +213,10 @@ def _of_courses(elevation: Elevation, settings: MissingSettings, codes: _FreeCod
             continue
         fillings = [likeliest(gap.width, joint, kinds, settings) for gap in hole.gaps]
         tall = _is_tall(hole)
-        known = [filling for filling in fillings if filling is not None]
-        if len(known) < len(fillings) or sum(len(one.kinds) for one in known) > settings.max_stones + tall:
+        filled = [filling for filling in fillings if filling is not None]
+        if len(filled) < len(fillings) or sum(len(one.kinds) for one in filled) > settings.max_stones + tall:
             continue
-        pairs = list(zip(hole.gaps, known, strict=True))
+        pairs = list(zip(hole.gaps, filled, strict=True))
         for gap, filling in pairs[:1] if tall else pairs:
             if gap.width - 2.0 * joint >= settings.min_length:
                 upper = hole.gaps[-1].upper if tall else gap.upper
@@ -270,7 +270,7 @@ def _sides(gap: CourseGap, upper: Line, joint: float) -> tuple[Line, Line]:
 def _quadrilateral(left: Line, right: Line, lower: Line, upper: Line) -> Array:
     """Return corners (4, 2), counter-clockwise from the lower left one."""
     pairs = ((left, lower), (right, lower), (right, upper), (left, upper))
-    return np.array([meeting(one, other) for one, other in pairs])
+    return np.array([meeting(first, second) for first, second in pairs])
 
 
 def _is_tall(hole: Hole) -> bool:

@@ -40,17 +40,17 @@ class Line:
         return float(self.point[1] + (place - self.point[0]) * self.direction[1] / self.direction[0])
 
 
-def line_through(one: Array, other: Array) -> Line:
+def line_through(first: Array, other: Array) -> Line:
     """Return the line through two points."""
-    run = other - one
-    return Line(one, run / np.linalg.norm(run))
+    run = other - first
+    return Line(first, run / np.linalg.norm(run))
 
 
-def meeting(one: Line, other: Line) -> Array:
+def meeting(first: Line, second: Line) -> Array:
     """Return the intersection (2,) of two lines."""
-    matrix = np.column_stack([one.direction, -other.direction])
-    along = np.linalg.solve(matrix, other.point - one.point)
-    out: Array = one.point + along[0] * one.direction
+    matrix = np.column_stack([first.direction, -second.direction])
+    along = np.linalg.solve(matrix, second.point - first.point)
+    out: Array = first.point + along[0] * first.direction
     return out
 
 
@@ -153,7 +153,7 @@ def elevations(blocks: Sequence[SurveyedBlock]) -> tuple[Elevation, ...]:
     normals = np.array([block.face.fit.normal for block in blocks])
     areas = np.array([block.face.measures.area for block in blocks])
     centres = np.array([block.face.outline.mean(axis=0) for block in blocks])
-    found = []
+    walls = []
     for facade in find_facades(normals, areas, centres):
         if facade.azimuth is None:
             continue
@@ -162,8 +162,8 @@ def elevations(blocks: Sequence[SurveyedBlock]) -> tuple[Elevation, ...]:
         layer = np.concatenate([[0], np.cumsum(np.diff(out[order]) > _LAYER)])
         for number in range(int(layer[-1]) + 1):
             members = sorted(facade.members[order[layer == number]].tolist())
-            found.append(_elevation([blocks[i] for i in members], facade.frame))
-    return tuple(found)
+            walls.append(_elevation([blocks[i] for i in members], facade.frame))
+    return tuple(walls)
 
 
 def _elevation(blocks: Sequence[SurveyedBlock], frame: WallPlane) -> Elevation:
