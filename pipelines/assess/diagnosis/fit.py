@@ -93,10 +93,8 @@ def fit(unknowns: Sequence[Unknown]) -> Ask:
     while jacobian is not None and len(best):
         # the least change among all that lower χ² as much: a direction without effect is left alone
         scaled = jacobian * span
-        change = (
-            span
-            * lsq_linear(scaled, -residuals, ((low - best) / span - 1e-12, (high - best) / span + 1e-12)).x
-        )
+        bounds = (low - best) / span - 1e-12, (high - best) / span + 1e-12
+        change = span * lsq_linear(scaled, -residuals, bounds).x
         promised = residuals @ residuals - float(((residuals + jacobian @ change) ** 2).sum())
         if promised < _ENOUGH:
             break
