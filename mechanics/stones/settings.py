@@ -19,7 +19,7 @@ class Setting(NamedTuple):
     doc : meaning, one sentence; the reference of the scene file shows it
     unit : of the value; "-" for a ratio
     above, at_least, below, at_most : bounds of a number
-    choices : the numbers allowed; any if empty
+    choices : the numbers or texts allowed; any if empty
     infinite : infinity is a value, which asks for nothing
     """
 
@@ -29,7 +29,7 @@ class Setting(NamedTuple):
     at_least: float | None = None
     below: float | None = None
     at_most: float | None = None
-    choices: tuple[int, ...] = ()
+    choices: tuple[int | str, ...] = ()
     infinite: bool = False
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Annotated, Any, cast
 
 import numpy as np
 
@@ -19,9 +19,9 @@ from pipelines.geology.experiments.repose import Repose
 from pipelines.geology.experiments.wedge import Wedge
 from pipelines.geology.observe import WHOLE
 from pipelines.geology.settings import DiskContact, GeologyOutput, Layer, SampleSettings, Stepping, Sweeping
-from pipelines.scene.keys import build, keys_of
+from pipelines.toml.keys import Numbers, Setting, build, keys_of, read_table
 from pipelines.toml.lines import key_lines, parse_toml, read_text
-from pipelines.toml.schema import REQUIRED, Key, TomlDocument, ValueKind, check_table, nearest
+from pipelines.toml.schema import TomlDocument, check_table, nearest, tables_of
 
 __all__ = ["EXPERIMENTS", "GeologyScene", "parse_geology", "read_geology"]
 
@@ -42,21 +42,27 @@ _TABLES: Mapping[str, type[Any]] = {
     "solver": Sweeping,
     "output": GeologyOutput,
 }
-_TITLE = (
-    Key("name", ValueKind.TEXT, "Title; by default the name of the file.", "", None),
-    Key(
-        "note",
-        ValueKind.TEXT,
-        "What a reader of the results has to know first, as a choice that was made.",
-        "",
-        "",
-    ),
-)
-_CELL = (
-    Key("name", ValueKind.TEXT, "Name of the cell.", "", REQUIRED),
-    Key("centre", ValueKind.NUMBERS, "x and y at the start.", "m", REQUIRED),
-    Key("radius", ValueKind.NUMBER, "Radius at the start.", "m", REQUIRED, above=0),
-)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Title:
+    """Table [scene]."""
+
+    name: Annotated[str | None, Setting("Title; by default the name of the file.")] = None
+    note: Annotated[
+        str, Setting("What a reader of the results has to know first, as a choice that was made.")
+    ] = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _CellTable:
+    """Table [[cells]]."""
+
+    name: Annotated[str, Setting("Name of the cell.")]
+    centre: Annotated[Numbers, Setting("x and y at the start.", "m")]
+    radius: Annotated[float, Setting("Radius at the start.", "m", above=0)]
+
+
 _CORNERS = 73  # of the polygon that stands for a cell
 _START = "see docs/howto/geology.md for a scene to start from"
 
@@ -125,17 +131,17 @@ def parse_geology(text: str, path: str, kind: str) -> GeologyScene:
             document.fail(f"unknown table [{name}]", name, remedy=other)
     if kind not in given:
         document.fail(f"no table [{kind}]", remedy=_START)
-    title = check_table(document, ("scene",), _table(document, given, "scene"), _TITLE)
+    title = read_table(document, ("scene",), _table(document, given, "scene"), _Title)
     tables = {name: _built(document, given, name, owner) for name, owner in _TABLES.items()}
     scene = GeologyScene(
         document=document,
         text=text,
-        name=str(title["name"] or Path(path).stem),
-        note=str(title["note"]),
+        name=title.name or Path(path).stem,
+        note=title.note,
         kind=kind,
         experiment=cast(Experiment, _built(document, given, kind, EXPERIMENTS[kind])),
-        cells=_cells(document, given.get("cells", [])),
-        layers=_layers(document, given.get("layers", [])),
+        cells=_cells(document, given),
+        layers=_layers(document, given),
         **tables,
     )
     _check_cells(scene)
@@ -192,20 +198,10 @@ def _built(document: TomlDocument, given: Mapping[str, Any], name: str, owner: t
         return build(owner, values)
 
 
-def _entries(document: TomlDocument, given: Any, name: str) -> list[dict[str, Any]]:
-    if not isinstance(given, list) or not all(isinstance(one, dict) for one in given):
-        document.fail(
-            f"{name!r} is not an array of tables", name, remedy=f"write [[{name}]] before each of them"
-        )
-    return given
-
-
-def _layers(document: TomlDocument, given: Any) -> tuple[Layer, ...]:
+def _layers(document: TomlDocument, given: Mapping[str, Any]) -> tuple[Layer, ...]:
     layers: list[Layer] = []
-    for number, content in enumerate(_entries(document, given, "layers")):
-        place = ("layers", str(number))
-        values = check_table(document, place, content, keys_of(Layer), f"[[layers]] {number + 1}")
-        layers.append(build(Layer, values))
+    for number, (place, content) in enumerate(tables_of(document, given, "layers")):
+        layers.append(read_table(document, place, content, Layer, f"[[layers]] {number + 1}"))
         if number and layers[-1].top <= layers[-2].top:
             document.fail(
                 f"top = {layers[-1].top:g} is not above that of the layer before, {layers[-2].top:g}",
@@ -216,17 +212,16 @@ def _layers(document: TomlDocument, given: Any) -> tuple[Layer, ...]:
     return tuple(layers)
 
 
-def _cells(document: TomlDocument, given: Any) -> tuple[Cell, ...]:
+def _cells(document: TomlDocument, given: Mapping[str, Any]) -> tuple[Cell, ...]:
     cells: dict[str, Cell] = {}
-    for number, content in enumerate(_entries(document, given, "cells")):
-        place = ("cells", str(number))
-        values = cast(dict[str, Any], check_table(document, place, content, _CELL, f"[[cells]] {number + 1}"))
-        if len(values["centre"]) != 2:
-            document.fail(f"centre = {list(values['centre'])}", *place, "centre", remedy="give x and y")
-        if values["name"] == WHOLE:
+    for number, (place, content) in enumerate(tables_of(document, given, "cells")):
+        cell = read_table(document, place, content, _CellTable, f"[[cells]] {number + 1}")
+        if len(cell.centre) != 2:
+            document.fail(f"centre = {list(cell.centre)}", *place, "centre", remedy="give x and y")
+        if cell.name == WHOLE:
             document.fail(f"{WHOLE!r} is the name of all disks", *place, "name", remedy="give another name")
-        if values["name"] in cells:
-            document.fail(f"cell {values['name']!r} is given twice", *place, "name")
+        if cell.name in cells:
+            document.fail(f"cell {cell.name!r} is given twice", *place, "name")
         with document.at(*place):
-            cells[values["name"]] = Cell(values["name"], values["centre"], values["radius"])
+            cells[cell.name] = Cell(cell.name, (cell.centre[0], cell.centre[1]), cell.radius)
     return tuple(cells.values())

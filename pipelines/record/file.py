@@ -19,7 +19,7 @@ from ground.errors import (
 )
 from pipelines.record.keys import ARRAYS, ATTRIBUTE, PROPERTY, RECORD
 from pipelines.toml.lines import Path, key_lines, parse_toml, read_text
-from pipelines.toml.schema import Key, TomlDocument, check_table, nearest
+from pipelines.toml.schema import Key, TomlDocument, check_table, nearest, tables_of
 
 __all__ = ["RecordFile", "Table", "parse_record", "read_record"]
 
@@ -115,11 +115,7 @@ def _array(
     document: TomlDocument, given: Mapping[str, Any], name: str, keys: tuple[Key, ...]
 ) -> Iterator[Table]:
     """Check all tables [[name]]."""
-    content = given.get(name, [])
-    if not isinstance(content, list) or not all(isinstance(one, dict) for one in content):
-        document.fail(f"{name!r} is not a list of tables", name, remedy=f"write [[{name}]] above each")
-    for index, table in enumerate(content):
-        path = (name, str(index))
+    for path, table in tables_of(document, given, name):
         values = check_table(document, path, table, keys, f"[[{name}]]")
         for inner, inner_keys in (("properties", PROPERTY), ("attributes", ATTRIBUTE)):
             if inner in values:

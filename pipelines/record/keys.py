@@ -1,13 +1,17 @@
 """Keys of a file of knowledge: type, unit, bounds. A test compares docs/knowledge.md with these lists."""
 
+import datetime
 from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated
 
 from archmodel.assertions.declare import DOCUMENT_TYPES
 from archmodel.tables.knowledge import OBSERVATIONS
 from archmodel.tables.opinions import DISPUTABLE, RULES
 from archmodel.tables.relations import RELATIONS
 from archmodel.tables.stratigraphy import DEFINITIONS, INVERSE
-from pipelines.toml.schema import Key, ValueKind
+from pipelines.toml.keys import Setting, Stones, Table, Texts, Vector, Year, keys_of
+from pipelines.toml.schema import Key
 
 __all__ = ["ABOUT", "ARRAYS", "ATTRIBUTE", "CITED", "PROPERTY", "RECORD", "WHO", "WITHDRAWN"]
 
@@ -17,228 +21,303 @@ WITHDRAWN = (
 )  # fmt: skip
 """Records that can be withdrawn; a depth is replaced by another one, a registered kind stays."""
 
-RECORD = (
-    Key("author", ValueKind.TEXT, "Author of the statements; `--author` takes precedence.", default=None),
-    Key("source", ValueKind.TEXT, "Grounds; default: the name of the file.", default=None),
-    Key("date", ValueKind.DATE, "Date of all statements without one.", default=None),
-)
 
-WHO = (
-    Key("author", ValueKind.TEXT, "Author; default: that of `[record]`.", default=None),
-    Key("source", ValueKind.TEXT, "Grounds; default: that of `[record]`.", default=None),
-)
+@dataclass(frozen=True, kw_only=True)
+class _Record:
+    """Table [record]."""
+
+    author: Annotated[str | None, Setting("Author of the statements; `--author` takes precedence.")] = None
+    source: Annotated[str | None, Setting("Grounds; default: the name of the file.")] = None
+    date: Annotated[datetime.date | None, Setting("Date of all statements without one.")] = None
+
+
+RECORD = keys_of(_Record)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Who:
+    """Keys of every table."""
+
+    author: Annotated[str | None, Setting("Author; default: that of `[record]`.")] = None
+    source: Annotated[str | None, Setting("Grounds; default: that of `[record]`.")] = None
+
+
+WHO = keys_of(_Who)
 """Keys of every table."""
 
-_STONES = Key("stones", ValueKind.STONES, "Codes or expressions of the stones.")
-_STONES_OR_NONE = Key("stones", ValueKind.TEXTS, "Codes or expressions of the stones.", default=())
-_STRUCTURES = Key("structures", ValueKind.TEXTS, "Codes of structures.", default=())
 
-ABOUT = (_STONES_OR_NONE, _STRUCTURES)
+@dataclass(frozen=True, kw_only=True)
+class _About:
+    """Subjects of a statement; at least one of them is given."""
+
+    stones: Annotated[Texts, Setting("Codes or expressions of the stones.")] = ()
+    structures: Annotated[Texts, Setting("Codes of structures.")] = ()
+
+
+ABOUT = keys_of(_About)
 """Keys for the subjects of a statement; at least one of them is given."""
 
-CITED = (
-    Key("text", ValueKind.TEXT, "In words.", default=None),
-    Key("document", ValueKind.TEXT, "Code of the document that states it.", default=None),
-    Key("locator", ValueKind.TEXT, "Where in the document: page, number of the figure.", default=None),
-    Key("date", ValueKind.DATE, "Date of the observation or opinion.", default=None),
-    Key(
-        "certainty",
-        ValueKind.NUMBER,
-        "How sure the author is, from 0 to 1.",
-        default=None,
-        at_least=0,
-        at_most=1,
-    ),
-)
+
+@dataclass(frozen=True, kw_only=True)
+class _Cited:
+    """Evidence of every statement."""
+
+    text: Annotated[str | None, Setting("In words.")] = None
+    document: Annotated[str | None, Setting("Code of the document that states it.")] = None
+    locator: Annotated[str | None, Setting("Where in the document: page, number of the figure.")] = None
+    date: Annotated[datetime.date | None, Setting("Date of the observation or opinion.")] = None
+    certainty: Annotated[
+        float | None, Setting("How sure the author is, from 0 to 1.", at_least=0, at_most=1)
+    ] = None
+
+
+CITED = keys_of(_Cited)
 """Keys of every statement for its evidence."""
 
 _SAID = (*ABOUT, *CITED, *WHO)
 
-_KIND = (
-    Key("name", ValueKind.TEXT, "In small letters, with _ between words."),
-    Key("parent", ValueKind.TEXT, "The more general kind, of stones or of structures."),
-    Key("definition", ValueKind.TEXT, "One sentence: one word, one role."),
-    Key(
-        "canon",
-        ValueKind.TEXT,
-        "Canonical proportions, as a query expression over attributes of the stone; default: those of the parent.",
-        default=None,
-    ),
-    Key(
-        "attributes",
-        ValueKind.TABLE,
-        "Attributes of this kind: `{ name = { unit, definition } }`.",
-        default={},
-    ),
-    *WHO,
-)
 
-ATTRIBUTE = (
-    Key(
-        "unit", ValueKind.TEXT, "Unit, `-` for a number without one; without this key: a text.", default=None
-    ),
-    Key("definition", ValueKind.TEXT, "Its meaning, in a few words."),
-)
+@dataclass(frozen=True, kw_only=True)
+class _KindTable:
+    """Table [[kind]]."""
+
+    name: Annotated[str, Setting("In small letters, with _ between words.")]
+    parent: Annotated[str, Setting("The more general kind, of stones or of structures.")]
+    definition: Annotated[str, Setting("One sentence: one word, one role.")]
+    canon: Annotated[
+        str | None,
+        Setting(
+            "Canonical proportions, as a query expression over attributes of the stone; default: those of "
+            "the parent."
+        ),
+    ] = None
+    attributes: Annotated[Table, Setting("Attributes of this kind: `{ name = { unit, definition } }`.")] = (
+        field(default_factory=dict)
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Attribute:
+    """Attribute of a registered kind."""
+
+    unit: Annotated[str | None, Setting("Unit, `-` for a number without one; without this key: a text.")] = (
+        None
+    )
+    definition: Annotated[str, Setting("Its meaning, in a few words.")]
+
+
+ATTRIBUTE = keys_of(_Attribute)
 """Keys of one attribute of a registered kind."""
 
-_MATERIAL = (
-    Key("name", ValueKind.TEXT, "Its name."),
-    Key("description", ValueKind.TEXT, "In words.", default=None),
-    Key(
-        "properties",
-        ValueKind.TABLE,
-        "Numbers `{ density = 2350 }`, or tables `{ density = { value, sigma, unit, source } }`.",
-        default={},
-    ),
-    *WHO,
-)
 
-PROPERTY = (
-    Key("value", ValueKind.NUMBER, "In the unit."),
-    Key("sigma", ValueKind.NUMBER, "Standard deviation, in the unit.", default=None, at_least=0),
-    Key("unit", ValueKind.TEXT, "SI unit; required for properties that are not listed below.", default=None),
-    Key(
-        "source", ValueKind.TEXT, "A test, a document, a table; default: that of the material.", default=None
-    ),
-)
+@dataclass(frozen=True, kw_only=True)
+class _MaterialTable:
+    """Table [[material]]."""
+
+    name: Annotated[str, Setting("Its name.")]
+    description: Annotated[str | None, Setting("In words.")] = None
+    properties: Annotated[
+        Table,
+        Setting("Numbers `{ density = 2350 }`, or tables `{ density = { value, sigma, unit, source } }`."),
+    ] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Property:
+    """Property of a material."""
+
+    value: Annotated[float, Setting("In the unit.")]
+    sigma: Annotated[float | None, Setting("Standard deviation, in the unit.", at_least=0)] = None
+    unit: Annotated[str | None, Setting("SI unit; required for properties that are not listed below.")] = None
+    source: Annotated[str | None, Setting("A test, a document, a table; default: that of the material.")] = (
+        None
+    )
+
+
+PROPERTY = keys_of(_Property)
 """Keys of one property of a material."""
 
-_PHASE = (
-    Key("name", ValueKind.TEXT, 'Its name, e.g. `"2"` or `"repair of 1860"`.'),
-    Key("begins", ValueKind.YEAR, "Earliest year; negative before our era.", default=None),
-    Key("ends", ValueKind.YEAR, "Latest year.", default=None),
-    Key("description", ValueKind.TEXT, "In words.", default=None),
-    *WHO,
-)
 
-_DOCUMENT = (
-    Key("code", ValueKind.TEXT, "Its name in this database."),
-    Key("type", ValueKind.TEXT, "What it is.", choices=DOCUMENT_TYPES),
-    Key("title", ValueKind.TEXT, "In words."),
-    Key("place", ValueKind.TEXT, "Where to find it: a path, a URL, an archive number.", default=None),
-    Key("by", ValueKind.TEXT, "Author of the document itself.", default=None),
-    Key("dated", ValueKind.TEXT, "Date of the document itself, as written there.", default=None),
-    *WHO,
-)
+@dataclass(frozen=True, kw_only=True)
+class _PhaseTable:
+    """Table [[phase]]."""
 
-_STRUCTURE = (
-    Key("kind", ValueKind.TEXT, "What it is."),
-    Key("code", ValueKind.TEXT, "Its name."),
-    Key("title", ValueKind.TEXT, "In words.", default=None),
-    Key("parent", ValueKind.TEXT, "Code of the structure that contains it.", default=None),
-    Key("number", ValueKind.INTEGER, "Of a course or storey, from the lowest.", default=None, at_least=0),
-    Key("side", ValueKind.TEXT, "Of a facing.", default=None, choices=("outer", "inner")),
-    Key("stones", ValueKind.TEXTS, "Codes or expressions of its members.", default=()),
-    Key(
-        "ordered",
-        ValueKind.BOOLEAN,
-        "Whether the members are given in their order; they get ranks from 1.",
-        default=False,
-    ),
-    *WHO,
-)
+    name: Annotated[str, Setting('Its name, e.g. `"2"` or `"repair of 1860"`.')]
+    begins: Annotated[Year | None, Setting("Earliest year; negative before our era.")] = None
+    ends: Annotated[Year | None, Setting("Latest year.")] = None
+    description: Annotated[str | None, Setting("In words.")] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _DocumentTable:
+    """Table [[document]]."""
+
+    code: Annotated[str, Setting("Its name in this database.")]
+    type: Annotated[str, Setting("What it is.", choices=DOCUMENT_TYPES)]
+    title: Annotated[str, Setting("In words.")]
+    place: Annotated[str | None, Setting("Where to find it: a path, a URL, an archive number.")] = None
+    by: Annotated[str | None, Setting("Author of the document itself.")] = None
+    dated: Annotated[str | None, Setting("Date of the document itself, as written there.")] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _StructureTable:
+    """Table [[structure]]."""
+
+    kind: Annotated[str, Setting("What it is.")]
+    code: Annotated[str, Setting("Its name.")]
+    title: Annotated[str | None, Setting("In words.")] = None
+    parent: Annotated[str | None, Setting("Code of the structure that contains it.")] = None
+    number: Annotated[int | None, Setting("Of a course or storey, from the lowest.", at_least=0)] = None
+    side: Annotated[
+        str | None,
+        Setting(
+            "Of a facing.",
+            choices=(
+                "outer",
+                "inner",
+            ),
+        ),
+    ] = None
+    stones: Annotated[Texts, Setting("Codes or expressions of its members.")] = ()
+    ordered: Annotated[
+        bool, Setting("Whether the members are given in their order; they get ranks from 1.")
+    ] = False
+
 
 _RELATIONS = tuple(dict.fromkeys((*RELATIONS, "supports", *DEFINITIONS, *INVERSE.values())))
 
-_RELATION = (
-    Key("kind", ValueKind.TEXT, "What it is.", choices=_RELATIONS),
-    Key("of", ValueKind.TEXTS, "Codes of the subjects; expressions for stones.", default=()),
-    Key("structures", ValueKind.TEXTS, "Codes of structures among the subjects.", default=()),
-    Key(
-        "to",
-        ValueKind.STONES,
-        "Codes of the objects; expressions for stones; each subject is related to each of them.",
-    ),
-    *WHO,
-)
 
-_CORRECTION = (
-    _STONES,
-    Key("set", ValueKind.TABLE, 'New values by attribute: `{ kind = "quoin" }`.', default={}),
-    Key("unset", ValueKind.TEXTS, "Attributes that turn out to be unknown.", default=()),
-    Key("reason", ValueKind.TEXT, "Grounds; default: the source.", default=None),
-    *WHO,
-)
+@dataclass(frozen=True, kw_only=True)
+class _RelationTable:
+    """Table [[relation]]."""
 
-_DEPTH = (
-    _STONES,
-    Key("value", ValueKind.NUMBER, "Depth behind the face.", "m", above=0),
-    Key("sigma", ValueKind.NUMBER, "Its standard deviation.", "m", None, at_least=0),
-    *CITED,
-    *WHO,
-)
+    kind: Annotated[str, Setting("What it is.", choices=_RELATIONS)]
+    of: Annotated[Texts, Setting("Codes of the subjects; expressions for stones.")] = ()
+    structures: Annotated[Texts, Setting("Codes of structures among the subjects.")] = ()
+    to: Annotated[
+        Stones,
+        Setting("Codes of the objects; expressions for stones; each subject is related to each of them."),
+    ]
 
-_OBSERVATION = (
-    Key("type", ValueKind.TEXT, "Type of damage or remark.", choices=tuple(OBSERVATIONS)),
-    Key(
-        "severity",
-        ValueKind.INTEGER,
-        "From 0 (traces) to 4 (lost, or about to be).",
-        default=None,
-        at_least=0,
-        at_most=4,
-    ),
-    Key("place", ValueKind.TEXT, "Where on the stone, in words.", default=None),
-    Key("at", ValueKind.VECTOR, "Position in the frame of the site.", "m", None),
-    *_SAID,
-)
 
-_OPINIONS = Key("about", ValueKind.TEXT, "Kind of the opinions.", choices=tuple(DISPUTABLE))
+@dataclass(frozen=True, kw_only=True)
+class _CorrectionTable:
+    """Table [[correction]]."""
 
-_DECISION = (
-    _OPINIONS,
-    Key(
-        "match",
-        ValueKind.TABLE,
-        'The opinion that holds, by its author or value: `{ author = "A. Mason" }`, `{ phase = "2" }`.',
-    ),
-    *_SAID,
-)
+    stones: Annotated[Stones, Setting("Codes or expressions of the stones.")]
+    set: Annotated[Table, Setting('New values by attribute: `{ kind = "quoin" }`.')] = field(
+        default_factory=dict
+    )
+    unset: Annotated[Texts, Setting("Attributes that turn out to be unknown.")] = ()
+    reason: Annotated[str | None, Setting("Grounds; default: the source.")] = None
 
-_RULE = (
-    _OPINIONS,
-    Key("rule", ValueKind.TEXT, "The one that holds, where none is decided.", choices=RULES),
-    Key("authors", ValueKind.TEXTS, "In the order in which they count, for `author`.", default=()),
-    *WHO,
-)
 
-_WITHDRAW = (
-    Key("what", ValueKind.TEXT, "What is withdrawn.", choices=WITHDRAWN),
-    Key(
-        "name",
-        ValueKind.TEXT,
-        "Of a material, phase, document or structure; or of the property's material.",
-        default=None,
-    ),
-    Key("property", ValueKind.TEXT, "Name of the property.", default=None),
-    *ABOUT,
-    Key("kind", ValueKind.TEXT, "Of the relation.", default=None, choices=_RELATIONS),
-    Key("to", ValueKind.TEXTS, "The objects of the relation.", default=()),
-    Key("match", ValueKind.TABLE, 'Only statements with these values: `{ sign = "A" }`.', default={}),
-    *WHO,
-)
+@dataclass(frozen=True, kw_only=True)
+class _DepthTable:
+    """Table [[depth]]."""
+
+    stones: Annotated[Stones, Setting("Codes or expressions of the stones.")]
+    value: Annotated[float, Setting("Depth behind the face.", "m", above=0)]
+    sigma: Annotated[float | None, Setting("Its standard deviation.", "m", at_least=0)] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _ObservationTable:
+    """Table [[observation]]."""
+
+    type: Annotated[str, Setting("Type of damage or remark.", choices=tuple(OBSERVATIONS))]
+    severity: Annotated[
+        int | None, Setting("From 0 (traces) to 4 (lost, or about to be).", at_least=0, at_most=4)
+    ] = None
+    place: Annotated[str | None, Setting("Where on the stone, in words.")] = None
+    at: Annotated[Vector | None, Setting("Position in the frame of the site.", "m")] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _DecisionTable:
+    """Table [[decision]]."""
+
+    about: Annotated[str, Setting("Kind of the opinions.", choices=tuple(DISPUTABLE))]
+    match: Annotated[
+        Table,
+        Setting(
+            'The opinion that holds, by its author or value: `{ author = "A. Mason" }`, `{ phase = "2" }`.'
+        ),
+    ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _RuleTable:
+    """Table [[rule]]."""
+
+    about: Annotated[str, Setting("Kind of the opinions.", choices=tuple(DISPUTABLE))]
+    rule: Annotated[str, Setting("The one that holds, where none is decided.", choices=RULES)]
+    authors: Annotated[Texts, Setting("In the order in which they count, for `author`.")] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class _WithdrawTable:
+    """Table [[withdraw]]."""
+
+    what: Annotated[str, Setting("What is withdrawn.", choices=WITHDRAWN)]
+    name: Annotated[
+        str | None, Setting("Of a material, phase, document or structure; or of the property's material.")
+    ] = None
+    property: Annotated[str | None, Setting("Name of the property.")] = None
+    kind: Annotated[str | None, Setting("Of the relation.", choices=_RELATIONS)] = None
+    to: Annotated[Texts, Setting("The objects of the relation.")] = ()
+    match: Annotated[Table, Setting('Only statements with these values: `{ sign = "A" }`.')] = field(
+        default_factory=dict
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _MadeOfTable:
+    """Table [[made_of]]."""
+
+    material: Annotated[str, Setting("Name of the material.")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _OfPhaseTable:
+    """Table [[of_phase]]."""
+
+    phase: Annotated[str, Setting("Name of the phase.")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _MarkTable:
+    """Table [[mark]]."""
+
+    sign: Annotated[str, Setting("Name of the mark, the same for the same mark.")]
+    place: Annotated[str | None, Setting("Where on the stone, in words.")] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _NoteTable:
+    """Table [[note]]."""
+
+    key: Annotated[str, Setting("Subject of the note, e.g. `edge`.")]
+
 
 ARRAYS: Mapping[str, tuple[Key, ...]] = {
-    "kind": _KIND,
-    "withdraw": _WITHDRAW,
-    "correction": _CORRECTION,
-    "material": _MATERIAL,
-    "phase": _PHASE,
-    "document": _DOCUMENT,
-    "structure": _STRUCTURE,
-    "relation": _RELATION,
-    "depth": _DEPTH,
-    "rule": _RULE,
-    "made_of": (Key("material", ValueKind.TEXT, "Name of the material."), *_SAID),
-    "of_phase": (Key("phase", ValueKind.TEXT, "Name of the phase."), *_SAID),
-    "mark": (
-        Key("sign", ValueKind.TEXT, "Name of the mark, the same for the same mark."),
-        Key("place", ValueKind.TEXT, "Where on the stone, in words.", default=None),
-        *_SAID,
-    ),
-    "observation": _OBSERVATION,
+    "kind": (*keys_of(_KindTable), *WHO),
+    "withdraw": (*keys_of(_WithdrawTable), *ABOUT, *WHO),
+    "correction": (*keys_of(_CorrectionTable), *WHO),
+    "material": (*keys_of(_MaterialTable), *WHO),
+    "phase": (*keys_of(_PhaseTable), *WHO),
+    "document": (*keys_of(_DocumentTable), *WHO),
+    "structure": (*keys_of(_StructureTable), *WHO),
+    "relation": (*keys_of(_RelationTable), *WHO),
+    "depth": (*keys_of(_DepthTable), *CITED, *WHO),
+    "rule": (*keys_of(_RuleTable), *WHO),
+    "made_of": (*keys_of(_MadeOfTable), *_SAID),
+    "of_phase": (*keys_of(_OfPhaseTable), *_SAID),
+    "mark": (*keys_of(_MarkTable), *_SAID),
+    "observation": (*keys_of(_ObservationTable), *_SAID),
     "reference": _SAID,
-    "note": (Key("key", ValueKind.TEXT, "Subject of the note, e.g. `edge`."), *_SAID),
-    "decision": _DECISION,
+    "note": (*keys_of(_NoteTable), *_SAID),
+    "decision": (*keys_of(_DecisionTable), *_SAID),
 }
 """Keys of every array of tables, in the order of recording."""

@@ -17,12 +17,12 @@ from pipelines.run.fidelity import Modelled, Wishes, modelled, neighbours
 from pipelines.run.remarks import remarks, remarks_on_laws, remarks_on_stones
 from pipelines.scene.array_tables import ArrayTable
 from pipelines.scene.file import SceneFile
-from pipelines.scene.keys import typed_values
 from pipelines.scene.laws import law_rules
 from pipelines.scene.loads import FORCES, build_loads, thrown
 from pipelines.scene.selection import SERIES, STRESS, Groups, StoneModel, select_groups, select_stones
 from pipelines.scene.settings import MeshSettings
-from pipelines.scene.stages import ACTS_IN, StandingStones, standing_stones
+from pipelines.scene.stages import StandingStones, standing_stones
+from pipelines.toml.keys import typed_values
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.solids import Solid
 from survey.geometry.stone_parts import stone_parts
@@ -220,7 +220,7 @@ def _stage(scene: SceneFile, whole: Scene, groups: Groups, origin: Array, stones
         if block.code in stones.standing
     )
     own = {path: tuple(codes & stones.standing for codes in of) for path, of in groups.items()}
-    acting = [_entry_about(one, origin) for one in scene.loads if stones.name in one.values[ACTS_IN.name]]
+    acting = [_entry_about(one, origin) for one in scene.loads if stones.name in one.values["stages"]]
     rules = (
         LawRule(one.first & stones.standing, one.second & stones.standing, one.law)
         for one in whole.contact.rules

@@ -18,7 +18,6 @@ from pipelines.run.record import settings_of
 from pipelines.scene.array_tables import describe
 from pipelines.scene.file import SceneFile
 from pipelines.scene.selection import Groups, StoneModel
-from pipelines.scene.stages import ACTS_IN
 
 __all__ = ["closing_lines", "run_inputs", "scene_inputs", "stage_lines"]
 
@@ -77,7 +76,7 @@ def stage_lines(scene: SceneFile, assembly: Assembly) -> tuple[str, ...]:
     for stage in assembly.stages:
         blocks = stage.scene.blocks
         held = sum(block.fidelity is Fidelity.FIXED and block.code not in own for block in blocks)
-        acting = [load.type for load in scene.loads if stage.name in load.values[ACTS_IN.name]]
+        acting = [load.type for load in scene.loads if stage.name in load.values["stages"]]
         said = [f"{len(blocks)} stones", *([f"{held} held"] if held else []), *acting]
         lines.append(f"{stage.name}: {', '.join(said)}")
     return tuple(lines)

@@ -12,7 +12,7 @@ from mechanics.scene.loads.ground_motion import braking_time
 from mechanics.scene.loads.tables import read_history
 from mechanics.scene.loads.time_series import History
 from pipelines.toml.lines import Path
-from pipelines.toml.schema import Key, TomlDocument, ValueKind, check_table
+from pipelines.toml.schema import Key, TomlDocument, ValueKind, check_table, tables_of
 
 __all__ = ["ArrayTable", "describe", "file_beside", "read_entries"]
 
@@ -48,11 +48,8 @@ def read_entries(
     common: tuple[Key, ...] = (),
 ) -> tuple[ArrayTable, ...]:
     """Check all tables [[name]]; an array of a single type has no key `type`."""
-    tables = given.get(name, [])
-    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
-        document.fail(f"{name!r} is not a list of tables", name, remedy=f"write [[{name}]] above each")
     return tuple(
-        _entry(document, (name, str(index)), table, types, common) for index, table in enumerate(tables)
+        _entry(document, path, table, types, common) for path, table in tables_of(document, given, name)
     )
 
 

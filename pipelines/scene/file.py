@@ -18,7 +18,6 @@ from mechanics.scene.scene import ContactSettings, SolverSettings, TimeSettings
 from mechanics.stones.materials import Material, Orthotropy
 from pipelines.draw.catalogue import PICTURES
 from pipelines.scene.array_tables import ArrayTable, read_entries
-from pipelines.scene.keys import build, typed_values
 from pipelines.scene.laws import BONDS, JointLaw, read_laws
 from pipelines.scene.loads import ASSESS_TYPES, read_loads, read_throws
 from pipelines.scene.pushover import Pushing, read_pushover
@@ -26,6 +25,7 @@ from pipelines.scene.settings import Fidelities, MaterialRule, MeshSettings, Out
 from pipelines.scene.site import Site
 from pipelines.scene.stages import read_stages
 from pipelines.scene.tables import ARRAYS, AUTO, MATERIAL_KEYS, MESH_KEYS, ORTHOTROPY_KEYS, SITE_KEYS, TABLES
+from pipelines.toml.keys import build, typed_values
 from pipelines.toml.lines import key_lines, parse_toml, read_text
 from pipelines.toml.schema import TomlDocument, check_table, nearest
 from survey.joints.settings import JointMode, JointSettings

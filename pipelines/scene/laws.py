@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -14,8 +14,8 @@ from mechanics.scene.laws.lennard_jones import LennardJones
 from mechanics.scene.laws.mortar import MortarJoint
 from mechanics.scene.scene import LawRule
 from pipelines.scene.array_tables import ArrayTable, read_entries
-from pipelines.scene.keys import build, keys_of
-from pipelines.toml.schema import Key, TomlDocument, ValueKind, nearest
+from pipelines.toml.keys import Groups, Setting, Texts, build, keys_of
+from pipelines.toml.schema import Key, TomlDocument, nearest
 
 __all__ = ["BONDS", "LAW_KEYS", "LAW_TYPES", "JointLaw", "law_rules", "read_laws"]
 
@@ -36,20 +36,22 @@ LAW_TYPES: Mapping[str, tuple[Key, ...]] = {
     for name, law in _CLASSES.items()
 }
 
-LAW_KEYS = (
-    Key(
-        "materials",
-        ValueKind.TEXTS,
-        "Two names of materials: the law holds between their stones.",
-        default=(),
-    ),
-    Key(
-        "between",
-        ValueKind.GROUPS,
-        "Two lists of codes or expressions: the law holds between the stones of the one and those of the other.",
-        default=(),
-    ),
-)
+
+@dataclass(frozen=True, kw_only=True)
+class _Between:
+    """Stones between which a law holds."""
+
+    materials: Annotated[Texts, Setting("Two names of materials: the law holds between their stones.")] = ()
+    between: Annotated[
+        Groups,
+        Setting(
+            "Two lists of codes or expressions: the law holds between the stones of the one and those of the "
+            "other."
+        ),
+    ] = ()
+
+
+LAW_KEYS = keys_of(_Between)
 """Keys of every law."""
 
 

@@ -1,8 +1,8 @@
 """Loads and initial motions: from [[loads]] and [[throw]] of a scene file to the loads of the mechanics."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -18,9 +18,9 @@ from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import Block, Fidelity
 from mechanics.stones.polyhedra import mass_properties
 from pipelines.scene.array_tables import ArrayTable, file_beside, read_entries
-from pipelines.scene.keys import keys_of
-from pipelines.scene.stages import ACTS_IN
-from pipelines.toml.schema import Key, TomlDocument, ValueKind
+from pipelines.scene.stages import LoadTable
+from pipelines.toml.keys import Series, Setting, Stones, Vector, VectorSeries, keys_of
+from pipelines.toml.schema import Key, TomlDocument
 
 __all__ = [
     "ASSESS_TYPES",
@@ -40,172 +40,242 @@ Codes = frozenset[str]
 Groups = Mapping[tuple[str, ...], Sequence[Codes]]
 Blocks = Mapping[str, Block]
 
-_STONES = Key("stones", ValueKind.STONES, "Codes or expressions of the stones on which it acts.")
-_SUPPORTS = Key("stones", ValueKind.STONES, "Codes or expressions of the fixed stones that move.")
-_START = Key("start", ValueKind.NUMBER, "Start time.", "s", 0.0, at_least=0)
-_DURATION = Key("duration", ValueKind.NUMBER, "Duration.", "s", above=0)
 
-LOAD_TYPES: Mapping[str, tuple[Key, ...]] = {
-    "gravity_ramp": keys_of(GravityRamp),
-    "tilt": (
-        Key("axis", ValueKind.VECTOR, "Axis about which the table turns, right-handed.", "-"),
-        Key("rate", ValueKind.NUMBER, "Constant rate; or give `angle`.", "°/s", None, above=0),
-        Key("limit", ValueKind.NUMBER, "Angle at which a constant rate ends.", "°", 90.0, above=0),
-        Key("start", ValueKind.NUMBER, "Start time of a constant rate.", "s", 0.0, at_least=0),
-        Key("angle", ValueKind.HISTORY, "Angle with time; or give `rate`.", "°", None),
-    ),
-    "force": (
-        _STONES,
-        Key("force", ValueKind.VECTOR_HISTORY, "Force on each of them, constant or with time.", "N"),
-        Key(
-            "point",
-            ValueKind.VECTOR,
-            "Point of application on a single stone, which carries it along; if not given, the centre of mass.",
+@dataclass(frozen=True, kw_only=True)
+class _Tilt:
+    """Load of type tilt."""
+
+    axis: Annotated[Vector, Setting("Axis about which the table turns, right-handed.", "-")]
+    rate: Annotated[float | None, Setting("Constant rate; or give `angle`.", "°/s", above=0)] = None
+    limit: Annotated[float, Setting("Angle at which a constant rate ends.", "°", above=0)] = 90.0
+    start: Annotated[float, Setting("Start time of a constant rate.", "s", at_least=0)] = 0.0
+    angle: Annotated[Series | None, Setting("Angle with time; or give `rate`.", "°")] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _ForceLoad:
+    """Load of type force."""
+
+    stones: Annotated[Stones, Setting("Codes or expressions of the stones on which it acts.")]
+    force: Annotated[VectorSeries, Setting("Force on each of them, constant or with time.", "N")]
+    point: Annotated[
+        Vector | None,
+        Setting(
+            "Point of application on a single stone, which carries it along; if not given, the centre of "
+            "mass.",
             "m",
-            None,
         ),
-        *keys_of(StoneForce),
-    ),
-    "settlement": (
-        _SUPPORTS,
-        Key("displacement", ValueKind.VECTOR, "Displacement at the end.", "m"),
-        _DURATION,
-        _START,
-    ),
-    "spreading": (
-        Key(
-            "first",
-            ValueKind.STONES,
-            "Codes or expressions of the fixed stones that move back by half of `distance`.",
+    ] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _SettlementLoad:
+    """Load of type settlement."""
+
+    stones: Annotated[Stones, Setting("Codes or expressions of the fixed stones that move.")]
+    displacement: Annotated[Vector, Setting("Displacement at the end.", "m")]
+    duration: Annotated[float, Setting("Duration.", "s", above=0)]
+    start: Annotated[float, Setting("Start time.", "s", at_least=0)] = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Spreading:
+    """Load of type spreading."""
+
+    first: Annotated[
+        Stones, Setting("Codes or expressions of the fixed stones that move back by half of `distance`.")
+    ]
+    second: Annotated[Stones, Setting("Codes or expressions of those that move forward by the other half.")]
+    direction: Annotated[Vector, Setting("Direction of the second ones; its length does not matter.", "-")]
+    distance: Annotated[float, Setting("Distance by which the groups part.", "m")]
+    duration: Annotated[float, Setting("Duration.", "s", above=0)]
+    start: Annotated[float, Setting("Start time.", "s", at_least=0)] = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class _MotionLoad:
+    """Load of type motion."""
+
+    stones: Annotated[Stones, Setting("Codes or expressions of the fixed stones that move.")]
+    velocity: Annotated[VectorSeries, Setting("Velocity, constant or with time.", "m/s")] = (0.0, 0.0, 0.0)
+    spin: Annotated[Series, Setting("Angular velocity, constant or with time; needs `pivot`.", "°/s")] = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Pivot:
+    """Place of the axis of a spin."""
+
+    pivot: Annotated[Vector | None, Setting("A point of that axis at the start.", "m")] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _GroundMotionLoad:
+    """Load of type ground_motion."""
+
+    stones: Annotated[Stones, Setting("Codes or expressions of the fixed stones that move.")]
+    x: Annotated[
+        str | None,
+        Setting("File of the record along x: of PEER, ESM or ITACA, K-NET, SMC, MiniSEED, SAC, or a table."),
+    ] = None
+    y: Annotated[str | None, Setting("File of the record along y.")] = None
+    z: Annotated[str | None, Setting("File of the record along z.")] = None
+    station: Annotated[
+        str | None,
+        Setting(
+            "Instead of x, y and z: all components of one station, e.g. `IT.AQV.*.ASC`; east is x, north is "
+            "y."
         ),
-        Key("second", ValueKind.STONES, "Codes or expressions of those that move forward by the other half."),
-        Key("direction", ValueKind.VECTOR, "Direction of the second ones; its length does not matter.", "-"),
-        Key("distance", ValueKind.NUMBER, "Distance by which the groups part.", "m"),
-        _DURATION,
-        _START,
-    ),
-    "motion": (
-        _SUPPORTS,
-        Key("velocity", ValueKind.VECTOR_HISTORY, "Velocity, constant or with time.", "m/s", (0.0, 0.0, 0.0)),
-        Key("spin", ValueKind.HISTORY, "Angular velocity, constant or with time; needs `pivot`.", "°/s", 0.0),
-        *keys_of(ImposedMotion),
-        Key("pivot", ValueKind.VECTOR, "A point of that axis at the start.", "m", None),
-    ),
-    "ground_motion": (
-        _SUPPORTS,
-        Key(
-            "x",
-            ValueKind.TEXT,
-            "File of the record along x: of PEER, ESM or ITACA, K-NET, SMC, MiniSEED, SAC, or a table.",
-            default=None,
+    ] = None
+    unit: Annotated[
+        str | None,
+        Setting(
+            "Unit of the acceleration in files that state none: `g`, `%g`, `m/s²`, `cm/s²`, `mm/s²` or "
+            "`gal`, in any spelling (`m/s2`, `m/s^2`, `m s⁻²`)."
         ),
-        Key("y", ValueKind.TEXT, "File of the record along y.", default=None),
-        Key("z", ValueKind.TEXT, "File of the record along z.", default=None),
-        Key(
-            "station",
-            ValueKind.TEXT,
-            "Instead of x, y and z: all components of one station, e.g. `IT.AQV.*.ASC`; east is x, north is y.",
-            default=None,
-        ),
-        Key(
-            "unit",
-            ValueKind.TEXT,
-            "Unit of the acceleration in files that state none: `g`, `%g`, `m/s²`, `cm/s²`, `mm/s²` or `gal`, in any "
-            "spelling (`m/s2`, `m/s^2`, `m s⁻²`).",
-            default=None,
-        ),
-        Key("dt", ValueKind.NUMBER, "Time step of records in files that state none.", "s", None, above=0),
-        Key("azimuth", ValueKind.NUMBER, "Angle by which x and y are first turned about z.", "°", 0.0),
-        *keys_of(GroundMotion),
-        Key("low", ValueKind.NUMBER, "Lower corner of a Butterworth filter, if any.", "Hz", None, above=0),
-        Key("high", ValueKind.NUMBER, "Upper corner of a Butterworth filter, if any.", "Hz", None, above=0),
-        Key(
-            "order",
-            ValueKind.INTEGER,
-            "Order of the filter, applied both ways.",
-            default=4,
-            at_least=1,
-            at_most=10,
-        ),
-        Key(
-            "baseline",
-            ValueKind.INTEGER,
+    ] = None
+    dt: Annotated[float | None, Setting("Time step of records in files that state none.", "s", above=0)] = (
+        None
+    )
+    azimuth: Annotated[float, Setting("Angle by which x and y are first turned about z.", "°")] = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class _RecordProcessing:
+    """Filter and correction of records."""
+
+    low: Annotated[float | None, Setting("Lower corner of a Butterworth filter, if any.", "Hz", above=0)] = (
+        None
+    )
+    high: Annotated[float | None, Setting("Upper corner of a Butterworth filter, if any.", "Hz", above=0)] = (
+        None
+    )
+    order: Annotated[int, Setting("Order of the filter, applied both ways.", at_least=1, at_most=10)] = 4
+    baseline: Annotated[
+        int,
+        Setting(
             "Degree of the polynomial that is subtracted from the displacement, at least 2; 0: none.",
-            default=0,
             at_least=0,
             at_most=12,
         ),
-    ),
+    ] = 0
+
+
+LOAD_TYPES: Mapping[str, tuple[Key, ...]] = {
+    "gravity_ramp": keys_of(GravityRamp),
+    "tilt": keys_of(_Tilt),
+    "force": (*keys_of(_ForceLoad), *keys_of(StoneForce)),
+    "settlement": keys_of(_SettlementLoad),
+    "spreading": keys_of(_Spreading),
+    "motion": (*keys_of(_MotionLoad), *keys_of(ImposedMotion), *keys_of(_Pivot)),
+    "ground_motion": (*keys_of(_GroundMotionLoad), *keys_of(GroundMotion), *keys_of(_RecordProcessing)),
 }
 
-LOAD_KEYS = (ACTS_IN,)
+LOAD_KEYS = keys_of(LoadTable)
 """Keys of every load."""
 
-_FIXED = Key("stones", ValueKind.STONES, "Codes or expressions of the fixed stones on which it acts.")
 
-_RUNS = (
-    Key(
-        "confirm",
-        ValueKind.BOOLEAN,
-        "Confirm the candidate by runs, as `--confirm` does for all loads.",
-        default=False,
-    ),
-    Key(
-        "pushover",
-        ValueKind.BOOLEAN,
-        "Lead the mechanism to collapse by a run: the capacity curve.",
-        default=False,
-    ),
-)
-_CODE = Key(
-    "code",
-    ValueKind.TEXT,
-    "Check the mechanism by this code, for the place of `[site]`, as `--code` does for all pushes on all stones.",
-    default=None,
-)
+@dataclass(frozen=True, kw_only=True)
+class _Confirmed:
+    """Runs of a candidate."""
+
+    confirm: Annotated[bool, Setting("Confirm the candidate by runs, as `--confirm` does for all loads.")] = (
+        False
+    )
+    pushover: Annotated[bool, Setting("Lead the mechanism to collapse by a run: the capacity curve.")] = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Checked(_Confirmed):
+    """Runs of a candidate, and its check by a code."""
+
+    code: Annotated[
+        str | None,
+        Setting(
+            "Check the mechanism by this code, for the place of `[site]`, as `--code` does for all pushes on "
+            "all stones."
+        ),
+    ] = None
+
+
+_RUNS, _CHECKS = keys_of(_Confirmed), keys_of(_Checked)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _HorizontalPush:
+    """Question of type horizontal."""
+
+    direction: Annotated[Vector, Setting("Direction of the push, λ times the weight of each stone.", "-")]
+    stones: Annotated[
+        Stones, Setting("Codes or expressions of the stones on which it acts; if not given, on all.")
+    ] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class _TiltQuestion:
+    """Question of type tilt."""
+
+    axis: Annotated[Vector, Setting("Axis about which the table turns, right-handed; its tangent is λ.", "-")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _WeightQuestion:
+    """Question of type weight."""
+
+    stones: Annotated[
+        Stones, Setting("Codes or expressions of the stones whose weight grows by λ of itself.")
+    ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _ForceQuestion:
+    """Question of type force."""
+
+    stones: Annotated[
+        Stones, Setting("Codes or expressions of the stones on which it acts, spread as their weight is.")
+    ]
+    force: Annotated[Vector, Setting("Force on all of them at λ = 1.", "N")]
+    point: Annotated[
+        Vector | None, Setting("Where it acts on a single stone; if not given, at the centre of mass.", "m")
+    ] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _ThrustQuestion:
+    """Question of type thrust."""
+
+    stones: Annotated[Stones, Setting("Codes or expressions of the fixed stones on which it acts.")]
+    direction: Annotated[Vector, Setting("Direction in which the thrust counts.", "-")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _SettlementQuestion:
+    """Question of type settlement."""
+
+    stones: Annotated[Stones, Setting("Codes or expressions of the fixed stones on which it acts.")]
+    direction: Annotated[Vector, Setting("Direction in which they yield.", "-")]
+
 
 ASSESS_TYPES: Mapping[str, tuple[Key, ...]] = {
-    "horizontal": (
-        Key("direction", ValueKind.VECTOR, "Direction of the push, λ times the weight of each stone.", "-"),
-        replace(_STONES, doc=f"{_STONES.doc[:-1]}; if not given, on all.", default=()),
-        *_RUNS,
-        _CODE,
-    ),
-    "tilt": (
-        Key(
-            "axis", ValueKind.VECTOR, "Axis about which the table turns, right-handed; its tangent is λ.", "-"
-        ),
-        *_RUNS,
-        _CODE,
-    ),
-    "weight": (
-        replace(_STONES, doc="Codes or expressions of the stones whose weight grows by λ of itself."),
-        *_RUNS,
-    ),
-    "force": (
-        replace(
-            _STONES, doc="Codes or expressions of the stones on which it acts, spread as their weight is."
-        ),
-        Key("force", ValueKind.VECTOR, "Force on all of them at λ = 1.", "N"),
-        Key(
-            "point",
-            ValueKind.VECTOR,
-            "Where it acts on a single stone; if not given, at the centre of mass.",
-            "m",
-            None,
-        ),
-        *_RUNS,
-    ),
-    "thrust": (_FIXED, Key("direction", ValueKind.VECTOR, "Direction in which the thrust counts.", "-")),
-    "settlement": (_FIXED, Key("direction", ValueKind.VECTOR, "Direction in which they yield.", "-")),
+    "horizontal": (*keys_of(_HorizontalPush), *_CHECKS),
+    "tilt": (*keys_of(_TiltQuestion), *_CHECKS),
+    "weight": (*keys_of(_WeightQuestion), *_RUNS),
+    "force": (*keys_of(_ForceQuestion), *_RUNS),
+    "thrust": keys_of(_ThrustQuestion),
+    "settlement": keys_of(_SettlementQuestion),
     "thickness": (),
 }
 
-THROW_KEYS = (
-    Key("stones", ValueKind.STONES, "Codes or expressions of the stones that begin in motion."),
-    Key("velocity", ValueKind.VECTOR, "Velocity of the centre of mass.", "m/s", (0.0, 0.0, 0.0)),
-    Key("spin", ValueKind.VECTOR, "Angular velocity about the axes x, y, z.", "°/s", (0.0, 0.0, 0.0)),
-)
+
+@dataclass(frozen=True, kw_only=True)
+class _Throw:
+    """Table [[throw]]."""
+
+    stones: Annotated[Stones, Setting("Codes or expressions of the stones that begin in motion.")]
+    velocity: Annotated[Vector, Setting("Velocity of the centre of mass.", "m/s")] = (0.0, 0.0, 0.0)
+    spin: Annotated[Vector, Setting("Angular velocity about the axes x, y, z.", "°/s")] = (0.0, 0.0, 0.0)
+
+
+THROW_KEYS = keys_of(_Throw)
 
 
 def read_loads(document: TomlDocument, given: Mapping[str, Any]) -> tuple[ArrayTable, ...]:

@@ -2,46 +2,62 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 from mechanics.scene.rig import Rig
-from pipelines.scene.keys import keys_of, typed_values
+from pipelines.toml.keys import Numbers, Setting, Vector, keys_of, typed_values
 from pipelines.toml.schema import Key, TomlDocument, ValueKind, check_table
 
 __all__ = ["PUSHOVER_KEYS", "SCATTER", "SCATTER_KEYS", "Pushing", "read_pushover"]
 
-PUSHOVER_KEYS = (
-    Key(
-        "direction",
-        ValueKind.VECTOR,
-        "Horizontal direction of the push; its length does not matter.",
-        "-",
-        (1.0, 0.0, 0.0),
-    ),
-    *keys_of(Rig),
-    Key(
-        "to",
-        ValueKind.NUMBERS,
-        "Displacements of the push, in turn: one, or those of cycles, such as [0.01, -0.01, 0.02, -0.02].",
-        "m",
-    ),
-    Key(
-        "step",
-        ValueKind.NUMBER,
-        "Way of one step; if not given, 1/200 of the largest displacement, or half of the least 2 G/c of bonds that "
-        "soften, where that is less.",
-        "m",
-        None,
-        above=0,
-    ),
-    Key(
-        "measured",
-        ValueKind.TEXT,
-        "CSV file beside the scene, to be drawn beside the curve: displacement [mm], force [kN].",
-        default=None,
-    ),
-    Key("level", ValueKind.NUMBER, "Level of the band of `[pushover.scatter]`.", "-", 0.9, above=0, below=1),
-)
+
+@dataclass(frozen=True, kw_only=True)
+class _Direction:
+    """Direction of the push."""
+
+    direction: Annotated[
+        Vector, Setting("Horizontal direction of the push; its length does not matter.", "-")
+    ] = (1.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pushing:
+    """Test that [pushover] asks for.
+
+    Attributes
+    ----------
+    rig : where it pushes
+    scatter : coefficients of variation by the names of `SCATTER`, of those that are given [-]
+    """
+
+    rig: Rig
+    scatter: Mapping[str, float]
+    to: Annotated[
+        Numbers,
+        Setting(
+            "Displacements of the push, in turn: one, or those of cycles, such as [0.01, -0.01, 0.02, -0.02].",
+            "m",
+        ),
+    ]
+    step: Annotated[
+        float | None,
+        Setting(
+            "Way of one step; if not given, 1/200 of the largest displacement, or half of the least 2 G/c of "
+            "bonds that soften, where that is less.",
+            "m",
+            above=0,
+        ),
+    ] = None
+    measured: Annotated[
+        str | None,
+        Setting("CSV file beside the scene, to be drawn beside the curve: displacement [mm], force [kN]."),
+    ] = None
+    level: Annotated[float, Setting("Level of the band of `[pushover.scatter]`.", "-", above=0, below=1)] = (
+        0.9
+    )
+
+
+PUSHOVER_KEYS = (*keys_of(_Direction), *keys_of(Rig), *keys_of(Pushing))
 """Keys of [pushover]."""
 
 SCATTER: Mapping[str, str] = {
@@ -62,28 +78,6 @@ SCATTER_KEYS = tuple(
 """Keys of [pushover.scatter]."""
 
 
-@dataclass(frozen=True)
-class Pushing:
-    """Test that [pushover] asks for.
-
-    Attributes
-    ----------
-    rig : where it pushes
-    to : displacements in turn [m]
-    step : way of one step; None: the usual one [m]
-    measured : file of a measured curve, relative to the scene; None: there is none
-    level : of the band [-]
-    scatter : coefficients of variation by the names of `SCATTER`, of those that are given [-]
-    """
-
-    rig: Rig
-    to: tuple[float, ...]
-    step: float | None
-    measured: str | None
-    level: float
-    scatter: Mapping[str, float]
-
-
 def read_pushover(document: TomlDocument, given: Mapping[str, Any]) -> Pushing | None:
     """Check the table; None where a scene has none."""
     if "pushover" not in given:
@@ -100,11 +94,5 @@ def read_pushover(document: TomlDocument, given: Mapping[str, Any]) -> Pushing |
         rig = Rig(direction=values["direction"], **typed_values(Rig, values))
     if not values["to"] or not any(values["to"]):
         document.fail("no displacement", "pushover", "to", remedy="give at least one, such as [0.03]")
-    return Pushing(
-        rig,
-        tuple(values["to"]),
-        values["step"],
-        values["measured"],
-        values["level"],
-        {name: value for name, value in scatter.items() if value is not None},
-    )
+    given_scatter = {name: value for name, value in scatter.items() if value is not None}
+    return Pushing(rig=rig, scatter=given_scatter, **typed_values(Pushing, values))

@@ -2,47 +2,68 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 from ground.errors import UsageError
 from pipelines.scene.array_tables import ArrayTable, read_entries
+from pipelines.toml.keys import Setting, Stones, Texts, keys_of
 from pipelines.toml.lines import Path
-from pipelines.toml.schema import Key, TomlDocument, ValueKind, nearest
+from pipelines.toml.schema import TomlDocument, nearest
 
-__all__ = ["ACTS_IN", "STAGE_KEYS", "StandingStones", "read_stages", "refuse_stages", "standing_stones"]
+__all__ = [
+    "STAGE_KEYS",
+    "LoadTable",
+    "Stage",
+    "StandingStones",
+    "read_stages",
+    "refuse_stages",
+    "standing_stones",
+]
 
 Codes = frozenset[str]
 
-STAGE_KEYS = (
-    Key("name", ValueKind.TEXT, "Name, by which loads refer to it."),
-    Key(
-        "lay",
-        ValueKind.STONES,
-        "Codes or expressions of the stones that are laid in it. Fixed stones that no stage lays stand from the first.",
-        default=(),
-    ),
-    Key(
-        "remove",
-        ValueKind.STONES,
-        "Codes or expressions of the stones that are taken away before it: a centring that was laid.",
-        default=(),
-    ),
-    Key(
-        "hold",
-        ValueKind.STONES,
-        "Codes or expressions of the stones that a rigid centring holds in it, if they stand: they do not move.",
-        default=(),
-    ),
-)
 
-ACTS_IN = Key(
-    "stages",
-    ValueKind.TEXTS,
-    "Names of the stages in which it acts, from the beginning of each; needed in a scene with `[[stages]]`, "
-    "and only there.",
-    default=(),
-)
-"""Key of every load."""
+@dataclass(frozen=True, kw_only=True)
+class Stage:
+    """Table [[stages]]."""
+
+    name: Annotated[str, Setting("Name, by which loads refer to it.")]
+    lay: Annotated[
+        Stones,
+        Setting(
+            "Codes or expressions of the stones that are laid in it. Fixed stones that no stage lays stand "
+            "from the first."
+        ),
+    ] = ()
+    remove: Annotated[
+        Stones,
+        Setting(
+            "Codes or expressions of the stones that are taken away before it: a centring that was laid."
+        ),
+    ] = ()
+    hold: Annotated[
+        Stones,
+        Setting(
+            "Codes or expressions of the stones that a rigid centring holds in it, if they stand: they do "
+            "not move."
+        ),
+    ] = ()
+
+
+STAGE_KEYS = keys_of(Stage)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoadTable:
+    """Keys of every load."""
+
+    stages: Annotated[
+        Texts,
+        Setting(
+            "Names of the stages in which it acts, from the beginning of each; needed in a scene with `[[stages]]`, "
+            "and only there."
+        ),
+    ] = ()
 
 
 @dataclass(frozen=True)
@@ -83,7 +104,7 @@ def read_stages(
 
 
 def _check_load(document: TomlDocument, load: ArrayTable, names: Sequence[str]) -> None:
-    asked = load.values[ACTS_IN.name]
+    asked = load.values["stages"]
     if names and not asked:
         document.fail(
             "a load that does not say in which stages it acts",
@@ -137,7 +158,7 @@ def standing_stones(
             if wrong:
                 document.fail(f"stone {min(wrong)} {what} in stage {name!r}", *entry.path, key, remedy=remedy)
         hold &= now
-        acting = [load for load in loads if name in load.values[ACTS_IN.name]]
+        acting = [load for load in loads if name in load.values["stages"]]
         if not now:
             document.fail(f"no stone stands in stage {name!r}", *entry.path, remedy="give lay")
         for load in acting:

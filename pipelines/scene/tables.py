@@ -1,15 +1,16 @@
 """Keys of the tables of a scene file; those of [[laws]], [[loads]] and [[throw]] stand beside what they make."""
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Annotated
 
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import ContactSettings, Fidelity, SolverSettings, TimeSettings
 from mechanics.stones.materials import Material, Orthotropy
-from pipelines.scene.keys import keys_of
 from pipelines.scene.settings import Fidelities, MaterialRule, MeshSettings, Output, Selection
 from pipelines.scene.site import Site
-from pipelines.toml.schema import Key, ValueKind
+from pipelines.toml.keys import Setting, Stones, Vector, keys_of
+from pipelines.toml.schema import Key
 from survey.joints.settings import JointSettings
 
 __all__ = ["ARRAYS", "AUTO", "MATERIAL_KEYS", "MESH_KEYS", "ORTHOTROPY_KEYS", "SITE_KEYS", "TABLES"]
@@ -23,29 +24,40 @@ AUTO = "auto"
 _default, *_lists = keys_of(Fidelities)
 _models = (AUTO, Fidelity.RIGID.value, Fidelity.DEFORMABLE.value)
 
+
+@dataclass(frozen=True, kw_only=True)
+class _Title:
+    """Table [scene]."""
+
+    name: Annotated[str | None, Setting("Title of reports and pictures; if not given, the file's name.")] = (
+        None
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Gravity:
+    """Table [gravity]."""
+
+    magnitude: Annotated[float, Setting("Acceleration of gravity.", "m/s²", at_least=0)] = 9.81
+    direction: Annotated[
+        Vector, Setting("Direction in which things fall; its length does not matter.", "-")
+    ] = (0.0, 0.0, -1.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _MeshedStones:
+    """Stones of a table [[meshes]]."""
+
+    stones: Annotated[Stones, Setting("Codes or expressions of the stones that are meshed otherwise.")]
+
+
 TABLES: Mapping[str, tuple[Key, ...]] = {
-    "scene": (
-        Key(
-            "name",
-            ValueKind.TEXT,
-            "Title of reports and pictures; if not given, the file's name.",
-            default=None,
-        ),
-    ),
+    "scene": keys_of(_Title),
     "select": keys_of(Selection),
     "bodies": (replace(_default, default=AUTO, choices=_models), *_lists),
     "joints": keys_of(JointSettings),
     "contact": (*keys_of(DryJoint), *keys_of(ContactSettings)),
-    "gravity": (
-        Key("magnitude", ValueKind.NUMBER, "Acceleration of gravity.", "m/s²", 9.81, at_least=0),
-        Key(
-            "direction",
-            ValueKind.VECTOR,
-            "Direction in which things fall; its length does not matter.",
-            "-",
-            (0.0, 0.0, -1.0),
-        ),
-    ),
+    "gravity": keys_of(_Gravity),
     "mesh": keys_of(MeshSettings),
     "time": keys_of(TimeSettings),
     "solver": keys_of(SolverSettings),
@@ -59,7 +71,7 @@ MATERIAL_KEYS = (*keys_of(Material), *keys_of(MaterialRule))
 ORTHOTROPY_KEYS = keys_of(Orthotropy)
 
 MESH_KEYS = (
-    Key("stones", ValueKind.STONES, "Codes or expressions of the stones that are meshed otherwise."),
+    *keys_of(_MeshedStones),
     *(
         replace(key, doc=f"As in `[mesh]`, whose `{key.name}` holds if none is given.", default=None)
         for key in keys_of(MeshSettings)

@@ -7,12 +7,12 @@ from datetime import date
 from difflib import get_close_matches
 from enum import Enum
 from math import isfinite
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from ground.errors import SceneError
 from pipelines.toml.lines import Path, line_of
 
-__all__ = ["REQUIRED", "Key", "TomlDocument", "ValueKind", "check_table", "nearest"]
+__all__ = ["REQUIRED", "Key", "TomlDocument", "ValueKind", "check_table", "nearest", "tables_of"]
 
 
 class _Required(Enum):
@@ -140,6 +140,29 @@ def check_table(
         else:
             values[name] = key.default
     return values
+
+
+def tables_of(
+    document: TomlDocument, given: Mapping[str, Any], name: str, path: Path = ()
+) -> list[tuple[Path, dict[str, Any]]]:
+    """Return the path and the contents of each table [[name]]; none where there is no such array.
+
+    Parameters
+    ----------
+    given : the table that has the array
+    path : its path
+
+    Raises
+    ------
+    SceneError : it is no array of tables
+    """
+    tables = given.get(name, [])
+    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
+        header = ".".join((*(step for step in path if not step.isdecimal()), name))
+        document.fail(
+            f"{name!r} is not a list of tables", *path, name, remedy=f"write [[{header}]] above each"
+        )
+    return [((*path, name, str(index)), table) for index, table in enumerate(tables)]
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

@@ -5,8 +5,9 @@ import re
 
 import pytest
 
-from pipelines.assess.diagnosis.file import DIAGNOSIS_KEYS, HYPOTHESIS_KEYS, UNKNOWN_KEYS, read_diagnosis
+from pipelines.assess.diagnosis.file import DiagnosisTable, HypothesisTable, Unknown, read_diagnosis
 from pipelines.scene.file import parse_scene
+from pipelines.toml.keys import keys_of
 from pipelines.toml.writer import toml_text
 from tests.docs.pages import blocks, ran
 from tests.moma.commands import answer
@@ -107,7 +108,7 @@ def test_the_tables_list_all_keys_and_the_example_can_be_read(tmp_path):
         if line.startswith("| `")
     ]
     listed = [(row[0].strip("`"), row[1], row[3]) for row in rows if len(row) == 4 and row[3]]
-    for key in (*DIAGNOSIS_KEYS, *HYPOTHESIS_KEYS, *UNKNOWN_KEYS):
+    for key in (*keys_of(DiagnosisTable), *keys_of(HypothesisTable), *keys_of(Unknown)):
         assert (key.name, key.unit, key.doc) in listed
     example, _ = blocks(PAGE, "toml")
     (tmp_path / "wall.toml").write_text("[[loads]]\n", encoding="utf-8")

@@ -5,7 +5,7 @@ import re
 import pytest
 
 from pipelines.assess.study.settings import CorrelationTable, InputTable, QuantityTable, StudyTable
-from pipelines.scene.keys import keys_of
+from pipelines.toml.keys import keys_of
 from tests.docs.pages import blocks, ran
 from tests.paths import ROOT
 

@@ -16,7 +16,7 @@ MOST = {
     "numbers of pipelines": 915,
     "long functions": 55,
     "wide functions": 5,
-    "undocumented functions": 176,
+    "undocumented functions": 175,
 }
 """Today's figures: whoever lowers one lowers its bound, and nobody raises one."""
 

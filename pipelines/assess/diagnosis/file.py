@@ -6,96 +6,24 @@ import operator
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from archmodel.store.lookalikes import explained, plain_form
 from ground.errors import SceneError
 from pipelines.scene.file import BESIDE
+from pipelines.toml.keys import Setting, Table, Texts, read_table
 from pipelines.toml.lines import key_lines, parse_toml, read_text
-from pipelines.toml.schema import Key, TomlDocument, ValueKind, check_table, nearest
+from pipelines.toml.schema import TomlDocument, nearest, tables_of
 from pipelines.toml.writer import is_table_array
 
 __all__ = [
-    "DIAGNOSIS_KEYS",
-    "HYPOTHESIS_KEYS",
-    "UNKNOWN_KEYS",
     "DiagnosisFile",
+    "DiagnosisTable",
     "Hypothesis",
+    "HypothesisTable",
     "Unknown",
     "read_diagnosis",
 ]
-
-DIAGNOSIS_KEYS = (
-    Key(
-        "scene",
-        ValueKind.TEXT,
-        "Scene file, beside this one; if not given, the scene is this file.",
-        default=None,
-    ),
-    Key("without", ValueKind.TEXTS, "Tables of that scene that are left out, such as loads.", default=()),
-    Key(
-        "battered",
-        ValueKind.BOOLEAN,
-        "Walls may have been built leaning, each by an angle of its own.",
-        default=False,
-    ),
-    Key(
-        "level_tolerance",
-        ValueKind.NUMBER,
-        "Standard deviation of the slope with which courses were laid.",
-        "-",
-        0.0,
-        at_least=0,
-        below=0.1,
-    ),
-    Key(
-        "from_rest",
-        ValueKind.BOOLEAN,
-        "Movements count from where the scene rests without any cause, not from the survey: for joints that yield "
-        "under the weight alone.",
-        default=False,
-    ),
-    Key(
-        "phases",
-        ValueKind.TEXTS,
-        "Names of building phases, the oldest first; with two or more the movement is dated against them.",
-        default=(),
-    ),
-)
-
-HYPOTHESIS_KEYS = (
-    Key("name", ValueKind.TEXT, "The hypothesis in words."),
-    Key(
-        "scene",
-        ValueKind.TABLE,
-        "Keys of the scene that it changes; arrays such as `loads` are added to those of the scene. A text that begins "
-        "with `=` is a formula of the unknowns: numbers, + - * / and brackets.",
-    ),
-)
-
-UNKNOWN_KEYS = (
-    Key("name", ValueKind.TEXT, "As it stands in formulas."),
-    Key("unit", ValueKind.TEXT, "Of its values, for reports."),
-    Key("start", ValueKind.NUMBER, "Value with which the search begins."),
-    Key("low", ValueKind.NUMBER, "Least value."),
-    Key("high", ValueKind.NUMBER, "Largest value."),
-    Key(
-        "step",
-        ValueKind.NUMBER,
-        "Change by which derivatives are taken; if not given, a twentieth of the range.",
-        default=None,
-        above=0,
-    ),
-    Key(
-        "scan",
-        ValueKind.INTEGER,
-        "Number of values across its range that are tried first; the search begins with the best. Where nothing moves "
-        "at the start, or its run fails, some are tried in any case.",
-        default=0,
-        at_least=0,
-        at_most=100,
-    ),
-)
 
 _LONGEST = 500  # characters of a formula
 _SHOWN = 60  # characters of a formula in a message
@@ -109,25 +37,77 @@ _OPERATORS: Mapping[type[ast.operator], Callable[[float, float], float]] = {
 _SHARE = 0.05  # of its range by which an unknown is changed for a derivative [-]
 
 
+@dataclass(frozen=True, kw_only=True)
+class DiagnosisTable:
+    """Table [diagnosis]."""
+
+    scene: Annotated[
+        str | None, Setting("Scene file, beside this one; if not given, the scene is this file.")
+    ] = None
+    without: Annotated[Texts, Setting("Tables of that scene that are left out, such as loads.")] = ()
+    battered: Annotated[bool, Setting("Walls may have been built leaning, each by an angle of its own.")] = (
+        False
+    )
+    level_tolerance: Annotated[
+        float,
+        Setting("Standard deviation of the slope with which courses were laid.", "-", at_least=0, below=0.1),
+    ] = 0.0
+    from_rest: Annotated[
+        bool,
+        Setting(
+            "Movements count from where the scene rests without any cause, not from the survey: for joints "
+            "that yield under the weight alone."
+        ),
+    ] = False
+    phases: Annotated[
+        Texts,
+        Setting(
+            "Names of building phases, the oldest first; with two or more the movement is dated against them."
+        ),
+    ] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class HypothesisTable:
+    """Table [[hypotheses]]."""
+
+    name: Annotated[str, Setting("The hypothesis in words.")]
+    scene: Annotated[
+        Table,
+        Setting(
+            "Keys of the scene that it changes; arrays such as `loads` are added to those of the scene. A "
+            "text that begins with `=` is a formula of the unknowns: numbers, + - * / and brackets."
+        ),
+    ]
+
+
 @dataclass(frozen=True)
 class Unknown:
-    """An amplitude to be estimated.
+    """Amplitude to be estimated: table [[hypotheses.unknowns]]."""
 
-    Attributes
-    ----------
-    name, unit : for formulas and reports
-    start, low, high : first value and bounds
-    step : change for derivatives, positive
-    scan : number of values across the range that are tried first
-    """
+    name: Annotated[str, Setting("As it stands in formulas.")]
+    unit: Annotated[str, Setting("Of its values, for reports.")]
+    start: Annotated[float, Setting("Value with which the search begins.")]
+    low: Annotated[float, Setting("Least value.")]
+    high: Annotated[float, Setting("Largest value.")]
+    step: Annotated[
+        float | None,
+        Setting("Change by which derivatives are taken; if not given, a twentieth of the range.", above=0),
+    ] = None
+    scan: Annotated[
+        int,
+        Setting(
+            "Number of values across its range that are tried first; the search begins with the best. Where "
+            "nothing moves at the start, or its run fails, some are tried in any case.",
+            at_least=0,
+            at_most=100,
+        ),
+    ] = 0
 
-    name: str
-    unit: str
-    start: float
-    low: float
-    high: float
-    step: float
-    scan: int = 0
+    @property
+    def change(self) -> float:
+        """Change by which derivatives are taken."""
+        return self.step or _SHARE * (self.high - self.low)
 
 
 @dataclass(frozen=True)
@@ -153,8 +133,8 @@ class Hypothesis:
         return _merged(base, _filled(self.change, values))
 
 
-@dataclass(frozen=True)
-class DiagnosisFile:
+@dataclass(frozen=True, kw_only=True)
+class DiagnosisFile(DiagnosisTable):
     """A diagnosis as its author wrote it, checked.
 
     Attributes
@@ -162,19 +142,12 @@ class DiagnosisFile:
     document : file and lines, for messages
     scene_path : of the scene, for files beside it
     base : contents of the scene file without what is left out
-    battered, level_tolerance : how walls and courses were laid
-    from_rest : whether movements count from where the scene rests without any cause
-    phases : names, the oldest first
     hypotheses : one or more
     """
 
     document: TomlDocument
     scene_path: str
     base: Mapping[str, Any]
-    battered: bool
-    level_tolerance: float
-    from_rest: bool
-    phases: tuple[str, ...]
     hypotheses: tuple[Hypothesis, ...]
 
 
@@ -188,11 +161,11 @@ def read_diagnosis(path: str | Path) -> DiagnosisFile:
     text = read_text(path, SceneError, missing="no such file")
     given = parse_toml(text, str(path), SceneError, "see docs/howto/diagnose.md for one to start from")
     document = TomlDocument(str(path), key_lines(text))
-    head: dict[str, Any] = check_table(document, ("diagnosis",), given.get("diagnosis", {}), DIAGNOSIS_KEYS)
-    if head["scene"] is None:
+    head = read_table(document, ("diagnosis",), given.get("diagnosis", {}), DiagnosisTable)
+    if head.scene is None:
         scene_path, base = str(path), {name: one for name, one in given.items() if name not in BESIDE}
     else:
-        beside = Path(path).parent / head["scene"]
+        beside = Path(path).parent / head.scene
         with document.at("diagnosis", "scene"):
             inner = read_text(beside, SceneError, missing="no such scene file")
         scene_path, base = str(beside), parse_toml(inner, str(beside), SceneError, "see docs/scene.md")
@@ -200,68 +173,58 @@ def read_diagnosis(path: str | Path) -> DiagnosisFile:
             if name not in BESIDE:
                 what = f"unknown table [{name}] beside a scene in another file"
                 document.fail(what, name, remedy="write it into the scene, or under [hypotheses.scene]")
-    for name in head["without"]:
+    for name in head.without:
         if name not in base:
             document.fail(
                 f"without: the scene has no {name!r}", "diagnosis", "without", remedy=nearest(name, base)
             )
+    _check_phases(document, head.phases)
     return DiagnosisFile(
-        document,
-        scene_path,
-        {name: one for name, one in base.items() if name not in (*BESIDE, *head["without"])},
-        head["battered"],
-        head["level_tolerance"],
-        head["from_rest"],
-        _distinct(document, head["phases"]),
-        tuple(_hypotheses(document, given)),
+        document=document,
+        scene_path=scene_path,
+        base={name: one for name, one in base.items() if name not in (*BESIDE, *head.without)},
+        hypotheses=tuple(_hypotheses(document, given)),
+        **vars(head),
     )
 
 
-def _distinct(document: TomlDocument, phases: tuple[str, ...]) -> tuple[str, ...]:
+def _check_phases(document: TomlDocument, phases: Texts) -> None:
     if len(phases) == 1 or len(set(phases)) < len(phases):
         what = f"phases = {list(phases)} are not several different ones"
         document.fail(what, "diagnosis", "phases", remedy="name two or more, the oldest first, or none")
-    return phases
 
 
 def _hypotheses(document: TomlDocument, given: Mapping[str, Any]) -> Iterator[Hypothesis]:
-    tables = given.get("hypotheses", [])
-    if not isinstance(tables, list) or not tables or not all(isinstance(table, dict) for table in tables):
+    if not given.get("hypotheses"):
         document.fail("no hypothesis", "hypotheses", remedy="write [[hypotheses]] above each")
     names: dict[str, str] = {}
-    for index, table in enumerate(tables):
-        path = ("hypotheses", str(index))
+    for path, table in tables_of(document, given, "hypotheses"):
         plain = {key: value for key, value in table.items() if key != "unknowns"}
-        values: dict[str, Any] = check_table(document, path, plain, HYPOTHESIS_KEYS, "[[hypotheses]]")
-        if values["name"] in names.values():
-            document.fail(f"two hypotheses {values['name']!r}", *path, "name", remedy="name each differently")
-        if (other := names.setdefault(plain_form(values["name"]), values["name"])) != values["name"]:
-            what = f"the hypothesis {explained(values['name'], other)}"
+        head = read_table(document, path, plain, HypothesisTable, "[[hypotheses]]")
+        if head.name in names.values():
+            document.fail(f"two hypotheses {head.name!r}", *path, "name", remedy="name each differently")
+        if (other := names.setdefault(plain_form(head.name), head.name)) != head.name:
+            what = f"the hypothesis {explained(head.name, other)}"
             document.fail(what, *path, "name", remedy="name each differently")
-        unknowns = tuple(_unknowns(document, path, table.get("unknowns", [])))
-        _check_formulas(document, path, values["scene"], [unknown.name for unknown in unknowns])
-        yield Hypothesis(values["name"], path, unknowns, values["scene"])
+        unknowns = tuple(_unknowns(document, path, table))
+        _check_formulas(document, path, head.scene, [unknown.name for unknown in unknowns])
+        yield Hypothesis(head.name, path, unknowns, head.scene)
 
 
-def _unknowns(document: TomlDocument, path: tuple[str, ...], tables: Any) -> Iterator[Unknown]:
-    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
-        what = "'unknowns' is not a list of tables"
-        document.fail(what, *path, "unknowns", remedy="write [[hypotheses.unknowns]] above each")
-    for index, table in enumerate(tables):
-        own = (*path, "unknowns", str(index))
-        values: dict[str, Any] = check_table(document, own, table, UNKNOWN_KEYS, "[[hypotheses.unknowns]]")
-        if not values["name"].isidentifier():
-            what = f"name = {values['name']!r} is no name for a formula"
+def _unknowns(document: TomlDocument, path: tuple[str, ...], table: Mapping[str, Any]) -> Iterator[Unknown]:
+    for own, content in tables_of(document, table, "unknowns", path):
+        unknown = read_table(document, own, content, Unknown, "[[hypotheses.unknowns]]")
+        low, start, high = unknown.low, unknown.start, unknown.high
+        if not unknown.name.isidentifier():
+            what = f"name = {unknown.name!r} is no name for a formula"
             document.fail(what, *own, "name", remedy="use letters, digits and _")
-        if not values["low"] <= values["start"] <= values["high"] or values["low"] == values["high"]:
-            what = "start = {start:g} is not between low = {low:g} and high = {high:g}".format(**values)
+        if not low <= start <= high or low == high:
+            what = f"start = {start:g} is not between low = {low:g} and high = {high:g}"
             document.fail(what, *own, "start", remedy="give low < high, and a start between them")
-        span = values["high"] - values["low"]
-        values["step"] = values["step"] or _SHARE * span
-        if values["step"] > 0.5 * span:
-            what = f"step = {values['step']:g} is more than half of the range of {values['name']}"
+        if unknown.change > 0.5 * (high - low):
+            what = f"step = {unknown.change:g} is more than half of the range of {unknown.name}"
             document.fail(what, *own, "step", remedy="give less, or leave it out")
-        yield Unknown(**values)
+        yield unknown
 
 
 def _check_formulas(document: TomlDocument, path: tuple[str, ...], change: Any, names: list[str]) -> None:

@@ -72,7 +72,7 @@ def fit(unknowns: Sequence[Unknown]) -> Ask:
     (0.31, 0.005)
     """
     low, high, step = (
-        np.array([getattr(unknown, name) for unknown in unknowns]) for name in ("low", "high", "step")
+        np.array([getattr(unknown, name) for unknown in unknowns]) for name in ("low", "high", "change")
     )
     span = high - low
     best = np.array([unknown.start for unknown in unknowns], dtype=np.float64)

@@ -29,9 +29,9 @@ def probes(unknowns: Sequence[Unknown], best: Place) -> list[list[Place]]:
     """Return for each unknown five places across its best amplitude, within its bounds, the others at their best."""
     found = []
     for k, unknown in enumerate(unknowns):
-        middle = min(max(best[k], unknown.low + unknown.step), unknown.high - unknown.step)
+        middle = min(max(best[k], unknown.low + unknown.change), unknown.high - unknown.change)
         found.append(
-            [(*best[:k], float(middle + unknown.step * share), *best[k + 1 :]) for share in _OFFSETS]
+            [(*best[:k], float(middle + unknown.change * share), *best[k + 1 :]) for share in _OFFSETS]
         )
     return found
 
@@ -51,13 +51,13 @@ def with_unevenness(ranked: Ranked, unknowns: Sequence[Unknown], answers: Mappin
         remark = f"runs beside its best amounts fail, so that its intervals may be too narrow: {failed}"
         return replace(ranked, remarks=(*ranked.remarks, remark))
     residuals = np.array(rows)
-    steps = np.array([one.step for one in unknowns])
+    steps = np.array([one.change for one in unknowns])
     jacobian = ((residuals[:, -1] - residuals[:, 0]) / (2.0 * steps)[:, None]).T
     inverse = np.linalg.pinv(jacobian)
     wide = float(stdtrit(ranked.dof, QUANTILE))
     estimates, uneven = [], []
     for k, (unknown, own) in enumerate(zip(unknowns, ranked.estimates, strict=True)):
-        told = unknown.step * _OFFSETS - residuals[k] @ inverse[k]
+        told = unknown.change * _OFFSETS - residuals[k] @ inverse[k]
         left = told - np.polyval(np.polyfit(_OFFSETS, told, 2), _OFFSETS)
         sigma = float(np.sqrt(left @ left / (len(left) - 3)))
         half = own.high - own.value

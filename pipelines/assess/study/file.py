@@ -25,9 +25,9 @@ from pipelines.assess.study.settings import (
     StudyTable,
 )
 from pipelines.scene.file import SceneFile, parse_scene
-from pipelines.scene.keys import build, keys_of
+from pipelines.toml.keys import read_table
 from pipelines.toml.lines import key_lines, parse_toml, read_text
-from pipelines.toml.schema import TomlDocument, check_table, nearest
+from pipelines.toml.schema import TomlDocument, nearest, tables_of
 
 __all__ = ["Correlation", "StudyFile", "read_study"]
 
@@ -89,7 +89,7 @@ def read_study(path: str | Path) -> StudyFile:
     for name in given:
         if name not in _TABLES:
             document.fail(f"unknown table [{name}]", name, remedy=nearest(name, _TABLES))
-    study = build(StudyTable, check_table(document, ("study",), given.get("study", {}), keys_of(StudyTable)))
+    study = read_table(document, ("study",), given.get("study", {}), StudyTable)
     beside = Path(path).parent / study.scene
     with document.at("study", "scene"):
         inner = read_text(beside, SceneError, missing="no such scene file")
@@ -108,19 +108,10 @@ def read_study(path: str | Path) -> StudyFile:
     )
 
 
-def _arrays(document: TomlDocument, given: Mapping[str, Any], name: str) -> list[dict[str, Any]]:
-    tables = given.get(name, [])
-    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
-        document.fail(f"{name!r} is not a list of tables", name, remedy=f"write [[{name}]] above each")
-    return tables
-
-
 def _inputs(document: TomlDocument, given: Mapping[str, Any], scene: SceneFile) -> tuple[InputTable, ...]:
     found: list[InputTable] = []
-    for number, table in enumerate(_arrays(document, given, "inputs")):
-        path = ("inputs", str(number))
-        values = check_table(document, path, table, keys_of(InputTable), "[[inputs]]")
-        made = build(InputTable, values)
+    for path, table in tables_of(document, given, "inputs"):
+        made = read_table(document, path, table, InputTable, "[[inputs]]")
         name = made.name or str(made.type)
         if name in [other.name or str(other.type) for other in found]:
             document.fail(f"two inputs {name!r}", *path, remedy="name each differently: name = …")
@@ -181,10 +172,8 @@ def _quantities(
     document: TomlDocument, given: Mapping[str, Any], method: Method
 ) -> tuple[QuantityTable, ...]:
     found: list[QuantityTable] = []
-    for number, table in enumerate(_arrays(document, given, "quantities")):
-        path = ("quantities", str(number))
-        values = check_table(document, path, table, keys_of(QuantityTable), "[[quantities]]")
-        made = build(QuantityTable, values)
+    for path, table in tables_of(document, given, "quantities"):
+        made = read_table(document, path, table, QuantityTable, "[[quantities]]")
         with document.at(*path):
             _check_quantity(made)
         if quantity_name(made) in map(quantity_name, found):
@@ -230,9 +219,8 @@ def _correlations(
 ) -> tuple[Correlation, ...]:
     names = [table.name or str(table.type) for table in inputs]
     found, used = [], set[int]()
-    for number, table in enumerate(_arrays(document, given, "correlations")):
-        path = ("correlations", str(number))
-        made = build(CorrelationTable, check_table(document, path, table, keys_of(CorrelationTable)))
+    for path, table in tables_of(document, given, "correlations"):
+        made = read_table(document, path, table, CorrelationTable)
         for name in made.inputs:
             if name not in names:
                 document.fail(f"no such input: {name!r}", *path, "inputs", remedy=nearest(name, names))

@@ -24,8 +24,8 @@ from pipelines.assess.study.settings import Acts, InputTable, InputType, Quantit
 from pipelines.assess.workers.store import Snapshot
 from pipelines.run.record import versions
 from pipelines.scene.file import parse_scene
-from pipelines.scene.keys import build
 from pipelines.scene.selection import Groups, StoneModel, select_groups, select_stones
+from pipelines.toml.keys import build
 from pipelines.toml.writer import toml_text
 
 __all__ = ["problem_of", "snapshot_content"]

@@ -3,13 +3,14 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from ground.errors import SceneError, UsageError
+from pipelines.toml.keys import Numbers, Setting, Texts, Vector, keys_of, read_table
 from pipelines.toml.lines import key_lines, parse_toml, read_text
-from pipelines.toml.schema import Key, TomlDocument, ValueKind, check_table, nearest
+from pipelines.toml.schema import Key, TomlDocument, ValueKind, check_table, nearest, tables_of
 from survey.orientation.formats.colmap import read_colmap
 from survey.orientation.formats.control import read_control, with_control
 from survey.orientation.formats.dbat import read_dbat
@@ -21,10 +22,10 @@ from survey.orientation.rotations import from_angles
 
 __all__ = [
     "CAMERA_KEYS",
-    "PHOTO_KEYS",
-    "PROJECT_KEYS",
     "WRITTEN",
+    "PhotoTable",
     "Project",
+    "ProjectTable",
     "calibrated",
     "exported_control",
     "read_project",
@@ -33,96 +34,96 @@ __all__ = [
 WRITTEN = ("photomodeler", "colmap", "metashape", "dbat")
 """Formats in which a result can be written."""
 
-_NUMBERS = ValueKind.NUMBERS
 
-PROJECT_KEYS = (
-    Key("name", ValueKind.TEXT, "Name of the project.", default=None),
-    Key("marks", ValueKind.TEXT, "File of marks: photograph, point, x, y, sigma.", default=None),
-    Key(
-        "photomodeler",
-        ValueKind.TEXT,
-        "Text export of PhotoModeler, instead of marks and cameras.",
-        default=None,
-    ),
-    Key(
-        "size",
-        _NUMBERS,
-        "Width and height of the photographs, with an export of PhotoModeler that does not state them.",
-        "px",
-        None,
-    ),
-    Key(
-        "colmap",
-        ValueKind.TEXT,
-        "Folder with a model of COLMAP, as text or binary, instead of marks and cameras.",
-        default=None,
-    ),
-    Key(
-        "metashape",
-        ValueKind.TEXT,
-        "XML of cameras that Metashape exports, instead of cameras.",
-        default=None,
-    ),
-    Key("markers", ValueKind.TEXT, "XML of markers that Metashape exports, with `metashape`.", default=None),
-    Key(
-        "dbat",
-        ValueKind.TEXT,
-        "Script of the Damped Bundle Adjustment Toolbox, instead of all others.",
-        default=None,
-    ),
-    Key(
-        "control", ValueKind.TEXT, "File of control points: number, name, X, Y, Z, deviations.", default=None
-    ),
-    Key(
-        "fixed_control",
-        ValueKind.BOOLEAN,
-        "Control points keep their places, whatever their deviations.",
-        default=False,
-    ),
-    Key("check", ValueKind.TEXTS, "Control points that only check the result.", default=()),
-    Key(
-        "sigma", ValueKind.NUMBER, "Standard deviation of marks without one of their own.", "px", 1.0, above=0
-    ),
-    Key(
-        "blunders",
-        ValueKind.TEXT,
-        "Whether marks that the test finds wrong are left out.",
-        default="report",
-        choices=("report", "remove"),
-    ),
-    Key(
-        "write",
-        ValueKind.TEXTS,
-        "Formats in which the result is written too: photomodeler, colmap, metashape, dbat.",
-        default=(),
-    ),
-    Key(
-        "pictures",
-        ValueKind.TEXT,
-        "Folder of the photographs themselves, on which results are drawn.",
-        default=None,
-    ),
-    Key(
-        "calibrate",
-        ValueKind.TEXTS,
-        "Parameters of cameras without a list of their own that are estimated.",
-        default=(),
-    ),
-)
-"""Keys at the top of a project file."""
+@dataclass(frozen=True, kw_only=True)
+class ProjectTable:
+    """Keys at the top of a project file."""
+
+    name: Annotated[str | None, Setting("Name of the project.")] = None
+    marks: Annotated[str | None, Setting("File of marks: photograph, point, x, y, sigma.")] = None
+    photomodeler: Annotated[
+        str | None, Setting("Text export of PhotoModeler, instead of marks and cameras.")
+    ] = None
+    size: Annotated[
+        Numbers | None,
+        Setting(
+            "Width and height of the photographs, with an export of PhotoModeler that does not state them.",
+            "px",
+        ),
+    ] = None
+    colmap: Annotated[
+        str | None, Setting("Folder with a model of COLMAP, as text or binary, instead of marks and cameras.")
+    ] = None
+    metashape: Annotated[
+        str | None, Setting("XML of cameras that Metashape exports, instead of cameras.")
+    ] = None
+    markers: Annotated[str | None, Setting("XML of markers that Metashape exports, with `metashape`.")] = None
+    dbat: Annotated[
+        str | None, Setting("Script of the Damped Bundle Adjustment Toolbox, instead of all others.")
+    ] = None
+    control: Annotated[str | None, Setting("File of control points: number, name, X, Y, Z, deviations.")] = (
+        None
+    )
+    fixed_control: Annotated[
+        bool, Setting("Control points keep their places, whatever their deviations.")
+    ] = False
+    check: Annotated[Texts, Setting("Control points that only check the result.")] = ()
+    sigma: Annotated[
+        float, Setting("Standard deviation of marks without one of their own.", "px", above=0)
+    ] = 1.0
+    blunders: Annotated[
+        str,
+        Setting(
+            "Whether marks that the test finds wrong are left out.",
+            choices=(
+                "report",
+                "remove",
+            ),
+        ),
+    ] = "report"
+    write: Annotated[
+        Texts, Setting("Formats in which the result is written too: photomodeler, colmap, metashape, dbat.")
+    ] = ()
+    pictures: Annotated[
+        str | None, Setting("Folder of the photographs themselves, on which results are drawn.")
+    ] = None
+    calibrate: Annotated[
+        Texts, Setting("Parameters of cameras without a list of their own that are estimated.")
+    ] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class _CameraTable:
+    """Table [[cameras]]."""
+
+    name: Annotated[str, Setting("Name of the camera.")]
+    unit: Annotated[
+        str,
+        Setting(
+            "Unit of its image.",
+            choices=(
+                "mm",
+                "px",
+            ),
+        ),
+    ] = "mm"
+    model: Annotated[
+        str,
+        Setting(
+            "Model of its distortion.",
+            choices=(
+                "backward",
+                "forward",
+            ),
+        ),
+    ] = "backward"
+    size: Annotated[Numbers, Setting("Width and height of its photographs.", "px")]
+    pixel: Annotated[float | None, Setting("Height of a pixel; 1 in the unit px.", "unit", above=0)] = None
+    calibrate: Annotated[Texts | None, Setting("Parameters that are estimated.")] = None
+
 
 CAMERA_KEYS = (
-    Key("name", ValueKind.TEXT, "Name of the camera."),
-    Key("unit", ValueKind.TEXT, "Unit of its image.", default="mm", choices=("mm", "px")),
-    Key(
-        "model",
-        ValueKind.TEXT,
-        "Model of its distortion.",
-        default="backward",
-        choices=("backward", "forward"),
-    ),
-    Key("size", _NUMBERS, "Width and height of its photographs.", "px"),
-    Key("pixel", ValueKind.NUMBER, "Height of a pixel; 1 in the unit px.", "unit", None, above=0),
+    *keys_of(_CameraTable),
     *(
         Key(
             name,
@@ -133,34 +134,25 @@ CAMERA_KEYS = (
         )
         for name in INTERIOR
     ),
-    Key("calibrate", ValueKind.TEXTS, "Parameters that are estimated.", default=None),
 )
 """Keys of `[[cameras]]`."""
 
-PHOTO_KEYS = (
-    Key("name", ValueKind.TEXT, "Name of the photograph, as in the marks."),
-    Key("camera", ValueKind.TEXT, "Its camera; not needed if there is one.", default=None),
-    Key("station", ValueKind.VECTOR, "Place of the projection centre.", "m", None),
-    Key(
-        "station_sigma",
-        ValueKind.VECTOR,
-        "Its standard deviations, which make it an observation.",
-        "m",
-        None,
-        above=0,
-    ),
-    Key("angles", ValueKind.VECTOR, "ω, φ, κ.", "°", None),
-    Key(
-        "angles_sigma",
-        ValueKind.VECTOR,
-        "Their standard deviations, which make them observations.",
-        "°",
-        None,
-        above=0,
-    ),
-    Key("fixed", ValueKind.BOOLEAN, "Station and angles are not estimated.", default=False),
-)
-"""Keys of `[[photos]]`."""
+
+@dataclass(frozen=True, kw_only=True)
+class PhotoTable:
+    """Table [[photos]]."""
+
+    name: Annotated[str, Setting("Name of the photograph, as in the marks.")]
+    camera: Annotated[str | None, Setting("Its camera; not needed if there is one.")] = None
+    station: Annotated[Vector | None, Setting("Place of the projection centre.", "m")] = None
+    station_sigma: Annotated[
+        Vector | None, Setting("Its standard deviations, which make it an observation.", "m", above=0)
+    ] = None
+    angles: Annotated[Vector | None, Setting("ω, φ, κ.", "°")] = None
+    angles_sigma: Annotated[
+        Vector | None, Setting("Their standard deviations, which make them observations.", "°", above=0)
+    ] = None
+    fixed: Annotated[bool, Setting("Station and angles are not estimated.")] = False
 
 
 @dataclass(frozen=True)
@@ -196,33 +188,24 @@ def read_project(path: Path) -> Project:
     text = read_text(path, SceneError)
     tables = parse_toml(text, str(path), SceneError, "see docs/howto/photographs.md")
     document = TomlDocument(str(path), key_lines(text))
-    cameras, photos = tables.pop("cameras", []), tables.pop("photos", [])
-    for name, given in (("cameras", cameras), ("photos", photos)):
-        if not (isinstance(given, list) and all(isinstance(one, dict) for one in given)):
-            document.fail(f"{name} is not a list of tables", name, remedy=f"write [[{name}]] before each")
-    values = check_table(document, (), tables, PROJECT_KEYS, "the project")
+    cameras, photos = tables_of(document, tables, "cameras"), tables_of(document, tables, "photos")
+    plain = {name: value for name, value in tables.items() if name not in ("cameras", "photos")}
+    values = read_table(document, (), plain, ProjectTable, "the project")
     network = _network(document, values, cameras, photos, path.parent)
-    if (control := values["control"]) is not None:
-        rows = read_control(path.parent / str(control))
-        network = with_control(
-            network, rows, fixed=bool(values["fixed_control"]), check=_texts(values["check"])
-        )
-    elif values["photomodeler"] is not None and network.control and not values["check"]:
-        network = exported_control(network, bool(values["fixed_control"]))
-    elif values["check"] or values["fixed_control"]:
-        key = "check" if values["check"] else "fixed_control"
+    if (control := values.control) is not None:
+        rows = read_control(path.parent / control)
+        network = with_control(network, rows, fixed=values.fixed_control, check=values.check)
+    elif values.photomodeler is not None and network.control and not values.check:
+        network = exported_control(network, values.fixed_control)
+    elif values.check or values.fixed_control:
+        key = "check" if values.check else "fixed_control"
         document.fail(f"{key} without control points", key, remedy="give control = FILE")
-    network = calibrated(network, _texts(values["calibrate"]), document.where("calibrate"))
-    write = _texts(values["write"])
-    for one in write:
-        if one not in WRITTEN:
-            document.fail(f"no format {one!r}", "write", remedy=nearest(one, WRITTEN))
-    pictures = (
-        {}
-        if values["pictures"] is None
-        else _pictures(document, path.parent / str(values["pictures"]), network)
-    )
-    return Project(str(values["name"] or path.stem), network, str(values["blunders"]), write, pictures)
+    network = calibrated(network, values.calibrate, document.where("calibrate"))
+    for name in values.write:
+        if name not in WRITTEN:
+            document.fail(f"no format {name!r}", "write", remedy=nearest(name, WRITTEN))
+    pictures = {} if values.pictures is None else _pictures(document, path.parent / values.pictures, network)
+    return Project(values.name or path.stem, network, values.blunders, values.write, pictures)
 
 
 def exported_control(network: Network, fixed: bool) -> Network:
@@ -315,17 +298,18 @@ def calibrated(network: Network, names: tuple[str, ...], where: str) -> Network:
     )
 
 
+_Tables = list[tuple[tuple[str, ...], dict[str, Any]]]
 _SOURCES = ("marks", "photomodeler", "colmap", "metashape", "dbat")
 
 
 def _network(
     document: TomlDocument,
-    values: Mapping[str, object],
-    cameras: list[Mapping[str, Any]],
-    photos: list[Mapping[str, Any]],
+    values: ProjectTable,
+    cameras: _Tables,
+    photos: _Tables,
     folder: Path,
 ) -> Network:
-    given = [name for name in _SOURCES if values[name] is not None]
+    given = [name for name in _SOURCES if getattr(values, name) is not None]
     if not given:
         document.fail("the project has no photographs", remedy=f"give one of {', '.join(_SOURCES)}")
     main = [name for name in given if name != "marks"]
@@ -334,46 +318,47 @@ def _network(
     if main and (cameras or photos):
         document.fail(f"[[cameras]] or [[photos]] beside {main[0]}", "cameras", remedy="leave them out")
     if not main:
-        if values["size"] is not None:
+        if values.size is not None:
             document.fail("size beside marks", "size", remedy="write it into [[cameras]]")
         return _marked(document, values, cameras, photos, folder)
-    if values["size"] is not None and main[0] != "photomodeler":
+    if values.size is not None and main[0] != "photomodeler":
         document.fail(f"size with {main[0]}", "size", remedy="leave it out")
-    source, sigma = folder / str(values[main[0]]), float(str(values["sigma"]))
+    source, sigma = folder / getattr(values, main[0]), values.sigma
     if main[0] == "photomodeler":
         return read_photomodeler(
-            source, None if values["size"] is None else _size(document, values["size"], "size")
+            source, None if values.size is None else _size(document, values.size, "size")
         )
     if main[0] == "colmap":
         return read_colmap(source, sigma)
     if main[0] == "dbat":
         return read_dbat(source)
-    markers = values["markers"]
-    file = None if markers is None else folder / str(markers)
+    markers = values.markers
+    file = None if markers is None else folder / markers
     network = read_metashape(source, file, sigma)
-    if values["marks"] is None:
+    if values.marks is None:
         return network
-    marks = folder / str(values["marks"])
+    marks = folder / values.marks
     return network_of(str(marks), read_marks(marks), network.cameras, network.photos, sigma)
 
 
 def _marked(
     document: TomlDocument,
-    values: Mapping[str, object],
-    cameras: list[Mapping[str, Any]],
-    photos: list[Mapping[str, Any]],
+    values: ProjectTable,
+    cameras: _Tables,
+    photos: _Tables,
     folder: Path,
 ) -> Network:
     """Make a network of a file of marks and the cameras and photographs of the project file."""
     if not cameras:
         document.fail("the project has no cameras", remedy="write [[cameras]] with name, size, pixel, c")
-    made = tuple(_camera(document, k, camera) for k, camera in enumerate(cameras))
+    made = tuple(_camera(document, place, table) for place, table in cameras)
     names = [one.name for one in made]
     if len(set(names)) < len(names):
         document.fail("two cameras have one name", "cameras", remedy="give each a name of its own")
-    marks = folder / str(values["marks"])
+    assert values.marks is not None
+    marks = folder / values.marks
     rows = read_marks(marks)
-    known = tuple(_photo(document, k, photo, names) for k, photo in enumerate(photos))
+    known = tuple(_photo(document, place, table, names) for place, table in photos)
     if not known:
         if len(made) > 1:
             document.fail(
@@ -382,12 +367,11 @@ def _marked(
                 remedy="write [[photos]] with name and camera",
             )
         known = tuple(Photo(name, 0, where=f"{marks}") for name in dict.fromkeys(row.photo for row in rows))
-    return network_of(str(marks), rows, made, known, float(values["sigma"]))  # type: ignore[arg-type]
+    return network_of(str(marks), rows, made, known, values.sigma)
 
 
-def _camera(document: TomlDocument, number: int, given: Mapping[str, Any]) -> Camera:
-    path = ("cameras", str(number))
-    values = check_table(document, path, given, CAMERA_KEYS, "[[cameras]]")
+def _camera(document: TomlDocument, path: tuple[str, ...], given: Mapping[str, Any]) -> Camera:
+    values: dict[str, Any] = check_table(document, path, given, CAMERA_KEYS, "[[cameras]]")
     width, height = _size(document, values["size"], *path, "size")
     pixel = values["pixel"]
     if pixel is None:
@@ -398,68 +382,62 @@ def _camera(document: TomlDocument, number: int, given: Mapping[str, Any]) -> Ca
         pixel = 1.0
     if values["c"] is None:
         document.fail("[[cameras]] has no 'c'", *path, remedy="give c: the camera constant")
-    middle = {"xp": 0.5 * width * float(pixel), "yp": 0.5 * height * float(pixel)}  # type: ignore[arg-type]
+    middle = {"xp": 0.5 * width * float(pixel), "yp": 0.5 * height * float(pixel)}
     inner = [values[name] if values[name] is not None else middle[name] for name in INTERIOR]
-    free = values["calibrate"]
-    for name in _texts(free or ()):
+    free = values["calibrate"] or ()
+    for name in free:
         if name not in INTERIOR:
             document.fail(
                 f"no parameter {name!r} of a camera", *path, "calibrate", remedy=nearest(name, INTERIOR)
             )
     return Camera(
-        str(values["name"]),
+        values["name"],
         np.array(inner, dtype=float),
         (width, height),
-        float(pixel),  # type: ignore[arg-type]
-        str(values["unit"]),
+        float(pixel),
+        values["unit"],
         values["model"] == "forward",
-        _texts(free or ()),
+        free,
         document.where(*path),
     )
 
 
-def _size(document: TomlDocument, given: object, *path: str) -> tuple[int, int]:
+def _size(document: TomlDocument, size: Numbers, *path: str) -> tuple[int, int]:
     """Return width and height in pixels."""
-    size = _texts(given)
     if len(size) != 2 or not all(float(one) == int(one) > 0 for one in size):
         document.fail("size is not a width and a height in pixels", *path, remedy="e.g. size = [6000, 4000]")
     return int(size[0]), int(size[1])
 
 
-def _photo(document: TomlDocument, number: int, given: Mapping[str, Any], cameras: list[str]) -> Photo:
-    path = ("photos", str(number))
-    values = check_table(document, path, given, PHOTO_KEYS, "[[photos]]")
-    camera = values["camera"]
+def _photo(
+    document: TomlDocument, path: tuple[str, ...], given: Mapping[str, Any], cameras: list[str]
+) -> Photo:
+    values = read_table(document, path, given, PhotoTable, "[[photos]]")
+    camera = values.camera
     if camera is None and len(cameras) > 1:
         document.fail("[[photos]] has no 'camera'", *path, remedy=f"give one of {', '.join(cameras)}")
     if camera is not None and camera not in cameras:
-        document.fail(f"no camera {camera!r}", *path, "camera", remedy=nearest(str(camera), cameras))
-    if values["fixed"] and (values["station"] is None or values["angles"] is None):
+        document.fail(f"no camera {camera!r}", *path, "camera", remedy=nearest(camera, cameras))
+    if values.fixed and (values.station is None or values.angles is None):
         document.fail("a fixed photograph without station and angles", *path, "fixed", remedy="give both")
 
-    def array(name: str) -> Any:
-        return None if values[name] is None else np.array(values[name], dtype=float)
-
-    angles = array("angles")
+    station, angles, sigma, angle_sigma = (
+        None if value is None else np.array(value)
+        for value in (values.station, values.angles, values.station_sigma, values.angles_sigma)
+    )
     rotation = None if angles is None else from_angles(*np.radians(angles))
-    sigma, angle_sigma = array("station_sigma"), array("angles_sigma")
-    for name, own in (("station", sigma), ("angles", angle_sigma)):
-        if own is not None and values[name] is None:
+    for name, place, own in (("station", station, sigma), ("angles", angles, angle_sigma)):
+        if own is not None and place is None:
             document.fail(f"{name}_sigma without {name}", *path, f"{name}_sigma", remedy=f"give {name}")
     return Photo(
-        str(values["name"]),
-        0 if camera is None else cameras.index(str(camera)),
+        values.name,
+        0 if camera is None else cameras.index(camera),
         rotation,
-        array("station"),
-        None if sigma is None else array("station"),
+        station,
+        None if sigma is None else station,
         sigma,
         None if angle_sigma is None else rotation,
         None if angle_sigma is None else np.radians(angle_sigma),
-        bool(values["fixed"]),
+        values.fixed,
         document.where(*path),
     )
-
-
-def _texts(value: object) -> tuple[Any, ...]:
-    assert isinstance(value, tuple | list)
-    return tuple(value)

@@ -103,7 +103,7 @@ def test_the_fold_has_the_area_of_its_disks():
         ),
         ("centre = [7.0, 1.5]", "centre = [50.0, 1.5]", 25, "cell 'W1' reaches out of the sample by 39 m"),
         ('name = "W1"', 'name = "whole sample"', 26, "is the name of all disks"),
-        ("[[cells]]", "[cells]", 25, "'cells' is not an array of tables"),
+        ("[[cells]]", "[cells]", 25, "'cells' is not a list of tables"),
         ('[scene]\nname = "Small fault"', "scene = 3", 2, "'scene' is not a table"),
     ],
 )
