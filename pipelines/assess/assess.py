@@ -164,7 +164,8 @@ def assess(
         inputs = scene_inputs(scene, assembled, groups, session)
         known = known_stones(session, [model.record.code for model in models])
     questions = [
-        _asked(one, confirm, code) for one in asked or scene_questions(scene, groups, assembled.origin)
+        _asked(question, confirm, code)
+        for question in asked or scene_questions(scene, groups, assembled.origin)
     ]
     dead = at_instant(assembled.scene, instant)
     on = assembly(dead)
@@ -173,21 +174,25 @@ def assess(
         refuse_unanswerable(on, question)
     progress(Progress("assess", 0, len(questions), "do the stones stand by themselves?"))
     on, standing, left_out = _standing(on, dead, leave_out_loose, progress)
-    questions = questions or [_asked(one, confirm, code) for one in facade_pushes(on.model.scene.blocks)]
+    questions = questions or [_asked(push, confirm, code) for push in facade_pushes(on.model.scene.blocks)]
     if weakest and standing.outcome.rests:
         progress(Progress("assess", 0, len(questions), "the weakest direction"))
         questions.append(_asked(weakest_push(on), confirm, code))
     given = digest(sorted(fingerprint(on.model.scene, on.model, on.state, models).items()))
-    with kept_answers(folder, UNFINISHED_ASSESSMENT, (Answer, Mechanism, Pushover)) as kept:
-        if len(kept):
-            text = f"going on, with {len(kept)} answers that were found before"
+    with kept_answers(folder, UNFINISHED_ASSESSMENT, (Answer, Mechanism, Pushover)) as store:
+        if len(store):
+            text = f"going on, with {len(store)} answers that were found before"
             progress(Progress("assess", 0, len(questions), found=text))
         if standing.outcome.rests:
             outwards = None if assembled.wall is None else assembled.wall.outwards
-            answers = _answered(on, questions, scene.site, kept, given, progress, outwards)
+            answers = _answered(on, questions, scene.site, store, given, progress, outwards)
         else:
             answers = [fallen(on, question, standing) for question in questions]
-    unchecked = [one.name for one in questions if code and isinstance(one, LoadQuestion) and one.code is None]
+    unchecked = [
+        question.name
+        for question in questions
+        if code and isinstance(question, LoadQuestion) and question.code is None
+    ]
     summary = _summary(assembled, on, answers, unchecked, standing, left_out)
     summary["inputs"] = {title: list(lines) for title, lines in inputs.items()}
     progress(Progress("write", 0, 1, "pictures"))
@@ -234,11 +239,11 @@ def _standing(
     first = standing.rest or on, standing
     while leave_out and standing.outcome is Outcome.COLLAPSED and standing.moved:
         loose = set(left_out) | set(standing.moved)
-        kept = tuple(block for block in dead.blocks if block.code not in loose)
+        blocks = tuple(block for block in dead.blocks if block.code not in loose)
         if len(loose) > _LOOSE * len(on.free):
             return *first, ()
         left_out = tuple(sorted(loose))
-        on = assembly(replace(dead, blocks=kept))
+        on = assembly(replace(dead, blocks=blocks))
         standing = stands(on, progress)
     return standing.rest or on, standing, left_out
 
@@ -247,7 +252,7 @@ def _answered(
     on: RigidAssembly,
     questions: Sequence[Question],
     site: Site | None,
-    kept: Kept,
+    store: Kept,
     given: str,
     progress: Listener,
     outwards: Array | None,
@@ -266,12 +271,12 @@ def _answered(
     for number, question in enumerate(questions):
         progress(Progress("assess", number, total, question.name))
         decides = [given, digest([question, site])]
-        found: Answer | None = kept.get(decides)
-        if found is None:
-            found = answer(on, question, confirming, leading, site, outwards)
-            kept.put(decides, found)
-        answers.append(found)
-        progress(Progress("assess", number + 1, total, question.name, found.told["headline"]))
+        kept_answer: Answer | None = store.get(decides)
+        if kept_answer is None:
+            kept_answer = answer(on, question, confirming, leading, site, outwards)
+            store.put(decides, kept_answer)
+        answers.append(kept_answer)
+        progress(Progress("assess", number + 1, total, question.name, kept_answer.told["headline"]))
     return answers
 
 
@@ -326,7 +331,7 @@ def _summary(
             else []
         ),
     ]
-    told = [one.told for one in answers]
+    loads = [one.told for one in answers]
     return {
         "scene": assembled.scene.name,
         "stones": len(on.model.mass),
@@ -334,8 +339,8 @@ def _summary(
         "weight": on.weight,
         "contacts": len(on.contacts),
         "cautions": [*cautions, *assembled.remarks],
-        "loads": told,
-        "governs": min(range(len(told)), key=lambda number: _limit(told[number])),
+        "loads": loads,
+        "governs": min(range(len(loads)), key=lambda number: _limit(loads[number])),
         "wall": None if assembled.wall is None else assembled.wall.record,
         "origin": assembled.origin.tolist(),
         "standing": {
@@ -344,7 +349,7 @@ def _summary(
             "moved": list(standing.moved),
         },
         "left_out": list(left_out),
-        "headline": _headline(told, standing, left_out),
+        "headline": _headline(loads, standing, left_out),
         "versions": dict(versions()),
     }
 
@@ -364,7 +369,7 @@ def _headline(loads: Sequence[dict[str, Any]], standing: Standing, left_out: Seq
     least = min(loads, key=_limit)
     if loads[0]["kind"] == "load" and not np.isfinite(_limit(least)):
         return f"{without}nothing limits its loads"
-    governs = "governs: " if sum(one["kind"] == "load" for one in loads) > 1 else ""
+    governs = "governs: " if sum(load["kind"] == "load" for load in loads) > 1 else ""
     return f"{without}{governs}{least['headline']}"
 
 
@@ -377,22 +382,22 @@ def _states(standing: Standing) -> list[str]:
     """Return cautions on the state from which limit loads start, where the dead load moves stones or breaks bonds."""
     if not standing.outcome.rests:
         return []
-    told = []
+    states = []
     if standing.outcome is Outcome.SETTLED:
-        told.append(f"under the dead load alone {standing.reason}")
+        states.append(f"under the dead load alone {standing.reason}")
     if standing.falls_as_drawn:
-        told.append(
+        states.append(
             f"as drawn it falls: no forces in its joints balance the dead load. It rests after moving by "
             f"{_short(standing.farthest)}, and joints are taken where stones rest"
         )
     elif standing.rest is not None and standing.farthest > 0.0:
-        told.append(
+        states.append(
             f"joints are those of the stones at rest, {_short(standing.farthest)} at most from where they are drawn"
         )
     if standing.broken:
         pairs = some([" and ".join(pair) for pair in standing.broken])
-        told.append(f"the dead load breaks the mortar between {pairs}: it holds nothing here")
-    return told
+        states.append(f"the dead load breaks the mortar between {pairs}: it holds nothing here")
+    return states
 
 
 def _short(length: float) -> str:
@@ -400,20 +405,24 @@ def _short(length: float) -> str:
     return f"{1e3 * length:.2g} mm"
 
 
-def _limit(one: dict[str, Any]) -> float:
+def _limit(load: dict[str, Any]) -> float:
     """Return the least load known at which an answer says that stones fall [-]; infinite without one."""
-    if one.get("outcome") == FALLS:
+    if load.get("outcome") == FALLS:
         return 0.0
-    runs = one.get("confirmation", {})
-    known = [one.get("limit", one.get("candidate")), one.get("bound"), runs.get("held") or runs.get("lost")]
+    runs = load.get("confirmation", {})
+    known = [
+        load.get("limit", load.get("candidate")),
+        load.get("bound"),
+        runs.get("held") or runs.get("lost"),
+    ]
     return min((value for value in known if value is not None), default=float("inf"))
 
 
-def _carried(on: RigidAssembly, found: Answer) -> Resultants | None:
+def _carried(on: RigidAssembly, given_answer: Answer) -> Resultants | None:
     """Return the resultants of all joints at a limit; None where nothing balances."""
-    if not found.force.any():
+    if not given_answer.force.any():
         return None
-    return resultants(on.joints, on.contacts, found.force, on.strength.shear(found.force))
+    return resultants(on.joints, on.contacts, given_answer.force, on.strength.shear(given_answer.force))
 
 
 def _write_forces(
@@ -421,18 +430,18 @@ def _write_forces(
 ) -> list[str]:
     """Write the resultants of all joints at each limit, with places in the frame of the site; return file names."""
     codes, names = [block.code for block in on.model.scene.blocks], []
-    for number, found in enumerate(carried, start=1):
-        if found is None:
+    for number, forces in enumerate(carried, start=1):
+        if forces is None:
             continue
         numbers = np.column_stack(
             [
                 on.joints.section.centroid + assembled.origin,
-                found.normal,
-                found.shear,
-                found.place + assembled.origin,
-                found.kern,
-                found.edge,
-                found.friction_use,
+                forces.normal,
+                forces.shear,
+                forces.place + assembled.origin,
+                forces.kern,
+                forces.edge,
+                forces.friction_use,
             ]
         )
         names.append(f"forces-{number}.csv")
@@ -476,12 +485,12 @@ def _record(
     )
 
 
-def _moving(on: RigidAssembly, found: Answer) -> tuple[MovingStone, ...]:
+def _moving(on: RigidAssembly, solved: Answer) -> tuple[MovingStone, ...]:
     speed = {
         block.code: float(one)
-        for block, one in zip(on.model.scene.blocks, found.mechanism.speed, strict=True)
+        for block, one in zip(on.model.scene.blocks, solved.mechanism.speed, strict=True)
     }
     return tuple(
         MovingStone(stone["code"], speed[stone["code"]], tuple(stone["velocity"]), tuple(stone["spin"]))
-        for stone in found.told["mechanism"]["stones"]
+        for stone in solved.told["mechanism"]["stones"]
     )

@@ -172,14 +172,15 @@ def _summary(
     for course in courses:
         walls.setdefault((course.line.facade, course.line.zone or None), []).append(course.misfit)
     beds = [
-        {"facade": facade, "zone": zone, "quantity": "beds", **_told(_sum(found))}
-        for (facade, zone), found in walls.items()
+        {"facade": facade, "zone": zone, "quantity": "beds", **_told(_sum(wall_beds))}
+        for (facade, zone), wall_beds in walls.items()
     ]
     faces = [
-        {"facade": one.facade, "zone": one.zone, "quantity": "plumb", **_told(one.misfit)} for one in plumb
+        {"facade": wall.facade, "zone": wall.zone, "quantity": "plumb", **_told(wall.misfit)}
+        for wall in plumb
     ]
-    whole = _sum([*(one.misfit for one in courses), *(one.misfit for one in plumb)])
-    leaning = {(one.facade, one.zone): one.courses for one in plumb}
+    whole = _sum([*(misfit_of.misfit for misfit_of in courses), *(one.misfit for one in plumb)])
+    leaning = {(wall.facade, wall.zone): wall.courses for wall in plumb}
     return {
         "scene": result.scene.name,
         "outcome": str(result.outcome),
@@ -191,7 +192,8 @@ def _summary(
         **_told(whole),
         "walls": [*beds, *faces],
         "courses": [
-            _course(one, leaning.get((one.line.facade, one.line.zone or None), {})) for one in courses
+            _course(course, leaning.get((course.line.facade, course.line.zone or None), {}))
+            for course in courses
         ],
         "versions": dict(versions()),
     }
@@ -209,39 +211,39 @@ def _told(misfit: Misfit) -> dict[str, Any]:
     return {"chi2": misfit.chi2, "chi2_still": misfit.still, "dof": misfit.dof}
 
 
-def _course(one: CourseMovement, leaning: Mapping[int, StoneMovement]) -> dict[str, Any]:
+def _course(movement: CourseMovement, leaning: Mapping[int, StoneMovement]) -> dict[str, Any]:
     """Return a course: of its sag, its slope and its lean what was measured, what simulated, and the σ of both."""
-    line = one.line
+    line = movement.line
     lean = leaning.get(line.course)
     return {
         "facade": line.facade,
         "zone": line.zone or None,
         "course": line.course,
         "measured": line.sag,
-        "simulated": one.sag,
-        "sigma": one.sag_sigma,
-        "slope": {"measured": line.slope, "simulated": one.slope, "sigma": one.slope_sigma},
+        "simulated": movement.sag,
+        "sigma": movement.sag_sigma,
+        "slope": {"measured": line.slope, "simulated": movement.slope, "sigma": movement.slope_sigma},
         "plumb": None
         if lean is None
         else {"measured": lean.measured, "simulated": lean.simulated, "sigma": lean.sigma},
-        **_told(one.misfit),
+        **_told(movement.misfit),
     }
 
 
 def _values(courses: Sequence[CourseMovement], plumb: Sequence[PlumbMovement]) -> dict[str, dict[str, float]]:
     """Return the named values of each stone, by its code."""
-    found: dict[str, dict[str, float]] = {}
+    values: dict[str, dict[str, float]] = {}
     for name, groups in (("sag", courses), ("plumb", plumb)):
         for group in groups:
             for code, stone in group.stones.items():
-                found.setdefault(code, {}).update(
+                values.setdefault(code, {}).update(
                     {
                         f"{name}_measured": stone.measured,
                         f"{name}_simulated": stone.simulated,
                         f"{name}_sigma": stone.sigma,
                     }
                 )
-    return found
+    return values
 
 
 def _with_values(result: StoneResult, values: Mapping[str, float]) -> StoneResult:

@@ -23,10 +23,10 @@ _AXES = {0.0: "x", 90.0: "y", 180.0: "-x", 270.0: "-y"}
 
 def push(angle: float) -> LoadQuestion:
     """Return the question of a horizontal push at an angle from x towards y [°]."""
-    near = min(_AXES, key=lambda one: abs((angle - one + 180.0) % 360.0 - 180.0))
-    if abs((angle - near + 180.0) % 360.0 - 180.0) <= _SAME:
-        x, y = round(np.cos(np.radians(near))), round(np.sin(np.radians(near)))
-        return LoadQuestion(f"horizontal {_AXES[near]}", Acceleration((float(x), float(y), 0.0)))
+    axis = min(_AXES, key=lambda one: abs((angle - one + 180.0) % 360.0 - 180.0))
+    if abs((angle - axis + 180.0) % 360.0 - 180.0) <= _SAME:
+        x, y = round(np.cos(np.radians(axis))), round(np.sin(np.radians(axis)))
+        return LoadQuestion(f"horizontal {_AXES[axis]}", Acceleration((float(x), float(y), 0.0)))
     turn = np.radians(angle)
     return LoadQuestion(
         f"horizontal {angle % 360.0:.3g}", Acceleration((float(np.cos(turn)), float(np.sin(turn)), 0.0))
@@ -42,35 +42,35 @@ def facade_pushes(blocks: Sequence[Block]) -> tuple[LoadQuestion, ...]:
     turns, left = list[float](), np.ones(len(area), dtype=bool)
     while left.any():
         # angles count four times: faces at right angles are of one façade or of those beside it
-        near = np.abs(np.angle(np.exp(4j * (angle[:, None] - angle[left])))) <= 4.0 * _ALIKE
-        weight = (area * left) @ near
+        alike = np.abs(np.angle(np.exp(4j * (angle[:, None] - angle[left])))) <= 4.0 * _ALIKE
+        weight = (area * left) @ alike
         peak = int(weight.argmax())
         if weight[peak] < _PART * area.sum():
             break
-        own = near[:, peak] & left
-        turn = float(np.degrees(np.angle(area[own] @ np.exp(4j * angle[own])) / 4.0))
+        facing = alike[:, peak] & left
+        turn = float(np.degrees(np.angle(area[facing] @ np.exp(4j * angle[facing])) / 4.0))
         turns.append(round(turn, 6) % 90.0)
-        left &= ~own
+        left &= ~facing
     sides = (0.0, 180.0, 90.0, 270.0)
     return tuple(push(turn + side) for turn in turns or [0.0] for side in sides)
 
 
 def weakest_push(on: RigidAssembly) -> LoadQuestion:
     """Return the horizontal push that the bound of associative friction limits most."""
-    known: dict[float, float] = {}
+    found_at: dict[float, float] = {}
 
     def bound(angle: float) -> float:
-        if angle not in known:
-            known[angle] = limit_load(on, push(angle).live).multiplier
-        return known[angle]
+        if angle not in found_at:
+            found_at[angle] = limit_load(on, push(angle).live).multiplier
+        return found_at[angle]
 
     best = min((float(index) for index in range(0, 360, _COARSE)), key=bound)
     width = _COARSE / 2.0
     while width >= _FINE:
         best = min((best - width, best, best + width), key=bound)
         width /= 2.0
-    found = push(best)
-    return LoadQuestion(f"{found.name} (weakest)", found.live)
+    question = push(best)
+    return LoadQuestion(f"{question.name} (weakest)", question.live)
 
 
 def _upright(blocks: Sequence[Block]) -> tuple[Array, Array]:

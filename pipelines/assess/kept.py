@@ -121,12 +121,12 @@ def kept_answers(folder: Path, name: str, records: Sequence[type]) -> Iterator[K
         raise UsageError(
             f"cannot be written: {error.strerror}", where=str(folder), remedy="name another folder"
         ) from error
-    kept = Kept(place, records)
+    store = Kept(place, records)
     with locked(place):
         try:
-            yield kept
+            yield store
         finally:
-            if place.exists() and not len(kept):
+            if place.exists() and not len(store):
                 shutil.rmtree(place, ignore_errors=True)
                 if made:
                     with suppress(OSError):

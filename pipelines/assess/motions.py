@@ -41,8 +41,8 @@ def stone_motions(bodies: Iterable[BodyResult], origin: Array) -> Motions:
     """Return the motions of the stones of a run; `origin` (3,) of the scene in the frame of the site [m]."""
     middle, field = {}, {}
     for body in bodies:
-        own = body.reference.mean(axis=0)
-        arms = np.column_stack([np.ones(len(body.reference)), body.reference - own])
-        middle[body.code] = own + origin
+        centre = body.reference.mean(axis=0)
+        arms = np.column_stack([np.ones(len(body.reference)), body.reference - centre])
+        middle[body.code] = centre + origin
         field[body.code] = np.linalg.lstsq(arms, body.displacement, rcond=None)[0]
     return Motions(middle, field)

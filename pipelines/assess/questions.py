@@ -101,8 +101,8 @@ def parse_question(words: str) -> Question:
     """
     try:
         match words.split():
-            case ["horizontal", way]:
-                return LoadQuestion(words, Acceleration(_horizontal(way)))
+            case ["horizontal", direction]:
+                return LoadQuestion(words, Acceleration(_horizontal(direction)))
             case ["tilt", axis]:
                 return LoadQuestion(words, Acceleration(_downhill(_horizontal(axis))))
             case ["force", stone, *numbers] if len(numbers) == 3:
@@ -110,8 +110,8 @@ def parse_question(words: str) -> Question:
                 return LoadQuestion(words, PointForce(stone, (x, y, z)))
             case ["weight", stones]:
                 return LoadQuestion(words, Acceleration(_DOWN, frozenset(stones.split(","))))
-            case ["thrust" | "settlement" as kind, stones, way] if way in _AXES:
-                return ThrustQuestion(words, tuple(stones.split(",")), _AXES[way], kind == "settlement")
+            case ["thrust" | "settlement" as kind, stones, direction] if direction in _AXES:
+                return ThrustQuestion(words, tuple(stones.split(",")), _AXES[direction], kind == "settlement")
             case ["thickness"]:
                 return Thickness()
     except (ValueError, SceneError):
@@ -127,7 +127,7 @@ def scene_questions(scene: SceneFile, groups: Groups, origin: Array) -> tuple[Qu
     scene, groups : the scene, and the codes of the stones that its tables name
     origin : (3,) of the scene, in the frame of the site [m]
     """
-    found = []
+    questions = []
     for entry in scene.assess:
         with scene.document.at(*entry.path):
             question = _TYPES[entry.type](entry, _codes(entry, groups), origin)
@@ -135,8 +135,8 @@ def scene_questions(scene: SceneFile, groups: Groups, origin: Array) -> tuple[Qu
             question = replace(question, **{key: entry.values[key] for key in _OWN if key in entry.values})
             if question.code is not None:
                 _refuse_code(scene, entry, question)
-        found.append(question)
-    return tuple(found)
+        questions.append(question)
+    return tuple(questions)
 
 
 def _refuse_code(scene: SceneFile, entry: ArrayTable, question: LoadQuestion) -> None:

@@ -63,7 +63,10 @@ def draw_in_space(folder: Path, shapes: ClosingShapes) -> tuple[str, ...]:
     """
     towards, elevation = viewpoint(shapes)
     step = _steps(shapes)[-1:]
-    looks = [(f"{one}-3d.png", "moved", _LABELS[one], f"{shapes.scene}: {_TITLES[one]}") for one in step]
+    looks = [
+        (f"{picture}-3d.png", "moved", _LABELS[picture], f"{shapes.scene}: {_TITLES[picture]}")
+        for picture in step
+    ]
     title = f"{shapes.scene}: joints by their surveyed width\n{_note(shapes)}"
     looks.append(("joints-3d.png", "joints", "Width of the joints as surveyed [mm]", title))
     pictures: list[dict[str, Any]] = [
@@ -89,17 +92,19 @@ def flat_facades(shapes: ClosingShapes) -> tuple[Facade, ...]:
     normals = np.array([stone.normal for stone in shapes.stones])
     areas = np.array([0.0 if stone.core else stone.area for stone in shapes.stones])
     centroids = np.array([stone.centroid for stone in shapes.stones])
-    found = []
+    facades = []
     for own_facade in find_facades(normals[seen], areas[seen], centroids[seen]):
         facade = replace(own_facade, members=seen[own_facade.members])
-        out, own = facade.frame.axes[2], facade.members
-        depth = float(np.ptp(centroids[own] @ out))
-        reach = float(np.ptp(facade.frame.flatten(centroids[own]), axis=0).max()) + np.sqrt(areas[own].mean())
-        looking = float(areas[own] @ (normals[own] @ out)) / float(areas[own].sum())
-        if depth <= _FLAT * reach and looking >= _LOOKING and areas[own].sum() >= _SHARE * areas.sum():
-            found.append(facade)
-    mainly_flat = sum(one.area for one in found) >= _MAINLY * areas.sum()
-    return tuple(found[:_MOST]) if mainly_flat else ()
+        out, members = facade.frame.axes[2], facade.members
+        depth = float(np.ptp(centroids[members] @ out))
+        reach = float(np.ptp(facade.frame.flatten(centroids[members]), axis=0).max()) + np.sqrt(
+            areas[members].mean()
+        )
+        looking = float(areas[members] @ (normals[members] @ out)) / float(areas[members].sum())
+        if depth <= _FLAT * reach and looking >= _LOOKING and areas[members].sum() >= _SHARE * areas.sum():
+            facades.append(facade)
+    mainly_flat = sum(facade.area for facade in facades) >= _MAINLY * areas.sum()
+    return tuple(facades[:_MOST]) if mainly_flat else ()
 
 
 def viewpoint(shapes: ClosingShapes) -> tuple[Array, float]:
@@ -133,9 +138,11 @@ def closing_surface(shapes: ClosingShapes, step: str = "moved") -> ClosingSurfac
     shut = [joint for joint in shapes.joints if not joint.joint.left_open and joint.polygon is not None]
     left = [joint for joint in shapes.joints if joint.joint.left_open and joint.polygon is not None]
     joint_points, joint_triangles, of_joint = fan_polygons(
-        [one.polygon for one in shut if one.polygon is not None]
+        [joint.polygon for joint in shut if joint.polygon is not None]
     )
-    gap_points, gap_triangles, _ = fan_polygons([one.polygon for one in left if one.polygon is not None])
+    gap_points, gap_triangles, _ = fan_polygons(
+        [joint.polygon for joint in left if joint.polygon is not None]
+    )
     return ClosingSurface(
         points=np.concatenate([solid.vertices for solid in solids]),
         triangles=np.concatenate(

@@ -123,13 +123,16 @@ def draw_views(
         lowest = write_picture(picture, fresh / "wall.png", fresh / "depth.png")
         (fresh / "wall.toml").write_text(wall_lines(frame), encoding="utf-8")
         if planes:
-            lines = {one.plane.name: one.lines(_THINNED * cell) for one in cut}
+            lines = {cut_section.plane.name: cut_section.lines(_THINNED * cell) for cut_section in cut}
             for plane in planes:
                 if plane.name.startswith("d"):
                     lines[plane.name] = contour(picture, plane, _SHORTEST * pixel, 0.5 * pixel)
             _write_sections(lines, fresh)
             names += ["sections.dxf", "sections.csv"]
-            drawn = [DrawnSection(name, len(own), _length(own)) for name, own in lines.items()]
+            drawn = [
+                DrawnSection(name, len(section_lines), _length(section_lines))
+                for name, section_lines in lines.items()
+            ]
         made = _report(picture, read, shown, lowest, drawn, clouds, folder, names)
         content = asdict(made) | {"files": [INDEX, *names], "clouds": [str(path) for path in files]}
         (fresh / INDEX).write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")

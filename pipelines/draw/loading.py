@@ -52,14 +52,14 @@ def draw_curve(path: Path, title: str, test: LoadingTest, band: Array | None, me
 def draw_pushed(path: Path, title: str, test: LoadingTest, step: Step) -> None:
     """Draw the stones at the end of a step as seen across the push, displacements exaggerated, open joints marked."""
     model, (along, across, up) = test.model, test.rig.axes
-    view, own = np.array([along, up]), np.flatnonzero(~model.fixed).tolist()
+    view, loose = np.array([along, up]), np.flatnonzero(~model.fixed).tolist()
     before, now = positions(model, test.settled), positions(model, step.after)
-    corners = np.vstack([before[k] for k in own]) @ view.T
+    corners = np.vstack([before[k] for k in loose]) @ view.T
     low, high = corners.min(axis=0), corners.max(axis=0)
     extent = float((high - low).max())
     # by the way of the push: a stone that has fallen out would leave none for the others
-    way = abs(float(test.displacement[np.abs(test.force).argmax() if step is test.peak else -1]))
-    factor = _WAY * extent / max(way, 1e-9)
+    displacement = abs(float(test.displacement[np.abs(test.force).argmax() if step is test.peak else -1]))
+    factor = _WAY * extent / max(displacement, 1e-9)
 
     def drawn(start: Array, end: Array) -> Array:
         """Project places (n, 3) at the end of the step, their displacements exaggerated."""
@@ -67,7 +67,7 @@ def draw_pushed(path: Path, title: str, test: LoadingTest, step: Step) -> None:
         return seen
 
     shown = list[Array]()
-    for number in own:
+    for number in loose:
         block, shape = model.scene.blocks[number], drawn(before[number], now[number])
         for face in map(list, block.faces):
             ring = block.vertices[face]
@@ -77,7 +77,7 @@ def draw_pushed(path: Path, title: str, test: LoadingTest, step: Step) -> None:
     figure = new_sheet((5.0, 5.0))
     axes = figure.subplots()
     axes.add_collection(PolyCollection(shown, facecolor="#e6dfd0", edgecolor="#4a4a4a", linewidth=0.6))
-    contacts, wide = step.active.contacts, step.active.gap > _OPEN * way
+    contacts, wide = step.active.contacts, step.active.gap > _OPEN * displacement
     kept = ~model.fixed[contacts.bodies[wide]]
     ends = (material_points(contacts, one)[wide][kept] for one in (test.settled, step.after))
     axes.plot(*drawn(*ends).T, ".", color="#c0392b", markersize=3)

@@ -40,11 +40,11 @@ def draw_network(path: Path, values: Mapping[str, Any]) -> float:
     """
     from matplotlib.collections import EllipseCollection, LineCollection
 
-    stations = np.array([[one["x"], one["y"], one["z"]] for one in values["photos"]])
+    stations = np.array([[photo["x"], photo["y"], photo["z"]] for photo in values["photos"]])
     points = np.array([point["xyz"] for point in values["points"]]).reshape(-1, 3)
     covariances = np.array([point["covariance"] for point in values["points"]]).reshape(-1, 3, 3)
     control = {one["id"] for one in values["control"]}
-    held = np.array([point["id"] in control for point in values["points"]], dtype=bool)
+    controlled = np.array([point["id"] in control for point in values["points"]], dtype=bool)
     rays = _rays(values, stations, points)
     some = np.linspace(0, len(points) - 1, min(len(points), _ELLIPSES)).astype(int)
     everything = np.concatenate([stations, points])
@@ -60,8 +60,10 @@ def draw_network(path: Path, values: Mapping[str, Any]) -> float:
     ):
         flat = [across, up]
         axes.add_collection(LineCollection(list(rays[:, :, flat]), colors=PALE, linewidths=0.25, alpha=0.6))
-        axes.plot(*points[~held][:, flat].T, ".", color=INK, markersize=1.5)
-        axes.plot(*points[held][:, flat].T, "^", color=PLAIN, markersize=5, label="control and check points")
+        axes.plot(*points[~controlled][:, flat].T, ".", color=INK, markersize=1.5)
+        axes.plot(
+            *points[controlled][:, flat].T, "^", color=PLAIN, markersize=5, label="control and check points"
+        )
         axes.plot(*stations[:, flat].T, "s", color=FLAG, markersize=4, label="photographs")
         width, height, turn = _ellipses(covariances[some][:, flat][:, :, flat])
         axes.add_collection(
@@ -114,9 +116,9 @@ def draw_photo_residuals(
     """
     marks = values["marks"]
     size = {camera["name"]: camera["size"] for camera in values["cameras"]}
-    photos = sorted(values["photos"], key=lambda one: -(one["rms"] or 0.0))[:_PHOTOS]
-    names = {one["name"] for one in photos}
-    photos = [one for one in values["photos"] if one["name"] in names]
+    photos = sorted(values["photos"], key=lambda photo: -(photo["rms"] or 0.0))[:_PHOTOS]
+    names = {photo["name"] for photo in photos}
+    photos = [photo for photo in values["photos"] if photo["name"] in names]
     off = np.array(
         [(a, b) if a is not None else (0.0, 0.0) for a, b in zip(marks["vx"], marks["vy"], strict=True)]
     )
@@ -125,7 +127,7 @@ def draw_photo_residuals(
     verdict = np.array(marks["verdict"])
     lengths = np.hypot(*off.reshape(-1, 2).T)
     typical = float(np.median(lengths[lengths > 0.0])) if (lengths > 0.0).any() else 1.0
-    width = max(size[one["camera"]][0] for one in photos)
+    width = max(size[photo["camera"]][0] for photo in photos)
     factor = float(f"{_READABLE * width / typical:.1g}")
     columns = min(4, len(photos))
     rows = -(-len(photos) // columns)

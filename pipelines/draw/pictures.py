@@ -64,8 +64,8 @@ _ENDINGS = {
 
 def package_of(message: str) -> str | None:
     """Return the Debian package of the shared library that a loader's message names; None if it names none."""
-    found = re.search(r"(lib[A-Za-z0-9_+-]+?)(?:-\d[\d.]*)?\.so", message)
-    return _PACKAGES.get(found.group(1)) if found else None
+    match = re.search(r"(lib[A-Za-z0-9_+-]+?)(?:-\d[\d.]*)?\.so", message)
+    return _PACKAGES.get(match.group(1)) if match else None
 
 
 def draw_pictures(

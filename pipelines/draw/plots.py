@@ -44,12 +44,14 @@ def draw_capacity(path: Path, title: str, curve: "Pushover", bound: float) -> No
     """Draw λ against the way of the stone that is led, with the bound and the limit load with which it began."""
     figure = new_sheet((7.0, 4.2))
     axes = figure.subplots()
-    way = 1e3 * curve.displacement
-    axes.plot(way, np.where(curve.calm, curve.multiplier, np.nan), color="#1f5f8b", label="borne at rest")
+    millimetres = 1e3 * curve.displacement
+    axes.plot(
+        millimetres, np.where(curve.calm, curve.multiplier, np.nan), color="#1f5f8b", label="borne at rest"
+    )
     hit = ~curve.calm
     if hit.any():
         span = np.clip(curve.multiplier[hit], 0.0, 1.2 * bound)
-        axes.plot(way[hit], span, ".", color="#b0b0b0", label="inertia counts")
+        axes.plot(millimetres[hit], span, ".", color="#b0b0b0", label="inertia counts")
     axes.axhline(bound, color="#8a3b12", linestyle="--", label="bound")
     axes.axhline(curve.limit, color="#6b7a2a", linestyle=":", label="limit load")
     axes.set_xlim(left=0.0)

@@ -18,14 +18,14 @@ _MOST = 15  # bars of a tornado
 
 def draw_samples(path: Path, name: str, values: Array, level: float | None) -> None:
     """Draw the histogram of samples (m,), their cumulative curve, and the level of failure."""
-    known = np.sort(values[np.isfinite(values)])
+    finite = np.sort(values[np.isfinite(values)])
     figure = new_sheet((7.0, 3.8))
     axes = figure.subplots()
-    axes.hist(known, bins="auto", color=_GREY)
+    axes.hist(finite, bins="auto", color=_GREY)
     axes.set_xlabel(name)
     axes.set_ylabel("samples")
     curve = axes.twinx()
-    curve.plot(known, np.arange(1, len(known) + 1) / len(known), color=_BLUE)
+    curve.plot(finite, np.arange(1, len(finite) + 1) / len(finite), color=_BLUE)
     curve.set_ylabel("share of the samples below [-]")
     curve.set_ylim(0.0, 1.0)
     if level is not None:

@@ -66,40 +66,40 @@ def write_assessment(path: Path, summary: Mapping[str, Any], model: Model | None
 
 def _lead(summary: Mapping[str, Any]) -> str:
     """Return the push that governs in a sentence: its direction, capacity and demand; nothing of other questions."""
-    one, axes = summary["loads"][summary["governs"]], axes_of(summary["wall"])
-    if "direction" not in one or "tilt" not in one or not one.get("limit"):
+    load, axes = summary["loads"][summary["governs"]], axes_of(summary["wall"])
+    if "direction" not in load or "tilt" not in load or not load.get("limit"):
         return ""
-    text = f"Pushed {direction_text(axes, one['direction'])}, the stones hold {100 * one['limit']:.4g} % of their "
-    text += f"weight, {kilonewtons(one['limit'] * summary['weight'])}"
-    if one["limit_lost"] is not None:
-        text += f", and fall at {100 * one['limit_lost']:.4g} %"
-    return f"{text}. Capacity against demand: {_demand(one)}. "
+    text = f"Pushed {direction_text(axes, load['direction'])}, the stones hold {100 * load['limit']:.4g} % of their "
+    text += f"weight, {kilonewtons(load['limit'] * summary['weight'])}"
+    if load["limit_lost"] is not None:
+        text += f", and fall at {100 * load['limit_lost']:.4g} %"
+    return f"{text}. Capacity against demand: {_demand(load)}. "
 
 
 def _governs(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Return what governs in words: direction, capacity against demand, mechanism, and how sure it is."""
-    one, axes = summary["loads"][summary["governs"]], axes_of(summary["wall"])
-    rows = [("Load", one["name"])]
-    if "direction" in one:
-        rows.append(("Direction", direction_text(axes, one["direction"])))
-    if one["kind"] == "load" and (limit := one.get("limit")):
-        push = "direction" in one and "tilt" in one
+    load, axes = summary["loads"][summary["governs"]], axes_of(summary["wall"])
+    rows = [("Load", load["name"])]
+    if "direction" in load:
+        rows.append(("Direction", direction_text(axes, load["direction"])))
+    if load["kind"] == "load" and (limit := load.get("limit")):
+        push = "direction" in load and "tilt" in load
         force = f": {kilonewtons(limit * summary['weight'])} on all stones that may move" if push else ""
-        rows += [("Capacity", f"λ = {_number(limit)}{force}"), ("Capacity against demand", _demand(one))]
-    if stones := one["mechanism"]["stones"]:
+        rows += [("Capacity", f"λ = {_number(limit)}{force}"), ("Capacity against demand", _demand(load))]
+    if stones := load["mechanism"]["stones"]:
         rows.append(("How it falls", _place(axes, stones)))
-    rows.append(("How sure it is", _sure(one.get("sensitivity"))))
+    rows.append(("How sure it is", _sure(load.get("sensitivity"))))
     return rows
 
 
-def _demand(one: Mapping[str, Any]) -> str:
+def _demand(load: Mapping[str, Any]) -> str:
     """Return the comparisons of a code in words."""
-    if "code" not in one:
+    if "code" not in load:
         return "no demand was stated: --code with a table [site] compares this load with that of a code"
     return "; ".join(
         f"{check['name']}: {check['capacity']:.4g} against {check['demand']:.4g} {check['unit']}, ratio "
         f"{check['ratio']:.2f}, {'passed' if check['passed'] else 'NOT PASSED'}"
-        for check in one["code"]["checks"]
+        for check in load["code"]["checks"]
     )
 
 
@@ -119,13 +119,13 @@ def _place(axes: WallAxes | None, stones: Sequence[Mapping[str, Any]]) -> str:
     )
 
 
-def _sure(found: Mapping[str, Any] | None) -> str:
+def _sure(limit: Mapping[str, Any] | None) -> str:
     """Return by how much the bound changes with friction and depth, to first order."""
-    if found is None:
+    if limit is None:
         return "friction, depths and densities are taken as certain"
     changes = [
-        ("less friction in all joints", found["friction"]),
-        ("less depth of all stones", found["depth"]),
+        ("less friction in all joints", limit["friction"]),
+        ("less depth of all stones", limit["depth"]),
     ]
     told = " and ".join(
         f"{'falls' if change >= 0.0 else 'rises'} by {percent(_SHARE * abs(change))} with {100 * _SHARE:g} % {what}"
@@ -138,32 +138,32 @@ def _sure(found: Mapping[str, Any] | None) -> str:
     )
 
 
-def _row(one: Mapping[str, Any]) -> tuple[str, ...]:
-    if one["kind"] == "thickness":
-        return (one["name"], _number(one["factor"]), *[""] * 6)
-    if one["kind"] != "load":
+def _row(load: Mapping[str, Any]) -> tuple[str, ...]:
+    if load["kind"] == "thickness":
+        return (load["name"], _number(load["factor"]), *[""] * 6)
+    if load["kind"] != "load":
         ends = (
-            "without limit" if one[end] is None else f"{1e-3 * one[end]:.4g} kN"
+            "without limit" if load[end] is None else f"{1e-3 * load[end]:.4g} kN"
             for end in ("least", "greatest")
         )
-        return (one["name"], *ends, *[""] * 5)
-    runs = one.get("confirmation", {})
-    tilt = f"{one['tilt']:.3g}°" if "tilt" in one else ""
-    bound = one["outcome"] if one["bound"] is None else _number(one["bound"])
+        return (load["name"], *ends, *[""] * 5)
+    runs = load.get("confirmation", {})
+    tilt = f"{load['tilt']:.3g}°" if "tilt" in load else ""
+    bound = load["outcome"] if load["bound"] is None else _number(load["bound"])
     held, lost = (_number(runs[end]) if runs.get(end) is not None else "" for end in ("held", "lost"))
     limit, too_much = (
-        one["outcome"] if one[key] is None else _number(one[key]) for key in ("limit", "limit_lost")
+        load["outcome"] if load[key] is None else _number(load[key]) for key in ("limit", "limit_lost")
     )
-    stood = "" if one["candidate_converged"] in (None, True) else " NOT CONVERGED"
-    return (one["name"], limit, too_much, bound, _number(one["candidate_lowest"]) + stood, held, lost, tilt)
+    stood = "" if load["candidate_converged"] in (None, True) else " NOT CONVERGED"
+    return (load["name"], limit, too_much, bound, _number(load["candidate_lowest"]) + stood, held, lost, tilt)
 
 
-def _part(folder: Path, number: int, one: Mapping[str, Any]) -> dict[str, Any]:
-    code = one.get("code", {"code": "", "caution": "", "values": [], "checks": []})
+def _part(folder: Path, number: int, load: Mapping[str, Any]) -> dict[str, Any]:
+    code = load.get("code", {"code": "", "caution": "", "values": [], "checks": []})
     places = [(folder / f"{name}-{number}.png", words) for name, words in _CAPTIONS.items()]
     return {
-        "name": one["name"],
-        "headline": one["headline"],
+        "name": load["name"],
+        "headline": load["headline"],
         "cautions": [code["caution"]] if code["caution"] else [],
         "code": code["code"],
         "numbers": [
@@ -182,7 +182,7 @@ def _part(folder: Path, number: int, one: Mapping[str, Any]) -> dict[str, Any]:
             )
             for check in code["checks"]
         ],
-        "mechanism": _mechanism(one["mechanism"]["stones"]),
+        "mechanism": _mechanism(load["mechanism"]["stones"]),
         "figures": [picture(place, words) for place, words in places if place.exists()],
     }
 

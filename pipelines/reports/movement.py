@@ -120,42 +120,51 @@ def _figures(folder: Path) -> list[dict[str, str]]:
     ]
 
 
-def _wall(one: Mapping[str, Any]) -> tuple[str, ...]:
+def _wall(wall: Mapping[str, Any]) -> tuple[str, ...]:
     return (
-        one["facade"],
-        one["zone"] or "–",
-        one["quantity"],
-        f"{one['chi2']:.1f}",
-        f"{one['chi2_still']:.1f}",
-        str(one["dof"]),
+        wall["facade"],
+        wall["zone"] or "–",
+        wall["quantity"],
+        f"{wall['chi2']:.1f}",
+        f"{wall['chi2_still']:.1f}",
+        str(wall["dof"]),
     )
 
 
-def _group(one: Mapping[str, Any]) -> tuple[str, ...]:
-    wall = _wall(one)
-    return (*wall[:3], "–" if one["course"] is None else str(one["course"]), *wall[3:])
+def _group(group: Mapping[str, Any]) -> tuple[str, ...]:
+    wall = _wall(group)
+    return (*wall[:3], "–" if group["course"] is None else str(group["course"]), *wall[3:])
 
 
-def _course(one: Mapping[str, Any]) -> tuple[str, ...]:
-    slope = one["slope"]
+def _course(course: Mapping[str, Any]) -> tuple[str, ...]:
+    slope = course["slope"]
     return (
-        one["facade"],
-        one["zone"] or "–",
-        str(one["course"]),
-        *("–" if one[key] is None else millimetres(one[key]) for key in ("measured", "simulated", "sigma")),
+        course["facade"],
+        course["zone"] or "–",
+        str(course["course"]),
+        *(
+            "–" if course[key] is None else millimetres(course[key])
+            for key in ("measured", "simulated", "sigma")
+        ),
         *(f"{1e3 * slope[key]:z.3g} mm/m" for key in ("measured", "simulated", "sigma")),
     )
 
 
-def _hypothesis(one: Mapping[str, Any]) -> list[tuple[str, ...]]:
+def _hypothesis(hypothesis: Mapping[str, Any]) -> list[tuple[str, ...]]:
     head = (
-        one["name"] + (f", stood: {', '.join(one['stood'])}" if one["stood"] else ""),
-        ratio(one["chi2"]),
-        str(one["dof"]),
-        ratio(one["probability"]),
-        ratio(one["behind"]),
+        hypothesis["name"] + (f", stood: {', '.join(hypothesis['stood'])}" if hypothesis["stood"] else ""),
+        ratio(hypothesis["chi2"]),
+        str(hypothesis["dof"]),
+        ratio(hypothesis["probability"]),
+        ratio(hypothesis["behind"]),
     )
     return [
-        (*head, own["name"], f"{own['value']:.4g} {own['unit']}", ratio(own["low"]), ratio(own["high"]))
-        for own in one["amplitudes"]
+        (
+            *head,
+            amplitude["name"],
+            f"{amplitude['value']:.4g} {amplitude['unit']}",
+            ratio(amplitude["low"]),
+            ratio(amplitude["high"]),
+        )
+        for amplitude in hypothesis["amplitudes"]
     ] or [(*head, "–", "–", "–", "–")]

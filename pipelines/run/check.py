@@ -143,7 +143,7 @@ def _of_rig(scene: SceneFile, assembly: Assembly) -> list[str]:
 def _simplified(assembly: Assembly) -> list[BlockyStone]:
     """Return the simplified stones; those that grew from their outlines are as surveyed."""
     grown = {code for leaf in assembly.closing.leaves for code in leaf.grown}
-    return [one for one in assembly.simplified if one.code not in grown]
+    return [stone for stone in assembly.simplified if stone.code not in grown]
 
 
 def _hypotheses(assembly: Assembly) -> frozenset[str]:
@@ -163,7 +163,7 @@ def _shapes(scene: str, assembly: Assembly) -> ClosingShapes:
             simple=[one.solid for one in assembly.simplified],
             closed=[Solid(block.code, block.vertices, block.faces) for block in assembly.scene.blocks],
         ),
-        simplified={one.code: one.report.displacement for one in assembly.simplified},
+        simplified={stone.code: stone.report.displacement for stone in assembly.simplified},
         closing=assembly.closing,
         faces=[record.outline - assembly.origin for record in records],
         hypotheses=_hypotheses(assembly),
@@ -187,10 +187,11 @@ def _report(
     return CheckReport(
         scene=scene.name,
         kinds=dict(sorted(kinds.items())),
-        bodies={str(one): bodies[str(one)] for one in Fidelity},
+        bodies={str(fidelity): bodies[str(fidelity)] for fidelity in Fidelity},
         ring=sum(one.ring > 0 for one in chosen.values()),
         stones=tuple(
-            StoneModelling(code, str(one.fidelity), one.reason, one.stress) for code, one in chosen.items()
+            StoneModelling(code, str(choice.fidelity), choice.reason, choice.stress)
+            for code, choice in chosen.items()
         ),
         materials=tuple(
             MaterialUse(key.name, key.density, key.young, key.poisson, count) for key, count in uses.items()
@@ -248,7 +249,7 @@ def _mesh_quality(meshes: MeshReport) -> MeshQualityReport | None:
         sharpest=sharpest.code,
         smallest_jacobian=worst.quality.min_scaled_jacobian,
         worst=worst.code,
-        retried={one.code: one.failures for one in meshes.retried},
+        retried={stone.code: stone.failures for stone in meshes.retried},
     )
 
 

@@ -149,7 +149,7 @@ def simplification_report(stones: Sequence[BlockyStone]) -> SimplificationReport
     if not stones:
         return None
     moved = {stone.code: float(stone.report.displacement.max(initial=0.0)) for stone in stones}
-    least = min(stones, key=lambda one: one.report.blockiness)
+    least = min(stones, key=lambda stone: stone.report.blockiness)
     worst = max(moved, key=lambda code: moved[code])
     outside = [
         OutsideStone(stone.code, moved[stone.code], stone.report.tolerance, stone.report.reason)
@@ -196,17 +196,19 @@ def joints_report(
         alone=closing.alone,
         displacement=moved,
         measured_overlaps=tuple(
-            GapPlace(one.stones, one.width, one.area, _place(one.centroid + origin), "closed half-way")
-            for one in sorted(closed, key=lambda one: one.width)
-            if one.width < -_DEEP and not hypotheses & set(one.stones)
+            GapPlace(
+                joint.stones, joint.width, joint.area, _place(joint.centroid + origin), "closed half-way"
+            )
+            for joint in sorted(closed, key=lambda one: one.width)
+            if joint.width < -_DEEP and not hypotheses & set(joint.stones)
         ),
         gaps=tuple(
             GapPlace(gap.stones, gap.width, gap.area, _place(gap.centroid + origin), gap.reason)
-            for gap in sorted(closing.gaps, key=lambda one: -one.width * one.area)
+            for gap in sorted(closing.gaps, key=lambda gap: -gap.width * gap.area)
         ),
         overlaps=tuple(
             OverlapPlace(overlap.stones, overlap.volume, overlap.depth, _place(overlap.centroid + origin))
-            for overlap in sorted(closing.overlaps, key=lambda one: -one.volume)
+            for overlap in sorted(closing.overlaps, key=lambda overlap: -overlap.volume)
         ),
         leaves=tuple(leaf_report(leaf, closing.joints, origin) for leaf in closing.leaves),
     )

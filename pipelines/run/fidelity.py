@@ -83,12 +83,12 @@ def modelled(codes: Sequence[str], neighbours: Neighbours, wishes: Wishes) -> di
 
 def neighbours(joints: Iterable[StoneJoint]) -> dict[str, set[str]]:
     """Return, by code, the stones that face it across a joint; stones without joints are left out."""
-    found: dict[str, set[str]] = {}
+    neighbouring: dict[str, set[str]] = {}
     for joint in joints:
         first, second = joint.stones
-        found.setdefault(first, set()).add(second)
-        found.setdefault(second, set()).add(first)
-    return found
+        neighbouring.setdefault(first, set()).add(second)
+        neighbouring.setdefault(second, set()).add(first)
+    return neighbouring
 
 
 def _listed(fidelity: Fidelity) -> Modelled:
@@ -121,15 +121,15 @@ def _others(
     region = [
         code for code in codes if code in (wishes.stress or ()) and _stressed(code, chosen[code], wishes)
     ]
-    near = _within(region, neighbours, wishes.ring, held)
+    within = _within(region, neighbours, wishes.ring, held)
     others: dict[str, Modelled] = {}
     for code in codes:
         if code in chosen:
             continue
         if code in wishes.pushed:
             others[code] = Modelled(Fidelity.RIGID, "a force acts on it, and forces act on rigid stones")
-        elif code in near:
-            distance, nearest = near[code]
+        elif code in within:
+            distance, nearest = within[code]
             reason = f"within {distance} joint{'' if distance == 1 else 's'} of {nearest}"
             others[code] = Modelled(Fidelity.DEFORMABLE, reason, ring=distance)
         else:
@@ -144,15 +144,15 @@ def _within(
 
     Fixed stones transmit no load from one side to another, so paths do not pass through them.
     """
-    near = {code: (0, code) for code in region}
+    reached = {code: (0, code) for code in region}
     waiting = deque(region)
     while waiting:
         code = waiting.popleft()
-        distance, nearest = near[code]
+        distance, nearest = reached[code]
         if distance == reach:
             continue
-        for other in sorted(neighbours.get(code, ())):
-            if other not in near and other not in held:
-                near[other] = distance + 1, nearest
-                waiting.append(other)
-    return near
+        for neighbour in sorted(neighbours.get(code, ())):
+            if neighbour not in reached and neighbour not in held:
+                reached[neighbour] = distance + 1, nearest
+                waiting.append(neighbour)
+    return reached

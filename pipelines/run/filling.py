@@ -134,10 +134,14 @@ class LeafReport:
 
 def leaf_report(leaf: GrownLeaf, joints: Sequence[StoneJoint], origin: Array) -> LeafReport:
     """Summarise a leaf and what stays open in it, whose positions are relative to `origin` (3,) [m]."""
-    own = [joint for joint in joints if all(code in leaf.grown for code in joint.stones)]
+    leaf_joints = [joint for joint in joints if all(code in leaf.grown for code in joint.stones)]
     pairs = [value for stones, value in leaf.thickness.items() if len(stones) > 1]
-    areas = np.array([one.area for one in own])
-    mean = float(np.average([one.width for one in own], weights=areas)) if len(own) else 0.0
+    areas = np.array([leaf_joint.area for leaf_joint in leaf_joints])
+    mean = (
+        float(np.average([leaf_joint.width for leaf_joint in leaf_joints], weights=areas))
+        if len(leaf_joints)
+        else 0.0
+    )
     usual = leaf.usual_area
     return LeafReport(
         stones=len(leaf.grown),
@@ -170,10 +174,10 @@ def _lengths(first: float, second: float, between: str) -> str:
     return f"{first:.2f}{between}{second:.2f} m"
 
 
-def _opening(one: Opening, origin: Array) -> OpeningPlace:
-    (width, height), (across, up) = one.size, one.low.tolist()
-    x, y, z = (one.front.mean(axis=(0, 1)) + origin).tolist()
-    return OpeningPlace(width, height, one.area, across, up, (x, y, z), one.stones, one.sides)
+def _opening(opening: Opening, origin: Array) -> OpeningPlace:
+    (width, height), (across, up) = opening.size, opening.low.tolist()
+    x, y, z = (opening.front.mean(axis=(0, 1)) + origin).tolist()
+    return OpeningPlace(width, height, opening.area, across, up, (x, y, z), opening.stones, opening.sides)
 
 
 @dataclass(frozen=True)

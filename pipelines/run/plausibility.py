@@ -45,8 +45,10 @@ def unusual_values(scene: SceneFile, models: Sequence[StoneModel]) -> list[str]:
 def corner_warnings(models: Sequence[StoneModel]) -> list[str]:
     """List the measured stones of which a corner seems out of place; outlines have as many as they like."""
     measured = (model for model in models if model.record.provenance == "points")
-    found = misplaced_corners([_seen(one) for one in measured if OUTLINE_NOTE not in one.record.notes])
-    texts = [f"stone {one.code}: {one.text}; measure its corners again" for one in found]
+    corners = misplaced_corners(
+        [_seen(stone) for stone in measured if OUTLINE_NOTE not in stone.record.notes]
+    )
+    texts = [f"stone {corner.code}: {corner.text}; measure its corners again" for corner in corners]
     left = len(texts) - _SHOWN
     return [*texts[:_SHOWN], *([f"{left} more signs of corners out of place"] if left > 0 else [])]
 
@@ -138,14 +140,14 @@ def _of_steps(scene: SceneFile) -> Iterator[tuple[str, Doubt]]:
 
 def _of_sizes(models: Sequence[StoneModel]) -> Iterator[tuple[str, Doubt]]:
     """Yield one finding for all stones of impossible size, and one for all of unusual size: they share a unit."""
-    found: dict[bool, list[tuple[str, Doubt]]] = defaultdict(list)
+    doubts: dict[bool, list[tuple[str, Doubt]]] = defaultdict(list)
     for model in models:
         if model.listed is Fidelity.FIXED:
             continue  # the ground may be of any size
         size = float(np.ptp(model.record.solid_vertices, axis=0).max())
         if (doubt := doubt_of(size, LENGTH)) is not None:
-            found[doubt.impossible].append((model.record.code, doubt))
-    for members in found.values():
+            doubts[doubt.impossible].append((model.record.code, doubt))
+    for members in doubts.values():
         (code, doubt), more = members[0], len(members) - 1
         others = f" (and {more} more stone{'s' if more > 1 else ''})" if more else ""
         yield f"stone {code}{others}: {doubt.text}", doubt

@@ -46,16 +46,16 @@ def remarks_on_laws(scene: SceneFile, rules: Sequence[LawRule], closing: Closing
     closing : the joints; none are known where stones stay as surveyed
     """
     where, found = scene.document.where, list[str]()
-    for one in scene.laws:
-        values = one.entry.values
-        if not values.get("tension") or not one.law.friction:
+    for rule_law in scene.laws:
+        values = rule_law.entry.values
+        if not values.get("tension") or not rule_law.law.friction:
             continue
-        held = held_tension(one.law.friction, values["tension"], values["shear"])
-        if held < values["tension"]:
-            enough = one.law.friction * values["tension"]
+        carried = held_tension(rule_law.law.friction, values["tension"], values["shear"])
+        if carried < values["tension"]:
+            enough = rule_law.law.friction * values["tension"]
             found.append(
-                f"{where(*one.entry.path, 'tension')}: of tension = {values['tension']:g} Pa no more than "
-                f"shear/friction = {held:.4g} Pa is held; a shear of {enough:.4g} Pa would hold all of it"
+                f"{where(*rule_law.entry.path, 'tension')}: of tension = {values['tension']:g} Pa no more than "
+                f"shear/friction = {carried:.4g} Pa is held; a shear of {enough:.4g} Pa would hold all of it"
             )
     if closing.mode is JointMode.AS_SURVEYED:
         return tuple(found)
@@ -67,16 +67,16 @@ def remarks_on_laws(scene: SceneFile, rules: Sequence[LawRule], closing: Closing
             joints[number] += 1
         if meant:
             holding[meant[-1]] += 1
-    for law, met, held in zip(scene.laws, joints, holding, strict=True):
-        if not held:
+    for law, met, carried in zip(scene.laws, joints, holding, strict=True):
+        if not carried:
             reason = "later laws hold in all of them" if met else "it holds only where they come to meet"
             joined = f"{met} joints lie between its stones" if met else "no joint lies between its stones"
             found.append(f"{where(*law.entry.path)}: [[laws]] has no effect: {joined}; {reason}")
     return tuple(found)
 
 
-def _lies_between(rule: LawRule, one: str, other: str) -> bool:
-    return (one in rule.first and other in rule.second) or (other in rule.first and one in rule.second)
+def _lies_between(rule: LawRule, first: str, second: str) -> bool:
+    return (first in rule.first and second in rule.second) or (second in rule.first and first in rule.second)
 
 
 def remarks_on_stones(stones: Sequence[BlockyStone]) -> tuple[str, ...]:

@@ -110,13 +110,13 @@ def _unclosed(assembly: Assembly) -> list[str]:
     """Report stones whose joints all stay open although they were to be closed."""
     if assembly.closing.mode is JointMode.AS_SURVEYED:
         return []
-    held = {block.code for block in assembly.scene.blocks if block.fidelity is Fidelity.FIXED}
+    fixed = {block.code for block in assembly.scene.blocks if block.fidelity is Fidelity.FIXED}
     closed = {code for joint in assembly.closing.joints if not joint.left_open for code in joint.stones}
     left = {
         code: joint.left_open
         for joint in reversed(assembly.closing.joints)
         for code in joint.stones
-        if joint.left_open and code not in closed | held
+        if joint.left_open and code not in closed | fixed
     }
     if not left:
         return []
@@ -149,8 +149,8 @@ def _overlapping(assembly: Assembly) -> list[str]:
     """Report stones that initially overlap deeply and would be driven apart."""
     deep = [overlap for overlap in assembly.closing.overlaps if overlap.depth > _DEEP]
     return [
-        f"{' and '.join(one.stones)} lie {one.depth * 1e3:.0f} mm in each other; measure them again, or exclude one"
-        for one in sorted(deep, key=lambda one: -one.volume)[:_NAMED]
+        f"{' and '.join(pair.stones)} lie {pair.depth * 1e3:.0f} mm in each other; measure them again, or exclude one"
+        for pair in sorted(deep, key=lambda one: -one.volume)[:_NAMED]
     ]
 
 

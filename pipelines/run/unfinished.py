@@ -118,21 +118,21 @@ class UnfinishedRun:
         write_whole(self._place / _INPUTS, json.dumps(inputs, ensure_ascii=False).encode())
 
     def _go_on(self, inputs: Mapping[str, str], versions: Mapping[str, str], duration: int) -> None:
-        found, wrong = self._checkpoints.read()
+        carried, wrong = self._checkpoints.read()
         where = str(self._place)
         try:
             then = json.loads((self._place / _INPUTS).read_text(encoding="utf-8"))
         except (OSError, ValueError):
-            found, wrong = None, [*wrong, f"{_INPUTS} is damaged"]
-        if found is None:
+            carried, wrong = None, [*wrong, f"{_INPUTS} is damaged"]
+        if carried is None:
             raise UsageError(
                 f"no checkpoint can be read: {'; '.join(wrong)}",
                 where=where,
                 remedy="begin again with --restart",
             )
         forbidden, free = changes(then, inputs)
-        if found.step >= duration:
-            forbidden.append(f"duration: the run has done {found.step} steps, {duration} are asked for")
+        if carried.step >= duration:
+            forbidden.append(f"duration: the run has done {carried.step} steps, {duration} are asked for")
         if forbidden:
             more = f", and {len(forbidden) - _NAMED} more" if len(forbidden) > _NAMED else ""
             raise UsageError(
@@ -140,18 +140,19 @@ class UnfinishedRun:
                 where=where,
                 remedy="undo the change, or begin again with --restart",
             )
-        other = [
-            f"{name} {found.notes['versions'].get(name)}, now {versions.get(name)}"
-            for name in dict.fromkeys([*found.notes["versions"], *versions])
-            if found.notes["versions"].get(name) != versions.get(name)
+        differing = [
+            f"{name} {carried.notes['versions'].get(name)}, now {versions.get(name)}"
+            for name in dict.fromkeys([*carried.notes["versions"], *versions])
+            if carried.notes["versions"].get(name) != versions.get(name)
         ]
-        self.warnings += [f"{what}; the run went on after step {found.step}" for what in wrong]
-        if other:
+        self.warnings += [f"{what}; the run went on after step {carried.step}" for what in wrong]
+        if differing:
             self.warnings.append(
-                f"resumed after step {found.step} with other libraries ({', '.join(other)}): the last bits may differ"
+                f"resumed after step {carried.step} with other libraries ({', '.join(differing)}): "
+                "the last bits may differ"
             )
-        self.resumed = [*found.notes["resumed"], {"step": found.step, "changed": [*free, *other]}]
-        self._found = found
+        self.resumed = [*carried.notes["resumed"], {"step": carried.step, "changed": [*free, *differing]}]
+        self._found = carried
         if free:
             write_whole(self._place / _INPUTS, json.dumps(inputs, ensure_ascii=False).encode())
 

@@ -164,7 +164,7 @@ def _twice(text: str, line: int) -> str:
         earlier.append((number, path))
     *before, (_, path) = earlier
     first = next((number for number, one in before if one[: len(path)] == path), None)
-    name = ".".join(one for one in path if not one.isdecimal())
+    name = ".".join(key for key in path if not key.isdecimal())
     return f"{name} is given twice" + ("" if first is None else f", first in line {first}")
 
 

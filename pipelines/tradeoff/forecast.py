@@ -43,26 +43,28 @@ class Forecast:
             if base is None or base.status is not Status.DONE:
                 return None
             return start + _twice(setting.effort * base.wall)
-        near = self._nearest(setting)
-        if near is None:
+        nearest = self._nearest(setting)
+        if nearest is None:
             return None
-        known = self.settings[near.name]
-        grown: float = (setting.unknowns / known.unknowns) ** self._power()
-        return start + _twice(grown * setting.effort / known.effort * max(near.wall, 1e-3))
+        near_setting = self.settings[nearest.name]
+        grown: float = (setting.unknowns / near_setting.unknowns) ** self._power()
+        return start + _twice(grown * setting.effort / near_setting.effort * max(nearest.wall, 1e-3))
 
     def memory(self, setting: Variant) -> float | None:
         """Return the expected memory of the process [bytes]; None if there is no run to infer it from."""
-        near = self.ended.get(setting.varied) if setting.varied is not None else self._nearest(setting)
-        if near is None or near.memory == 0:
+        nearest = self.ended.get(setting.varied) if setting.varied is not None else self._nearest(setting)
+        if nearest is None or nearest.memory == 0:
             return None
-        grown: float = (setting.unknowns / self.settings[near.name].unknowns) ** _MEMORY_POWER
+        grown: float = (setting.unknowns / self.settings[nearest.name].unknowns) ** _MEMORY_POWER
         # compiled kernels, whatever the mesh
         least = min(run.memory for run in self.ended.values() if run.memory)
-        return least + grown * (near.memory - least)
+        return least + grown * (nearest.memory - least)
 
     def _start(self) -> float:
         """Return the time of a process besides its work [s]."""
-        spent = [one.elapsed - _twice(one.wall) for one in self.ended.values() if one.status is Status.DONE]
+        spent = [
+            ended.elapsed - _twice(ended.wall) for ended in self.ended.values() if ended.status is Status.DONE
+        ]
         return max(float(np.median(spent)), 0.5) if spent else _START
 
     def _nearest(self, setting: Variant) -> Measured | None:
@@ -71,17 +73,19 @@ class Forecast:
         A stopped run only bounds the time of the same element type with more unknowns.
         """
         alike, others = [], []
-        for one in self.ended.values():
-            known = self.settings[one.name]
-            if known.varied is not None or (known.element is None) != (setting.element is None):
+        for ended in self.ended.values():
+            ended_setting = self.settings[ended.name]
+            if ended_setting.varied is not None or (ended_setting.element is None) != (
+                setting.element is None
+            ):
                 continue
-            if known.element is setting.element:
-                if one.status is Status.DONE or (
-                    one.status is Status.STOPPED and known.unknowns <= setting.unknowns
+            if ended_setting.element is setting.element:
+                if ended.status is Status.DONE or (
+                    ended.status is Status.STOPPED and ended_setting.unknowns <= setting.unknowns
                 ):
-                    alike.append(one)
-            elif one.status is Status.DONE:
-                others.append(one)
+                    alike.append(ended)
+            elif ended.status is Status.DONE:
+                others.append(ended)
         return min(alike or others, key=lambda one: self._apart(setting, one), default=None)
 
     def _apart(self, setting: Variant, run: Measured) -> float:
@@ -90,15 +94,17 @@ class Forecast:
     def _power(self) -> float:
         """Return the power of the unknowns by which time grows, from pairs of runs with one element type."""
         slopes = []
-        for one in self.ended.values():
-            for other in self.ended.values():
-                a, b = self.settings[one.name], self.settings[other.name]
+        for first in self.ended.values():
+            for second in self.ended.values():
+                a, b = self.settings[first.name], self.settings[second.name]
                 both = (
-                    one.status is Status.DONE and other.status is Status.DONE and a.varied is b.varied is None
+                    first.status is Status.DONE
+                    and second.status is Status.DONE
+                    and a.varied is b.varied is None
                 )
                 same = a.element is b.element is not None
-                if both and same and b.unknowns > 1.5 * a.unknowns and one.wall > 0.0 and other.wall > 0.0:
-                    slopes.append(math.log(other.wall / one.wall) / math.log(b.unknowns / a.unknowns))
+                if both and same and b.unknowns > 1.5 * a.unknowns and first.wall > 0.0 and second.wall > 0.0:
+                    slopes.append(math.log(second.wall / first.wall) / math.log(b.unknowns / a.unknowns))
         return float(np.clip(np.median(slopes), *_POWERS)) if slopes else _USUAL_POWER
 
 
@@ -138,11 +144,13 @@ def next_run(
     Time that the variants leave goes to the models again, so that the reference is as fine as possible.
     """
     waiting = [setting for setting in forecast.settings.values() if setting.name not in begun]
-    models = [one for one in waiting if one.varied is None]
-    variants = [one for one in waiting if one.varied in worth and forecast.seconds(one) is not None]
+    models = [setting for setting in waiting if setting.varied is None]
+    variants = [
+        setting for setting in waiting if setting.varied in worth and forecast.seconds(setting) is not None
+    ]
     of_models = left - (1.0 - _MODELS_SHARE) * budget
     for candidates, time in ((models, of_models), (variants, left), (models, left)):
-        for candidate in sorted(candidates, key=lambda one: _order(forecast, one)):
+        for candidate in sorted(candidates, key=lambda candidate: _order(forecast, candidate)):
             if _refusal(forecast, candidate, time, memory) == "":
                 return Choice(candidate, min(_patience(forecast.seconds(candidate), budget), left))
     return None

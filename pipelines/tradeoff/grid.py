@@ -127,22 +127,22 @@ def setting_name(overlay: Overlay) -> str:
 def _models(scene: SceneFile, moving: Sequence[Block], width: float, stress: bool) -> list[Variant]:
     """Return the models of the stones, by increasing cost."""
     soft = [block for block in moving if block.fidelity is Fidelity.DEFORMABLE]
-    found = [_model(scene, Overlay(), moving, soft, width)]
+    models = [_model(scene, Overlay(), moving, soft, width)]
     if soft and not scene.bodies.deformable:
-        found.append(_model(scene, _RIGID, moving, (), width))
+        models.append(_model(scene, _RIGID, moving, (), width))
     all_soft = Overlay(fidelity=Fidelity.DEFORMABLE)
     if stress and not soft:
         plain, soft = all_soft, list(moving)
     else:
         plain = Overlay()
         if 0 < len(soft) < len(moving):
-            found.append(_model(scene, all_soft, moving, moving, width))
+            models.append(_model(scene, all_soft, moving, moving, width))
     for element, counts in _CELLS.items() if soft else ():
         if element.is_tetrahedron or all(map(_suits_hexahedra, soft)):
             meshes = [replace(plain, element=element, cells=float(cells)) for cells in counts]
-            found += [_model(scene, mesh, moving, soft, width) for mesh in meshes]
-    found += _profiles(scene, moving, () if plain is all_soft else soft, width)
-    return sorted(found, key=lambda one: one.effort * one.unknowns)
+            models += [_model(scene, mesh, moving, soft, width) for mesh in meshes]
+    models += _profiles(scene, moving, () if plain is all_soft else soft, width)
+    return sorted(models, key=lambda model: model.effort * model.unknowns)
 
 
 def _profiles(

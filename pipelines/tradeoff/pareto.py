@@ -110,11 +110,11 @@ def front(points: Iterable[tuple[float, float]]) -> tuple[int, ...]:
     """
     listed = list(points)
     order = sorted(range(len(listed)), key=lambda one: (*listed[one], one))
-    found: list[int] = []
-    for one in order:
-        if not found or listed[one][1] < listed[found[-1]][1]:
-            found.append(one)
-    return tuple(found)
+    rows: list[int] = []
+    for index in order:
+        if not rows or listed[index][1] < listed[rows[-1]][1]:
+            rows.append(index)
+    return tuple(rows)
 
 
 def cheapest(
@@ -125,16 +125,16 @@ def cheapest(
     A run that differs by e from a reference whose error is at most e_r has an error of at most e + e_r. Of runs whose
     times differ by chance alone, that which changes least of the scene.
     """
-    known = [(one, bound) for one in judged if (bound := _bound(one, reference, quantity)) is not None]
-    if not known:
+    bounded = [(run, bound) for run in judged if (bound := _bound(run, reference, quantity)) is not None]
+    if not bounded:
         return None
-    below = [(one, bound) for one, bound in known if bound <= error]
+    below = [(one, bound) for one, bound in bounded if bound <= error]
     if below:
         least = min(one.run.cpu for one, _ in below)
         alike = [pair for pair in below if pair[0].run.cpu <= _CHANCE * least]
         best, bound = min(alike, key=lambda pair: (_changes(pair[0].run.overlay), pair[0].run.cpu))
     else:
-        best, bound = min(known, key=lambda pair: (pair[1], pair[0].run.cpu))
+        best, bound = min(bounded, key=lambda pair: (pair[1], pair[0].run.cpu))
     return Recommendation(best.run.name, bound, bool(below))
 
 
@@ -148,27 +148,28 @@ def models_of_interest(
 ) -> frozenset[str]:
     """Return the scene as written, if its error is known, and the models on the front of a quantity."""
     _, judged = judge(settings, runs)
-    known = [
-        (one.run, error)
-        for one in judged
-        if settings[one.run.name].varied is None and (error := counted(one, quantity)) is not None
+    with_errors = [
+        (run_judged.run, error)
+        for run_judged in judged
+        if settings[run_judged.run.name].varied is None
+        and (error := counted(run_judged, quantity)) is not None
     ]
-    best = front((run.cpu, error) for run, error in known)
-    written = {run.name for run, _ in known if run.overlay == Overlay()}
-    return frozenset(known[number][0].name for number in best) | written
+    best = front((run.cpu, error) for run, error in with_errors)
+    written = {run.name for run, _ in with_errors if run.overlay == Overlay()}
+    return frozenset(with_errors[number][0].name for number in best) | written
 
 
-def counted(one: Judged, quantity: str) -> float | None:
+def counted(judged: Judged, quantity: str) -> float | None:
     """Return the error of a run [-]; None if it is unknown, or if the outcome differs from that of the reference."""
-    return None if one.errors["outcome"] else one.errors[quantity]
+    return None if judged.errors["outcome"] else judged.errors[quantity]
 
 
-def _bound(one: Judged, reference: ErrorReference, quantity: str) -> float | None:
+def _bound(judged: Judged, reference: ErrorReference, quantity: str) -> float | None:
     """Return the error of a run plus that of the reference; None if it is unknown, or the outcome differs."""
-    error, own = counted(one, quantity), reference.errors[quantity]
-    if error is None or own is None:
+    error, own_error = counted(judged, quantity), reference.errors[quantity]
+    if error is None or own_error is None:
         return None
-    return error if one.run.name == reference.name or quantity in _OWN else error + own
+    return error if judged.run.name == reference.name or quantity in _OWN else error + own_error
 
 
 def _fineness(setting: Variant, run: Measured) -> tuple[float, ...]:
@@ -188,12 +189,12 @@ def _reference(
     settings: Mapping[str, Variant], finest: Measured, others: Sequence[Measured]
 ) -> ErrorReference:
     """Return the finest run, its error estimated from the finest of the others that is coarser in mesh or step."""
-    found = _partner(settings, finest, others)
+    match = _partner(settings, finest, others)
     assert finest.quantities is not None
-    if found is None:
+    if match is None:
         own = dict.fromkeys(QUANTITIES) | {name: finest.quantities.errors[name] for name in _OWN}
         return ErrorReference(finest.name, own, "", 1.0, finest.quantities.stress_error)
-    partner, ratio = found
+    partner, ratio = match
     assert partner.quantities is not None
     apart = differences(partner.quantities, finest.quantities)
     errors = {name: None if value is None else value / (ratio - 1.0) for name, value in apart.items()}
@@ -206,15 +207,17 @@ def _partner(
 ) -> tuple[Measured, float] | None:
     """Return a run for the error estimate of the finest, and how much coarser it is; None if none is coarser."""
     fine = settings[finest.name]
-    alike = [one for one in others if settings[one.name].element is fine.element]
-    meshes = [one for one in others if settings[one.name].element not in (None, fine.element)]
+    alike = [candidate for candidate in others if settings[candidate.name].element is fine.element]
+    meshes = [
+        candidate for candidate in others if settings[candidate.name].element not in (None, fine.element)
+    ]
     by_edge = _coarser(settings, fine, alike, "edge") if fine.element else None
     if by_edge is None and fine.element and meshes:
         return meshes[0], 2.0  # of another element: as if it were half as fine
-    found = by_edge or _coarser(settings, fine, alike, "step")
-    if found is None and fine.element is None and others:
+    coarser = by_edge or _coarser(settings, fine, alike, "step")
+    if coarser is None and fine.element is None and others:
         return others[0], 2.0  # a looser tolerance, fewer points
-    return found
+    return coarser
 
 
 def _coarser(

@@ -56,10 +56,10 @@ def study_record(goal: Goal, forecast: Forecast, left: float, limits: Limits) ->
     """Return the contents of trade.json: every setting with its cost and errors, or the reason for having no result."""
     reference, judged = judge(forecast.settings, forecast.ended)
     quantity = goal.quantity
-    points = [(one.run.cpu, error) for one in judged if (error := counted(one, quantity)) is not None]
-    names = [one.run.name for one in judged if counted(one, quantity) is not None]
+    points = [(entry.run.cpu, error) for entry in judged if (error := counted(entry, quantity)) is not None]
+    names = [entry.run.name for entry in judged if counted(entry, quantity) is not None]
     best = {names[number] for number in front(points)}
-    rows = [_row(one) | {"front": one.run.name in best} for one in judged]
+    rows = [_row(entry) | {"front": entry.run.name in best} for entry in judged]
     rows.sort(key=lambda row: row["cpu"])
     for name, setting in forecast.settings.items():
         run = forecast.ended.get(name)
@@ -93,8 +93,8 @@ def write_study(store: Store, record: Mapping[str, Any]) -> None:
     store.write(INDEX, as_json(record).encode("utf-8"))
 
 
-def _row(one: Judged) -> dict[str, Any]:
-    run = one.run
+def _row(judged: Judged) -> dict[str, Any]:
+    run = judged.run
     return {
         "setting": run.name,
         "overlay": overlay_record(run.overlay),
@@ -104,7 +104,7 @@ def _row(one: Judged) -> dict[str, Any]:
         **{name: getattr(run, name) for name in _COSTS},
         "outcome": None if run.quantities is None else run.quantities.outcome,
         "stress_error": None if run.quantities is None else run.quantities.stress_error,
-        "errors": dict(one.errors),
+        "errors": dict(judged.errors),
     }
 
 
@@ -114,14 +114,14 @@ def _recommended(
     judged: Sequence[Judged],
     runs: Mapping[str, Measured],
 ) -> dict[str, Any] | None:
-    found = None if reference is None else cheapest(judged, reference, goal.quantity, goal.error)
-    if found is None:
+    recommendation = None if reference is None else cheapest(judged, reference, goal.quantity, goal.error)
+    if recommendation is None:
         return None
-    run = runs[found.name]
+    run = runs[recommendation.name]
     return {
-        "setting": found.name,
-        "error": found.error,
-        "holds": found.holds,
+        "setting": recommendation.name,
+        "error": recommendation.error,
+        "holds": recommendation.holds,
         "cpu": run.cpu,
         "lines": scene_lines(run.overlay, goal.width),
     }
@@ -152,10 +152,10 @@ def _panels(record: Mapping[str, Any]) -> list[Panel]:
     done = [row for row in record["rows"] if row["status"] == Status.DONE and not row["errors"]["outcome"]]
     reference, panels = record["reference"], []
     for quantity in dict.fromkeys([record["quantity"], *MAIN]):
-        known = [row for row in done if row["errors"][quantity] is not None]
-        if len(known) < 2:
+        rows = [row for row in done if row["errors"][quantity] is not None]
+        if len(rows) < 2:
             continue
-        points = [Point(row["setting"], _kind(row), row["cpu"], row["errors"][quantity]) for row in known]
+        points = [Point(row["setting"], _kind(row), row["cpu"], row["errors"][quantity]) for row in rows]
         recommended = record["recommended"] if quantity == record["quantity"] else None
         panels.append(
             Panel(

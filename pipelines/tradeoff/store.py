@@ -106,16 +106,16 @@ class Store:
 
     def load(self) -> dict[str, Measured]:
         """Return all runs of this study that have ended, by the name of their setting."""
-        found = {}
+        measured = {}
         for file in sorted((self.folder / _RUNS).glob("*.json")):
             try:
                 record = json.loads(file.read_text(encoding="utf-8"))
                 if record.pop("study") == self.key:
-                    one = _measured(record)
-                    found[one.name] = one
+                    run_measured = _measured(record)
+                    measured[run_measured.name] = run_measured
             except (OSError, ValueError, LookupError, TypeError):
                 continue  # not a result of a study: the run is repeated
-        return found
+        return measured
 
     def keep(self, run: Measured) -> None:
         """Write one run; the file appears whole or not at all."""
@@ -143,13 +143,13 @@ class Store:
 
 
 def _measured(record: dict[str, Any]) -> Measured:
-    known = record["quantities"]
+    quantities = record["quantities"]
     return Measured(
         **record
         | {
             "overlay": overlay_from(record["overlay"]),
             "status": Status(record["status"]),
-            "quantities": None if known is None else quantities_from(known),
+            "quantities": None if quantities is None else quantities_from(quantities),
         }
     )
 

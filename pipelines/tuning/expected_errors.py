@@ -95,21 +95,23 @@ def profile_report(name: str | None, scene: SceneFile, result: Result) -> Profil
     )
 
 
-def expected_errors(name: str, found: Quantities, free: float, *, rigid: bool) -> dict[str, Expected]:
+def expected_errors(
+    name: str, quantities_found: Quantities, free: float, *, rigid: bool
+) -> dict[str, Expected]:
     """Return the errors to expect of a run at a profile.
 
     Parameters
     ----------
     name : of the profile
-    found : quantities of the run
+    quantities_found : quantities of the run
     free : fraction of its joints that statics leaves undetermined, see `loops`
     rigid : some of its stones are rigid
     """
-    if not Outcome(found.outcome).rests:
+    if not Outcome(quantities_found.outcome).rests:
         return {}
     expected = {}
     for quantity in (*TYPICAL, *BOUNDS):
-        value = _expected(name, quantity, found.stress_error, free, rigid)
+        value = _expected(name, quantity, quantities_found.stress_error, free, rigid)
         if value is not None:
             value = max(min(value, 1.0), _LEAST)
             expected[quantity] = Expected(value, QUANTITIES[quantity], quantity in BOUNDS)

@@ -166,7 +166,7 @@ def _block(block: Block, overlay: Overlay, size: float | None, listed: bool) -> 
 
 def _replaced(scene: SceneFile | Scene, overlay: Overlay) -> dict[str, Any]:
     """Return contact, time and solver of a scene with what the overlay gives."""
-    return {table: replace(getattr(scene, table), **given) for table, given in _settings(overlay).items()}
+    return {table: replace(getattr(scene, table), **fields) for table, fields in _settings(overlay).items()}
 
 
 def _settings(overlay: Overlay) -> dict[str, dict[str, Any]]:

@@ -100,7 +100,9 @@ _ACCURATE = Profile(
     step=0.0005,
     theta=0.5,
 )
-PROFILES: Mapping[str, Profile] = MappingProxyType({one.name: one for one in (_FAST, _BALANCED, _ACCURATE)})
+PROFILES: Mapping[str, Profile] = MappingProxyType(
+    {profile.name: profile for profile in (_FAST, _BALANCED, _ACCURATE)}
+)
 """From the quickest to the most accurate."""
 
 

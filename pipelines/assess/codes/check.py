@@ -84,14 +84,14 @@ class CodeCheck:
 _KINDS = ("linear", "nonlinear")
 
 
-def check_code(code: str, site: Site, found: Kinematics, gravity: float = 9.81) -> CodeCheck:
+def check_code(code: str, site: Site, kinematics: Kinematics, gravity: float = 9.81) -> CodeCheck:
     """Check the mechanism of a limit load.
 
     Parameters
     ----------
     code : one of `CODES`
     site : seismic action
-    found : kinematic analysis of the mechanism
+    kinematics : kinematic analysis of the mechanism
     gravity : [m/s²]
 
     Raises
@@ -102,13 +102,17 @@ def check_code(code: str, site: Site, found: Kinematics, gravity: float = 9.81) 
         raise UsageError(f"no such code: {code!r}", where="--code", remedy=f"give one of {', '.join(CODES)}")
     rules = tomllib.loads((_FOLDER / f"{code}.toml").read_text(encoding="utf-8"))
     article, q = rules["articles"], rules["behaviour"] if site.behaviour is None else site.behaviour
-    capacity = found.acceleration(site.confidence)
+    capacity = kinematics.acceleration(site.confidence)
     values = [
         _value(
-            "α0", found.multiplier, "-", article["oscillator"], "multiplier at which the mechanism begins"
+            "α0",
+            kinematics.multiplier,
+            "-",
+            article["oscillator"],
+            "multiplier at which the mechanism begins",
         ),
-        _value("M*", found.mass, "kg", article["oscillator"], "(Σ P δ)² / (g Σ P δ²)"),
-        _value("e*", found.share, "-", article["oscillator"], "g M* / Σ P"),
+        _value("M*", kinematics.mass, "kg", article["oscillator"], "(Σ P δ)² / (g Σ P δ²)"),
+        _value("e*", kinematics.share, "-", article["oscillator"], "g M* / Σ P"),
         _value("a0*", capacity, "m/s²", article["oscillator"], f"α0 g / (e* FC), FC = {site.confidence:g}"),
     ]
     checks = [
@@ -125,12 +129,12 @@ def check_code(code: str, site: Site, found: Kinematics, gravity: float = 9.81) 
     floor = rules.get("floor")
     if upper:
         checks.append(_linear_above(site, article, capacity, q, gravity, floor is not None))
-    if np.isfinite(found.capacity):
-        ultimate, where = rules["ultimate"] * found.capacity, article["nonlinear"]
-        at, slowed, period = _secant(rules, found.capacity, ultimate, capacity)
+    if np.isfinite(kinematics.capacity):
+        ultimate, where = rules["ultimate"] * kinematics.capacity, article["nonlinear"]
+        at, slowed, period = _secant(rules, kinematics.capacity, ultimate, capacity)
         factor, damping = rules["period"], rules["damping"]
         values += [
-            _value("d0*", found.capacity, "m", where, "displacement at which the multiplier is 0"),
+            _value("d0*", kinematics.capacity, "m", where, "displacement at which the multiplier is 0"),
             _value("du*", ultimate, "m", where, f"{rules['ultimate']:g} d0*"),
             _value("ds*", at, "m", where, f"{rules['secant']:g} du*"),
             _value("as*", slowed, "m/s²", where, "a0* (1 - ds*/d0*)"),
@@ -159,7 +163,7 @@ def check_code(code: str, site: Site, found: Kinematics, gravity: float = 9.81) 
             )
         elif upper:
             above, first = rules["above"], site.period or 0.0
-            share = _secant(above, found.capacity, ultimate, capacity)[2] / first
+            share = _secant(above, kinematics.capacity, ultimate, capacity)[2] / first
             demand = site.displacement(first, gravity) * site.shape * site.participation * share**2
             checks.append(
                 Check(
@@ -173,7 +177,7 @@ def check_code(code: str, site: Site, found: Kinematics, gravity: float = 9.81) 
                 )
             )
     unchecked = [rules["unchecked"], floor["unchecked"] if upper and floor is not None else ""]
-    caution = "; ".join(one for one in unchecked if one)
+    caution = "; ".join(caution for caution in unchecked if caution)
     return CodeCheck(rules["name"], caution, tuple(values), tuple(checks))
 
 
@@ -238,8 +242,10 @@ def floor_spectrum(
         off = (1.0 - period / first) ** rules["rise"]
     elif period > last:
         off = (period / last - 1.0) ** rules["fall"]
-    found = peak * floor_acceleration(site, gravity) / (1.0 + (peak - 1.0) * off)
-    return max(found, site.acceleration(period, gravity, damping)) if period > building else found
+    acceleration = peak * floor_acceleration(site, gravity) / (1.0 + (peak - 1.0) * off)
+    return (
+        max(acceleration, site.acceleration(period, gravity, damping)) if period > building else acceleration
+    )
 
 
 def floor_displacement(
@@ -249,10 +255,10 @@ def floor_displacement(
 
     Parameters as `floor_spectrum`; [C8.7.1.12].
     """
-    found = floor_spectrum(site, period, damping, gravity, rules) * (period / (2.0 * np.pi)) ** 2
+    displacement = floor_spectrum(site, period, damping, gravity, rules) * (period / (2.0 * np.pi)) ** 2
     building = site.period or 0.0
     last = rules["last"] * building
     if period <= last:
-        return float(found)
+        return float(displacement)
     least = floor_spectrum(site, building, damping, gravity, rules) * (last / (2.0 * np.pi)) ** 2
-    return float(max(found, least))
+    return float(max(displacement, least))

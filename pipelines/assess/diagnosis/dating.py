@@ -54,19 +54,21 @@ class Dating:
     evidence: tuple[str, ...]
 
 
-def date_movement(file: DiagnosisFile, ranking: Ranking, found: Measurements, whole: Motions) -> Dating:
+def date_movement(
+    file: DiagnosisFile, ranking: Ranking, measurements: Measurements, whole: Motions
+) -> Dating:
     """Date the best hypothesis.
 
     Parameters
     ----------
     file : with the phases, the oldest first
     ranking : of all hypotheses at all times
-    found : the survey
+    measurements : the survey
     whole : motions by the best, of as much as it is estimated, if all phases had stood
     """
     best = ranking.hypotheses[0]
-    shares = tuple(_share(found, phase, whole) for phase in file.phases)
-    evidence = tuple(_evidence(file, found, whole, shares))
+    shares = tuple(_share(measurements, phase, whole) for phase in file.phases)
+    evidence = tuple(_evidence(file, measurements, whole, shares))
     return Dating(_verdict(file, ranking, best), shares, evidence)
 
 
@@ -89,10 +91,10 @@ def _verdict(file: DiagnosisFile, ranking: Ranking, best: Ranked) -> str:
     return f"the movement is {when} (AICc of other dates larger by {margin:.3g} or more)"
 
 
-def _share(found: Measurements, phase: str, whole: Motions) -> Share:
+def _share(measurements: Measurements, phase: str, whole: Motions) -> Share:
     product = square = 0.0
-    for group in found.deformation.groups:
-        if found.phases[group.codes[0]] == phase:
+    for group in measurements.deformation.groups:
+        if measurements.phases[group.codes[0]] == phase:
             moved = group.whitening @ group.simulated(whole.displacement)
             product += float(moved @ (group.whitening @ group.values))
             square += float(moved @ moved)
@@ -102,25 +104,25 @@ def _share(found: Measurements, phase: str, whole: Motions) -> Share:
 
 
 def _evidence(
-    file: DiagnosisFile, found: Measurements, whole: Motions, shares: tuple[Share, ...]
+    file: DiagnosisFile, measurements: Measurements, whole: Motions, shares: tuple[Share, ...]
 ) -> Iterator[str]:
-    lines = compare_courses(measure_beds(found.stones, found.facades)[0], whole.displacement)
+    lines = compare_courses(measure_beds(measurements.stones, measurements.facades)[0], whole.displacement)
     for index, share in enumerate(shares):
-        own = [line for line in lines if found.phases[line.line.codes[0]] == share.phase]
+        dated = [line for line in lines if measurements.phases[line.line.codes[0]] == share.phase]
         if share.value is None:
             yield f"phase {share.phase}: the movement would hardly have touched its courses"
         else:
             yield f"phase {share.phase} shows {share.value:.2f} ± {share.sigma:.2f} of the movement (one σ)"
-        resting = sorted({code for line in own for code in line.stones if code in found.resting})
+        resting = sorted({code for line in dated for code in line.stones if code in measurements.resting})
         if resting:
             yield (
                 f"  {', '.join(resting)} of phase {share.phase} rest on stones of an earlier phase: "
                 "their beds may follow what had moved already and are left out"
             )
         # the last courses of a phase before the break, the first of the later one
-        near = sorted(own, key=lambda line: line.line.course, reverse=index == 0)
-        told = [text for line in near if (text := _course(line, found.resting)) is not None]
-        yield from told[:_TOLD]
+        near = sorted(dated, key=lambda line: line.line.course, reverse=index == 0)
+        texts = [text for line in near if (text := _course(line, measurements.resting)) is not None]
+        yield from texts[:_TOLD]
 
 
 def _course(line: CourseMovement, resting: frozenset[str]) -> str | None:

@@ -80,20 +80,22 @@ def diagnose(
     folder, file = Path(folder), read_diagnosis(path)
     check_replaceable(folder, INDEX, () if overwrite else (Path(path),))
     progress(Progress("blocks", 0, None, "reading the stones"))
-    found = measurements(file, url)
-    every = cases_of(file, found.phases)
+    measured = measurements(file, url)
+    every = cases_of(file, measured.phases)
     impossible = [check_case(file, case, url, accept_unsound) for case in every]
     cases = tuple(case for case, reason in zip(every, impossible, strict=True) if not reason)
-    with kept_answers(folder, UNFINISHED_DIAGNOSIS, (Tried, Motions)) as kept:
-        if len(kept):
-            progress(Progress("run", 0, None, found=f"going on, with {len(kept)} runs that were made before"))
-        with runner(jobs) if run is None else nullcontext(run) as own:
-            runs = runs_of(file, url, kept_runner(file, found.solids, kept, own))
-            done = fit_cases(cases, found.deformation, runs, progress)
-            dating = _dated(file, cases, found, done, runs) if found.phases else None
+    with kept_answers(folder, UNFINISHED_DIAGNOSIS, (Tried, Motions)) as store:
+        if len(store):
+            progress(
+                Progress("run", 0, None, found=f"going on, with {len(store)} runs that were made before")
+            )
+        with runner(jobs) if run is None else nullcontext(run) as run_all:
+            runs = runs_of(file, url, kept_runner(file, measured.solids, store, run_all))
+            done = fit_cases(cases, measured.deformation, runs, progress)
+            dating = _dated(file, cases, measured, done, runs) if measured.phases else None
     progress(Progress("write", 0, 1, "pictures"))
     with replacing(folder, INDEX) as fresh:
-        summary = write_diagnosis(fresh, file, cases, found, done, dating, tuple(filter(None, impossible)))
+        summary = write_diagnosis(fresh, file, cases, measured, done, dating, tuple(filter(None, impossible)))
     progress(Progress("write", 1, 1))
     return Diagnosis(folder, summary, file.battered)
 

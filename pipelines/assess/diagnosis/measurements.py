@@ -106,16 +106,16 @@ def _resting(
             stone.code: (stone.outline - facade.frame.origin) @ facade.frame.axes[0] for stone in members
         }
         for stone in members:
-            own = along[stone.code]
+            heights = along[stone.code]
             below = (
                 member
                 for member in members
                 if member.course == (stone.course or 0) - 1 and member.zone == stone.zone
             )
             if any(
-                order.index(phases[one.code]) < order.index(phases[stone.code])
-                and along[one.code].min() < own.max()
-                and own.min() < along[one.code].max()
-                for one in below
+                order.index(phases[other_stone.code]) < order.index(phases[stone.code])
+                and along[other_stone.code].min() < heights.max()
+                and heights.min() < along[other_stone.code].max()
+                for other_stone in below
             ):
                 yield stone.code

@@ -123,7 +123,7 @@ class Ranking:
 
 
 def rank(
-    name: str, stood: tuple[str, ...], unknowns: Sequence[Unknown], found: Fit, dof: int, freedom: float
+    name: str, stood: tuple[str, ...], unknowns: Sequence[Unknown], fit: Fit, dof: int, freedom: float
 ) -> Ranked:
     """Return a hypothesis with its measures.
 
@@ -131,31 +131,31 @@ def rank(
     ----------
     name, stood : see `Ranked`
     unknowns : of the hypothesis
-    found : its best amplitudes
+    fit : its best amplitudes
     dof : of the measurements, before amplitudes are estimated
     freedom : degrees of freedom of the scatter of beds; 0: it is taken as exact
     """
     count = len(unknowns)
     left = max(dof - count, 1)
-    if not len(found.residuals):
-        return Ranked(name, stood, found, left, 0.0, math.inf, (), (f"not run: {found.trouble}",))
-    ratio = found.chi2 / left
+    if not len(fit.residuals):
+        return Ranked(name, stood, fit, left, 0.0, math.inf, (), (f"not run: {fit.trouble}",))
+    ratio = fit.chi2 / left
     probability = float(fdtrc(left, freedom or 1e9, ratio))
-    aicc = found.chi2 + 2.0 * count + 2.0 * count * (count + 1) / max(dof - count - 1, 1)
-    own = tuple(estimates(unknowns, found, left))
-    tied = tuple(_tied(unknowns, found))
-    remarks = (*_remarks(unknowns, found, own), *tied)
-    return Ranked(name, stood, found, left, probability, aicc, own, remarks, tied)
+    aicc = fit.chi2 + 2.0 * count + 2.0 * count * (count + 1) / max(dof - count - 1, 1)
+    estimated = tuple(estimates(unknowns, fit, left))
+    tied = tuple(_tied(unknowns, fit))
+    remarks = (*_remarks(unknowns, fit, estimated), *tied)
+    return Ranked(name, stood, fit, left, probability, aicc, estimated, remarks, tied)
 
 
-def estimates(unknowns: Sequence[Unknown], found: Fit, dof: int) -> Iterator[Estimate]:
+def estimates(unknowns: Sequence[Unknown], fit: Fit, dof: int) -> Iterator[Estimate]:
     """Yield the amplitudes with intervals of Student's t, widened where the residuals are larger than expected."""
-    wide = float(stdtrit(dof, QUANTILE)) * max(1.0, math.sqrt(found.chi2 / dof))
-    blind = np.abs(np.array(found.undetermined).reshape(len(found.undetermined), len(unknowns))).max(
+    wide = float(stdtrit(dof, QUANTILE)) * max(1.0, math.sqrt(fit.chi2 / dof))
+    blind = np.abs(np.array(fit.undetermined).reshape(len(fit.undetermined), len(unknowns))).max(
         axis=0, initial=0.0
     )
-    for k, (unknown, value) in enumerate(zip(unknowns, found.amplitudes, strict=True)):
-        variance = found.covariance[k, k]
+    for k, (unknown, value) in enumerate(zip(unknowns, fit.amplitudes, strict=True)):
+        variance = fit.covariance[k, k]
         # a part of a direction that nothing feels may be as large as the bounds allow
         known = blind[k] < 0.1 and math.isfinite(variance)
         half = wide * math.sqrt(variance) if known else math.inf
@@ -164,14 +164,14 @@ def estimates(unknowns: Sequence[Unknown], found: Fit, dof: int) -> Iterator[Est
         yield Estimate(unknown.name, unknown.unit, value, value - half, value + half, bound)
 
 
-def _remarks(unknowns: Sequence[Unknown], found: Fit, own: Sequence[Estimate]) -> Iterator[str]:
+def _remarks(unknowns: Sequence[Unknown], fit: Fit, own: Sequence[Estimate]) -> Iterator[str]:
     names = [unknown.name for unknown in unknowns]
-    if found.trouble:
-        yield found.trouble
-    for one in own:
-        if one.at_bound:
-            yield f"{one.name} lies at a bound of its range"
-    for direction in found.undetermined:
+    if fit.trouble:
+        yield fit.trouble
+    for estimate in own:
+        if estimate.at_bound:
+            yield f"{estimate.name} lies at a bound of its range"
+    for direction in fit.undetermined:
         parts = [
             f"{part:+.2f} {name}" for part, name in zip(direction, names, strict=True) if abs(part) > 0.1
         ]
@@ -179,13 +179,13 @@ def _remarks(unknowns: Sequence[Unknown], found: Fit, own: Sequence[Estimate]) -
         yield f"not determined, as it moves nothing that was measured: {told}"
 
 
-def _tied(unknowns: Sequence[Unknown], found: Fit) -> Iterator[str]:
+def _tied(unknowns: Sequence[Unknown], fit: Fit) -> Iterator[str]:
     """Yield the pairs of amplitudes of which the measurements tell a combination alone."""
     names = [unknown.name for unknown in unknowns]
-    sigma = np.sqrt(np.diag(found.covariance))
+    sigma = np.sqrt(np.diag(fit.covariance))
     for i in range(len(names)):
         for k in range(i):
-            correlation = found.covariance[i, k] / (sigma[i] * sigma[k]) if sigma[i] * sigma[k] > 0.0 else 0.0
+            correlation = fit.covariance[i, k] / (sigma[i] * sigma[k]) if sigma[i] * sigma[k] > 0.0 else 0.0
             if abs(correlation) > _CORRELATED:
                 yield f"{names[k]} and {names[i]} cannot be told apart: their correlation is {correlation:+.3f}"
 
@@ -203,8 +203,8 @@ def with_others(ranked: Ranked, tried: Mapping[tuple[float, ...], float]) -> Ran
     more = float(stdtrit(ranked.dof, QUANTILE)) ** 2 * max(1.0, ranked.fit.chi2 / ranked.dof)
     beyond = {
         place: max(
-            abs(x - own.value) / max(own.high - own.value, 1e-300)
-            for own, x in zip(ranked.estimates, place, strict=True)
+            abs(x - estimate.value) / max(estimate.high - estimate.value, 1e-300)
+            for estimate, x in zip(ranked.estimates, place, strict=True)
         )
         for place, chi2 in tried.items()
         if chi2 < ranked.fit.chi2 + more
@@ -213,10 +213,11 @@ def with_others(ranked: Ranked, tried: Mapping[tuple[float, ...], float]) -> Ran
     if not farthest or beyond[farthest] <= 1.0:
         return ranked
     amounts = " and ".join(
-        f"{own.name} = {x:.3g} {own.unit}" for own, x in zip(ranked.estimates, farthest, strict=True)
+        f"{estimate.name} = {x:.3g} {estimate.unit}"
+        for estimate, x in zip(ranked.estimates, farthest, strict=True)
     )
-    said = f"{amounts} explains as well, so that its intervals are too narrow"
-    return replace(ranked, remarks=(*ranked.remarks, said), tied=(*ranked.tied, said))
+    remark = f"{amounts} explains as well, so that its intervals are too narrow"
+    return replace(ranked, remarks=(*ranked.remarks, remark), tied=(*ranked.tied, remark))
 
 
 def verdict(ranking: Ranking) -> str:
@@ -250,10 +251,10 @@ def verdict(ranking: Ranking) -> str:
     return f"{best.title!r} explains what was measured ({chi2}){f': {amounts}' if amounts else ''}; {caution}"
 
 
-def _amount(one: Estimate) -> str:
+def _amount(estimate: Estimate) -> str:
     """Return an amplitude with its interval in words."""
-    if not math.isfinite(one.low):
-        return f"{one.name} is not determined"
-    half = one.high - one.value
+    if not math.isfinite(estimate.low):
+        return f"{estimate.name} is not determined"
+    half = estimate.high - estimate.value
     digits = max(0, 1 - math.floor(math.log10(half))) if half > 0.0 else 6
-    return f"{one.name} = {one.value:.{digits}f} ± {half:.{digits}f} {one.unit} (95 %)"
+    return f"{estimate.name} = {estimate.value:.{digits}f} ± {half:.{digits}f} {estimate.unit} (95 %)"

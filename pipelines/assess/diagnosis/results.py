@@ -38,7 +38,7 @@ def write_diagnosis(
     folder: Path,
     file: DiagnosisFile,
     cases: tuple[Case, ...],
-    found: Measurements,
+    measurements: Measurements,
     done: Fitted,
     dating: Dating | None,
     cautions: tuple[str, ...],
@@ -49,32 +49,38 @@ def write_diagnosis(
     ----------
     folder : that is empty
     file, cases : what was asked, and the hypotheses at all times
-    found, done : the survey, and the fits
+    measurements, done : the survey, and the fits
     dating : None if it is not dated
     cautions : cases that were not tried, each with its reason
     """
     best = done.ranking.hypotheses[0]
     motions = done.motions[best.name, best.stood]
-    courses = compare_courses(measure_beds(found.stones, found.facades)[0], motions.displacement)
+    courses = compare_courses(
+        measure_beds(measurements.stones, measurements.facades)[0], motions.displacement
+    )
     _write_hypotheses(folder / "hypotheses.csv", done)
     _write_stones(folder / "stones.csv", courses)
     _draw(folder, courses)
     case = next(case for case in cases if (case.hypothesis.name, case.stood) == (best.name, best.stood))
     write_best(folder, file, case, best)
-    summary = _summary(file, found, done, dating)
+    summary = _summary(file, measurements, done, dating)
     summary["cautions"] += cautions
-    summary["inputs"] = {title: list(lines) for title, lines in found.inputs.items()}
+    summary["inputs"] = {title: list(lines) for title, lines in measurements.inputs.items()}
     summary["source"] = source_of([file.document.path], folder)
-    lines = bed_lines(courses, {facade.name: facade.frame.axes[2] for facade in found.facades})
-    model = survey_model(best.title, found.stones, moved=motions.displacement, lines=lines, colour="course")
+    lines = bed_lines(courses, {facade.name: facade.frame.axes[2] for facade in measurements.facades})
+    model = survey_model(
+        best.title, measurements.stones, moved=motions.displacement, lines=lines, colour="course"
+    )
     write_diagnosis_page(folder / "report.html", Path(file.scene_path).stem, summary, model)
     summary["files"] = sorted([INDEX, *(entry.name for entry in folder.iterdir())])
     (folder / INDEX).write_text(as_json(summary), encoding="utf-8")
     return summary
 
 
-def _summary(file: DiagnosisFile, found: Measurements, done: Fitted, dating: Dating | None) -> dict[str, Any]:
-    ranking, deformation = done.ranking, found.deformation
+def _summary(
+    file: DiagnosisFile, measurements: Measurements, done: Fitted, dating: Dating | None
+) -> dict[str, Any]:
+    ranking, deformation = done.ranking, measurements.deformation
     laid = "with a batter" if file.battered else "plumb"
     tolerance = f"level within {1e3 * file.level_tolerance:g} mm/m" if file.level_tolerance else "level"
     return {
@@ -101,38 +107,38 @@ def _summary(file: DiagnosisFile, found: Measurements, done: Fitted, dating: Dat
             " ".join(filter(None, wall)): {"beds": value} for wall, value in deformation.scatter.items()
         },
         "freedom": deformation.freedom,
-        "groups": _groups(found, done),
+        "groups": _groups(measurements, done),
         "runs": done.runs,
         "cpu": done.cpu,
         "versions": dict(versions()),
     }
 
 
-def _told(one: Ranked, best: Ranked) -> dict[str, Any]:
+def _told(ranked: Ranked, best: Ranked) -> dict[str, Any]:
     return {
-        "name": one.name,
-        "stood": list(one.stood),
-        "chi2": one.fit.chi2 if len(one.fit.residuals) else None,
-        "dof": one.dof,
-        "probability": one.probability,
-        "explains": one.explains,
-        "aicc": _finite(one.aicc),
-        "behind": _finite(one.aicc - best.aicc),
+        "name": ranked.name,
+        "stood": list(ranked.stood),
+        "chi2": ranked.fit.chi2 if len(ranked.fit.residuals) else None,
+        "dof": ranked.dof,
+        "probability": ranked.probability,
+        "explains": ranked.explains,
+        "aicc": _finite(ranked.aicc),
+        "behind": _finite(ranked.aicc - best.aicc),
         "amplitudes": [
             {
-                "name": own.name,
-                "unit": own.unit,
-                "value": own.value,
-                "low": _finite(own.low),
-                "high": _finite(own.high),
-                "at_bound": own.at_bound,
-                "run_sigma": _finite(own.run_sigma),
+                "name": estimate.name,
+                "unit": estimate.unit,
+                "value": estimate.value,
+                "low": _finite(estimate.low),
+                "high": _finite(estimate.high),
+                "at_bound": estimate.at_bound,
+                "run_sigma": _finite(estimate.run_sigma),
             }
-            for own in one.estimates
+            for estimate in ranked.estimates
         ],
-        "covariance": [[_finite(value) for value in row] for row in one.fit.covariance.tolist()],
-        "remarks": list(one.remarks),
-        "turns": one.fit.turns,
+        "covariance": [[_finite(value) for value in row] for row in ranked.fit.covariance.tolist()],
+        "remarks": list(ranked.remarks),
+        "turns": ranked.fit.turns,
     }
 
 
@@ -140,7 +146,7 @@ def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _groups(found: Measurements, done: Fitted) -> list[dict[str, Any]]:
+def _groups(measurements: Measurements, done: Fitted) -> list[dict[str, Any]]:
     """Return χ² of each course and wall: of the best hypothesis, and if nothing had moved."""
     best = done.ranking.hypotheses[0]
     still, motions = Motions({}, {}), done.motions[best.name, best.stood]
@@ -156,7 +162,7 @@ def _groups(found: Measurements, done: Fitted) -> list[dict[str, Any]]:
             },
             "dof": group.dof,
         }
-        for group in found.deformation.groups
+        for group in measurements.deformation.groups
     ]
 
 
@@ -178,8 +184,10 @@ def _write_hypotheses(path: Path, done: Fitted) -> None:
                 hypothesis.probability,
                 hypothesis.aicc,
             ]
-            for own in hypothesis.estimates:
-                table.writerow([*head, own.name, own.unit, own.value, own.low, own.high])
+            for estimate in hypothesis.estimates:
+                table.writerow(
+                    [*head, estimate.name, estimate.unit, estimate.value, estimate.low, estimate.high]
+                )
             if not hypothesis.estimates:
                 table.writerow([*head, "", "", "", "", ""])
 
@@ -249,17 +257,17 @@ class _Copies:
             return part
         names = RECORDS if part.get("type") == "ground_motion" else ("file",)
         return {
-            key: self._copied(one) if key in names and isinstance(one, str) else self.named(one)
-            for key, one in part.items()
+            key: self._copied(value) if key in names and isinstance(value, str) else self.named(value)
+            for key, value in part.items()
         }
 
     def _copied(self, name: str) -> str:
         path = (self._source / name).resolve()
         if path not in self._names:
-            own, number = path.name, 1
-            while own in self._names.values() or (self._target / own).exists():
+            copy, number = path.name, 1
+            while copy in self._names.values() or (self._target / copy).exists():
                 number += 1
-                own = f"{path.stem}-{number}{path.suffix}"
-            shutil.copyfile(path, self._target / own)
-            self._names[path] = own
+                copy = f"{path.stem}-{number}{path.suffix}"
+            shutil.copyfile(path, self._target / copy)
+            self._names[path] = copy
         return self._names[path]

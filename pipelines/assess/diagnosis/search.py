@@ -156,7 +156,7 @@ def runs_of(file: DiagnosisFile, url: str, run: Runner) -> Runs:
 
     def made(places: Sequence[Place]) -> Iterator[Tried]:
         scenes = [_scene_or_fault(file, case, x) for case, x in places]
-        trials = [Trial(one, file.scene_path, url) for one in scenes if isinstance(one, str)]
+        trials = [Trial(scene, file.scene_path, url) for scene in scenes if isinstance(scene, str)]
         fresh = [later for later in dict.fromkeys(case.later for case, _ in places) if later not in rest]
         fresh = fresh if file.from_rest else []
         first = [Trial(toml_text(_without(file.base, later)), file.scene_path, url) for later in fresh]
@@ -176,14 +176,14 @@ def _scene_or_fault(file: DiagnosisFile, case: Case, amplitudes: tuple[float, ..
         return Tried(None, str(error), 0.0)
 
 
-def kept_runner(file: DiagnosisFile, solids: str, kept: Kept, run: Runner) -> Runner:
+def kept_runner(file: DiagnosisFile, solids: str, store: Kept, run: Runner) -> Runner:
     """Return a runner that keeps each answer as soon as there is one, and does not run again what is kept.
 
     Parameters
     ----------
     file : names the scene, beside which the files lie that scenes name
     solids : digest of the stones in the database
-    kept : the answers
+    store : the answers
     run : runs the other scenes
     """
 
@@ -196,12 +196,12 @@ def kept_runner(file: DiagnosisFile, solids: str, kept: Kept, run: Runner) -> Ru
         ]
 
     def made(trials: Sequence[Trial]) -> Iterator[Tried]:
-        known = [(trial, keys, kept.get(keys)) for trial in trials for keys in [decides(trial)]]
-        others = iter(run([one for one, _, tried in known if tried is None]))
-        for _, keys, tried in known:
+        tried_before = [(trial, keys, store.get(keys)) for trial in trials for keys in [decides(trial)]]
+        others = iter(run([one for one, _, tried in tried_before if tried is None]))
+        for _, keys, tried in tried_before:
             if tried is None:
                 tried = next(others)
-                kept.put(keys, tried)
+                store.put(keys, tried)
             yield tried
 
     return made
@@ -210,21 +210,23 @@ def kept_runner(file: DiagnosisFile, solids: str, kept: Kept, run: Runner) -> Ru
 def named_files(part: Any, scene: str | Path) -> Iterator[Path]:
     """Yield the files that the contents of a scene file name, which lie beside it."""
     if isinstance(part, list):
-        for one in part:
-            yield from named_files(one, scene)
+        for entry in part:
+            yield from named_files(entry, scene)
     elif isinstance(part, Mapping):
         names = RECORDS if part.get("type") == "ground_motion" else ("file",)
-        for key, one in part.items():
-            if key in names and isinstance(one, str):
-                yield Path(scene).parent / one
+        for key, entry in part.items():
+            if key in names and isinstance(entry, str):
+                yield Path(scene).parent / entry
             else:
-                yield from named_files(one, scene)
+                yield from named_files(entry, scene)
 
 
 def _without(scene: Mapping[str, Any], later: tuple[str, ...]) -> dict[str, Any]:
     """Return the contents of a scene file without stones that did not stand yet."""
-    own = scene.get("select", {})
-    return dict(scene) | ({"select": {**own, "exclude": [*own.get("exclude", []), *later]}} if later else {})
+    selection = scene.get("select", {})
+    return dict(scene) | (
+        {"select": {**selection, "exclude": [*selection.get("exclude", []), *later]}} if later else {}
+    )
 
 
 def fit_cases(
@@ -278,7 +280,7 @@ def fit_cases(
     # those that may be reported: the best, and what cannot be told apart from it
     least = min(one.aicc for one in ranked)
     near = {
-        k: [x for own in probes(case.hypothesis.unknowns, fits[k].amplitudes) for x in own]
+        k: [x for probe in probes(case.hypothesis.unknowns, fits[k].amplitudes) for x in probe]
         for k, case in enumerate(cases)
         if ranked[k].aicc < least + APART and len(fits[k].covariance)
     }
@@ -291,7 +293,12 @@ def fit_cases(
             x: _answer(tried, deformation) for (own, x), tried in known.items() if own == k and tried.motions
         }
         ranked[k] = with_others(
-            uneven, {x: float(one @ one) for x, one in everywhere.items() if not isinstance(one, str)}
+            uneven,
+            {
+                x: float(residuals @ residuals)
+                for x, residuals in everywhere.items()
+                if not isinstance(residuals, str)
+            },
         )
     residuals = deformation.residuals(_NOWHERE.displacement)
     still = Fit((), residuals, np.zeros((0, 0)), (), 0)

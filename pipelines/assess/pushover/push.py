@@ -249,11 +249,11 @@ def _summary(
 def _beside(test: LoadingTest, measured: Array) -> dict[str, Any]:
     """Return the largest forces of a measured curve (n, 2), and those predicted over them."""
     most, least = float(measured[:, 1].max()), float(measured[:, 1].min())
-    strength, other = test.strength
+    strength, backwards = test.strength
     return {
         "strength": {"forwards": most, "backwards": min(least, 0.0)},
         "ratio": {
             "forwards": strength / most if strength and most > 0 else None,
-            "backwards": other / least if other and least < 0 else None,
+            "backwards": backwards / least if backwards and least < 0 else None,
         },
     }

@@ -53,30 +53,36 @@ def draw_moved(path: Path, shapes: ClosingShapes, facade: Facade, step: str) -> 
     step : "simplified": on the stones as surveyed, with lines about those that became others; "moved": in closing the
         joints, on the stones as simplified, with lines about all as simulated
     """
-    own = back_to_front(shapes.stones, facade)
+    shown_stones = back_to_front(shapes.stones, facade)
     simplified = step == "simplified"
-    values = [1e3 * (stone.simplified if simplified else stone.moved) for stone in own]
-    faces = [visible_faces(stone.surveyed if simplified else stone.simple, facade) for stone in own]
-    known = np.concatenate(values)
-    known = known[np.isfinite(known)]
-    end, _ = robust_ceiling(known, _FINEST)
+    values = [1e3 * (stone.simplified if simplified else stone.moved) for stone in shown_stones]
+    faces = [visible_faces(stone.surveyed if simplified else stone.simple, facade) for stone in shown_stones]
+    finite = np.concatenate(values)
+    finite = finite[np.isfinite(finite)]
+    end, _ = robust_ceiling(finite, _FINEST)
     low, high = extent([corners for face in faces for corners, _ in face])
     figure = new_sheet(sheet_size(high - low))
     axes = figure.subplots()
     shading = _shade_all(axes, faces, values, end)
-    hatch(axes, own, faces)
+    hatch(axes, shown_stones, faces)
     after = [
-        (one.simple if simplified else one.closed, one.simplified if simplified else one.moved) for one in own
+        (stone.simple if simplified else stone.closed, stone.simplified if simplified else stone.moved)
+        for stone in shown_stones
     ]
     changed = [solid for solid, moved in after if np.nanmax(moved, initial=0.0) > 1e-3 * _FINEST]
     _outline(axes, [corners for solid in changed for corners, _ in visible_faces(solid, facade)])
     shade = [float(np.nanmean(moved)) / end if np.isfinite(moved).any() else np.nan for moved in values]
-    name_stones(axes, own, faces, shade)
-    frame_elevation(axes, facade, low, high, _title(shapes.scene, facade, step, own, values))
+    name_stones(axes, shown_stones, faces, shade)
+    frame_elevation(axes, facade, low, high, _title(shapes.scene, facade, step, shown_stones, values))
     if shading is not None:
-        beyond = "max" if known.max() > end else "neither"
+        beyond = "max" if finite.max() > end else "neither"
         figure.colorbar(shading, ax=axes, label=_LABELS[step], shrink=0.75, pad=0.02, extend=beyond)
-    _legend(figure, step, any(one.hypothesis for one in own), len(known) < sum(map(len, values)))
+    _legend(
+        figure,
+        step,
+        any(shown_stone.hypothesis for shown_stone in shown_stones),
+        len(finite) < sum(map(len, values)),
+    )
     save_sheet(figure, path)
 
 
@@ -88,12 +94,12 @@ def back_to_front(stones: Sequence[DrawnStone], facade: Facade) -> list[DrawnSto
 
 def visible_faces(solid: Solid, facade: Facade) -> list[VisibleFace]:
     """List the faces of a solid that look to the viewer: corners (k, 2) in the elevation, and their indices."""
-    found = []
+    faces = []
     for face in solid.faces:
         area = area_vector(solid.vertices[list(face)])
         if area @ facade.frame.axes[2] > _SEEN * float(np.linalg.norm(area)):
-            found.append((project(solid.vertices[list(face)], facade), face))
-    return found
+            faces.append((project(solid.vertices[list(face)], facade), face))
+    return faces
 
 
 def hatch(axes: "Axes", stones: Sequence[DrawnStone], faces: Sequence[Sequence[VisibleFace]]) -> None:
@@ -118,13 +124,13 @@ def name_stones(
     ----------
     shade : where on the colour scale each is, from 0 to 1; NaN where it has no colour
     """
-    found = [
+    named = [
         (stone.code, max((corners for corners, _ in face), key=_area), dark)
         for stone, face, dark in zip(stones, faces, shade, strict=True)
         if face
     ]
-    if found and len(found) <= CODES:
-        codes, corners, dark = zip(*found, strict=True)
+    if named and len(named) <= CODES:
+        codes, corners, dark = zip(*named, strict=True)
         write_codes(axes, codes, corners, np.array(dark))
 
 

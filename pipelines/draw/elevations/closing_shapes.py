@@ -159,7 +159,7 @@ def closing_shapes(
         )
         for before, between, after, face in zip(*solids, faces, strict=True)
     )
-    closed = {one.code: one for one in solids.closed}
+    closed = {stone.code: stone for stone in solids.closed}
     joints = tuple(
         DrawnJoint(
             joint,
@@ -180,7 +180,7 @@ def places(closing: ClosingReport) -> tuple[Place, ...]:
             overlap.centroid,
             f"{_pair(overlap.stones)} lie {overlap.depth * 1e3:.1f} mm in each other",
         )
-        for overlap in sorted(closing.overlaps, key=lambda one: -one.volume)
+        for overlap in sorted(closing.overlaps, key=lambda overlap: -overlap.volume)
     ]
     gaps = [
         Place(
@@ -189,7 +189,7 @@ def places(closing: ClosingReport) -> tuple[Place, ...]:
             gap.centroid,
             f"{_pair(gap.stones)} open by {gap.width * 1e3:.1f} mm: {gap.reason}",
         )
-        for gap in sorted(closing.gaps, key=lambda one: -one.width * one.area)
+        for gap in sorted(closing.gaps, key=lambda gap: -gap.width * gap.area)
     ]
     return (*overlaps, *gaps)
 
@@ -239,15 +239,15 @@ def _sides(solid: Solid, towards: Array, axes: Array, centroid: Array) -> list[A
 
     Where faces lie in the plane of the joint, others do not count.
     """
-    found, within = [], []
+    sides, within = [], []
     for face in solid.faces:
         polygon = solid.vertices[list(face)]
         area = area_vector(polygon)
         if area @ towards > _FACING * float(np.linalg.norm(area)):
             flat = (polygon - centroid) @ axes.T
-            found.append(flat if _area(flat) > 0.0 else flat[::-1])
+            sides.append(flat if _area(flat) > 0.0 else flat[::-1])
             within.append(bool((np.abs((polygon - centroid) @ towards) < _IN_PLANE).all()))
-    return [one for one, own in zip(found, within, strict=True) if own] if any(within) else found
+    return [side for side, own in zip(sides, within, strict=True) if own] if any(within) else sides
 
 
 def _clipped(subject: Array, window: Array) -> Array:
@@ -258,14 +258,14 @@ def _clipped(subject: Array, window: Array) -> Array:
         inside = [
             float(edge[0] * (corner[1] - start[1]) - edge[1] * (corner[0] - start[0])) for corner in corners
         ]
-        kept: list[Array] = []
+        polygon: list[Array] = []
         for i, corner in enumerate(corners):
             before = inside[i - 1]
             if before * inside[i] < 0.0:
-                kept.append(corners[i - 1] + before / (before - inside[i]) * (corner - corners[i - 1]))
+                polygon.append(corners[i - 1] + before / (before - inside[i]) * (corner - corners[i - 1]))
             if inside[i] >= 0.0:
-                kept.append(corner)
-        corners = kept
+                polygon.append(corner)
+        corners = polygon
         if not corners:
             break
     return np.array(corners).reshape(-1, 2)

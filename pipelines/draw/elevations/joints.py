@@ -51,27 +51,31 @@ def draw_joints(path: Path, shapes: ClosingShapes, facade: Facade) -> None:
     """
     from matplotlib.collections import PolyCollection
 
-    own = back_to_front(shapes.stones, facade)
-    codes = {stone.code for stone in own}
-    faces = [visible_faces(stone.closed, facade) for stone in own]
+    shown_stones = back_to_front(shapes.stones, facade)
+    codes = {stone.code for stone in shown_stones}
+    faces = [visible_faces(stone.closed, facade) for stone in shown_stones]
     flat = [corners for face in faces for corners, _ in face]
     low, high = extent(flat)
     shown = [joint for joint in shapes.joints if _is_seen(joint, facade, codes)]
     marked = [place for place in shapes.places if codes & {*place.stones}]
     openings = [opening for opening in shapes.openings if codes & {*opening.stones}]
-    keys = _keys(shown, marked, len(shapes.places), any(one.hypothesis for one in own))
+    keys = _keys(
+        shown, marked, len(shapes.places), any(shown_stone.hypothesis for shown_stone in shown_stones)
+    )
     keys += [_open_key()] if openings else []
     width, height = sheet_size(high - low)
     figure = new_sheet((width, height + _LINE * len(keys)))
     axes = figure.subplots()
     axes.add_collection(PolyCollection(flat, facecolors=_STONE, edgecolors=PALE, linewidths=0.6))
-    outlines = [corners for one in own if one.grown for corners, _ in visible_faces(one.simple, facade)]
+    outlines = [
+        corners for stone in shown_stones if stone.grown for corners, _ in visible_faces(stone.simple, facade)
+    ]
     axes.add_collection(PolyCollection(outlines, facecolors=_OUTLINE, edgecolors=PALE, linewidths=0.6))
-    hatch(axes, own, faces)
-    name_stones(axes, own, faces, [float("nan")] * len(own))
-    closed = [one for one in shown if not one.joint.left_open]
-    left = [one for one in shown if one.joint.left_open]
-    stroke = float(np.clip(28.0 / np.sqrt(len(own)), 0.8, 3.2))
+    hatch(axes, shown_stones, faces)
+    name_stones(axes, shown_stones, faces, [float("nan")] * len(shown_stones))
+    closed = [drawn for drawn in shown if not drawn.joint.left_open]
+    left = [drawn for drawn in shown if drawn.joint.left_open]
+    stroke = float(np.clip(28.0 / np.sqrt(len(shown_stones)), 0.8, 3.2))
     _add_closed(figure, axes, closed, facade, stroke)
     _add_open(axes, left, facade, stroke)
     _mark(axes, marked, facade)
@@ -137,22 +141,22 @@ def _open_key() -> Any:
     return Line2D([], [], color=INK, linestyle="dashed", label="opening: wider than mortar, stays open")
 
 
-def _is_seen(one: DrawnJoint, facade: Facade, codes: set[str]) -> bool:
+def _is_seen(joint: DrawnJoint, facade: Facade, codes: set[str]) -> bool:
     """Return True for a joint of the facade's stones that is seen edge on."""
     return bool(
-        codes & {*one.joint.stones} and abs(float(one.joint.normal @ facade.frame.axes[2])) < _EDGE_ON
+        codes & {*joint.joint.stones} and abs(float(joint.joint.normal @ facade.frame.axes[2])) < _EDGE_ON
     )
 
 
-def _trace(one: DrawnJoint, facade: Facade) -> Array:
+def _trace(joint: DrawnJoint, facade: Facade) -> Array:
     """Find the line where a joint meets the face of the wall: its ends (2, 2) in the elevation."""
-    if one.polygon is None:
-        along = np.cross(one.joint.normal, facade.frame.axes[2])
-        reach = 0.5 * np.sqrt(max(one.joint.area, 0.0)) * along / max(float(np.linalg.norm(along)), 1e-9)
-        return project(np.array([one.joint.centroid - reach, one.joint.centroid + reach]), facade)
-    out = one.polygon @ facade.frame.axes[2]
-    front = one.polygon[out >= 0.5 * (out.min() + out.max())]
-    along = np.cross(one.joint.normal, facade.frame.axes[2])
+    if joint.polygon is None:
+        along = np.cross(joint.joint.normal, facade.frame.axes[2])
+        reach = 0.5 * np.sqrt(max(joint.joint.area, 0.0)) * along / max(float(np.linalg.norm(along)), 1e-9)
+        return project(np.array([joint.joint.centroid - reach, joint.joint.centroid + reach]), facade)
+    out = joint.polygon @ facade.frame.axes[2]
+    front = joint.polygon[out >= 0.5 * (out.min() + out.max())]
+    along = np.cross(joint.joint.normal, facade.frame.axes[2])
     place = front @ along
     return project(front[[int(place.argmin()), int(place.argmax())]], facade)
 

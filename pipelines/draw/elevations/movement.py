@@ -36,9 +36,11 @@ def draw_bed_movement(path: Path, courses: Sequence[CourseMovement]) -> None:
     path : PNG
     courses : of one wall
     """
-    levels = [float(np.mean(one.line.height)) for one in courses]
+    levels = [float(np.mean(course.line.height)) for course in courses]
     room = float(np.median(np.diff(sorted(set(levels))))) if len(set(levels)) > 1 else 0.3
-    lines = [(one.line.height - level, one.simulated) for one, level in zip(courses, levels, strict=True)]
+    lines = [
+        (course.line.height - level, course.simulated) for course, level in zip(courses, levels, strict=True)
+    ]
     simulated = [moved - moved.mean() for _, moved in lines]
     largest = [
         float(max(np.abs(measured).max(), np.abs(own).max(), 1e-6))
@@ -49,7 +51,7 @@ def draw_bed_movement(path: Path, courses: Sequence[CourseMovement]) -> None:
     factors = [max(1.0, float(f"{_LARGEST * room / one:.1g}")) for one in reach]
     figure = new_sheet((10.0, float(np.clip(2.0 + 0.42 * len(courses), 3.5, 24.0))))
     axes = figure.subplots()
-    right = max(float(one.line.along.max()) for one in courses)
+    right = max(float(course.line.along.max()) for course in courses)
     for course, level, (measured, _), own, factor in zip(
         courses, levels, lines, simulated, factors, strict=True
     ):

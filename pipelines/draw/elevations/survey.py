@@ -60,14 +60,16 @@ def draw_elevation(
     """
     from matplotlib.collections import PolyCollection
 
-    own = [stones[i] for i in facade.members.tolist()]
-    polygons = [project(one.outline, facade) for one in own]
+    wall_stones = [stones[i] for i in facade.members.tolist()]
+    polygons = [project(wall_stone.outline, facade) for wall_stone in wall_stones]
     low, high = extent(polygons)
     figure = new_sheet(sheet_size(high - low))
     axes = figure.subplots()
-    rms = np.array([one.rms * 1e3 if one.measured and one.redundancy else np.nan for one in own])
+    rms = np.array(
+        [stone.rms * 1e3 if stone.measured and stone.redundancy else np.nan for stone in wall_stones]
+    )
     end, _ = robust_ceiling(rms, _FINEST if np.isfinite(rms).any() else 1.0)
-    fine = 0.9 if len(own) <= 2000 else 0.15
+    fine = 0.9 if len(wall_stones) <= 2000 else 0.15
     faces = PolyCollection(
         polygons, array=rms, cmap=palette(_UNKNOWN), clim=(0.0, end), edgecolors=PALE, linewidths=fine
     )
@@ -75,13 +77,17 @@ def draw_elevation(
         photo.draw(axes, facade)
         faces.set_alpha(_OVER_PHOTO)
     axes.add_collection(faces)
-    marked = [polygon for polygon, one in zip(polygons, own, strict=True) if one.code in flagged]
+    marked = [
+        polygon
+        for polygon, wall_stone in zip(polygons, wall_stones, strict=True)
+        if wall_stone.code in flagged
+    ]
     if marked:
         axes.add_collection(
             PolyCollection(marked, facecolors="none", edgecolors=FLAG, linewidths=max(1.8 * fine, 0.6))
         )
-    if len(own) <= CODES:
-        write_codes(axes, [one.code for one in own], polygons, rms / end)
+    if len(wall_stones) <= CODES:
+        write_codes(axes, [wall_stone.code for wall_stone in wall_stones], polygons, rms / end)
     frame_elevation(axes, facade, low, high, _title(facade))
     figure.colorbar(
         faces, ax=axes, label="rms of the points about their plane [mm]", shrink=0.75, pad=0.02,
@@ -103,7 +109,7 @@ def draw_departure(
     stones : all stones of the survey
     walls : departures of the walls of this facade; others are left out
     """
-    own = [wall for wall in walls if wall.facade == facade.name]
+    of_facade = [wall for wall in walls if wall.facade == facade.name]
     members = facade.members.tolist()
     polygons = {i: project(stones[i].outline, facade) for i in members}
     low, high = extent(list(polygons.values()))
@@ -111,20 +117,25 @@ def draw_departure(
     stacked = high[0] - low[0] > high[1] - low[1]
     figure = new_sheet((width, 2.0 * height) if stacked else (2.0 * width, height))
     panels = list(np.ravel(np.array(figure.subplots(2 if stacked else 1, 1 if stacked else 2))))
-    found = {
+    departures = {
         name: {
             int(i): 1e3 * float(v)
-            for wall in own
+            for wall in of_facade
             for i, v in zip(wall.stones, getattr(wall, name), strict=True)
         }
         for name in ("plane", "plumb")
     }
     end = max(
-        _LEAST, *(float(np.percentile(np.abs(list(one.values())), 98)) for one in found.values() if one)
+        _LEAST,
+        *(
+            float(np.percentile(np.abs(list(values.values())), 98))
+            for values in departures.values()
+            if values
+        ),
     )
-    odd = {one.code for wall in own for one in wall.odd}
+    odd = {one.code for wall in of_facade for one in wall.odd}
     titles = {"plane": "departure from its plane", "plumb": "departure from plumb"}
-    for axes, (name, values) in zip(panels, found.items(), strict=True):
+    for axes, (name, values) in zip(panels, departures.items(), strict=True):
         _shade(axes, polygons, values, end, [polygons[i] for i in members if stones[i].code in odd])
         if len(members) <= CODES:
             shade = np.array([0.0 if i in values else np.nan for i in members])

@@ -86,11 +86,11 @@ def draw(surface: ClosingSurface, path: Path, job: dict[str, Any]) -> None:
 
 
 def _add_stones(pyvista: Any, plotter: Any, surface: ClosingSurface, label: str) -> None:
-    known = np.isfinite(surface.moved)[surface.triangles].all(axis=1)
-    if not known.all():
-        plotter.add_mesh(mesh_of(pyvista, surface.points, surface.triangles[~known]), color=PLAIN, **LIGHT)
-    if known.any():
-        mesh = mesh_of(pyvista, surface.points, surface.triangles[known])
+    finite = np.isfinite(surface.moved)[surface.triangles].all(axis=1)
+    if not finite.all():
+        plotter.add_mesh(mesh_of(pyvista, surface.points, surface.triangles[~finite]), color=PLAIN, **LIGHT)
+    if finite.any():
+        mesh = mesh_of(pyvista, surface.points, surface.triangles[finite])
         mesh.point_data["value"] = 1e3 * surface.moved
         add_coloured(plotter, mesh, _colouring(1e3 * surface.moved, label, _MOVED))
 
@@ -117,9 +117,9 @@ def _add_places(pyvista: Any, plotter: Any, surface: ClosingSurface) -> None:
 
 
 def _colouring(values: Array, label: str, palette: tuple[str, float]) -> Colouring:
-    known = values[np.isfinite(values)]
+    finite = values[np.isfinite(values)]
     end, intervals = robust_ceiling(values, _FINEST)
-    saturated = bool(known.max() > end)
+    saturated = bool(finite.max() > end)
     return Colouring(values, label, end, intervals, saturated, palette)
 
 

@@ -80,8 +80,8 @@ def _draw_motion(
     pyvista: Any, plotter: Any, surface: MechanismSurface, path: Path, job: dict[str, Any]
 ) -> None:
     moved = surface.moved[job["number"]]
-    way = np.linalg.norm(moved - surface.points, axis=1)
-    share = way / max(float(way.max()), 1e-300)
+    motion = np.linalg.norm(moved - surface.points, axis=1)
+    share = motion / max(float(motion.max()), 1e-300)
     mesh = mesh_of(pyvista, moved, surface.triangles)
     mesh.point_data["value"] = share
     add_coloured(plotter, mesh, Colouring(share, "Way over the longest [-]", 1.0, 5, False, _PALETTE))

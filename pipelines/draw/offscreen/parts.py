@@ -95,8 +95,8 @@ def nice_ceiling(value: float) -> tuple[float, int]:
 
 def robust_ceiling(values: Array, finest: float) -> tuple[float, int]:
     """Round up the 98th percentile of the finite values, at least `finest`, like `nice_ceiling`."""
-    known = values[np.isfinite(values)]
-    return nice_ceiling(max(float(np.percentile(known, _ROBUST)) if len(known) else 0.0, finest))
+    finite = values[np.isfinite(values)]
+    return nice_ceiling(max(float(np.percentile(finite, _ROBUST)) if len(finite) else 0.0, finest))
 
 
 def new_plotter(pyvista: Any) -> Any:

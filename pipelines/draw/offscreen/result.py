@@ -75,13 +75,13 @@ def draw(surface: WallSurface, path: Path, job: dict[str, Any]) -> None:
 
 
 def _add_stones(pyvista: Any, plotter: Any, surface: WallSurface, colours: Colouring) -> None:
-    known = np.isfinite(colours.values)[surface.triangles].all(axis=1) & ~surface.fixed
-    for rows, colour in ((~known & surface.fixed, _FIXED), (~known & ~surface.fixed, PLAIN)):
+    finite = np.isfinite(colours.values)[surface.triangles].all(axis=1) & ~surface.fixed
+    for rows, colour in ((~finite & surface.fixed, _FIXED), (~finite & ~surface.fixed, PLAIN)):
         if rows.any():
             mesh = mesh_of(pyvista, surface.points, surface.triangles[rows])
             plotter.add_mesh(mesh, color=colour, **LIGHT)
-    if known.any():
-        mesh = mesh_of(pyvista, surface.points, surface.triangles[known])
+    if finite.any():
+        mesh = mesh_of(pyvista, surface.points, surface.triangles[finite])
         mesh.point_data["value"] = colours.values
         add_coloured(plotter, mesh, colours)
 

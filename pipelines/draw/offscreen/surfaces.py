@@ -122,9 +122,9 @@ def stone_fields(body: BodyResult, material: Material, carried: Array | None = N
     Displacements are relative to `carried` (3,), that of the supports [m]; None: absolute.
     """
     displacement = body.displacement if carried is None else body.displacement - carried
-    known = {"displacement": np.linalg.norm(displacement, axis=1)}
+    fields = {"displacement": np.linalg.norm(displacement, axis=1)}
     if body.von_mises is not None and body.principal is not None and body.values is not None:
-        known |= {
+        fields |= {
             "von_mises": body.von_mises,
             "principal_tension": np.maximum(body.principal[:, 0], 0.0),
             "principal_compression": np.maximum(-body.principal[:, 2], 0.0),
@@ -132,7 +132,7 @@ def stone_fields(body: BodyResult, material: Material, carried: Array | None = N
             "error": np.full(len(body.reference), body.values.error),
         }
     unknown = np.full(len(body.reference), np.nan)
-    return np.column_stack([known.get(name, unknown) for name in FIELDS])
+    return np.column_stack([fields.get(name, unknown) for name in FIELDS])
 
 
 def _fans(faces: tuple[tuple[int, ...], ...]) -> Ints:

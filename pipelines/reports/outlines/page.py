@@ -69,7 +69,7 @@ def editor_html(
         "matrix": matrix.tolist(),
         "origin": origin.tolist(),
         "stones": list(stones),
-        "doubts": [asdict(doubt) for doubt in sorted(doubts, key=lambda one: -one.rank)],
+        "doubts": [asdict(doubt) for doubt in sorted(doubts, key=lambda doubt: -doubt.rank)],
         "facts": list(facts),
     }
     # no text of a survey ends the script that carries it

@@ -122,14 +122,14 @@ def _codes(paper: Array, faces: list[tuple[int, Ints]], codes: Sequence[str]) ->
         area = float(np.prod(high - low))
         if area > largest.get(stone, (0.0,))[0]:
             largest[stone] = (area, low, high)
-    told = []
+    labels = []
     for stone, (_, low, high) in largest.items():
         code = codes[stone]
         wide, tall = high - low
         if tall > 1.2 * _LETTER and wide > _BROAD * _LETTER * len(code):
             x, y = (low + high) / 2
-            told.append(f'<text x="{x:.1f}" y="{y + 0.35 * _LETTER:.1f}">{escape(code)}</text>')
-    return "".join(told)
+            labels.append(f'<text x="{x:.1f}" y="{y + 0.35 * _LETTER:.1f}">{escape(code)}</text>')
+    return "".join(labels)
 
 
 def _bar(scale: int, below: float, wide: float) -> str:

@@ -112,28 +112,34 @@ def _relations(session: Session, ids: dict[int, int]) -> Relations:
 def _events(session: Session, ids: dict[int, int]) -> Iterator[Event]:
     """Yield what was recorded of each stone itself, in the order of recording."""
     entries = {row.id: row for row in session.scalars(select(Entry))}
-    told: list[tuple[int, int, str]] = [
+    events: list[tuple[int, int, str]] = [
         (entry, ids[entity], "measured")
         for entry, entity in session.execute(select(Measurement.entry_id, Measurement.entity_id))
         if entity in ids
     ]
-    told += [
+    events += [
         (row.entry_id, ids[row.entity_id], f"{row.attribute} corrected: {row.before} → {row.after}")
         for row in session.scalars(select(Correction))
         if row.entity_id in ids
     ]
     members = select(Membership.entry_id, Membership.entity_id, Structure.code).join(Membership.structure)
-    told += [
+    events += [
         (entry, ids[entity], f"member of {code}")
         for entry, entity, code in session.execute(members)
         if entity in ids
     ]
-    said = select(Statement).where(Statement.entity_id.is_not(None)).options(joinedload(Statement.document))
-    for one in session.scalars(said).unique():
-        if one.entity_id in ids:
-            values = ", ".join(f"{name} {value}" for name, value in statement_values(one).items())
-            told.append((one.entry_id, ids[one.entity_id], f"{one.kind.replace('_', ' ')}: {values}"))
-    for number, stone, what in sorted(told):
+    query = select(Statement).where(Statement.entity_id.is_not(None)).options(joinedload(Statement.document))
+    for statement in session.scalars(query).unique():
+        if statement.entity_id in ids:
+            values = ", ".join(f"{name} {value}" for name, value in statement_values(statement).items())
+            events.append(
+                (
+                    statement.entry_id,
+                    ids[statement.entity_id],
+                    f"{statement.kind.replace('_', ' ')}: {values}",
+                )
+            )
+    for number, stone, what in sorted(events):
         entry = entries[number]
         who = entry.author or "MOMA"
         yield Event(stone, entry.recorded_at.date().isoformat(), who, f"{what} ({entry.source})")

@@ -17,8 +17,8 @@ def catalogues() -> dict[str, dict[str, Any]]:
     """Return name and words of each language by its tag, English first."""
     folder = files("pipelines.reports.page") / "words"
     found = {
-        one.name.removesuffix(".toml"): tomllib.loads(one.read_text(encoding="utf-8"))
-        for one in sorted(folder.iterdir(), key=lambda one: one.name)
-        if one.name.endswith(".toml")
+        path.name.removesuffix(".toml"): tomllib.loads(path.read_text(encoding="utf-8"))
+        for path in sorted(folder.iterdir(), key=lambda one: one.name)
+        if path.name.endswith(".toml")
     }
     return {"en": {"name": "English", "words": {}}, **found}

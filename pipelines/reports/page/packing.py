@@ -51,8 +51,8 @@ class _Packer:
 
     def places(self, values: Any, step: float) -> dict[str, Any]:
         """Append places (n, 3) in whole steps [m], as differences between rows."""
-        known = np.nan_to_num(np.asarray(values, dtype=float).reshape(-1, 3))
-        return {"values": self.indices(np.rint(known / step)), "step": step}
+        numbers = np.nan_to_num(np.asarray(values, dtype=float).reshape(-1, 3))
+        return {"values": self.indices(np.rint(numbers / step)), "step": step}
 
     def steps(self, values: Array) -> dict[str, Any]:
         """Append a series (nf, n, k) as int16 with a scale for each of the n, in differences of time."""
@@ -114,12 +114,12 @@ def _head(model: Model, packer: _Packer) -> dict[str, Any]:
         "mechanisms": [_mechanism(mechanism, packer) for mechanism in model.mechanisms],
         "lines": [
             {
-                "name": one.name,
-                "colour": one.colour,
-                "points": packer.places(np.concatenate([*one.lines, np.zeros((0, 3))]), _FINE),
-                "counts": [len(line) for line in one.lines],
+                "name": drawn.name,
+                "colour": drawn.colour,
+                "points": packer.places(np.concatenate([*drawn.lines, np.zeros((0, 3))]), _FINE),
+                "counts": [len(line) for line in drawn.lines],
             }
-            for one in model.lines
+            for drawn in model.lines
         ],
         "colour": model.colour,
         "towards": np.asarray(model.towards).tolist(),
@@ -144,15 +144,20 @@ def _head(model: Model, packer: _Packer) -> dict[str, Any]:
     return head
 
 
-def _column(one: Column, packer: _Packer) -> dict[str, Any]:
+def _column(column: Column, packer: _Packer) -> dict[str, Any]:
     """Describe a column; texts as numbers of a list of words."""
-    told: dict[str, Any] = {"name": one.name, "label": one.label, "unit": one.unit, "group": one.group}
-    if one.unit is None:
-        words = sorted({str(value) for value in one.values if value is not None})
+    record: dict[str, Any] = {
+        "name": column.name,
+        "label": column.label,
+        "unit": column.unit,
+        "group": column.group,
+    }
+    if column.unit is None:
+        words = sorted({str(value) for value in column.values if value is not None})
         number = {word: index for index, word in enumerate(words)}
-        rows = [-1 if value is None else number[str(value)] for value in one.values]
-        return {**told, "words": words, "values": packer.add(rows, "int32")}
-    return {**told, "values": packer.add(one.values, "float32")}
+        rows = [-1 if value is None else number[str(value)] for value in column.values]
+        return {**record, "words": words, "values": packer.add(rows, "int32")}
+    return {**record, "values": packer.add(column.values, "float32")}
 
 
 def _motion(motion: Motion, packer: _Packer) -> dict[str, Any]:
@@ -183,11 +188,11 @@ def _joints(joints: Joints, packer: _Packer) -> dict[str, Any]:
     }
 
 
-def _mechanism(one: Mechanism, packer: _Packer) -> dict[str, Any]:
+def _mechanism(mechanism: Mechanism, packer: _Packer) -> dict[str, Any]:
     return {
-        "name": one.name,
-        "about": one.about,
-        "centres": packer.add(one.centres, "float32"),
-        "velocity": packer.add(one.velocity, "float32"),
-        "joints": None if one.joints is None else _joints(one.joints, packer),
+        "name": mechanism.name,
+        "about": mechanism.about,
+        "centres": packer.add(mechanism.centres, "float32"),
+        "velocity": packer.add(mechanism.velocity, "float32"),
+        "joints": None if mechanism.joints is None else _joints(mechanism.joints, packer),
     }

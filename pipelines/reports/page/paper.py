@@ -57,9 +57,9 @@ def contents(page: str) -> str:
     """Put an anchor before each heading of a page, and a list of them where the page has ``<nav class="contents">``."""
     titles: list[str] = []
 
-    def named(found: re.Match[str]) -> str:
-        titles.append(found[1])
-        return f'<a id="part-{len(titles)}"></a><h2>{found[1]}</h2>'
+    def named(match: re.Match[str]) -> str:
+        titles.append(match[1])
+        return f'<a id="part-{len(titles)}"></a><h2>{match[1]}</h2>'
 
     page = _HEADING.sub(named, page)
     items = "".join(
@@ -77,8 +77,8 @@ def sealed(page: str) -> str:
 
 def check_sum(page: str) -> bool | None:
     """Return whether a page is as it was written; None if it states no checksum."""
-    found = _SUM.search(page)
-    return None if found is None else found[2] == _digest(_SUM.sub(rf"\g<1>{NO_SUM}\g<3>", page, count=1))
+    match = _SUM.search(page)
+    return None if match is None else match[2] == _digest(_SUM.sub(rf"\g<1>{NO_SUM}\g<3>", page, count=1))
 
 
 def appraise_page(page: Path) -> bool | None:
@@ -107,7 +107,7 @@ def print_pdf(page: Path, target: Path, language: str = "en") -> None:
     ------
     MomaError : there is no Chromium, or it fails
     """
-    browser = next((found for name in _BROWSERS if (found := shutil.which(name))), None)
+    browser = next((browser_path for name in _BROWSERS if (browser_path := shutil.which(name))), None)
     browser = browser or next((place for place in _PLACES if Path(place).is_file()), None)
     if browser is None:
         raise MomaError(

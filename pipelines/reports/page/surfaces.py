@@ -140,9 +140,9 @@ def _three(stones: Sequence[Array]) -> Ints:
         rows = np.flatnonzero(counts == count)
         arms = np.array([stones[row] for row in rows.tolist()])
         arms -= arms[:, :1]
-        far = np.argmax(np.sum(arms**2, axis=2), axis=1)
-        away = np.cross(arms, arms[np.arange(len(rows)), far][:, None])
-        chosen[rows, 1], chosen[rows, 2] = far, np.argmax(np.sum(away**2, axis=2), axis=1)
+        farthest = np.argmax(np.sum(arms**2, axis=2), axis=1)
+        away = np.cross(arms, arms[np.arange(len(rows)), farthest][:, None])
+        chosen[rows, 1], chosen[rows, 2] = farthest, np.argmax(np.sum(away**2, axis=2), axis=1)
     return chosen
 
 

@@ -43,15 +43,15 @@ def survey_model(
     shapes = [_prism(stone) for stone in stones]
     mesh, _ = stones_of([stone.code for stone in stones], shapes)
     origin = np.floor(mesh.vertices.mean(axis=0)) if len(mesh.vertices) else np.zeros(3)
-    near = np.array([stone.normal * stone.area for stone in stones]).reshape(-1, 3).sum(axis=0)
+    mean_normal = np.array([stone.normal * stone.area for stone in stones]).reshape(-1, 3).sum(axis=0)
     return Model(
         title=title,
         stones=type(mesh)(mesh.codes, mesh.vertices - origin, mesh.owner, mesh.triangles, mesh.edges),
         columns=[*_columns(stones), *columns],
         motion=None if moved is None else _motion(stones, shapes, moved, origin),
-        lines=[Lines(one.name, one.colour, [line - origin for line in one.lines]) for one in lines],
+        lines=[Lines(drawn.name, drawn.colour, [line - origin for line in drawn.lines]) for drawn in lines],
         colour=colour,
-        towards=near / max(float(np.linalg.norm(near)), 1e-300),
+        towards=mean_normal / max(float(np.linalg.norm(mean_normal)), 1e-300),
         origin=origin,
         notes=["Faces are as measured; the stones behind them are extruded straight by their depth."],
     )
@@ -67,21 +67,24 @@ def bed_lines(courses: Sequence[CourseMovement], normals: dict[str, Array]) -> l
     """
     if not courses:
         return []
-    levels = [float(np.mean(one.line.height)) for one in courses]
+    levels = [float(np.mean(course.line.height)) for course in courses]
     apart = np.diff(sorted(set(levels)))
     room = float(np.median(apart)) if len(apart) else 0.3
-    simulated = [one.simulated - one.simulated.mean() for one in courses]
-    departures = [np.abs(one.line.height - level).max() for one, level in zip(courses, levels, strict=True)]
+    simulated = [course.simulated - course.simulated.mean() for course in courses]
+    departures = [
+        np.abs(course.line.height - level).max() for course, level in zip(courses, levels, strict=True)
+    ]
     largest = max(max(departures), max(float(np.abs(own).max()) for own in simulated), 1e-6)
     factor = max(1.0, float(f"{_LARGEST * room / largest:.1g}"))
-    found: dict[str, list[Array]] = {"measured": [], "simulated": []}
+    polylines: dict[str, list[Array]] = {"measured": [], "simulated": []}
     for course, level, own in zip(courses, levels, simulated, strict=True):
         places = course.line.places + _BEFORE * normals.get(course.line.facade, np.zeros(3))
         for name, departure in (("measured", course.line.height - level), ("simulated", own)):
-            found[name].append(np.column_stack([places[:, :2], level + factor * departure]))
+            polylines[name].append(np.column_stack([places[:, :2], level + factor * departure]))
     colours = {"measured": _ORANGE, "simulated": _BLUE}
     return [
-        Lines(f"Beds {name}, departure × {factor:g}", colours[name], lines) for name, lines in found.items()
+        Lines(f"Beds {name}, departure × {factor:g}", colours[name], lines)
+        for name, lines in polylines.items()
     ]
 
 

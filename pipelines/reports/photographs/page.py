@@ -89,9 +89,9 @@ def photographs_section(
 def _adjustment(values: Mapping[str, Any]) -> list[Row]:
     marks = values["marks"]
     external = [
-        one
-        for one, verdict in zip(marks["external"], marks["verdict"], strict=True)
-        if one is not None and not verdict
+        mark
+        for mark, verdict in zip(marks["external"], marks["verdict"], strict=True)
+        if mark is not None and not verdict
     ]
     unchecked = sum(one is None for one in marks["external"])
     return [
@@ -109,34 +109,34 @@ def _adjustment(values: Mapping[str, Any]) -> list[Row]:
     ]
 
 
-def _camera(one: Mapping[str, Any]) -> dict[str, Any]:
+def _camera(camera: Mapping[str, Any]) -> dict[str, Any]:
     rows = [
         (name, f"{value['value']:.8g}", f"± {value['sigma']:.3g}" if value["sigma"] else "held")
-        for name, value in one["parameters"].items()
+        for name, value in camera["parameters"].items()
     ]
-    width, height = one["size"]
+    width, height = camera["size"]
     return {
-        "name": f"{one['name']}: {one['model']} model, {width} × {height} pixels, {one['unit']}",
+        "name": f"{camera['name']}: {camera['model']} model, {width} × {height} pixels, {camera['unit']}",
         "rows": rows,
     }
 
 
-def _photo(one: Mapping[str, Any]) -> Row:
-    sigma = one["sigma"]
-    angles = (f"{one[name]:.4f} ± {sigma[name]:.4f}°" for name in ("omega", "phi", "kappa"))
-    places = (f"{one[name]:.4f} ± {sigma[name]:.4f} m" for name in "xyz")
+def _photo(photo: Mapping[str, Any]) -> Row:
+    sigma = photo["sigma"]
+    angles = (f"{photo[name]:.4f} ± {sigma[name]:.4f}°" for name in ("omega", "phi", "kappa"))
+    places = (f"{photo[name]:.4f} ± {sigma[name]:.4f} m" for name in "xyz")
     return (
-        one["name"],
+        photo["name"],
         *angles,
         *places,
-        str(one["marks"]),
-        "–" if one["rms"] is None else f"{one['rms']:.2f} px",
+        str(photo["marks"]),
+        "–" if photo["rms"] is None else f"{photo['rms']:.2f} px",
     )
 
 
-def _control(one: Mapping[str, Any]) -> Row:
-    test = "–" if one["use"] == "fixed" else f"{one['test']:.2f}"
-    return (one["id"], one["use"], *(f"{1e3 * value:z.1f} mm" for value in one["residual"]), test)
+def _control(point: Mapping[str, Any]) -> Row:
+    test = "–" if point["use"] == "fixed" else f"{point['test']:.2f}"
+    return (point["id"], point["use"], *(f"{1e3 * value:z.1f} mm" for value in point["residual"]), test)
 
 
 def _mark(marks: Mapping[str, Any], k: int) -> Row:

@@ -173,7 +173,7 @@ def _face(wall: WallFace, stones: Sequence[StoneQuality]) -> dict[str, Any]:
         for i, before, upright in zip(wall.stones.tolist(), plane.tolist(), plumb.tolist(), strict=True)
     ]
     values["movements"] = [{**_record(movement), "text": movement.text} for movement in wall.movements]
-    values["odd"] = [{**_record(one), "text": one.text} for one in wall.odd]
+    values["odd"] = [{**_record(stone), "text": stone.text} for stone in wall.odd]
     return values
 
 
@@ -187,8 +187,8 @@ def _masonry(wall: MasonryQuality, stones: Sequence[StoneQuality]) -> dict[str, 
     return {**values, "categories": wall.categories, "strengths": wall.strengths}
 
 
-def _remeasure(one: Remeasure) -> dict[str, Any]:
-    return {**_record(one), "urgency": one.urgency.name.lower()}
+def _remeasure(remeasure: Remeasure) -> dict[str, Any]:
+    return {**_record(remeasure), "urgency": remeasure.urgency.name.lower()}
 
 
 def finding_of(line: CourseLine, walls: Sequence[WallBeds]) -> str:

@@ -66,7 +66,9 @@ def write_survey_page(
         movements=list(_movements(study)),
         faces=list(_faces(study)),
         odd=_first(_odd(study), lambda row: row),
-        depths=_first(study.depths, lambda one: (one.code, one.against, one.text, f"{one.score:.1f} σ")),
+        depths=_first(
+            study.depths, lambda doubt: (doubt.code, doubt.against, doubt.text, f"{doubt.score:.1f} σ")
+        ),
         masonry=list(_masonry(study)),
         quality=_overall(study),
         control=list(_control(study.files)),
@@ -101,15 +103,15 @@ def _again_column(study: SurveyStudy) -> Column:
 def _located(study: SurveyStudy) -> Iterator[Row]:
     """Yield a row for each corner that was located on photographs, with the rays behind it."""
     for stone in study.stones:
-        for one in stone.evidence:
-            if one["role"] == "vertex":
-                rays: Any = one["rays"]
-                sigma: Any = one["sigma"]
+        for point in stone.evidence:
+            if point["role"] == "vertex":
+                rays: Any = point["rays"]
+                sigma: Any = point["sigma"]
                 yield (
                     stone.code,
-                    str(one["point"]),
+                    str(point["point"]),
                     " × ".join(f"{1e3 * value:.1f}" for value in sigma) + " mm",
-                    str(one["how"]),
+                    str(point["how"]),
                     "; ".join(f"{ray['photo']} ({ray['x']:.1f}, {ray['y']:.1f})" for ray in rays),
                 )
 
@@ -135,9 +137,9 @@ def _place(wall: WallBeds | WallFace | MasonryQuality) -> str:
     return wall.facade if wall.zone is None else f"{wall.facade}, {wall.zone}"
 
 
-def _remeasure_row(one: Remeasure) -> Row:
-    line = str(one.line) if one.line else "–"
-    return (one.code or "(no code)", one.changes or "–", one.reason, one.action, line)
+def _remeasure_row(remeasure: Remeasure) -> Row:
+    line = str(remeasure.line) if remeasure.line else "–"
+    return (remeasure.code or "(no code)", remeasure.changes or "–", remeasure.reason, remeasure.action, line)
 
 
 def _movements(study: SurveyStudy) -> Iterator[Row]:
@@ -168,8 +170,12 @@ def _faces(study: SurveyStudy) -> Iterator[Row]:
 
 
 def _odd(study: SurveyStudy) -> list[Row]:
-    rows = [(one.code, one.text, one.amount / one.sigma) for wall in study.faces for one in wall.odd]
-    rows += [(one.code, one.text, one.amount / one.sigma) for wall in study.beds for one in wall.odd]
+    rows = [
+        (stone.code, stone.text, stone.amount / stone.sigma) for wall in study.faces for stone in wall.odd
+    ]
+    rows += [
+        (stone.code, stone.text, stone.amount / stone.sigma) for wall in study.beds for stone in wall.odd
+    ]
     return [
         (code, text, f"{abs(score):.1f} σ")
         for code, text, score in sorted(rows, key=lambda row: -abs(row[2]))
@@ -211,8 +217,8 @@ def _percent(probability: float) -> str:
     return "< 0.01 %" if probability < 1e-4 else f"{100.0 * probability:.2f} %"
 
 
-def _contradiction_row(one: Contradiction) -> Row:
-    return (one.code, one.kind, one.text, f"{one.significance:.1f} σ")
+def _contradiction_row(contradiction: Contradiction) -> Row:
+    return (contradiction.code, contradiction.kind, contradiction.text, f"{contradiction.significance:.1f} σ")
 
 
 def _overall(study: SurveyStudy) -> list[tuple[str, str]]:
@@ -297,18 +303,18 @@ def _course_row(
 def _kinds(study: SurveyStudy) -> list[Row]:
     return [
         (
-            one.kind,
-            f"{one.length:.3f} ± {one.length_scatter:.3f} m",
-            f"{one.height:.3f} ± {one.height_scatter:.3f} m",
-            one.source,
+            kind.kind,
+            f"{kind.length:.3f} ± {kind.length_scatter:.3f} m",
+            f"{kind.height:.3f} ± {kind.height_scatter:.3f} m",
+            kind.source,
             ", ".join(
                 f"{odd.code} ({odd.length * 1e3:+z.0f} mm long, {odd.height * 1e3:+z.0f} mm high)"
                 for odd in sorted(study.deviations, key=lambda odd: -odd.worst)[:_MOST]
-                if odd.kind == one.kind and odd.worst > 3.0
+                if odd.kind == kind.kind and odd.worst > 3.0
             )
             or "none",
         )
-        for one in study.usual.values()
+        for kind in study.usual.values()
     ]
 
 

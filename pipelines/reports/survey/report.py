@@ -55,7 +55,7 @@ def report_surveys(
     format: str = "moma",
     options: ReadingOptions | None = None,
     progress: Listener = silent,
-    given: Mapping[str, Grade] | None = None,
+    grades: Mapping[str, Grade] | None = None,
     overwrite: bool = False,
     orthophoto: str | Path | None = None,
 ) -> SurveyReport:
@@ -68,7 +68,7 @@ def report_surveys(
     format : name of their format
     options : defaults for what the files leave out
     progress : called at every stage
-    given : grades of the masonry that no survey tells: "SM", the state of the stones, and "MM", the mortar
+    grades : grades of the masonry that no survey tells: "SM", the state of the stones, and "MM", the mortar
     overwrite : replace a report on other files in the folder
     orthophoto : picture of a wall on which its elevation is drawn, with a world file and the wall's frame, FILE.toml
 
@@ -84,7 +84,7 @@ def report_surveys(
         source.append(options.outlines)
     check_replaceable(folder, INDEX, () if overwrite else source)
     photo = None if orthophoto is None else read_orthophoto(Path(orthophoto))
-    study = study_surveys(paths, format, options or ReadingOptions(), progress, given)
+    study = study_surveys(paths, format, options or ReadingOptions(), progress, grades)
     with replacing(folder, INDEX) as fresh:
         content = write_survey_report(study, fresh, progress, source, photo)
     return SurveyReport(folder, study, content)
@@ -144,11 +144,11 @@ def _outlines(study: SurveyStudy, photos: set[str]) -> Iterator[DrawnOutline]:
     for stone in study.stones:
         marks: dict[str, list[tuple[float, float]]] = {}
         drawn = set[str]()
-        for one in stone.evidence:
-            rays: Any = one["rays"]
+        for seen in stone.evidence:
+            rays: Any = seen["rays"]
             for ray in rays:
                 marks.setdefault(ray["photo"], []).append((ray["x"], ray["y"]))
-                if str(one["point"]).startswith("corner "):
+                if str(seen["point"]).startswith("corner "):
                     drawn.add(ray["photo"])
         if marks.keys() & photos:
             places = {name: np.array(ones) for name, ones in marks.items()}

@@ -111,7 +111,7 @@ def study_surveys(
     format: str,
     options: ReadingOptions,
     progress: Listener = silent,
-    given: Mapping[str, Grade] | None = None,
+    grades: Mapping[str, Grade] | None = None,
 ) -> SurveyStudy:
     """Read, fit and judge the stones of survey files.
 
@@ -121,7 +121,7 @@ def study_surveys(
     format : its name
     options : defaults for what the files leave out
     progress : called now and then
-    given : grades of the masonry that no survey tells: "SM", the state of the stones, and "MM", the mortar
+    grades : grades of the masonry that no survey tells: "SM", the state of the stones, and "MM", the mortar
 
     Raises
     ------
@@ -138,7 +138,7 @@ def study_surveys(
         file = _read(source, format, options, stones, rejects, progress)
         _refuse_second_campaign([stone.code for stone in stones[before[0] :]], source.path, seen)
         files.append(replace(file, stones=len(stones) - before[0], rejects=len(rejects) - before[1]))
-    study = _judge(tuple(files), tuple(stones), tuple(rejects), given or {}, progress)
+    study = _judge(tuple(files), tuple(stones), tuple(rejects), grades or {}, progress)
     if format != "cloud" or not stones:
         return study
     return replace(study, quality=replace(study.quality, verdict=_OF_PATCHES))
@@ -197,7 +197,7 @@ def _judge(
     files: tuple[SurveyFile, ...],
     stones: tuple[StoneQuality, ...],
     rejects: tuple[Reject, ...],
-    given: Mapping[str, Grade],
+    grades: Mapping[str, Grade],
     progress: Listener,
 ) -> SurveyStudy:
     progress(Progress("judge", 0, 3, "courses and faces"))
@@ -219,7 +219,7 @@ def _judge(
     seen = [_seen(stone) for stone in stones if stone.measured]
     remeasures = list_remeasures(stones, rejects, odd, quality, misplaced_corners(seen), depths)
     progress(Progress("judge", 1, 3, "masonry"))
-    masonry = judge_masonry([_wall_stone(stone) for stone in stones], facades, given)
+    masonry = judge_masonry([_wall_stone(stone) for stone in stones], facades, grades)
     progress(Progress("judge", 2, 3, "what depends on doubtful stones"))
     again = short_list(remeasures, len(stones) + len(rejects), _verdicts(stones, facades, tilts, beds, faces))
     progress(Progress("judge", 3, 3))
@@ -267,20 +267,20 @@ def _movements(
 
 def _findings(beds: Sequence[WallBeds], faces: Sequence[WallFace]) -> dict[tuple[object, ...], str]:
     """Return the verdicts on the walls, each with its name."""
-    found: dict[tuple[object, ...], str] = {}
+    findings: dict[tuple[object, ...], str] = {}
     for wall in beds:
         for movement in wall.movements:
             name = "settlement" if movement.kind in ("step", "part") else movement.kind
-            found[wall.facade, wall.zone, name] = f"the {name} of {wall.facade}"
+            findings[wall.facade, wall.zone, name] = f"the {name} of {wall.facade}"
             if movement.older_than is not None:
                 dated = f"that it is older than course {movement.older_than}"
-                found[wall.facade, wall.zone, name, movement.older_than] = (
+                findings[wall.facade, wall.zone, name, movement.older_than] = (
                     f"{dated} ({name} of {wall.facade})"
                 )
     for face in faces:
         for moved in face.movements:
-            found[face.facade, face.zone, moved.kind] = f"the {moved.kind} of {face.facade}"
-    return found
+            findings[face.facade, face.zone, moved.kind] = f"the {moved.kind} of {face.facade}"
+    return findings
 
 
 def _verdicts(
@@ -292,7 +292,7 @@ def _verdicts(
 ) -> Callable[[str], str | None]:
     """Return what names the verdicts on its wall that are no longer the same without a stone."""
     places = {stones[i].code: (facade, i) for facade in facades for i in facade.members.tolist()}
-    found, walls = _findings(beds, faces), (len(beds), len(faces))
+    texts, walls = _findings(beds, faces), (len(beds), len(faces))
 
     def ask(code: str) -> str | None:
         if code not in places:
@@ -303,8 +303,8 @@ def _verdicts(
         alone = replace(facade, members=np.arange(len(wall)))
         lines = measure_courses(wall, [alone], tilts)
         without = _findings(*_movements(wall, [alone], lines, tilts, walls))
-        lost = [text for key, text in found.items() if key[:2] == (facade.name, zone) and key not in without]
-        gained = [text for key, text in without.items() if key not in found]
+        lost = [text for key, text in texts.items() if key[:2] == (facade.name, zone) and key not in without]
+        gained = [text for key, text in without.items() if key not in texts]
         if lost:
             return f"{lost[0]}, which is not found without it"
         return f"{gained[0]}, which is found without it" if gained else None
@@ -313,7 +313,7 @@ def _verdicts(
 
 
 def _wall_stone(stone: StoneQuality) -> WallStone:
-    known = stone.corner_sigma[np.isfinite(stone.corner_sigma)]
+    finite = stone.corner_sigma[np.isfinite(stone.corner_sigma)]
     return WallStone(
         code=stone.code,
         kind=stone.kind,
@@ -321,7 +321,7 @@ def _wall_stone(stone: StoneQuality) -> WallStone:
         zone=stone.zone,
         outline=stone.outline,
         normal=stone.normal,
-        sigma=float(np.median(known)) if len(known) else 0.0,
+        sigma=float(np.median(finite)) if len(finite) else 0.0,
         depth=stone.depth,
         depth_sigma=stone.depth_sigma,
         area=stone.area,
@@ -344,11 +344,11 @@ def _seen(stone: StoneQuality) -> SeenFace:
 
 def _canons(files: Sequence[SurveyFile]) -> list[Canon]:
     """Gather the canons of all files; of two for one kind the first holds."""
-    found: dict[str, Canon] = {}
+    canons: dict[str, Canon] = {}
     for file in files:
         for canon in file.head.canons:
-            found.setdefault(canon.kind, canon)
-    return list(found.values())
+            canons.setdefault(canon.kind, canon)
+    return list(canons.values())
 
 
 def _unknown_kinds(kinds: Mapping[str, int]) -> Iterator[str]:
@@ -362,10 +362,10 @@ def _unknown_kinds(kinds: Mapping[str, int]) -> Iterator[str]:
 
 def _doubtful_sizes(stones: Sequence[StoneQuality]) -> Iterator[str]:
     """Yield a warning for the stones whose sizes hardly any stone has, and one for those that none has."""
-    found: dict[bool, list[str]] = {}
+    doubtful: dict[bool, list[str]] = {}
     for stone in stones:
         if (doubt := doubt_of(max(stone.length, stone.height, stone.depth or 0.0), LENGTH)) is not None:
-            found.setdefault(doubt.impossible, []).append(f"stone {stone.code}: {doubt.text}")
-    for texts in found.values():
+            doubtful.setdefault(doubt.impossible, []).append(f"stone {stone.code}: {doubt.text}")
+    for texts in doubtful.values():
         more = f" (and {len(texts) - 1} more stones)" if len(texts) > 1 else ""
         yield texts[0] + more
