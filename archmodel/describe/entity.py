@@ -11,6 +11,7 @@ from archmodel.assertions.plain_values import entry_values
 from archmodel.database.as_known import as_known
 from archmodel.describe.knowledge import knowledge, memberships, owners_of, owners_of_structure
 from archmodel.describe.rows import entity_row, structures_named
+from archmodel.describe.runs import JOINT_VALUES
 from archmodel.store.find_by_code import no_such_code
 from archmodel.tables.entities import Entity, canon_of, kind_named, own_attributes
 from archmodel.tables.entries import held_at
@@ -309,15 +310,7 @@ def _joints(session: Session, entity: int, run: int) -> list[Values]:
     return [
         {
             "neighbour": (row.second if row.first_id == entity else row.first).code,
-            "area": row.area,
-            "width": row.width,
-            "force_normal": row.force_normal,
-            "force_shear": row.force_shear,
-            "pressure_max": row.pressure_max,
-            "kern": row.kern,
-            "friction_use": row.friction_use,
-            "opening": row.opening,
-            "sliding": row.sliding,
+            **{name: getattr(row, name) for name in ("area", *JOINT_VALUES)},
         }
         for row in session.scalars(statement)
     ]

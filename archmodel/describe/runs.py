@@ -6,15 +6,21 @@ from typing import Any
 from sqlalchemy import func, select
 from sqlalchemy.orm import InstrumentedAttribute, Session, aliased, joinedload
 
+from archmodel.quantities import quantities_of
 from archmodel.tables.entities import Entity
 from archmodel.tables.runs import CellResult, EntityResult, JointResult, Run
 from archmodel.tables.surveys import Simplification
 from ground.errors import UsageError
 
-__all__ = ["compare_runs", "describe_run", "list_runs"]
+__all__ = ["JOINT_VALUES", "compare_runs", "describe_run", "list_runs"]
 
-ERRORS = ("natural_map", "penetration", "balance", "reaction", "energy")
+ERRORS = tuple(name for name in quantities_of("run") if name in Run.__table__.c)
 """Columns of a run that say how far it can be trusted [-]."""
+
+JOINT_VALUES = (
+    "width", "force_normal", "force_shear", "pressure_max", "kern", "friction_use", "opening", "sliding",
+)  # fmt: skip
+"""Values of a joint that descriptions show."""
 
 _LARGEST = 2**31 - 1
 """No run has a larger number."""
@@ -249,7 +255,7 @@ def _joints(
         select(
             first.code.label("first"),
             second.code.label("second"),
-            *(getattr(JointResult, name) for name in _JOINT_VALUES),
+            *(getattr(JointResult, name) for name in JOINT_VALUES),
         )
         .join(chosen, chosen.c.number == JointResult.number)
         .join(first, JointResult.first_id == first.id)
@@ -258,18 +264,6 @@ def _joints(
         .order_by(worst.desc(), JointResult.number)
     )
     return [dict(row) for row in session.execute(statement).mappings()]
-
-
-_JOINT_VALUES = (
-    "width",
-    "force_normal",
-    "force_shear",
-    "pressure_max",
-    "kern",
-    "friction_use",
-    "opening",
-    "sliding",
-)
 
 
 def _flat(settings: Mapping[str, Any], prefix: str = "") -> dict[str, object]:

@@ -7,6 +7,7 @@ from typing import Any
 from sqlalchemy import Boolean, ColumnElement, func
 from sqlalchemy.orm import Session
 
+from archmodel.quantities import quantities_of
 from archmodel.query.columns import (
     Test,
     Value,
@@ -27,7 +28,6 @@ from archmodel.query.columns import (
     structures,
 )
 from archmodel.query.scope import Scope
-from archmodel.store.run_record import STONE_VALUES
 from archmodel.tables.base import Base, StoneAttribute, declared_attributes
 from archmodel.tables.entities import Entity, own_attributes
 from archmodel.tables.hierarchy import kinds_in
@@ -85,8 +85,9 @@ def _declared(cls: type[Base], place: Callable[[str], Value], of_run: bool = Fal
             value = place(column.name)
             yield Attribute(one.name, one.unit, one.definition, value, of_run, one.words, is_truth)
         elif cls is EntityResult and column.name == "values":
-            for name, (unit, meaning) in STONE_VALUES.items():
-                yield Attribute(name, unit, meaning, of_values(name), of_run)
+            for name, quantity in quantities_of("stone").items():
+                if name not in declared:
+                    yield Attribute(name, quantity.unit, quantity.meaning, of_values(name), of_run)
 
 
 _MEASURED = (

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 from archmodel.arrays import Array, Bools, Ints, Texts
 
 __all__ = [
-    "STONE_VALUES",
     "ContactArrays",
     "ErrorMeasures",
     "JointArrays",
@@ -20,43 +19,6 @@ __all__ = [
     "StoneResult",
     "without_rounding",
 ]
-
-
-STONE_VALUES: Mapping[str, tuple[str, str]] = {
-    "variance_share": (
-        "-",
-        "share of the variance of a study that the best measurement of the stone takes away",
-    ),
-    "von_mises_p99": ("Pa", "Von Mises stress that 1 % of its volume exceeds"),
-    "principal_tension": ("Pa", "largest principal stress, positive in tension"),
-    "principal_compression": ("Pa", "smallest principal stress, negative in compression"),
-    "mean_pressure": ("Pa", "mean pressure over its volume"),
-    "tension_zone": ("-", "part of its volume in tension, beyond what the error of the stress explains"),
-    "overstressed_zone": ("-", "part of its volume with tension above the tensile strength"),
-    "utilisation": ("-", "largest stress over strength, in tension or compression"),
-    "utilisation_tension": ("-", "largest tension over the tensile strength"),
-    "utilisation_compression": ("-", "largest compression over the compressive strength"),
-    "stress_error": ("-", "estimated relative error of its stress"),
-    "joint_pressure": ("Pa", "largest pressure in its joints"),
-    "joint_kern": ("-", "largest of its joints: up to 1, the resultant is within the kern"),
-    "joint_opening": ("m", "largest opening of its joints"),
-    "joint_sliding": ("m", "largest sliding in its joints since the start"),
-    "joint_friction_use": ("-", "largest part of friction and cohesion that a joint of it uses"),
-    "displacement_peak": ("m", "largest displacement of its points during the run"),
-    "displacement_peak_time": ("s", "time of that"),
-    "relative_displacement_peak": ("m", "largest displacement during the run, seen from the supports"),
-    "joint_opening_peak": ("m", "largest opening of its joints during the run"),
-    "joint_sliding_peak": ("m", "largest sliding in its joints during the run"),
-    "joint_pressure_peak": ("Pa", "largest pressure in its joints during the run"),
-    "sag_measured": ("m", "height of its bed above the mean of its course, as surveyed"),
-    "sag_simulated": ("m", "the same of the movement in the run, by moma compare"),
-    "sag_sigma": ("m", "standard deviation of their difference"),
-    "plumb_measured": ("m", "outward position of its face from the mean of its wall, as surveyed"),
-    "plumb_simulated": ("m", "the same of the movement in the run, by moma compare"),
-    "plumb_sigma": ("m", "standard deviation of their difference"),
-    "von_mises_peak": ("Pa", "largest Von Mises stress in the frames of the run"),
-}
-"""Unit and meaning of the named values of a stone's result that can be asked for."""
 
 
 # by unit: 10⁻¹² of a metre, of 1 MN and of 1 MPa, which are usual in masonry
@@ -83,7 +45,7 @@ class StoneResult:
     von_mises_max, von_mises_mean : [Pa]; None if the stone was rigid
     displacement_max : of its points, at the end [m]
     contact_force_max : largest force of one contact point [N]
-    values : further named numbers; those of STONE_VALUES can be asked for
+    values : further named numbers; those of `archmodel.quantities` can be asked for
     """
 
     code: str

@@ -1,8 +1,11 @@
 """Runs and their results by entity, by joint, by contact point, by cell of disks, and by mechanism."""
 
-from sqlalchemy import ForeignKey, Index
-from sqlalchemy.orm import Mapped, mapped_column, relationship
+from typing import Any
 
+from sqlalchemy import ForeignKey, Index
+from sqlalchemy.orm import Mapped, MappedColumn, mapped_column, relationship
+
+from archmodel.quantities import quantities_of
 from archmodel.tables.base import JSON_TYPE, Base, attribute
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Entry
@@ -67,6 +70,12 @@ class Run(Base):
     results: Mapped[list["EntityResult"]] = relationship(back_populates="run")
 
 
+def _of_stone(name: str) -> MappedColumn[Any]:
+    """Declare a column by its quantity."""
+    quantity = quantities_of("stone")[name]
+    return attribute(quantity.unit, quantity.meaning)
+
+
 class EntityResult(Base):
     """Results of one run for one entity.
 
@@ -83,10 +92,10 @@ class EntityResult(Base):
 
     entity_id: Mapped[int] = mapped_column(ForeignKey("entity.id"), primary_key=True)
     run_id: Mapped[int] = mapped_column(ForeignKey("run.id"), primary_key=True)
-    von_mises_max: Mapped[float | None] = attribute("Pa", "largest Von Mises stress")
-    von_mises_mean: Mapped[float | None] = attribute("Pa", "mean Von Mises stress")
-    displacement_max: Mapped[float] = attribute("m", "largest displacement of its points at the end")
-    contact_force_max: Mapped[float | None] = attribute("N", "largest contact force")
+    von_mises_max: Mapped[float | None] = _of_stone("von_mises_max")
+    von_mises_mean: Mapped[float | None] = _of_stone("von_mises_mean")
+    displacement_max: Mapped[float] = _of_stone("displacement_max")
+    contact_force_max: Mapped[float | None] = _of_stone("contact_force_max")
     values: Mapped[dict[str, float]] = mapped_column(JSON_TYPE)
     fidelity: Mapped[str] = attribute(None, "fixed, rigid or deformable", words=FIDELITIES)
 

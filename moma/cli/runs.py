@@ -1,64 +1,53 @@
 """Commands that list, show and compare simulation runs, and print their reports."""
 
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from archmodel.quantities import units_of
 from ground.errors import UsageError
 from moma.cli.console import reporting, say
 from moma.cli.options import Common, Json, Verbose, check_ending
 
 __all__ = ["report", "runs"]
 
-_LIST = {
-    **dict.fromkeys(("run", "scene", "stored_at", "outcome")),
-    **dict.fromkeys(("stones", "contacts", "natural_map", "balance", "reaction"), "-"),
-    "wall": "s",
-}
-_MORE = {"penetration": "-", "energy": "-"}
-_STRESSES = {
-    **dict.fromkeys(("code", "kind")),
-    **dict.fromkeys(("von_mises_p99", "von_mises_mean", "von_mises_max"), "Pa"),
-}
-_JOINTS = {
-    "first": None,
-    "second": None,
-    "width": "m",
-    "force_normal": "N",
-    "force_shear": "N",
-    "pressure_max": "Pa",
-    "kern": "-",
-    "friction_use": "-",
-    "opening": "m",
-    "sliding": "m",
-}
-_PEAKS = {"peak": None, "value": None, "end": None, "unit": None, "time": "s", "stones": None}
-_CELLS = {
-    "cell": None,
-    "lambda_x": "-",
-    "lambda_y": "-",
-    "p": "Pa",
-    "q": "Pa",
-    "porosity": "-",
-    "coordination": "-",
-}
-_STAGES = {
-    **dict.fromkeys(("name", "outcome", "stones", "laid", "removed", "held")),
-    "weight": "N",
-    "reaction": "N",
+_LIST = (
+    "run",
+    "scene",
+    "stored_at",
+    "outcome",
+    "stones",
+    "contacts",
+    "natural_map",
+    "balance",
+    "reaction",
+    "wall",
+)
+_MORE = ("penetration", "energy")
+_STAGES = ("name", "outcome", "stones", "laid", "removed", "held", "weight", "reaction", "bed", "time")
+_CELLS = ("cell", "lambda_x", "lambda_y", "p", "q", "porosity", "coordination")
+_UNITS = {
+    **units_of("stone", "joint", "joint in the database"),
+    **dict.fromkeys(("time", "wall"), "s"),
+    **dict.fromkeys(("p", "q"), "Pa"),
+    **dict.fromkeys(("weight", "reaction"), "N"),
     "bed": "m",
-    "time": "s",
 }
-_TABLES = {
+_TABLES: dict[str, tuple[str, tuple[str, ...] | None]] = {
     "stages": ("stages of building", _STAGES),
     "cells": ("cells of disks at the end", _CELLS),
-    "peaks": ("largest values during the run, and at its end", _PEAKS),
-    "largest_stresses": ("largest Von Mises stresses, exceeded in 1 % of the volume", _STRESSES),
-    "largest_openings": ("joints that have opened most", _JOINTS),
-    "least_centred": ("joints with the resultant farthest out of the kern", _JOINTS),
-    "most_used_friction": ("joints that use most of their friction", _JOINTS),
+    "peaks": (
+        "largest values during the run, and at its end",
+        ("peak", "value", "end", "unit", "time", "stones"),
+    ),
+    "largest_stresses": ("largest Von Mises stresses, exceeded in 1 % of the volume", None),
+    "largest_openings": ("joints that have opened most", None),
+    "least_centred": ("joints with the resultant farthest out of the kern", None),
+    "most_used_friction": ("joints that use most of their friction", None),
 }
+"""Tables of a run: heading, and columns; None: all."""
 
 
 @reporting
@@ -73,7 +62,7 @@ def runs(
     """List the simulation runs, or show one in full, or compare two."""
     from archmodel.database.session import open_database
     from archmodel.describe.runs import compare_runs, describe_run, list_runs
-    from moma.cli.text.formats import as_json, as_table
+    from moma.cli.text.formats import as_json
 
     if number is None and against is not None:
         raise UsageError("--against needs a run to compare", remedy=f"moma runs N --against {against}")
@@ -88,7 +77,7 @@ def runs(
         marked = [
             row | {"outcome": row["outcome"] + (" (caution)" if row["cautions"] else "")} for row in found
         ]
-        print(as_table(_LIST | _MORE if common.verbose else _LIST, marked))
+        print(_table(marked, _LIST + _MORE if common.verbose else _LIST, reaction=None))
         say(f"{len(found)} found")
     elif number is None:
         say("no run found; simulate with moma run SCENE.toml")
@@ -96,9 +85,18 @@ def runs(
         print(_comparison(found) if against is not None else _full(found, common.verbose))
 
 
+def _table(
+    rows: Sequence[Mapping[str, object]], names: Iterable[str] | None = None, **units: str | None
+) -> str:
+    """Format rows as a table of some columns, or of all, with the units of the catalogue."""
+    from moma.cli.text.formats import as_table
+
+    return as_table({name: (_UNITS | units).get(name) for name in names or rows[0]}, rows)
+
+
 def _full(run: dict[str, Any], verbose: bool) -> str:
     """Format one run as lines and tables; with the scene file if `verbose`."""
-    from moma.cli.text.formats import as_lines, as_table
+    from moma.cli.text.formats import as_lines
 
     scene_text = run.pop("scene_text")
     tables = {name: run.pop(name) for name in _TABLES}
@@ -106,7 +104,7 @@ def _full(run: dict[str, Any], verbose: bool) -> str:
     for name, rows in tables.items():
         heading, columns = _TABLES[name]
         if rows:
-            parts.append(f"{heading}\n{as_table(columns, rows)}")
+            parts.append(f"{heading}\n{_table(rows, columns)}")
     return "\n\n".join([*parts, *([f"scene file\n{scene_text.rstrip()}"] if verbose else [])])
 
 

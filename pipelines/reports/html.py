@@ -20,6 +20,7 @@ from pipelines.results.wall_axes import WallAxes
 __all__ = [
     "Picture",
     "direction_text",
+    "in_words",
     "input_rows",
     "kilonewtons",
     "kilopascals",
@@ -144,6 +145,13 @@ def percent(part: float) -> str:
 def ratio(value: float | None) -> str:
     """Format a ratio; a dash if it is not known."""
     return "–" if value is None or not np.isfinite(value) else f"{value:z.3g}"
+
+
+def in_words(value: float, unit: str | None, least: float = 0.0) -> str:
+    """Format a value by its unit; a smaller length than `least` [m] as such."""
+    if unit == "m":
+        return millimetres(value, least)
+    return {"N": kilonewtons, "Pa": megapascals}.get(unit or "", ratio)(value)
 
 
 def scientific(value: float | int | None) -> str:

@@ -3,14 +3,12 @@
 from collections.abc import Mapping
 from typing import Any
 
-from pipelines.reports.html import kilonewtons, megapascals, millimetres
-from pipelines.results.peaks import PEAKS
+from archmodel.quantities import quantities_of
+from pipelines.reports.html import in_words
 
 __all__ = ["passed_peaks", "peak_rows", "peak_text"]
 
 _PASSED = 1.05  # peak over the value at the end, from which the end says too little [-]
-_LENGTHS = ("displacement", "relative_displacement", "opening", "sliding")
-_FORCES = ("reaction", "shear")
 _NO_FORCE = 1e-3  # of the weight [-]: a smaller reaction is not worth a line
 
 
@@ -20,20 +18,21 @@ def passed_peaks(summary: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     return {
         name: one
         for name, one in known.items()
-        if one["value"] > _PASSED * max(one["end"], 0.0) and one["value"] > _least(name, summary, least)
+        if one["value"] > _PASSED * max(one["end"], 0.0) and one["value"] > _least(one, summary, least)
     }
 
 
-def peak_text(name: str, peak: Mapping[str, Any], least: float) -> str:
+def peak_text(peak: Mapping[str, Any], least: float) -> str:
     """Describe a peak: its value, time and stones, and the value at the end; lengths below `least` [m] as such."""
-    value, when, where, end = _cells(name, peak, least)
+    value, when, where, end = _cells(peak, least)
     return f"{value} after {when}{f', {where}' if where else ''}; {end} at the end"
 
 
 def peak_rows(summary: Mapping[str, Any]) -> list[tuple[str, ...]]:
     """Return the rows of the table of all peaks."""
     least = summary["tolerance"]["length"]
-    return [(PEAKS[name], *_cells(name, one, least)) for name, one in _distinct(summary).items()]
+    labels = quantities_of("peak")
+    return [(labels[name].label, *_cells(one, least)) for name, one in _distinct(summary).items()]
 
 
 def _distinct(summary: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
@@ -44,21 +43,14 @@ def _distinct(summary: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     return known
 
 
-def _cells(name: str, peak: Mapping[str, Any], least: float) -> tuple[str, str, str, str]:
+def _cells(peak: Mapping[str, Any], least: float) -> tuple[str, str, str, str]:
     """Return the value, the time, the stone or joint, and the value at the end."""
-    value, end = (_number(name, peak[key], least) for key in ("value", "end"))
-    if name in _LENGTHS and peak["value"] < least:
+    value, end = (in_words(peak[key], peak["unit"], least) for key in ("value", "end"))
+    if peak["unit"] == "m" and peak["value"] < least:
         return value, "–", "–", end
     return value, f"{peak['time']:.4g} s", " – ".join(peak["stones"]), end
 
 
-def _least(name: str, summary: Mapping[str, Any], length: float) -> float:
-    if name in _LENGTHS:
-        return length
-    return _NO_FORCE * float(summary["reaction"]["weight"]) if name in _FORCES else 0.0
-
-
-def _number(name: str, value: float, least: float) -> str:
-    if name in _LENGTHS:
-        return millimetres(value, least)
-    return kilonewtons(value) if name in _FORCES else megapascals(value)
+def _least(peak: Mapping[str, Any], summary: Mapping[str, Any], length: float) -> float:
+    """Return the least value that is worth a line."""
+    return {"m": length, "N": _NO_FORCE * float(summary["reaction"]["weight"])}.get(peak["unit"], 0.0)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from archmodel.quantities import quantities_of
 from archmodel.store.run_record import StoneResult
 from mechanics.arrays import Array
 from mechanics.results.result import Result
@@ -38,29 +39,6 @@ _OUTCOMES = {
 }
 
 _OPEN = ("moving", "undecided", "interrupted")
-
-_ERRORS = (
-    (
-        "natural_map",
-        "Contact law",
-        "Distance of the contact forces from satisfying friction and non-penetration: the residual η of the "
-        "natural map, dimensionless. Below the solver's tolerance the step is solved.",
-    ),
-    ("penetration", "Overlap", "Deepest overlap of two stones over the size of the smallest one."),
-    ("balance", "Balance of each stone", "Unbalanced force over the stone's weight; worst stone."),
-    ("reaction", "Balance of the whole", "Reaction of the supports minus weight, over the weight."),
-    (
-        "energy",
-        "Energy",
-        "Energy that no term of the balance explains, over the reference energy of the run.",
-    ),
-    ("unconverged_steps", "Unsolved steps", "Steps that the solver left above its tolerance."),
-    (
-        "stress",
-        "Stress",
-        "Relative error of the stress of all deformable stones, estimated from its jumps between finite elements.",
-    ),
-)
 
 _GREY = "Grey stones are fixed or rigid, or their stress was not requested."
 _CAPTIONS = {
@@ -150,7 +128,10 @@ def write_report(
         notes=_notes(summary),
         peaks=peak_rows(summary),
         inputs=input_rows(summary),
-        errors=[(name, _error(key, result, summary), words) for key, name, words in _ERRORS],
+        errors=[
+            (one.label, _error(one.name, result, summary), one.meaning)
+            for one in quantities_of("run").values()
+        ],
         profile=_profile(summary["profile"]),
         sections=[
             _stages(summary),

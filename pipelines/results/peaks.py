@@ -5,11 +5,12 @@ from typing import Any
 
 import numpy as np
 
+from archmodel.quantities import quantities_of
 from mechanics.arrays import Array, Bools
 from mechanics.results.result import Largest, Outcome, Peaks, Result
 from mechanics.scene.scene import Fidelity
 
-__all__ = ["PEAKS", "peak_records", "realisations", "rocking_caution", "rocking_stones"]
+__all__ = ["peak_records", "realisations", "rocking_caution", "rocking_stones"]
 
 _LIFTED = 1e-3  # opening over the width of a stone, an angle [rad], from which it rocks: a hundredth of a slender one's
 _CLOSED = 0.5  # part of its largest opening that a joint has in the end, below which it has closed again [-]
@@ -20,40 +21,20 @@ _CHAOTIC = (
     "shear",
 )  # peaks of which rocking makes one realisation
 
-PEAKS = {
-    "displacement": "Displacement",
-    "relative_displacement": "Displacement relative to the supports",
-    "opening": "Opening of a joint",
-    "sliding": "Sliding in a joint",
-    "pressure": "Pressure in a joint",
-    "von_mises": "Von Mises stress",
-    "tension": "Tension in a stone",
-    "compression": "Compression in a stone",
-    "reaction": "Reaction of the supports against gravity",
-    "shear": "Reaction of the supports across gravity",
-}
-"""Peaks by name, in words."""
-
-_UNITS = {
-    **dict.fromkeys(("displacement", "relative_displacement", "opening", "sliding"), "m"),
-    **dict.fromkeys(("pressure", "von_mises", "tension", "compression"), "Pa"),
-    **dict.fromkeys(("reaction", "shear"), "N"),
-}
-
 
 def peak_records(result: Result) -> dict[str, dict[str, Any] | None]:
-    """Return each of PEAKS: `value`, `unit`, `time` [s], `end`, and the codes of its stone, or of those of its joint.
+    """Return each peak of the catalogue: `value`, `unit`, `time` [s], `end`, and `stones`.
 
-    The codes are in `stones`.
+    These are the codes of its stone, or of both stones of its joint.
 
     None where a quantity is not known, as stresses of rigid stones.
     """
     peaks = result.peaks
     if peaks is None:
-        return dict.fromkeys(PEAKS)
+        return dict.fromkeys(quantities_of("peak"))
     codes, last = [body.code for body in result.bodies], _at_end(result, peaks)
     found: dict[str, dict[str, Any] | None] = {}
-    for name in PEAKS:
+    for name in quantities_of("peak"):
         if name in ("reaction", "shear"):
             one = getattr(peaks, name)
             found[name] = _peak(name, one.value, one.time, one.end, [])
@@ -64,7 +45,13 @@ def peak_records(result: Result) -> dict[str, dict[str, Any] | None]:
 
 
 def _peak(name: str, value: float, time: float, end: float, stones: list[str]) -> dict[str, Any]:
-    return {"value": value, "unit": _UNITS[name], "time": time, "end": end, "stones": stones}
+    return {
+        "value": value,
+        "unit": quantities_of("peak")[name].unit,
+        "time": time,
+        "end": end,
+        "stones": stones,
+    }
 
 
 def _largest(name: str, largest: Largest, codes: Sequence[str], end: float) -> dict[str, Any] | None:
@@ -150,9 +137,10 @@ def rocking_caution(result: Result) -> str:
     parts = []
     for name in _CHAOTIC:
         if name in first["peaks"] and name in second["peaks"]:
-            factor, unit = units[_UNITS[name]]
+            peak = quantities_of("peak")[name]
+            factor, unit = units[str(peak.unit)]
             values = (f"{factor * one['peaks'][name]:.3g}" for one in (first, second))
-            parts.append(f"{PEAKS[name].lower()} {' and '.join(values)} {unit}")
+            parts.append(f"{peak.label.lower()} {' and '.join(values)} {unit}")
     steps = " and ".join(f"{1e3 * one['step']:.3g}" for one in (first, second))
     other = "" if first["outcome"] == second["outcome"] else f"the second run is {second['outcome']}; "
     return f"{said}; with steps of {steps} ms: {other}{', '.join(parts)}"

@@ -1,17 +1,20 @@
-"""Values of a result by stone and over the scene, for tables, database and reports."""
+"""Values of a result by stone, by joint and over the scene, for tables, database and reports."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from archmodel.quantities import quantities_of
 from archmodel.store.run_record import StoneResult
 from mechanics.arrays import Array, Ints
 from mechanics.results.contact_result import JointResult
 from mechanics.results.result import BodyResult, Peaks, Result
 from mechanics.results.stress_values import volume_quantile
 
-__all__ = ["StressStatistics", "stone_results", "stress_statistics"]
+__all__ = ["StressStatistics", "joint_values", "stone_results", "stress_statistics"]
 
 _STRESSES = (
     "von_mises_p99",
@@ -24,6 +27,8 @@ _STRESSES = (
     "utilisation_tension",
     "utilisation_compression",
 )
+
+_OF_WHOLE_JOINTS = ("pressure_mean", "pressure_max", "kern")
 
 
 @dataclass(frozen=True)
@@ -60,6 +65,28 @@ def stress_statistics(result: Result) -> StressStatistics | None:
     )
 
 
+def joint_values(
+    joints: JointResult, origin: Array | float = 0.0, *, slivers: bool = True
+) -> dict[str, NDArray[Any]]:
+    """Return the values (nj,) of joints by name, as in `archmodel.quantities`; NaN where not known.
+
+    Parameters
+    ----------
+    joints : of a result
+    origin : (3,) of the scene, in the frame of the site [m]
+    slivers : False: without their pressures and kern, which say nothing of the masonry
+    """
+    normal = np.einsum("ji,ji->j", joints.force, joints.frame[:, 0])
+    shear = np.linalg.norm(joints.force - normal[:, None] * joints.frame[:, 0], axis=1)
+    values = {name: getattr(joints, name) for name in quantities_of("joint") if hasattr(joints, name)}
+    values |= dict(zip("xyz", (joints.centroid + origin).T, strict=True))
+    values |= {"force_normal": normal, "force_shear": shear}
+    values["eccentricity"] = np.linalg.norm(joints.eccentricity, axis=1)
+    if not slivers:
+        values |= {name: np.where(joints.sliver, np.nan, values[name]) for name in _OF_WHOLE_JOINTS}
+    return values
+
+
 def stone_results(result: Result) -> tuple[StoneResult, ...]:
     """Return the results for the database, one per stone, in the order of the scene."""
     force = np.linalg.norm(result.contacts.force, axis=1)
@@ -80,7 +107,7 @@ def stone_results(result: Result) -> tuple[StoneResult, ...]:
 
 
 def _values(body: BodyResult, further: Mapping[str, float]) -> dict[str, float]:
-    """Return the known values of a stone by name; archmodel.store.run_record.STONE_VALUES explains them."""
+    """Return the known values of a stone by name; `archmodel.quantities` explains them."""
     values: dict[str, float | None] = {"volume": body.volume, "mass": body.mass, **further}
     if body.values is not None:
         values |= {name: getattr(body.values, name) for name in _STRESSES}

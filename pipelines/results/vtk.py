@@ -1,10 +1,11 @@
 """Results for ParaView: stones and contact points as time series, joints at the end of the run."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from archmodel.quantities import quantities_of, units_of
 from mechanics.arrays import Array, Ints
 from mechanics.results.contact_result import ContactResult, JointResult
 from mechanics.results.result import BodyResult, Frame, Result
@@ -42,19 +43,10 @@ __all__ = [
 FIDELITIES = (Fidelity.FIXED, Fidelity.RIGID, Fidelity.DEFORMABLE)
 """Models of stones by their number in the files."""
 
-CONTACT_ARRAYS = ("force", "pressure", "normal", "gap", "opening", "slide", "area")
+CONTACT_ARRAYS = tuple(one for one in quantities_of("contact") if one not in ("status", "bodies", "joint"))
 """Values of contact points in the files, by their names in `ContactResult`."""
 
-UNITS: Mapping[str, str] = {
-    **dict.fromkeys(("displacement", "gap", "slide", "opening", "sliding", "eccentricity"), "m"),
-    "centre_of_pressure": "m",
-    "velocity": "m/s",
-    **dict.fromkeys(("stress", "von_mises", "principal", "mean_pressure"), "Pa"),
-    **dict.fromkeys(("pressure", "pressure_mean", "pressure_max"), "Pa"),
-    **dict.fromkeys(("force", "contact_force"), "N"),
-    "moment": "N m",
-    "area": "m²",
-}
+UNITS = units_of("point of a stone", "contact", "joint", "joint in joints.vtu")
 """Units of the arrays; all others are ratios, directions or numbers."""
 
 
@@ -221,23 +213,21 @@ def joint_grid(joints: JointResult) -> UnstructuredGrid:
     ]
     sizes = np.array([len(polygon) for polygon in polygons], dtype=np.int64)
     ends = np.cumsum(sizes)
+    values: dict[str, Array | Ints] = {
+        "bodies": joints.bodies.astype(np.int64),
+        "parted": joints.parted.astype(np.int64),
+        "sliver": joints.sliver.astype(np.int64),
+        "normal": joints.frame[:, 0],
+        "in_kern": joints.in_kern.astype(np.int64),
+        "area": joints.area,
+    }
+    for name in quantities_of("joint in joints.vtu", "joint"):
+        if name not in values and hasattr(joints, name):
+            values[name] = getattr(joints, name)
     return UnstructuredGrid(
         points=np.concatenate([*polygons, np.zeros((0, 3))]),
         cells=cells_of(POLYGON, [range(end - size, end) for size, end in zip(sizes, ends, strict=True)]),
         point_data={},
-        cell_data={
-            "bodies": joints.bodies.astype(np.int64),
-            "parted": joints.parted.astype(np.int64),
-            "sliver": joints.sliver.astype(np.int64),
-            "normal": joints.frame[:, 0],
-            "in_kern": joints.in_kern.astype(np.int64),
-            **{name: getattr(joints, name) for name in _JOINT_ARRAYS},
-        },
+        cell_data=values,
         units=UNITS,
     )
-
-
-_JOINT_ARRAYS = (
-    "area", "force", "moment", "centre_of_pressure", "eccentricity", "kern", "edge", "pressure_mean", "pressure_max",
-    "gap", "opening", "sliding", "slipping", "open", "friction_use",
-)  # fmt: skip

@@ -28,7 +28,7 @@ from mechanics.arrays import Array
 from mechanics.results.contact_result import ContactResult, JointResult
 from mechanics.results.result import Errors, Result
 from mechanics.scene.scene import Scene
-from pipelines.results.joints_csv import normal_and_shear
+from pipelines.results.stone_values import joint_values
 from pipelines.run.assemble import Assembly
 from pipelines.scene.file import SceneFile
 from survey.joints.report import ClosingReport, StoneJoint
@@ -96,19 +96,13 @@ def run_record(
 
 def joint_arrays(joints: JointResult, origin: Array, widths: Array) -> JointArrays:
     """Return the joints in the frame of the site, given the scene's `origin` (3,) and surveyed `widths` (nj,) [m]."""
-    normal, shear = normal_and_shear(joints)
-    # force over area says nothing of a sliver
-    whole = np.where(joints.sliver, np.nan, 1.0)
-    own = {
-        **{name: getattr(joints, name) * whole for name in ("pressure_mean", "pressure_max", "kern")},
+    values = joint_values(joints, slivers=False) | {
         "stones": joints.bodies,
         "centroid": joints.centroid + origin,
         "normal": joints.frame[:, 0],
-        "force_normal": normal,
-        "force_shear": shear,
         "width": widths,
     }
-    return JointArrays(**_shared(JointArrays, joints) | own)
+    return JointArrays(**{one.name: values[one.name] for one in fields(JointArrays)})
 
 
 def contact_arrays(contacts: ContactResult, origin: Array) -> ContactArrays:

@@ -32,10 +32,9 @@ from pipelines.reports.page.known import Known, known_stones
 from pipelines.reports.page.scenes import run_model
 from pipelines.reports.run import write_report
 from pipelines.results.folder import check_replaceable, replacing, source_of
-from pipelines.results.joints_csv import write_joints
 from pipelines.results.notebook import notebook_html
 from pipelines.results.peaks import rocking_caution
-from pipelines.results.series_csv import write_series
+from pipelines.results.run_csv import write_joints, write_series
 from pipelines.results.stone_values import stone_results
 from pipelines.results.summary import as_json, summarise
 from pipelines.results.vtk import write_frames, write_joint_grid

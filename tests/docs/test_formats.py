@@ -8,10 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from moma.cli import app
-from pipelines.results.joints_csv import JOINT_COLUMNS
-from pipelines.results.series_csv import SERIES_COLUMNS
 from pipelines.results.summary import summarise
-from pipelines.results.vtk import body_cells, body_grid, contact_grid, joint_grid
 from survey.formats.native import reader as moma_ascii
 from survey.formats.native.header import HeadReader
 from survey.formats.native.stone import STONE_WORDS
@@ -19,6 +16,7 @@ from survey.formats.reading import FORMATS, ReadingOptions, open_survey, with_he
 from survey.formats.tables.reader import NEEDED, OPTIONAL
 from survey.geometry.solids import Solid
 from survey.records.survey import Reject
+from tests.docs.quantities import PAGES, with_tables
 from tests.paths import ROOT
 from tests.pipelines.results_by_hand import deformable_body, result_of, rigid_body
 from tests.survey.joints.assemblies import dome, obj
@@ -44,28 +42,16 @@ def rows(heading, columns):
     return [row for row in found if len(row) == columns and row[0].startswith("`")]
 
 
-def test_every_array_is_documented_with_its_place_and_unit(result):
-    frame = result.frames[-1]
-    for heading, grid in (
-        ("Stones", body_grid(result, frame, body_cells(result))),
-        ("Contact points", contact_grid(frame.contacts)),
-        ("Joints", joint_grid(result.joints)),
-    ):
-        written = [
-            (f"`{name}`", on, grid.units.get(name, ""))
-            for on, data in (("points", grid.point_data), ("cells", grid.cell_data))
-            for name in data
-        ]
-        assert [tuple(row[:3]) for row in rows(heading, 4)] == written
+@pytest.mark.parametrize("name", PAGES)
+def test_tables_of_results_are_those_of_the_catalogue(name):
+    """`python -m tests.docs.quantities` renews them."""
+    page = (ROOT / "docs" / name).read_text(encoding="utf-8")
+    assert with_tables(page) == page
 
 
-def test_every_column_of_the_joints_is_documented():
-    assert rows("Joints", 2) == [[f"`{name}`", meaning] for name, meaning in JOINT_COLUMNS.items()]
-
-
-def test_every_column_of_the_series_is_documented():
-    columns = [one for of_file in SERIES_COLUMNS.values() for one in of_file.items()]
-    assert rows("Time series", 2) == [[f"`{name}`", meaning] for name, meaning in columns]
+def test_a_table_that_lacks_a_result_gets_it_back():
+    line = next(one for one in PAGE.splitlines(keepends=True) if one.startswith("| `opening` | cells"))
+    assert with_tables(PAGE.replace(line, "")) == PAGE
 
 
 def test_every_key_of_the_summary_is_documented(result):

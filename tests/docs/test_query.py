@@ -11,7 +11,6 @@ import pytest
 from archmodel.database.session import Database, open_database
 from archmodel.query import grammar
 from archmodel.query.api import MAX_EXPRESSIONS, attributes, find, find_rows
-from archmodel.query.compile import STRUCTURE_ATTRIBUTES
 from archmodel.query.functions.usages import STRUCTURE_USAGES, USAGES
 from archmodel.query.grammar import MAX_CALLS, MAX_DEPTH
 from archmodel.query.scope import MAX_FUNCTIONS, MAX_RUNS
@@ -118,14 +117,8 @@ def test_the_relations_and_structures_are_those_on_the_page() -> None:
 
 
 def test_the_attributes_are_those_of_the_program() -> None:
-    def lines(of_run: bool) -> list[list[str]]:
-        return [[f"`{a.name}`", a.type_name, a.definition] for a in attributes() if a.of_run is of_run]
-
-    assert table("attribute")[1:] == lines(of_run=False)
-    assert table("result")[1:] == lines(of_run=True)
-    assert table("of a structure")[1:] == [
-        [f"`{a.name}`", a.definition] for a in STRUCTURE_ATTRIBUTES.values()
-    ]
+    lines = [[f"`{a.name}`", a.type_name, a.definition] for a in attributes() if not a.of_run]
+    assert table("attribute")[1:] == lines
 
 
 def test_the_own_attributes_of_kinds_are_those_of_the_program() -> None:

@@ -5,7 +5,8 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from archmodel.store.run_record import STONE_VALUES, without_rounding
+from archmodel.quantities import units_of
+from archmodel.store.run_record import without_rounding
 
 __all__ = [
     "USUAL_COLUMNS",
@@ -31,11 +32,7 @@ _UNITS = {
     "volume": "m³",
     "mass": "kg",
     "tilt_sigma": "rad",
-    "displacement_max": "m",
-    "von_mises_max": "Pa",
-    "von_mises_mean": "Pa",
-    "contact_force_max": "N",
-    **{name: unit for name, (unit, _) in STONE_VALUES.items() if unit != "-"},
+    **units_of("stone"),
 }
 
 _PLACES = frozenset({"x", "y", "z", "centroid", "offset"})

@@ -165,12 +165,12 @@ def _displacement(summary: dict[str, Any]) -> str:
 
 def _peak_lines(summary: dict[str, Any]) -> list[str]:
     """Describe the peaks of a run that its end does not show."""
+    from archmodel.quantities import quantities_of
     from pipelines.reports.peaks import passed_peaks, peak_text
-    from pipelines.results.peaks import PEAKS
 
-    passed, least = passed_peaks(summary), summary["tolerance"]["length"]
+    passed, least, peaks = passed_peaks(summary), summary["tolerance"]["length"], quantities_of("peak")
     passed.pop("displacement", None)  # stated before
-    lines = [f"    {_uncapital(PEAKS[name])}: {peak_text(name, one, least)}" for name, one in passed.items()]
+    lines = [f"    {_uncapital(peaks[name].label)}: {peak_text(one, least)}" for name, one in passed.items()]
     return [*(["  larger during the run than at its end:"] if lines else []), *lines]
 
 

@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from archmodel.store.run_record import STONE_VALUES, StoneResult
+from archmodel.quantities import quantities_of
+from archmodel.store.run_record import StoneResult
 from mechanics.arrays import Array, Ints
 from mechanics.limit.assembly import RigidAssembly
 from mechanics.limit.joints import Resultants
@@ -24,12 +25,14 @@ from pipelines.reports.page.model import (
     VertexField,
 )
 from pipelines.reports.page.surfaces import rigid_motion, stones_of
+from pipelines.results.stone_values import joint_values
 from pipelines.results.summary import length_tolerance
 
 __all__ = ["assessment_model", "run_model", "with_known"]
 
 _MOST = 1_200_000  # stones times instants in a page; of longer runs every second instant, or every third, …
 _INSTANTS = 400  # at most
+_OF_JOINTS = ("pressure_mean", "pressure_max", "opening", "sliding", "kern", "friction_use", "area")
 
 
 def with_known(model: Model, known: Known | None) -> Model:
@@ -214,55 +217,13 @@ def _von_mises(stress: Array) -> Array:
 def _result_columns(stones: Sequence[StoneResult]) -> list[Column]:
     """Return the results of the stones, those of which any stone has a value."""
 
-    def numbers(values: Sequence[float | None]) -> Array:
-        return np.array([np.nan if value is None else value for value in values], dtype=float)
-
-    columns = [
-        Column("fidelity", "modelled as", None, [stone.fidelity for stone in stones], "Results"),
-        Column(
-            "displacement_max",
-            "displacement at the end",
-            "m",
-            numbers([s.displacement_max for s in stones]),
-            "Results",
-        ),
-        Column(
-            "von_mises_max",
-            "largest Von Mises stress",
-            "Pa",
-            numbers([s.von_mises_max for s in stones]),
-            "Results",
-        ),
-        Column(
-            "von_mises_mean",
-            "mean Von Mises stress",
-            "Pa",
-            numbers([s.von_mises_mean for s in stones]),
-            "Results",
-        ),
-        Column(
-            "contact_force_max",
-            "largest contact force",
-            "N",
-            numbers([s.contact_force_max for s in stones]),
-            "Results",
-        ),
-    ]
-    columns += [
-        Column(
-            name,
-            name.replace("_", " "),
-            unit,
-            numbers([stone.values.get(name) for stone in stones]),
-            "Results",
-        )
-        for name, (unit, _) in STONE_VALUES.items()
-    ]
-    return [
-        column
-        for column in columns
-        if column.unit is None or np.isfinite(np.asarray(column.values, dtype=float)).any()
-    ]
+    found = [Column("fidelity", "modelled as", None, [stone.fidelity for stone in stones], "Results")]
+    for name, quantity in quantities_of("stone").items():
+        given = [stone.values.get(name, getattr(stone, name, None)) for stone in stones]
+        values = np.array([np.nan if value is None else value for value in given], dtype=float)
+        if np.isfinite(values).any():
+            found.append(Column(name, quantity.label, quantity.unit, values, "Results"))
+    return found
 
 
 def _joints(joints: JointResult, centres: Array, shift: Array, turn: Array) -> Joints:
@@ -277,16 +238,8 @@ def _joints(joints: JointResult, centres: Array, shift: Array, turn: Array) -> J
 
     counts = [len(one) for one in joints.polygon]
     corners = back(np.concatenate([np.zeros((0, 3)), *joints.polygon]), np.repeat(second, counts))
-    whole = joints.sliver
-    columns = [
-        Column("pressure", "mean pressure", "Pa", np.where(whole, np.nan, joints.pressure_mean)),
-        Column("pressure_max", "largest pressure", "Pa", np.where(whole, np.nan, joints.pressure_max)),
-        Column("opening", "opening", "m", joints.opening),
-        Column("sliding", "sliding", "m", joints.sliding),
-        Column("kern", "over the kern", "-", np.where(whole, np.nan, joints.kern)),
-        Column("friction_use", "friction used", "-", joints.friction_use),
-        Column("area", "area", "m²", joints.area),
-    ]
+    values = joint_values(joints, slivers=False)
+    columns = [_column(name, values[name]) for name in _OF_JOINTS]
     return Joints(
         joints.bodies,
         np.split(corners, np.cumsum(counts)[:-1]) if counts else [],
@@ -300,9 +253,15 @@ def _joints(joints: JointResult, centres: Array, shift: Array, turn: Array) -> J
 def _resultants(on: RigidAssembly, carried: Resultants) -> Joints:
     section = on.joints.section
     columns = [
-        Column("normal", "normal force", "N", carried.normal),
-        Column("shear", "shear force", "N", carried.shear),
-        Column("kern", "over the kern", "-", carried.kern),
-        Column("friction_use", "friction used", "-", carried.friction_use),
+        _column("force_normal", carried.normal),
+        _column("force_shear", carried.shear),
+        _column("kern", carried.kern),
+        _column("friction_use", carried.friction_use),
     ]
     return Joints(on.joints.bodies, section.polygons(), carried.place, carried.force, carried.kern, columns)
+
+
+def _column(name: str, values: Array) -> Column:
+    """Return the column of a result of joints."""
+    quantity = quantities_of("joint")[name]
+    return Column(name, quantity.label, quantity.unit, values)

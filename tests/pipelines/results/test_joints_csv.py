@@ -8,7 +8,7 @@ import pytest
 
 from mechanics.results.joints import SLIVER
 from mechanics.stones.materials import Material
-from pipelines.results.joints_csv import JOINT_COLUMNS, write_joints
+from pipelines.results.run_csv import JOINT_COLUMNS, write_joints
 from pipelines.results.stone_values import stone_results
 from pipelines.results.summary import summarise
 from tests.pipelines.results_by_hand import deformable_body, result_of, rigid_body

@@ -15,8 +15,7 @@ from moma.cli.text.runs_and_surveys import run_lines
 from pipelines.draw.pictures import _heading, _top
 from pipelines.reports.html import kilonewtons, megapascals, millimetres, percent
 from pipelines.reports.run import write_report
-from pipelines.results.joints_csv import write_joints
-from pipelines.results.series_csv import write_series
+from pipelines.results.run_csv import write_joints, write_series
 from pipelines.results.stone_values import stone_results
 from pipelines.results.summary import indeterminacy, length_tolerance, summarise
 from pipelines.run.record import joint_arrays

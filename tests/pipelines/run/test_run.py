@@ -10,8 +10,8 @@ import pytest
 from archmodel.database.session import open_database
 from archmodel.describe.entity import describe
 from archmodel.describe.runs import describe_run
+from archmodel.quantities import quantities_of
 from archmodel.query.api import find_rows
-from archmodel.store.run_record import STONE_VALUES
 from ground.errors import MissingLibraryError, UsageError
 from mechanics.dynamics.outcome import Outcome
 from mechanics.scene.scene import Fidelity
@@ -153,7 +153,7 @@ def test_a_run_writes_its_folder_and_keeps_its_results(own_url, tmp_path):
     assert 0 < rows[0]["stress_error"] < 1
     assert rows[0]["utilisation"] is None  # no strengths
     assert {"W02-02", "W01-03"} <= {row["code"] for row in bearing}
-    assert set(run["values"]) <= {*STONE_VALUES, "volume", "mass"}
+    assert set(run["values"]) <= {*quantities_of("stone"), "volume", "mass"}
     assert summary["stress"]["error"]["stone"] == "W02-02"
     assert summary["joints"]["count"] >= summary["joints"]["pressed"] > 8
     assert run["scene"] == "Two courses"

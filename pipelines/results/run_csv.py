@@ -1,4 +1,4 @@
-"""series_stones.csv and series_joints.csv: chosen stones, and the joints between them, step by step."""
+"""joints.csv, series_stones.csv and series_joints.csv: joints at the end, and chosen stones and joints step by step."""
 
 import csv
 from collections.abc import Iterable, Mapping, Sequence
@@ -6,11 +6,16 @@ from pathlib import Path
 
 import numpy as np
 
+from archmodel.quantities import quantities_of
 from mechanics.arrays import Array
 from mechanics.results.result import Result
+from pipelines.results.stone_values import joint_values
 from pipelines.results.table_csv import inert
 
-__all__ = ["SERIES_COLUMNS", "write_series"]
+__all__ = ["JOINT_COLUMNS", "SERIES_COLUMNS", "write_joints", "write_series"]
+
+JOINT_COLUMNS = {name: one.described for name, one in quantities_of("joint").items()}
+"""Columns of joints.csv and their meaning."""
 
 SERIES_COLUMNS: Mapping[str, Mapping[str, str]] = {
     "series_stones.csv": {
@@ -25,15 +30,36 @@ SERIES_COLUMNS: Mapping[str, Mapping[str, str]] = {
     "series_joints.csv": {
         "time": "[s]",
         "joint": "its line in joints.csv, from 0",
-        "first": "code of one stone",
-        "second": "code of the other",
-        "opening": "largest growth of the gap since the start, at its corners [m]",
-        "sliding": "largest since the start, at its corners [m]",
-        "force_normal": "resultant across the joint, positive in compression [N]",
-        "force_shear": "resultant along the joint [N]",
+        **{
+            name: JOINT_COLUMNS[name]
+            for name in ("first", "second", "opening", "sliding", "force_normal", "force_shear")
+        },
     },
 }
 """Files, their columns, and the meaning of these."""
+
+
+def write_joints(path: Path, result: Result, origin: Array) -> None:
+    """Write one line for each joint, in the order of `Result.joints`, with places in the frame of the site.
+
+    Parameters
+    ----------
+    path : the file
+    result : of the simulation
+    origin : (3,) of the scene, in the frame of the site [m]
+    """
+    values = joint_values(result.joints, origin)
+    columns = [values[name] for name in list(JOINT_COLUMNS)[2:]]
+    codes = [body.code for body in result.bodies]
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(JOINT_COLUMNS)
+        for (first, second), *numbers in zip(result.joints.bodies, *columns, strict=True):
+            writer.writerow([inert(codes[first]), inert(codes[second]), *map(_cell, numbers)])
+
+
+def _cell(value: float) -> str:
+    return f"{value + 0.0:.12g}" if np.isfinite(value) else ""
 
 
 def write_series(folder: Path, result: Result, origin: Array) -> None:
