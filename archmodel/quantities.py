@@ -35,208 +35,165 @@ class Quantity:
         return self.meaning if self.unit is None else f"{self.meaning} [{self.unit}]"
 
 
-def _of(
-    bearer: str, *rows: tuple[str, str | None, str] | tuple[str, str | None, str, str]
-) -> Iterator[Quantity]:
-    """Yield quantities of a bearer from rows of name, unit, meaning and, where it is not the name, label."""
-    for name, unit, meaning, *label in rows:
-        yield Quantity(name, unit, label[0] if label else name.replace("_", " "), meaning, bearer)
+def _of(bearer: str, table: str) -> Iterator[Quantity]:
+    """Yield quantities of a bearer from lines of name, unit (none of texts), meaning and, if not the name, label."""
+    for line in table.strip().splitlines():
+        name, unit, meaning, *label = (" ".join(cell.split()) for cell in line.split("|"))
+        yield Quantity(name, unit or None, label[0] if label else name.replace("_", " "), meaning, bearer)
 
 
 QUANTITIES: tuple[Quantity, ...] = (
     *_of(
         "stone",
-        ("displacement_max", "m", "largest displacement of its points at the end", "displacement at the end"),
-        ("von_mises_max", "Pa", "largest Von Mises stress", "largest Von Mises stress"),
-        ("von_mises_mean", "Pa", "mean Von Mises stress", "mean Von Mises stress"),
-        ("contact_force_max", "N", "largest contact force", "largest contact force"),
-        (
-            "variance_share",
-            "-",
-            "share of the variance of a study that the best measurement of the stone takes away",
-        ),
-        ("von_mises_p99", "Pa", "Von Mises stress that 1 % of its volume exceeds"),
-        ("principal_tension", "Pa", "largest principal stress, positive in tension"),
-        ("principal_compression", "Pa", "smallest principal stress, negative in compression"),
-        ("mean_pressure", "Pa", "mean pressure over its volume"),
-        ("tension_zone", "-", "part of its volume in tension, beyond what the error of the stress explains"),
-        ("overstressed_zone", "-", "part of its volume with tension above the tensile strength"),
-        ("utilisation", "-", "largest stress over strength, in tension or compression"),
-        ("utilisation_tension", "-", "largest tension over the tensile strength"),
-        ("utilisation_compression", "-", "largest compression over the compressive strength"),
-        ("stress_error", "-", "estimated relative error of its stress"),
-        ("joint_pressure", "Pa", "largest pressure in its joints"),
-        ("joint_kern", "-", "largest of its joints: up to 1, the resultant is within the kern"),
-        ("joint_opening", "m", "largest opening of its joints"),
-        ("joint_sliding", "m", "largest sliding in its joints since the start"),
-        ("joint_friction_use", "-", "largest part of friction and cohesion that a joint of it uses"),
-        ("displacement_peak", "m", "largest displacement of its points during the run"),
-        ("displacement_peak_time", "s", "time of that"),
-        ("relative_displacement_peak", "m", "largest displacement during the run, seen from the supports"),
-        ("joint_opening_peak", "m", "largest opening of its joints during the run"),
-        ("joint_sliding_peak", "m", "largest sliding in its joints during the run"),
-        ("joint_pressure_peak", "Pa", "largest pressure in its joints during the run"),
-        ("sag_measured", "m", "height of its bed above the mean of its course, as surveyed"),
-        ("sag_simulated", "m", "the same of the movement in the run, by moma compare"),
-        ("sag_sigma", "m", "standard deviation of their difference"),
-        ("plumb_measured", "m", "outward position of its face from the mean of its wall, as surveyed"),
-        ("plumb_simulated", "m", "the same of the movement in the run, by moma compare"),
-        ("plumb_sigma", "m", "standard deviation of their difference"),
-        ("von_mises_peak", "Pa", "largest Von Mises stress in the frames of the run"),
+        """
+        displacement_max | m | largest displacement of its points at the end | displacement at the end
+        von_mises_max | Pa | largest Von Mises stress | largest Von Mises stress
+        von_mises_mean | Pa | mean Von Mises stress | mean Von Mises stress
+        contact_force_max | N | largest contact force | largest contact force
+        variance_share | - | share of the variance of a study that the best measurement of the stone takes away
+        von_mises_p99 | Pa | Von Mises stress that 1 % of its volume exceeds
+        principal_tension | Pa | largest principal stress, positive in tension
+        principal_compression | Pa | smallest principal stress, negative in compression
+        mean_pressure | Pa | mean pressure over its volume
+        tension_zone | - | part of its volume in tension, beyond what the error of the stress explains
+        overstressed_zone | - | part of its volume with tension above the tensile strength
+        utilisation | - | largest stress over strength, in tension or compression
+        utilisation_tension | - | largest tension over the tensile strength
+        utilisation_compression | - | largest compression over the compressive strength
+        stress_error | - | estimated relative error of its stress
+        joint_pressure | Pa | largest pressure in its joints
+        joint_kern | - | largest of its joints: up to 1, the resultant is within the kern
+        joint_opening | m | largest opening of its joints
+        joint_sliding | m | largest sliding in its joints since the start
+        joint_friction_use | - | largest part of friction and cohesion that a joint of it uses
+        displacement_peak | m | largest displacement of its points during the run
+        displacement_peak_time | s | time of that
+        relative_displacement_peak | m | largest displacement during the run, seen from the supports
+        joint_opening_peak | m | largest opening of its joints during the run
+        joint_sliding_peak | m | largest sliding in its joints during the run
+        joint_pressure_peak | Pa | largest pressure in its joints during the run
+        sag_measured | m | height of its bed above the mean of its course, as surveyed
+        sag_simulated | m | the same of the movement in the run, by moma compare
+        sag_sigma | m | standard deviation of their difference
+        plumb_measured | m | outward position of its face from the mean of its wall, as surveyed
+        plumb_simulated | m | the same of the movement in the run, by moma compare
+        plumb_sigma | m | standard deviation of their difference
+        von_mises_peak | Pa | largest Von Mises stress in the frames of the run
+        """,
     ),
     *_of(
         "joint",
-        ("first", None, "code of one stone"),
-        ("second", None, "code of the other"),
-        ("x", "m", "centroid of the joint"),
-        ("y", "m", "centroid of the joint"),
-        ("z", "m", "centroid of the joint"),
-        ("area", "m²", "of the polygon"),
-        ("force_normal", "N", "resultant across the joint, positive in compression", "normal force"),
-        ("force_shear", "N", "resultant along the joint", "shear force"),
-        ("eccentricity", "m", "of the resultant, from the centroid; unknown without compression"),
-        (
-            "kern",
-            "-",
-            "up to 1: a linear pressure presses everywhere (rectangle of width b: 6 e/b); unknown without compression",
-            "over the kern",
-        ),
-        (
-            "edge",
-            "-",
-            "0: the resultant meets the centroid, 1: the edge, where a hinge forms",
-            "over the edge",
-        ),
-        ("pressure_mean", "Pa", "resultant across the joint over its area", "mean pressure"),
-        ("pressure_max", "Pa", "largest of the contact points, each with its neighbours", "largest pressure"),
-        ("gap", "m", "largest gap"),
-        ("opening", "m", "largest growth of the gap since the start; of joints found later, their gap"),
-        ("sliding", "m", "largest slide of a contact point since the start"),
-        ("slipping", "-", "part of the area of the contact points that slips"),
-        ("open", "-", "part of the area of the contact points that bears nothing"),
-        (
-            "friction_use",
-            "-",
-            "shear over what friction and cohesion can bear; unknown where that is nothing",
-            "friction used",
-        ),
-        ("sliver", "-", "1: its area is tiny beside the faces of its stones; pressure and kern say nothing"),
-        ("parted", "-", "1: it was closed at the start and is now wide open"),
+        """
+        first | | code of one stone
+        second | | code of the other
+        x | m | centroid of the joint
+        y | m | centroid of the joint
+        z | m | centroid of the joint
+        area | m² | of the polygon
+        force_normal | N | resultant across the joint, positive in compression | normal force
+        force_shear | N | resultant along the joint | shear force
+        eccentricity | m | of the resultant, from the centroid; unknown without compression
+        kern | - | up to 1: a linear pressure presses everywhere (rectangle of width b: 6 e/b); unknown without \
+        compression | over the kern
+        edge | - | 0: the resultant meets the centroid, 1: the edge, where a hinge forms | over the edge
+        pressure_mean | Pa | resultant across the joint over its area | mean pressure
+        pressure_max | Pa | largest of the contact points, each with its neighbours | largest pressure
+        gap | m | largest gap
+        opening | m | largest growth of the gap since the start; of joints found later, their gap
+        sliding | m | largest slide of a contact point since the start
+        slipping | - | part of the area of the contact points that slips
+        open | - | part of the area of the contact points that bears nothing
+        friction_use | - | shear over what friction and cohesion can bear; unknown where that is nothing | friction \
+        used
+        sliver | - | 1: its area is tiny beside the faces of its stones; pressure and kern say nothing
+        parted | - | 1: it was closed at the start and is now wide open
+        """,
     ),
     *_of(
         "joint in joints.vtu",
-        ("bodies", "-", "numbers of the two stones"),
-        ("normal", "-", "from the second stone to the first"),
-        ("in_kern", "-", "1: it is pressed, with the resultant within the kern"),
-        ("force", "N", "resultant"),
-        ("moment", "N m", "about the centroid"),
-        ("centre_of_pressure", "m", "where the resultant meets the joint; NaN without compression"),
-        ("eccentricity", "m", "the same from the centroid, along the principal axes, the longer first"),
+        """
+        bodies | - | numbers of the two stones
+        normal | - | from the second stone to the first
+        in_kern | - | 1: it is pressed, with the resultant within the kern
+        force | N | resultant
+        moment | N m | about the centroid
+        centre_of_pressure | m | where the resultant meets the joint; NaN without compression
+        eccentricity | m | the same from the centroid, along the principal axes, the longer first
+        """,
     ),
     *_of(
         "joint in the database",
-        ("width", "m", "as surveyed, which is the thickness of its mortar"),
+        """
+        width | m | as surveyed, which is the thickness of its mortar
+        """,
     ),
     *_of(
         "contact",
-        ("force", "N", "on the first of `bodies`"),
-        ("pressure", "Pa", "normal force over area; NaN between edges"),
-        ("normal", "-", "towards the first of `bodies`"),
-        ("gap", "m", "negative: overlap"),
-        ("opening", "m", "growth of the gap since the start"),
-        ("slide", "m", "how far the two stones have moved along each other here since the start"),
-        ("area", "m²", "that the point stands for"),
-        ("status", "-", "0 open, 1 stick, 2 slip, 3 bonded, 4 broken, 5 crush"),
-        ("bodies", "-", "numbers of the two stones"),
-        ("joint", "-", "number in `joints.vtu`, of the joints that there are at the start; -1: none"),
+        """
+        force | N | on the first of `bodies`
+        pressure | Pa | normal force over area; NaN between edges
+        normal | - | towards the first of `bodies`
+        gap | m | negative: overlap
+        opening | m | growth of the gap since the start
+        slide | m | how far the two stones have moved along each other here since the start
+        area | m² | that the point stands for
+        status | - | 0 open, 1 stick, 2 slip, 3 bonded, 4 broken, 5 crush
+        bodies | - | numbers of the two stones
+        joint | - | number in `joints.vtu`, of the joints that there are at the start; -1: none
+        """,
     ),
     *_of(
         "point of a stone",
-        ("displacement", "m", "since the start"),
-        ("velocity", "m/s", "at the instant of the frame"),
-        ("stress", "Pa", "xx, yy, zz, xy, yz, zx"),
-        ("von_mises", "Pa", "Von Mises stress", "Von Mises stress"),
-        ("principal", "Pa", "σ1 ≥ σ2 ≥ σ3"),
-        ("principal_direction_1", "-", "direction of σ1, the largest tension; either sense is meant"),
-        ("principal_direction_3", "-", "direction of σ3, the largest compression"),
-        ("mean_pressure", "Pa", "minus a third of the trace"),
-        ("utilisation", "-", "the larger of σ1/f_t and -σ3/f_c (Rankine)"),
-        (
-            "contact_force",
-            "N",
-            "of the contacts on the nodes of deformable stones, mean over the last step; with it and the weight any "
-            "program of finite elements finds the stress of a single stone again",
-        ),
+        """
+        displacement | m | since the start
+        velocity | m/s | at the instant of the frame
+        stress | Pa | xx, yy, zz, xy, yz, zx
+        von_mises | Pa | Von Mises stress | Von Mises stress
+        principal | Pa | σ1 ≥ σ2 ≥ σ3
+        principal_direction_1 | - | direction of σ1, the largest tension; either sense is meant
+        principal_direction_3 | - | direction of σ3, the largest compression
+        mean_pressure | Pa | minus a third of the trace
+        utilisation | - | the larger of σ1/f_t and -σ3/f_c (Rankine)
+        contact_force | N | of the contacts on the nodes of deformable stones, mean over the last step; with it and \
+        the weight any program of finite elements finds the stress of a single stone again
+        """,
     ),
     *_of(
         "cell of a stone",
-        ("stone", "-", "number of the stone in the scene, from 0"),
-        ("fidelity", "-", "0 fixed, 1 rigid, 2 deformable"),
-        ("stress_error", "-", "estimated relative error of the stone's stress (Zienkiewicz & Zhu 1987)"),
+        """
+        stone | - | number of the stone in the scene, from 0
+        fidelity | - | 0 fixed, 1 rigid, 2 deformable
+        stress_error | - | estimated relative error of the stone's stress (Zienkiewicz & Zhu 1987)
+        """,
     ),
     *_of(
         "peak",
-        ("displacement", "m", "of the points of a stone that is not fixed", "Displacement"),
-        (
-            "relative_displacement",
-            "m",
-            "the same, seen from the supports",
-            "Displacement relative to the supports",
-        ),
-        (
-            "opening",
-            "m",
-            "of a joint; of joints of the start also after stones have parted",
-            "Opening of a joint",
-        ),
-        (
-            "sliding",
-            "m",
-            "in a joint; of joints of the start also after stones have parted",
-            "Sliding in a joint",
-        ),
-        ("pressure", "Pa", "as `pressure_max` of a joint; slivers are left out", "Pressure in a joint"),
-        ("von_mises", "Pa", "of a deformable stone, in the frames", "Von Mises stress"),
-        ("tension", "Pa", "of a deformable stone, in the frames", "Tension in a stone"),
-        ("compression", "Pa", "of a deformable stone, in the frames", "Compression in a stone"),
-        ("reaction", "N", "of all supports", "Reaction of the supports against gravity"),
-        ("shear", "N", "of all supports: the base shear", "Reaction of the supports across gravity"),
+        """
+        displacement | m | of the points of a stone that is not fixed | Displacement
+        relative_displacement | m | the same, seen from the supports | Displacement relative to the supports
+        opening | m | of a joint; of joints of the start also after stones have parted | Opening of a joint
+        sliding | m | in a joint; of joints of the start also after stones have parted | Sliding in a joint
+        pressure | Pa | as `pressure_max` of a joint; slivers are left out | Pressure in a joint
+        von_mises | Pa | of a deformable stone, in the frames | Von Mises stress
+        tension | Pa | of a deformable stone, in the frames | Tension in a stone
+        compression | Pa | of a deformable stone, in the frames | Compression in a stone
+        reaction | N | of all supports | Reaction of the supports against gravity
+        shear | N | of all supports: the base shear | Reaction of the supports across gravity
+        """,
     ),
     *_of(
         "run",
-        (
-            "natural_map",
-            "-",
-            "Distance of the contact forces from satisfying friction and non-penetration: the residual η of the "
-            "natural map, dimensionless. Below the solver's tolerance the step is solved.",
-            "Contact law",
-        ),
-        ("penetration", "-", "Deepest overlap of two stones over the size of the smallest one.", "Overlap"),
-        ("balance", "-", "Unbalanced force over the stone's weight; worst stone.", "Balance of each stone"),
-        (
-            "reaction",
-            "-",
-            "Reaction of the supports minus weight, over the weight.",
-            "Balance of the whole",
-        ),
-        (
-            "energy",
-            "-",
-            "Energy that no term of the balance explains, over the reference energy of the run.",
-            "Energy",
-        ),
-        (
-            "unconverged_steps",
-            "-",
-            "Steps that the solver left above its tolerance.",
-            "Unsolved steps",
-        ),
-        (
-            "stress",
-            "-",
-            "Relative error of the stress of all deformable stones, estimated from its jumps between finite elements.",
-            "Stress",
-        ),
+        """
+        natural_map | - | Distance of the contact forces from satisfying friction and non-penetration: the residual \
+        η of the natural map, dimensionless. Below the solver's tolerance the step is solved. | Contact law
+        penetration | - | Deepest overlap of two stones over the size of the smallest one. | Overlap
+        balance | - | Unbalanced force over the stone's weight; worst stone. | Balance of each stone
+        reaction | - | Reaction of the supports minus weight, over the weight. | Balance of the whole
+        energy | - | Energy that no term of the balance explains, over the reference energy of the run. | Energy
+        unconverged_steps | - | Steps that the solver left above its tolerance. | Unsolved steps
+        stress | - | Relative error of the stress of all deformable stones, estimated from its jumps between finite \
+        elements. | Stress
+        """,
     ),
 )
 """All results of runs."""

@@ -31,7 +31,7 @@ from archmodel.describe.trace import trace
 from archmodel.query.api import find
 from archmodel.relations.graph import load_path
 from archmodel.store.find_by_code import Subjects
-from archmodel.store.run_record import ContactArrays, ErrorMeasures, JointArrays, RunRecord, StoneResult
+from archmodel.store.run_record import Columns, ErrorMeasures, RunRecord, StoneResult
 from archmodel.store.runs import store_run
 from archmodel.store.stone_record import StoneRecord
 from archmodel.store.stones import store_survey
@@ -402,33 +402,38 @@ def _touching(session: Session) -> Ints:
     return numbers - 1  # in a new database stones are numbered from 1
 
 
-def _joints(pairs: Ints, rng: np.random.Generator) -> JointArrays:
+def _joints(pairs: Ints, rng: np.random.Generator) -> Columns:
     count = len(pairs)
     names = "area force_normal force_shear pressure_mean pressure_max friction_use slipping open gap opening sliding"
-    return JointArrays(
-        stones=pairs,
-        centroid=rng.random((count, 3)),
-        normal=np.tile([0.0, 0.0, 1.0], (count, 1)),
-        parted=np.zeros(count, dtype=bool),
-        kern=np.where(rng.random(count) < 0.1, np.nan, 2.0 * rng.random(count)),
+    return {
+        "first": pairs[:, 0],
+        "second": pairs[:, 1],
+        **_vectors("", rng.random((count, 3))),
+        **_vectors("n", np.tile([0.0, 0.0, 1.0], (count, 1))),
+        "parted": np.zeros(count, dtype=bool),
+        "kern": np.where(rng.random(count) < 0.1, np.nan, 2.0 * rng.random(count)),
         **{name: rng.random(count) for name in names.split()},
-    )
+        "width": np.full(count, np.nan),
+    }
 
 
-def _contacts(pairs: Ints, rng: np.random.Generator) -> ContactArrays:
+def _vectors(prefix: str, values: Array) -> dict[str, Array]:
+    """Return the components of vectors (n, 3) by the names of their columns."""
+    return {f"{prefix}{axis}": column for axis, column in zip("xyz", values.T, strict=True)}
+
+
+def _contacts(pairs: Ints, rng: np.random.Generator) -> Columns:
     count = 4 * len(pairs)
-    return ContactArrays(
-        stones=np.repeat(pairs, 4, axis=0),
-        joint=np.arange(count) // 4,
-        point=rng.random((count, 3)),
-        normal=np.tile([0.0, 0.0, 1.0], (count, 1)),
-        force=rng.random((count, 3)),
-        area=rng.random(count),
-        gap=rng.random(count),
-        opening=rng.random(count),
-        slide=rng.random(count),
-        status=np.array(["stick", "slip", "open"])[rng.integers(0, 3, count)],
-    )
+    return {
+        "candidate": np.repeat(pairs[:, 0], 4),
+        "antagonist": np.repeat(pairs[:, 1], 4),
+        "joint": np.arange(count) // 4,
+        **_vectors("", rng.random((count, 3))),
+        **_vectors("n", np.tile([0.0, 0.0, 1.0], (count, 1))),
+        **_vectors("f", rng.random((count, 3))),
+        **{name: rng.random(count) for name in ("area", "gap", "opening", "slide")},
+        "status": np.array(["stick", "slip", "open"])[rng.integers(0, 3, count)],
+    }
 
 
 STEPS: Mapping[str, Step] = {

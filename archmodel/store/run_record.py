@@ -1,18 +1,20 @@
 """Plain values of a simulation run that go into the database, without SQLAlchemy.
 
-Joints and contact points, of which a run can have a million, are structures of arrays; in them NaN marks an undefined
+Joints and contact points, of which a run can have a million, are columns of arrays; in them NaN marks an undefined
 value, and becomes null.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from archmodel.arrays import Array, Bools, Ints, Texts
+import numpy as np
+from numpy.typing import NDArray
+
+from archmodel.arrays import Array
 
 __all__ = [
-    "ContactArrays",
+    "Columns",
     "ErrorMeasures",
-    "JointArrays",
     "MovingStone",
     "RunRecord",
     "SimplificationRecord",
@@ -20,6 +22,9 @@ __all__ = [
     "without_rounding",
 ]
 
+
+Columns = Mapping[str, NDArray[np.generic]]
+"""Columns of a table by name, equally long."""
 
 # by unit: 10⁻¹² of a metre, of 1 MN and of 1 MPa, which are usual in masonry
 _ROUNDING: Mapping[str, float] = {"m": 1e-12, "N": 1e-6, "Pa": 1e-6}
@@ -75,75 +80,6 @@ class ErrorMeasures:
     balance: float | None = None
     reaction: float | None = None
     energy: float | None = None
-
-
-@dataclass(frozen=True)
-class JointArrays:
-    """The joints at the end of a run, in the frame of the site.
-
-    Attributes
-    ----------
-    stones : (nj, 2) indices into `RunRecord.results`; forces act on the first
-    centroid : (nj, 3) [m]
-    normal : (nj, 3) unit normal from the second to the first
-    area : (nj,) [m²]
-    parted : (nj,) it was closed at the start and is now wide open
-    force_normal, force_shear : (nj,) across it, compression positive, and the size of the rest [N]
-    pressure_mean, pressure_max : (nj,) [Pa]; NaN where it has no area or is a sliver, as all that may be NaN
-    kern : (nj,) up to 1: the resultant is within the kern; NaN without compression, and of slivers [-]
-    friction_use : (nj,) shear over the strength of friction and cohesion; NaN where that is zero [-]
-    slipping, open : (nj,) parts of its contact area that slip, that transmit nothing; NaN where it has none [-]
-    gap : (nj,) largest [m]
-    opening, sliding : (nj,) largest since the start [m]
-    width : (nj,) as surveyed, which is the thickness of its mortar; NaN where not known [m]; None: not known of any
-    """
-
-    stones: Ints
-    centroid: Array
-    normal: Array
-    area: Array
-    parted: Bools
-    force_normal: Array
-    force_shear: Array
-    pressure_mean: Array
-    pressure_max: Array
-    kern: Array
-    friction_use: Array
-    slipping: Array
-    open: Array
-    gap: Array
-    opening: Array
-    sliding: Array
-    width: Array | None = None
-
-
-@dataclass(frozen=True)
-class ContactArrays:
-    """The contact points at the end of a run, in the frame of the site.
-
-    Attributes
-    ----------
-    stones : (nc, 2) indices into `RunRecord.results`: candidate, antagonist; the force acts on the candidate
-    joint : (nc,) number of its joint; -1: none
-    point : (nc, 3) [m]
-    normal : (nc, 3) unit normal from the antagonist to the candidate
-    force : (nc, 3) mean force over the last step, world axes [N]
-    area : (nc,) that the point stands for; zero between edges [m²]
-    gap : (nc,) [m]
-    opening, slide : (nc,) since the start [m]
-    status : (nc,) open, stick, slip, bonded or broken
-    """
-
-    stones: Ints
-    joint: Ints
-    point: Array
-    normal: Array
-    force: Array
-    area: Array
-    gap: Array
-    opening: Array
-    slide: Array
-    status: Texts
 
 
 @dataclass(frozen=True)
@@ -211,7 +147,8 @@ class RunRecord:
     steps : how many were done
     simulated, wall : simulated time and time of work [s]
     errors : its error measures
-    joints, contacts : at its end; None if they are not kept
+    joints, contacts : columns of the tables `joint_result` and `contact_point` at its end, without run and number, with
+        `first` and `second`, or `candidate` and `antagonist`, indices into `results`; None if they are not kept
     simplifications : of its stones; () if they are not kept
     mechanisms : of an assessment, the stones that move by the name of its load
     cells : of a run of disks, the columns of the rows of each cell by its name: at least step and time; NaN: unknown
@@ -229,8 +166,8 @@ class RunRecord:
     simulated: float | None = None
     wall: float | None = None
     errors: ErrorMeasures = field(default_factory=ErrorMeasures)
-    joints: JointArrays | None = None
-    contacts: ContactArrays | None = None
+    joints: Columns | None = None
+    contacts: Columns | None = None
     simplifications: tuple[SimplificationRecord, ...] = ()
     mechanisms: Mapping[str, tuple[MovingStone, ...]] = field(default_factory=dict)
     cells: Mapping[str, Mapping[str, Array]] = field(default_factory=dict)

@@ -9,19 +9,19 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import select
+from sqlalchemy import Float, select
 from sqlalchemy.orm import Session
 
 from archmodel.arrays import Array, Ints
 from archmodel.store.bulk import batches, insert_rows
 from archmodel.store.run_record import (
-    ContactArrays,
-    JointArrays,
+    Columns,
     RunRecord,
     SimplificationRecord,
     StoneResult,
 )
 from archmodel.store.stone_rows import storable
+from archmodel.tables.base import Base
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Entry, new_entry
 from archmodel.tables.runs import (
@@ -38,22 +38,18 @@ from ground.errors import DatabaseError
 
 __all__ = [
     "cell_rows",
-    "contact_rows",
-    "joint_rows",
     "plain",
     "result_row",
     "run_row",
     "simplification_row",
     "store_run",
+    "table_rows",
 ]
 
 _CHUNK = 5_000
 """Rows that are Python objects at a time, so that of a million contact points only the arrays are in memory."""
 
-_JOINT_NUMBERS = ("area", "force_normal", "force_shear", "gap", "opening", "sliding")
-_JOINT_UNKNOWNS = ("pressure_mean", "pressure_max", "kern", "friction_use", "slipping", "open")
 _MOTION = ("speed", "vx", "vy", "vz", "wx", "wy", "wz")
-_CONTACT_NUMBERS = ("area", "gap", "opening", "slide")
 
 
 def run_row(run: RunRecord, place: str) -> dict[str, object]:
@@ -70,7 +66,7 @@ def run_row(run: RunRecord, place: str) -> dict[str, object]:
         "scene_text": storable(run.scene_text),
         "outcome": str(run.outcome),
         "steps": run.steps,
-        "contacts": None if run.contacts is None else len(run.contacts.joint),
+        "contacts": None if run.contacts is None else len(run.contacts["joint"]),
         "versions": {str(name): str(version) for name, version in run.versions.items()},
         "summary": plain(run.summary, "summary", place),
         **{name: _finite(value, name, place) for name, value in numbers.items()},
@@ -126,54 +122,64 @@ def simplification_row(record: SimplificationRecord, place: str) -> dict[str, ob
     }
 
 
-def joint_rows(joints: JointArrays, entities: Ints, run: int, place: str) -> Iterator[dict[str, Any]]:
-    """Return the rows of the `joint_result` table, all checked before the first is yielded.
+def table_rows(
+    table: type[Base], columns: Columns, entities: Ints, run: int, place: str
+) -> Iterator[dict[str, Any]]:
+    """Return the rows of a table of results, all checked before the first is yielded.
 
     Parameters
     ----------
-    joints : the arrays
+    table : with a column `run_id`
+    columns : of the table, without those of the run and, if its rows are numbered, the number; NaN where unknown.
+        In place of `first_id` there may be `first`, an index into `entities`; likewise for other stones
     entities : (n,) primary keys of the run's stones
     run : number of the run
     place : names the run in errors
+
+    Raises
+    ------
+    DatabaseError
+        if the columns are not those of the table, a number is not finite, or a stone is not one of the run
     """
-    columns: dict[str, NDArray[Any]] = {"number": np.arange(len(joints.area))}
-    columns |= _stones(joints.stones, entities, ("first_id", "second_id"), place)
-    columns |= _vectors(joints.centroid, ("x", "y", "z"), place)
-    columns |= _vectors(joints.normal, ("nx", "ny", "nz"), place)
-    columns |= {name: _all_finite(getattr(joints, name), name, place) for name in _JOINT_NUMBERS}
-    columns |= {name: _known(getattr(joints, name), name, place) for name in _JOINT_UNKNOWNS}
-    width = np.full(len(joints.area), np.nan) if joints.width is None else joints.width
-    columns["width"] = _known(width, "width", place)
-    return _rows(columns | {"parted": np.asarray(joints.parted, dtype=bool)}, run)
+    count = len(next(iter(columns.values())))
+    given: dict[str, NDArray[Any]] = {"number": np.arange(count), **columns}
+    wanted = [column for column in table.__table__.columns if column.name != "run_id"]
+    named = {column.name: column.name.removesuffix("_id") for column in wanted}
+    if "number" not in named:
+        del given["number"]
+    if wrong := sorted(set(given) ^ set(named.values())):
+        raise DatabaseError(f"the columns are not those of the table: {', '.join(wrong)}", where=place)
+    checked = {}
+    for column in wanted:
+        values = given[named[column.name]]
+        if column.foreign_keys:
+            values = _entities_of(values, entities, place)
+        elif isinstance(column.type, Float):
+            check = _known if column.nullable else _all_finite
+            values = check(values, column.name, place)
+        elif column.nullable:
+            values = np.ma.masked_less(values, 0)
+        checked[column.name] = values
+    return _rows(checked, run)
 
 
-def contact_rows(contacts: ContactArrays, entities: Ints, run: int, place: str) -> Iterator[dict[str, Any]]:
-    """Return the rows of the `contact_point` table; as `joint_rows`."""
-    joint = np.ma.masked_less(contacts.joint, 0)
-    columns: dict[str, NDArray[Any]] = {"number": np.arange(len(joint)), "joint": joint}
-    columns |= _stones(contacts.stones, entities, ("candidate_id", "antagonist_id"), place)
-    columns |= _vectors(contacts.point, ("x", "y", "z"), place)
-    columns |= _vectors(contacts.normal, ("nx", "ny", "nz"), place)
-    columns |= _vectors(contacts.force, ("fx", "fy", "fz"), place)
-    columns |= {name: _all_finite(getattr(contacts, name), name, place) for name in _CONTACT_NUMBERS}
-    return _rows(columns | {"status": np.asarray(contacts.status)}, run)
-
-
-def cell_rows(cells: Mapping[str, Mapping[str, Array]], run: int, place: str) -> Iterator[dict[str, Any]]:
-    """Return the rows of the `cell_result` table; as `joint_rows`."""
-    known = [column.name for column in CellResult.__table__.columns if column.name not in ("run_id", "cell")]
-    chains = []
-    for name, given in cells.items():
-        if wrong := sorted(set(given) ^ set(known)):
-            raise DatabaseError(
-                f"cell {name!r} has not the columns of the table: {', '.join(wrong)}", where=place
-            )
-        columns: dict[str, NDArray[Any]] = {"cell": np.full(len(given["step"]), storable(name))}
-        columns["step"] = np.asarray(given["step"], dtype=np.int64)
-        columns["time"] = _all_finite(given["time"], "time", place)
-        columns |= {one: _known(given[one], one, place) for one in known if one not in ("step", "time")}
-        chains.append(_rows(columns, run))
-    return chain.from_iterable(chains)
+def cell_rows(cells: Mapping[str, Columns], run: int, place: str) -> Iterator[dict[str, Any]]:
+    """Return the rows of the `cell_result` table; as `table_rows`."""
+    none = np.zeros(0, dtype=np.int64)
+    return chain.from_iterable(
+        table_rows(
+            CellResult,
+            {
+                "cell": np.full(len(given["step"]), storable(name)),
+                **given,
+                "step": np.asarray(given["step"], dtype=np.int64),
+            },
+            none,
+            run,
+            f"{place}, cell {name!r}",
+        )
+        for name, given in cells.items()
+    )
 
 
 def _rows(columns: Mapping[str, NDArray[Any]], run: int) -> Iterator[dict[str, Any]]:
@@ -185,18 +191,11 @@ def _rows(columns: Mapping[str, NDArray[Any]], run: int) -> Iterator[dict[str, A
             yield dict(zip(names, row, strict=True))
 
 
-def _stones(stones: Ints, entities: Ints, names: tuple[str, str], place: str) -> dict[str, NDArray[Any]]:
-    """Replace the indices of the two stones by their primary keys."""
+def _entities_of(stones: Ints, entities: Ints, place: str) -> Ints:
+    """Return the primary keys of stones by their indices."""
     if len(stones) and not (stones.min() >= 0 and stones.max() < len(entities)):
-        raise DatabaseError(
-            f"a pair of stones is not among the {len(entities)} stones of the run", where=place
-        )
-    return {name: entities[stones[:, side]] for side, name in enumerate(names)}
-
-
-def _vectors(values: Array, names: tuple[str, str, str], place: str) -> dict[str, NDArray[Any]]:
-    """Return the three components by name."""
-    return {name: _all_finite(values[:, axis], name, place) for axis, name in enumerate(names)}
+        raise DatabaseError(f"a stone is not among the {len(entities)} stones of the run", where=place)
+    return entities[stones]
 
 
 def _all_finite(values: Array, name: str, place: str) -> Array:
@@ -259,9 +258,10 @@ def store_run(session: Session, run: RunRecord) -> int:
         insert_rows(session, EntityResult, _results(run, numbers, stored.id, place))
         insert_rows(session, Simplification, _simplifications(run, numbers, stored.id, place))
         if run.joints is not None:
-            insert_rows(session, JointResult, joint_rows(run.joints, entities, stored.id, f"{place}, joints"))
+            rows = table_rows(JointResult, run.joints, entities, stored.id, f"{place}, joints")
+            insert_rows(session, JointResult, rows)
         if run.contacts is not None:
-            rows = contact_rows(run.contacts, entities, stored.id, f"{place}, contact points")
+            rows = table_rows(ContactPoint, run.contacts, entities, stored.id, f"{place}, contact points")
             insert_rows(session, ContactPoint, rows)
         insert_rows(session, MechanismStone, _moving(session, run, stored.id, place))
         insert_rows(session, CellResult, cell_rows(run.cells, stored.id, f"{place}, cells"))

@@ -11,18 +11,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from archmodel.database.session import Database
 from archmodel.store.run_record import (
-    ContactArrays,
+    Columns,
     ErrorMeasures,
-    JointArrays,
     RunRecord,
     SimplificationRecord,
     StoneResult,
 )
 from archmodel.store.runs import store_run
 from archmodel.store.stone_rows import solid_volume
+from archmodel.tables.runs import ContactPoint
+from archmodel.tables.runs import JointResult as JointRow
 from ground.errors import DatabaseError
 from mechanics.arrays import Array
 from mechanics.results.contact_result import ContactResult, JointResult
@@ -34,9 +36,9 @@ from pipelines.scene.file import SceneFile
 from survey.joints.report import ClosingReport, StoneJoint
 
 __all__ = [
-    "contact_arrays",
+    "contact_columns",
     "error_measures",
-    "joint_arrays",
+    "joint_columns",
     "run_record",
     "settings_of",
     "simplifications",
@@ -82,33 +84,49 @@ def run_record(
         simulated=result.time,
         wall=summary["time"]["wall"],
         errors=error_measures(result.errors),
-        joints=joint_arrays(
+        joints=joint_columns(
             result.joints,
             assembly.origin,
             surveyed_widths(result.joints, [block.code for block in result.scene.blocks], assembly.closing),
         ),
-        contacts=contact_arrays(result.contacts, assembly.origin),
+        contacts=contact_columns(result.contacts, assembly.origin),
         simplifications=tuple(
             simplification for simplification in simplifications(assembly) if simplification.code in standing
         ),
     )
 
 
-def joint_arrays(joints: JointResult, origin: Array, widths: Array) -> JointArrays:
+def joint_columns(joints: JointResult, origin: Array, widths: Array) -> Columns:
     """Return the joints in the frame of the site, given the scene's `origin` (3,) and surveyed `widths` (nj,) [m]."""
-    values = joint_values(joints, slivers=False) | {
-        "stones": joints.bodies,
-        "centroid": joints.centroid + origin,
-        "normal": joints.frame[:, 0],
-        "width": widths,
-    }
-    return JointArrays(**{one.name: values[one.name] for one in fields(JointArrays)})
+    values = joint_values(joints, origin, slivers=False) | _components("n", joints.frame[:, 0])
+    values |= {"first": joints.bodies[:, 0], "second": joints.bodies[:, 1], "width": widths}
+    return {name: values[name] for name in _named_columns(JointRow)}
 
 
-def contact_arrays(contacts: ContactResult, origin: Array) -> ContactArrays:
+def contact_columns(contacts: ContactResult, origin: Array) -> Columns:
     """Return the contact points in the frame of the site, given the scene's `origin` (3,) [m]."""
-    own = {"stones": contacts.bodies, "point": contacts.point + origin}
-    return ContactArrays(**_shared(ContactArrays, contacts) | own)
+    values = {
+        "candidate": contacts.bodies[:, 0],
+        "antagonist": contacts.bodies[:, 1],
+        **_components("", contacts.point + origin),
+        **_components("n", contacts.normal),
+        **_components("f", contacts.force),
+    }
+    return {
+        name: values[name] if name in values else getattr(contacts, name)
+        for name in _named_columns(ContactPoint)
+    }
+
+
+def _components(prefix: str, vectors: Array) -> dict[str, NDArray[np.generic]]:
+    """Return the components of vectors (n, 3) by the names of their columns."""
+    return {f"{prefix}{axis}": column for axis, column in zip("xyz", vectors.T, strict=True)}
+
+
+def _named_columns(table: type[JointRow] | type[ContactPoint]) -> list[str]:
+    """Return the columns of a table that a record gives, stones without the ending of their keys."""
+    names = (column.name.removesuffix("_id") for column in table.__table__.columns)
+    return [name for name in names if name not in ("run", "number")]
 
 
 def surveyed_widths(joints: JointResult, codes: Sequence[str], closing: ClosingReport) -> Array:

@@ -20,7 +20,7 @@ from archmodel.assertions.statements import (
 from archmodel.database.session import Database
 from archmodel.describe.entity import describe
 from archmodel.store.find_by_code import subjects
-from archmodel.store.run_record import JointArrays
+from archmodel.store.run_record import Columns
 from archmodel.store.runs import store_run
 from archmodel.tables.entries import new_entry
 from tests.archmodel.stones import run_record
@@ -118,34 +118,19 @@ def test_structures_and_relations_are_seen_from_the_stone(filled: Database) -> N
     assert before["knowledge"]["material"] is None  # type: ignore[index]
 
 
-def joint_arrays(force: float) -> JointArrays:
+def joint_columns(force: float) -> Columns:
     """One joint, between the two stones of a run."""
-    one = np.ones(1)
-    return JointArrays(
-        stones=np.array([[0, 1]]),
-        centroid=np.zeros((1, 3)),
-        normal=np.array([[0.0, 0.0, 1.0]]),
-        area=0.06 * one,
-        force_normal=force * one,
-        force_shear=0.0 * one,
-        pressure_mean=np.nan * one,
-        pressure_max=2e5 * one,
-        kern=0.5 * one,
-        friction_use=0.1 * one,
-        slipping=0.0 * one,
-        open=0.0 * one,
-        gap=0.0 * one,
-        opening=0.0 * one,
-        sliding=0.0 * one,
-        parted=np.zeros(1, dtype=bool),
-    )
+    given = {"second": 1, "nz": 1.0, "area": 0.06, "force_normal": force, "pressure_mean": np.nan}
+    given |= {"pressure_max": 2e5, "kern": 0.5, "friction_use": 0.1, "width": np.nan}
+    names = "first x y z nx ny parted force_shear slipping open gap opening sliding"
+    return {name: np.array([value]) for name, value in (dict.fromkeys(names.split(), 0) | given).items()}
 
 
 def test_the_joints_are_those_of_the_latest_run(filled: Database) -> None:
     with filled.session() as session:
         for force in (900.0, 1200.0):
             record = run_record({"V2": 4e5, "V3": None})
-            store_run(session, replace(record, joints=joint_arrays(force)))
+            store_run(session, replace(record, joints=joint_columns(force)))
         told = {code: describe(session, code)["joints"] for code in ("V2", "V3", "V1")}
     (joint,) = told["V3"]  # type: ignore[misc]
     assert (joint["neighbour"], joint["force_normal"], joint["pressure_max"]) == ("V2", 1200.0, 2e5)

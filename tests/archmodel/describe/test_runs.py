@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 
 from archmodel.database.session import Database
 from archmodel.describe.runs import compare_runs, describe_run, list_runs
-from archmodel.store.run_record import ErrorMeasures, JointArrays, SimplificationRecord
+from archmodel.store.run_record import Columns, ErrorMeasures, SimplificationRecord
 from archmodel.store.runs import store_run
 from ground.errors import UsageError
 from tests.archmodel.stones import run_record
@@ -17,28 +17,14 @@ from tests.archmodel.stones import run_record
 NAN = float("nan")
 
 
-def joints(opening: list[float], kern: list[float], friction_use: list[float]) -> JointArrays:
+def joints(opening: list[float], kern: list[float], friction_use: list[float]) -> Columns:
     """Joints in the order V1 on V2, V2 on V3, V1 on V3, equal but for what is given."""
-    ones = np.ones(3)
-    return JointArrays(
-        stones=np.array([[0, 1], [1, 2], [0, 2]]),
-        centroid=np.zeros((3, 3)),
-        normal=np.tile([0.0, 0.0, 1.0], (3, 1)),
-        area=ones,
-        parted=ones < 0,
-        force_normal=ones,
-        force_shear=ones,
-        pressure_mean=ones,
-        pressure_max=ones,
-        kern=np.array(kern),
-        friction_use=np.array(friction_use),
-        slipping=ones,
-        open=ones,
-        gap=ones,
-        opening=np.array(opening),
-        sliding=ones,
-        width=np.array([0.01, NAN, 0.012]),
-    )
+    given = {"first": [0, 1, 0], "second": [1, 2, 2], "nz": [1.0] * 3, "parted": [False] * 3}
+    given |= {"opening": opening, "kern": kern, "friction_use": friction_use, "width": [0.01, NAN, 0.012]}
+    names = ("area", "force_normal", "force_shear", "pressure_mean", "pressure_max", "slipping", "open")
+    constant = dict.fromkeys((*names, "gap", "sliding"), [1.0] * 3)
+    constant |= dict.fromkeys(("x", "y", "z", "nx", "ny"), [0.0] * 3)
+    return {name: np.array(values) for name, values in (constant | given).items()}
 
 
 def solid(code: str, moved: float, shape: str | None = None, within: bool = True) -> SimplificationRecord:
@@ -118,7 +104,7 @@ def test_the_worst_joints_are_those_of_the_run_itself_and_the_worst_of_all(fille
             told, run = describe_run(session, number, count=2), runs[number - numbers[0]]
             for name, column in columns.items():
                 assert [(row["first"], row["second"]) for row in told[name]] == [*pairs]
-                worst = sorted(getattr(run.joints, column), reverse=True)[:2]
+                worst = sorted(run.joints[column], reverse=True)[:2]
                 assert [row[column] for row in told[name]] == worst
 
 

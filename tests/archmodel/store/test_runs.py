@@ -9,9 +9,8 @@ from sqlalchemy import func, select
 
 from archmodel.database.session import Database
 from archmodel.store.run_record import (
-    ContactArrays,
+    Columns,
     ErrorMeasures,
-    JointArrays,
     RunRecord,
     SimplificationRecord,
     StoneResult,
@@ -31,13 +30,14 @@ SOLID = SimplificationRecord(
 )
 
 
-def joints(**values: Any) -> JointArrays:
+def joints(**values: Any) -> Columns:
     """Two joints, V1 on V2 and V2 on V3, with every number another; `values` in place of some."""
     numbers = np.arange(2.0)
     columns: dict[str, Any] = {
-        "stones": np.array([[0, 1], [1, 2]]),
-        "centroid": np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]),
-        "normal": np.array([[0.0, 0.0, 1.0], [0.6, 0.0, 0.8]]),
+        "first": np.array([0, 1]),
+        "second": np.array([1, 2]),
+        **dict(zip("xyz", np.array([[1.0, 4.0], [2.0, 5.0], [3.0, 6.0]]), strict=True)),
+        **dict(zip(("nx", "ny", "nz"), np.array([[0.0, 0.6], [0.0, 0.0], [1.0, 0.8]]), strict=True)),
         "area": numbers + 10,
         "parted": np.array([False, True]),
         "force_normal": numbers + 20,
@@ -51,27 +51,34 @@ def joints(**values: Any) -> JointArrays:
         "gap": numbers + 100,
         "opening": numbers + 110,
         "sliding": numbers + 120,
+        "width": np.full(2, NAN),
     }
-    return JointArrays(**columns | values)
+    return columns | values
 
 
-def contacts(count: int = 3, **values: Any) -> ContactArrays:
+def contacts(count: int = 3, **values: Any) -> Columns:
     """Points between V1 and V2, every number another; `values` in place of some."""
     numbers = np.arange(float(count))
-    triples = numbers[:, None] + [0.1, 0.2, 0.3]
     columns: dict[str, Any] = {
-        "stones": np.tile([0, 1], (count, 1)),
+        "candidate": np.zeros(count, dtype=np.int64),
+        "antagonist": np.ones(count, dtype=np.int64),
         "joint": np.arange(count) - 1,
-        "point": triples,
-        "normal": triples + 1e6,
-        "force": triples + 2e6,
+        **{name: numbers + shift for name, shift in zip("xyz", (0.1, 0.2, 0.3), strict=True)},
+        **{
+            name: numbers + shift + 1e6
+            for name, shift in zip(("nx", "ny", "nz"), (0.1, 0.2, 0.3), strict=True)
+        },
+        **{
+            name: numbers + shift + 2e6
+            for name, shift in zip(("fx", "fy", "fz"), (0.1, 0.2, 0.3), strict=True)
+        },
         "area": numbers + 0.5,
         "gap": numbers + 0.6,
         "opening": numbers + 0.7,
         "slide": numbers + 0.8,
         "status": np.array(["open", "stick", "slip", "bonded", "broken"])[np.arange(count) % 5],
     }
-    return ContactArrays(**columns | values)
+    return columns | values
 
 
 def test_a_run_is_kept_with_its_results(filled: Database) -> None:
@@ -109,16 +116,17 @@ def test_a_run_is_kept_with_its_results(filled: Database) -> None:
             "stone V2: the corners of its solid are not",
         ),
         (
-            replace(PLAIN, joints=joints(stones=np.array([[0, 1], [1, 3]]))),
+            replace(PLAIN, joints=joints(second=np.array([1, 3]))),
             "not among the 3 stones of the run",
         ),
         (
-            replace(PLAIN, joints=joints(stones=np.array([[0, 1], [-1, 1]]))),
+            replace(PLAIN, joints=joints(first=np.array([0, -1]))),
             "not among the 3 stones of the run",
         ),
         (replace(PLAIN, joints=joints(area=np.array([1.0, NAN]))), "joints, number 1: area is nan"),
         (replace(PLAIN, joints=joints(kern=np.array([NAN, INF]))), "joints, number 1: kern is inf"),
-        (replace(PLAIN, contacts=contacts(point=np.full((3, 3), NAN))), "contact points, number 0: x is nan"),
+        (replace(PLAIN, joints=joints(depth=np.zeros(2))), "columns are not those of the table: depth"),
+        (replace(PLAIN, contacts=contacts(x=np.full(3, NAN))), "contact points, number 0: x is nan"),
         (
             replace(PLAIN, joints=joints(), contacts=contacts(1100, slide=np.append(np.zeros(1099), -INF))),
             "contact points, number 1099: slide is -inf",
@@ -188,10 +196,9 @@ def test_contact_points_of_any_number_come_out_in_order(filled: Database, count:
     assert [row.number for row in rows] == list(range(count))
     assert [row.joint for row in rows] == [None, *range(count - 1)]
     assert {(codes[row.candidate_id], codes[row.antagonist_id]) for row in rows} == {("V1", "V2")}
-    assert [row.status for row in rows] == given.status.tolist()
-    stored = np.array([[row.x, row.y, row.z, row.nx, row.fz, row.area, row.gap, row.slide] for row in rows])
-    wanted = [*given.point.T, given.normal[:, 0], given.force[:, 2], given.area, given.gap, given.slide]
-    np.testing.assert_array_equal(stored, np.column_stack(wanted))
+    assert [row.status for row in rows] == given["status"].tolist()
+    for name in ("x", "y", "z", "nx", "fz", "area", "gap", "slide"):
+        np.testing.assert_array_equal([getattr(row, name) for row in rows], given[name])
 
 
 def test_solids_settings_and_errors_are_kept(filled: Database) -> None:

@@ -18,7 +18,7 @@ from pipelines.reports.run import write_report
 from pipelines.results.run_csv import write_joints, write_series
 from pipelines.results.stone_values import stone_results
 from pipelines.results.summary import indeterminacy, length_tolerance, summarise
-from pipelines.run.record import joint_arrays
+from pipelines.run.record import joint_columns
 from pipelines.run.run import RunReport
 from tests.pipelines.reports.page import Page
 from tests.pipelines.results_by_hand import deformable_body, joints_of, result_of, rigid_body
@@ -160,9 +160,9 @@ def test_slivers_count_apart(splintered, tmp_path):
     assert _heading(splintered, "pressure")[1] == "largest: 2 kPa, between base and A-1; without slivers (1)"
     values = [stone.values["joint_pressure"] for stone in stone_results(splintered)]
     assert values == pytest.approx([3000.0, 3000.0, 1500.0])
-    record = joint_arrays(splintered.joints, np.zeros(3), np.full(3, np.nan))
-    assert np.isnan([record.pressure_max[2], record.pressure_mean[2], record.kern[2]]).all()
-    assert record.force_normal[2] == pytest.approx(18504.0)
+    record = joint_columns(splintered.joints, np.zeros(3), np.full(3, np.nan))
+    assert np.isnan([record[name][2] for name in ("pressure_max", "pressure_mean", "kern")]).all()
+    assert record["force_normal"][2] == pytest.approx(18504.0)
     write_joints(tmp_path / "joints.csv", splintered, np.zeros(3))
     rows = lines_of(tmp_path / "joints.csv")
     assert [row["sliver"] for row in rows] == ["0", "0", "1"]
