@@ -81,8 +81,16 @@ WAYS_OUT: Mapping[str, str] = {
 }  # fmt: skip
 """Ways out for files that are not read, or not without a format, by ending."""
 
+_START = 4096  # bytes of a file, by which formats are told apart
+
+_SOLIDS_BY_CONTENTS = {
+    ".json": (b'"compas.', b'"compas_'),
+    ".dat": (b"! File BODIES", b"$bdyty"),
+}
+"""Words at the start of files of solids whose ending others have too: kinds of COMPAS, BODIES.DAT of LMGC90."""
+
 SOLIDS = ENDINGS["solids"]
-"""Endings of files of solids."""
+"""Endings of files of solids; `.json` of COMPAS and `BODIES.DAT` of LMGC90 are solids by their contents."""
 
 
 def format_of(path: Path) -> str:
@@ -95,7 +103,7 @@ def format_of(path: Path) -> str:
     """
     try:
         with path.open("rb") as handle:
-            start = handle.read(2000)
+            start = handle.read(_START)
     except OSError as error:
         raise unreadable(path, error, "give an existing survey file") from error
     ending = path.suffix.lower()
@@ -103,6 +111,8 @@ def format_of(path: Path) -> str:
         return "moma"
     if ending == ".xml" and b"<JOBFile" in start:
         return "jobxml"
+    if any(word in start for word in _SOLIDS_BY_CONTENTS.get(ending, ())):
+        return "solids"
     for format, endings in ENDINGS.items():
         if ending in endings:
             return format

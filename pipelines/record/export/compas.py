@@ -1,7 +1,7 @@
 """Block models and results as COMPAS (compas_dem 0.6) writes them: plain JSON, without COMPAS."""
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from archmodel.tables.entities import Entity
 from archmodel.tables.runs import ContactPoint, EntityResult, JointResult
 from mechanics.arrays import Array
 from pipelines.record.export.building import Building, stable_uuid
+from pipelines.record.export.compas_contacts import PairContact, contact_document, results_document
 
 __all__ = ["model_content", "results_content"]
 
@@ -29,8 +30,9 @@ def model_content(building: Building, session: Session) -> bytes:
             EntityResult.run_id == building.run, EntityResult.fidelity == "fixed"
         )  # fmt: skip
         supports = {str(code) for code in session.scalars(fixed)}
-        for first, second, contact in _contacts(building, session):
-            edges[str(first)].setdefault(str(second), {"contacts": []})["contacts"].append(contact)
+        for one in _contacts(building, session):
+            edge = edges[str(one.first)].setdefault(str(one.second), {"contacts": []})
+            edge["contacts"].append(contact_document(one))
     used = building.values("material")
     names = sorted({str(name) for name in used if name is not None})
     materials = {str(stable_uuid("material", name)): _material(building, name) for name in names}
@@ -71,41 +73,14 @@ def model_content(building: Building, session: Session) -> bytes:
 
 def results_content(building: Building, session: Session) -> bytes:
     """Return the `Results` of a run: by edge of the graph its resultant, its points and their forces."""
-    edges: dict[str, dict[str, Any]] = {}
-    for first, second, contact in _contacts(building, session):
-        forces = contact["data"]["forces"]
-        frame = contact["data"]["frame"]["data"]
-        axes = [np.array(frame["xaxis"]), np.array(frame["yaxis"])]
-        axes.append(np.cross(axes[0], axes[1]))
-        local = np.array(
-            [[force["c_u"], force["c_v"], force["c_np"] - force["c_nn"]] for force in forces]
-        ).reshape(-1, 3)
-        total = local.sum(axis=0)
-        points = [point["data"] for point in contact["data"]["points"]]
-        edges[f"{first},{second}"] = {
-            "contact_data": contact,
-            "contact_points": points,
-            "contact_frame": contact["data"]["frame"],
-            "face_contact": len(points) >= 3,
-            "edge_contact": len(points) == 2,
-            "point_contact": len(points) == 1,
-            "force_normal": local[:, 2].tolist(),
-            "force_tangent1": local[:, 0].tolist(),
-            "force_tangent2": local[:, 1].tolist(),
-            "resultant_local": total.tolist(),
-            "resultant_global": (total @ np.array(axes)).tolist(),
-            "force_magnitude": float(np.linalg.norm(total)),
-        }
-    data = {
-        "model_id": _model_guid(building),
-        "problem_id": str(stable_uuid("problem", str(building.run))),
-        "displacement_scale": 1.0,
-        "node_data": {},
-        "edge_data": edges,
-        "metadata": {"solver": "MOMA", "run": building.run, "outcome": building.outcome},
-    }
-    guid = str(stable_uuid("results", str(building.run)))
-    return _written({"dtype": "compas_dem.problem/Results", "data": data, "name": "Results", "guid": guid})
+    guids = (str(stable_uuid("results", str(building.run))), _model_guid(building))
+    document = results_document(
+        (*guids, str(stable_uuid("problem", str(building.run)))),
+        _contacts(building, session),
+        {},
+        {"solver": "MOMA", "run": building.run, "outcome": building.outcome},
+    )
+    return _written(document)
 
 
 def _model_guid(building: Building) -> str:
@@ -169,8 +144,8 @@ def _material(building: Building, name: str) -> dict[str, Any]:
     return {"dtype": "compas_dem.material/Stone", "data": data, "name": name, "guid": guid}
 
 
-def _contacts(building: Building, session: Session) -> Iterator[tuple[int, int, dict[str, Any]]]:
-    """Yield rows of both stones and the contact of each joint of the run that has points."""
+def _contacts(building: Building, session: Session) -> Iterator[PairContact]:
+    """Yield the joints of the run that have contact points, between rows of the stones."""
     rows = {code: row for row, code in enumerate(building.codes)}
     codes = {number: str(code) for number, code in session.execute(select(Entity.id, Entity.code))}
     points: dict[int, list[ContactPoint]] = {}
@@ -179,57 +154,20 @@ def _contacts(building: Building, session: Session) -> Iterator[tuple[int, int, 
         points.setdefault(int(one.joint or 0), []).append(one)
     joints = select(JointResult).where(JointResult.run_id == building.run).order_by(JointResult.number)
     for joint in session.scalars(joints):
-        first, second = (rows.get(codes[number]) for number in (joint.first_id, joint.second_id))
+        ends = (codes[joint.first_id], codes[joint.second_id])
+        first, second = (rows.get(code) for code in ends)
         some = points.get(joint.number, [])
-        if first is not None and second is not None and some:
-            yield first, second, _contact(joint, some, f"{codes[joint.first_id]}\x1f{codes[joint.second_id]}")
-
-
-def _contact(joint: JointResult, points: Sequence[ContactPoint], name: str) -> dict[str, Any]:
-    """Return a contact with the forces on the first stone, in its frame."""
-    normal = np.array([joint.nx, joint.ny, joint.nz])
-    x, y = _tangents(normal)
-    places = np.array([[one.x, one.y, one.z] for one in points])
-    # forces of points act on the candidate, those of the joint on its first stone
-    signs = np.array([1.0 if one.candidate_id == joint.first_id else -1.0 for one in points])
-    forces = np.array([[one.fx, one.fy, one.fz] for one in points]) * signs[:, None]
-    order = _around(places, x, y)
-    guid = str(stable_uuid("contact", name, str(joint.number)))
-    centre = [joint.x, joint.y, joint.z]
-    data = {
-        "name": "FrictionContact",
-        "points": [_geometry("Point", guid, at, places[at].tolist()) for at in order],
-        "frame": _geometry(
-            "Frame", guid, "frame", {"point": centre, "xaxis": x.tolist(), "yaxis": y.tolist()}
-        ),
-        "size": joint.area,
-        "mesh": None,
-        "holes": None,
-        "forces": [_force(forces[at], x, y, normal) for at in order],
-    }
-    return {"dtype": "compas_dem.interactions/FrictionContact", "data": data, "guid": guid}
-
-
-def _force(force: Array, x: Array, y: Array, normal: Array) -> dict[str, float]:
-    along = float(force @ normal)
-    pressing, pulling = max(along, 0.0), max(-along, 0.0)
-    return {"c_np": pressing, "c_nn": pulling, "c_u": float(force @ x), "c_v": float(force @ y)}
-
-
-def _geometry(kind: str, guid: str, at: object, data: object) -> dict[str, Any]:
-    return {"dtype": f"compas.geometry/{kind}", "data": data, "guid": str(stable_uuid(guid, kind, str(at)))}
-
-
-def _tangents(normal: Array) -> tuple[Array, Array]:
-    """Return two unit vectors that make a right-handed frame with a normal."""
-    axis = np.zeros(3)
-    axis[np.argmin(np.abs(normal))] = 1.0
-    x = np.cross(axis, normal)
-    x /= np.linalg.norm(x)
-    return x, np.asarray(np.cross(normal, x))
-
-
-def _around(places: Array, x: Array, y: Array) -> list[int]:
-    """Return points in the order in which they lie around their middle."""
-    arms = places - places.mean(axis=0)
-    return [int(at) for at in np.argsort(np.arctan2(arms @ y, arms @ x), kind="stable")]
+        if first is None or second is None or not some:
+            continue
+        # forces of points act on the candidate, those of the joint on its first stone
+        signs = np.array([1.0 if one.candidate_id == joint.first_id else -1.0 for one in some])
+        yield PairContact(
+            first,
+            second,
+            "\x1f".join((*ends, str(joint.number))),
+            np.array([joint.x, joint.y, joint.z]),
+            np.array([joint.nx, joint.ny, joint.nz]),
+            joint.area,
+            np.array([[one.x, one.y, one.z] for one in some]),
+            np.array([[one.fx, one.fy, one.fz] for one in some]) * signs[:, None],
+        )

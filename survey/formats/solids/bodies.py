@@ -45,6 +45,7 @@ class RawBody:
     end : the line after it
     resolution : rounding of the file's numbers [m]
     error : the first error in its lines; None if there is none
+    kind : of the stone, where the file states it; None: it does not
     """
 
     name: str
@@ -54,6 +55,7 @@ class RawBody:
     end: int = 0
     resolution: float = 0.0
     error: SurveyError | None = None
+    kind: str | None = None
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
-"""Closed solids from other programs: OBJ, PLY, STL and Gmsh MSH, one stone per object.
+"""Closed solids from other programs: OBJ, PLY, STL, Gmsh MSH, COMPAS and LMGC90, one stone per object.
 
-An object is an ``o`` (or ``g``) of OBJ, a ``solid`` of STL, a volume of MSH, the whole of a PLY. Where one has several
+An object is an ``o`` (or ``g``) of OBJ, a ``solid`` of STL, a volume of MSH, a block of COMPAS, a polyhedron of LMGC90,
+the whole of a PLY. Where one has several
 bodies, each is a stone: NAME-1, NAME-2, … The name is parsed by the code template, {block}:{kind} by default; if it
 does not fit, it is the code itself, blanks replaced by "_".
 
@@ -20,6 +21,8 @@ from ground.tables.numbers import shown
 from survey.formats.fields import CODE, code_of
 from survey.formats.options import ReadingOptions
 from survey.formats.solids.bodies import ClosedBody, RawBody, closed_bodies
+from survey.formats.solids.compas import compas_bodies
+from survey.formats.solids.lmgc90 import lmgc90_bodies
 from survey.formats.solids.msh.bodies import msh_bodies
 from survey.formats.solids.obj import obj_bodies
 from survey.formats.solids.ply import ply_bodies
@@ -40,6 +43,8 @@ _BODIES: Mapping[str, Callable[[Path], Iterator[RawBody]]] = {
     ".ply": ply_bodies,
     ".stl": stl_bodies,
     ".msh": msh_bodies,
+    ".json": compas_bodies,
+    ".dat": lmgc90_bodies,
 }
 
 
@@ -193,7 +198,7 @@ class _Solids:
             else:
                 self._known.add(code)
                 vertices, faces = body.solid.vertices, body.solid.faces
-                own = kind or self._options.kind
+                own = kind or raw.kind or self._options.kind
                 yield SolidRecord(code, own, course, vertices, faces, raw.line, remarks=_remarks(body))
 
     def _bodies(self, raw: RawBody) -> Iterator[ClosedBody | GeometryError]:
