@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from mechanics.stones.materials import Material
     from pipelines.assess.assess import assess
     from pipelines.ingest.ingest import ingest
+    from pipelines.record.export.compas_solve import moma_solve
     from pipelines.record.record import record
     from pipelines.reports.survey.report import report_surveys
     from pipelines.run.assemble import assemble
@@ -71,6 +72,7 @@ __all__ = [
     "history",
     "ingest",
     "load_path",
+    "moma_solve",
     "open_database",
     "open_survey",
     "read_scene",
@@ -100,6 +102,7 @@ _HOMES = {
     "history": "archmodel.describe.history",
     "ingest": "pipelines.ingest.ingest",
     "load_path": "archmodel.relations.graph",
+    "moma_solve": "pipelines.record.export.compas_solve",
     "open_database": "archmodel.database.session",
     "open_survey": "survey.formats.reading",
     "read_scene": "pipelines.scene.file",

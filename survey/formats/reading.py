@@ -81,8 +81,6 @@ WAYS_OUT: Mapping[str, str] = {
 }  # fmt: skip
 """Ways out for files that are not read, or not without a format, by ending."""
 
-_START = 4096  # bytes of a file, by which formats are told apart
-
 _SOLIDS_BY_CONTENTS = {
     ".json": (b'"compas.', b'"compas_'),
     ".dat": (b"! File BODIES", b"$bdyty"),
@@ -103,7 +101,7 @@ def format_of(path: Path) -> str:
     """
     try:
         with path.open("rb") as handle:
-            start = handle.read(_START)
+            start = handle.read(4096)
     except OSError as error:
         raise unreadable(path, error, "give an existing survey file") from error
     ending = path.suffix.lower()

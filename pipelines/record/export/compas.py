@@ -13,7 +13,13 @@ from archmodel.tables.entities import Entity
 from archmodel.tables.runs import ContactPoint, EntityResult, JointResult
 from mechanics.arrays import Array
 from pipelines.record.export.building import Building, stable_uuid
-from pipelines.record.export.compas_contacts import PairContact, contact_document, results_document
+from pipelines.record.export.compas_contacts import (
+    MEGAPASCAL,
+    POISSON,
+    PairContact,
+    contact_document,
+    results_document,
+)
 
 __all__ = ["model_content", "results_content"]
 
@@ -23,13 +29,14 @@ _MESH_DEFAULTS = {"x": 0.0, "y": 0.0, "z": 0.0}
 def model_content(building: Building, session: Session) -> bytes:
     """Return a `BlockModel` with all stones; with a run, its supports and the joints with their forces."""
     guids = [str(stable_uuid("block", code)) for code in building.codes]
-    supports: set[str] = set()
+    kinds = dict(zip(building.codes, building.kinds, strict=True))
+    supports = {code for code, kind in kinds.items() if kind == "support"}
     edges: dict[str, dict[str, Any]] = {str(row): {} for row in range(len(guids))}
     if building.run is not None:
         fixed = select(Entity.code).join(EntityResult).where(
             EntityResult.run_id == building.run, EntityResult.fidelity == "fixed"
         )  # fmt: skip
-        supports = {str(code) for code in session.scalars(fixed)}
+        supports |= {str(code) for code in session.scalars(fixed)}
         for one in _contacts(building, session):
             edge = edges[str(one.first)].setdefault(str(one.second), {"contacts": []})
             edge["contacts"].append(contact_document(one))
@@ -130,7 +137,7 @@ def _material(building: Building, name: str) -> dict[str, Any]:
 
     def in_megapascals(label: str) -> float | None:
         """Return a property of the material [MPa]; None where not known."""
-        return known[label] / 1e6 if label in known else None
+        return known[label] / MEGAPASCAL if label in known else None
 
     data = {
         "name": name,
@@ -138,7 +145,7 @@ def _material(building: Building, name: str) -> dict[str, Any]:
         "ft": in_megapascals("tensile_strength"),
         "Ecm": in_megapascals("young"),
         "density": known.get("density"),
-        "poisson": known.get("poisson", 0.2),
+        "poisson": known.get("poisson", POISSON),
     }
     guid = str(stable_uuid("material", name))
     return {"dtype": "compas_dem.material/Stone", "data": data, "name": name, "guid": guid}

@@ -9,7 +9,20 @@ import numpy as np
 from mechanics.arrays import Array
 from pipelines.record.export.building import stable_uuid
 
-__all__ = ["PairContact", "contact_document", "results_document", "transformation_document"]
+__all__ = [
+    "MEGAPASCAL",
+    "POISSON",
+    "PairContact",
+    "contact_document",
+    "results_document",
+    "transformation_document",
+]
+
+MEGAPASCAL = 1e6
+"""Unit of strengths and moduli in COMPAS [Pa]."""
+
+POISSON = 0.2
+"""Poisson's ratio of the materials of compas_dem [-]."""
 
 
 @dataclass(frozen=True)
@@ -118,9 +131,9 @@ def results_document(
     edges : of the graph of the model, whose directions are kept
     """
     pairs: dict[tuple[int, int], list[PairContact]] = {}
-    for one in contacts:
-        one = one.turned() if (one.second, one.first) in edges else one
-        pairs.setdefault((one.first, one.second), []).append(one)
+    for contact in contacts:
+        seen = contact.turned() if (contact.second, contact.first) in edges else contact
+        pairs.setdefault((seen.first, seen.second), []).append(seen)
     added = [list(edge) for edge in pairs if edges and edge not in edges]
     data = {
         "model_id": guids[1],

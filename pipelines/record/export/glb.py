@@ -19,10 +19,11 @@ __all__ = ["glb_content"]
 
 _FLOAT, _UNSIGNED = 5126, 5125  # component types
 _VERTICES, _INDICES = 34962, 34963  # targets of views
-_ABSENT = -1.7976931348623157e308
+_ABSENT = -float(np.finfo(np.float64).max)
 """Number that stands for no value: JSON has no NaN."""
 
-_UPWARDS = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]
+_EIGHTH = 0.5**0.5  # cosine and sine of 45°
+_UPWARDS = [-_EIGHTH, 0.0, 0.0, _EIGHTH]
 """Rotation that turns z, which is upwards here, to y, which is upwards in glTF."""
 
 

@@ -13,7 +13,8 @@ from pipelines.record.export.building import Building, Value, plain_values
 
 __all__ = ["write_gpkg"]
 
-_APPLICATION, _VERSION = 0x47504B47, 10300  # GPKG, 1.3
+_APPLICATION, _VERSION = int.from_bytes(b"GPKG"), 10300  # 1.3
+_WGS84 = 4326
 _CARTESIAN = -1  # number of the reference system that is not known
 
 _TABLES = """
@@ -33,7 +34,7 @@ CREATE TABLE layer_styles (id INTEGER PRIMARY KEY AUTOINCREMENT, f_table_catalog
 _SYSTEMS = (
     ("Undefined Cartesian", -1, "NONE", -1, "undefined", "not known"),
     ("Undefined geographic", 0, "NONE", 0, "undefined", "not known"),
-    ("WGS 84", 4326, "EPSG", 4326, "undefined", "longitude and latitude"),
+    ("WGS 84", _WGS84, "EPSG", _WGS84, "undefined", "longitude and latitude"),
 )
 
 _COLOURS = ("#c8b48c", "#a3b18a", "#8fa6b8", "#c99a86", "#b8a5c0", "#d2c56b", "#86b3a8", "#b0a79f")

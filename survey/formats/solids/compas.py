@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from moma.errors import SurveyError
-from moma.tables.numbers import unreadable
+from ground.errors import SurveyError
+from ground.tables.numbers import unreadable
 from survey.arrays import Array
 from survey.formats.solids.bodies import RawBody, check_coordinates
 
@@ -191,6 +191,7 @@ def _places(data: Mapping[str, Any], elements: Mapping[str, Mapping[str, Any]]) 
     places: dict[str, Array] = {}
 
     def visit(node: Mapping[str, Any], outer: Array) -> None:
+        """Place the elements below a node of the tree."""
         for child in node.get("children") or ():
             guid = str(child["element"])
             places[guid] = outer @ _matrix(_data(elements[guid]).get("transformation"))

@@ -7,24 +7,27 @@ in the file, as LMGC90 does, whatever number the file states.
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
-from moma.errors import SurveyError
-from moma.tables.text_lines import TextLines
+from ground.errors import SurveyError
+from ground.tables.text_lines import TextLines
 from survey.arrays import Array
 from survey.formats.solids.bodies import RawBody, check_coordinates
 
 __all__ = ["lmgc90_bodies"]
 
 _FIELD = re.compile(r"(\w+(?:\(\d\))?)\s*=\s*([-+]?\d*\.?\d+(?:[EeDd][-+]?\d+)?)")
-_ALL = 6  # degrees of freedom of a rigid body
-_SIGNS = 7  # digits behind the decimal point that LMGC90 writes
+_ALL = {*"123456"}  # components of the velocity of a rigid body
+_DIGITS = float(
+    np.finfo(np.float32).eps
+)  # LMGC90 writes eight digits: a little more than single precision [-]
 _REMEDY = "export the body as polyhedra (POLYR), or leave it out with --keep-going"
 _SHAPES = ("PLANx", "POLYR")
-_BOX = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
-_AXES = [f"{axis}{at}" for axis in ("alp", "bet", "gam") for at in (1, 2, 3)]
+_AXES = [f"{axis}{at}" for axis in ("alp", "bet", "gam") for at in "123"]
 
 
 @dataclass
@@ -71,19 +74,18 @@ def lmgc90_bodies(path: Path) -> Iterator[RawBody]:
             remedy = f"put DOF.INI into the same folder, with body {body.number}"
             yield _refused(path, body, "its corners are in its axes of inertia, which DOF.INI has", remedy)
             continue
-        strange = sorted({one.kind for one in body.contactors} - {*_SHAPES})
+        strange = sorted({each.kind for each in body.contactors} - {*_SHAPES})
         if strange or not body.contactors:
             what = f"its shape is {' and '.join(strange)}, not POLYR" if strange else "it has no contactor"
             yield _refused(path, body, what, _REMEDY)
             continue
-        for at, one in enumerate(body.contactors, 1):
+        for at, each in enumerate(body.contactors, 1):
             label = name if len(body.contactors) == 1 else f"{name}-{at}"
-            where = f"{path}:{one.line}"
-            corners, faces = (_box if one.kind == "PLANx" else _polyhedron)(one, where)
+            where = f"{path}:{each.line}"
+            corners, faces = (_box if each.kind == "PLANx" else _polyhedron)(each, where)
             points = _placed(corners, body, frame)
             check_coordinates(points, "corner", where)
-            size = max(np.abs(corners).max(initial=0.0), 1e-300)
-            resolution = 10.0 ** (np.ceil(np.log10(size)) - _SIGNS)
+            resolution = _DIGITS * float(np.abs(corners).max(initial=0.0))
             yield RawBody(label, points, faces, body.line, body.end, resolution, kind=kind)
 
 
@@ -101,7 +103,7 @@ def _polyhedron(contactor: _Contactor, where: str) -> tuple[Array, Sequence[tupl
     if count != len(corners) or faces != len(triangles):
         what = f"{len(corners)} of {count} corners and {len(triangles)} of {faces} faces"
         raise SurveyError(what, where=where, remedy="the file is cut short, or was changed by hand")
-    if not all(0 <= at < count for one in triangles for at in one):
+    if not all(0 <= at < count for each in triangles for at in each):
         raise SurveyError(f"a face has a corner beyond {count}", where=where, remedy="export the file again")
     return np.array(corners).reshape(-1, 3), triangles
 
@@ -111,12 +113,13 @@ def _box(contactor: _Contactor, where: str) -> tuple[Array, Sequence[tuple[int, 
     half = np.array(list(contactor.values.values())[:3])  # whatever their names
     if len(half) < 3 or not (half > 0).all():
         raise SurveyError("a plane without three half axes", where=where, remedy="export the file again")
-    signs = np.array([(x, y, z) for z in (-1, 1) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
+    corners = np.array(list(product((-1.0, 1.0), repeat=3))) * half
     axes = np.eye(3)
     if all(name in contactor.values for name in _AXES):
         axes = np.array([contactor.values[name] for name in _AXES]).reshape(3, 3)
     shift = np.array(contactor.points[0]) if contactor.points else np.zeros(3)
-    return (signs * half) @ axes + shift, _BOX
+    # triangles, which the reader of solids turns outwards and unites
+    return corners @ axes + shift, [tuple(face) for face in ConvexHull(corners).simplices.tolist()]
 
 
 def _placed(corners: Array, body: _Body, frame: Array | None) -> Array:
@@ -228,6 +231,6 @@ def _held(path: Path) -> set[int]:
         for words in (row.split() for row in rows):
             if words[:1] == ["vlocy"] and len(words) > 2 and not _double(words[2]):
                 still.add(words[1])
-        if len(still) == _ALL:
+        if still >= _ALL:
             found.add(number)
     return found

@@ -18,6 +18,7 @@ from pipelines.record.export.glb import glb_content
 from pipelines.record.export.gpkg import write_gpkg
 from pipelines.record.export.ifc import global_id, ifc_content
 from pipelines.record.export.step import real, text
+from survey.formats.solids.compas import read_compas
 from tests.pipelines.record.export.buildings import HOSTILE, made_building
 
 CODES = [*HOSTILE, *(f"{HOSTILE[at % len(HOSTILE)]} {at}" for at in range(60))]
@@ -190,6 +191,16 @@ def test_compas_blocks_have_the_corners_and_names_of_the_stones(building):
     agree(building, 3, vertices, [(f[0], f[at], f[at + 1]) for f in mesh["face"].values() for at in (1, 2)])
     nodes = [one["element"] for one in document["data"]["graph"]["node"].values()]
     assert nodes == list(document["data"]["elements"])
+
+
+def test_compas_blocks_come_back_with_their_corners_codes_and_supports(tmp_path):
+    walled = made_building(["A 1", "B-2", "Ü3"], origin=(100.0, 200.0, 50.0))
+    walled = replace(walled, kinds=["support", "header", "header"])
+    back = read_compas(json.loads(model_content(walled, None)), "here").blocks
+    assert [(one.name, one.support) for one in back] == [("A 1", True), ("B-2", False), ("Ü3", False)]
+    for one, (corners, faces) in zip(back, walled.shapes, strict=True):
+        assert np.array_equal(one.vertices, corners)
+        assert tuple(one.faces.values()) == faces
 
 
 def test_the_same_building_gives_the_same_bytes(building, tmp_path):

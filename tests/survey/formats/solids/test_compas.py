@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from moma.errors import SurveyError
+from ground.errors import SurveyError
 from survey.formats.reading import format_of, open_survey
 from survey.formats.solids.compas import read_compas
 from survey.geometry.solids import Solid, volume_of
