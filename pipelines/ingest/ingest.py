@@ -97,11 +97,11 @@ def ingest(
             check_outline_rejects(target)
     elif keep_going:
         check_targets(targets, [file for source in sources for file in source.files])
-    with ExitStack() as held:
-        _open_if_there(url, held)
+    with ExitStack() as stack:
+        _open_if_there(url, stack)
         check_kinds(rules)
         options = replace(options or ReadingOptions(), known_kinds=frozenset(kinds()))
-        spools = [held.enter_context(Spool()) for _ in surveys]
+        spools = [stack.enter_context(Spool()) for _ in surveys]
         tallies = [
             _measure(source, spool, format, options, rules, bool(keep_going), progress)
             for source, spool in zip(sources, spools, strict=True)
@@ -116,7 +116,7 @@ def ingest(
                 else:
                     header, sheet = tally.stream.header, options.sheet
                     text = rejects_text(path, format, tally.refused, stations, header=header, sheet=sheet)
-                held.enter_context(_published(target, text))
+                stack.enter_context(_published(target, text))
         with open_database(url, lock_timeout=_PATIENCE) as database, database.session() as session:
             solids = KnownSolids()
             for tally, spool in zip(tallies, spools, strict=True):
@@ -132,10 +132,10 @@ def ingest(
     return IngestReport(database.url, reports)
 
 
-def _open_if_there(url: str, held: ExitStack) -> None:
+def _open_if_there(url: str, stack: ExitStack) -> None:
     """Open an existing database early, to know its registered kinds and to report its faults first."""
     try:
-        held.enter_context(open_database(url, create=False))
+        stack.enter_context(open_database(url, create=False))
     except NoDatabaseError:
         home_of(url).engine(create=True).dispose()  # fails if none could be created
 
@@ -157,8 +157,8 @@ _LISTS = ("csv", "pnezd", "penzd", "gsi")
 def _listed_stations(tally: Tally, options: ReadingOptions | None) -> list[int]:
     """List the lines of the stations that are given among the points, not in the header file."""
     elsewhere = () if options is None or options.head is None else options.head.stations
-    known = {one.name for one in elsewhere}
-    return [station.line for station in tally.stream.head.stations if station.name not in known]
+    names = {station.name for station in elsewhere}
+    return [station.line for station in tally.stream.head.stations if station.name not in names]
 
 
 def _measure(

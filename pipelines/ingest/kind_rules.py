@@ -206,8 +206,8 @@ def _check(node: Node) -> None:
 
 def _check_attribute(token: Token) -> None:
     if token.text not in RULE_ATTRIBUTES:
-        near = difflib.get_close_matches(token.text, RULE_ATTRIBUTES, n=3) or list(RULE_ATTRIBUTES)
-        raise complaint(token, f"unknown attribute {token.text!r}", f"known: {', '.join(near)}")
+        close_matches = difflib.get_close_matches(token.text, RULE_ATTRIBUTES, n=3) or list(RULE_ATTRIBUTES)
+        raise complaint(token, f"unknown attribute {token.text!r}", f"known: {', '.join(close_matches)}")
 
 
 def _check_value(attribute: Token, value: Token) -> None:
@@ -229,8 +229,8 @@ def _holds(node: Node, values: Mapping[str, Value]) -> bool | None:
             found = [_holds(operand, values) for operand in operands]
             return True if True in found else None if None in found else False
         case Not(operand):
-            held = _holds(operand, values)
-            return None if held is None else not held
+            operand_holds = _holds(operand, values)
+            return None if operand_holds is None else not operand_holds
         case IsNull(Token() as attribute):
             return values[attribute.text] is None
         case Like(attribute, pattern):
@@ -255,10 +255,10 @@ def _is_a(kind: Value, named: Token) -> bool:
     return kind in names_below(kind_named(named.text))
 
 
-def _compared(sign: str, one: Value, other: Value) -> bool | None:
-    if one is None or other is None:
+def _compared(sign: str, first: Value, second: Value) -> bool | None:
+    if first is None or second is None:
         return None
-    return _OPERATORS[sign](one, other)
+    return _OPERATORS[sign](first, second)
 
 
 def _value(attribute: Token, token: Token, values: Mapping[str, Value]) -> Value:

@@ -58,7 +58,7 @@ def _of_zones(session: Session, among: Collection[int] | None) -> Iterable[Colum
 
 
 def _stone(face: StoneFace) -> WallStone:
-    known = face.sigma[np.isfinite(face.sigma)]
+    finite = face.sigma[np.isfinite(face.sigma)]
     return WallStone(
         code=face.code,
         kind=face.kind,
@@ -66,7 +66,7 @@ def _stone(face: StoneFace) -> WallStone:
         zone=face.zone,
         outline=face.outline,
         normal=face.normal,
-        sigma=float(np.median(known)) if len(known) else 0.0,
+        sigma=float(np.median(finite)) if len(finite) else 0.0,
         depth=face.depth,
         depth_sigma=face.depth_sigma,
         area=face.area,

@@ -122,7 +122,7 @@ def write_review(path: Path, review: Sequence[Doubtful]) -> None:
         with path.open("w", encoding="utf-8", newline="") as file:
             rows = csv.writer(file, lineterminator="\n")
             rows.writerow(("code", "reason", "text", "where"))
-            rows.writerows((one.code, one.reason, one.text, one.where) for one in review)
+            rows.writerows((doubt.code, doubt.reason, doubt.text, doubt.where) for doubt in review)
     except OSError as error:
         what = f"the review cannot be written: {error.strerror or error}"
         raise UsageError(what, where=str(path), remedy="name a file that can be written") from error
@@ -215,8 +215,8 @@ def mask_options(
     )
 
 
-def _check_lengths(*given: tuple[str, float | None, float, float]) -> None:
-    for name, value, least, most in given:
+def _check_lengths(*lengths: tuple[str, float | None, float, float]) -> None:
+    for name, value, least, most in lengths:
         if value is not None and not least <= value <= most:
             what, remedy = f"is {value:g} m", f"give it in metres, from {least:g} to {most:g}"
             raise UsageError(what, where=name, remedy=remedy)
@@ -230,9 +230,9 @@ def size_of(text: str) -> tuple[float, float]:
     UsageError
         if it is written otherwise
     """
-    found = _SIZE.fullmatch(text.strip().lower().removesuffix("m").strip())
-    if found is not None:
-        width, height = (float(group.replace(",", ".")) for group in found.groups())
+    match = _SIZE.fullmatch(text.strip().lower().removesuffix("m").strip())
+    if match is not None:
+        width, height = (float(group.replace(",", ".")) for group in match.groups())
         if 0.0 < width < _LARGEST and 0.0 < height < _LARGEST:
             return width, height
     remedy = "give width and height of the picture or wall in metres, e.g. 1.0x1.2"

@@ -29,26 +29,26 @@ def format_of_all(paths: Sequence[str | Path]) -> str:
     ------
     UsageError : a file does not tell its format, or they differ
     """
-    found: dict[str, Path] = {}
+    candidates: dict[str, Path] = {}
     for path in map(Path, paths):
         if not path.exists():
             raise UsageError("no such file", where=str(path), remedy="name a survey file")
         if path.is_dir():
-            known = {end for ends in ENDINGS.values() for end in ends} - {".json", ".xml"}
+            endings = {end for ends in ENDINGS.values() for end in ends} - {".json", ".xml"}
             inside = {
-                format_of(one): one
-                for one in sorted(path.iterdir())
-                if one.suffix.lower() in known and one.is_file()
+                format_of(path_inside): path_inside
+                for path_inside in sorted(path.iterdir())
+                if path_inside.suffix.lower() in endings and path_inside.is_file()
             }
-            found.update(inside or {"moma": path})
+            candidates.update(inside or {"moma": path})
         else:
-            found.setdefault(format_of(path), path)
-    if len(found) > 1:
-        names = " and ".join(f"{path.name} ({name})" for name, path in sorted(found.items()))
+            candidates.setdefault(format_of(path), path)
+    if len(candidates) > 1:
+        names = " and ".join(f"{path.name} ({name})" for name, path in sorted(candidates.items()))
         raise UsageError(
             f"files of different formats: {names}", remedy="ingest them one after the other, or give --format"
         )
-    return next(iter(found), "moma")
+    return next(iter(candidates), "moma")
 
 
 @dataclass(frozen=True)
@@ -106,15 +106,15 @@ def _files_in(folder: Path, format: str) -> Sequence[Path]:
     if format == "solids":
         return solid_files(folder)
     endings = _ENDINGS.get(format, ())
-    found = sorted(
-        one
-        for one in folder.iterdir()
-        if one.suffix.lower() in endings and one.is_file() and not one.stem.endswith(".rejects")
+    paths = sorted(
+        entry
+        for entry in folder.iterdir()
+        if entry.suffix.lower() in endings and entry.is_file() and not entry.stem.endswith(".rejects")
     )
-    if not found:
+    if not paths:
         remedy = f"name a folder with files that end in {' or '.join(endings)}, or give --format"
         raise UsageError(f"the folder has no files of format {format}", where=str(folder), remedy=remedy)
-    return found
+    return paths
 
 
 def reading_options(
@@ -173,10 +173,10 @@ def reading_options(
             raise UsageError(f"sigma is {sigma:g} m", where="--sigma", remedy="give it in metres, e.g. 0.003")
         options = replace(options, sigma=sigma)
     if unit is not None:
-        if (known := length_unit(unit)) is None:
+        if (unit_name := length_unit(unit)) is None:
             what, remedy = f"unknown unit {unit!r}", f"units: {', '.join(UNITS)}"
             raise UsageError(what, where="--unit", remedy=remedy)
-        options = replace(options, unit=UNITS[known])
+        options = replace(options, unit=UNITS[unit_name])
     if snap is not None:
         if not 0.0 <= snap < 1.0:
             what, remedy = f"the tolerance is {snap:g} m", "give it in metres, e.g. 0.002; 0: none"

@@ -66,7 +66,7 @@ def rejects_text(
     survey: Path,
     format: str,
     rejects: Sequence[Reject],
-    kept: Iterable[int] = (),
+    also: Iterable[int] = (),
     *,
     header: int = 0,
     sheet: str | None = None,
@@ -78,7 +78,7 @@ def rejects_text(
     survey : the file
     format : name of its format
     rejects : stones that could not be ingested
-    kept : lines of the survey that its stones depend on, such as stations in a list of points
+    also : lines of the survey that its stones depend on, such as stations in a list of points
     header : number of lines at the beginning of a table that hold for all stones
     sheet : of a workbook
     """
@@ -88,12 +88,12 @@ def rejects_text(
         head = [line for _, line in _picked(survey, set(range(1, header + 1)), sheet)]
     ordered = sorted(rejects, key=lambda one: one.spans[0].start if one.spans else 0)
     wanted = {line for one in ordered for span in one.spans for line in span} if by_lines else set()
-    lines = dict(_picked(survey, wanted.union(kept), sheet)) if wanted else {}
-    text = head + [lines[line] for line in sorted(kept) if line in lines]
-    for one in ordered:
-        reason = " ".join(str(one.error).split())
+    lines = dict(_picked(survey, wanted.union(also), sheet)) if wanted else {}
+    text = head + [lines[line] for line in sorted(also) if line in lines]
+    for reject in ordered:
+        reason = " ".join(str(reject.error).split())
         text += [b"\n", b"# " + reason.encode("ascii", "backslashreplace") + b"\n"]
-        text += [lines[line] for span in one.spans for line in span if line in lines]
+        text += [lines[line] for span in reject.spans for line in span if line in lines]
     count = f": {len(rejects)} of {survey.name}, as written {_digest(text)}\n"
     text.insert(1 if format == "moma" else 0, MARK + count.encode("ascii", "backslashreplace"))
     return b"".join(text)

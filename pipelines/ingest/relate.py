@@ -121,8 +121,10 @@ def relate(
     # zones and courses stay what they are when their kind is corrected, a zone as a tower, say
     other_kinds = structure_kinds().keys() - arch_kinds
     changes = [store_parts(session, parts_of_survey(courses), act, kinds=other_kinds, among=chosen)]
-    near = None if chosen is None else chosen.union(ids[found.subject].tolist(), ids[found.object].tolist())
-    tails = {number: {"tail_length": tail} for number, tail in tail_lengths(session, near).items()}
+    touched = (
+        None if chosen is None else chosen.union(ids[found.subject].tolist(), ids[found.object].tolist())
+    )
+    tails = {number: {"tail_length": tail} for number, tail in tail_lengths(session, touched).items()}
     values = give_values(session, tails, act)
     values += give_values(session, masonry_values(session, chosen), act)
     arches = find_arches(session)
@@ -191,13 +193,13 @@ def _relations(
     rank = np.empty(len(ids), np.int64)
     rank[order] = np.arange(len(ids))
     ids = ids[order]
-    held = wanted[touching.pairs].all(axis=1)
+    chosen_pairs = wanted[touching.pairs].all(axis=1)
     contacts = StoneContacts(
-        rank[touching.pairs[held]],
-        touching.area[held],
-        touching.gap[held],
-        touching.normal[held],
-        touching.centroid[held],
+        rank[touching.pairs[chosen_pairs]],
+        touching.area[chosen_pairs],
+        touching.gap[chosen_pairs],
+        touching.normal[chosen_pairs],
+        touching.centroid[chosen_pairs],
     )
     place = np.minimum(np.searchsorted(stones.ids, ids), max(len(stones) - 1, 0))
     kinds = [stones.kinds[i] for i in place.tolist()]

@@ -192,7 +192,7 @@ class Tally:
             rms=self.rms,
             worst=self.worst,
             shapes=self.shapes,
-            refused=tuple(Refusal(one.code, str(one.error)) for one in self.refused),
+            refused=tuple(Refusal(reject.code, str(reject.error)) for reject in self.refused),
             rejects=None if rejects is None else str(rejects),
             frame=frame_record(self.stream.transform),
             again=self.again,

@@ -87,35 +87,39 @@ def parse_record(text: str, path: str) -> RecordFile:
     """Check the text of a file of knowledge; `path` appears in messages."""
     # one form of each letter, however it was typed; no line changes its number
     plain = unicodedata.normalize("NFC", text)
-    given = parse_toml(plain, path, UsageError, "see docs/knowledge.md for a file to start from")
+    content_of_file = parse_toml(plain, path, UsageError, "see docs/knowledge.md for a file to start from")
     document = TomlDocument(path, key_lines(text))
     try:
-        record, tables = _checked(document, given)
+        record, tables = _checked(document, content_of_file)
     except SceneError as error:
         raise UsageError(error.what, where=error.where, remedy=error.remedy) from None
     return RecordFile(document, hashlib.sha256(text.encode()).hexdigest(), record, tables)
 
 
-def _checked(document: TomlDocument, given: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[Table, ...]]:
-    known = ["record", *ARRAYS]
-    for name, content in given.items():
-        if name not in known:
+def _checked(
+    document: TomlDocument, content_of_file: Mapping[str, Any]
+) -> tuple[dict[str, Any], tuple[Table, ...]]:
+    allowed = ["record", *ARRAYS]
+    for name, content in content_of_file.items():
+        if name not in allowed:
             what = f"unknown table [{name}]" if isinstance(content, dict | list) else f"unknown key {name!r}"
-            document.fail(what, name, remedy=nearest(name, known))
-    record = given.get("record", {})
+            document.fail(what, name, remedy=nearest(name, allowed))
+    record = content_of_file.get("record", {})
     if not isinstance(record, dict):
         document.fail("'record' is not a table", "record", remedy="write [record] on a line of its own")
-    tables = [one for name, keys in ARRAYS.items() for one in _array(document, given, name, keys)]
+    tables = [
+        table for name, keys in ARRAYS.items() for table in _array(document, content_of_file, name, keys)
+    ]
     if not tables:
         document.fail("nothing is recorded", remedy="add a table such as [[material]]; see docs/knowledge.md")
     return check_table(document, ("record",), record, RECORD), tuple(tables)
 
 
 def _array(
-    document: TomlDocument, given: Mapping[str, Any], name: str, keys: tuple[Key, ...]
+    document: TomlDocument, content_of_file: Mapping[str, Any], name: str, keys: tuple[Key, ...]
 ) -> Iterator[Table]:
     """Check all tables [[name]]."""
-    for path, table in tables_of(document, given, name):
+    for path, table in tables_of(document, content_of_file, name):
         values = check_table(document, path, table, keys, f"[[{name}]]")
         for inner, inner_keys in (("properties", PROPERTY), ("attributes", ATTRIBUTE)):
             if inner in values:

@@ -76,7 +76,7 @@ def record(
     if not files:
         raise UsageError("no file", remedy="name at least one")
     with open_database(url, create=not dry_run) as database, database.session() as session:
-        kept = session.begin_nested()
+        savepoint = session.begin_nested()
         reports = tuple(
             _record_file(session, file, author, source)
             if isinstance(file, RecordFile)
@@ -85,9 +85,9 @@ def record(
         )
         related = _relate_corrected(session, [number for report in reports for number in report.entries])
         if dry_run:
-            kept.rollback()
+            savepoint.rollback()
         else:
-            kept.commit()
+            savepoint.commit()
         return RecordReport(database.url, dry_run, reports, related)
 
 
@@ -152,11 +152,11 @@ class _Entries:
 
     def of(self, table: Table) -> Entry:
         """Return the entry of a table, and make it if necessary."""
-        record, own = self.file.record, table.values
+        record, values = self.file.record, table.values
         with self.file.at(*table.path):
-            author = checked_text("author", own["author"] or self.author or record["author"])
+            author = checked_text("author", values["author"] or self.author or record["author"])
             source = checked_text(
-                "source", own.get("reason") or own["source"] or self.source or record["source"]
+                "source", values.get("reason") or values["source"] or self.source or record["source"]
             )
         source = source or self.file.document.path
         action = "correction" if table.name in _CORRECTIONS else "declaration"

@@ -128,8 +128,8 @@ def _relation(row: TableRow, column: int, where: str) -> str:
     text = row.cells[column] if column < len(row.cells) else ""
     name = relation_of(text)
     if name is None:
-        known = ", ".join((*DEFINITIONS, *dict.fromkeys(INVERSE.values())))
-        raise UsageError(f"unknown relation {text[:40]!r}", where=where, remedy=f"relations are {known}")
+        names = ", ".join((*DEFINITIONS, *dict.fromkeys(INVERSE.values())))
+        raise UsageError(f"unknown relation {text[:40]!r}", where=where, remedy=f"relations are {names}")
     return name
 
 

@@ -39,8 +39,8 @@ from mechanics.scene.state import State
 __all__ = ["Checkpoint", "Checkpoints", "DamagedError", "write_shared", "write_whole"]
 
 _RECORDS = {
-    one.__name__: one
-    for one in (
+    record.__name__: record
+    for record in (
         ContactForces,
         ContactResult,
         Contacts,
@@ -125,11 +125,11 @@ class Checkpoints:
         for step in self.steps():
             name = f"checkpoint-{step:08d}.h5"
             try:
-                found = self._read(name)
+                content = self._read(name)
             except DamagedError as error:
                 wrong.append(f"{name} is damaged: {error}")
                 continue
-            return found, wrong
+            return content, wrong
         return None, wrong
 
     def _read(self, name: str) -> Checkpoint:
@@ -137,8 +137,8 @@ class Checkpoints:
         rows: dict[str, Rows[Any]] = {}
         for history, checksum in values["histories"]:
             part, columns = _contents(self._folder / history, checksum)
-            for key, one in part.items():
-                rows.setdefault(key, Rows()).extend(_revived_rows(one, columns))
+            for key, content in part.items():
+                rows.setdefault(key, Rows()).extend(_revived_rows(content, columns))
         carried = _revived(values["carried"], arrays, rows)
         self._kept, self._histories = [name], values["histories"]
         self._counts = {key: len(row) for key, row in rows.items()}
@@ -191,11 +191,11 @@ def _image(values: Any, arrays: Mapping[str, np.ndarray[Any, Any]]) -> bytes:
     """Return an HDF5 file with its checksum, made in memory: HDF5 itself may not survive a disk that is full."""
     import h5py
 
-    own = np.frombuffer(json.dumps(values, ensure_ascii=False).encode(), dtype=np.uint8)
+    encoded = np.frombuffer(json.dumps(values, ensure_ascii=False).encode(), dtype=np.uint8)
     with h5py.File(
         "image", "w", driver="core", backing_store=False, block_size=_BLOCK, userblock_size=_HEAD
     ) as file:
-        file[_VALUES] = own
+        file[_VALUES] = encoded
         for name, array in arrays.items():
             file[name] = array
         file.flush()
@@ -219,7 +219,7 @@ def _contents(path: Path, checksum: str | None = None) -> tuple[Any, dict[str, A
     arrays: dict[str, Any] = {}
     with h5py.File(io.BytesIO(whole), "r") as file:
         file.visititems(
-            lambda name, one: arrays.update({name: one[()]}) if isinstance(one, h5py.Dataset) else None
+            lambda name, item: arrays.update({name: item[()]}) if isinstance(item, h5py.Dataset) else None
         )
     return json.loads(bytes(arrays.pop(_VALUES))), arrays
 
@@ -267,12 +267,12 @@ class _Store:
         return {key: self.plain(value, f"{name}/{key}" if name else key) for key, value in values.items()}
 
     def _tuple(self, value: tuple[Any, ...], name: str) -> Any:
-        arrays = [one for one in value if isinstance(one, np.ndarray)]
+        arrays = [entry for entry in value if isinstance(entry, np.ndarray)]
         kinds = {(array.dtype, array.shape[1:], array.ndim > 0) for array in arrays}
-        if len(kinds) != 1 or any(one is not None and not isinstance(one, np.ndarray) for one in value):
-            return ["tuple", [self.plain(one, f"{name}/{k}") for k, one in enumerate(value)]]
+        if len(kinds) != 1 or any(entry is not None and not isinstance(entry, np.ndarray) for entry in value):
+            return ["tuple", [self.plain(entry, f"{name}/{k}") for k, entry in enumerate(value)]]
         # thousands of small arrays are one large one
-        sizes = np.array([-1 if one is None else len(one) for one in value])
+        sizes = np.array([-1 if entry is None else len(entry) for entry in value])
         return ["arrays", self._array(np.concatenate(arrays), name), self._array(sizes, f"{name} sizes")]
 
     def _array(self, array: np.ndarray[Any, Any], name: str) -> str:
@@ -304,7 +304,7 @@ def _revived(value: Any, arrays: Mapping[str, Any], rows: Mapping[str, Rows[Any]
             for size, end in zip(sizes, ends, strict=True)
         )
     if kind == "tuple":
-        return tuple(_revived(one, arrays, rows) for one in content[0])
+        return tuple(_revived(entry, arrays, rows) for entry in content[0])
     if kind == "rows":
         return rows.get(content[0], Rows())
     if kind == "sparse":
@@ -321,7 +321,7 @@ def _revived_rows(value: Any, arrays: Mapping[str, Any]) -> list[Any]:
         # numbers become those of Python again
         columns = [arrays[name].tolist() if arrays[name].ndim == 1 else arrays[name] for name in content]
         return list(zip(*columns, strict=True))
-    return [_revived(one, arrays, {}) for one in content]
+    return [_revived(entry, arrays, {}) for entry in content]
 
 
 def _array(array: Any) -> Any:

@@ -94,18 +94,18 @@ def check_replaceable(folder: Path, index: str = RUN_INDEX, source: Sequence[Pat
     _recover(folder)
     if not folder.exists():
         return
-    known = {name: _own_files(folder, name) for name in _INDEXES}
-    foreign = sorted(_entries(folder) - set[str]().union(*known.values()))
+    files_by_index = {name: _own_files(folder, name) for name in _INDEXES}
+    foreign = sorted(_entries(folder) - set[str]().union(*files_by_index.values()))
     if foreign:
         shown = ", ".join(foreign[:3]) + (", …" if len(foreign) > 3 else "")
         raise UsageError(f"holds files that no run of MOMA wrote ({shown})", where=place, remedy=remedy)
-    if known[RUN_INDEX] and index != RUN_INDEX:
+    if files_by_index[RUN_INDEX] and index != RUN_INDEX:
         raise UsageError("holds the results of a run", where=place, remedy=remedy)
-    for left, (own, what) in _LEFT.items():
-        if index != own and (folder / left).exists():
+    for left, (index_name, what) in _LEFT.items():
+        if index != index_name and (folder / left).exists():
             raise UsageError(f"holds an unfinished {what}", where=place, remedy=remedy)
     if source and (earlier := _source(folder)) not in (None, source_of(source, folder)):
-        there = " and ".join(os.path.normpath(folder / one) for one in earlier or ())
+        there = " and ".join(os.path.normpath(folder / name) for name in earlier or ())
         raise UsageError(
             f"holds the results of {there}", where=place, remedy=f"{remedy}, or replace them with --overwrite"
         )
@@ -196,14 +196,14 @@ def _put(fresh: Path, target: Path) -> None:
             shutil.rmtree(earlier)
 
 
-def _exchanged(one: Path, other: Path) -> bool:
+def _exchanged(path: Path, other: Path) -> bool:
     """Exchange two names at once; return False where the system cannot."""
     if not sys.platform.startswith("linux"):
         return False
     rename = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
     if rename is None:
         return False
-    if rename(_HERE, os.fsencode(one), _HERE, os.fsencode(other), _EXCHANGE) == 0:
+    if rename(_HERE, os.fsencode(path), _HERE, os.fsencode(other), _EXCHANGE) == 0:
         return True
     number = ctypes.get_errno()
     if number in _CANNOT:

@@ -14,7 +14,7 @@ def notebook_html(folder: Path, summary: Mapping[str, Any], warnings: Sequence[s
     The page is within the text, so that the notebook shows it wherever it is opened.
     """
     headline = str(summary["headline"])
-    cautions = "".join(f"<li>{escape(one)}</li>" for one in (*summary["cautions"], *warnings))
+    cautions = "".join(f"<li>{escape(caution)}</li>" for caution in (*summary["cautions"], *warnings))
     head = f"<p><strong>{escape(headline[:1].upper() + headline[1:])}</strong></p>"
     listed = f"<ul>{cautions}</ul>" if cautions else ""
     try:

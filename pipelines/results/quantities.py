@@ -96,15 +96,15 @@ class Quantities:
     @property
     def stress_error(self) -> float | None:
         """Estimated error of the stress of all stones, weighted by volume and squared stress [-]."""
-        known = [
+        weighted = [
             (stone.stress_error, stone.volume * stone.von_mises_mean**2)
             for stone in self.stones.values()
             if stone.stress_error is not None and stone.von_mises_mean is not None
         ]
-        total = sum(weight for _, weight in known)
+        total = sum(weight for _, weight in weighted)
         if total == 0.0:
             return None
-        return math.sqrt(sum(error**2 * weight for error, weight in known) / total)
+        return math.sqrt(sum(error**2 * weight for error, weight in weighted) / total)
 
     def as_record(self) -> dict[str, Any]:
         """Return plain numbers and texts, for JSON; `quantities_from` reads them."""
@@ -124,7 +124,9 @@ def quantities(result: Result) -> Quantities:
         von_mises_mean=None if stress is None else stress.mean,
         stones={body.code: _stone(body) for body in moving},
         support_reactions=_support_reactions(result),
-        joint_forces={f"{one}|{other}": tuple(force.tolist()) for (one, other), force in forces.items()},
+        joint_forces={
+            f"{first}|{second}": tuple(force.tolist()) for (first, second), force in forces.items()
+        },
         displacement=max(float(np.linalg.norm(body.displacement, axis=1).max()) for body in result.bodies),
         settlement=float(result.history.settlement[-1]),
         errors={name: _known(getattr(result.errors, name)) for name in _OWN_ERRORS},
@@ -141,7 +143,7 @@ def quantities_from(record: Mapping[str, Any]) -> Quantities:
     return Quantities(**{**record, "stones": stones, "joint_forces": joints})
 
 
-def differences(found: Quantities, reference: Quantities) -> dict[str, float | None]:
+def differences(compared: Quantities, reference: Quantities) -> dict[str, float | None]:
     """Compute the relative error of each of QUANTITIES; None where one of the two runs does not give it.
 
     With the values a of a run and b of the reference: |a - b| / |b| for single numbers; Σ|a - b| / Σ|b| for the
@@ -150,24 +152,26 @@ def differences(found: Quantities, reference: Quantities) -> dict[str, float | N
     the p99 of all is known only if those are the same stones. Reference movements below 10⁻⁶ of a stone's size count
     as that.
     """
-    both = [(found.stones[code], stone) for code, stone in reference.stones.items() if code in found.stones]
+    both = [
+        (compared.stones[code], stone) for code, stone in reference.stones.items() if code in compared.stones
+    ]
     stressed = [(a, b) for a, b in both if a.von_mises_max is not None and b.von_mises_max is not None]
     ours, theirs = [a for a, _ in stressed], [b for _, b in stressed]
-    alike = _stressed(found) == _stressed(reference)
+    alike = _stressed(compared) == _stressed(reference)
     still = _NO_MOVEMENT * reference.size
     return {
-        "outcome": float(found.outcome != reference.outcome),
+        "outcome": float(compared.outcome != reference.outcome),
         "von_mises_max": _apart(_largest(ours), _largest(theirs)),
-        "von_mises_p99": _apart(found.von_mises_p99, reference.von_mises_p99) if alike else None,
+        "von_mises_p99": _apart(compared.von_mises_p99, reference.von_mises_p99) if alike else None,
         "von_mises_mean": _apart(_mean(ours), _mean(theirs)),
         "stone_von_mises_p99": _field_apart(stressed, "von_mises_p99"),
         "stone_von_mises_mean": _field_apart(stressed, "von_mises_mean"),
-        "support_reactions": _reactions_apart(found.support_reactions, reference.support_reactions),
-        "joint_forces": _forces_apart(found.joint_forces, reference.joint_forces),
-        "displacement": _apart(found.displacement, reference.displacement, still),
+        "support_reactions": _reactions_apart(compared.support_reactions, reference.support_reactions),
+        "joint_forces": _forces_apart(compared.joint_forces, reference.joint_forces),
+        "displacement": _apart(compared.displacement, reference.displacement, still),
         "stone_displacement": _field_apart(both, "displacement", still),
-        "settlement": _apart(found.settlement, reference.settlement, still),
-        **found.errors,
+        "settlement": _apart(compared.settlement, reference.settlement, still),
+        **compared.errors,
     }
 
 
@@ -206,11 +210,11 @@ def _joint_forces(result: Result) -> dict[tuple[str, str], Array]:
     codes = [body.code for body in result.bodies]
     total: dict[tuple[str, str], Array] = defaultdict(lambda: np.zeros(3))
     for (first, second), force in zip(result.contacts.bodies.tolist(), result.contacts.force, strict=True):
-        one, other = codes[first], codes[second]
-        if one < other:
-            total[one, other] += force
+        first_code, second_code = codes[first], codes[second]
+        if first_code < second_code:
+            total[first_code, second_code] += force
         else:
-            total[other, one] -= force
+            total[second_code, first_code] -= force
     return dict(sorted(total.items()))
 
 
@@ -222,11 +226,11 @@ def _number(value: float | None) -> float:
     return math.nan if value is None else value
 
 
-def _apart(found: float | None, reference: float | None, least: float = 0.0) -> float | None:
-    if found is None or reference is None:
+def _apart(value: float | None, reference: float | None, least: float = 0.0) -> float | None:
+    if value is None or reference is None:
         return None
     scale = max(abs(reference), least)
-    return abs(found - reference) / scale if scale > 0.0 else None
+    return abs(value - reference) / scale if scale > 0.0 else None
 
 
 def _stressed(of: Quantities) -> set[str]:
@@ -239,9 +243,9 @@ def _largest(stones: Iterable[StoneQuantities]) -> float | None:
 
 def _mean(stones: Iterable[StoneQuantities]) -> float | None:
     """Return the mean stress of stones, weighted by volume."""
-    known = [(_number(stone.von_mises_mean), stone.volume) for stone in stones]
-    volume = sum(one for _, one in known)
-    return sum(mean * one for mean, one in known) / volume if volume > 0.0 else None
+    weighted = [(_number(stone.von_mises_mean), stone.volume) for stone in stones]
+    volume = sum(weight for _, weight in weighted)
+    return sum(mean * weight for mean, weight in weighted) / volume if volume > 0.0 else None
 
 
 def _field_apart(
@@ -250,29 +254,35 @@ def _field_apart(
     """Return the difference of a value of each stone over the value, both as root mean squares over the volume."""
     if not pairs:
         return None
-    found, true = (
+    values, true = (
         np.array([getattr(pair[side], name) for pair in pairs], dtype=float).reshape(len(pairs), -1)
         for side in (0, 1)
     )
     volume = np.array([reference.volume for _, reference in pairs])
     apart, scale = (
-        float(np.sqrt(np.average((one**2).sum(axis=1), weights=volume))) for one in (found - true, true)
+        float(np.sqrt(np.average((one**2).sum(axis=1), weights=volume))) for one in (values - true, true)
     )
     scale = max(scale, least)
     return apart / scale if scale > 0.0 else None
 
 
-def _reactions_apart(found: Mapping[str, float], reference: Mapping[str, float]) -> float | None:
+def _reactions_apart(reactions: Mapping[str, float], reference: Mapping[str, float]) -> float | None:
     scale = sum(map(abs, reference.values()))
-    return sum(abs(found.get(code, 0.0) - one) for code, one in reference.items()) / scale if scale else None
+    return (
+        sum(abs(reactions.get(code, 0.0) - force) for code, force in reference.items()) / scale
+        if scale
+        else None
+    )
 
 
 def _forces_apart(
-    found: Mapping[str, tuple[float, ...]], reference: Mapping[str, tuple[float, ...]]
+    forces: Mapping[str, tuple[float, ...]], reference: Mapping[str, tuple[float, ...]]
 ) -> float | None:
     """Return the relative difference of joint forces; in a run where two stones do not touch, their force is zero."""
     none = (0.0, 0.0, 0.0)
-    true = {pair: np.array(reference.get(pair, none)) for pair in {*found, *reference}}
-    scale = sum(float(one @ one) for one in true.values())
-    apart = sum(float(np.sum((np.array(found.get(pair, none)) - one) ** 2)) for pair, one in true.items())
+    true = {pair: np.array(reference.get(pair, none)) for pair in {*forces, *reference}}
+    scale = sum(float(force @ force) for force in true.values())
+    apart = sum(
+        float(np.sum((np.array(forces.get(pair, none)) - force) ** 2)) for pair, force in true.items()
+    )
     return math.sqrt(apart / scale) if scale > 0.0 else None

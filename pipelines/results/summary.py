@@ -49,7 +49,8 @@ def summarise(
         "headline": headline(result),
         "cautions": list(result.cautions),
         "bodies": {
-            str(one): fidelities.count(one) for one in (Fidelity.RIGID, Fidelity.DEFORMABLE, Fidelity.FIXED)
+            str(fidelity): fidelities.count(fidelity)
+            for fidelity in (Fidelity.RIGID, Fidelity.DEFORMABLE, Fidelity.FIXED)
         },
         "contacts": len(result.contacts.gap),
         "steps": result.steps,
@@ -89,22 +90,22 @@ def summarise(
 def headline(result: Result) -> str:
     """Return the outcome with its reason and its first caution: the first line that a person reads of a run."""
     of = f" of stage {len(result.stages)}, {result.stages[-1].name!r}" if result.stages else ""
-    said = ": ".join(filter(None, (f"{result.outcome} after {result.time:.4g} s{of}", result.reason)))
-    return "; but ".join(filter(None, (said, *result.cautions[:1])))
+    text = ": ".join(filter(None, (f"{result.outcome} after {result.time:.4g} s{of}", result.reason)))
+    return "; but ".join(filter(None, (text, *result.cautions[:1])))
 
 
 def _stage(stage: StageResult) -> dict[str, Any]:
     """Return the numbers of one stage of building."""
-    own = asdict(stage)
-    names, forces, moved = own.pop("supports"), own.pop("forces"), own.pop("moved")
+    values = asdict(stage)
+    names, forces, moved = values.pop("supports"), values.pop("forces"), values.pop("moved")
     measured = {"natural_map": "natural_map", "balance": "balance", "reaction": "reaction_error"}
-    own["errors"] = {name: _finite(own.pop(field)) for name, field in measured.items()}
-    own["cautions"] = list(own["cautions"])
-    own["displacement"] = {"max": own["displacement"], "stone": moved or None}
-    own["supports"] = [
+    values["errors"] = {name: _finite(values.pop(field)) for name, field in measured.items()}
+    values["cautions"] = list(values["cautions"])
+    values["displacement"] = {"max": values["displacement"], "stone": moved or None}
+    values["supports"] = [
         {"stone": name, "force": force} for name, force in zip(names, forces.tolist(), strict=True)
     ]
-    return own
+    return values
 
 
 def as_json(value: Mapping[str, Any] | list[Any]) -> str:
@@ -126,8 +127,12 @@ def _stress(result: Result) -> dict[str, Any] | None:
     pulled, tension = max(values, key=lambda pair: pair[1].principal_tension)
     pressed, compression = min(values, key=lambda pair: pair[1].principal_compression)
     worst, error = max(values, key=lambda pair: pair[1].error)
-    used = [(code, one.utilisation, one.governing) for code, one in values if one.utilisation is not None]
-    code, utilisation, governing = max(used, key=lambda one: one[1], default=(None, None, None))
+    used = [
+        (code, stress.utilisation, stress.governing)
+        for code, stress in values
+        if stress.utilisation is not None
+    ]
+    code, utilisation, governing = max(used, key=lambda entry: entry[1], default=(None, None, None))
     return {
         "tension": {
             "value": tension.principal_tension,
@@ -171,7 +176,7 @@ def _joints(joints: JointResult) -> dict[str, Any]:
 
 def _finite(value: Any) -> Any:
     if isinstance(value, dict):
-        return {key: _finite(one) for key, one in value.items()}
+        return {key: _finite(entry) for key, entry in value.items()}
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, float) and not math.isfinite(value):

@@ -161,7 +161,7 @@ class _Writer:
             total = (
                 None
                 if self._parts is None
-                else sum(len(one[self._name(group)].arrays[name]) for one in self._parts)
+                else sum(len(part[self._name(group)].arrays[name]) for part in self._parts)
             )
             self._make(group, name, like, total, _CHUNK)
         count = None if self._parts is None else len(self._parts)
@@ -193,7 +193,7 @@ class _Writer:
         return str(group.name).rpartition("/")[2]
 
     def _most(self, group: Any) -> int | None:
-        return None if self._parts is None else max(one[self._name(group)].points for one in self._parts)
+        return None if self._parts is None else max(part[self._name(group)].points for part in self._parts)
 
     def _make(
         self, group: Any, name: str, like: NDArray[Any], total: int | None, least: int | None = None
@@ -218,8 +218,8 @@ class _Writer:
         if not shared:
             for name, number in zip(_PER_FRAME, (part.points, part.cells, part.ids), strict=True):
                 self._append(group, name, np.array([number]))
-            if (known := self._data(group, "Connectivity")[1]) < part.points:
-                self._append(group, "Connectivity", np.arange(known, part.points, dtype=np.int32))
+            if (points_before := self._data(group, "Connectivity")[1]) < part.points:
+                self._append(group, "Connectivity", np.arange(points_before, part.points, dtype=np.int32))
         offsets: dict[str, float] = {
             "Values": instant,
             "PartOffsets": 0 if shared else count,
@@ -308,10 +308,10 @@ def write_vtkhdf(
     path: Path, bodies: Sequence[BodyResult], blocks: Sequence[Block], frames: Sequence[Frame]
 ) -> None:
     """Write all frames of a run that is over, without room for more."""
-    own = _blocks_of(bodies, blocks)
-    parts = [_parts_of(own, frame) for frame in frames]
-    _begin(path, own, frames[0], parts)
-    _add(path, own, frames, parts)
+    joined = _blocks_of(bodies, blocks)
+    parts = [_parts_of(joined, frame) for frame in frames]
+    _begin(path, joined, frames[0], parts)
+    _add(path, joined, frames, parts)
 
 
 class GrowingResults:

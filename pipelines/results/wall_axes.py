@@ -34,8 +34,8 @@ class WallAxes:
 
     def components(self, vector: Array) -> Array:
         """Return the components (…, 3) of vectors along the wall, outwards and up."""
-        found: Array = np.asarray(vector) @ np.array([self.along, self.outwards, (0.0, 0.0, 1.0)]).T
-        return found
+        components: Array = np.asarray(vector) @ np.array([self.along, self.outwards, (0.0, 0.0, 1.0)]).T
+        return components
 
     def place(self, point: Array) -> tuple[float, float]:
         """Return the distance of a point from the left end, and its height above the foot [m]."""

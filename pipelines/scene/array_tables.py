@@ -42,14 +42,14 @@ class ArrayTable:
 
 def read_entries(
     document: TomlDocument,
-    given: Mapping[str, Any],
+    tables: Mapping[str, Any],
     name: str,
     types: Mapping[str, tuple[Key, ...]],
     common: tuple[Key, ...] = (),
 ) -> tuple[ArrayTable, ...]:
     """Check all tables [[name]]; an array of a single type has no key `type`."""
     return tuple(
-        _entry(document, path, table, types, common) for path, table in tables_of(document, given, name)
+        _entry(document, path, table, types, common) for path, table in tables_of(document, tables, name)
     )
 
 
@@ -97,7 +97,7 @@ def _entry(
     types: Mapping[str, tuple[Key, ...]],
     common: tuple[Key, ...],
 ) -> ArrayTable:
-    title, given = f"[[{path[0]}]]", dict(table)
+    title, entry = f"[[{path[0]}]]", dict(table)
     kind = next(iter(types))
     if len(types) > 1:
         which = Key("type", ValueKind.TEXT, "Type.", choices=tuple(types))
@@ -106,10 +106,10 @@ def _entry(
                 "type"
             ]
         )
-        given.pop("type")
+        entry.pop("type")
         title = f"[[{path[0]}]] of type {kind!r}"
     keys = (*types[kind], *common)
-    values = check_table(document, path, given, keys, title)
+    values = check_table(document, path, entry, keys, title)
     for key in keys:
         if key.kind in (ValueKind.HISTORY, ValueKind.VECTOR_HISTORY) and values[key.name] is not None:
             values[key.name] = _history(document, (*path, key.name), values[key.name], key)

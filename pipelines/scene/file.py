@@ -105,33 +105,33 @@ def parse_scene(text: str, path: str) -> SceneFile:
     >>> scene.name, scene.contact.law.friction, scene.time.step
     ('tower', 0.6, 0.001)
     """
-    given = parse_toml(text, path, SceneError, "see docs/scene.md for a scene to start from")
+    toml = parse_toml(text, path, SceneError, "see docs/scene.md for a scene to start from")
     document = TomlDocument(path, key_lines(text))
-    tables = _checked_tables(document, given)
-    laws = read_laws(document, given)
-    loads, throws = read_loads(document, given), read_throws(document, given)
+    tables = _checked_tables(document, toml)
+    laws = read_laws(document, toml)
+    loads, throws = read_loads(document, toml), read_throws(document, toml)
     return SceneFile(
         document=document,
         text=text,
         name=tables["scene"]["name"] or Path(path).stem,
         selection=build(Selection, tables["select"]),
-        materials=_materials(document, given),
+        materials=_materials(document, toml),
         bodies=_fidelities(tables["bodies"]),
         joints=_joints(document, laws, tables["joints"]),
         contact=_contact(document, tables["contact"]),
         gravity=_gravity(document, **tables["gravity"]),
         mesh=build(MeshSettings, tables["mesh"]),
-        meshes=read_entries(document, given, "meshes", {"mesh": MESH_KEYS}),
+        meshes=read_entries(document, toml, "meshes", {"mesh": MESH_KEYS}),
         time=_time(document, tables["time"]),
         solver=build(SolverSettings, tables["solver"]),
         output=_output(document, tables["output"]),
         laws=laws,
         loads=loads,
         throws=throws,
-        stages=read_stages(document, given, loads, throws),
-        assess=read_entries(document, given, "assess", ASSESS_TYPES),
-        site=_site(document, given),
-        pushover=read_pushover(document, given),
+        stages=read_stages(document, toml, loads, throws),
+        assess=read_entries(document, toml, "assess", ASSESS_TYPES),
+        site=_site(document, toml),
+        pushover=read_pushover(document, toml),
     )
 
 
@@ -140,35 +140,35 @@ def _fidelities(values: dict[str, Any]) -> Fidelities:
     return build(Fidelities, values | {"default": default})
 
 
-def _checked_tables(document: TomlDocument, given: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    known = [*TABLES, "materials", "site", "pushover", *ARRAYS, *BESIDE]
-    for name, content in given.items():
+def _checked_tables(document: TomlDocument, toml: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    allowed = [*TABLES, "materials", "site", "pushover", *ARRAYS, *BESIDE]
+    for name, content in toml.items():
         if name in (*ARRAYS, *BESIDE):
             continue
-        if name not in known:
+        if name not in allowed:
             what = f"unknown table [{name}]" if isinstance(content, dict | list) else f"unknown key {name!r}"
-            document.fail(what, name, remedy=nearest(name, known))
+            document.fail(what, name, remedy=nearest(name, allowed))
         if not isinstance(content, dict):
             document.fail(f"{name!r} is not a table", name, remedy=f"write [{name}] on a line of its own")
-    return {name: check_table(document, (name,), given.get(name, {}), keys) for name, keys in TABLES.items()}
+    return {name: check_table(document, (name,), toml.get(name, {}), keys) for name, keys in TABLES.items()}
 
 
-def _site(document: TomlDocument, given: Mapping[str, Any]) -> Site | None:
-    if "site" not in given:
+def _site(document: TomlDocument, toml: Mapping[str, Any]) -> Site | None:
+    if "site" not in toml:
         return None
-    values: dict[str, Any] = check_table(document, ("site",), given["site"], SITE_KEYS)
+    values: dict[str, Any] = check_table(document, ("site",), toml["site"], SITE_KEYS)
     with document.at("site"):
         return Site(**typed_values(Site, values))
 
 
-def _materials(document: TomlDocument, given: Mapping[str, Any]) -> tuple[MaterialRule, ...]:
-    tables = given.get("materials", {})
+def _materials(document: TomlDocument, toml: Mapping[str, Any]) -> tuple[MaterialRule, ...]:
+    tables = toml.get("materials", {})
     if not tables:
         document.fail("no material", "materials", remedy="add a table such as [materials.limestone]")
     rules, forms = [], dict[str, str]()
     for name, content in tables.items():
-        if (other := forms.setdefault(plain_form(name), name)) != name:
-            what = f"the material {explained(name, other)}"
+        if (earlier := forms.setdefault(plain_form(name), name)) != name:
+            what = f"the material {explained(name, earlier)}"
             document.fail(what, "materials", name, remedy="write both with the same characters")
         if not isinstance(content, dict):
             document.fail(
@@ -176,9 +176,9 @@ def _materials(document: TomlDocument, given: Mapping[str, Any]) -> tuple[Materi
             )
         plain = {key: value for key, value in content.items() if key != "orthotropy"}
         values: dict[str, Any] = check_table(document, ("materials", name), plain, MATERIAL_KEYS)
-        own = _orthotropy(document, name, content["orthotropy"]) if "orthotropy" in content else None
+        orthotropy = _orthotropy(document, name, content["orthotropy"]) if "orthotropy" in content else None
         with document.at("materials", name, "orthotropy"):
-            material = Material(name, **typed_values(Material, values), orthotropy=own)
+            material = Material(name, **typed_values(Material, values), orthotropy=orthotropy)
             rules.append(MaterialRule(material, values["stones"]))
     general = [rule.material.name for rule in rules if not rule.stones]
     if len(general) > 1:
@@ -230,7 +230,7 @@ def _gravity(
     length = float(np.linalg.norm(direction))
     if length == 0.0:
         document.fail("direction has no length", "gravity", "direction", remedy="give for example [0, 0, -1]")
-    x, y, z = (magnitude * one / length for one in direction)
+    x, y, z = (magnitude * component / length for component in direction)
     return x, y, z
 
 

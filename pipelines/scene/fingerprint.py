@@ -37,20 +37,20 @@ def fingerprint(
     >>> dict(_parts(TimeSettings(step=2e-3), "time"))["time.step"]
     '0.002'
     """
-    own = {field.name: getattr(scene, field.name) for field in fields(scene) if field.name != "blocks"}
+    settings = {field.name: getattr(scene, field.name) for field in fields(scene) if field.name != "blocks"}
     recorded = (
         (stone.record.code, [stone.record.solid_vertices, stone.record.solid_faces]) for stone in stones
     )
-    found = {f"{_STONE}{code}: solid in the database": digest(solid) for code, solid in recorded}
-    found |= dict(_parts(own, ""))
+    digests = {f"{_STONE}{code}: solid in the database": digest(solid) for code, solid in recorded}
+    digests |= dict(_parts(settings, ""))
     for block in scene.blocks:
         values = ((field.name, getattr(block, field.name)) for field in fields(block) if field.name != "code")
-        found |= {f"{_STONE}{block.code}: {name}": digest(value) for name, value in values}
+        digests |= {f"{_STONE}{block.code}: {name}": digest(value) for name, value in values}
     for number, stage in enumerate(stages, 1):
         standing = [(block.code, str(block.fidelity)) for block in stage.scene.blocks]
         what = {"name": stage.name, "stones": digest(standing), "loads": stage.scene.loads}
         what["duration"] = stage.scene.time.duration
-        found |= dict(_parts(what, f"stage {number}"))
+        digests |= dict(_parts(what, f"stage {number}"))
     built = (
         start.centre,
         start.node,
@@ -58,7 +58,7 @@ def fingerprint(
         model.fixed,
         [stone and stone.mesh for stone in model.stones],
     )
-    return found | {
+    return digests | {
         "order of the stones": digest([block.code for block in scene.blocks]),
         "meshes": digest(built),
     }
@@ -66,14 +66,14 @@ def fingerprint(
 
 def planar_fingerprint(scene: PlanarScene) -> dict[str, str]:
     """Return a text for each setting, load and body of a scene of the plane."""
-    own = {
+    settings = {
         field.name: getattr(scene, field.name)
         for field in fields(scene)
         if field.name not in ("disks", "walls")
     }
     bodies = [(f"disk {disk.code}", digest(disk)) for disk in scene.disks]
     bodies += [(f"wall {wall.code}", digest(wall)) for wall in scene.walls]
-    return dict(_parts(own, "")) | dict(bodies) | {"order of the bodies": digest(scene.codes)}
+    return dict(_parts(settings, "")) | dict(bodies) | {"order of the bodies": digest(scene.codes)}
 
 
 def changes(then: Mapping[str, str], now: Mapping[str, str]) -> tuple[list[str], list[str]]:
@@ -90,8 +90,8 @@ def changes(then: Mapping[str, str], now: Mapping[str, str]) -> tuple[list[str],
 
 def _missing(some: Mapping[str, str], others: Mapping[str, str], what: str) -> list[str]:
     """Name the stones of one scene that another does not have."""
-    one, other = ({name.partition(": ")[0] for name in names} for names in (some, others))
-    return [f"{name} {what}" for name in sorted(one - other) if name.startswith(_STONE)]
+    first, second = ({name.partition(": ")[0] for name in names} for names in (some, others))
+    return [f"{name} {what}" for name in sorted(first - second) if name.startswith(_STONE)]
 
 
 def _or(text: str | None) -> str:
@@ -108,13 +108,13 @@ def _parts(value: Any, path: str) -> Iterator[tuple[str, str]]:
         yield f"{path}.type", type(value).__name__
         value = {field.name: getattr(value, field.name) for field in fields(value)}
     if isinstance(value, Mapping):
-        for name, one in value.items():
-            yield from _parts(one, f"{path}.{name}" if path else str(name))
+        for name, entry in value.items():
+            yield from _parts(entry, f"{path}.{name}" if path else str(name))
     elif isinstance(value, frozenset):
         yield path, _text(sorted(value))
     elif isinstance(value, list | tuple) and any(is_dataclass(one) for one in value):
-        for number, one in enumerate(value, 1):
-            yield from _parts(one, f"{path} {number}")
+        for number, entry in enumerate(value, 1):
+            yield from _parts(entry, f"{path} {number}")
     else:
         yield path, _text(value)
 
@@ -130,10 +130,10 @@ def _text(value: Any) -> str:
 
 def digest(value: Any) -> str:
     """Return a digest of a value made of dataclasses, lists, tuples, sets, arrays and plain values."""
-    found = hashlib.sha256()
+    sha256 = hashlib.sha256()
     for part in _bytes(value):
-        found.update(part)
-    return f"#{found.hexdigest()[:_DIGITS]}"
+        sha256.update(part)
+    return f"#{sha256.hexdigest()[:_DIGITS]}"
 
 
 def _bytes(value: Any) -> Iterator[bytes]:
@@ -146,8 +146,8 @@ def _bytes(value: Any) -> Iterator[bytes]:
         yield from _bytes([getattr(value, field.name) for field in fields(value)])
     elif isinstance(value, list | tuple):
         yield f"({len(value)}".encode()
-        for one in value:
-            yield from _bytes(one)
+        for entry in value:
+            yield from _bytes(entry)
     elif isinstance(value, frozenset):
         yield from _bytes(sorted(value))
     else:

@@ -63,12 +63,12 @@ class JointLaw:
     law: Law
 
 
-def read_laws(document: TomlDocument, given: Mapping[str, Any]) -> tuple[JointLaw, ...]:
+def read_laws(document: TomlDocument, toml: Mapping[str, Any]) -> tuple[JointLaw, ...]:
     """Check and build all laws; the stones between which they hold are still expressions."""
-    materials = tuple(given.get("materials", {}))
+    materials = tuple(toml.get("materials", {}))
     return tuple(
         _law(document, entry, materials)
-        for entry in read_entries(document, given, "laws", LAW_TYPES, LAW_KEYS)
+        for entry in read_entries(document, toml, "laws", LAW_TYPES, LAW_KEYS)
     )
 
 

@@ -278,9 +278,9 @@ class _Throw:
 THROW_KEYS = keys_of(_Throw)
 
 
-def read_loads(document: TomlDocument, given: Mapping[str, Any]) -> tuple[ArrayTable, ...]:
+def read_loads(document: TomlDocument, toml: Mapping[str, Any]) -> tuple[ArrayTable, ...]:
     """Check all loads and read their records; their stones are still expressions."""
-    entries = read_entries(document, given, "loads", LOAD_TYPES, LOAD_KEYS)
+    entries = read_entries(document, toml, "loads", LOAD_TYPES, LOAD_KEYS)
     for entry in entries:
         if entry.type == "tilt" and (entry.values["rate"] is None) == (entry.values["angle"] is None):
             document.fail("a tilt by rate or by angle", *entry.path, remedy="give either 'rate' or 'angle'")
@@ -291,9 +291,9 @@ def read_loads(document: TomlDocument, given: Mapping[str, Any]) -> tuple[ArrayT
     )
 
 
-def read_throws(document: TomlDocument, given: Mapping[str, Any]) -> tuple[ArrayTable, ...]:
+def read_throws(document: TomlDocument, toml: Mapping[str, Any]) -> tuple[ArrayTable, ...]:
     """Check all initial motions; their stones are still expressions."""
-    return read_entries(document, given, "throw", {"throw": THROW_KEYS})
+    return read_entries(document, toml, "throw", {"throw": THROW_KEYS})
 
 
 def build_loads(
@@ -327,33 +327,33 @@ def thrown(
     document: TomlDocument, entries: Iterable[ArrayTable], groups: Groups, blocks: Blocks
 ) -> dict[str, tuple[float, ...]]:
     """Return the initial velocity (6,) [m/s, rad/s] of every stone that begins in motion, by code."""
-    found: dict[str, tuple[float, ...]] = {}
+    thrown_stones: dict[str, tuple[float, ...]] = {}
     for entry in entries:
-        velocity = (*entry.values["velocity"], *(float(np.radians(one)) for one in entry.values["spin"]))
+        velocity = (*entry.values["velocity"], *(float(np.radians(angle)) for angle in entry.values["spin"]))
         for code in sorted(groups[entry.path][0]):
             if blocks[code].fidelity is Fidelity.FIXED:
                 what = f"stone {code} is thrown, but it is fixed"
                 document.fail(what, *entry.path, "stones", remedy="leave it out, or let it be rigid")
-            if code in found:
+            if code in thrown_stones:
                 document.fail(f"stone {code} is thrown twice", *entry.path, "stones", remedy="name it once")
-            found[code] = velocity
-    return found
+            thrown_stones[code] = velocity
+    return thrown_stones
 
 
 def _with_records(document: TomlDocument, entry: ArrayTable) -> ArrayTable:
     """Return the entry with records in place of their file names."""
     values = dict(entry.values)
-    given = [axis for axis in "xyz" if values[axis] is not None]
-    if bool(given) == (values["station"] is not None):
+    axes = [axis for axis in "xyz" if values[axis] is not None]
+    if bool(axes) == (values["station"] is not None):
         document.fail(
-            "a ground motion without a record" if not given else "records by axes and by station",
+            "a ground motion without a record" if not axes else "records by axes and by station",
             *entry.path,
             remedy="give at least one of x, y, z, or station",
         )
     if values["unit"] is not None and unit_of(values["unit"]) is None:
         remedy = f"give {', '.join(UNITS)}"
         document.fail(f"unknown unit {values['unit']!r}", *entry.path, "unit", remedy=remedy)
-    for axis in given:
+    for axis in axes:
         path = file_beside(document, values[axis])
         if values["unit"] is None and path.suffix.lower() in _TABLES and not path.exists():
             what = f"the unit of the acceleration in {values[axis]!r} is not known, and there is no such file"
@@ -361,10 +361,10 @@ def _with_records(document: TomlDocument, entry: ArrayTable) -> ArrayTable:
         record = read_accelerogram(path, values["unit"], values["dt"], axis)
         with document.at(*entry.path, axis):
             values[axis] = _processed(record, values)
-    if not given:
-        found = read_station(file_beside(document, values["station"]), values["unit"], values["dt"])
+    if not axes:
+        accelerograms = read_station(file_beside(document, values["station"]), values["unit"], values["dt"])
         with document.at(*entry.path, "station"):
-            values["station"] = tuple(_processed(one, values) for one in found)
+            values["station"] = tuple(_processed(record, values) for record in accelerograms)
     return ArrayTable(entry.path, entry.type, values, entry.groups)
 
 
@@ -455,7 +455,8 @@ def _ground_motion(values: Mapping[str, Any], groups: Sequence[Codes]) -> tuple[
     )
     axes = np.array([directions[axis] for axis in "xyz"])
     components += tuple(
-        Component(tuple((np.array(one.direction) @ axes).tolist()), one) for one in values["station"] or ()
+        Component(tuple((np.array(record.direction) @ axes).tolist()), record)
+        for record in values["station"] or ()
     )
     return (GroundMotion(groups[0], components, values["scale"], values["start"]),)
 

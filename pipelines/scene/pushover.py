@@ -78,11 +78,11 @@ SCATTER_KEYS = tuple(
 """Keys of [pushover.scatter]."""
 
 
-def read_pushover(document: TomlDocument, given: Mapping[str, Any]) -> Pushing | None:
+def read_pushover(document: TomlDocument, toml: Mapping[str, Any]) -> Pushing | None:
     """Check the table; None where a scene has none."""
-    if "pushover" not in given:
+    if "pushover" not in toml:
         return None
-    content = given["pushover"]
+    content = toml["pushover"]
     if not isinstance(content, dict):
         document.fail("'pushover' is not a table", "pushover", remedy="write [pushover] on a line of its own")
     plain = {key: value for key, value in content.items() if key != "scatter"}

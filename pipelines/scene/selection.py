@@ -108,27 +108,27 @@ def _selected(scene: SceneFile, session: Session) -> dict[str, StoneRecord]:
 def _materials(scene: SceneFile, session: Session, records: Mapping[str, StoneRecord]) -> dict[str, Material]:
     """Return the material of every stone: that of the one rule that names it, or the general one."""
     general: Material | None = None
-    found: dict[str, Material] = {}
+    materials: dict[str, Material] = {}
     for rule in scene.materials:
         if not rule.stones:
             general = rule.material
             continue
         path = ("materials", rule.material.name, "stones")
         for code in _named(scene, session, records, path, rule.stones):
-            if code in found:
-                both = f"{found[code].name!r} and {rule.material.name!r}"
+            if code in materials:
+                both = f"{materials[code].name!r} and {rule.material.name!r}"
                 scene.document.fail(f"stone {code} is of two materials, {both}", *path, remedy="name it once")
-            found[code] = rule.material
+            materials[code] = rule.material
     if general is not None:
-        return {code: found.get(code, general) for code in records}
-    without = [code for code in records if code not in found]
+        return {code: materials.get(code, general) for code in records}
+    without = [code for code in records if code not in materials]
     if without:
         scene.document.fail(
             f"{len(without)} stones have no material, e.g. {without[0]}",
             "materials",
             remedy="leave 'stones' out of one material: it is that of all others",
         )
-    return found
+    return materials
 
 
 def _fidelities(

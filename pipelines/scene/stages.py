@@ -82,12 +82,12 @@ class StandingStones:
 
 def read_stages(
     document: TomlDocument,
-    given: Mapping[str, Any],
+    toml: Mapping[str, Any],
     loads: Iterable[ArrayTable],
     throws: Sequence[ArrayTable],
 ) -> tuple[ArrayTable, ...]:
     """Check all stages, and the names by which loads refer to them; their stones are still expressions."""
-    stages = read_entries(document, given, "stages", {"stage": STAGE_KEYS})
+    stages = read_entries(document, toml, "stages", {"stage": STAGE_KEYS})
     names: list[str] = []
     for entry in stages:
         if entry.values["name"] in names:

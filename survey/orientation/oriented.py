@@ -45,7 +45,7 @@ class Oriented:
         for number, photo in enumerate(self.photos):
             if photo.name == name:
                 return number
-        names = [one.name for one in self.photos]
+        names = [photo.name for photo in self.photos]
         raise SurveyError(
             f"no photograph {name} in {self.path}", where=where, remedy=f"oriented are {listed(names)}"
         )

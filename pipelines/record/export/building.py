@@ -176,16 +176,18 @@ def _columns(session: Session, codes: Sequence[str], run: int | None) -> tuple[C
     for values in find_rows(session, "entity", run=run, columns=["code", *asked]):
         if (row := place.get(str(values["code"]))) is not None:
             rows[row] = values
-    columns = (column_of(one, [values.get(name) for values in rows]) for name, one in asked.items())
+    columns = (
+        column_of(attribute, [values.get(name) for values in rows]) for name, attribute in asked.items()
+    )
     return tuple(column for column in columns if column is not None)
 
 
 def _groups(session: Session, ids: dict[int, int]) -> tuple[Group, ...]:
     """Return the structures that are held now, with their stones."""
-    held = session.scalars(
+    groups = session.scalars(
         select(Structure).where(Structure.superseded_id.is_(None)).order_by(Structure.code)
     ).all()
-    codes = {one.id: one.code for one in held}
+    codes = {group.id: group.code for group in groups}
     members: dict[int, list[int]] = {}
     rows = session.execute(
         select(Membership.structure_id, Membership.entity_id)
@@ -197,24 +199,26 @@ def _groups(session: Session, ids: dict[int, int]) -> tuple[Group, ...]:
             members.setdefault(structure, []).append(ids[entity])
     return tuple(
         Group(
-            one.code,
-            one.kind,
-            one.title,
-            None if one.parent_id is None else codes.get(one.parent_id),
-            tuple(sorted(set(members.get(one.id, ())))),
+            group.code,
+            group.kind,
+            group.title,
+            None if group.parent_id is None else codes.get(group.parent_id),
+            tuple(sorted(set(members.get(group.id, ())))),
         )
-        for one in held
+        for group in groups
     )
 
 
 def _materials(session: Session) -> dict[str, dict[str, tuple[float, str]]]:
     """Return the properties of the materials that are held now."""
-    held = session.scalars(select(Material).where(Material.superseded_id.is_(None)).order_by(Material.name))
+    materials = session.scalars(
+        select(Material).where(Material.superseded_id.is_(None)).order_by(Material.name)
+    )
     return {
-        one.name: {
+        material.name: {
             each.name: (each.value, each.unit)
-            for each in sorted(one.properties, key=lambda each: each.name)
+            for each in sorted(material.properties, key=lambda each: each.name)
             if each.superseded_id is None
         }
-        for one in held
+        for material in materials
     }

@@ -48,15 +48,15 @@ class _Chunks:
     def accessor(self, array: NDArray[Any], kind: str, target: int) -> int:
         """Add an array, and return the number of the accessor to it."""
         component = _FLOAT if array.dtype == np.float32 else _UNSIGNED
-        one: dict[str, Any] = {
+        accessor: dict[str, Any] = {
             "bufferView": self.view(array.tobytes(), target),
             "componentType": component,
             "count": len(array),
             "type": kind,
         }
         if kind == "VEC3":
-            one |= {"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()}
-        self.accessors.append(one)
+            accessor |= {"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()}
+        self.accessors.append(accessor)
         return len(self.accessors) - 1
 
 
@@ -114,8 +114,8 @@ def _table(building: Building, chunks: _Chunks) -> tuple[dict[str, Any], dict[st
     def texts(name: str, values: Sequence[Value]) -> None:
         """Add a column of texts."""
         raw = ["" if value is None else str(value) for value in values]
-        coded = [one.encode() for one in raw]
-        ends = np.concatenate([[0], np.cumsum([len(one) for one in coded])]).astype("<u4")
+        coded = [text.encode() for text in raw]
+        ends = np.concatenate([[0], np.cumsum([len(code) for code in coded])]).astype("<u4")
         schema[name] = {"type": "STRING", "noData": ""}
         # a view of no bytes is not allowed
         properties[name] = {

@@ -194,10 +194,10 @@ class _Writer:
             if not there:
                 continue
             properties = list_of(self._property(label, _measure(value)) for label, value in there)
-            held = self._file.add(
+            property_set = self._file.add(
                 "IFCPROPERTYSET", self._id("set", name, code), "$", text(name), "$", properties
             )
-            self._relate("IFCRELDEFINESBYPROPERTIES", f"set {name}", list_of([element]), held, code)
+            self._relate("IFCRELDEFINESBYPROPERTIES", f"set {name}", list_of([element]), property_set, code)
 
     def _property(self, label: str, value: str) -> str:
         """Return a property; stones with the same value share it."""
@@ -225,14 +225,19 @@ class _Writer:
     def _assign_groups(self, elements: Sequence[str]) -> None:
         groups = self._building.groups
         made = {
-            one.code: self._file.add(
-                "IFCGROUP", self._id("group", one.code), "$", text(one.code), text(one.title), text(one.kind)
+            group.code: self._file.add(
+                "IFCGROUP",
+                self._id("group", group.code),
+                "$",
+                text(group.code),
+                text(group.title),
+                text(group.kind),
             )
-            for one in groups
+            for group in groups
         }
         for group in groups:
             members = [elements[row] for row in group.members]
-            members += [made[other.code] for other in groups if other.parent == group.code]
+            members += [made[member.code] for member in groups if member.parent == group.code]
             if members:
                 self._relate(
                     "IFCRELASSIGNSTOGROUP", "group", list_of(members), f"$,{made[group.code]}", group.code

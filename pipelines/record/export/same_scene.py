@@ -109,8 +109,8 @@ def laws_by_group(scene: Scene, blocks: Sequence[Block]) -> LawGroups:
     for first in range(len(examples)):
         for second in range(first, len(examples)):
             law = law_of(scene, examples[first], examples[second])
-            for known, pairs in laws:
-                if known == law:
+            for law_known, pairs in laws:
+                if law_known == law:
                     pairs.append((first, second))
                     break
             else:

@@ -16,15 +16,15 @@ def text(value: str | None) -> str:
         return "$"
     if value.isascii() and value.isprintable():
         return "'" + value.replace("\\", "\\\\").replace("'", "''") + "'"
-    return "'" + "".join(_character(one) for one in value) + "'"
+    return "'" + "".join(_character(character) for character in value) + "'"
 
 
-def _character(one: str) -> str:
-    code = ord(one)
-    if one in "'\\":
-        return 2 * one
+def _character(character: str) -> str:
+    code = ord(character)
+    if character in "'\\":
+        return 2 * character
     if 32 <= code < 127:
-        return one
+        return character
     return f"\\X2\\{code:04X}\\X0\\" if code < 0x10000 else f"\\X4\\{code:08X}\\X0\\"
 
 

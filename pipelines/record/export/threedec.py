@@ -81,8 +81,8 @@ def _stiffness(same: SameScene) -> tuple[float, float]:
         )
         for part in same.parts
     ]
-    young, poisson = (float(np.mean([one[at] for one in each])) for at in (0, 1))
-    normal = young / float(np.mean([one[2] for one in each])) ** (1 / 3)
+    young, poisson = (float(np.mean([stiffness[at] for stiffness in each])) for at in (0, 1))
+    normal = young / float(np.mean([stiffness[2] for stiffness in each])) ** (1 / 3)
     return normal, normal / (2 * (1 + poisson))
 
 

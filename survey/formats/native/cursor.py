@@ -33,16 +33,16 @@ class Cursor:
 
     def peek(self) -> str:
         """Return the next word without consuming it; empty at the end of the line."""
-        found = _WORD.match(self._line, self._at)
-        return "" if found is None or found[1].startswith("#") else found[1]
+        match = _WORD.match(self._line, self._at)
+        return "" if match is None or match[1].startswith("#") else match[1]
 
     def word(self) -> str:
         """Consume the next word; empty at the end of the line."""
-        found = _WORD.match(self._line, self._at)
-        if found is None or found[1].startswith("#"):
+        match = _WORD.match(self._line, self._at)
+        if match is None or match[1].startswith("#"):
             return ""
-        self._at = found.end()
-        return found[1]
+        self._at = match.end()
+        return match[1]
 
     def keyword(self, word: str) -> bool:
         """Consume the next word if it is this one; return whether it was."""
@@ -53,9 +53,9 @@ class Cursor:
 
     def copy(self) -> "Cursor":
         """Return a cursor at the same position."""
-        other = Cursor(self._line, self.where)
-        other._at = self._at
-        return other
+        copied = Cursor(self._line, self.where)
+        copied._at = self._at
+        return copied
 
     def key(self) -> str:
         """Consume the next word, even if it begins with ``#`` or a quotation mark."""
@@ -124,11 +124,11 @@ class Cursor:
 
     def courses(self) -> tuple[int, int]:
         """Consume a course, or first - last."""
-        found = _COURSES.match(self._line, self._at)
-        if found is None:
+        match = _COURSES.match(self._line, self._at)
+        if match is None:
             raise self.fail(f"courses {shown(self.peek())}", "write: course 3, or: course 3-5")
-        self._at = found.end()
-        first, last = int(found[1]), int(found[2] or found[1])
+        self._at = match.end()
+        first, last = int(match[1]), int(match[2] or match[1])
         if first > last:
             raise self.fail(f"courses {first}-{last}", "write the lower course first")
         return first, last

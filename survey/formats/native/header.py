@@ -96,7 +96,7 @@ class HeadReader:
             name=self._name or name,
             path=path,
             stations=tuple(self._stations.values()),
-            control=tuple(self._control_point(one) for one in self._control.values()),
+            control=tuple(self._control_point(control_line) for control_line in self._control.values()),
             photographs=self._finished_photographs(),
             depth_rules=tuple(self._rules),
             canons=tuple(self._canons.values()),
@@ -182,11 +182,11 @@ class HeadReader:
             )
         depth, sigma, source = cursor.length("depth"), cursor.sigma("depth"), cursor.source("depth")
         rule = DepthRule(kind, depth, sigma, source, line, courses, zone)
-        for other in self._rules:
-            if _overlap(rule, other):
+        for earlier in self._rules:
+            if _overlap(rule, earlier):
                 raise cursor.fail(
                     f"a second depth for {kind or '*'!r} of the same courses and zone",
-                    f"the first is on line {other.line}",
+                    f"the first is on line {earlier.line}",
                 )
         self._rules.append(rule)
 
@@ -272,21 +272,21 @@ def read_extrusion(cursor: Cursor) -> Extrusion:
     return Extrusion(direction, tail)
 
 
-def _overlap(one: DepthRule, other: DepthRule) -> bool:
+def _overlap(first: DepthRule, second: DepthRule) -> bool:
     """Return whether two equally specific rules would hold for the same stone."""
-    if (one.kind, one.zone) != (other.kind, other.zone):
+    if (first.kind, first.zone) != (second.kind, second.zone):
         return False
-    if one.courses is None or other.courses is None:
-        return one.courses is other.courses
-    return one.courses[0] <= other.courses[1] and other.courses[0] <= one.courses[1]
+    if first.courses is None or second.courses is None:
+        return first.courses is second.courses
+    return first.courses[0] <= second.courses[1] and second.courses[0] <= first.courses[1]
 
 
-def _new(name: str, known: Mapping[str, _Numbered], what: str, cursor: Cursor) -> None:
-    if name in known:
-        raise cursor.fail(f"{what} {name} a second time", f"the first is on line {known[name].line}")
+def _new(name: str, items: Mapping[str, _Numbered], what: str, cursor: Cursor) -> None:
+    if name in items:
+        raise cursor.fail(f"{what} {name} a second time", f"the first is on line {items[name].line}")
 
 
-def missing(what: str, name: str, known: Iterable[str], where: str) -> SurveyError:
+def missing(what: str, name: str, names_known: Iterable[str], where: str) -> SurveyError:
     """Make the error of a name that is missing in the head."""
-    names = ", ".join(known) or "none"
+    names = ", ".join(names_known) or "none"
     return SurveyError(f"no {what} {name}", where=where, remedy=f"{what}s of this survey: {names}")

@@ -60,10 +60,10 @@ class StoneReader:
 
     def take_place(self, line: str) -> bool:
         """Read a line of a vertex or point if it is a plain one: the fast path for most of a file."""
-        found = _PLACE(line)
-        if found is None:
+        match = _PLACE(line)
+        if match is None:
             return False
-        word, a, b, c = found.groups()
+        word, a, b, c = match.groups()
         try:
             x, y, z = float(a), float(b), float(c)
         except ValueError:
@@ -89,9 +89,9 @@ class StoneReader:
                 self._take_note(cursor)
             case "photo":
                 cursor.check_first(self._photograph, word)
-                known = [photograph.name for photograph in self._head.photographs]
+                names = [photograph.name for photograph in self._head.photographs]
                 if self._head.orientation is None:
-                    self._photograph = self._known("photo", known, cursor)
+                    self._photograph = self._known("photo", names, cursor)
                 else:  # the result of the orientation, which is not read here, names more of them
                     self._photograph = cursor.name("photo")
                     cursor.end("write: photo NAME")
@@ -224,7 +224,7 @@ class StoneReader:
         if not self._sigmas:
             return None
         order = [(word, k) for word in ("point", "vertex") for k in range(len(self._places[word]))]
-        return np.array([self._sigmas.get(one, common) for one in order])
+        return np.array([self._sigmas.get(role, common) for role in order])
 
 
 def _array(rows: list[tuple[float, ...]], columns: int) -> Array:

@@ -42,8 +42,8 @@ def write_moma(survey: Survey, path: Path) -> None:
         raise SurveyError(
             "the survey has no stones", where=str(path), remedy="write surveys of one stone or more"
         )
-    own = (block.sigma for block in survey.blocks if block.sigmas is None and block.sigma > 0.0)
-    counts = Counter(own) or Counter([0.003])
+    sigmas = (block.sigma for block in survey.blocks if block.sigmas is None and block.sigma > 0.0)
+    counts = Counter(sigmas) or Counter([0.003])
     common = max(sorted(counts), key=counts.__getitem__)
     _write(Path(path), _survey_lines(survey, common))
 
@@ -103,16 +103,16 @@ def _head_lines(head: SurveyHead) -> Iterator[str]:
         yield _extrusion_line(head.extrusion)
 
 
-def _control_line(one: ControlPoint) -> str:
-    measured = f"{_row(one.measured)} sigma {_number(one.measured_sigma)}"
-    return f"control {_name(one.name)} {measured} site {_row(one.site)} sigma {_number(one.site_sigma)}"
+def _control_line(point: ControlPoint) -> str:
+    measured = f"{_row(point.measured)} sigma {_number(point.measured_sigma)}"
+    return f"control {_name(point.name)} {measured} site {_row(point.site)} sigma {_number(point.site_sigma)}"
 
 
-def _photograph_lines(one: Photograph) -> list[str]:
-    name = _name(one.name)
-    station = "" if one.station is None else f" station {_name(one.station)}"
-    lines = [f"photo {name} sigma {_number(one.sigma)}{station}"]
-    for mark in one.marks:
+def _photograph_lines(photograph: Photograph) -> list[str]:
+    name = _name(photograph.name)
+    station = "" if photograph.station is None else f" station {_name(photograph.station)}"
+    lines = [f"photo {name} sigma {_number(photograph.sigma)}{station}"]
+    for mark in photograph.marks:
         at = f"{_row(mark.position)} sigma {_number(mark.sigma)}"
         lines.append(f"mark {name} {_row(mark.image)} at {at}")
     return lines
@@ -144,13 +144,13 @@ def _stone_lines(block: BlockRecord, common_sigma: float) -> list[str]:
     lines += [f"  note {_key(key)} {_text(text)}" for key, text in block.notes.items()]
     if block.photograph is not None:
         lines.append(f"  photo {_name(block.photograph)}")
-        lines += [f"  pixel {_row(one)}" for one in block.image]
+        lines += [f"  pixel {_row(pixel)}" for pixel in block.image]
     if block.surface is not None:
         lines.append(f"  on {_name(block.surface)}")
     for mark in block.marks:
-        own = "" if mark.sigma is None else f" sigma {_number(mark.sigma)}"
+        accuracy = "" if mark.sigma is None else f" sigma {_number(mark.sigma)}"
         lines.append(
-            f"  mark {_name(mark.name)} {mark.role} {_name(mark.photograph)} {_row(mark.image)}{own}"
+            f"  mark {_name(mark.name)} {mark.role} {_name(mark.photograph)} {_row(mark.image)}{accuracy}"
         )
     precisions = [""] * (len(block.points) + len(block.vertices))
     if block.sigmas is not None:
@@ -163,9 +163,13 @@ def _stone_lines(block: BlockRecord, common_sigma: float) -> list[str]:
     return [*lines, "end"]
 
 
-def _extrusion_line(one: Extrusion) -> str:
-    along = "" if one.direction is None else f" along {_row(one.direction)}"
-    return f"extrude{along}" if along and one.tail == 1.0 else f"extrude{along} tail {_number(one.tail)}"
+def _extrusion_line(extrusion: Extrusion) -> str:
+    along = "" if extrusion.direction is None else f" along {_row(extrusion.direction)}"
+    return (
+        f"extrude{along}"
+        if along and extrusion.tail == 1.0
+        else f"extrude{along} tail {_number(extrusion.tail)}"
+    )
 
 
 def _depth_text(depth: float, sigma: float | None, source: str) -> str:

@@ -37,13 +37,13 @@ def open_geojson(path: Path, options: ReadingOptions | None = None) -> SurveyStr
     """
     path = Path(path)
     features = _features(path)
-    named = dict.fromkeys(name for one in features for name in _properties(one))
+    named = dict.fromkeys(name for feature in features for name in _properties(feature))
     # the outline has the coordinates; attributes such as x and height of a layer are those of the stone;
     # stations are in a header file
     left_out = {*COORDINATES, *(() if options is not None and options.head is not None else ("station",))}
     names = [name for name in named if kind_of_column(name) not in left_out]
-    known = {kind_of_column(name) for name in names}
-    ids = not known & {"block", "description", "name"}
+    kinds = {kind_of_column(name) for name in names}
+    ids = not kinds & {"block", "description", "name"}
     rows: list[tuple[int, list[str]]] = [(0, [*names, *(["block"] if ids else []), "outline"])]
     corners: list[Any] = []
     for number, feature in enumerate(features, start=1):
@@ -51,9 +51,12 @@ def open_geojson(path: Path, options: ReadingOptions | None = None) -> SurveyStr
         ring = _ring(feature, f"{path}:{number}")
         corners.append(ring)
         text = ", ".join(" ".join(map(repr, corner)) for corner in ring.tolist())
-        own = [cell_text(feature.get("id", ""))] if ids else []
+        identifier = [cell_text(feature.get("id", ""))] if ids else []
         rows.append(
-            (number, [*(cell_text(values.get(name, "")) for name in names), *own, f"POLYGON Z (({text}))"])
+            (
+                number,
+                [*(cell_text(values.get(name, "")) for name in names), *identifier, f"POLYGON Z (({text}))"],
+            )
         )
     _check_degrees(corners, path)
     remarks = (f"{len(features)} features; places in messages are their numbers",)
@@ -71,19 +74,19 @@ def _features(path: Path) -> list[Mapping[str, Any]]:
         ) from error
     except (OSError, ValueError, RecursionError) as error:
         raise unreadable(path, error, "give an existing GeoJSON file") from error
-    found = document.get("features") if isinstance(document, dict) else None
-    if not isinstance(found, list) or not all(isinstance(one, dict) for one in found):
+    features = document.get("features") if isinstance(document, dict) else None
+    if not isinstance(features, list) or not all(isinstance(feature, dict) for feature in features):
         raise SurveyError(
             "not a FeatureCollection of GeoJSON", where=str(path), remedy="export a layer as GeoJSON"
         )
-    if not found:
+    if not features:
         raise SurveyError("the file has no features", where=str(path), remedy="export a layer with outlines")
-    return found
+    return features
 
 
 def _properties(feature: Mapping[str, Any]) -> Mapping[str, Any]:
-    found = feature.get("properties")
-    return found if isinstance(found, dict) else {}
+    properties = feature.get("properties")
+    return properties if isinstance(properties, dict) else {}
 
 
 def _ring(feature: Mapping[str, Any], where: str) -> Any:
@@ -96,26 +99,27 @@ def _ring(feature: Mapping[str, Any], where: str) -> Any:
     """
     geometry = feature.get("geometry")
     geometry = geometry if isinstance(geometry, dict) else {}
-    kind, found = geometry.get("type"), geometry.get("coordinates")
-    if not isinstance(found, list):
+    kind, coordinates = geometry.get("type"), geometry.get("coordinates")
+    if not isinstance(coordinates, list):
         raise SurveyError(
             "a feature without coordinates", where=where, remedy="draw one outline around each stone"
         )
-    if kind == "MultiPolygon" and len(found) == 1:
-        kind, found = "Polygon", found[0]
+    if kind == "MultiPolygon" and len(coordinates) == 1:
+        kind, coordinates = "Polygon", coordinates[0]
     if kind == "LineString":
-        kind, found = "Polygon", [found]
-    if kind != "Polygon" or not _is_nested(found):
+        kind, coordinates = "Polygon", [coordinates]
+    if kind != "Polygon" or not _is_nested(coordinates):
         raise SurveyError(
             f"a feature of type {str(kind)[:40]!r}, not one outline", where=where,
             remedy="draw one polygon around each stone; points are read from a table (--format csv)",
         )  # fmt: skip
-    return ring_of(found, where)
+    return ring_of(coordinates, where)
 
 
-def _is_nested(found: Any) -> bool:
-    return isinstance(found, list) and all(
-        isinstance(ring, list) and all(isinstance(one, list) for one in ring) for ring in found
+def _is_nested(coordinates: Any) -> bool:
+    return isinstance(coordinates, list) and all(
+        isinstance(ring, list) and all(isinstance(position, list) for position in ring)
+        for ring in coordinates
     )
 
 

@@ -53,9 +53,9 @@ def open_gsi(path: Path, options: ReadingOptions | None = None) -> SurveyStream:
         if not text:
             continue
         words = _words(text, number, lines)
-        here = " ".join(one for one in (words.get(f"7{k}", "") for k in range(1, 10)) if one)
+        here = " ".join(word for word in (words.get(f"7{k}", "") for k in range(1, 10)) if word)
         if "41" in words and "11" not in words:
-            code = " ".join(one for one in (words.get(f"4{k}", "") for k in range(1, 10)) if one)
+            code = " ".join(word for word in (words.get(f"4{k}", "") for k in range(1, 10)) if word)
             continue
         name = words.get("11", "")
         target, station = _place(words, "81", "82", "83"), _place(words, "84", "85", "86")
@@ -78,7 +78,7 @@ def _words(text: str, number: int, lines: TextLines) -> dict[str, str]:
     """Return the data of the words of a line by their index; of coordinates the number in metres as text."""
     wide = text.startswith("*")
     size = 16 if wide else 8
-    found: dict[str, str] = {}
+    values: dict[str, str] = {}
     at, text = 0, text.removeprefix("*")
     while at < len(text):
         word = text[at : at + 7 + size]
@@ -98,13 +98,13 @@ def _words(text: str, number: int, lines: TextLines) -> dict[str, str]:
                     f"{shown(word)} is not a coordinate in metres or feet",
                     "export the coordinates again",
                 )
-            found[index] = repr(int(parts[3] + data) * unit)
+            values[index] = repr(int(parts[3] + data) * unit)
         else:
-            found[index] = data.lstrip("0") or ("0" if index == "11" else "")
+            values[index] = data.lstrip("0") or ("0" if index == "11" else "")
         at += 7 + size
         while at < len(text) and text[at] == " ":
             at += 1
-    return found
+    return values
 
 
 def _place(words: dict[str, str], *indices: str) -> Place | None:

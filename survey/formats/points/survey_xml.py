@@ -32,10 +32,10 @@ def open_landxml(path: Path, options: ReadingOptions | None = None) -> SurveyStr
     unit = [options.scale]
     count = [0]
 
-    def element(where: str, given: Mapping[str, str], text: str, line: int) -> None:
+    def element(where: str, attributes: Mapping[str, str], text: str, line: int) -> None:
         name = where.rpartition("/")[2]
         if name in ("Metric", "Imperial"):
-            linear = given.get("linearUnit", "meter").casefold()
+            linear = attributes.get("linearUnit", "meter").casefold()
             if linear not in _LINEAR:
                 raise collector.fail(line, f"unknown linear unit {shown(linear)}", "export in metres")
             unit[0] = _LINEAR[linear]
@@ -47,9 +47,11 @@ def open_landxml(path: Path, options: ReadingOptions | None = None) -> SurveyStr
                 )
             at = f"{path}:{line}"
             north, east, up = (unit[0] * parse_number(word, "coordinate", at) for word in words)
-            number = given.get("name") or given.get("oID") or ""
+            number = attributes.get("name") or attributes.get("oID") or ""
             count[0] += 1
-            collector.add(number, given.get("code") or given.get("desc") or number, (east, north, up), line)
+            collector.add(
+                number, attributes.get("code") or attributes.get("desc") or number, (east, north, up), line
+            )
 
     _parse(path, element)
     return _stream(collector, path, count[0], "CgPoint")
@@ -59,14 +61,14 @@ def open_jobxml(path: Path, options: ReadingOptions | None = None) -> SurveyStre
     """Read the points of a JobXML file and return its stones one by one; see `open_gsi`."""
     path, options = Path(path), options or ReadingOptions()
     collector = PointCollector(path, options, unique=False)
-    found: dict[str, list[tuple[dict[str, str], int]]] = {"Point": [], "PointRecord": []}
+    elements: dict[str, list[tuple[dict[str, str], int]]] = {"Point": [], "PointRecord": []}
     stations: set[str] = set()
     now: dict[str, str] = {}
 
     def element(where: str, given: Mapping[str, str], text: str, line: int) -> None:
         parent, _, name = where.rpartition("/")
-        if name in found and parent.rpartition("/")[2] in ("Reductions", "FieldBook"):
-            found[name].append((dict(now), line))
+        if name in elements and parent.rpartition("/")[2] in ("Reductions", "FieldBook"):
+            elements[name].append((dict(now), line))
             now.clear()
         elif name == "StationRecord" and "StationName" in now:
             stations.add(now["StationName"])
@@ -81,19 +83,21 @@ def open_jobxml(path: Path, options: ReadingOptions | None = None) -> SurveyStre
 
     _parse(path, element)
     count = 0
-    for one, line in found["Point"] or found["PointRecord"]:
-        if one.get("Deleted", "").casefold() == "true" or not all(
-            one.get(k) for k in ("North", "East", "Elevation")
+    for attributes, line in elements["Point"] or elements["PointRecord"]:
+        if attributes.get("Deleted", "").casefold() == "true" or not all(
+            attributes.get(k) for k in ("North", "East", "Elevation")
         ):
             continue
         at = f"{path}:{line}"
-        north, east, up = (parse_number(one[k], k.lower(), at) for k in ("North", "East", "Elevation"))
-        name = one.get("Name", "")
+        north, east, up = (parse_number(attributes[k], k.lower(), at) for k in ("North", "East", "Elevation"))
+        name = attributes.get("Name", "")
         if name in stations:
             collector.add_station(code_of(name) or name, (east, north, up), line)
             continue
         count += 1
-        collector.add(name, one.get("Code") or one.get("Description1") or name, (east, north, up), line)
+        collector.add(
+            name, attributes.get("Code") or attributes.get("Description1") or name, (east, north, up), line
+        )
     return _stream(collector, path, count, "Point with a Grid")
 
 
@@ -112,14 +116,14 @@ def _parse(path: Path, element: Element) -> None:
     parser = expat.ParserCreate(namespace_separator="|")
     parser.buffer_text = True
 
-    def start(name: str, given: Mapping[str, str]) -> None:
+    def start(name: str, attributes: Mapping[str, str]) -> None:
         bare = name.rpartition("|")[2]
         where = f"{open_[-1][0]}/{bare}" if open_ else bare
-        open_.append((where, given, [], parser.CurrentLineNumber))
+        open_.append((where, attributes, [], parser.CurrentLineNumber))
 
     def end(_: str) -> None:
-        where, given, text, line = open_.pop()
-        element(where, given, "".join(text), line)
+        where, attributes, text, line = open_.pop()
+        element(where, attributes, "".join(text), line)
 
     def text(some: str) -> None:
         if open_:

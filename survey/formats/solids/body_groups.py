@@ -80,11 +80,11 @@ def _grow(
     members = [seed]
     for k in members:
         for a, b in _edges(turned[k]):
-            other = mates[(min(a, b), max(a, b)), k]
-            if other not in turned:
-                wrong = (a, b) in set(_edges(polygons[other]))
-                turned[other] = polygons[other][::-1] if wrong else polygons[other]
-                members.append(other)
+            neighbour = mates[(min(a, b), max(a, b)), k]
+            if neighbour not in turned:
+                wrong = (a, b) in set(_edges(polygons[neighbour]))
+                turned[neighbour] = polygons[neighbour][::-1] if wrong else polygons[neighbour]
+                members.append(neighbour)
     return members
 
 
@@ -105,8 +105,8 @@ def _mates_by_angle(
         if len(forward) > 1:
             pairs = _pairs(vertices, edge, [polygons[k] for k in forward], [polygons[k] for k in backward])
             pairs = [(forward[i], backward[j]) for i, j in pairs]
-        for one, other in pairs:
-            mates[edge, one], mates[edge, other] = other, one
+        for first, second in pairs:
+            mates[edge, first], mates[edge, second] = second, first
     return mates
 
 
@@ -118,8 +118,8 @@ def _pairs(
     frame = np.linalg.svd(axis[None, :])[2][1:]
     if np.linalg.det([*frame, axis]) < 0.0:
         frame = frame[::-1]
-    starts = [_angle(vertices, one, axis, frame) for one in forward]
-    stops = [_angle(vertices, one, -axis, frame) for one in backward]
+    starts = [_angle(vertices, vertex, axis, frame) for vertex in forward]
+    stops = [_angle(vertices, vertex, -axis, frame) for vertex in backward]
     pairs = []
     for i, start in enumerate(starts):
         # the interior lies behind a face seen from outside: decreasing angle about its own direction

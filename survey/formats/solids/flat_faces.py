@@ -47,18 +47,18 @@ def merge_flat(
     resolution : of the coordinates [m]
     """
     triangles = np.array([polygon for polygon in polygons if len(polygon) == 3], dtype=np.intp).reshape(-1, 3)
-    kept = [polygon for polygon in polygons if len(polygon) != 3]
+    large = [polygon for polygon in polygons if len(polygon) != 3]
     if not len(triangles):
-        return kept
+        return large
     tolerance = _SAME_PLANE * float(np.linalg.norm(np.ptp(vertices[used], axis=0))) + resolution
     merged: list[Polygon] = []
     for region in _regions(vertices, triangles, tolerance):
         loop = _outline(triangles[region].tolist()) if len(region) > 1 else None
         if loop is None:
-            kept += [tuple(one) for one in triangles[region].tolist()]
+            large += [tuple(triangle) for triangle in triangles[region].tolist()]
         else:
             merged.append(loop)
-    return _without_straight_corners(vertices, merged, kept, tolerance)
+    return _without_straight_corners(vertices, merged, large, tolerance)
 
 
 def _regions(vertices: Array, triangles: NDArray[np.intp], tolerance: float) -> list[list[int]]:
@@ -76,12 +76,12 @@ def _regions(vertices: Array, triangles: NDArray[np.intp], tolerance: float) -> 
         region, normal, origin = [seed], normals[seed], a[seed]
         for k in region:
             for p, q in _edges(triangles[k].tolist()):
-                other = owner.get((q, p))
-                if other is None or taken[other] or normals[other] @ normal < _SAME_SIDE:
+                neighbour = owner.get((q, p))
+                if neighbour is None or taken[neighbour] or normals[neighbour] @ normal < _SAME_SIDE:
                     continue
-                if np.abs((vertices[triangles[other]] - origin) @ normal).max() <= tolerance:
-                    taken[other] = True
-                    region.append(other)
+                if np.abs((vertices[triangles[neighbour]] - origin) @ normal).max() <= tolerance:
+                    taken[neighbour] = True
+                    region.append(neighbour)
         regions.append(region)
     return regions
 
@@ -104,22 +104,22 @@ def _outline(triangles: list[list[int]]) -> Polygon | None:
 
 
 def _without_straight_corners(
-    vertices: Array, merged: list[Polygon], kept: list[Polygon], tolerance: float
+    vertices: Array, merged: list[Polygon], polygons: list[Polygon], tolerance: float
 ) -> list[Polygon]:
     """Drop the corners that only divide an edge between two merged faces."""
     faces_at: dict[int, int] = defaultdict(int)
-    for polygon in (*merged, *kept):
+    for polygon in (*merged, *polygons):
         for i in polygon:
             faces_at[i] += 1
     turns: dict[int, int] = defaultdict(int)  # number of faces that need the corner
-    for polygon in kept:
+    for polygon in polygons:
         for i in polygon:
             turns[i] += 1
     for polygon in merged:
         for i in _corners(vertices, polygon, faces_at, tolerance):
             turns[i] += 1
     out = [tuple(i for i in polygon if turns[i]) for polygon in merged]
-    return [*out, *kept] if all(len(one) > 2 for one in out) else [*merged, *kept]
+    return [*out, *polygons] if all(len(polygon) > 2 for polygon in out) else [*merged, *polygons]
 
 
 def _corners(vertices: Array, polygon: Polygon, faces_at: dict[int, int], tolerance: float) -> list[int]:

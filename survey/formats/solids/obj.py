@@ -112,8 +112,8 @@ class _ObjReader:
     def _polygon(self, words: list[str], where: str) -> tuple[int, ...]:
         count, corners = len(self._places) // 3, []
         for word in words:
-            found = _CORNER(word)
-            index = 0 if found is None else int(found[1])
+            match = _CORNER(word)
+            index = 0 if match is None else int(match[1])
             index = index - 1 if index > 0 else count + index if index < 0 else -1
             if not 0 <= index < count:
                 raise SurveyError(

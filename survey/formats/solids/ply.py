@@ -119,13 +119,13 @@ class _TextRows:
         number, line = next(self._rows, (self._lines.end, ""))
         words, at, row = line.split(), 0, dict[str, tuple[float, ...]]()
         where = f"{self._path}:{number}"
-        for one in properties:
+        for entry in properties:
             length = 1
-            if one.count is not None:
+            if entry.count is not None:
                 length = int(self._numbers(words, at, 1, "i", where)[0])
                 at += 1
-            if one.name in names or length < 0 or at + length > len(words):
-                row[one.name] = self._numbers(words, at, length, one.kind, where)
+            if entry.name in names or length < 0 or at + length > len(words):
+                row[entry.name] = self._numbers(words, at, length, entry.kind, where)
             at += length
         if at != len(words):
             raise SurveyError(f"{len(words)} numbers for {at}", where=where, remedy=_REMEDY)
@@ -167,25 +167,25 @@ class _BinaryRows:
         start = self._at
         lengths = [0 if one.count is None else -1 for one in element.properties]
         if -1 in lengths:
-            for k, one in enumerate(element.properties):
-                lengths[k] = 0 if one.count is None else int(self._take(one.count, 1)[0])
-                self._take(one.kind, 1 if one.count is None else lengths[k])
+            for k, entry in enumerate(element.properties):
+                lengths[k] = 0 if entry.count is None else int(self._take(entry.count, 1)[0])
+                self._take(entry.kind, 1 if entry.count is None else lengths[k])
             self._at = start
             if min(lengths) < 0:
                 return None
         fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
-        for k, one in enumerate(element.properties):
-            kind = self._order + one.kind
-            if one.count is None:
+        for k, entry in enumerate(element.properties):
+            kind = self._order + entry.kind
+            if entry.count is None:
                 fields.append((f"v{k}", kind))
             else:
-                fields += [(f"n{k}", self._order + one.count), (f"v{k}", kind, (lengths[k],))]
+                fields += [(f"n{k}", self._order + entry.count), (f"v{k}", kind, (lengths[k],))]
         row = np.dtype(fields)
         if self._at + element.length * row.itemsize > len(self._data):
             return None
         table = np.frombuffer(self._data, row, element.length, self._at)
-        for k, one in enumerate(element.properties):
-            if one.count is not None and (table[f"n{k}"] != lengths[k]).any():
+        for k, entry in enumerate(element.properties):
+            if entry.count is not None and (table[f"n{k}"] != lengths[k]).any():
                 return None
         self._at += element.length * row.itemsize
         place = {one.name: k for k, one in enumerate(element.properties)}
@@ -194,9 +194,9 @@ class _BinaryRows:
 
     def _row(self, properties: Sequence[_Property], names: Sequence[str]) -> list[tuple[float, ...]]:
         row = dict[str, tuple[float, ...]]()
-        for one in properties:
-            length = 1 if one.count is None else int(self._take(one.count, 1)[0])
-            row[one.name] = self._take(one.kind, length)
+        for entry in properties:
+            length = 1 if entry.count is None else int(self._take(entry.count, 1)[0])
+            row[entry.name] = self._take(entry.kind, length)
         return [row[name] for name in names]
 
     def _take(self, kind: str, length: int) -> tuple[float, ...]:
@@ -222,12 +222,14 @@ def _body(
     for element in elements:
         if not element.properties:
             continue
-        names = [one.name for one in element.properties]
+        names = [entry.name for entry in element.properties]
         if element.name == "vertex":
             if not {"x", "y", "z"} <= set(names):
                 raise SurveyError("vertices without x, y and z", where=where, remedy=_REMEDY)
             resolution = (
-                _SINGLE if any(one.kind == "f" for one in element.properties if one.name in "xyz") else 0.0
+                _SINGLE
+                if any(entry.kind == "f" for entry in element.properties if entry.name in "xyz")
+                else 0.0
             )
         lists = [name for name in names if name in _LISTS]
         wanted = ["x", "y", "z"] if element.name == "vertex" else lists[:1] if element.name == "face" else []

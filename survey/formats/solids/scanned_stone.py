@@ -136,11 +136,11 @@ def _largest(
     scores = ((tried @ normals[some].T > _ALIGNED) * areas[some]).sum(axis=1)
     normal = tried[int(scores.argmax())]
     for _ in range(_ROUNDS):
-        near = some[normals[some] @ normal > _ALIGNED]
-        mean = (normals[near] * areas[near, None]).sum(axis=0)
+        aligned = some[normals[some] @ normal > _ALIGNED]
+        mean = (normals[aligned] * areas[aligned, None]).sum(axis=0)
         normal = mean / np.linalg.norm(mean)
-    near = some[normals[some] @ normal > _ALIGNED]
-    offset = _densest(centres[near] @ normal, areas[near], tolerance)
+    aligned = some[normals[some] @ normal > _ALIGNED]
+    offset = _densest(centres[aligned] @ normal, areas[aligned], tolerance)
     for _ in range(_ROUNDS):
         heights = centres @ normal - offset
         taken = left & (np.abs(heights) <= tolerance) & (normals @ normal > _LEANING)

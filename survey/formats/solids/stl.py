@@ -51,7 +51,7 @@ def _read_binary(path: Path) -> RawBody | None:
         raise unreadable(path, error) from error
     vertices = np.asarray(loaded.get("vertices", np.empty((0, 3))), dtype=np.float64).reshape(-1, 3)
     check_coordinates(vertices, "corner", str(path))
-    triangles = [tuple(one) for one in np.arange(len(vertices)).reshape(-1, 3).tolist()]
+    triangles = [tuple(triangle) for triangle in np.arange(len(vertices)).reshape(-1, 3).tolist()]
     return RawBody(
         path.stem, vertices, triangles, resolution=_SINGLE * float(np.abs(vertices).max(initial=0.0))
     )

@@ -105,17 +105,17 @@ class CodeTemplate:
     def __init__(self, text: str) -> None:
         self.text = text
         parts = _PART.split(text.strip())
-        self.fields = tuple(one.removesuffix("?") for one in parts[1::2])
+        self.fields = tuple(name.removesuffix("?") for name in parts[1::2])
         self._literals = parts[::2]
-        self._optional = [one.endswith("?") for one in parts[1::2]]
+        self._optional = [name.endswith("?") for name in parts[1::2]]
         if any("{" in literal or "}" in literal for literal in self._literals):
             raise UsageError(f"code template {text!r} has a brace without its other", remedy=_REMEDY)
         self._check_fields()
-        self._matches = [self._compiled(kept) for kept in self._variants()]
+        self._matches = [self._compiled(variant) for variant in self._variants()]
 
     def parse(self, description: str) -> CodeFields | None:
         """Split a description into its fields; None if it does not fit the template."""
-        found = next((one for match in self._matches if (one := match(description))), None)
+        found = next((parsed for match in self._matches if (parsed := match(description))), None)
         if found is None:
             return None
         fields = found.groupdict()
@@ -132,9 +132,12 @@ class CodeTemplate:
         """Return the remedy for a description that does not fit: the usual template that fits it and others."""
         rows = [description, *others]
         for text in _USUAL:
-            other = CodeTemplate(text)
-            found = [other.parse(row) for row in rows]
-            if all(one is not None and code_of(one.block) for one in found) and text != self.text:
+            template = CodeTemplate(text)
+            parsed_rows = [template.parse(row) for row in rows]
+            if (
+                all(fields is not None and code_of(fields.block) for fields in parsed_rows)
+                and text != self.text
+            ):
                 return f'it would be read by --codes "{text}"'
         return 'correct it, or give the template of its codes, such as --codes "{block} {kind} {role}"'
 
@@ -142,9 +145,9 @@ class CodeTemplate:
         named = [field for field in self.fields if field != _IGNORED]
         for name in named:
             if name not in _FIELDS:
-                known = ", ".join((*_FIELDS, _IGNORED))
+                allowed = ", ".join((*_FIELDS, _IGNORED))
                 raise UsageError(
-                    f"code template {self.text!r} has a field {name!r}", remedy=f"fields: {known}"
+                    f"code template {self.text!r} has a field {name!r}", remedy=f"fields: {allowed}"
                 )
             if named.count(name) > 1:
                 raise UsageError(f"code template {self.text!r} has {{{name}}} twice", remedy="keep one")
@@ -153,20 +156,20 @@ class CodeTemplate:
 
     def _variants(self) -> Iterable[tuple[bool, ...]]:
         """Iterate over which fields are there: all first, and those with a closed list of words before others."""
-        choices = [(True, False) if one else (True,) for one in self._optional]
+        choices = [(True, False) if optional else (True,) for optional in self._optional]
         closed = [name in ("role", "course") for name in self.fields]
         return sorted(
             product(*choices),
-            key=lambda kept: (-sum(kept), -sum(a and b for a, b in zip(kept, closed, strict=True))),
+            key=lambda choice: (-sum(choice), -sum(a and b for a, b in zip(choice, closed, strict=True))),
         )
 
-    def _compiled(self, kept: tuple[bool, ...]) -> Callable[[str], "re.Match[str] | None"]:
+    def _compiled(self, present: tuple[bool, ...]) -> Callable[[str], "re.Match[str] | None"]:
         """Return the match of a description that has these fields."""
         first = self._literals[0]
         names: list[str] = []
         between: list[str] = []
         last = ""
-        for k, (name, there) in enumerate(zip(self.fields, kept, strict=True)):
+        for k, (name, there) in enumerate(zip(self.fields, present, strict=True)):
             before, after = self._literals[k], self._literals[k + 1]
             if not there:
                 if names:  # with the text before it
@@ -228,7 +231,7 @@ def _ends(fields: Fields, field: str, literal: str) -> bool:
     if field == _IGNORED:
         return bool(literal)
     character = re.compile(f"[{fields[field][1]}]")
-    return any(character.fullmatch(one) is None for one in literal)
+    return any(character.fullmatch(character_text) is None for character_text in literal)
 
 
 def _literal(text: str) -> str:

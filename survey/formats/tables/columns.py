@@ -153,17 +153,17 @@ def read_map(text: str | None) -> ColumnMap:
     for part in (text or "").split(","):
         if not part.strip():
             continue
-        what, equals, name = (one.strip() for one in part.partition("="))
-        known = ", ".join((*ALIASES, "ignore"))
+        what, equals, name = (word.strip() for word in part.partition("="))
+        allowed = ", ".join((*ALIASES, "ignore"))
         if not equals or not name:
             raise UsageError(f"{part.strip()!r} is not of the form WHAT=COLUMN", where="--columns",
                              remedy="write e.g. block=Stein,x=Rechts,ignore=Datum")  # fmt: skip
         if what == "ignore":
             ignored.add(plain(name) or name)
         elif what not in ALIASES:
-            near = difflib.get_close_matches(what, ALIASES, n=1)
+            alike = difflib.get_close_matches(what, ALIASES, n=1)
             raise UsageError(f"unknown column {what!r}", where="--columns",
-                             remedy=f"did you mean {near[0]}?" if near else f"write one of {known}")  # fmt: skip
+                             remedy=f"did you mean {alike[0]}?" if alike else f"write one of {allowed}")  # fmt: skip
         elif what in names:
             raise UsageError(f"{what} is given twice", where="--columns", remedy="give it once")
         else:
@@ -179,13 +179,13 @@ _KNOWN: Mapping[str, str] = {
 }
 
 
-def find_columns(names: Sequence[str], given: ColumnMap, where: str, codes: bool) -> Columns:
+def find_columns(names: Sequence[str], column_map: ColumnMap, where: str, codes: bool) -> Columns:
     """Find out what the columns of a table are.
 
     Parameters
     ----------
     names : of the columns, in order
-    given : by the user
+    column_map : by the user
     where : place of the names, for errors
     codes : whether a template is given for descriptions, so that ``Code`` is one, not the name of the stone
 
@@ -200,26 +200,30 @@ def find_columns(names: Sequence[str], given: ColumnMap, where: str, codes: bool
     at: dict[str, int] = {}
     scales: dict[str, float] = {}
     free: list[int] = []
-    mine = {what: _place(names, name, what, where, given.numbered) for what, name in given.names.items()}
+    mine = {
+        what: _place(names, name, what, where, column_map.numbered) for what, name in column_map.names.items()
+    }
     taken = set(mine.values())
     for what, k in mine.items():
         _take(what, k, names, at, scales, where)
     for k, name in enumerate(names):
         if k in taken or not name or re.fullmatch(r"(?i)unnamed: \d+", name):
             continue
-        found = kind_of_column(name)
-        if {plain(name), plain(unit_of(name)[0])} & given.ignored or (found is None and "*" in given.ignored):
+        kind = kind_of_column(name)
+        if {plain(name), plain(unit_of(name)[0])} & column_map.ignored or (
+            kind is None and "*" in column_map.ignored
+        ):
             continue
-        if found is None or found in mine or (found in _FALLBACK and found in at):
+        if kind is None or kind in mine or (kind in _FALLBACK and kind in at):
             free.append(k)
-        elif found in at:
+        elif kind in at:
             raise SurveyError(
-                f"columns {shown(names[at[found]])} and {shown(name)} are both {found}",
+                f"columns {shown(names[at[kind]])} and {shown(name)} are both {kind}",
                 where=where,
-                remedy=f'say which with --columns "{found}=…", and leave out others with ignore=…',
+                remedy=f'say which with --columns "{kind}=…", and leave out others with ignore=…',
             )
         else:
-            _take(found, k, names, at, scales, where)
+            _take(kind, k, names, at, scales, where)
     free += _fall_back(at, codes)
     _check_missing(names, at, where)
     for k in free:
@@ -237,10 +241,12 @@ def _place(names: Sequence[str], name: str, what: str, where: str, numbered: boo
     if numbered and 1 <= int(name) <= len(names):
         return int(name) - 1
     wanted = plain(name)
-    for spelling in (str, plain, lambda one: plain(unit_of(one)[0])):
-        found = [k for k, one in enumerate(names) if spelling(one) == (name if spelling is str else wanted)]
-        if len(found) == 1:
-            return found[0]
+    for spelling in (str, plain, lambda text: plain(unit_of(text)[0])):
+        places = [
+            k for k, title in enumerate(names) if spelling(title) == (name if spelling is str else wanted)
+        ]
+        if len(places) == 1:
+            return places[0]
     shown_names = ", ".join(name or "(none)" for name in names)
     raise SurveyError(
         f"no column {shown(name)} for {what}", where=where, remedy=f"the columns are: {shown_names[:300]}"
@@ -283,10 +289,10 @@ def _check_missing(names: Sequence[str], at: Mapping[str, int], where: str) -> N
 
 def _check_spelling(name: str, at: Mapping[str, int], where: str) -> None:
     """Refuse a column that is nearly one that is missing, rather than keep it as a note."""
-    known = [spelling for one in _MISSPELT if _KNOWN[spelling := plain(one)] not in at]
-    near = difflib.get_close_matches(plain(unit_of(name)[0]), known, n=1, cutoff=_ALIKE)
-    if near:
-        what = _KNOWN[near[0]]
+    spelled = [spelling for misspelt in _MISSPELT if _KNOWN[spelling := plain(misspelt)] not in at]
+    close_matches = difflib.get_close_matches(plain(unit_of(name)[0]), spelled, n=1, cutoff=_ALIKE)
+    if close_matches:
+        what = _KNOWN[close_matches[0]]
         raise SurveyError(
             f"unknown column {shown(name)}, nearly {what}",
             where=where,

@@ -45,19 +45,19 @@ _WORDS = {plain(word): kind for kind, words in KINDS.items() for word in words} 
 }
 
 
-def kind_of(text: str, given: Mapping[str, str]) -> str:
+def kind_of(text: str, kinds: Mapping[str, str]) -> str:
     """Return the kind that a word stands for; the word itself, in lower case, if it is not known.
 
     Parameters
     ----------
     text : as in the file
-    given : kinds by abbreviation in lower case, as the user gave them
+    kinds : kinds by abbreviation in lower case, as the user gave them
     """
     lower = text.lower()
-    return given.get(lower) or _WORDS.get(plain(text)) or "_".join(lower.split())
+    return kinds.get(lower) or _WORDS.get(plain(text)) or "_".join(lower.split())
 
 
-def meant(word: str, known: Iterable[str]) -> str:
+def meant(word: str, kinds: Iterable[str]) -> str:
     """Return the kind that an abbreviation may stand for: one with its letters in order; "…" if there is none.
 
     Examples
@@ -65,15 +65,16 @@ def meant(word: str, known: Iterable[str]) -> str:
     >>> meant("spr", ["support", "springer"]), meant("hdr", ["header", "voussoir"]), meant("xy", ["header"])
     ('springer', 'header', '…')
     """
-    letters = ".*".join(re.escape(one) for one in word)
-    found = sorted(one for one in known if re.match(letters, one))
-    return min(found, key=lambda one: (-_alike(word, one), len(one)), default="…")
+    letters = ".*".join(re.escape(letter) for letter in word)
+    candidates = sorted(kind for kind in kinds if re.match(letters, kind))
+    return min(candidates, key=lambda kind: (-_alike(word, kind), len(kind)), default="…")
 
 
-def _alike(word: str, other: str) -> int:
+def _alike(word: str, candidate: str) -> int:
     """Return the number of letters with which both begin."""
     return next(
-        (k for k, (a, b) in enumerate(zip(word, other, strict=False)) if a != b), min(len(word), len(other))
+        (k for k, (a, b) in enumerate(zip(word, candidate, strict=False)) if a != b),
+        min(len(word), len(candidate)),
     )
 
 
@@ -103,7 +104,7 @@ def read_kinds(text: str) -> Mapping[str, str]:
             rows.append([cell for cell in table.cells(row, number) if cell])
         if rows and plain(rows[0][-1]) in ("kind", "art", "tipo", "genre"):
             del rows[0]
-    found: dict[str, str] = {}
+    kinds: dict[str, str] = {}
     for row in rows:
         if len(row) != 2 or not row[0] or KIND.fullmatch(row[1].lower()) is None:
             raise UsageError(
@@ -111,6 +112,6 @@ def read_kinds(text: str) -> Mapping[str, str]:
                 where="--kinds",
                 remedy="write e.g. SPR=springer",
             )
-        if found.setdefault(row[0].lower(), row[1].lower()) != row[1].lower():
+        if kinds.setdefault(row[0].lower(), row[1].lower()) != row[1].lower():
             raise UsageError(f"{row[0]} stands for two kinds", where="--kinds", remedy="give it once")
-    return found
+    return kinds

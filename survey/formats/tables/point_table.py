@@ -139,8 +139,8 @@ class PointTable:
                 yield _reject(*astray[at])
                 at += 1
             yield self._record(stone)
-        for one in astray[at:]:
-            yield _reject(*one)
+        for reject_parts in astray[at:]:
+            yield _reject(*reject_parts)
 
     def _record(self, stone: TableStone) -> BlockRecord | Reject:
         count = len(stone.vertices) // 3

@@ -152,7 +152,7 @@ def _open_list(path: Path, options: ReadingOptions, form: str) -> SurveyStream:
 
 
 def _has_digits(row: Row) -> bool:
-    return any(one.isdigit() for text in ([row] if isinstance(row, str) else row) for one in text)
+    return any(character.isdigit() for text in ([row] if isinstance(row, str) else row) for character in text)
 
 
 def _read(
@@ -179,7 +179,7 @@ def _read(
 
 
 def _find_header(
-    rows: AnyRows, ahead: Sequence[tuple[int, Any]], given: ColumnMap, codes: bool
+    rows: AnyRows, ahead: Sequence[tuple[int, Any]], column_map: ColumnMap, codes: bool
 ) -> tuple[int, Columns]:
     """Return the number of rows up to the names of the columns, and the columns; sets the separator."""
     stated = rows.delimiter
@@ -187,19 +187,19 @@ def _find_header(
     for k, (number, row) in enumerate(ahead[:_TITLES]):
         rows.delimiter = stated
         for delimiter in rows.delimiters(row):
-            rows.delimiter, known = delimiter, 0
+            rows.delimiter, recognised = delimiter, 0
             try:
                 names = rows.cells(row, number)
-                known = sum(kind_of_column(name) is not None for name in names if name)
+                recognised = sum(kind_of_column(name) is not None for name in names if name)
                 where = f"{rows.path}:{number}" if number else rows.path
-                columns = find_columns(names, given, where, codes)
+                columns = find_columns(names, column_map, where, codes)
             except SurveyError as error:
-                if best is None or known > best[0]:
-                    best = known, error
+                if best is None or recognised > best[0]:
+                    best = recognised, error
                 continue
-            if given.numbered and _is_data(rows, names, columns, number):
+            if column_map.numbered and _is_data(rows, names, columns, number):
                 return k, replace(columns, notes=())
-            return k + 1, _with_roles(rows, ahead[k + 1 :], columns, given)
+            return k + 1, _with_roles(rows, ahead[k + 1 :], columns, column_map)
     rows.delimiter = stated
     if best is None:
         raise rows.fail(rows.end, "the table is empty: no column 'block'", "begin it with e.g. block,x,y,z")
@@ -207,13 +207,13 @@ def _find_header(
 
 
 def _with_roles(
-    rows: AnyRows, ahead: Sequence[tuple[int, Any]], columns: Columns, given: ColumnMap
+    rows: AnyRows, ahead: Sequence[tuple[int, Any]], columns: Columns, column_map: ColumnMap
 ) -> Columns:
     """Return the columns with the one whose values are all roles of points as the role, whatever its name."""
     if {"role", "description"} & set(columns.at):
         return columns
     free = [k for k, _ in columns.notes] + (
-        [columns.at["name"]] if "name" in columns.at.keys() - given.names else []
+        [columns.at["name"]] if "name" in columns.at.keys() - column_map.names else []
     )
     texts: dict[int, set[str]] = {k: set() for k in free}
     for number, row in ahead:
@@ -223,7 +223,7 @@ def _with_roles(
             continue
         for k in free:
             texts[k].add(values[k].casefold() if k < len(values) else "")
-    roles = [k for k, found in texts.items() if found and found <= _ROLE_WORDS]
+    roles = [k for k, words in texts.items() if words and words <= _ROLE_WORDS]
     if len(roles) != 1:
         return columns
     at = {what: k for what, k in columns.at.items() if k != roles[0]} | {"role": roles[0]}
@@ -281,13 +281,13 @@ def _check_axes(rows: AnyRows, header: tuple[int, Any], form: str) -> None:
         names = rows.cells(row, number, 5)
     except SurveyError:
         return
-    found = [kind_of_column(name) if plain(name) not in ("x", "y") else None for name in names[1:3]]
-    other = "penzd" if form == "pnezd" else "pnezd"
-    if found == list(_LIST[other][1:3]):
+    kinds = [kind_of_column(name) if plain(name) not in ("x", "y") else None for name in names[1:3]]
+    alternative = "penzd" if form == "pnezd" else "pnezd"
+    if kinds == list(_LIST[alternative][1:3]):
         raise rows.fail(
             number,
             f"the columns are {', '.join(names)[:200]}, which is not the order of {form}",
-            f"give --format {other}",
+            f"give --format {alternative}",
         )
 
 
@@ -342,7 +342,7 @@ class PointCollector:
         ]
         unknown = [stone for stone in stones if stone.kind not in self._options.known_kinds]
         if self._options.known_kinds and 2 * len(unknown) > len(stones):
-            words = list(dict.fromkeys(str(one.kind) for one in unknown))
+            words = list(dict.fromkeys(str(stone.kind) for stone in unknown))
             table = ",".join(f"{word}={meant(word, self._options.known_kinds)}" for word in words[:_LISTED])
             raise self.fail(
                 unknown[0].line,
@@ -362,11 +362,11 @@ class PointCollector:
         SurveyError
             if it does not fit the template; of the whole file, if no description so far has
         """
-        found = self.template.parse(description)
-        if found is not None:
-            if found.role != STATION:
+        code_fields = self.template.parse(description)
+        if code_fields is not None:
+            if code_fields.role != STATION:
                 self._misfits = None
-            return found
+            return code_fields
         remedy = "correct it, or give the code template that the list was made with: --codes"
         if self._misfits is not None:
             if not self._misfits:
@@ -401,17 +401,17 @@ class PointCollector:
         if not code or len(block) > 2 * _LONGEST_NAME or not block.isprintable():
             what = f"block {shown(block)} is not a block name"
             raise self.fail(line, what, "write e.g. W01-01, at most 64 letters and digits")
-        found = None
+        kind_word = None
         if kind:
-            found = kind_of(kind, self._options.kinds)
-            if KIND.fullmatch(found) is None:
+            kind_word = kind_of(kind, self._options.kinds)
+            if KIND.fullmatch(kind_word) is None:
                 raise self.fail(
                     line, f"kind {shown(kind)} is not a kind name",
                     f'write e.g. header, or say what it stands for: --kinds "{kind[:20]}=header"',
                 )  # fmt: skip
-        return _Identity(code, block, found, course, zone, role)
+        return _Identity(code, block, kind_word, course, zone, role)
 
-    def stone(self, one: _Identity, line: int) -> TableStone:
+    def stone(self, identity: _Identity, line: int) -> TableStone:
         """Return the stone of a row, made if it is not there yet; not yet kept.
 
         Raises
@@ -419,30 +419,34 @@ class PointCollector:
         SurveyError
             if it has another name, kind or course than before
         """
-        stone = self.table.stones.get(one.code)
-        if stone is not None and stone.agreed is one:  # the usual case: the row before was of the same stone
+        stone = self.table.stones.get(identity.code)
+        if (
+            stone is not None and stone.agreed is identity
+        ):  # the usual case: the row before was of the same stone
             return stone
         if stone is None:
-            return TableStone(one.code, one.kind, one.course, line, one.name, zone=one.zone)
+            return TableStone(
+                identity.code, identity.kind, identity.course, line, identity.name, zone=identity.zone
+            )
         if stone.error is not None:
             return stone
-        if stone.name != one.name:
+        if stone.name != identity.name:
             raise self.fail(
                 line,
-                f"the names {shown(stone.name)} and {shown(one.name)} both give the code {one.code}",
+                f"the names {shown(stone.name)} and {shown(identity.name)} both give the code {identity.code}",
                 "write one name for one stone, and names that differ in letters or digits for two",
             )
         for name in ("kind", "course", "zone"):
-            new, old = getattr(one, name), getattr(stone, name)
+            new, old = getattr(identity, name), getattr(stone, name)
             if new is not None and old is None:
                 setattr(stone, name, new)
             elif new is not None and new != old:
                 raise self.fail(
                     line,
-                    f"kind, course or zone of block {one.code} differs from line {stone.line}",
+                    f"kind, course or zone of block {identity.code} differs from line {stone.line}",
                     "give every line of a block the same kind and course",
                 )
-        stone.agreed = one
+        stone.agreed = identity
         return stone
 
     def check_name(self, name: str, line: int) -> None:
@@ -473,22 +477,22 @@ class PointCollector:
         """Add a point with a description; a wrong one spoils its stone."""
         code: str | None = None
         try:
-            found = self.fields(description, line)
-            one = self.identity(found.block, found.kind, found.course, found.zone, found.role, line)
-            if found.role != STATION:
-                code = one.code
+            fields = self.fields(description, line)
+            identity = self.identity(fields.block, fields.kind, fields.course, fields.zone, fields.role, line)
+            if fields.role != STATION:
+                code = identity.code
             if not all(math.isfinite(value) and abs(value) <= 1e8 for value in place):
                 raise self.fail(
                     line, "a coordinate is not finite, or beyond 1e+08 m", "coordinates are in metres"
                 )
             self.check_name(name, line)
-            if found.role == STATION:
-                self.add_station(one.code, place, line)
+            if fields.role == STATION:
+                self.add_station(identity.code, place, line)
                 return
-            stone = self.stone(one, line)
+            stone = self.stone(identity, line)
             if stone.error is None:
-                stone.add_place(found.role == "vertex", place, _NOTHING, name)
-                self.table.stones[one.code] = stone
+                stone.add_place(fields.role == "vertex", place, _NOTHING, name)
+                self.table.stones[identity.code] = stone
             stone.add_line(line, count)
         except _WrongTemplateError:
             raise
@@ -514,25 +518,25 @@ class _RowReader:
         at = columns.at
         self._count = columns.count
         self._pick = itemgetter(
-            *(at[one] for one in _IDENTITY if one in at), at.get("block", at.get("description", 0))
+            *(at[column] for column in _IDENTITY if column in at), at.get("block", at.get("description", 0))
         )
-        self._by = [one for one in _IDENTITY if one in at]
+        self._by = [column for column in _IDENTITY if column in at]
         self._outline_at = at.get("outline")
         self._place = None if self._outline_at is not None else itemgetter(at["x"], at["y"], at["z"])
         self._name_at, self._sigma_at = at.get("name"), at.get("sigma")
-        self._of_stones = [(one, at[one]) for one in _OF_STONES if one in at]
+        self._of_stones = [(column, at[column]) for column in _OF_STONES if column in at]
         self._notes = [(k, _note_key(name)) for k, name in columns.notes]
         unit = options.scale
         self._scale = {
-            one: columns.scales.get(one, unit) for one in (*"xyz", "sigma", "depth", "depth_sigma")
+            column: columns.scales.get(column, unit) for column in (*"xyz", "sigma", "depth", "depth_sigma")
         }
         scales = (self._scale["x"], self._scale["y"], self._scale["z"])
         self._decimals = Decimals(rows.path, rows.delimiter != ",", rows.any_mark, scales)
         self._known: dict[Any, _Identity] = {}
         self.remarks: tuple[str, ...] = ()
         if columns.notes:
-            kept = ", ".join(name[:40] for _, name in columns.notes)
-            self.remarks = (f'kept as notes: {kept}; --columns "ignore=…" leaves columns out',)
+            notes = ", ".join(name[:40] for _, name in columns.notes)
+            self.remarks = (f'kept as notes: {notes}; --columns "ignore=…" leaves columns out',)
 
     def take(self, row: Any, number: int) -> None:
         """Read one row."""
@@ -542,17 +546,17 @@ class _RowReader:
             if len(values) != self._count:
                 self._fit(values, number)
             key = self._pick(values)
-            one = self._known.get(key)
-            if one is None:
-                one = self._identified(values, number)
+            identity = self._known.get(key)
+            if identity is None:
+                identity = self._identified(values, number)
                 if len(self._known) >= _CACHED:
                     self._known.clear()
-                self._known[key] = one
-            stone = self._table.stones.get(one.code)
-            if stone is not None and stone.error is not None and one.role != STATION:
+                self._known[key] = identity
+            stone = self._table.stones.get(identity.code)
+            if stone is not None and stone.error is not None and identity.role != STATION:
                 stone.add_line(number, self._rows.lines_of(row))
             else:
-                self._add(one, values, number, self._rows.lines_of(row))
+                self._add(identity, values, number, self._rows.lines_of(row))
         except _WrongTemplateError:
             raise
         except SurveyError as error:
@@ -571,15 +575,15 @@ class _RowReader:
 
     def _identified(self, values: Sequence[str], number: int) -> _Identity:
         """Find out which stone a row is of, and what its point is."""
-        cells = {one: values[self._columns.at[one]] for one in self._by}
+        cells = {column: values[self._columns.at[column]] for column in self._by}
         role = "vertex"
         block, kind, course, zone = cells.get("block", ""), cells.get("kind"), None, None
         if "block" in cells and self._rows.is_date(block, number, self._columns.at["block"]):
             raise self._fail(number, f"the name of a stone is a date, {block}", DATE_REMEDY)
         if "description" in cells:
-            found = self.collector.fields(cells["description"], number)
-            block, kind = block or found.block, kind or found.kind
-            course, zone, role = found.course, found.zone, found.role
+            fields = self.collector.fields(cells["description"], number)
+            block, kind = block or fields.block, kind or fields.kind
+            course, zone, role = fields.course, fields.zone, fields.role
         if cells.get("course"):
             course = parse_course(cells["course"], f"{self._path}:{number}")
         if "role" in cells:
@@ -591,48 +595,48 @@ class _RowReader:
             role = ROLES[text]
         return self.collector.identity(block, kind, course, zone, role, number)
 
-    def _add(self, one: _Identity, values: Sequence[str], number: int, count: int) -> None:
+    def _add(self, identity: _Identity, values: Sequence[str], number: int, count: int) -> None:
         name = None
         if self._name_at is not None:
             name = values[self._name_at]
             if name or self._form:
                 self.collector.check_name(name, number)
         if self._place is None:
-            self._add_outline(one, values, number, count)
+            self._add_outline(identity, values, number, count)
             return
         texts = self._place(values)
         place = self._decimals.place(texts, "xyz", number)
-        if one.role == STATION:
-            self.collector.add_station(one.code, place, number)
+        if identity.role == STATION:
+            self.collector.add_station(identity.code, place, number)
             return
         sigma = _NOTHING
         if self._sigma_at is not None and (text := values[self._sigma_at]).lower() not in _UNKNOWN:
             sigma = self._decimals.length(text, "sigma", number, self._scale["sigma"])
-        stone = self._stone_of(one, values, number)
-        stone.add_place(one.role == "vertex", place, sigma, name)
+        stone = self._stone_of(identity, values, number)
+        stone.add_place(identity.role == "vertex", place, sigma, name)
         stone.add_line(number, count)
 
-    def _add_outline(self, one: _Identity, values: Sequence[str], number: int, count: int) -> None:
+    def _add_outline(self, identity: _Identity, values: Sequence[str], number: int, count: int) -> None:
         corners = self._options.scale * outline_of(values[self._outline_at or 0], f"{self._path}:{number}")
         sigma = _NOTHING
         if self._sigma_at is not None and (text := values[self._sigma_at]).lower() not in _UNKNOWN:
             sigma = self._decimals.length(text, "sigma", number, self._scale["sigma"])
-        if one.code in self._table.stones:
-            before = self._table.stones[one.code].line
+        if identity.code in self._table.stones:
+            before = self._table.stones[identity.code].line
             raise self._fail(
                 number,
-                f"block {one.code} a second time",
+                f"block {identity.code} a second time",
                 f"the first is on line {before}; draw one outline for each",
             )
-        stone = self._stone_of(one, values, number)
+        stone = self._stone_of(identity, values, number)
         for corner in corners.tolist():
             stone.add_place(True, (corner[0], corner[1], corner[2]), sigma, None)
         stone.add_line(number, count)
 
-    def _stone_of(self, one: _Identity, values: Sequence[str], number: int) -> TableStone:
+    def _stone_of(self, identity: _Identity, values: Sequence[str], number: int) -> TableStone:
         """Return the stone of a row, with what the row says of all of it."""
-        stone = self.collector.stone(one, number)
-        if stone.agreed is one and not self._of_stones and not self._notes:
+        stone = self.collector.stone(identity, number)
+        if stone.agreed is identity and not self._of_stones and not self._notes:
             return stone
         for name, k in self._of_stones:
             if values[k].lower() not in _UNKNOWN:
@@ -640,7 +644,7 @@ class _RowReader:
         for k, key in self._notes:
             if values[k]:
                 stone.add_note(key, values[k])
-        self._table.stones[one.code] = stone
+        self._table.stones[identity.code] = stone
         return stone
 
     def _set(self, stone: TableStone, name: str, text: str, number: int) -> None:
@@ -658,26 +662,29 @@ class _RowReader:
             raise self._fail(number, f"{name} {shown(text)} is not a name", "write printable words")
         before = getattr(stone, name)
         if before not in (None, value):
-            found, first = (f"{one:g} m" if isinstance(one, float) else shown(one) for one in (value, before))
-            raise self._fail(number, f"{name} {found}, but {first} before", f"give a block one {name}")
+            shown_value, first = (
+                f"{number_or_text:g} m" if isinstance(number_or_text, float) else shown(number_or_text)
+                for number_or_text in (value, before)
+            )
+            raise self._fail(number, f"{name} {shown_value}, but {first} before", f"give a block one {name}")
         setattr(stone, name, value)
 
     def _likely_code(self, row: Any, values: list[str] | None) -> str | None:
         """Return the stone that a wrong row names; None if it cannot be known."""
         at = self._columns.at
         if values is not None and len(values) == self._count and "description" in at:
-            found = self.collector.template.parse(values[at["description"]])
-            if found is not None:
-                return code_of(found.block) or None if found.role != STATION else None
+            parsed = self.collector.template.parse(values[at["description"]])
+            if parsed is not None:
+                return code_of(parsed.block) or None if parsed.role != STATION else None
         if "block" in at:
             rough = self._rows.rough_cells(row) if values is None else values
             name = rough[at["block"]] if at["block"] < len(rough) else ""
             return (code_of(name) or None) if len(name) <= 2 * _LONGEST_NAME else None
         rest = [row if isinstance(row, str) else ";".join(row)]
         while len(rest := rest[-1].split(self._rows.delimiter or None, 1)) == 2:
-            found = self.collector.template.parse(rest[1].strip())
-            if found is not None and found.role != STATION and CODE.fullmatch(found.block):
-                return found.block
+            parsed = self.collector.template.parse(rest[1].strip())
+            if parsed is not None and parsed.role != STATION and CODE.fullmatch(parsed.block):
+                return parsed.block
         return None
 
 

@@ -30,16 +30,16 @@ def outline_of(text: str, where: str) -> Array:
     SurveyError
         if it is not one ring in space
     """
-    found = _WKT.fullmatch(text)
-    if found is None:
+    match = _WKT.fullmatch(text)
+    if match is None:
         raise SurveyError(
             f"{shown(text)} is not an outline",
             where=where,
             remedy="write e.g. POLYGON Z ((0 0 0, 1 0 0, 1 0 1))",
         )
-    if (found[2] or "").upper() == "M":
-        raise SurveyError(f"{found[1]} M has measures instead of z", where=where, remedy=FLAT)
-    rings = _RING.findall(found[3])
+    if (match[2] or "").upper() == "M":
+        raise SurveyError(f"{match[1]} M has measures instead of z", where=where, remedy=FLAT)
+    rings = _RING.findall(match[3])
     corners = [[word.split() for word in ring.split(",")] for ring in rings]
     return ring_of(corners, where)
 
@@ -59,7 +59,7 @@ def ring_of(rings: "list[list[list[str]]] | list[list[list[float]]]", where: str
             remedy="draw one ring around each stone, without holes",
         )
     (ring,) = rings
-    sizes = {len(one) for one in ring}
+    sizes = {len(corner) for corner in ring}
     if sizes == {2}:
         raise SurveyError("an outline in two dimensions, without z", where=where, remedy=FLAT)
     if not sizes <= {3, 4}:
@@ -69,7 +69,7 @@ def ring_of(rings: "list[list[list[str]]] | list[list[list[float]]]", where: str
             remedy="give x, y and z of each",
         )
     try:
-        corners = np.array([[float(value) for value in one[:3]] for one in ring], dtype=np.float64)
+        corners = np.array([[float(value) for value in corner[:3]] for corner in ring], dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
         raise SurveyError("a coordinate is not a number", where=where, remedy="give x, y and z") from None
     if not (np.abs(corners) <= FARTHEST).all():

@@ -127,10 +127,10 @@ def prepare(
     start.point[~free] = place[~free]
     observed = [photo for photo in photos if not photo.fixed]
     stations = 3 * sum(
-        (one.observed_station is not None) + (one.observed_rotation is not None) for one in observed
+        (photo.observed_station is not None) + (photo.observed_rotation is not None) for photo in observed
     )
-    held = weighted or bool(np.count_nonzero(~free)) or any(photo.fixed for photo in photos)
-    held = held or any(photo.observed_station is not None for photo in photos)
+    has_datum = weighted or bool(np.count_nonzero(~free)) or any(photo.fixed for photo in photos)
+    has_datum = has_datum or any(photo.observed_station is not None for photo in photos)
     seen = free & ((counts > 0) | information.any(axis=(1, 2)))
     return Prepared(
         rays,
@@ -141,7 +141,7 @@ def prepare(
         columns,
         2 * len(chosen) + weighted + stations,
         len(columns) + 3 * int(np.count_nonzero(seen)),
-        0 if held else 7,
+        0 if has_datum else 7,
     )
 
 
@@ -150,14 +150,14 @@ def _known_places(network: Network) -> tuple[Array, Array, NDArray[np.bool_], in
     count = len(network.names)
     information, place = np.zeros((count, 3, 3)), np.zeros((count, 3))
     free, observed = np.ones(count, dtype=bool), 0
-    for one in network.control:
-        if one.check:
+    for gcp in network.control:
+        if gcp.check:
             continue
-        place[one.point] = one.place
-        if one.fixed:
-            free[one.point] = False
+        place[gcp.point] = gcp.place
+        if gcp.fixed:
+            free[gcp.point] = False
         else:
-            information[one.point] = np.linalg.inv(one.covariance)
+            information[gcp.point] = np.linalg.inv(gcp.covariance)
             observed += 3
     return information, place, free, observed
 
@@ -168,14 +168,14 @@ def _columns(network: Network) -> tuple[tuple[tuple[str, str], ...], NDArray[np.
     for f, photo in enumerate(network.photos):
         if not photo.fixed:
             table[f, :6] = len(names) + np.arange(6)
-            names += [(photo.name, one) for one in _EXTERIOR]
+            names += [(photo.name, element) for element in _EXTERIOR]
     for m, camera in enumerate(network.cameras):
-        own = np.full(len(INTERIOR), -1)
+        places = np.full(len(INTERIOR), -1)
         for k, name in enumerate(INTERIOR):
             if name in camera.free:
-                own[k] = len(names)
+                places[k] = len(names)
                 names.append((camera.name, name))
-        table[[f for f, photo in enumerate(network.photos) if photo.camera == m], 6:] = own
+        table[[f for f, photo in enumerate(network.photos) if photo.camera == m], 6:] = places
     return tuple(names), table
 
 
@@ -197,9 +197,9 @@ def adjust(network: Network, prepared: Prepared) -> Solution:
             taken += 1
             if damping == 0.0 and abs(float(step @ right)) <= _STILL * max(square, 1e-12):
                 return Solution(tried, square, taken, behind)
-            found = normals(network, prepared, tried, 0.0)
-            if found[2] <= square * (1.0 + _ROUNDING):
-                unknowns, (normal, right, square, behind) = tried, found
+            equations = normals(network, prepared, tried, 0.0)
+            if equations[2] <= square * (1.0 + _ROUNDING):
+                unknowns, (normal, right, square, behind) = tried, equations
                 damping = 0.0 if damping <= _FIRST else 0.1 * damping
                 if damping:
                     normal, right, _, _ = normals(network, prepared, unknowns, damping)
@@ -319,8 +319,8 @@ def with_datum(normal: Array, prepared: Prepared, unknowns: Unknowns) -> Array:
         return normal
     free = inner_constraints(prepared, unknowns)
     free = np.linalg.qr(free)[0] * np.sqrt(max(float(np.median(np.diag(normal))), 1.0))
-    held: Array = normal + np.tril(free @ free.T)
-    return held
+    bordered: Array = normal + np.tril(free @ free.T)
+    return bordered
 
 
 def _step(
@@ -335,9 +335,9 @@ def _step(
     if not (scale > 0.0).all():
         return None
     scale = 1.0 / np.sqrt(scale)
-    held = normal if damping else with_datum(normal, prepared, unknowns)
+    system = normal if damping else with_datum(normal, prepared, unknowns)
     try:
-        factor = cholesky(held, scale)
+        factor = cholesky(system, scale)
     except np.linalg.LinAlgError:
         return None
     step: Array = scale * cho_solve((factor, False), scale * right, check_finite=False)

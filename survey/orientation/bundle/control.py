@@ -31,14 +31,14 @@ def control_tests(network: Network, solution: Solution, result: Statistics) -> A
     check point Σ + C; returned is √(dᵀ(…)⁻¹d / 3).
     """
     out = np.zeros(len(network.control))
-    for k, one in enumerate(network.control):
-        own = result.points[one.point]
-        if (one.fixed and not one.check) or not np.isfinite(own).all():
+    for k, gcp in enumerate(network.control):
+        solved = result.points[gcp.point]
+        if (gcp.fixed and not gcp.check) or not np.isfinite(solved).all():
             continue
-        off = one.place - solution.unknowns.point[one.point]
-        spread = one.covariance + (own if one.check else -own)
+        off = gcp.place - solution.unknowns.point[gcp.point]
+        spread = gcp.covariance + (solved if gcp.check else -solved)
         values, axes = np.linalg.eigh(spread)
-        sound = values > 1e-3 * float(np.trace(one.covariance if not one.check else spread)) / 3.0
+        sound = values > 1e-3 * float(np.trace(gcp.covariance if not gcp.check else spread)) / 3.0
         if sound.any():
             out[k] = np.sqrt((((axes.T @ off)[sound]) ** 2 / values[sound]).sum() / sound.sum())
     return out
@@ -56,26 +56,26 @@ def control_remarks(network: Network, solution: Solution, photos: Sequence[Photo
     SurveyError
         if coordinates are stated far finer than a pixel: they are of another unit
     """
-    given = [one for one in network.control if not one.check]
-    if len(given) < 3:
+    fitted_points = [gcp for gcp in network.control if not gcp.check]
+    if len(fitted_points) < 3:
         return []
-    places, out = np.array([one.place for one in given]), list[str]()
+    places, out = np.array([gcp.place for gcp in fitted_points]), list[str]()
     towards = solution.unknowns.station.mean(axis=0) - places.mean(axis=0)
     lengths = [network.camera_of(f).inner[0] / network.camera_of(f).pixel for f in range(len(network.photos))]
     footprint = float(np.linalg.norm(towards) / np.median(lengths))
-    sigma = float(np.sqrt(np.median([np.trace(one.covariance) / 3.0 for one in given])))
+    sigma = float(np.sqrt(np.median([np.trace(gcp.covariance) / 3.0 for gcp in fitted_points])))
     if footprint > _FOOTPRINT:
-        told = f"a pixel covers about {footprint:.2g} m where the control points are"
+        what = f"a pixel covers about {footprint:.2g} m where the control points are"
         if 0.0 < sigma < _FINE * footprint:
             raise SurveyError(
-                f"{told}, which are stated to {sigma:.2g} m: their coordinates are of another unit",
-                where=given[0].where or network.path,
+                f"{what}, which are stated to {sigma:.2g} m: their coordinates are of another unit",
+                where=fitted_points[0].where or network.path,
                 remedy="give coordinates and deviations in metres",
             )
-        out.append(f"{told}: are their coordinates in metres?")
+        out.append(f"{what}: are their coordinates in metres?")
     _, sizes, axes = np.linalg.svd(places - places.mean(axis=0), full_matrices=False)
-    found = zip((photo.station for photo in photos), solution.unknowns.station, strict=True)
-    off = [float(np.linalg.norm(here - there)) for there, here in found if there is not None]
+    stations = zip((photo.station for photo in photos), solution.unknowns.station, strict=True)
+    off = [float(np.linalg.norm(here - there)) for there, here in stations if there is not None]
     placed = bool(off) and np.median(off) < _NEAR * np.linalg.norm(towards)
     placed = placed or any(photo.observed_station is not None or photo.fixed for photo in photos)
     if sizes[2] < FLAT * sizes[0] and not placed:

@@ -76,7 +76,7 @@ class Orientation:
                 replace(camera, inner=inner)
                 for camera, inner in zip(network.cameras, values.inner, strict=True)
             ),
-            photos=tuple(replace(one, rotation=turn, station=place) for one, turn, place in pairs),
+            photos=tuple(replace(photo, rotation=turn, station=place) for photo, turn, place in pairs),
             start=values.point.copy(),
         )
 
@@ -103,7 +103,7 @@ def orient(network: Network, blunders: Blunders = "report") -> Orientation:
     """
     check_network(network)
     used, remarks = _useful(network)
-    given = network.photos
+    photos = network.photos
     with _few_threads(network):
         network, prepared, solution = _oriented(network, used)
         try:
@@ -120,7 +120,7 @@ def orient(network: Network, blunders: Blunders = "report") -> Orientation:
             )
     remarks += _left_out(control, network, solution, result)
     remarks += _tested_control(network, solution, result)
-    remarks += control_remarks(network, solution, given)
+    remarks += control_remarks(network, solution, photos)
     suspected = {*removed, *_suspects(result).tolist()}
     if removed:
         remarks.append(
@@ -143,11 +143,11 @@ def orient(network: Network, blunders: Blunders = "report") -> Orientation:
 
 
 def _left_out(
-    given: Sequence[Control], network: Network, solution: Solution, result: Statistics
+    controls: Sequence[Control], network: Network, solution: Solution, result: Statistics
 ) -> list[str]:
     """Return a remark on control points that were left out, by how much the others contradict them."""
     tests = control_tests(network, solution, result)
-    pairs = zip(given, network.control, tests, strict=True)
+    pairs = zip(controls, network.control, tests, strict=True)
     names = [
         f"{network.names[new.point]} ({test:.1f} σ, {1e3 * off:.3g} mm)"
         for old, new, test in pairs
@@ -161,14 +161,14 @@ def _tested_control(network: Network, solution: Solution, result: Statistics) ->
     """Return remarks on control points that miss their places by more than chance."""
     tests = control_tests(network, solution, result)
     wrong = [
-        (test, one)
-        for one, test in zip(network.control, tests, strict=True)
-        if test > MISSES and not one.check
+        (test, gcp)
+        for gcp, test in zip(network.control, tests, strict=True)
+        if test > MISSES and not gcp.check
     ]
     if not wrong:
         return []
     names = [
-        f"{network.names[one.point]} ({test:.1f} σ)" for test, one in sorted(wrong, key=lambda pair: -pair[0])
+        f"{network.names[gcp.point]} ({test:.1f} σ)" for test, gcp in sorted(wrong, key=lambda pair: -pair[0])
     ]
     return [f"control points that miss their places: {listed(names)}"]
 
@@ -183,11 +183,11 @@ def _check_control(network: Network, solution: Solution, result: Statistics, blu
     SurveyError
     """
     tests = control_tests(network, solution, result)
-    held = np.array([test for one, test in zip(network.control, tests, strict=True) if not one.check])
-    if not (held > FAR_OFF).any() or (alone := _alone(network)) is None:
+    scores = np.array([test for gcp, test in zip(network.control, tests, strict=True) if not gcp.check])
+    if not (scores > FAR_OFF).any() or (alone := _alone(network)) is None:
         return
     _check_hand(network, alone[0])
-    if np.median(held) <= FAR_OFF or alone[1] >= _AGREE:
+    if np.median(scores) <= FAR_OFF or alone[1] >= _AGREE:
         return
     if blunders == "report" or not _minority(network, alone[0]):
         raise _control_misfit(network, alone[0])
@@ -205,7 +205,7 @@ def _useful(network: Network) -> tuple[NDArray[np.bool_], list[str]]:
     """Return the marks that take part: those of points with two rays, or of control points."""
     rays = np.bincount(network.point, minlength=len(network.names))
     control = np.zeros(len(network.names), dtype=bool)
-    control[[one.point for one in network.control if not one.check]] = True
+    control[[gcp.point for gcp in network.control if not gcp.check]] = True
     lone = (rays == 1) & ~control
     remarks = []
     if lone.any():
@@ -220,10 +220,10 @@ def _oriented(network: Network, used: NDArray[np.bool_]) -> tuple[Network, Prepa
     rests: list[tuple[float, Network, Prepared, Solution]] = []
     failure: MomaError | None = None
     chosen = aligned(_only(network, used))
-    for given in (True, False):
+    for with_start in (True, False):
         try:
-            for start in start_values(chosen if given else without_start(chosen)):
-                found = replace(
+            for start in start_values(chosen if with_start else without_start(chosen)):
+                candidate = replace(
                     start,
                     photo=network.photo,
                     point=network.point,
@@ -231,22 +231,22 @@ def _oriented(network: Network, used: NDArray[np.bool_]) -> tuple[Network, Prepa
                     sigma=network.sigma,
                     lines=network.lines,
                 )
-                prepared = prepare(found, keep=used)
-                solution = adjust(found, prepared)
-                rests.append((_misfit(found, prepared, solution), found, prepared, solution))
+                prepared = prepare(candidate, keep=used)
+                solution = adjust(candidate, prepared)
+                rests.append((_misfit(candidate, prepared, solution), candidate, prepared, solution))
                 if rests[-1][0] < _GOOD:
                     break
         except MomaError as error:
             failure = error
-        if rests and min(one[0] for one in rests) < _POOR:
+        if rests and min(misfit_of[0] for misfit_of in rests) < _POOR:
             break
     if not rests:
         assert failure is not None
         _check_control_alone(network)
         raise failure
-    misfit, found, prepared, solution = min(rests, key=lambda one: one[0])
-    _check_contradictions(network, found, solution, misfit, failure)
-    return found, prepared, solution
+    misfit, candidate, prepared, solution = min(rests, key=lambda one: one[0])
+    _check_contradictions(network, candidate, solution, misfit, failure)
+    return candidate, prepared, solution
 
 
 def _only(network: Network, used: NDArray[np.bool_]) -> Network:
@@ -276,15 +276,15 @@ def _misfit(network: Network, prepared: Prepared, solution: Solution) -> float:
 
 
 def _check_contradictions(
-    network: Network, found: Network, solution: Solution, misfit: float, failure: MomaError | None
+    network: Network, oriented: Network, solution: Solution, misfit: float, failure: MomaError | None
 ) -> None:
     """Refuse an orientation that contradicts its marks, its control points or its start values."""
     values = solution.unknowns
     photos = tuple(
         replace(photo, rotation=r, station=s)
-        for photo, r, s in zip(found.photos, values.rotation, values.station, strict=True)
+        for photo, r, s in zip(oriented.photos, values.rotation, values.station, strict=True)
     )
-    pair = swapped(network, replace(found, photos=photos))
+    pair = swapped(network, replace(oriented, photos=photos))
     if pair is not None:
         raise _swapped(network, *pair)
     _check_stations(network, solution)
@@ -293,7 +293,7 @@ def _check_contradictions(
     _check_control_alone(network)
     if failure is not None:
         raise failure
-    worst = _worst(found, solution)
+    worst = _worst(oriented, solution)
     raise GeometryError(
         f"the marks contradict each other: half miss by over {misfit:.1%} of a photograph, most on {worst.name}",
         where=worst.where or network.path,
@@ -303,8 +303,8 @@ def _check_contradictions(
 
 def _check_control_alone(network: Network) -> None:
     """Refuse control points that do not fit photographs which agree with each other without them."""
-    given = [one for one in network.control if not one.check]
-    if not given or (alone := _alone(network)) is None:
+    adjusted_points = [gcp for gcp in network.control if not gcp.check]
+    if not adjusted_points or (alone := _alone(network)) is None:
         return
     _check_hand(network, alone[0])
     raise _control_misfit(network, alone[0])
@@ -313,13 +313,13 @@ def _check_control_alone(network: Network) -> None:
 def _control_misfit(network: Network, alone: Solution) -> SurveyError:
     """Return the error that names the few control points that are wrong, or tells that they do not fit as a whole."""
     if wrong := _minority(network, alone):
-        names = [f"{network.names[one.point]} ({off:.3g} m)" for one, off in wrong]
+        names = [f"{network.names[gcp.point]} ({off:.3g} m)" for gcp, off in wrong]
         return SurveyError(
             f"control points are far from where the others put them: {listed(names)}",
             where=wrong[0][0].where or network.path,
             remedy="check their coordinates and their number on the photographs, or let them only check the result",
         )
-    first = next(one for one in network.control if not one.check)
+    first = next(gcp for gcp in network.control if not gcp.check)
     return SurveyError(
         "the control points do not fit the photographs, which agree with each other without them",
         where=first.where or network.path,
@@ -329,18 +329,18 @@ def _control_misfit(network: Network, alone: Solution) -> SurveyError:
 
 def _minority(network: Network, alone: Solution) -> list[tuple[Control, float]]:
     """Return the control points that most others contradict, the worst first, and how far off they are [m]."""
-    given = [
-        one for one in network.control if not one.check and np.isfinite(alone.unknowns.point[one.point]).all()
+    gcps = [
+        gcp for gcp in network.control if not gcp.check and np.isfinite(alone.unknowns.point[gcp.point]).all()
     ]
-    if len(given) <= _ENOUGH:
+    if len(gcps) <= _ENOUGH:
         return []
-    there = np.array([one.place for one in given])
-    off = np.linalg.norm(_fitted(alone.unknowns.point[[one.point for one in given]], there) - there, axis=1)
-    sigma = np.sqrt([np.trace(one.covariance) / 3.0 for one in given])
+    there = np.array([gcp.place for gcp in gcps])
+    off = np.linalg.norm(_fitted(alone.unknowns.point[[gcp.point for gcp in gcps]], there) - there, axis=1)
+    sigma = np.sqrt([np.trace(gcp.covariance) / 3.0 for gcp in gcps])
     wrong = off > FAR_OFF * np.maximum(np.median(off), sigma)
-    if len(given) - wrong.sum() < _ENOUGH:
+    if len(gcps) - wrong.sum() < _ENOUGH:
         return []
-    return [(given[k], float(off[k])) for k in np.argsort(-off) if wrong[k]]
+    return [(gcps[k], float(off[k])) for k in np.argsort(-off) if wrong[k]]
 
 
 def _check_stations(network: Network, solution: Solution) -> None:
@@ -363,18 +363,18 @@ def _check_stations(network: Network, solution: Solution) -> None:
     if (alone := _alone(free)) is None:
         return
     here = _fitted(alone[0].unknowns.station[seen], there)
-    own = np.linalg.norm(here - there, axis=1)
+    distances = np.linalg.norm(here - there, axis=1)
     apart = np.linalg.norm(here[:, None] - there[None], axis=2)
-    worst = int(np.argmax(own))
+    worst = int(np.argmax(distances))
     photo = network.photos[seen[worst]]
-    for other in range(len(seen)):
-        if other != worst and max(apart[worst, other], apart[other, worst]) < 0.2 * min(
-            own[worst], own[other]
+    for index in range(len(seen)):
+        if index != worst and max(apart[worst, index], apart[index, worst]) < 0.2 * min(
+            distances[worst], distances[index]
         ):
-            raise _swapped(network, *sorted((seen[worst], seen[other])))
-    if own[worst] > FAR_OFF * sigma[worst]:
+            raise _swapped(network, *sorted((seen[worst], seen[index])))
+    if distances[worst] > FAR_OFF * sigma[worst]:
         raise SurveyError(
-            f"the observed station of photograph {photo.name} is {own[worst]:.3g} m from where the others put it",
+            f"the observed station of photograph {photo.name} is {distances[worst]:.3g} m from where the others put it",
             where=photo.where or network.path,
             remedy="check its coordinates, and to which photograph they belong",
         )
@@ -429,10 +429,10 @@ def _sigma0(prepared: Prepared, solution: Solution) -> float:
 
 def _check_hand(network: Network, alone: Solution) -> None:
     """Refuse mirrored control points."""
-    given = [one for one in network.control if not one.check]
-    source = alone.unknowns.point[[one.point for one in given]]
+    gcps = [gcp for gcp in network.control if not gcp.check]
+    source = alone.unknowns.point[[gcp.point for gcp in gcps]]
     fine = np.isfinite(source).all(axis=1)
-    check_mirrored(source[fine], np.array([one.place for one in given])[fine], network)
+    check_mirrored(source[fine], np.array([gcp.place for gcp in gcps])[fine], network)
 
 
 def _worst(network: Network, solution: Solution) -> Photo:
@@ -485,7 +485,7 @@ def _snooped(
         wrong = _wrong_control(network, solution, result, rays, float(tests.max(initial=0.0)))
         if wrong is not None:
             control = tuple(
-                replace(one, check=one.check or k == wrong) for k, one in enumerate(network.control)
+                replace(gcp, check=gcp.check or k == wrong) for k, gcp in enumerate(network.control)
             )
             network = replace(network, control=control)
             free = prepared.unknowns.free.copy()
@@ -512,22 +512,22 @@ def _wrong_control(
     A point with one ray is not determined without its place: its mark is blamed.
     """
     tests = control_tests(network, solution, result)
-    tests[[one.check or rays[one.point] < 2 for one in network.control]] = 0.0
+    tests[[gcp.check or rays[gcp.point] < 2 for gcp in network.control]] = 0.0
     if not len(tests) or tests.max() <= MISSES or np.sqrt(3.0) * tests.max() <= most:
         return None
     worst = int(np.argmax(tests))
-    left = [one.place for k, one in enumerate(network.control) if not one.check and k != worst]
+    left = [gcp.place for k, gcp in enumerate(network.control) if not gcp.check and k != worst]
     return worst if len(left) >= _ENOUGH else None
 
 
 def _worst_marks(network: Network, rays: NDArray[np.intp], suspects: NDArray[np.intp]) -> list[int]:
     """Choose marks to leave out, the worst first: one of a photograph and of a point."""
-    held = np.zeros(len(network.names), dtype=bool)
-    held[[one.point for one in network.control if not one.check]] = True
+    controlled = np.zeros(len(network.names), dtype=bool)
+    controlled[[gcp.point for gcp in network.control if not gcp.check]] = True
     photos, points, out = set[int](), set[int](), list[int]()
     for k in suspects:
         f, i = int(network.photo[k]), int(network.point[k])
-        if f in photos or i in points or (rays[i] < 3 and not held[i]):
+        if f in photos or i in points or (rays[i] < 3 and not controlled[i]):
             continue
         photos.add(f)
         points.add(i)

@@ -182,22 +182,25 @@ def essential_orientations(first: Array, second: Array) -> list[tuple[Array, Arr
     first = first / np.linalg.norm(first, axis=1)[:, None]
     second = second / np.linalg.norm(second, axis=1)[:, None]
     rng = np.random.default_rng(0)
-    found: list[tuple[Array, Array, int, float]] = []
+    candidates: list[tuple[Array, Array, int, float]] = []
     for count in range(_FIVES):
-        if count >= _ENOUGH and max((one[2] for one in found), default=0) > 0.9 * len(first):
+        if count >= _ENOUGH and max((candidate[2] for candidate in candidates), default=0) > 0.9 * len(first):
             break
         five = rng.choice(len(first), 5, replace=False)
         for essential in _essential(first[five], second[five]):
             for rotation, station in _decomposed(essential):
                 agree, rest = _agreement(first, second, rotation, station)
                 if agree >= 5:
-                    found.append((rotation, station, agree, rest))
-    found.sort(key=lambda one: (-one[2], one[3]))
+                    candidates.append((rotation, station, agree, rest))
+    candidates.sort(key=lambda candidate: (-candidate[2], candidate[3]))
     chosen: list[tuple[Array, Array, int]] = []
-    for rotation, station, agree, _ in found[:60]:
-        if agree < 0.8 * found[0][2] or len(chosen) == 4:
+    for rotation, station, agree, _ in candidates[:60]:
+        if agree < 0.8 * candidates[0][2] or len(chosen) == 4:
             break
-        if all(np.trace(rotation.T @ one[0]) < 2.999 or station @ one[1] < 0.999 for one in chosen):
+        if all(
+            np.trace(rotation.T @ chosen_before[0]) < 2.999 or station @ chosen_before[1] < 0.999
+            for chosen_before in chosen
+        ):
             chosen.append((rotation, station, agree))
     return chosen
 
@@ -210,9 +213,9 @@ def _agreement(first: Array, second: Array, rotation: Array, station: Array) -> 
     # depths along either ray, by the cross products of the law of sines
     across = np.cross(first, turned)
     size = np.maximum((across**2).sum(axis=1), 1e-18)
-    near = np.einsum("ij,ij->i", np.cross(station, turned), across) / size
-    far = np.einsum("ij,ij->i", np.cross(station, first), across) / size
-    fine = (miss < _AGREES) & (near > 0.0) & (far > 0.0)
+    first_depth = np.einsum("ij,ij->i", np.cross(station, turned), across) / size
+    second_depth = np.einsum("ij,ij->i", np.cross(station, first), across) / size
+    fine = (miss < _AGREES) & (first_depth > 0.0) & (second_depth > 0.0)
     return int(fine.sum()), float(np.median(miss))
 
 

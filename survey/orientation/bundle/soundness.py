@@ -77,7 +77,7 @@ def check_cameras(network: Network) -> None:
 
 def _camera_fault(camera: Camera) -> str | None:
     c, xp, yp = camera.inner[:3].tolist()
-    width, height = (one * camera.pixel for one in camera.size)
+    width, height = (side * camera.pixel for side in camera.size)
     if not np.isfinite(camera.inner).all():
         return f"camera {camera.name} has a value that is not finite"
     if camera.unit == "mm" and not _PIXELS_MM[0] <= camera.pixel <= _PIXELS_MM[1]:
@@ -106,7 +106,7 @@ def _camera_fault(camera: Camera) -> str | None:
 def _check_control(network: Network) -> None:
     """Check that control points and observed stations hold the network, if there are any."""
     marked = np.bincount(network.point, minlength=len(network.names))
-    points = [one for one in network.control if not one.check]
+    points = [gcp for gcp in network.control if not gcp.check]
     for point in points:
         if not marked[point.point]:
             raise SurveyError(
@@ -114,10 +114,10 @@ def _check_control(network: Network) -> None:
                 where=point.where or network.path,
                 remedy="mark it, or leave it out",
             )
-    places = [one.place for one in points]
+    places = [gcp.place for gcp in points]
     places += [photo.observed_station for photo in network.photos if photo.observed_station is not None]
-    held = any(photo.fixed or photo.observed_station is not None for photo in network.photos)
-    if network.control and not points and not held:
+    has_datum = any(photo.fixed or photo.observed_station is not None for photo in network.photos)
+    if network.control and not points and not has_datum:
         raise SurveyError(
             f"all {len(network.control)} control points only check the result: none holds the photographs",
             where=network.control[0].where or network.path,
@@ -126,7 +126,7 @@ def _check_control(network: Network) -> None:
     if not places or any(photo.fixed for photo in network.photos):
         return
     if len(places) < 3:
-        names = listed([network.names[one.point] for one in points])
+        names = listed([network.names[gcp.point] for gcp in points])
         raise SurveyError(
             f"{len(points)} control point{'' if len(points) == 1 else 's'} ({names}) cannot hold the photographs",
             where=(points[0].where if points else network.photos[0].where) or network.path,
@@ -136,7 +136,7 @@ def _check_control(network: Network) -> None:
     along, across = np.linalg.svd(arms, compute_uv=False)[:2]
     if not across > _ON_LINE * along:
         raise SurveyError(
-            f"the {len(places)} control points {listed([network.names[one.point] for one in points])} lie on one line",
+            f"the {len(places)} control points {listed([network.names[gcp.point] for gcp in points])} lie on one line",
             where=(points[0].where if points else network.photos[0].where) or network.path,
             remedy="measure a control point off this line: the photographs could turn about it",
         )

@@ -37,9 +37,9 @@ _NARROW = np.radians(2.0)  # angle between rays below which a point is not used 
 def without_start(network: Network) -> Network:
     """Return a network without start values, apart from control points and observed or fixed orientations."""
     start = np.full_like(network.start, np.nan)
-    for one in network.control:
-        if not one.check:
-            start[one.point] = one.place
+    for gcp in network.control:
+        if not gcp.check:
+            start[gcp.point] = gcp.place
     photos = tuple(
         photo if photo.fixed else replace(photo, station=None, rotation=None) for photo in network.photos
     )
@@ -59,7 +59,7 @@ def start_values(network: Network) -> Iterator[Network]:
         if a photograph cannot be oriented, naming it, or the control points are mirrored
     """
     rays = _rays(network)
-    control = {one.point: one.place for one in network.control if not one.check}
+    control = {gcp.point: gcp.place for gcp in network.control if not gcp.check}
     oriented = {
         f: (photo.rotation, photo.station)
         for f, photo in enumerate(network.photos)
@@ -70,10 +70,10 @@ def start_values(network: Network) -> Iterator[Network]:
         yield _filled(network, rays, dict(oriented), {**places, **control})
         return
     for first in _pairs(network, rays):
-        found = _filled(network, rays, first, {}, strict=False)
-        if any(photo.rotation is None for photo in found.photos):
+        filled = _filled(network, rays, first, {}, strict=False)
+        if any(photo.rotation is None for photo in filled.photos):
             continue
-        yield aligned(found, always=True)
+        yield aligned(filled, always=True)
     _filled(network, rays, {}, dict(control))  # names what cannot be oriented
     raise GeometryError(
         "no pair of photographs can be oriented", where=network.path, remedy="mark more common points"
@@ -101,10 +101,10 @@ def check_mirrored(source: Array, target: Array, network: Network) -> None:
     extent = float(np.linalg.norm(np.std(target, axis=0)))
     right, wrong = misfit(False), misfit(True)
     if wrong < _BETTER * right and right > 1e-4 * extent:
-        one = next(one for one in network.control if not one.check)
+        gcp = next(entry for entry in network.control if not entry.check)
         raise SurveyError(
             f"the control points are mirrored: they fit to {wrong:.3g} m as a reflection, to {right:.3g} m otherwise",
-            where=one.where or network.path,
+            where=gcp.where or network.path,
             remedy="check the order and the signs of their coordinates, which must form a right-handed system, and "
             "that y of the marks counts downwards",
         )
@@ -119,7 +119,7 @@ def aligned(network: Network, always: bool = False) -> Network:
         if the control points are mirrored
     """
     control = [
-        one for one in network.control if not one.check and np.isfinite(network.start[one.point]).all()
+        gcp for gcp in network.control if not gcp.check and np.isfinite(network.start[gcp.point]).all()
     ]
     stations = [
         photo for photo in network.photos if photo.observed_station is not None and photo.station is not None
@@ -127,9 +127,9 @@ def aligned(network: Network, always: bool = False) -> Network:
     if len(control) + len(stations) < 3:
         return network
     source = np.array(
-        [*(network.start[one.point] for one in control), *(station.station for station in stations)]
+        [*(network.start[gcp.point] for gcp in control), *(station.station for station in stations)]
     )
-    target = np.array([*(one.place for one in control), *(station.observed_station for station in stations)])
+    target = np.array([*(gcp.place for gcp in control), *(station.observed_station for station in stations)])
     if control:
         check_mirrored(source, target, network)
     extent = float(np.linalg.norm(np.std(target, axis=0)))
@@ -162,7 +162,7 @@ def _looks_mirrored(source: Array, target: Array) -> bool:
     """
     fitted, _, _ = similarity_between(source, target, mirrored=True)
     usual = (np.diag([-1.0, 1.0, 1.0]), np.diag([1.0, -1.0, 1.0]), np.eye(3)[[1, 0, 2]])
-    return any(float(np.abs(fitted - one).max()) < _ALIKE for one in usual)
+    return any(float(np.abs(fitted - mirrored).max()) < _ALIKE for mirrored in usual)
 
 
 def _rays(network: Network) -> Array:
@@ -181,8 +181,8 @@ def _rays(network: Network) -> Array:
 
 
 def _resectable(network: Network, control: dict[int, Array]) -> bool:
-    known = np.isin(network.point, list(control))
-    return bool((np.bincount(network.photo[known], minlength=1) >= _FEWEST).any())
+    controlled = np.isin(network.point, list(control))
+    return bool((np.bincount(network.photo[controlled], minlength=1) >= _FEWEST).any())
 
 
 def _filled(
@@ -198,17 +198,17 @@ def _filled(
     while True:
         _intersect(network, rays, oriented, places, firm)
         waiting = [f for f in range(len(network.photos)) if f not in oriented]
-        known = {f: [k for k in of_photo[f] if network.point[k] in firm] for f in waiting}
-        ready = sorted((f for f in waiting if len(known[f]) >= _FEWEST), key=lambda f: -len(known[f]))
+        usable = {f: [k for k in of_photo[f] if network.point[k] in firm] for f in waiting}
+        ready = sorted((f for f in waiting if len(usable[f]) >= _FEWEST), key=lambda f: -len(usable[f]))
         progress = False
         for f in ready:
-            if len(known[f]) < 0.5 * len(known[ready[0]]):
+            if len(usable[f]) < 0.5 * len(usable[ready[0]]):
                 break
-            found = resect(rays[known[f]], np.array([places[network.point[k]] for k in known[f]]))
-            if found is None or found[2] < max(_FEWEST, _MOST_AGREE * len(known[f])):
+            resected = resect(rays[usable[f]], np.array([places[network.point[k]] for k in usable[f]]))
+            if resected is None or resected[2] < max(_FEWEST, _MOST_AGREE * len(usable[f])):
                 misfits.add(f)
                 continue
-            oriented[f] = found[:2]
+            oriented[f] = resected[:2]
             progress = True
         if not progress:
             break
@@ -221,7 +221,7 @@ def _filled(
                 else photo
             )
         elif strict:
-            raise _not_oriented(network, f, len(known.get(f, ())), f in misfits)
+            raise _not_oriented(network, f, len(usable.get(f, ())), f in misfits)
         else:
             photos.append(photo)
     start = network.start.copy()
@@ -230,14 +230,14 @@ def _filled(
     return replace(network, photos=tuple(photos), start=start)
 
 
-def _not_oriented(network: Network, f: int, known: int, misfit: bool) -> SurveyError:
+def _not_oriented(network: Network, f: int, count: int, misfit: bool) -> SurveyError:
     photo = network.photos[f]
     what = f"photograph {photo.name} cannot be oriented: "
     if misfit:
-        what += f"its {known} known points do not lie as it shows them"
+        what += f"its {count} known points do not lie as it shows them"
         remedy = "check their marks, the control points (are they mirrored?) and the unit of the camera"
     else:
-        what += f"{known} of its points {'is' if known == 1 else 'are'} known"
+        what += f"{count} of its points {'is' if count == 1 else 'are'} known"
         remedy = f"mark {_FEWEST} points on it that are control points or marked on two other photographs"
     return SurveyError(what, where=photo.where or network.path, remedy=remedy)
 
@@ -250,15 +250,15 @@ def _intersect(
     firm: set[int],
 ) -> None:
     """Intersect the points that two oriented photographs show; `firm` collects those good for a resection."""
-    known = np.zeros(len(network.photos), dtype=bool)
-    known[list(oriented)] = True
+    located = np.zeros(len(network.photos), dtype=bool)
+    located[list(oriented)] = True
     wanted = np.ones(len(network.names), dtype=bool)
     wanted[list(firm)] = False
-    marks = np.flatnonzero(known[network.photo] & wanted[network.point])
+    marks = np.flatnonzero(located[network.photo] & wanted[network.point])
     marks = marks[np.argsort(network.point[marks], kind="stable")]
     if not len(marks):
         return
-    rotations, stations = np.zeros((len(known), 3, 3)), np.zeros((len(known), 3))
+    rotations, stations = np.zeros((len(located), 3, 3)), np.zeros((len(located), 3))
     for f, (rotation, station) in oriented.items():
         rotations[f], stations[f] = rotation, station
     photo = network.photo[marks]
@@ -303,19 +303,19 @@ def _pairs(network: Network, rays: Array) -> Iterator[dict[int, tuple[Array, Arr
         )
 
 
-def swapped(network: Network, found: Network) -> tuple[int, int] | None:
+def swapped(network: Network, oriented: Network) -> tuple[int, int] | None:
     """Return two photographs of which each was oriented where the file has the other; None without such a pair."""
-    given = [
+    stations = [
         photo.station if photo.observed_station is None else photo.observed_station
         for photo in network.photos
     ]
-    if any(one is None for one in given):
+    if any(station is None for station in stations):
         return None
-    there, here = np.array(given), np.array([photo.station for photo in found.photos])
-    own = np.linalg.norm(here - there, axis=1)
+    there, here = np.array(stations), np.array([photo.station for photo in oriented.photos])
+    distances = np.linalg.norm(here - there, axis=1)
     apart = np.linalg.norm(here[:, None] - there[None], axis=2)
-    for a in range(len(given)):
-        for b in range(a + 1, len(given)):
-            if max(apart[a, b], apart[b, a]) < 0.2 * min(own[a], own[b]):
+    for a in range(len(stations)):
+        for b in range(a + 1, len(stations)):
+            if max(apart[a, b], apart[b, a]) < 0.2 * min(distances[a], distances[b]):
                 return a, b
     return None

@@ -156,7 +156,7 @@ def _inverse(normal: Array, network: Network, prepared: Prepared) -> Array:
 
 
 def _to_points(
-    prepared: Prepared, solution: Solution, known: Array, cameras: Array, points: Array
+    prepared: Prepared, solution: Solution, priors: Array, cameras: Array, points: Array
 ) -> tuple[Array, Array]:
     """Refer covariances to the datum that the points define together."""
     unknowns = solution.unknowns
@@ -164,7 +164,7 @@ def _to_points(
     moves = np.where(unknowns.free[:, None, None], similarity(arms), 0.0)
     gathered = np.zeros((7, len(cameras)))  # cov(t, c) and cov(t, p) of t = Σ Gᵀ p
     each = np.zeros((len(points), 7, 3))
-    datum_sums(prepared.rays, unknowns, known, cameras, moves, (gathered, each))
+    datum_sums(prepared.rays, unknowns, priors, cameras, moves, (gathered, each))
     total = np.einsum("iax,ixb->ab", each, moves)
     inverse = np.linalg.inv(np.einsum("ixa,ixb->ab", moves, moves))
     whole = inverse @ total @ inverse

@@ -129,15 +129,17 @@ def _unknown(model: str, where: str) -> SurveyError:
     return SurveyError(what, where=where, remedy=remedy)
 
 
-def _camera(number: int, model: str, size: tuple[int, int], given: Sequence[float], where: str) -> Camera:
+def _camera(
+    number: int, model: str, size: tuple[int, int], parameters: Sequence[float], where: str
+) -> Camera:
     if model not in _MODELS:
         raise _unknown(model, where)
     names = _MODELS[model]
-    if len(given) != len(names):
+    if len(parameters) != len(names):
         raise SurveyError(
-            f"{len(given)} parameters of {model}", where=where, remedy=f"it has {', '.join(names)}"
+            f"{len(parameters)} parameters of {model}", where=where, remedy=f"it has {', '.join(names)}"
         )
-    values = dict(zip(names, given, strict=True))
+    values = dict(zip(names, parameters, strict=True))
     for name in ("k4", "k5", "k6"):
         if values.get(name):
             raise SurveyError(

@@ -106,7 +106,7 @@ def binary_cameras(path: Path) -> Iterator[tuple[int, str, tuple[int, int], list
         if model not in MODELS:
             raise data.fail(f"a camera model with the number {model}")
         name, count = MODELS[model]
-        yield number, name, (width, height), [float(one) for one in data.take(f"<{count}d")], where
+        yield number, name, (width, height), [float(number) for number in data.take(f"<{count}d")], where
 
 
 def binary_images(path: Path) -> Iterator[BinaryImage]:

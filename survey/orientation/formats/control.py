@@ -25,7 +25,10 @@ _COLUMNS: Mapping[str, Sequence[str]] = {
     "number": POINT,
     "name": ("name", "label", "description", "desc", "code", "type", "Bezeichnung", "nom", "nome", "nombre"),
     "sigma": SIGMA,
-    **{f"s{a}": (f"s{a}", *(f"{one} {a}" for one in SIGMA), *(f"{a} {one}" for one in SIGMA)) for a in "xyz"},
+    **{
+        f"s{a}": (f"s{a}", *(f"{synonym} {a}" for synonym in SIGMA), *(f"{a} {synonym}" for synonym in SIGMA))
+        for a in "xyz"
+    },
 }
 _REMEDY = "write: number, name, X, Y, Z, and deviations: none, one, three, or nine covariances, with commas"
 _FAR = 10.0  # mean offset between two lists of the same points over its spread, from which it is a shift of the origin
@@ -82,7 +85,7 @@ def read_control(path: Path) -> tuple[ControlRow, ...]:
 
 def _fits(table: Table, places: Mapping[str, int]) -> bool:
     """Return whether the columns of coordinates hold numbers in every row."""
-    columns = [places[one] for one in "xyz" if one in places]
+    columns = [places[axis] for axis in "xyz" if axis in places]
     return all(
         column < len(row.cells) and is_number(row.cells[column], table.commas)
         for row in table.rows
@@ -103,7 +106,7 @@ def _check_header(table: Table, header: TableRow, places: dict[str, int]) -> Non
             if "name" in places
             else next(k for k in range(len(taken) + 1) if k not in taken)
         )
-    missing = [one for one in "xyz" if one not in places]
+    missing = [axis for axis in "xyz" if axis not in places]
     if missing:
         raise SurveyError(
             f"no column {missing[0]} among {', '.join(header.cells)[:200]}",
@@ -122,7 +125,7 @@ def _by_name(table: Table, row: TableRow, header: TableRow, places: Mapping[str,
         return (length_scale(name, where) or 1.0) * table.number(row.cells[column], what, row.line)
 
     last = max(places.values())
-    if last >= len(row.cells) and max(places[one] for one in "xyz") >= len(row.cells):
+    if last >= len(row.cells) and max(places[axis] for axis in "xyz") >= len(row.cells):
         what = f"a control point of {len(row.cells)} values"
         raise SurveyError(what, where=where, remedy=f"the columns are {', '.join(header.cells)[:200]}")
     known = {
@@ -140,13 +143,13 @@ def _by_name(table: Table, row: TableRow, header: TableRow, places: Mapping[str,
             where=table.where(header.line),
             remedy="name it sigma, or sx, sy and sz, if it holds standard deviations; otherwise take it out",
         )
-    columns = [known[one] for one in ("sx", "sy", "sz") if one in known] or [
-        known[one] for one in ("sigma",) if one in known
+    columns = [known[name] for name in ("sx", "sy", "sz") if name in known] or [
+        known[name] for name in ("sigma",) if name in known
     ]
     return ControlRow(
         table.name(row, places["number"], "the number of a control point"),
         row.cells[known["name"]] if "name" in known else "",
-        np.array([length(places[one], f"coordinate {one}") for one in "xyz"]),
+        np.array([length(places[axis], f"coordinate {axis}") for axis in "xyz"]),
         _covariance([length(k, "a standard deviation") for k in columns or rest], where),
         where,
     )
@@ -212,14 +215,14 @@ def with_control(
     """
     marked = set(network.point.tolist())
     index = {name: k for k, name in enumerate(network.names) if k in marked}
-    known = [row for row in rows if row.number in index]
-    if not known:
+    usable = [row for row in rows if row.number in index]
+    if not usable:
         raise SurveyError(
             f"none of the {len(rows)} control points is marked on a photograph: {listed([row.number for row in rows])}",
             where=rows[0].where.rpartition(":")[0] if rows else network.path,
             remedy=f"marked points: {listed(list(index))}",
         )
-    names = {row.number for row in known} | {row.name for row in known if row.name}
+    names = {row.number for row in usable} | {row.name for row in usable if row.name}
     for wanted in check:
         if wanted not in names:
             raise SurveyError(
@@ -227,14 +230,14 @@ def with_control(
                 where=network.path,
                 remedy=f"known: {listed(sorted(names))}",
             )
-    own = {one.point: one.place for one in network.control}
-    pairs = [(own[index[row.number]], row.place) for row in known if index[row.number] in own]
+    places = {one.point: one.place for one in network.control}
+    pairs = [(places[index[row.number]], row.place) for row in usable if index[row.number] in places]
     shift, remarks = np.zeros(3), list(network.remarks)
     if len(pairs) >= 2:
         off = np.array([a - b for a, b in pairs])
         if np.linalg.norm(off.mean(axis=0)) > _FAR * np.ptp(off, axis=0).max():
             shift = off.mean(axis=0)
-            place = ", ".join(f"{one:.3f}" for one in shift)
+            place = ", ".join(f"{coordinate:.3f}" for coordinate in shift)
             remarks.append(f"{network.path} has another origin: control points are moved by ({place}) m")
     control = tuple(
         Control(
@@ -244,15 +247,15 @@ def with_control(
             row.number in check or (row.name != "" and row.name in check),
             row.where,
         )
-        for row in known
+        for row in usable
     )
     left = [row.number for row in rows if row.number not in index]
     if left:
         remarks.append(f"control points that are marked nowhere: {listed(left)}")
     start = network.start.copy()
-    for one in control:
-        if not np.isfinite(start[one.point]).all():
-            start[one.point] = one.place
+    for gcp in control:
+        if not np.isfinite(start[gcp.point]).all():
+            start[gcp.point] = gcp.place
     return replace(network, control=control, start=start, remarks=tuple(remarks))
 
 

@@ -53,23 +53,23 @@ def read_dbat(path: Path) -> Network:
         naming file and line
     """
     document = read_xml(path, "document")
-    given = document.need("input")
-    base = _base(path, given)
+    entries = document.need("input")
+    base = _base(path, entries)
     free = _estimated(document)
-    cameras = tuple(_camera(camera, free) for camera in _cameras(given, base))
+    cameras = tuple(_camera(camera, free) for camera in _cameras(entries, base))
     if len(cameras) != 1:
-        raise given.fail(f"{len(cameras)} cameras", "scripts of one camera can be read")
-    images = [row for file in given.all("images", "file") for row in _table(file, base, ("id", "path"))]
+        raise entries.fail(f"{len(cameras)} cameras", "scripts of one camera can be read")
+    images = [row for file in entries.all("images", "file") for row in _table(file, base, ("id", "path"))]
     photos = tuple(
         Photo(PurePosixPath(str(row["path"]).replace("\\", "/")).name, 0, where=str(row["where"]))
         for row in images
     )
-    photos = _prior(given, base, images, photos)
+    photos = _prior(entries, base, images, photos)
     number = {str(row["id"]): photo.name for row, photo in zip(images, photos, strict=True)}
     if not photos:
-        raise given.fail("the script has no images", "give images/file")
+        raise entries.fail("the script has no images", "give images/file")
     marks, source = list[MarkRow](), str(path)
-    for file in given.all("image_pts", "file"):
+    for file in entries.all("image_pts", "file"):
         default = file.attributes.get("sxy")
         for row in _table(file, base, ("im", "id", "x", "y")):
             where = str(row["where"])
@@ -85,15 +85,18 @@ def read_dbat(path: Path) -> Network:
     network = network_of(source, tuple(marks), cameras, photos, _DEFAULT)
     control = [
         _control(row)
-        for file in given.all("ctrl_pts", "file")
+        for file in entries.all("ctrl_pts", "file")
         for row in _table(file, base, ("id", "x", "y", "z"))
     ]
     checks = [
         _control(row)
-        for file in given.all("check_pts", "file")
+        for file in entries.all("check_pts", "file")
         for row in _table(file, base, ("id", "x", "y", "z"))
     ]
-    control, checks = _filtered(given.find("ctrl_pts"), control), _filtered(given.find("check_pts"), checks)
+    control, checks = (
+        _filtered(entries.find("ctrl_pts"), control),
+        _filtered(entries.find("check_pts"), checks),
+    )
     if not (control or checks):
         return network
     rows = {check.number: check for check in (*checks, *control)}
@@ -105,10 +108,10 @@ def read_dbat(path: Path) -> Network:
     return with_control(network, tuple(rows.values()), check=only)
 
 
-def _base(path: Path, given: Element) -> Path:
-    text = given.attributes.get("base_dir", "$HERE")
+def _base(path: Path, section: Element) -> Path:
+    text = section.attributes.get("base_dir", "$HERE")
     if text.startswith("$DBAT"):
-        raise given.fail(
+        raise section.fail(
             "the folder of the toolbox, $DBAT, is not known here", 'write base_dir="$HERE", or a path'
         )
     if text.startswith("$HERE"):
@@ -117,12 +120,12 @@ def _base(path: Path, given: Element) -> Path:
 
 
 def _prior(
-    given: Element, base: Path, images: list[Mapping[str, object]], photos: tuple[Photo, ...]
+    section: Element, base: Path, images: list[Mapping[str, object]], photos: tuple[Photo, ...]
 ) -> tuple[Photo, ...]:
     """Return the photographs with the stations and angles that are known beforehand."""
     places = {str(row["id"]): k for k, row in enumerate(images)}
     out = list(photos)
-    for file in given.all("prior_eo", "file"):
+    for file in section.all("prior_eo", "file"):
         unit = file.attributes.get("units", "radians").strip().lower()
         if unit not in ("degrees", "radians"):
             raise file.fail(f"angles in {shown(unit)}", 'write units="degrees" or "radians"')
@@ -141,7 +144,9 @@ def _placed(photo: Photo, row: Mapping[str, object], where: str, radian: float) 
     """Return a photograph with one row of a table of stations and angles."""
 
     def three(names: tuple[str, str, str], *common: str) -> Array | None:
-        texts = [row.get(name, next((row[one] for one in common if one in row), None)) for name in names]
+        texts = [
+            row.get(name, next((row[alias] for alias in common if alias in row), None)) for name in names
+        ]
         if all(text is None for text in texts):
             return None
         if any(text is None for text in texts):
@@ -180,7 +185,7 @@ def _placed(photo: Photo, row: Mapping[str, object], where: str, radian: float) 
 def _table(file: Element, base: Path, needed: tuple[str, ...]) -> list[Mapping[str, object]]:
     """Read a table by the names of its columns; `where` is added to each row."""
     columns = [word.strip() for word in file.attribute("format").split(",")]
-    missing = [one for one in needed if one not in columns]
+    missing = [column for column in needed if column not in columns]
     if missing:
         raise file.fail(
             f"the format {file.attributes['format']!r} has no {missing[0]}", f"it needs {', '.join(needed)}"
@@ -216,34 +221,34 @@ def _control(row: Mapping[str, object]) -> ControlRow:
 
 
 def _filtered(part: Element | None, rows: list[ControlRow]) -> list[ControlRow]:
-    for one in () if part is None else part.all("filter"):
-        ids = {word.strip() for word in one.attribute("id").split(",")}
-        what = one.text.strip()
+    for part_filter in () if part is None else part.all("filter"):
+        ids = {word.strip() for word in part_filter.attribute("id").split(",")}
+        what = part_filter.text.strip()
         if what not in ("keep", "remove"):
-            raise one.fail(f"a filter that says {shown(what)}", "write keep or remove")
+            raise part_filter.fail(f"a filter that says {shown(what)}", "write keep or remove")
         rows = [row for row in rows if (row.number in ids) == (what == "keep")]
     return rows
 
 
-def _cameras(given: Element, base: Path) -> list[Element]:
-    out = list(given.all("cameras", "camera"))
-    for file in given.all("cameras", "file"):
+def _cameras(section: Element, base: Path) -> list[Element]:
+    out = list(section.all("cameras", "camera"))
+    for file in section.all("cameras", "file"):
         out += read_xml(base / file.text.strip(), "document").all("cameras", "camera")
     return out
 
 
-def _camera(one: Element, free: tuple[str, ...]) -> Camera:
+def _camera(element: Element, free: tuple[str, ...]) -> Camera:
     def values(name: str, count: int) -> list[float]:
-        found = one.find(name)
-        return [0.0] * count if found is None or not found.text.strip() else found.numbers()
+        value = element.find(name)
+        return [0.0] * count if value is None or not value.text.strip() else value.numbers()
 
-    image = [int(value) for value in one.need("image").numbers(2)]
-    sensor = one.need("sensor").text.split(",")
+    image = [int(value) for value in element.need("image").numbers(2)]
+    sensor = element.need("sensor").text.split(",")
     if len(sensor) != 2:
-        raise one.need("sensor").fail(
+        raise element.need("sensor").fail(
             "a sensor without width and height", "write WIDTH,HEIGHT or auto,HEIGHT"
         )
-    height = parse_number(sensor[1].strip(), "the sensor", one.need("sensor").where)
+    height = parse_number(sensor[1].strip(), "the sensor", element.need("sensor").where)
     pixel = height / image[1]
     cc, pp = values("cc", 1), values("pp", 2)
     c = cc[0] if len(cc) == 1 and cc[0] else values("focal", 1)[0]
@@ -251,19 +256,19 @@ def _camera(one: Element, free: tuple[str, ...]) -> Camera:
     width = (
         image[0] * pixel
         if sensor[0].strip() == "auto"
-        else parse_number(sensor[0].strip(), "the sensor", one.need("sensor").where)
+        else parse_number(sensor[0].strip(), "the sensor", element.need("sensor").where)
     )
     if sensor[0].strip() != "auto" and abs(width / image[0] / pixel - 1.0) > 0.05:
-        raise one.need("sensor").fail(
+        raise element.need("sensor").fail(
             f"pixels of {width / image[0]:g} × {pixel:g} mm", "check the sensor's size"
         )
     xp, yp = (pp[0], pp[1]) if len(pp) == 2 and any(pp) else (0.5 * width, 0.5 * height)
     radial, tangential = (values("K", 3) + [0.0] * 3)[:3], (values("P", 2) + [0.0] * 2)[:2]
-    model = one.find("model")
+    model = element.find("model")
     number = 1 if model is None else int(model.numbers(1)[0])
     if number not in (-1, 1, 2, 3, 4, 5):
-        raise one.fail(f"lens distortion model {number}", "models -1 and 1 to 5 are known")
-    name = one.find("name")
+        raise element.fail(f"lens distortion model {number}", "models -1 and 1 to 5 are known")
+    name = element.find("name")
     side = 1.0 if number < 0 else -1.0  # a correction has the opposite sign
     inner = np.array(
         [
@@ -284,13 +289,13 @@ def _camera(one: Element, free: tuple[str, ...]) -> Camera:
         "mm",
         number < 0,
         free,
-        one.where,
+        element.where,
     )
 
 
 def _estimated(document: Element) -> tuple[str, ...]:
     """Return the parameters of the camera that the script estimates."""
-    found = next(
+    choice = next(
         (
             e
             for path in (("operations",), ("operations", "operation"))
@@ -298,19 +303,19 @@ def _estimated(document: Element) -> tuple[str, ...]:
         ),
         None,
     )
-    if found is None:
+    if choice is None:
         return ()
-    whole = found.find("all")
+    whole = choice.find("all")
     chosen = set(INTERIOR) if whole is not None and whole.text.strip() == "true" else set()
-    for one in found.children:
-        if one.name == "all":
+    for child in choice.children:
+        if child.name == "all":
             continue
-        names = _PARTS.get(one.name) or ((one.name,) if one.name in INTERIOR else None)
-        if names is None or one.text.strip() not in ("true", "false"):
-            raise one.fail(
-                f"<{one.name}> {shown(one.text.strip())}", f"write true or false for {', '.join(_PARTS)}"
+        names = _PARTS.get(child.name) or ((child.name,) if child.name in INTERIOR else None)
+        if names is None or child.text.strip() not in ("true", "false"):
+            raise child.fail(
+                f"<{child.name}> {shown(child.text.strip())}", f"write true or false for {', '.join(_PARTS)}"
             )
-        chosen = chosen | set(names) if one.text.strip() == "true" else chosen - set(names)
+        chosen = chosen | set(names) if child.text.strip() == "true" else chosen - set(names)
     return tuple(name for name in INTERIOR if name in chosen)
 
 
@@ -329,11 +334,11 @@ def write_dbat(network: Network, folder: Path) -> Path:
     camera = network.cameras[0]
     folder.mkdir(parents=True, exist_ok=True)
     rows = [
-        ControlRow(network.names[one.point], network.names[one.point], one.place, one.covariance)
-        for one in network.control
+        ControlRow(network.names[gcp.point], network.names[gcp.point], gcp.place, gcp.covariance)
+        for gcp in network.control
     ]
-    kinds = {"control": [r for r, one in zip(rows, network.control, strict=True) if not one.check]}
-    kinds["check"] = [r for r, one in zip(rows, network.control, strict=True) if one.check]
+    kinds = {"control": [r for r, gcp in zip(rows, network.control, strict=True) if not gcp.check]}
+    kinds["check"] = [r for r, gcp in zip(rows, network.control, strict=True) if gcp.check]
     tables = []
     for kind, tag in (("control", "ctrl_pts"), ("check", "check_pts")):
         if kinds[kind]:

@@ -71,7 +71,7 @@ def read_marks(path: Path) -> tuple[MarkRow, ...]:
         if missing:
             what = f"no column {missing[0]} among {', '.join(header.cells)[:200]}"
             raise SurveyError(what, where=where, remedy=_REMEDY)
-        if any(length_scale(header.cells[places[one]].replace("[px]", ""), where) for one in "xy"):
+        if any(length_scale(header.cells[places[axis]].replace("[px]", ""), where) for axis in "xy"):
             raise SurveyError("marks in a unit of length", where=where, remedy="give marks in pixels")
     return tuple(_rows(table, places or _PLACES, len(header.cells) if header in table.titles else 0))
 
@@ -85,12 +85,12 @@ def _rows(table: Table, places: Mapping[str, int], count: int) -> Iterator[MarkR
     """Yield the marks; `count` is the number of named columns, 0 where they are not named."""
     seen: dict[tuple[str, str], int] = {}
     for row in table.rows:
-        if len(row.cells) <= max(places[one] for one in "xy") or len(row.cells) > (count or len(_PLACES)):
+        if len(row.cells) <= max(places[axis] for axis in "xy") or len(row.cells) > (count or len(_PLACES)):
             what = f"a mark of {len(row.cells)} values"
             raise SurveyError(what, where=table.where(row.line), remedy=_REMEDY)
         photo = table.name(row, places["photograph"], "the photograph of a mark")
         point = table.name(row, places["point"], "the point of a mark")
-        x, y = (table.number(row.cells[places[one]], one, row.line) for one in "xy")
+        x, y = (table.number(row.cells[places[axis]], axis, row.line) for axis in "xy")
         at = places.get("sigma", len(row.cells))
         sigma = None
         if at < len(row.cells) and row.cells[at]:
@@ -183,14 +183,14 @@ def numbered(network: Network, table: Path) -> tuple[str, ...]:
 def marked_well(network: Network) -> Network:
     """Leave out photographs with too few marks to be oriented, with a remark that names them."""
     counts = np.bincount(network.photo, minlength=len(network.photos))
-    kept = counts >= _FEWEST
-    if kept.all() or not kept.any():
+    enough = counts >= _FEWEST
+    if enough.all() or not enough.any():
         return network
-    place, rays = np.cumsum(kept) - 1, kept[network.photo]
-    names = [photo.name for photo, stays in zip(network.photos, kept, strict=True) if not stays]
+    place, rays = np.cumsum(enough) - 1, enough[network.photo]
+    names = [photo.name for photo, stays in zip(network.photos, enough, strict=True) if not stays]
     return replace(
         network,
-        photos=tuple(photo for photo, stays in zip(network.photos, kept, strict=True) if stays),
+        photos=tuple(photo for photo, stays in zip(network.photos, enough, strict=True) if stays),
         photo=place[network.photo[rays]],
         point=network.point[rays],
         image=network.image[rays],

@@ -43,31 +43,31 @@ def read_metashape(path: Path, markers: Path | None = None, sigma: float = 1.0) 
     """
     chunk = read_xml(path, "document").need("chunk")
     shown = [one for one in _grouped(chunk, "cameras", "camera") if _is_enabled(one)]
-    known = {one.attribute("id"): one for one in chunk.all("sensors", "sensor")}
-    for one in shown:
-        if one.attribute("sensor_id") not in known:
-            raise one.fail(
-                f"sensor {one.attributes['sensor_id']} is not in the file", "export the cameras again"
+    known = {sensor.attribute("id"): sensor for sensor in chunk.all("sensors", "sensor")}
+    for camera in shown:
+        if camera.attribute("sensor_id") not in known:
+            raise camera.fail(
+                f"sensor {camera.attributes['sensor_id']} is not in the file", "export the cameras again"
             )
     # a project has sensors of photographs that were left out
     used = [number for number in known if any(one.attributes["sensor_id"] == number for one in shown)]
     sensors = {number: k for k, number in enumerate(used)}
     cameras = tuple(_camera(known[number]) for number in used)
-    other = chunk if markers is None else read_xml(markers, "document").need("chunk")
-    frame = _local_frame(chunk, other)
+    markers_chunk = chunk if markers is None else read_xml(markers, "document").need("chunk")
+    frame = _local_frame(chunk, markers_chunk)
     worlds = {name: frame.moved(world) if frame else world for name, world in _worlds(chunk).items()}
     photos = {
-        one.attribute("id"): _photo(
-            one,
-            sensors[one.attributes["sensor_id"]],
-            worlds.get(one.attributes.get("component_id", ""), worlds[""]),
+        element.attribute("id"): _photo(
+            element,
+            sensors[element.attributes["sensor_id"]],
+            worlds.get(element.attributes.get("component_id", ""), worlds[""]),
         )
-        for one in shown
+        for element in shown
     }
     if not photos:
         raise chunk.fail("the chunk has no cameras", "export the cameras")
     source = path if markers is None else markers
-    network = _network(source, other, cameras, photos, sigma, _remarks(chunk, frame))
+    network = _network(source, markers_chunk, cameras, photos, sigma, _remarks(chunk, frame))
     return network if frame is None else _in_frame(network, frame)
 
 
@@ -87,8 +87,10 @@ def _local_frame(chunk: Element, markers: Element) -> LocalFrame | None:
     reference = chunk.find("reference") or markers.find("reference")
     if reference is None or not reference.text.strip().startswith(("GEOGCS", "GEOGCRS")):
         return None
-    found = (one.find("reference") for one in _grouped(markers, "markers", "marker"))
-    first = next((one for one in found if one is not None and "x" in one.attributes), None)
+    references = (marker.find("reference") for marker in _grouped(markers, "markers", "marker"))
+    first = next(
+        (reference for reference in references if reference is not None and "x" in reference.attributes), None
+    )
     return None if first is None else LocalFrame(np.array([first.number(name) for name in "xyz"]))
 
 
@@ -96,8 +98,8 @@ def _in_frame(network: Network, frame: LocalFrame) -> Network:
     """Return a network whose control points, given by longitude, latitude and height, are in a local frame."""
     control = tuple(replace(one, place=frame.place(one.place)) for one in network.control)
     start = network.start.copy()
-    for one in control:
-        start[one.point] = one.place
+    for gcp in control:
+        start[gcp.point] = gcp.place
     return replace(network, control=control, start=start)
 
 
@@ -106,8 +108,8 @@ def _grouped(chunk: Element, outer: str, inner: str) -> list[Element]:
 
 
 def _value(calibration: Element, name: str) -> float:
-    found = calibration.find(name)
-    return 0.0 if found is None else found.numbers(1)[0]
+    element = calibration.find(name)
+    return 0.0 if element is None else element.numbers(1)[0]
 
 
 def _camera(sensor: Element) -> Camera:
@@ -118,20 +120,24 @@ def _camera(sensor: Element) -> Camera:
     calibrations = list(sensor.all("calibration"))
     if not calibrations:
         raise sensor.fail(f"sensor {name} has no calibration", "align the photographs before exporting")
-    one = next((c for c in calibrations if c.attributes.get("class") == "adjusted"), calibrations[-1])
-    size = one.find("resolution") or sensor.need("resolution")
+    calibration = next((c for c in calibrations if c.attributes.get("class") == "adjusted"), calibrations[-1])
+    size = calibration.find("resolution") or sensor.need("resolution")
     width, height = int(size.number("width")), int(size.number("height"))
-    fx, fy = (_value(one, "f"),) * 2 if one.find("f") is not None else (_value(one, "fx"), _value(one, "fy"))
+    fx, fy = (
+        (_value(calibration, "f"),) * 2
+        if calibration.find("f") is not None
+        else (_value(calibration, "fx"), _value(calibration, "fy"))
+    )
     if not (fx > 0.0 and fy > 0.0):
-        raise one.fail(f"sensor {name} has no focal length", "align the photographs before exporting")
-    if _value(one, "k4") or _value(one, "p3") or _value(one, "p4"):
-        raise one.fail(f"sensor {name} has k4, p3 or p4", "calibrate with k1, k2, k3, p1, p2 alone")
-    cx, cy = _value(one, "cx"), _value(one, "cy")
-    if one.find("f") is not None:  # since version 1.4 the principal point counts from the centre
+        raise calibration.fail(f"sensor {name} has no focal length", "align the photographs before exporting")
+    if _value(calibration, "k4") or _value(calibration, "p3") or _value(calibration, "p4"):
+        raise calibration.fail(f"sensor {name} has k4, p3 or p4", "calibrate with k1, k2, k3, p1, p2 alone")
+    cx, cy = _value(calibration, "cx"), _value(calibration, "cy")
+    if calibration.find("f") is not None:  # since version 1.4 the principal point counts from the centre
         cx, cy = cx + 0.5 * width, cy + 0.5 * height
-    stretch = fx + _value(one, "b1")
-    skew = _value(one, "b2") + _value(one, "skew")
-    k1, k2, k3 = (_value(one, name) for name in ("k1", "k2", "k3"))
+    stretch = fx + _value(calibration, "b1")
+    skew = _value(calibration, "b2") + _value(calibration, "skew")
+    k1, k2, k3 = (_value(calibration, name) for name in ("k1", "k2", "k3"))
     inner = [
         fy,
         cx,
@@ -141,14 +147,14 @@ def _camera(sensor: Element) -> Camera:
         k1 / fy**2,
         k2 / fy**4,
         k3 / fy**6,
-        _value(one, "p1") / fy,
-        -_value(one, "p2") / fy,
+        _value(calibration, "p1") / fy,
+        -_value(calibration, "p2") / fy,
     ]
-    return Camera(name, np.array(inner), (width, height), 1.0, "px", True, where=one.where)
+    return Camera(name, np.array(inner), (width, height), 1.0, "px", True, where=calibration.where)
 
 
-def _is_enabled(one: Element) -> bool:
-    return one.attributes.get("enabled", "true").lower() not in ("0", "false")
+def _is_enabled(element: Element) -> bool:
+    return element.attributes.get("enabled", "true").lower() not in ("0", "false")
 
 
 def _worlds(chunk: Element) -> dict[str, tuple[Array, Array, float]]:
@@ -156,18 +162,25 @@ def _worlds(chunk: Element) -> dict[str, tuple[Array, Array, float]]:
 
     Since version 2.0 a chunk has components, each with a transform of its own.
     """
-    components = {one.attribute("id"): one.find("transform") for one in chunk.all("components", "component")}
+    components = {
+        component.attribute("id"): component.find("transform")
+        for component in chunk.all("components", "component")
+    }
     outer = chunk.find("components")
     active = components.get("" if outer is None else outer.attributes.get("active_id", ""))
     default = chunk.find("transform") or active
-    found = {number: _world(component or default) for number, component in components.items()}
-    return found | {"": _world(default)}
+    worlds = {number: _world(component or default) for number, component in components.items()}
+    return worlds | {"": _world(default)}
 
 
-def _world(own: Element | None) -> tuple[Array, Array, float]:
-    if own is None:
+def _world(transform: Element | None) -> tuple[Array, Array, float]:
+    if transform is None:
         return np.eye(3), np.zeros(3), 1.0
-    rotation, shift, scale = own.find("rotation"), own.find("translation"), own.find("scale")
+    rotation, shift, scale = (
+        transform.find("rotation"),
+        transform.find("translation"),
+        transform.find("scale"),
+    )
     return (
         np.eye(3) if rotation is None else np.array(rotation.numbers(9)).reshape(3, 3),
         np.zeros(3) if shift is None else np.array(shift.numbers(3)),
@@ -175,17 +188,17 @@ def _world(own: Element | None) -> tuple[Array, Array, float]:
     )
 
 
-def _photo(one: Element, camera: int, world: tuple[Array, Array, float]) -> Photo:
-    name = one.attributes.get("label") or one.attribute("id")
+def _photo(element: Element, camera: int, world: tuple[Array, Array, float]) -> Photo:
+    name = element.attributes.get("label") or element.attribute("id")
     rotation, station = None, None
-    if (found := one.find("transform")) is not None:
-        own = np.array(found.numbers(16)).reshape(4, 4)
+    if (transform := element.find("transform")) is not None:
+        pose = np.array(transform.numbers(16)).reshape(4, 4)
         turn, shift, scale = world
-        rotation = turn @ own[:3, :3] @ _FLIP
+        rotation = turn @ pose[:3, :3] @ _FLIP
         if not np.allclose(rotation.T @ rotation, np.eye(3), atol=1e-6) or np.linalg.det(rotation) < 0.0:
-            raise found.fail(f"the transform of camera {name} is no rotation", "export the cameras again")
-        station = scale * turn @ own[:3, 3] + shift
-    return Photo(name, camera, rotation, station, where=one.where)
+            raise transform.fail(f"the transform of camera {name} is no rotation", "export the cameras again")
+        station = scale * turn @ pose[:3, 3] + shift
+    return Photo(name, camera, rotation, station, where=element.where)
 
 
 def _network(
@@ -197,7 +210,7 @@ def _network(
     remarks: tuple[str, ...],
 ) -> Network:
     places = {photo: k for k, photo in enumerate(photos)}
-    markers = {one.attribute("id"): one for one in _grouped(chunk, "markers", "marker")}
+    markers = {marker.attribute("id"): marker for marker in _grouped(chunk, "markers", "marker")}
     names = [marker.attributes.get("label") or number for number, marker in markers.items()]
     index = {number: k for k, number in enumerate(markers)}
     sigma = _setting(chunk, "accuracy_projections") or sigma
@@ -207,12 +220,12 @@ def _network(
             index[number],
             place,
             covariance,
-            check=found.attributes.get("enabled", "true").lower() in ("0", "false"),
-            where=found.where,
+            check=reference.attributes.get("enabled", "true").lower() in ("0", "false"),
+            where=reference.where,
         )
         for number, marker in markers.items()
-        if (found := marker.find("reference")) is not None and "x" in found.attributes
-        for place, covariance in [_reference(found, common)]
+        if (reference := marker.find("reference")) is not None and "x" in reference.attributes
+        for place, covariance in [_reference(reference, common)]
     )
     photo, point, image, lines, seen = (
         list[int](),
@@ -239,8 +252,8 @@ def _network(
             image.append([location.number("x"), location.number("y")])
             lines.append(int(location.where.rpartition(":")[2]))
     start = np.full((len(names), 3), np.nan)
-    for one in control:
-        start[one.point] = one.place
+    for gcp in control:
+        start[gcp.point] = gcp.place
     return marked_well(
         Network(
             str(path),
@@ -261,17 +274,20 @@ def _network(
 
 def _setting(chunk: Element, name: str) -> float | None:
     """Return an accuracy that the chunk states for all that have none of their own."""
-    found = next((e for e in chunk.all("settings", "property") if e.attributes.get("name") == name), None)
-    return None if found is None else found.number("value")
+    setting = next((e for e in chunk.all("settings", "property") if e.attributes.get("name") == name), None)
+    return None if setting is None else setting.number("value")
 
 
-def _reference(one: Element, common: float | None) -> tuple[Array, Array]:
+def _reference(reference: Element, common: float | None) -> tuple[Array, Array]:
     """Return the place of a marker by survey, and its covariance, by the accuracy of the chunk if it has none."""
-    sigmas = [one.attributes.get(name) or one.attributes.get("sxyz") for name in ("sx", "sy", "sz")]
-    deviations = [
-        common or 0.0 if text is None else parse_number(text, "a deviation", one.where) for text in sigmas
+    sigmas = [
+        reference.attributes.get(name) or reference.attributes.get("sxyz") for name in ("sx", "sy", "sz")
     ]
-    return np.array([one.number(name) for name in "xyz"]), np.diag(np.square(deviations))
+    deviations = [
+        common or 0.0 if text is None else parse_number(text, "a deviation", reference.where)
+        for text in sigmas
+    ]
+    return np.array([reference.number(name) for name in "xyz"]), np.diag(np.square(deviations))
 
 
 def write_metashape(network: Network, path: Path) -> None:
@@ -310,19 +326,19 @@ def write_metashape(network: Network, path: Path) -> None:
         )
         out += [f"<transform>{numbers}</transform>", "</camera>"]
     out += ["</cameras>", "<markers>"]
-    control = {one.point: one for one in network.control}
+    control = {gcp.point: gcp for gcp in network.control}
     for number, name in enumerate(network.names):
         out.append(f'<marker id="{number}" label={quoteattr(name)}>')
         if number in control:
             x, y, z = control[number].place.tolist()
             deviations = np.sqrt(np.diag(control[number].covariance)).tolist()
-            own = (
+            accuracy = (
                 "".join(f' s{axis}="{value!r}"' for axis, value in zip("xyz", deviations, strict=True))
                 if any(deviations)
                 else ""
             )
             used = "false" if control[number].check else "true"
-            out.append(f'<reference x="{x!r}" y="{y!r}" z="{z!r}"{own} enabled="{used}"/>')
+            out.append(f'<reference x="{x!r}" y="{y!r}" z="{z!r}"{accuracy} enabled="{used}"/>')
         out.append("</marker>")
     out += ["</markers>", "<frames>", '<frame id="0">', "<markers>"]
     of_point = marks_of_points(network)

@@ -128,27 +128,27 @@ def read_photomodeler(path: Path, size: tuple[int, int] | None = None) -> Networ
     whole = _camera("camera1", common, settings[2:], lines.where)
     lines.numbers("the camera's standard deviations", (10,))
     cameras, photos, numbers = [whole], list[Photo](), dict[int, int]()
-    while (found := lines.photo()) is not None:
-        number, file = found
+    while (header := lines.photo()) is not None:
+        number, file = header
         where = lines.where
         orientation = lines.numbers(f"photograph {number}", (7,))[1:]
         lines.numbers(f"standard deviations of photograph {number}", (7,))
         lines.line(f"covariances of photograph {number}")
-        own = lines.numbers(f"camera of photograph {number}", (11,))[1:]
-        camera = _own_camera(cameras, own, common, settings[2:], lines.where)
+        parameters = lines.numbers(f"camera of photograph {number}", (11,))[1:]
+        camera = _own_camera(cameras, parameters, common, settings[2:], lines.where)
         lines.numbers(f"standard deviations of the camera of photograph {number}", (11,))
         numbers[int(number)] = len(photos)
         name = PurePosixPath(file.replace("\\", "/")).name
         if name in {photo.name for photo in photos}:
             name = f"{number} {name}"
-        known = bool(orientation.any())
+        is_oriented = bool(orientation.any())
         kappa, phi, omega = np.radians(orientation[3:])
         photos.append(
             Photo(
                 name,
                 camera,
-                from_angles(omega, phi, kappa) if known else None,
-                orientation[:3] if known else None,
+                from_angles(omega, phi, kappa) if is_oriented else None,
+                orientation[:3] if is_oriented else None,
                 where=where,
             )
         )
@@ -161,7 +161,7 @@ def read_photomodeler(path: Path, size: tuple[int, int] | None = None) -> Networ
 
 
 def _camera(name: str, row: Array, size: Array, where: str) -> Camera:
-    width, height = (int(one) for one in size)
+    width, height = (int(length) for length in size)
     if not (row[0] > 0.0 and row[3] > 0.0 and row[4] > 0.0):
         raise SurveyError(
             "camera constant and format must be greater than 0", where=where, remedy="they are in millimetres"
@@ -171,11 +171,11 @@ def _camera(name: str, row: Array, size: Array, where: str) -> Camera:
     return Camera(name, inner, (width, height), row[4] / height, where=where)
 
 
-def _own_camera(cameras: list[Camera], own: Array, common: Array, size: Array, where: str) -> int:
+def _own_camera(cameras: list[Camera], parameters: Array, common: Array, size: Array, where: str) -> int:
     """Return the index of the camera of a photograph, whose values are printed with fewer digits."""
-    if np.abs(own - common).max() <= _COARSE:
+    if np.abs(parameters - common).max() <= _COARSE:
         return 0
-    made = _camera(f"camera{len(cameras) + 1}", own, size, where)
+    made = _camera(f"camera{len(cameras) + 1}", parameters, size, where)
     for number, camera in enumerate(cameras):
         if np.array_equal(camera.inner, made.inner) and camera.pixel == made.pixel:
             return number
@@ -193,7 +193,7 @@ def _network(
     marks: list[tuple[int, Array]],
     default: float,
 ) -> Network:
-    shift, split = _smart_points([one for one, _ in points], marks)
+    shift, split = _smart_points([point for point, _ in points], marks)
     places = {number + (shift if k >= split else 0): place for k, (number, place) in enumerate(points)}
     for number, place, _ in control:
         places.setdefault(number, place)
@@ -253,16 +253,17 @@ def write_photomodeler(network: Network, path: Path, title: str = "moma") -> Non
         place
     """
     camera = network.cameras[0]
-    for one in network.cameras:
-        if one.forward or one.unit != "mm" or one.inner[3:5].any():
+    for device in network.cameras:
+        if device.forward or device.unit != "mm" or device.inner[3:5].any():
             raise SurveyError(
-                f"camera {one.name}: {one.model} distortion, as {one.inner[3]:g}, sk {one.inner[4]:g}, {one.unit}",
+                f"camera {device.name}: {device.model} distortion, as {device.inner[3]:g}, "
+                f"sk {device.inner[4]:g}, {device.unit}",
                 where=str(path),
                 remedy="this format holds backward distortion in millimetres, without affinity and skew",
             )
-        if one.size != camera.size:
+        if device.size != camera.size:
             raise SurveyError(
-                f"cameras {camera.name} and {one.name} have photographs of different sizes",
+                f"cameras {camera.name} and {device.name} have photographs of different sizes",
                 where=str(path),
                 remedy="this format holds one size",
             )
@@ -271,9 +272,9 @@ def write_photomodeler(network: Network, path: Path, title: str = "moma") -> Non
     def row(values: Sequence[float] | Array) -> str:
         return " ".join(repr(float(value)) for value in values)
 
-    def of(one: Camera) -> list[float]:
-        inner = one.inner.tolist()
-        return [*inner[:3], one.pixel * one.size[0], one.pixel * one.size[1], *inner[5:]]
+    def of(camera: Camera) -> list[float]:
+        inner = camera.inner.tolist()
+        return [*inner[:3], camera.pixel * camera.size[0], camera.pixel * camera.size[1], *inner[5:]]
 
     none = row(np.zeros(10))
     text = [title, f"0.0005 20 {camera.size[0]} {camera.size[1]}", row(np.ones(9)), row(of(camera)), none]
@@ -281,21 +282,21 @@ def write_photomodeler(network: Network, path: Path, title: str = "moma") -> Non
         orientation = np.zeros(6)
         if photo.rotation is not None and photo.station is not None:
             orientation = np.concatenate([photo.station, np.degrees(angles(photo.rotation))[::-1]])
-        own = row(of(network.cameras[photo.camera]))
+        camera_row = row(of(network.cameras[photo.camera]))
         text += [
             f"{k} {photo.name}",
             f"{k} {row(orientation)}",
             f"{k} {row(np.zeros(6))}",
             "",
-            f"{k} {own}",
+            f"{k} {camera_row}",
             f"{k} {none}",
         ]
     sigmas = row(np.zeros(3))
     text.append("")
-    text += [f"{names[one.point]} {row(one.place)} {sigmas}" for one in network.control]
+    text += [f"{names[gcp.point]} {row(gcp.place)} {sigmas}" for gcp in network.control]
     text.append("")
-    known = np.isfinite(network.start).all(axis=1)
-    text += [f"{names[i]} {row(network.start[i])} {sigmas}" for i in np.flatnonzero(known)]
+    located = np.isfinite(network.start).all(axis=1)
+    text += [f"{names[i]} {row(network.start[i])} {sigmas}" for i in np.flatnonzero(located)]
     text.append("")
     for k in range(len(network.photo)):
         text.append(

@@ -119,14 +119,14 @@ def _control(result: Orientation) -> list[dict[str, Any]]:
     tests = control_tests(network, result.solution, result.statistics)
     return [
         {
-            "id": network.names[one.point],
-            "use": "check" if one.check else "fixed" if one.fixed else "weighted",
-            "place": one.place.tolist(),
-            "sigma": np.sqrt(np.diag(one.covariance)).tolist(),
-            "residual": (one.place - values.point[one.point]).tolist(),
+            "id": network.names[gcp.point],
+            "use": "check" if gcp.check else "fixed" if gcp.fixed else "weighted",
+            "place": gcp.place.tolist(),
+            "sigma": np.sqrt(np.diag(gcp.covariance)).tolist(),
+            "residual": (gcp.place - values.point[gcp.point]).tolist(),
             "test": float(test),
         }
-        for one, test in zip(network.control, tests, strict=True)
+        for gcp, test in zip(network.control, tests, strict=True)
     ]
 
 
@@ -145,14 +145,14 @@ def _marks(result: Orientation) -> dict[str, Any]:
         "line": network.lines[taken].tolist(),
         "x": network.image[taken, 0].tolist(),
         "y": network.image[taken, 1].tolist(),
-        "vx": [_finite(one) for one in residuals[taken, 0].round(5).tolist()],
-        "vy": [_finite(one) for one in residuals[taken, 1].round(5).tolist()],
+        "vx": [_finite(value) for value in residuals[taken, 0].round(5).tolist()],
+        "vy": [_finite(value) for value in residuals[taken, 1].round(5).tolist()],
         "test": [
-            removed.get(k, _finite(one))
-            for k, one in zip(taken, tests[taken].max(axis=1).round(3).tolist(), strict=True)
+            removed.get(k, _finite(value))
+            for k, value in zip(taken, tests[taken].max(axis=1).round(3).tolist(), strict=True)
         ],
-        "redundancy": [_finite(one) for one in statistics.parts[taken].sum(axis=1).round(4).tolist()],
-        "external": [_finite(one) for one in statistics.external[taken].max(axis=1).round(7).tolist()],
+        "redundancy": [_finite(value) for value in statistics.parts[taken].sum(axis=1).round(4).tolist()],
+        "external": [_finite(value) for value in statistics.external[taken].max(axis=1).round(7).tolist()],
         "verdict": ["removed" if k in removed else "suspected" if k in suspected else "" for k in taken],
     }
 
@@ -165,12 +165,12 @@ def _correlations(result: Orientation) -> list[dict[str, Any]]:
     precision = photo_precision(result.network, result.prepared, result.solution, result.statistics)
     out = []
     for f, photo in enumerate(result.network.photos):
-        own = precision[f]
-        spread = np.sqrt(np.maximum(np.diag(own), 1e-300))
+        covariance = precision[f]
+        spread = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
         for a in range(6):
             for b in range(a + 1, 6):
-                value = float(own[a, b] / (spread[a] * spread[b]))
-                if abs(value) > _CORRELATED and own.any():
+                value = float(covariance[a, b] / (spread[a] * spread[b]))
+                if abs(value) > _CORRELATED and covariance.any():
                     out.append({"of": photo.name, "a": _ANGLES[a], "b": _ANGLES[b], "value": value})
     inner = [k for k, (_, parameter) in enumerate(columns) if parameter in INTERIOR]
     for place, a in enumerate(inner):
@@ -199,13 +199,13 @@ def write_orientation(path: Path, values: dict[str, Any]) -> None:
             file.write(f"{',' if number else ''}\n{_json(name)}: ")
             if isinstance(value, dict):
                 file.write("{")
-                for k, (key, one) in enumerate(value.items()):
-                    file.write(f"{',' if k else ''}\n {_json(key)}: {_json(one)}")
+                for k, (key, entry) in enumerate(value.items()):
+                    file.write(f"{',' if k else ''}\n {_json(key)}: {_json(entry)}")
                 file.write("\n}" if value else "}")
             elif isinstance(value, list):
                 file.write("[")
-                for k, one in enumerate(value):
-                    file.write(f"{',' if k else ''}\n {_json(one)}")
+                for k, entry in enumerate(value):
+                    file.write(f"{',' if k else ''}\n {_json(entry)}")
                 file.write("\n]" if value else "]")
             else:
                 file.write(_json(value))

@@ -36,12 +36,12 @@ class Element:
 
     def all(self, *path: str) -> Iterator["Element"]:
         """Yield the elements below this one along a path of tags."""
-        for one in self.children:
-            if one.name == path[0]:
+        for child in self.children:
+            if child.name == path[0]:
                 if len(path) == 1:
-                    yield one
+                    yield child
                 else:
-                    yield from one.all(*path[1:])
+                    yield from child.all(*path[1:])
 
     def find(self, *path: str) -> "Element | None":
         """Return the first element along a path of tags."""
@@ -49,10 +49,10 @@ class Element:
 
     def need(self, *path: str) -> "Element":
         """Return the first element along a path of tags, which must be there."""
-        found = self.find(*path)
-        if found is None:
+        element = self.find(*path)
+        if element is None:
             raise self.fail(f"<{self.name}> has no <{'/'.join(path)}>", "export the file again")
-        return found
+        return element
 
     def numbers(self, count: int | None = None) -> list[float]:
         """Return the numbers of the text, separated by blanks or commas."""
@@ -120,7 +120,7 @@ def read_xml(path: Path, root: str) -> Element:
             where=f"{path}:{error.lineno}",
             remedy="export the file again",
         ) from error
-    found = top.children[0]
-    if found.name != root:
-        raise found.fail(f"the document is <{shown(found.name)[1:-1]}>", f"<{root}> is expected")
-    return found
+    element = top.children[0]
+    if element.name != root:
+        raise element.fail(f"the document is <{shown(element.name)[1:-1]}>", f"<{root}> is expected")
+    return element

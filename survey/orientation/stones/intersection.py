@@ -43,12 +43,12 @@ def intersect(oriented: Oriented, name: str, marks: Sequence[Mark]) -> Located:
     """
     rays = np.array(
         [
-            oriented.rotation(one.photo) @ directions(oriented.camera(one.photo), one.image[None])[0]
-            for one in marks
+            oriented.rotation(mark.photo) @ directions(oriented.camera(mark.photo), mark.image[None])[0]
+            for mark in marks
         ]
     )
-    stations = np.array([oriented.station(one.photo) for one in marks])
-    seen = " and ".join(oriented.photos[one.photo].name for one in marks)
+    stations = np.array([oriented.station(mark.photo) for mark in marks])
+    seen = " and ".join(oriented.photos[mark.photo].name for mark in marks)
     place, angle = intersect_rays(stations, rays)
     if not np.degrees(angle) > _NARROWEST:
         raise GeometryError(
@@ -56,7 +56,7 @@ def intersect(oriented: Oriented, name: str, marks: Sequence[Mark]) -> Located:
             remedy="mark it on photographs taken from places further apart",
         )
     for _ in range(_MOST):
-        rows = [line_up(oriented, one, place) for one in marks]
+        rows = [line_up(oriented, mark, place) for mark in marks]
         by_point = np.concatenate([row[2] for row in rows])
         inverse = np.linalg.inv(by_point.T @ by_point)
         step = inverse @ by_point.T @ np.concatenate([row[0] for row in rows])
@@ -69,7 +69,7 @@ def intersect(oriented: Oriented, name: str, marks: Sequence[Mark]) -> Located:
                 f"point {name} would lie behind photograph {oriented.photos[mark.photo].name}",
                 remedy="check its marks: one of them is of another point",
             )
-    rows = [line_up(oriented, one, place) for one in marks]
+    rows = [line_up(oriented, mark, place) for mark in marks]
     gain = inverse @ by_point.T
     by_camera = np.concatenate([row[1] for row in rows])
     # the residuals are those of the marks, and of the photographs' orientation
@@ -77,8 +77,8 @@ def intersect(oriented: Oriented, name: str, marks: Sequence[Mark]) -> Located:
     spread = rest @ (np.eye(len(by_point)) + by_camera @ oriented.covariance @ by_camera.T) @ rest
     deviations = np.sqrt(np.maximum(np.diag(spread), 0.0)).reshape(-1, 2)
     sights = tuple(
-        sight(oriented, one, row[0], own, place)
-        for one, row, own in zip(marks, rows, deviations, strict=True)
+        sight(oriented, mark, row[0], deviation, place)
+        for mark, row, deviation in zip(marks, rows, deviations, strict=True)
     )
     worst = max(sights, key=lambda one: one.test)
     if worst.test > _MISSES and max(abs(worst.residual)) > _MISSES * marks[0].sigma:
@@ -90,7 +90,7 @@ def intersect(oriented: Oriented, name: str, marks: Sequence[Mark]) -> Located:
         name,
         place,
         -gain @ by_camera,
-        {_source(one): gain[:, 2 * k : 2 * k + 2] for k, one in enumerate(marks)},
+        {_source(mark): gain[:, 2 * k : 2 * k + 2] for k, mark in enumerate(marks)},
         sights,
         f"intersection of {len(marks)} rays at {np.degrees(angle):.0f}°",
     )

@@ -91,7 +91,7 @@ def joint_covariance(points: Sequence[Located], oriented: Oriented, *, shared: b
     count = 3 * len(points)
     out = np.zeros((count, count))
     if shared and oriented.covariance.size:
-        by = np.concatenate([one.by_orientation for one in points])
+        by = np.concatenate([point.by_orientation for point in points])
         used = np.flatnonzero(by.any(axis=0))
         by = by[:, used]
         out += by @ oriented.covariance[np.ix_(used, used)] @ by.T
@@ -100,11 +100,11 @@ def joint_covariance(points: Sequence[Located], oriented: Oriented, *, shared: b
         for name, slopes in point.by_source.items():
             widths[name] = slopes.shape[1]
     offsets = dict(zip(widths, np.cumsum([0, *widths.values()]).tolist(), strict=False))
-    own = np.zeros((count, sum(widths.values())))
+    slopes_of_points = np.zeros((count, sum(widths.values())))
     for k, point in enumerate(points):
         for name, slopes in point.by_source.items():
-            own[3 * k : 3 * k + 3, offsets[name] : offsets[name] + widths[name]] = slopes
-    return out + own @ own.T
+            slopes_of_points[3 * k : 3 * k + 3, offsets[name] : offsets[name] + widths[name]] = slopes
+    return out + slopes_of_points @ slopes_of_points.T
 
 
 def line_up(oriented: Oriented, mark: Mark, place: Array) -> tuple[Array, Array, Array]:

@@ -85,20 +85,20 @@ def _marks(record: BlockRecord) -> dict[str, list[PointMark]]:
     return out
 
 
-def _mark(one: PointMark, head: SurveyHead, oriented: Oriented) -> Mark:
-    where = f"{head.path}:{one.line}"
-    photo = oriented.index(one.photograph, where)
+def _mark(mark: PointMark, head: SurveyHead, oriented: Oriented) -> Mark:
+    where = f"{head.path}:{mark.line}"
+    photo = oriented.index(mark.photograph, where)
     width, height = oriented.camera(photo).size
     if not (
-        -0.02 * width <= one.image[0] <= 1.02 * width and -0.02 * height <= one.image[1] <= 1.02 * height
+        -0.02 * width <= mark.image[0] <= 1.02 * width and -0.02 * height <= mark.image[1] <= 1.02 * height
     ):
         raise SurveyError(
-            f"point {one.name} at ({one.image[0]:g}, {one.image[1]:g}) lies outside photograph {one.photograph} "
+            f"point {mark.name} at ({mark.image[0]:g}, {mark.image[1]:g}) lies outside photograph {mark.photograph} "
             f"of {width} × {height} pixels",
             where=where,
             remedy="marks are in pixels, to the right and down from the upper left corner",
         )
-    return Mark(photo, one.image, one.sigma or oriented.mark_sigma, one.line)
+    return Mark(photo, mark.image, mark.sigma or oriented.mark_sigma, mark.line)
 
 
 def _intersected(record: BlockRecord, head: SurveyHead, oriented: Oriented) -> dict[str, Located]:
@@ -113,7 +113,7 @@ def _intersected(record: BlockRecord, head: SurveyHead, oriented: Oriented) -> d
             name, place, still, {f"{record.code} {name}": sigma * np.eye(3)}, (), "measured in space"
         )
     for name, ones in _marks(record).items():
-        marks = [_mark(one, head, oriented) for one in ones]
+        marks = [_mark(mark, head, oriented) for mark in ones]
         if len(marks) >= 2:
             try:
                 out[name] = intersect(oriented, name, marks)
@@ -129,13 +129,16 @@ def _surface(
     oriented: Oriented,
 ) -> Surface | MomaError:
     """Fit a surface to the points of all stones that lie on it."""
-    own: dict[str, Located] = {}
+    located_by_name: dict[str, Located] = {}
     for record in records:
         if record.surface == rule.name:
             # a corner that stones share is measured once
-            own |= {f"{one.place.round(6).tolist()}": one for one in points.get(record.code, {}).values()}
+            located_by_name |= {
+                f"{located.place.round(6).tolist()}": located
+                for located in points.get(record.code, {}).values()
+            }
     try:
-        return fit_surface(rule.kind, list(own.values()), oriented, _middle(oriented), rule.sigma)
+        return fit_surface(rule.kind, list(located_by_name.values()), oriented, _middle(oriented), rule.sigma)
     except MomaError as error:
         return error.at(f"surface {rule.name} (line {rule.line})")
 
@@ -163,7 +166,7 @@ def _record(
             except MomaError as error:
                 raise error.at(f"{head.path}:{mark.line}") from error
     role = {name: ones[0].role for name, ones in grouped.items()}
-    measured = [one for name, one in intersected.items() if name not in grouped]
+    measured = [point for name, point in intersected.items() if name not in grouped]
     # points that only one photograph shows define nothing: they were put on the surface
     located = measured + [
         intersected[name] for name in grouped if role[name] == "point" and name in intersected
@@ -191,38 +194,38 @@ def _in_space(
 ) -> BlockRecord:
     """Return a record with points and corners in space, and the evidence for them."""
     every = [*located, *corners]
-    places = np.array([one.place for one in every])
+    places = np.array([point.place for point in every])
     joint = joint_covariance(every, oriented)
-    own = [joint_covariance([one], oriented, shared=False) for one in every]
+    covariances = [joint_covariance([point], oriented, shared=False) for point in every]
     normal = np.linalg.svd(places - places.mean(axis=0))[2][2]
-    sigmas = np.maximum([np.sqrt(normal @ one @ normal) for one in own], _LEAST)
+    sigmas = np.maximum([np.sqrt(normal @ covariance @ normal) for covariance in covariances], _LEAST)
     photos = {sight.photo for each in every for sight in each.sights}
     stations = [oriented.station(f) for f, photo in enumerate(oriented.photos) if photo.name in photos]
     return replace(
         record,
-        points=np.array([one.place for one in located]).reshape(-1, 3),
+        points=np.array([point.place for point in located]).reshape(-1, 3),
         vertices=np.array([corner.place for corner in corners]).reshape(-1, 3),
         sigma=float(np.sqrt((sigmas**2).mean())),
         sigmas=sigmas,
-        names=tuple(one.name for one in every),
+        names=tuple(point.name for point in every),
         photograph=None,
         image=np.empty((0, 2)),
         seen_from=np.mean(stations, axis=0),
         joint=joint.ravel(),
         evidence=tuple(
-            _evidence(one, k >= len(located), joint[3 * k : 3 * k + 3, 3 * k : 3 * k + 3])
-            for k, one in enumerate(every)
+            _evidence(point, k >= len(located), joint[3 * k : 3 * k + 3, 3 * k : 3 * k + 3])
+            for k, point in enumerate(every)
         ),
     )
 
 
-def _evidence(one: Located, corner: bool, covariance: Array) -> dict[str, object]:
+def _evidence(point: Located, corner: bool, covariance: Array) -> dict[str, object]:
     """Describe in plain values how a point was located."""
     return {
-        "point": one.name,
+        "point": point.name,
         "role": "vertex" if corner else "point",
-        "place": one.place.tolist(),
-        "how": one.text,
+        "place": point.place.tolist(),
+        "how": point.text,
         "sigma": np.sqrt(np.diag(covariance)).tolist(),
         "covariance": covariance.tolist(),
         "rays": [
@@ -234,6 +237,6 @@ def _evidence(one: Located, corner: bool, covariance: Array) -> dict[str, object
                 "test": sight.test,
                 "distance": sight.distance,
             }
-            for sight in one.sights
+            for sight in point.sights
         ],
     }

@@ -121,11 +121,15 @@ class Cylinder:
         root = b * b - a * c
         if a < 1e-18 or root < 0.0:
             return None
-        found = [
-            origin + one * direction for one in ((-b - root**0.5) / a, (-b + root**0.5) / a) if one > 0.0
+        meetings = [
+            origin + distance * direction
+            for distance in ((-b - root**0.5) / a, (-b + root**0.5) / a)
+            if distance > 0.0
         ]
         middle = np.mean([point.place for point in self.points], axis=0)
-        return min(found, key=lambda one: float(np.linalg.norm(one - middle))) if found else None
+        return (
+            min(meetings, key=lambda meeting: float(np.linalg.norm(meeting - middle))) if meetings else None
+        )
 
     def normal(self, place: Array) -> Array:
         """Return the unit vector from the axis to a place."""
@@ -163,11 +167,13 @@ def fit_surface(
     GeometryError
         if there are too few points, or they define no such surface
     """
-    own = np.array([joint_covariance([point], oriented, shared=False) for point in points]).reshape(-1, 3, 3)
-    return (_plane if kind == "plane" else _cylinder)(tuple(points), own, towards, scatter)
+    covariances = np.array([joint_covariance([point], oriented, shared=False) for point in points]).reshape(
+        -1, 3, 3
+    )
+    return (_plane if kind == "plane" else _cylinder)(tuple(points), covariances, towards, scatter)
 
 
-def _plane(points: tuple[Located, ...], own: Array, towards: Array, scatter: float | None) -> Plane:
+def _plane(points: tuple[Located, ...], covariances: Array, towards: Array, scatter: float | None) -> Plane:
     if len(points) < 3:
         raise GeometryError(
             f"{len(points)} points define no plane",
@@ -176,7 +182,7 @@ def _plane(points: tuple[Located, ...], own: Array, towards: Array, scatter: flo
     places = np.array([point.place for point in points])
     normal = np.linalg.svd(places - places.mean(axis=0))[2][2]
     for _ in range(2):
-        sigma = np.sqrt(np.einsum("a,nab,b->n", normal, own, normal))
+        sigma = np.sqrt(np.einsum("a,nab,b->n", normal, covariances, normal))
         fit = fit_plane(places, sigma, towards)
         normal = fit.normal
     sound = np.ones(len(points), dtype=bool)
@@ -186,14 +192,18 @@ def _plane(points: tuple[Located, ...], own: Array, towards: Array, scatter: flo
     return Plane(fit, sound, sigma, points, spread, text)
 
 
-def _cylinder(points: tuple[Located, ...], own: Array, towards: Array, scatter: float | None) -> Cylinder:
+def _cylinder(
+    points: tuple[Located, ...], covariances: Array, towards: Array, scatter: float | None
+) -> Cylinder:
     if len(points) < _FEWEST:
         raise GeometryError(
             f"{len(points)} points define no cylinder",
             remedy=f"mark {_FEWEST} or more points of the faces on two photographs",
         )
     places = np.array([point.place for point in points])
-    best = min((_refined(places, own, axis) for axis in _starts(places)), key=lambda one: one[0])
+    best = min(
+        (_refined(places, covariances, axis) for axis in _starts(places)), key=lambda candidate: candidate[0]
+    )
     square, centre, axis, across, radius, normal, sigma = best
     if not np.isfinite(square) or np.linalg.pinv(normal)[4, 4] > (_VAGUE * radius) ** 2:
         raise GeometryError(

@@ -46,10 +46,10 @@ class MshNumbers:
             raise self.fail(f"format {shown(b' '.join(head).decode('latin-1'))} of a gmsh mesh")
         self.version, self.binary = head[0].decode(), head[1] == b"1"
         if self.binary:
-            one = data[self._at : self._at + 4]
-            if one not in (b"\x01\0\0\0", b"\0\0\0\x01"):
+            marker = data[self._at : self._at + 4]
+            if marker not in (b"\x01\0\0\0", b"\0\0\0\x01"):
                 raise self.fail("the byte order cannot be read")
-            self._order = "<" if one[0] else ">"
+            self._order = "<" if marker[0] else ">"
             self._at += 4
         self.end("MeshFormat")
 

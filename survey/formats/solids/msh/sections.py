@@ -84,11 +84,11 @@ class MshFile:
 
     def _read_names(self, lines: list[str]) -> None:
         for line in lines[1:]:
-            found = _NAME.fullmatch(line)
-            if found is None:
+            match = _NAME.fullmatch(line)
+            if match is None:
                 raise self._numbers.fail(f"{shown(line)} is not a physical name")
-            if found[1] == "3":
-                self.names[int(found[2])] = found[3]
+            if match[1] == "3":
+                self.names[int(match[2])] = match[3]
 
     def _read_entities(self) -> None:
         numbers = self._numbers
