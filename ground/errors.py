@@ -151,8 +151,8 @@ def storage_error(error: Exception, where: str | None = None, kept: str = "") ->
     kept : what has not been lost
     """
     number = getattr(error, "errno", None)
-    if number is None and (told := re.search(r"errno = (\d+)", str(error))) is not None:
-        number = int(told[1])
+    if number is None and (match := re.search(r"errno = (\d+)", str(error))) is not None:
+        number = int(match[1])
     if not isinstance(error, OSError | RuntimeError) or number not in _STORAGE:
         return None
     what, remedy = _STORAGE[number]

@@ -88,9 +88,9 @@ def declare_relation(
         raise UsageError(
             f"{len(both)} stones would be in relation to themselves", remedy="leave them out of one"
         )
-    pairs = [(one, other) for one in of for other in to]
+    pairs = [(subject, target) for subject in of for target in to]
     if kind not in RELATIONS:
-        kind, pairs = INVERSE[kind], [(other, one) for one, other in pairs]
+        kind, pairs = INVERSE[kind], [(second, first) for first, second in pairs]
     if kind in SYMMETRIC:
         pairs = [(min(pair), max(pair)) for pair in pairs]
     outcome = NOTHING
@@ -111,44 +111,44 @@ def _declare_members(
     session: Session, entry: Entry, structure: int, ranks: Mapping[int, int | None]
 ) -> RowCounts:
     table = table_of(Membership)
-    held = select(table).where(
+    query = select(table).where(
         table.c.structure_id == structure, table.c.entity_id.in_(ranks), table.c.superseded_id.is_(None)
     )
     same: set[int] = set()
-    other: dict[int, int] = {}
-    given = dict(ranks)
-    for row in session.execute(held).mappings():
+    replaced: dict[int, int] = {}
+    rank_of = dict(ranks)
+    for row in session.execute(query).mappings():
         number = row["entity_id"]
         if ranks[number] is None:
-            given[number] = row["rank"]
-        if row["declared"] and row["rank"] == given[number]:
+            rank_of[number] = row["rank"]
+        if row["declared"] and row["rank"] == rank_of[number]:
             same.add(number)
         else:
             # what was computed, too, is declared from now on
-            other[number] = row["id"]
-    if other:
-        end_rows(session, entry, Membership, list(other.values()))
+            replaced[number] = row["id"]
+    if replaced:
+        end_rows(session, entry, Membership, list(replaced.values()))
     rows = [
         {"entry_id": entry.id, "entity_id": number, "structure_id": structure, "rank": rank, "declared": True}
-        for number, rank in given.items()
+        for number, rank in rank_of.items()
         if number not in same
     ]
     if rows:
         session.execute(insert(table), rows)
-    return RowCounts(new=len(rows) - len(other), replaced=len(other), unchanged=len(same))
+    return RowCounts(new=len(rows) - len(replaced), replaced=len(replaced), unchanged=len(same))
 
 
 def _declare_relations(
     session: Session, entry: Entry, kind: str, pairs: Sequence[tuple[int, int]]
 ) -> RowCounts:
     table = table_of(Relation)
-    held = select(table.c.subject_id, table.c.object_id).where(
+    query = select(table.c.subject_id, table.c.object_id).where(
         table.c.kind == kind,
         table.c.declared,
         table.c.superseded_id.is_(None),
         table.c.subject_id.in_({subject for subject, _ in pairs}),
     )
-    same = {(subject, target) for subject, target in session.execute(held)} & set(pairs)
+    same = {(subject, target) for subject, target in session.execute(query)} & set(pairs)
     rows = [
         {"entry_id": entry.id, "kind": kind, "subject_id": subject, "object_id": target, "declared": True}
         for subject, target in pairs

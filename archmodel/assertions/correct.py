@@ -53,9 +53,9 @@ def correct(session: Session, entry: Entry, code: str, values: Mapping[str, obje
     """
     row = _row(session, code)
     kind = _kind(values.get("kind", row["kind"]))
-    own = own_attributes(kind_named(kind))
-    checked = {name: _checked(name, value, own, code) for name, value in values.items()}
-    checked |= dict.fromkeys(_lost(row, own) - checked.keys()) if kind != row["kind"] else {}
+    stone_attributes = own_attributes(kind_named(kind))
+    checked = {name: _checked(name, value, stone_attributes, code) for name, value in values.items()}
+    checked |= dict.fromkeys(_lost(row, stone_attributes) - checked.keys()) if kind != row["kind"] else {}
     changes = {name: (old, new) for name, new in checked.items() if (old := _value(row, name)) != new}
     if not changes:
         return RowCounts(unchanged=1)
@@ -66,7 +66,7 @@ def correct(session: Session, entry: Entry, code: str, values: Mapping[str, obje
     registered = {name: new for name, new in after.items() if name not in columns}
     if registered:
         kept = {**(row["own"] or {}), **registered}
-        columns["own"] = {name: one for name, one in kept.items() if one is not None} or None
+        columns["own"] = {name: value for name, value in kept.items() if value is not None} or None
     _change(session, entry, row["id"], columns, changes)
     return RowCounts(replaced=1)
 
@@ -80,19 +80,19 @@ def replace_measurement(session: Session, entry: Entry, stone: StoneRecord, plac
     place : for errors
     """
     row = _row(session, stone.code)
-    held = session.scalar(
+    measured = session.scalar(
         select(Measurement).where(Measurement.entity_id == row["id"], Measurement.superseded_id.is_(None))
     )
-    if held is None:
+    if measured is None:
         raise DatabaseError(f"{stone.code} was not measured", where=place)
     made = entity_rows([stone], [place])[0]
     changes = {name: (row[name], made[name]) for name in _GEOMETRY if row[name] != made[name]}
     if not changes:
         return RowCounts(unchanged=1)
-    held.superseded_id = entry.id
+    measured.superseded_id = entry.id
     session.flush()
     values = measurement_row(stone, place)
-    owner = {"entity_id": row["id"], "survey_id": held.survey_id, "entry_id": entry.id}
+    owner = {"entity_id": row["id"], "survey_id": measured.survey_id, "entry_id": entry.id}
     session.execute(insert(table_of(Measurement)).values({**values, **owner, "superseded_id": None}))
     _change(session, entry, row["id"], {name: new for name, (_, new) in changes.items()}, changes)
     return RowCounts(replaced=1)
@@ -116,19 +116,19 @@ def _kind(value: object) -> str:
     return kind_of(kind_named(value))
 
 
-def _checked(name: str, value: object, own: Mapping[str, StoneAttribute], code: str) -> object:
+def _checked(name: str, value: object, stone_attributes: Mapping[str, StoneAttribute], code: str) -> object:
     """Check a value against its column."""
     if name == "kind":
         return _kind(value)
-    if name in own:
-        return _own_value(own[name], value)
+    if name in stone_attributes:
+        return _own_value(stone_attributes[name], value)
     if name in MEASURED and not name.startswith("depth"):
         raise UsageError(
             f"{name} of {code} follows from its survey", remedy="measure it again, or give its depth"
         )
     if name.startswith("depth"):
         raise UsageError(f"{name} is no plain attribute", remedy="record it as a depth: the solid follows")
-    checked_choice("attribute", name, (*CORRECTABLE, *own))
+    checked_choice("attribute", name, (*CORRECTABLE, *stone_attributes))
     if name == "course":
         return checked_whole(name, value, -1000)  # type: ignore[arg-type]
     if value is None and name == "zone":
@@ -157,17 +157,17 @@ def _value(row: Mapping[str, Any], name: str) -> object:
     return row[name] if name in row else (row["own"] or {}).get(name)
 
 
-def _lost(row: Mapping[str, Any], own: Mapping[str, StoneAttribute]) -> set[str]:
+def _lost(row: Mapping[str, Any], stone_attributes: Mapping[str, StoneAttribute]) -> set[str]:
     """List attributes of the old kind that have a value and that the new kind lacks."""
     before = own_attributes(kind_named(row["kind"]))
-    return {name for name in before if name not in own and _value(row, name) is not None}
+    return {name for name in before if name not in stone_attributes and _value(row, name) is not None}
 
 
 def _refuse_taken(session: Session, code: str, number: int) -> None:
     if session.scalar(select(Entity.id).where(Entity.code == code)) is not None:
         raise UsageError(f"the code {code} is taken by another stone", remedy="give it a code of its own")
-    if (found := Lookalikes(session, Entity.code, Entity.id != number).like([code])) is not None:
-        raise UsageError(f"the code {explained(*found)}", remedy="write both with the same characters")
+    if (like := Lookalikes(session, Entity.code, Entity.id != number).like([code])) is not None:
+        raise UsageError(f"the code {explained(*like)}", remedy="write both with the same characters")
 
 
 def _change(

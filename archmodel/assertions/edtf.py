@@ -41,8 +41,8 @@ def year_bounds(name: str, value: int | str) -> Bounds:
         return value, value
     text = value.strip()
     for pattern, edtf in _WORDS:
-        if (found := pattern.fullmatch(text)) is not None:
-            text = found.expand(edtf)
+        if (match := pattern.fullmatch(text)) is not None:
+            text = match.expand(edtf)
             break
     ends = text.split("/")
     if len(ends) > 2:
@@ -58,12 +58,12 @@ def _of_end(name: str, value: str, text: str, end: int, *, open_too: bool) -> in
     """Return the first (0) or last (1) year of one end of an interval; None if it is open."""
     if open_too and text.strip() in ("", ".."):
         return None
-    found = _YEAR.fullmatch(text.strip())
+    match = _YEAR.fullmatch(text.strip())
     # what is not known of a year are its last digits: 14XX, 140X
-    if found is None or not re.fullmatch(r"[0-9]+X{0,3}", found["year"]):
+    if match is None or not re.fullmatch(r"[0-9]+X{0,3}", match["year"]):
         raise _refusal(name, value)
-    negative = bool(found["sign"])
-    year = int(found["year"].replace("X", "9" if bool(end) != negative else "0"))
+    negative = bool(match["sign"])
+    year = int(match["year"].replace("X", "9" if bool(end) != negative else "0"))
     return -year if negative else year
 
 

@@ -60,7 +60,7 @@ def _decide_batch(
             column.in_(numbers), Statement.kind.in_((about, "decision")), Statement.superseded_id.is_(None)
         )
     ).all()
-    before = {getattr(one, owner): one for one in rows if isinstance(one, Decision) and one.about == about}
+    before = {getattr(row, owner): row for row in rows if isinstance(row, Decision) and row.about == about}
     chosen: dict[int, list[Statement]] = {number: [] for number in numbers}
     for row in rows:
         if not isinstance(row, Decision) and says(row, match):

@@ -31,7 +31,7 @@ def checked_text(name: str, value: str | None) -> str | None:
     if value is None:
         return None
     text = unicodedata.normalize("NFC", value.strip())
-    if not text or any(not one.isprintable() and one not in "\n\t" for one in text):
+    if not text or any(not character.isprintable() and character not in "\n\t" for character in text):
         what = f"{name} {value[:40]!a} has no visible character, or some that cannot be typed"
         raise UsageError(what, remedy="write a text")
     if len(text) > MAX_TEXT:
@@ -97,11 +97,13 @@ def checked_years(begins: int | None, ends: int | None) -> None:
         raise UsageError(f"begins in {begins} and ends in {ends}", remedy="give the earlier year first")
 
 
-def checked_choice(name: str, value: str, known: Iterable[str]) -> str:
+def checked_choice(name: str, value: str, choices: Iterable[str]) -> str:
     """Check that a value is one of the known names."""
-    names = list(known)
+    names = list(choices)
     if value in names:
         return value
-    near = difflib.get_close_matches(value[:40].strip().lower(), names, n=3, cutoff=0.5)
-    remedy = f"did you mean {' or '.join(near)}?" if near else f"they are {', '.join(names)}"
+    close_matches = difflib.get_close_matches(value[:40].strip().lower(), names, n=3, cutoff=0.5)
+    remedy = (
+        f"did you mean {' or '.join(close_matches)}?" if close_matches else f"they are {', '.join(names)}"
+    )
     raise UsageError(f"unknown {name} {value[:40]!r}", remedy=remedy)

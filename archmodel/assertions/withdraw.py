@@ -48,24 +48,28 @@ def withdraw_statements(
     if cls is DepthEvidence:
         raise UsageError("a depth cannot be withdrawn", remedy="record the depth that holds instead")
     outcome = NOTHING
-    held: list[Statement] = []
+    statements: list[Statement] = []
     for owner, batch in about.batches():
         for row in session.scalars(select(cls).where(getattr(cls, owner).in_(batch))):
             if not says(row, match or {}):
                 continue
             if row.superseded_id is None and row.entry_id > since:
-                held.append(row)
+                statements.append(row)
             else:
                 outcome += RowCounts(unchanged=1)
-    mine = [one for one in held if one.author == entry.author]
-    ended = mine or held
-    voices = {one.author for one in ended}
+    mine = [statement for statement in statements if statement.author == entry.author]
+    ended = mine or statements
+    voices = {statement.author for statement in ended}
     if cls in SINGLE and len(voices) > 1:
         names = ", ".join(sorted(name or "an unnamed author" for name in voices))
         remedy = 'name the author: match = { author = "…" }'
         raise UsageError(f"{cls.__kind__} was said by several other authors: {names}", remedy=remedy)
-    counts = _ended(session, entry, Statement, [one.id for one in ended], outcome, cls.__kind__)
-    _say_again(session, entry, [one.supersedes_id for one in ended if one.supersedes_id is not None])
+    counts = _ended(session, entry, Statement, [statement.id for statement in ended], outcome, cls.__kind__)
+    _say_again(
+        session,
+        entry,
+        [statement.supersedes_id for statement in ended if statement.supersedes_id is not None],
+    )
     return counts
 
 
@@ -83,7 +87,7 @@ def _say_again(session: Session, entry: Entry, numbers: Sequence[int]) -> None:
 
 def withdraw_members(session: Session, entry: Entry, about: Subjects) -> RowCounts:
     """Withdraw declared memberships of entities in structures; computed ones stay."""
-    outcome, held = NOTHING, []
+    outcome, ids = NOTHING, []
     for batch in batches(about.entities):
         statement = select(Membership).where(
             Membership.entity_id.in_(batch),
@@ -92,10 +96,10 @@ def withdraw_members(session: Session, entry: Entry, about: Subjects) -> RowCoun
         )
         for row in session.scalars(statement):
             if row.superseded_id is None:
-                held.append(row.id)
+                ids.append(row.id)
             else:
                 outcome += RowCounts(unchanged=1)
-    return _ended(session, entry, Membership, held, outcome, "declared membership")
+    return _ended(session, entry, Membership, ids, outcome, "declared membership")
 
 
 def withdraw_relations(
@@ -105,11 +109,11 @@ def withdraw_relations(
     checked_choice("relation", kind, (*RELATIONS, "supports"))
     if kind not in RELATIONS:
         kind, of, to = INVERSE[kind], to, of
-    ends = {(one, other) for one in of for other in to}
+    ends = {(subject, target) for subject in of for target in to}
     if kind in SYMMETRIC:
-        ends |= {(other, one) for one, other in ends}
-    outcome, held = NOTHING, []
-    for batch in batches(sorted({one for one, _ in ends})):
+        ends |= {(second, first) for first, second in ends}
+    outcome, ids = NOTHING, []
+    for batch in batches(sorted({subject for subject, _ in ends})):
         statement = select(Relation).where(
             Relation.kind == kind, Relation.declared, Relation.subject_id.in_(batch)
         )
@@ -117,23 +121,23 @@ def withdraw_relations(
             if (relation.subject_id, relation.object_id) not in ends:
                 continue
             if relation.superseded_id is None:
-                held.append(relation.id)
+                ids.append(relation.id)
             else:
                 outcome += RowCounts(unchanged=1)
-    return _ended(session, entry, Relation, held, outcome, f"declared relation {kind}")
+    return _ended(session, entry, Relation, ids, outcome, f"declared relation {kind}")
 
 
 def _ended(
     session: Session,
     entry: Entry,
     cls: type[Statement] | type[Membership] | type[Relation],
-    held: Sequence[int],
+    ids: Sequence[int],
     before: RowCounts,
     thing: str,
 ) -> RowCounts:
     """End rows that are held; rows withdrawn already stay, and rows that never were are an error."""
-    if not held and not before.unchanged:
+    if not ids and not before.unchanged:
         raise UsageError(f"there is no such {thing} to withdraw", remedy="look at it by: moma show CODE")
-    for batch in batches(held):
+    for batch in batches(ids):
         end_rows(session, entry, cls, batch)
-    return RowCounts(withdrawn=len(held)) if held else before
+    return RowCounts(withdrawn=len(ids)) if ids else before

@@ -44,9 +44,9 @@ def entry_named(session: Session, text: str) -> int:
     """
     if text.isascii() and text.isdigit() and len(text) < 10 and session.get(Entry, int(text)) is not None:
         return int(text)
-    found = re.fullmatch(r"(\d{4})(?:-(\d{2})(?:-(\d{2}))?)?", text)
+    match = re.fullmatch(r"(\d{4})(?:-(\d{2})(?:-(\d{2}))?)?", text)
     try:
-        day = None if found is None else _last_day(*found.groups())
+        day = None if match is None else _last_day(*match.groups())
     except ValueError:
         day = None
     if day is None or (text.isdigit() and int(text) < 1000):
@@ -134,10 +134,10 @@ def _undo_corrections(connection: Connection, entry: int) -> None:
         undone.setdefault(row["entity_id"], {})[row["attribute"]] = row["before"]
     for number, values in undone.items():
         columns = {name: value for name, value in values.items() if name in entity.c}
-        own = {name: value for name, value in values.items() if name not in entity.c}
-        if own:
+        values_now = {name: value for name, value in values.items() if name not in entity.c}
+        if values_now:
             before = connection.scalar(select(entity.c.own).where(entity.c.id == number)) or {}
-            after = {name: value for name, value in {**before, **own}.items() if value is not None}
+            after = {name: value for name, value in {**before, **values_now}.items() if value is not None}
             columns["own"] = after or None
         connection.execute(update(entity).where(entity.c.id == number).values(columns))
 
@@ -149,7 +149,7 @@ def _take_back(connection: Connection, entry: int) -> None:
         number = table.c.id if table is Entry.__table__ else table.c.get("entry_id")
         if number is not None:
             connection.execute(delete(table).where(number > entry))
-        for key in sorted(table.foreign_keys, key=lambda one: one.parent.name):
+        for key in sorted(table.foreign_keys, key=lambda foreign_key: foreign_key.parent.name):
             _drop_lost(connection, table, key)
     for table in tables:
         if "superseded_id" in table.c:
@@ -161,8 +161,8 @@ def _drop_lost(connection: Connection, table: Table, key: ForeignKey) -> None:
     column, target = key.parent, key.column
     if column.name == "superseded_id":
         return
-    other = target.table.alias() if target.table is table else target.table
-    lost = column.is_not(None) & column.not_in(select(other.c[target.name]))
+    target_rows = target.table.alias() if target.table is table else target.table
+    lost = column.is_not(None) & column.not_in(select(target_rows.c[target.name]))
     if column.name == "supersedes_id":
         connection.execute(update(table).where(lost).values({column.name: None}))
     else:

@@ -38,11 +38,11 @@ class Deadline:
 
     def stopped(self, error: BaseException) -> bool:
         """Return whether the database gave up a statement, whose error or its cause this is, as its time was over."""
-        told: BaseException | None = error
-        while told is not None:
-            if getattr(getattr(told, "orig", told), "sqlstate", None) == _CANCELLED:
+        reason: BaseException | None = error
+        while reason is not None:
+            if getattr(getattr(reason, "orig", reason), "sqlstate", None) == _CANCELLED:
                 return True
-            told = told.__cause__
+            reason = reason.__cause__
         return self._passed
 
 

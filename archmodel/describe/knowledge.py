@@ -59,7 +59,7 @@ def owners_of(session: Session, members: Iterable[Membership]) -> list[Owner]:
     owners: dict[int, Owner] = {}
     for membership in members:
         _ascend(session, membership.structure_id, 1, owners)
-    return sorted(owners.values(), key=lambda one: one.distance)
+    return sorted(owners.values(), key=lambda owner: owner.distance)
 
 
 def owners_of_structure(session: Session, parent: int | None) -> list[Owner]:
@@ -93,18 +93,20 @@ def knowledge(session: Session, column: str, number: int, owners: Sequence[Owner
     number : its own
     owners : the structures that it belongs to; a statement about one of those names it
     """
-    own = _statements(session, column, [number])
+    statements = _statements(session, column, [number])
     inherited = _statements(session, "structure_id", [owner.structure.id for owner in owners])
-    far = {owner.structure.id: owner for owner in owners}
-    ranked = [(0, one) for one in own]
-    ranked += sorted(((far[_of(one)].distance, one) for one in inherited), key=lambda pair: pair[0])
-    told: Values = {
-        "material": _holding(session, ranked, MadeOf, far),
-        "phase": _holding(session, ranked, OfPhase, far),
+    owner_of = {owner.structure.id: owner for owner in owners}
+    ranked = [(0, statement) for statement in statements]
+    ranked += sorted(
+        ((owner_of[_of(statement)].distance, statement) for statement in inherited), key=lambda pair: pair[0]
+    )
+    values: Values = {
+        "material": _holding(session, ranked, MadeOf, owner_of),
+        "phase": _holding(session, ranked, OfPhase, owner_of),
     }
     for name, kind in _LISTS.items():
-        told[name] = [_told(one, far) for _, one in ranked if one.kind == kind]
-    return told
+        values[name] = [_told(statement, owner_of) for _, statement in ranked if statement.kind == kind]
+    return values
 
 
 def _of(statement: Statement) -> int:
@@ -123,10 +125,10 @@ def _statements(session: Session, column: str, numbers: Sequence[int]) -> list[S
     return list(session.scalars(statement))
 
 
-def _told(statement: Statement, far: Mapping[int, Owner]) -> Values:
+def _told(statement: Statement, owners: Mapping[int, Owner]) -> Values:
     """Describe a statement with its provenance, and its structure if that is another one."""
     values = statement_values(statement)
-    owner = far.get(_of(statement))
+    owner = owners.get(_of(statement))
     if owner is not None:
         values["said_of"] = owner.structure.code
     return values | entry_values(statement.entry)
@@ -136,23 +138,27 @@ def _holding(
     session: Session,
     ranked: Sequence[tuple[int, Statement]],
     cls: type[MadeOf] | type[OfPhase],
-    far: Mapping[int, Owner],
+    owners: Mapping[int, Owner],
 ) -> Values | None:
     """Describe the opinion that holds, of its own or of the nearest structure, and those beside it."""
-    opinions = [(distance, one) for distance, one in ranked if isinstance(one, cls)]
+    opinions = [(distance, opinion) for distance, opinion in ranked if isinstance(opinion, cls)]
     if not opinions:
         return None
-    nearest = [one for distance, one in opinions if distance == opinions[0][0]]
+    nearest = [opinion for distance, opinion in opinions if distance == opinions[0][0]]
     rule = rule_of(session, cls.__kind__) if len(nearest) > 1 else None
-    said: Any = nearest[0] if rule is None else _preferred(session, rule, nearest)
-    about = _material(session, said.material) if isinstance(said, MadeOf) else _phase(said.phase)
-    rest = {name: value for name, value in _told(said, far).items() if name not in ("material", "phase")}
+    preferred: Any = nearest[0] if rule is None else _preferred(session, rule, nearest)
+    about = (
+        _material(session, preferred.material) if isinstance(preferred, MadeOf) else _phase(preferred.phase)
+    )
+    rest = {
+        name: value for name, value in _told(preferred, owners).items() if name not in ("material", "phase")
+    }
     if rule is None:
         return about | rest
-    others = [_opinion(one, far) for one in nearest if one is not said]
+    others = [_opinion(opinion, owners) for opinion in nearest if opinion is not preferred]
     column = DISPUTABLE[cls.__kind__]
-    disputed = any(getattr(one, column) != getattr(said, column) for one in nearest)
-    return about | rest | {"disputed": disputed, "rule": _rule(session, said, rule), "others": others}
+    disputed = any(getattr(opinion, column) != getattr(preferred, column) for opinion in nearest)
+    return about | rest | {"disputed": disputed, "rule": _rule(session, preferred, rule), "others": others}
 
 
 def _preferred(session: Session, rule: OpinionRule, opinions: Sequence[Statement]) -> Statement:
@@ -166,16 +172,16 @@ def _preferred(session: Session, rule: OpinionRule, opinions: Sequence[Statement
     return next(opinion for opinion in opinions if opinion.id == number)
 
 
-def _opinion(statement: Statement, far: Mapping[int, Owner]) -> Values:
+def _opinion(statement: Statement, owners: Mapping[int, Owner]) -> Values:
     """Describe an opinion beside the one that holds, with its author and date."""
     seen = statement.stated_on
     author = {"author": statement.author, "stated_on": None if seen is None else seen.isoformat()}
-    return _told(statement, far) | author
+    return _told(statement, owners) | author
 
 
-def _rule(session: Session, said: Statement, rule: OpinionRule) -> str:
+def _rule(session: Session, opinion: Statement, rule: OpinionRule) -> str:
     """Return in words why an opinion holds: a decision, or the rule."""
-    decision = session.scalar(select(Decision).where(Decision.chosen_id == said.id, held_at(Decision)))
+    decision = session.scalar(select(Decision).where(Decision.chosen_id == opinion.id, held_at(Decision)))
     if decision is not None:
         return f"decided by {decision.author or 'an unnamed author'} in entry {decision.entry_id}"
     return {
@@ -197,8 +203,13 @@ def _material(session: Session, row: Material | None) -> Values:
         "name": row.name,
         "description": row.description,
         "properties": {
-            one.name: {"value": one.value, "sigma": one.sigma, "unit": one.unit, "source": one.source}
-            for one in properties
+            property_row.name: {
+                "value": property_row.value,
+                "sigma": property_row.sigma,
+                "unit": property_row.unit,
+                "source": property_row.source,
+            }
+            for property_row in properties
         },
     }
 

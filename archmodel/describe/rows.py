@@ -36,6 +36,8 @@ def first_values(session: Session, number: int, *names: str) -> dict[str, Any]:
 def structures_named(session: Session, code: str) -> list[Structure]:
     """List structures that have or had a code, latest first, without rows that only keep an earlier revision."""
     rows = session.scalars(select(Structure).where(Structure.code == code)).all()
-    kept = {row.supersedes_id for row in rows}
-    found = [row for row in rows if row.id not in kept]
-    return sorted(found, key=lambda one: (one.superseded_id is None, one.superseded_id or 0), reverse=True)
+    replaced = {row.supersedes_id for row in rows}
+    named_rows = [row for row in rows if row.id not in replaced]
+    return sorted(
+        named_rows, key=lambda row: (row.superseded_id is None, row.superseded_id or 0), reverse=True
+    )

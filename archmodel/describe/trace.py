@@ -66,9 +66,13 @@ def trace(session: Session, code: str, run: int | None = None) -> Trace:
     entity = session.scalar(select(Entity).where(Entity.code == code)) if code.isprintable() else None
     if entity is None:
         raise no_such_code(session, code, Entity.code)
-    own = select(EntityResult).where(EntityResult.entity_id == entity.id)
+    results = select(EntityResult).where(EntityResult.entity_id == entity.id)
     # no run has a number that the column cannot hold
-    wanted = own if run is None else own.where(EntityResult.run_id == (run if abs(run) < _TOO_LARGE else 0))
+    wanted = (
+        results
+        if run is None
+        else results.where(EntityResult.run_id == (run if abs(run) < _TOO_LARGE else 0))
+    )
     result = session.scalar(
         wanted.options(joinedload(EntityResult.run).joinedload(Run.entry))
         .order_by(EntityResult.run_id.desc())
@@ -87,10 +91,10 @@ def trace(session: Session, code: str, run: int | None = None) -> Trace:
 
 def _measurement(entity: Entity, run: Run) -> Select[Any]:
     """Return the measurement that held when the run read the stone."""
-    known = run.entry_id if run.as_of_id is None else run.as_of_id
+    as_of = run.entry_id if run.as_of_id is None else run.as_of_id
     return (
         select(Measurement)
-        .where(Measurement.entity_id == entity.id, held_at(Measurement, known))
+        .where(Measurement.entity_id == entity.id, held_at(Measurement, as_of))
         .options(joinedload(Measurement.survey))
         .order_by(Measurement.id.desc())
         .limit(1)

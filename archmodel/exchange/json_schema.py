@@ -28,7 +28,7 @@ _DESCRIPTION = (
 
 def building_schema() -> Schema:
     """Return the JSON Schema, draft 2020-12, of the documents that this version writes and reads."""
-    known = sections()
+    expected = sections()
     tables = {
         "type": "object",
         "description": "the sections, in their order",
@@ -38,9 +38,9 @@ def building_schema() -> Schema:
                 "description": _first_sentence(section.mapper.class_),
                 "items": {"$ref": f"#/$defs/{section.name}"},
             }
-            for section in known
+            for section in expected
         },
-        "required": [section.name for section in known],
+        "required": [section.name for section in expected],
         "additionalProperties": False,
     }
     return {
@@ -53,7 +53,7 @@ def building_schema() -> Schema:
         "required": [*HEAD, TABLES],
         "additionalProperties": False,
         "$defs": {"number": {**NUMBER, "description": "of 64 bits"}}
-        | {section.name: _row(section) for section in known},
+        | {section.name: _row(section) for section in expected},
     }
 
 
@@ -89,22 +89,24 @@ def _column(section: Section, field: Field, meanings: dict[str, str]) -> Schema:
         schema = {"anyOf": [*others, _NULL]}
     parts = [meanings.get(field.name) or meanings.get(field.name.removesuffix("_id"))]
     parts += [f"refers to {key.target_fullname}" for key in field.column.foreign_keys]
-    text = "; ".join(one for one in parts if one)
+    text = "; ".join(text_part for text_part in parts if text_part)
     return schema | {"description": text} if text else schema
 
 
 def _meanings(section: Section) -> dict[str, str]:
     """Return what attributes and docstrings of a table's classes say of its columns."""
-    found: dict[str, str] = {}
+    documented: dict[str, str] = {}
     for mapper in section.mapper.self_and_descendants:
         if getattr(mapper.class_, "__users__", None) is not None:
             continue  # registered in an open database, not a part of MOMA
         for cls in (mapper.class_, *mapper.class_.__bases__):
-            found = _documented(cls) | found
+            documented = _documented(cls) | documented
     for column in section.table.columns:
-        if (one := declared_attribute(column)) is not None:
-            found[column.name] = f"{one.definition} [{one.unit}]" if one.unit else one.definition
-    return {**_OF_ALL, **found}
+        if (attribute := declared_attribute(column)) is not None:
+            documented[column.name] = (
+                f"{attribute.definition} [{attribute.unit}]" if attribute.unit else attribute.definition
+            )
+    return {**_OF_ALL, **documented}
 
 
 _OF_ALL = {
@@ -132,12 +134,12 @@ def _plain(meaning: str, cls: type[Any]) -> str:
 def _entries(text: str) -> dict[str, str]:
     """Return the entries of a numpydoc section "Attributes" by name."""
     match = re.search(r"^Attributes\n-+\n(.*?)(?:\n\n|\Z)", text, re.MULTILINE | re.DOTALL)
-    found: dict[str, str] = {}
+    entries: dict[str, str] = {}
     for entry in re.split(r"\n(?=\S)", match[1]) if match else ():
         names, colon, meaning = entry.partition(" : ")
         if colon:
-            found |= dict.fromkeys(re.split(r",\s*", names), " ".join(meaning.split()))
-    return found
+            entries |= dict.fromkeys(re.split(r",\s*", names), " ".join(meaning.split()))
+    return entries
 
 
 def _first_sentence(cls: type[Any]) -> str:

@@ -32,12 +32,12 @@ class _Unreadable(ValueError):
 
 
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    found = dict(pairs)
-    if len(found) != len(pairs):
+    content = dict(pairs)
+    if len(content) != len(pairs):
         seen: set[str] = set()
         twice = next(key for key, _ in pairs if key in seen or seen.add(key))  # type: ignore[func-returns-value]
         raise _Unreadable(f"the key {twice[:40]!a} comes twice in one object")
-    return found
+    return content
 
 
 def _refuse_constant(word: str) -> NoReturn:

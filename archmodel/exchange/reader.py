@@ -97,15 +97,15 @@ def _read_head(text: JsonText, name: str) -> int:
     raise ExchangeError("is missing", where=f"{name} $.{TABLES}", remedy="export the building again")
 
 
-def _key(text: JsonText, before: dict[str, Any], known: Sequence[str]) -> str:
+def _key(text: JsonText, before: dict[str, Any], keys: Sequence[str]) -> str:
     """Return the next key of an object, past its colon."""
     if text.peek() != '"':
         text.take('"')
     key = str(text.value())
     if key in before:
         text.refuse(f"the key {key} comes twice")
-    if key not in known:
-        text.refuse(f"unknown key {key[:40]!a}", nearest(key, known))
+    if key not in keys:
+        text.refuse(f"unknown key {key[:40]!a}", nearest(key, keys))
     text.take(":")
     return key
 
@@ -125,7 +125,7 @@ def _read_tables(
     added : sections that an older document lacks
     """
     expected = [section for section in sections() if section.name not in added]
-    known = [section.name for section in expected]
+    names = [section.name for section in expected]
     counts: dict[str, int] = {}
     kinds: set[str] = set()
     text.take("{")
@@ -134,15 +134,15 @@ def _read_tables(
             raise ExchangeError(
                 "is missing", where=f"{name} $.{TABLES}.{section.name}", remedy="write [] if it is empty"
             )
-        key = _key(text, counts, known)
+        key = _key(text, counts, names)
         if key != section.name:
-            text.refuse(f"found section {key}, expected {section.name}", f"the order is {', '.join(known)}")
+            text.refuse(f"found section {key}, expected {section.name}", f"the order is {', '.join(names)}")
         reader = RowReader(section, name, kinds, absent.get(section.name))
         counts[key] = _read_section(session, section, text, reader, name)
         if section is not expected[-1] and text.peek() != "}":
             text.take(",")
     if text.take(",", "}") == ",":
-        _key(text, counts, known)  # which is unknown, or comes twice
+        _key(text, counts, names)  # which is unknown, or comes twice
     return counts
 
 

@@ -68,7 +68,7 @@ class SectionStore:
         """Refuse rows that are parts or successors of themselves, even by way of others."""
         key = self._section.table.c[self._section.key[0]]
         pairs = self._session.execute(select(key, column).where(column.is_not(None)))
-        target: dict[Any, Any] = {number: other for number, other in pairs}  # noqa: C416
+        target: dict[Any, Any] = {number: parent for number, parent in pairs}  # noqa: C416
         while target:
             start, at = target.popitem()
             chain = [start]
@@ -76,7 +76,7 @@ class SectionStore:
                 chain.append(at)
                 at = target.pop(at)
             if at in chain:
-                ring = " → ".join(str(one) for one in [*chain[chain.index(at) :], at][:10])
+                ring = " → ".join(str(label) for label in [*chain[chain.index(at) :], at][:10])
                 what = f"{self._section.name} {at} refers to itself by {column.name}: {ring}"
                 raise ExchangeError(what, where=f"{self._document} $.tables.{self._section.name}")
 
@@ -99,15 +99,15 @@ class SectionStore:
         if not labelled:
             return
         pairs = select(label.number, label.target).where(label.number.in_(wanted))
-        found: dict[Any, str] = {number: code for number, code in self._session.execute(pairs)}  # noqa: C416
+        code_of: dict[Any, str] = {number: code for number, code in self._session.execute(pairs)}  # noqa: C416
         for row in labelled:
             number, code = row.values[name], row.labels[key]
             if number is None:
                 raise row.wrong(f"is {quoted(code)}, but {name} is null", f".{key}")
-            if number not in found:
+            if number not in code_of:
                 raise row.wrong(f"there is no {label.target.table.name} {number}", f".{name}")
-            if found[number] != code:
-                what = f"is {quoted(code)}, but {name} {number} is {quoted(found[number])}"
+            if code_of[number] != code:
+                what = f"is {quoted(code)}, but {name} {number} is {quoted(code_of[number])}"
                 raise row.wrong(what, f".{key}", f"correct one of them, or leave {key} out")
 
     def _refer(self, rows: Sequence[Row]) -> None:
@@ -158,10 +158,10 @@ class SectionStore:
                         f"there is no {key.column.table.name} {quoted(target)}", f".{field.name}"
                     )
         for columns, where in self._unique():
-            if (other := self._same(row, columns, where)) is not None:
+            if (same := self._same(row, columns, where)) is not None:
                 names = ", ".join(column.name for column in columns)
                 mine = quoted_key(tuple(row.values[column.name] for column in columns))
-                what = f"{names} {mine} is also that of {', '.join(self._section.key)} {quoted_key(other)}"
+                what = f"{names} {mine} is also that of {', '.join(self._section.key)} {quoted_key(same)}"
                 return row.wrong(what, remedy="each may be there once")
         cause = error.orig if isinstance(error, StatementError) else error
         lines = str(cause).strip().splitlines() or [type(cause).__name__]
@@ -183,8 +183,8 @@ class SectionStore:
         if where is not None and row.values["superseded_id"] is not None:
             return None
         conditions = [column == row.values[column.name] for column in columns]
-        found = select(*self._section.table.primary_key).where(
+        query = select(*self._section.table.primary_key).where(
             *conditions, *(() if where is None else (where,))
         )
-        other = self._session.execute(found).first()
+        other = self._session.execute(query).first()
         return None if other is None else tuple(other)

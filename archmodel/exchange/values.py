@@ -93,24 +93,24 @@ def _same(value: Any) -> Any:
     return value
 
 
-def _text(given: Any) -> str:
-    if type(given) is not str:
-        raise Mismatch(f"is {quoted(given)}, expected a text")
-    if not given.isascii() and any("\ud800" <= letter <= "\udfff" for letter in given):
+def _text(value: Any) -> str:
+    if type(value) is not str:
+        raise Mismatch(f"is {quoted(value)}, expected a text")
+    if not value.isascii() and any("\ud800" <= letter <= "\udfff" for letter in value):
         raise Mismatch("has half of a surrogate pair, which no database can keep")
-    return given
+    return value
 
 
-def _integer(given: Any) -> int:
-    if type(given) is not int or not INTEGERS[0] <= given <= INTEGERS[1]:
-        raise Mismatch(f"is {quoted(given)}, expected a whole number of 64 bits")
-    return given
+def _integer(value: Any) -> int:
+    if type(value) is not int or not INTEGERS[0] <= value <= INTEGERS[1]:
+        raise Mismatch(f"is {quoted(value)}, expected a whole number of 64 bits")
+    return value
 
 
-def _boolean(given: Any) -> bool:
-    if type(given) is not bool:
-        raise Mismatch(f"is {quoted(given)}, expected true or false")
-    return given
+def _boolean(value: Any) -> bool:
+    if type(value) is not bool:
+        raise Mismatch(f"is {quoted(value)}, expected true or false")
+    return value
 
 
 def _written_number(value: float) -> float | str:
@@ -121,39 +121,39 @@ def _written_number(value: float) -> float | str:
     return "Infinity" if value > 0 else "-Infinity"
 
 
-def _number(given: Any) -> float:
-    if type(given) is float and math.isfinite(given):
-        return given
-    if type(given) is int:
+def _number(value: Any) -> float:
+    if type(value) is float and math.isfinite(value):
+        return value
+    if type(value) is int:
         try:
-            return float(given)
+            return float(value)
         except OverflowError:
             pass
-    elif type(given) is str and given in INFINITIES:
-        return INFINITIES[given]
-    raise Mismatch(f"is {quoted(given)}, expected a number of 64 bits")
+    elif type(value) is str and value in INFINITIES:
+        return INFINITIES[value]
+    raise Mismatch(f"is {quoted(value)}, expected a number of 64 bits")
 
 
-def _date(given: Any) -> date:
-    if type(given) is str and re.match(DATE, given, re.ASCII):
+def _date(value: Any) -> date:
+    if type(value) is str and re.match(DATE, value, re.ASCII):
         try:
-            return date.fromisoformat(given)
+            return date.fromisoformat(value)
         except ValueError:
             pass
-    raise Mismatch(f'is {quoted(given)}, expected a date, as "2024-05-31"')
+    raise Mismatch(f'is {quoted(value)}, expected a date, as "2024-05-31"')
 
 
 def _written_instant(value: datetime) -> str:
     return value.astimezone(UTC).replace(tzinfo=None).isoformat() + "Z"
 
 
-def _instant(given: Any) -> datetime:
-    if type(given) is str and re.match(INSTANT, given, re.ASCII):
+def _instant(value: Any) -> datetime:
+    if type(value) is str and re.match(INSTANT, value, re.ASCII):
         try:
-            return datetime.fromisoformat(given)
+            return datetime.fromisoformat(value)
         except ValueError:
             pass
-    raise Mismatch(f'is {quoted(given)}, expected an instant in UTC, as "2024-05-31T14:05:00Z"')
+    raise Mismatch(f'is {quoted(value)}, expected an instant in UTC, as "2024-05-31T14:05:00Z"')
 
 
 _SIMPLE: tuple[tuple[type[Any], Value], ...] = (
@@ -173,13 +173,13 @@ def _array(shape: tuple[int, ...]) -> Value:
         nested: list[Any] = array.tolist()
         return nested if np.isfinite(array).all() else _sayable(nested)
 
-    def decode(given: Any) -> Array:
-        flat = _flattened(given, shape, "")
+    def decode(value: Any) -> Array:
+        flat = _flattened(value, shape, "")
         if {*map(type, flat)} <= {float}:
             array = np.array(flat, dtype=np.float64)
             if np.isfinite(array).all():
                 return array.reshape(shape)
-        return _read_one_by_one(given, flat, shape)
+        return _read_one_by_one(value, flat, shape)
 
     return Value(encode, decode, _array_schema(shape))
 
@@ -190,19 +190,19 @@ def _sayable(nested: Any) -> Any:
     return None if math.isnan(nested) else _written_number(nested)
 
 
-def _flattened(given: Any, shape: tuple[int, ...], path: str) -> list[Any]:
+def _flattened(value: Any, shape: tuple[int, ...], path: str) -> list[Any]:
     """Return the innermost values of nested lists of this shape, unchecked."""
     size = shape[0]
-    if type(given) is not list or size not in (-1, len(given)):
+    if type(value) is not list or size not in (-1, len(value)):
         wanted = "a list of numbers" if len(shape) == 1 else f"a list of {_wording(shape[1:])}"
         count = "" if size == -1 else f", {size} of them"
-        raise Mismatch(f"is {quoted(given)}, expected {wanted}{count}", path)
+        raise Mismatch(f"is {quoted(value)}, expected {wanted}{count}", path)
     if len(shape) == 1:
-        return given
+        return value
     inner = shape[1]
-    if len(shape) == 2 and all(type(row) is list and len(row) == inner for row in given):
-        return list(chain.from_iterable(given))
-    rows = (_flattened(row, shape[1:], f"{path}[{index}]") for index, row in enumerate(given))
+    if len(shape) == 2 and all(type(row) is list and len(row) == inner for row in value):
+        return list(chain.from_iterable(value))
+    rows = (_flattened(row, shape[1:], f"{path}[{index}]") for index, row in enumerate(value))
     return list(chain.from_iterable(rows))
 
 
@@ -210,14 +210,14 @@ def _wording(shape: tuple[int, ...]) -> str:
     return f"lists of {' × '.join(str(size) for size in shape)} numbers"
 
 
-def _read_one_by_one(given: Any, flat: list[Any], shape: tuple[int, ...]) -> Array:
+def _read_one_by_one(value: Any, flat: list[Any], shape: tuple[int, ...]) -> Array:
     """Read the slow way arrays with NaN, infinities, whole numbers, and mistakes, which it locates."""
     array = np.empty(len(flat))
     for index, item in enumerate(flat):
         try:
             array[index] = math.nan if item is None else _number(item)
         except Mismatch as wrong:
-            sizes = (len(given), *shape[1:])
+            sizes = (len(value), *shape[1:])
             path = "".join(f"[{at}]" for at in np.unravel_index(index, sizes))
             raise Mismatch(f"{wrong.what}, or null for one that is not known", path) from None
     return array.reshape(shape)
@@ -250,8 +250,8 @@ class _Shape:
     def checked(self, value: Any) -> Any:
         """Return the value itself; raise Mismatch unless it is of this shape."""
         if not self.fits(value):
-            found = "null" if value is None else type(value).__name__
-            raise Mismatch(f"is {_JSON_NAMES.get(found, found)}, expected {self.name}")
+            kind = "null" if value is None else type(value).__name__
+            raise Mismatch(f"is {_JSON_NAMES.get(kind, kind)}, expected {self.name}")
         for step, item, shape in self.items(value):
             try:
                 shape.checked(item)
@@ -294,7 +294,7 @@ def _shape_of(annotation: object) -> _Shape:
         return _Shape(
             "a list",
             lambda value: type(value) is list,
-            lambda value: ((f"[{index}]", one, item) for index, one in enumerate(value)),
+            lambda value: ((f"[{index}]", entry, item) for index, entry in enumerate(value)),
             {"type": "array", "items": item.schema},
         )
     if origin is dict and arguments[0] is str:
@@ -302,7 +302,7 @@ def _shape_of(annotation: object) -> _Shape:
         return _Shape(
             "an object",
             lambda value: type(value) is dict,
-            lambda value: ((f".{ascii(key[:40])[1:-1]}", one, item) for key, one in value.items()),
+            lambda value: ((f".{ascii(key[:40])[1:-1]}", entry, item) for key, entry in value.items()),
             {"type": "object"} | ({"additionalProperties": item.schema} if item.schema else {}),
         )
     if origin is tuple:
@@ -321,7 +321,7 @@ def _tuple(shapes: list[_Shape]) -> _Shape:
         f"a list of {size}",
         lambda value: type(value) is list and len(value) == size,
         lambda value: (
-            (f"[{i}]", one, shape) for i, (one, shape) in enumerate(zip(value, shapes, strict=True))
+            (f"[{i}]", entry, shape) for i, (entry, shape) in enumerate(zip(value, shapes, strict=True))
         ),
         {"type": "array", **schema},
     )
@@ -336,16 +336,16 @@ def _union(options: list[_Shape]) -> _Shape:
     )
 
 
-def quoted(given: Any) -> str:
+def quoted(value: Any) -> str:
     """Return a value as an error quotes it, always short."""
-    if isinstance(given, list):
-        return f"a list of {len(given)}"
-    if isinstance(given, dict):
-        return f"an object of {len(given)}"
-    if given is None or isinstance(given, bool):
-        return {None: "null", True: "true", False: "false"}[given]
-    if isinstance(given, str):
-        return ascii(given[:40]) + ("…" if len(given) > 40 else "")
-    if isinstance(given, int) and abs(given) >= 10**40:
+    if isinstance(value, list):
+        return f"a list of {len(value)}"
+    if isinstance(value, dict):
+        return f"an object of {len(value)}"
+    if value is None or isinstance(value, bool):
+        return {None: "null", True: "true", False: "false"}[value]
+    if isinstance(value, str):
+        return ascii(value[:40]) + ("…" if len(value) > 40 else "")
+    if isinstance(value, int) and abs(value) >= 10**40:
         return "a whole number of more than 40 digits"
-    return repr(given)
+    return repr(value)

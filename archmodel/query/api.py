@@ -113,8 +113,8 @@ def find_rows(
     if _is_of_structures(kind):
         return _find_structures(session, kind, where, columns, limit)
     names = list(ATTRIBUTES) if columns is None else columns
-    found = _select(session, kind, where, run, lambda scope: _columns(scope, names), limit)
-    return [dict(zip(names, row, strict=True)) for row in found]
+    rows = _select(session, kind, where, run, lambda scope: _columns(scope, names), limit)
+    return [dict(zip(names, row, strict=True)) for row in rows]
 
 
 def find_faces(
@@ -130,18 +130,18 @@ def find_faces(
         measurement = scope.measurement()
         return [measurement.c.outline, measurement.c.normal, *_columns(scope, columns)]
 
-    found = _select(session, kind, where, run, chosen)
+    rows = _select(session, kind, where, run, chosen)
     return [
-        FoundFace(outline, normal, dict(zip(columns, row, strict=True))) for outline, normal, *row in found
+        FoundFace(outline, normal, dict(zip(columns, row, strict=True))) for outline, normal, *row in rows
     ]
 
 
 def asked_columns(where: Sequence[str], session: Session | None = None, kind: str = "entity") -> list[str]:
     """List the attributes that expressions name, without those of other entities: ``depth``, ``von_mises_max@12``."""
-    known = _known(session, kind)
+    attribute_names = _known(session, kind)
     expressions = [where] if isinstance(where, str) else where
     named = [token.text.lower() for expression in expressions for token in attributes_in(parse(expression))]
-    return [name for name in dict.fromkeys(named) if name.partition("@")[0] in known]
+    return [name for name in dict.fromkeys(named) if name.partition("@")[0] in attribute_names]
 
 
 def row_of(entity: Entity) -> dict[str, object]:
@@ -153,7 +153,7 @@ def rows_of(entities: Iterable[Entity]) -> list[dict[str, object]]:
     """Return every attribute of many entities of one session, in their order, as `row_of` does."""
     wanted = list(entities)
     names = list(ATTRIBUTES)
-    found: dict[object, dict[str, object]] = {}
+    by_code: dict[object, dict[str, object]] = {}
     for start in range(0, len(wanted), BATCH):
         batch = wanted[start : start + BATCH]
         session = object_session(batch[0])
@@ -164,8 +164,8 @@ def rows_of(entities: Iterable[Entity]) -> list[dict[str, object]]:
         statement = scope.joined(select(*_columns(scope, names)))
         statement = statement.where(scope.entity.c.id.in_([entity.id for entity in batch]))
         rows = (dict(zip(names, row, strict=True)) for row in session.execute(statement))
-        found.update((row["code"], row) for row in rows)
-    return [found[entity.code] for entity in wanted]
+        by_code.update((row["code"], row) for row in rows)
+    return [by_code[entity.code] for entity in wanted]
 
 
 def _known(session: Session | None, kind: str) -> Mapping[str, Attribute]:

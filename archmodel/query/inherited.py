@@ -62,13 +62,13 @@ def statements_of_structures(alias: Alias, *kinds: str) -> CTE:
     CTE
         of structure_id, statement_id, distance (0: said of the structure itself)
     """
-    said, part = alias(Statement), alias(Structure)
+    statement, part = alias(Statement), alias(Structure)
     # > 0, and not "is not null", since SQLite has an index for it
     seeds = select(
-        said.c.structure_id.label("structure_id"),
-        said.c.id.label("statement_id"),
+        statement.c.structure_id.label("structure_id"),
+        statement.c.id.label("statement_id"),
         literal(0).label("distance"),
-    ).where(said.c.structure_id > 0, said.c.kind.in_(kinds), held(said))
+    ).where(statement.c.structure_id > 0, statement.c.kind.in_(kinds), held(statement))
     reach = seeds.cte(recursive=True)
     return reach.union_all(
         select(part.c.id, reach.c.statement_id, reach.c.distance + 1)
@@ -96,8 +96,10 @@ class Opinions:
 
     def holding(self, column: str) -> ColumnElement[Any]:
         """Return a column of the statement that holds: its own opinions come before those of its structures."""
-        own, (inherited, joined) = self.alias(Statement), self._inherited()
-        by_itself = self._own(select(own.c[column]), own).order_by(*self._preference(own)).limit(1)
+        statement, (inherited, joined) = self.alias(Statement), self._inherited()
+        by_itself = (
+            self._own(select(statement.c[column]), statement).order_by(*self._preference(statement)).limit(1)
+        )
         by_structure = (
             joined(select(inherited.c[column]))
             .order_by(self.of_structures.c.distance, *self._preference(inherited))
@@ -105,16 +107,19 @@ class Opinions:
         )
         # by number of rows and not by coalesce: a column of the statement that holds may be null
         return case(
-            (self._own(select(own.c.id), own).correlate(self.entity).exists(), self._of_entity(by_itself)),
+            (
+                self._own(select(statement.c.id), statement).correlate(self.entity).exists(),
+                self._of_entity(by_itself),
+            ),
             else_=self._of_entity(by_structure),
         )
 
     def disputed(self) -> ColumnElement[bool]:
         """Return whether the opinions that come first by distance differ."""
         subject = DISPUTABLE[self.rule.about]
-        own, (inherited, joined) = self.alias(Statement), self._inherited()
+        statement, (inherited, joined) = self.alias(Statement), self._inherited()
         _, of_nearest = self._inherited()
-        of_itself = self._own(select(func.count(distinct(own.c[subject]))), own)
+        of_itself = self._own(select(func.count(distinct(statement.c[subject]))), statement)
         least = of_nearest(select(func.min(self.of_structures.c.distance)))
         of_structures = joined(select(func.count(distinct(inherited.c[subject])))).where(
             self.of_structures.c.distance == self._of_entity(least)
@@ -122,8 +127,12 @@ class Opinions:
         number = self._of_entity(of_itself)
         return case((number > 0, number > 1), else_=self._of_entity(of_structures) > 1)
 
-    def _own(self, statement: Select[Any], own: FromClause) -> Select[Any]:
-        return statement.where(own.c.entity_id == self.entity.c.id, own.c.kind == self.rule.about, held(own))
+    def _own(self, statement: Select[Any], source_rows: FromClause) -> Select[Any]:
+        return statement.where(
+            source_rows.c.entity_id == self.entity.c.id,
+            source_rows.c.kind == self.rule.about,
+            held(source_rows),
+        )
 
     def _inherited(self) -> tuple[FromClause, Callable[[Select[Any]], Select[Any]]]:
         """Return an alias of statements, and what joins it to the structures of the entity."""
@@ -155,8 +164,10 @@ def statements_of(
     ----------
     of_structures : `statements_of_structures` of these kinds
     """
-    own, member = alias(Statement), alias(Membership)
-    by_itself = select(own.c.id).where(own.c.entity_id == entity.c.id, own.c.kind.in_(kinds), held(own))
+    statement, member = alias(Statement), alias(Membership)
+    by_itself = select(statement.c.id).where(
+        statement.c.entity_id == entity.c.id, statement.c.kind.in_(kinds), held(statement)
+    )
     by_structure = (
         select(of_structures.c.statement_id)
         .join(member, member.c.structure_id == of_structures.c.structure_id)
@@ -181,9 +192,9 @@ def entities_with_statement(
     wanted : what is asked of the statement
     own_type_first : a statement about a structure gives way to one of the same type about the entity
     """
-    said, inherited, member = alias(Statement), alias(Statement), alias(Membership)
-    by_themselves = select(said.c.entity_id).where(
-        said.c.entity_id > 0, said.c.kind.in_(kinds), held(said), *wanted(said)
+    statement, inherited, member = alias(Statement), alias(Statement), alias(Membership)
+    by_themselves = select(statement.c.entity_id).where(
+        statement.c.entity_id > 0, statement.c.kind.in_(kinds), held(statement), *wanted(statement)
     )
     by_structures = (
         select(member.c.entity_id)
@@ -207,21 +218,24 @@ def observations_of(
     tuple
         an alias of the statements, and the condition on it, which speaks of the `entity` around it
     """
-    said = alias(Statement)
-    same = _of_same_type(alias, entity.c.id, said, entity)
+    statement = alias(Statement)
+    same = _of_same_type(alias, entity.c.id, statement, entity)
     seen = and_(
-        statements_of(alias, entity, said, of_structures, "observation"),
-        or_(said.c.entity_id.is_not(None), not_(same)),
+        statements_of(alias, entity, statement, of_structures, "observation"),
+        or_(statement.c.entity_id.is_not(None), not_(same)),
     )
-    return said, seen
+    return statement, seen
 
 
 def _of_same_type(
     alias: Alias, entity_id: ColumnElement[int], said: FromClause, around: FromClause
 ) -> ColumnElement[bool]:
     """Test for an observation about the entity itself of the type of `said`."""
-    own = alias(Statement)
-    same = select(own.c.id).where(
-        own.c.entity_id == entity_id, own.c.kind == "observation", own.c.type == said.c.type, held(own)
+    statement = alias(Statement)
+    same = select(statement.c.id).where(
+        statement.c.entity_id == entity_id,
+        statement.c.kind == "observation",
+        statement.c.type == said.c.type,
+        held(statement),
     )
     return same.correlate(around, said).exists()

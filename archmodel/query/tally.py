@@ -48,9 +48,9 @@ def sorted_rows(rows: Sequence[dict[str, object]], names: Sequence[str]) -> list
     ordered = list(rows)
     for name in reversed(names):
         key = name.removeprefix("-")
-        known = [row for row in ordered if row[key] is not None]
-        known.sort(key=lambda row: row[key], reverse=name != key)  # type: ignore[arg-type, return-value]
-        ordered = known + [row for row in ordered if row[key] is None]
+        valued = [row for row in ordered if row[key] is not None]
+        valued.sort(key=lambda row: row[key], reverse=name != key)  # type: ignore[arg-type, return-value]
+        ordered = valued + [row for row in ordered if row[key] is None]
     return ordered
 
 
@@ -80,12 +80,12 @@ def count_by(
     QueryError
         if an expression cannot be understood
     """
-    known = {attribute.name: attribute for attribute in attributes(session, kind)}
+    attribute_of = {attribute.name: attribute for attribute in attributes(session, kind)}
     names = list(dict.fromkeys(["code", *by, *([share_of] if share_of else [])]))
     rows = find_rows(session, kind, where, run, names)
-    if share_of is not None and not known[share_of.partition("@")[0]].is_number:
+    if share_of is not None and not attribute_of[share_of.partition("@")[0]].is_number:
         raise UsageError(f"{share_of} is no number", remedy="name one, e.g. --share-of area")
-    if MARK in by and kind_has_marks(known):
+    if MARK in by and kind_has_marks(attribute_of):
         rows = _with_each_mark(session, rows)
     groups: dict[tuple[object, ...], list[Row]] = {}
     for row in rows:
@@ -96,30 +96,32 @@ def count_by(
     counted = [
         {**dict(zip(by, values, strict=True)), "count": len(members)} for values, members in groups.items()
     ]
-    units: dict[str, str | None] = {name: known[name.partition("@")[0]].unit for name in by} | {"count": "-"}
+    units: dict[str, str | None] = {name: attribute_of[name.partition("@")[0]].unit for name in by} | {
+        "count": "-"
+    }
     if share_of is not None:
         _add_shares(counted, list(groups.values()), _total(rows, share_of), share_of)
         unknown = len({row["code"] for row in rows if row[share_of] is None})
         notes += [f"{share_of} of {unknown} is not known, and does not count"] if unknown else []
-        units |= {share_of: known[share_of.partition("@")[0]].unit, "share": "-"}
+        units |= {share_of: attribute_of[share_of.partition("@")[0]].unit, "share": "-"}
     return Tally(units, sorted_rows(counted, by), tuple(notes))
 
 
-def kind_has_marks(known: Mapping[str, object]) -> bool:
+def kind_has_marks(attribute_names: Mapping[str, object]) -> bool:
     """Return whether these are attributes of entities, which can have marks."""
-    return MARK in known
+    return MARK in attribute_names
 
 
 def _with_each_mark(session: Session, rows: Sequence[dict[str, object]]) -> list[dict[str, object]]:
     """Repeat the row of an entity for each of its mason marks."""
-    held = (
+    marked = (
         select(Entity.code, MasonMark.sign)
         .join(Entity, Entity.id == MasonMark.entity_id)
         .where(MasonMark.superseded_id.is_(None))
         .distinct()
     )
     signs: dict[object, list[str]] = {}
-    for code, sign in session.execute(held):
+    for code, sign in session.execute(marked):
         signs.setdefault(code, []).append(str(sign))
     none: list[str | None] = [None]
     return [{**row, MARK: sign} for row in rows for sign in sorted(signs.get(row["code"], [])) or none]

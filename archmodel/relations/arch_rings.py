@@ -97,8 +97,8 @@ def arches_among(stones: StoneColumns, feet: Sequence[bool], joints: Iterable[Ar
         touching[joint.second].append(joint)
     members = [i for i in range(len(stones)) if not feet[i]]
     arches = (_arch(group, touching, stones) for group in _groups(members, touching))
-    found = [arch for arch in arches if arch is not None]
-    return sorted(found, key=lambda arch: min(stone.entity for stone in arch.stones))
+    present = [arch for arch in arches if arch is not None]
+    return sorted(present, key=lambda arch: min(stone.entity for stone in arch.stones))
 
 
 def _groups(members: Sequence[int], touching: Mapping[int, Sequence[ArchJoint]]) -> Iterator[list[int]]:
@@ -110,11 +110,13 @@ def _groups(members: Sequence[int], touching: Mapping[int, Sequence[ArchJoint]])
         left.remove(start)
         group, front = [start], [start]
         while front:
-            one = front.pop()
-            near = {other for joint in touching.get(one, ()) if (other := joint.other(one)) in left}
-            left -= near
-            group += near
-            front += near
+            voussoir = front.pop()
+            linked = {
+                second for joint in touching.get(voussoir, ()) if (second := joint.other(voussoir)) in left
+            }
+            left -= linked
+            group += linked
+            front += linked
         yield sorted(group)
 
 
@@ -141,11 +143,11 @@ def _arch(
     rows.sort(key=lambda row: float(np.linalg.norm(view.places(row) - centre, axis=1).mean()))
     for i in group:  # a ring ends at the springers that its last stones touch
         crossed[i] += [joint for joint in touching.get(i, ()) if joint.other(i) not in inside]
-    found: dict[int, ArchStone] = {}
+    arch_stones: dict[int, ArchStone] = {}
     for number, row in enumerate(rows, start=1):
         for stone in _placed(number, row, crossed, inside, stones, view):
-            found.setdefault(stone.entity, stone)
-    return ArchRings(tuple(found.values())) if len(found) >= _FEWEST else None
+            arch_stones.setdefault(stone.entity, stone)
+    return ArchRings(tuple(arch_stones.values())) if len(arch_stones) >= _FEWEST else None
 
 
 class _View:
@@ -275,7 +277,7 @@ def _placed(
     first = 2 if feet[0] else 1
     place = {i: rank for rank, i in enumerate(row, start=first)}
     place |= dict.fromkeys(sorted(feet[0]), 1) | dict.fromkeys(sorted(feet[1]), first + len(row))
-    for i, rank in sorted(place.items(), key=lambda one: (one[1], one[0])):
+    for i, rank in sorted(place.items(), key=lambda item: (item[1], item[0])):
         angle = _angle(i, place, crossed[i], view) if i in inside else None
         yield ArchStone(int(stones.ids[i]), number, rank, angle)
 
@@ -289,5 +291,5 @@ def _angle(stone: int, place: Mapping[int, int], joints: Sequence[ArchJoint], vi
             sides[int(apart > 0)] += joint.towards(stone) * -apart
     if not sides[0].any() or not sides[1].any():
         return None
-    one, other = view.project(sides[0]), view.project(sides[1])
-    return float(np.arctan2(abs(one[0] * other[1] - one[1] * other[0]), one @ other))
+    first, second = view.project(sides[0]), view.project(sides[1])
+    return float(np.arctan2(abs(first[0] * second[1] - first[1] * second[0]), first @ second))

@@ -28,23 +28,23 @@ def find_arches(session: Session) -> list[ArchRings]:
     place = {number: i for i, number in enumerate(stones.ids.tolist())}
     springers = kinds_below(Springer)
     joints = (
-        ArchJoint(place[one], place[two], np.array(normal))
-        for one, two, *normal in _touching_voussoirs(session)
+        ArchJoint(place[first], place[two], np.array(normal))
+        for first, two, *normal in _touching_voussoirs(session)
     )
     return arches_among(stones, [kind in springers for kind in stones.kinds], joints)
 
 
 def _touching_voussoirs(session: Session) -> Iterable[Any]:
     """Select subject, object and normal of the joints between voussoirs."""
-    subject, other = aliased(Entity), aliased(Entity)
+    subject, neighbour = aliased(Entity), aliased(Entity)
     names = kinds_below(Voussoir)
     return session.execute(
         select(Relation.subject_id, Relation.object_id, Relation.nx, Relation.ny, Relation.nz)
         .join(subject, subject.id == Relation.subject_id)
-        .join(other, other.id == Relation.object_id)
+        .join(neighbour, neighbour.id == Relation.object_id)
         .where(
             subject.kind.in_(names),
-            other.kind.in_(names),
+            neighbour.kind.in_(names),
             Relation.kind.in_(("rests_on", "beside")),
             Relation.superseded_id.is_(None),
             Relation.nx.is_not(None),
@@ -57,7 +57,7 @@ def arch_parts(session: Session, arches: Sequence[ArchRings]) -> list[StructureP
     """Return the arches as structures; one that shares most of its stones with a stored arch keeps its code."""
     number = {stone.entity: i for i, arch in enumerate(arches) for stone in arch.stones}
     votes: Counter[tuple[int, str]] = Counter()
-    known = (
+    query = (
         select(Membership.entity_id, Structure.code)
         .join(Structure, Structure.id == Membership.structure_id)
         .where(
@@ -67,7 +67,7 @@ def arch_parts(session: Session, arches: Sequence[ArchRings]) -> list[StructureP
             Membership.declared.is_(False),
         )
     )
-    for entity, code in session.execute(known):
+    for entity, code in session.execute(query):
         if entity in number:
             votes[number[entity], code] += 1
     codes: dict[int, str] = {}

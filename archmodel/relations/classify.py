@@ -168,19 +168,19 @@ class _Faces:
 
     @classmethod
     def of(cls, contacts: StoneContacts, stones: StonesOf, settings: RelationSettings) -> "_Faces":
-        near = np.cos(np.radians(settings.along))
-        one, two = stones.normals[contacts.pairs[:, 0]], stones.normals[contacts.pairs[:, 1]]
+        near_cosine = np.cos(np.radians(settings.along))
+        first_normal, two = stones.normals[contacts.pairs[:, 0]], stones.normals[contacts.pairs[:, 1]]
         steepest = np.sin(np.radians(settings.bed))
-        upright = (np.abs(one[:, 2]) <= steepest) & (np.abs(two[:, 2]) <= steepest)
-        cosine = (one * two).sum(axis=1)
-        along_one = (one * contacts.normal).sum(axis=1)
+        upright = (np.abs(first_normal[:, 2]) <= steepest) & (np.abs(two[:, 2]) <= steepest)
+        cosine = (first_normal * two).sum(axis=1)
+        along_one = (first_normal * contacts.normal).sum(axis=1)
         along_two = (two * contacts.normal).sum(axis=1)
-        opposite = upright & (cosine <= -near)
+        opposite = upright & (cosine <= -near_cosine)
         return cls(
-            across=opposite & (along_one >= near) & (along_two <= -near),
+            across=opposite & (along_one >= near_cosine) & (along_two <= -near_cosine),
             opposite=opposite,
-            apart=upright & (cosine < near),
-            back=(np.abs(along_one) >= near) & (np.abs(along_two) >= near),
+            apart=upright & (cosine < near_cosine),
+            back=(np.abs(along_one) >= near_cosine) & (np.abs(along_two) >= near_cosine),
         )
 
     def bonded(self, names: Sequence[str], first: Ints, second: Ints, rests: Bools) -> Bools:
@@ -245,13 +245,13 @@ def _merged(contacts: StoneContacts, parts: Sequence[tuple[int, Bools, Ints, Int
     """Merge relations to one of a kind for each pair, with the area of all its contacts."""
     rows = np.concatenate([np.flatnonzero(mask) for _, mask, _, _, _ in parts])
     kind = np.concatenate([np.full(int(mask.sum()), number) for number, mask, _, _, _ in parts])
-    subject = np.concatenate([one[mask] for _, mask, one, _, _ in parts])
-    other = np.concatenate([two[mask] for _, mask, _, two, _ in parts])
+    subject = np.concatenate([first[mask] for _, mask, first, _, _ in parts])
+    target = np.concatenate([two[mask] for _, mask, _, two, _ in parts])
     sign = np.concatenate([turn[mask] for _, mask, _, _, turn in parts])
-    order = np.lexsort((other, subject, kind))
-    rows, kind, subject, other, sign = (one[order] for one in (rows, kind, subject, other, sign))
+    order = np.lexsort((target, subject, kind))
+    rows, kind, subject, target, sign = (column[order] for column in (rows, kind, subject, target, sign))
     new = np.ones(len(rows), np.bool_)
-    new[1:] = (np.diff(kind) != 0) | (np.diff(subject) != 0) | (np.diff(other) != 0)
+    new[1:] = (np.diff(kind) != 0) | (np.diff(subject) != 0) | (np.diff(target) != 0)
     starts = np.flatnonzero(new)
     if len(starts) == 0:
         none, empty = np.zeros(0, np.int64), np.zeros(0)
@@ -265,7 +265,7 @@ def _merged(contacts: StoneContacts, parts: Sequence[tuple[int, Bools, Ints, Int
     return FoundRelations(
         kind=kind[starts],
         subject=subject[starts],
-        object=other[starts],
+        object=target[starts],
         area=area,
         gap=np.add.reduceat(weight * contacts.gap[rows], starts) / area,
         centroid=origin + np.add.reduceat(weight[:, None] * offset, starts) / area[:, None],

@@ -26,8 +26,8 @@ def arch_values(arches: Sequence[ArchRings]) -> dict[int, dict[str, float | None
     values: dict[int, dict[str, float | None]] = {}
     for arch in arches:
         for stone in arch.stones:
-            given = {"ring": stone.ring, "rank": stone.rank, "intrados_angle": stone.angle}
-            values.setdefault(stone.entity, dict(given))
+            ring_values = {"ring": stone.ring, "rank": stone.rank, "intrados_angle": stone.angle}
+            values.setdefault(stone.entity, dict(ring_values))
     return values
 
 
@@ -40,7 +40,7 @@ def tail_lengths(session: Session, headers: Collection[int] | None = None) -> di
     """
     conditions: Iterator[ColumnElement[bool]] | list[ColumnElement[bool]]
     conditions = [Entity.id.is_not(None)] if headers is None else id_conditions(Entity.id, headers)
-    found: dict[int, float] = {}
+    tails: dict[int, float] = {}
     for condition in conditions:
         for mine, others in (
             (Relation.subject_id, Relation.object_id),
@@ -66,8 +66,8 @@ def tail_lengths(session: Session, headers: Collection[int] | None = None) -> di
                 assert depth is not None
                 assert deepest is not None
                 tail = max(depth - deepest, 0.0)
-                found[number] = min(tail, found.get(number, tail))
-    return found
+                tails[number] = min(tail, tails.get(number, tail))
+    return tails
 
 
 def give_values(session: Session, values: Mapping[int, Mapping[str, float | None]], act: Act) -> int:
@@ -82,14 +82,14 @@ def give_values(session: Session, values: Mapping[int, Mapping[str, float | None
     values : by entity and attribute, the same attributes for all; None: nothing to say
     act : that they come with
     """
-    names = sorted({name for given in values.values() for name in given})
+    names = sorted({name for changes in values.values() for name in changes})
     if not names:
         return 0
     declared = _declared(session, names)
     columns = [table_of(Entity).c[name] for name in names]
     changed = 0
     for some in batches(values):
-        held = {
+        stored = {
             row[0]: dict(zip(names, row[1:], strict=True))
             for row in session.execute(
                 select(table_of(Entity).c.id, *columns).where(table_of(Entity).c.id.in_(some))
@@ -99,11 +99,11 @@ def give_values(session: Session, values: Mapping[int, Mapping[str, float | None
             (number, name, before, after)
             for number in some
             for name, after in values[number].items()
-            if (number, name) not in declared and _differs(before := held[number][name], after)
+            if (number, name) not in declared and _differs(before := stored[number][name], after)
         ]
         changed += len(changes)
         if changes:
-            _update(session, names, held, changes)
+            _update(session, names, stored, changes)
             _keep_former(session, [change for change in changes if change[2] is not None], act)
     return changed
 
@@ -128,10 +128,10 @@ _Change = tuple[int, str, float | None, float | None]
 def _update(
     session: Session,
     names: Sequence[str],
-    held: Mapping[int, Mapping[str, float | None]],
+    stored: Mapping[int, Mapping[str, float | None]],
     changes: Sequence[_Change],
 ) -> None:
-    after = {number: dict(held[number]) for number, *_ in changes}
+    after = {number: dict(stored[number]) for number, *_ in changes}
     for number, name, _, value in changes:
         after[number][name] = value
     table = table_of(Entity)

@@ -54,11 +54,11 @@ def held_settings(session: Session) -> RelationSettings:
     Relations that are computed later, of stones that come or change, are so to the same measure.
     """
     last = select(Entry.settings).where(Entry.action == "geometry").order_by(Entry.id.desc()).limit(1)
-    known = {field.name for field in fields(RelationSettings)}
-    given: dict[str, Any] = {
-        name: value for name, value in (session.scalar(last) or {}).items() if name in known
+    names = {field.name for field in fields(RelationSettings)}
+    stored_values: dict[str, Any] = {
+        name: value for name, value in (session.scalar(last) or {}).items() if name in names
     }
-    return RelationSettings(**given)
+    return RelationSettings(**stored_values)
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,11 @@ class Changes:
 
 
 def store_relations(
-    session: Session, ids: Ints, found: FoundRelations, act: Act, only: Collection[int] | None = None
+    session: Session,
+    ids: Ints,
+    found_relations: FoundRelations,
+    act: Act,
+    only: Collection[int] | None = None,
 ) -> dict[str, Changes]:
     """Replace the computed relations of the database with those that were found.
 
@@ -90,8 +94,8 @@ def store_relations(
     Parameters
     ----------
     session : a writing session
-    ids : (n,) numbers of the entities that the indices of `found` mean, growing
-    found : relations
+    ids : (n,) numbers of the entities that the indices of `found_relations` mean, growing
+    found_relations : relations
     act : that they come with
     only : numbers of entities; relations of which neither side is one of them are left alone. None: all
 
@@ -99,26 +103,28 @@ def store_relations(
     -------
     Changes by kind of relation
     """
-    held = _held(session, only)
-    keys = _keys(found.kind, ids[found.subject], ids[found.object])
-    declared = np.isin(keys, held.keys[held.declared])
-    place = np.searchsorted(held.keys, keys) if len(held.keys) else np.zeros(len(keys), np.int64)
-    known = np.zeros(len(keys), np.bool_)
-    if len(held.keys):
-        place = np.minimum(place, len(held.keys) - 1)
-        known = (held.keys[place] == keys) & ~held.declared[place]
-        known[known] &= (np.abs(held.numbers[place[known]] - _numbers(found)[known]) <= _SAME).all(axis=1)
-    stays = held.declared.copy()
-    stays[place[known]] = True
-    new = np.flatnonzero(~declared & ~known)
-    supersede(session, Relation, held.ids[~stays].tolist(), act)
+    stored = _held(session, only)
+    keys = _keys(found_relations.kind, ids[found_relations.subject], ids[found_relations.object])
+    declared = np.isin(keys, stored.keys[stored.declared])
+    place = np.searchsorted(stored.keys, keys) if len(stored.keys) else np.zeros(len(keys), np.int64)
+    unchanged = np.zeros(len(keys), np.bool_)
+    if len(stored.keys):
+        place = np.minimum(place, len(stored.keys) - 1)
+        unchanged = (stored.keys[place] == keys) & ~stored.declared[place]
+        unchanged[unchanged] &= (
+            np.abs(stored.numbers[place[unchanged]] - _numbers(found_relations)[unchanged]) <= _SAME
+        ).all(axis=1)
+    stays = stored.declared.copy()
+    stays[place[unchanged]] = True
+    new = np.flatnonzero(~declared & ~unchanged)
+    supersede(session, Relation, stored.ids[~stays].tolist(), act)
     if len(new):
-        insert_rows(session, Relation, _rows(ids, found, new, act.id))
+        insert_rows(session, Relation, _rows(ids, found_relations, new, act.id))
     return {
         name: Changes(
-            int((found.kind[new] == number).sum()),
-            int((found.kind[known] == number).sum()),
-            int((held.kinds[~stays] == number).sum()),
+            int((found_relations.kind[new] == number).sum()),
+            int((found_relations.kind[unchanged] == number).sum()),
+            int((stored.kinds[~stays] == number).sum()),
         )
         for number, name in enumerate(RELATIONS)
     }
@@ -145,14 +151,14 @@ class _Held:
 def _held(session: Session, only: Collection[int] | None) -> _Held:
     rows = {row[0]: row for condition in _concerning(only) for row in _select(session, condition)}
     count = len(rows)
-    ids, subject, other = (np.array([row[k] for row in rows.values()], dtype=np.int64) for k in (0, 2, 3))
+    ids, subject, target = (np.array([row[k] for row in rows.values()], dtype=np.int64) for k in (0, 2, 3))
     kind = np.array([row[1] for row in rows.values()], dtype="U16")
     declared = np.array([row[4] for row in rows.values()], dtype=np.bool_)
     kinds = np.zeros(count, np.int64)
     for number, name in enumerate(RELATIONS):
         kinds[kind == name] = number
     numbers = np.array([row[5:] for row in rows.values()], dtype=np.float64).reshape(count, len(_NUMBERS))
-    keys = _keys(kinds, subject, other)
+    keys = _keys(kinds, subject, target)
     order = np.lexsort((ids, declared, keys))
     return _Held(ids[order], keys[order], kinds[order], declared[order], numbers[order])
 
@@ -180,26 +186,33 @@ def _concerning(only: Collection[int] | None) -> Iterator[ColumnElement[bool]]:
         yield condition
 
 
-def _keys(kind: Ints, subject: Ints, other: Ints) -> Ints:
+def _keys(kind: Ints, subject: Ints, target: Ints) -> Ints:
     """Return one number for kind, subject and object; each entity's number is below 2³⁰."""
-    return (kind << 60) | (subject << 30) | other
+    return (kind << 60) | (subject << 30) | target
 
 
-def _numbers(found: FoundRelations) -> Array:
-    return np.column_stack([found.area, found.gap, found.centroid, found.normal])
+def _numbers(found_relations: FoundRelations) -> Array:
+    return np.column_stack(
+        [found_relations.area, found_relations.gap, found_relations.centroid, found_relations.normal]
+    )
 
 
-def _rows(ids: Ints, found: FoundRelations, new: Ints, entry: int) -> Iterator[dict[str, Any]]:
-    numbers = _numbers(found)
+def _rows(ids: Ints, found_relations: FoundRelations, new: Ints, entry: int) -> Iterator[dict[str, Any]]:
+    numbers = _numbers(found_relations)
     for batch in batches(new.tolist()):
         rows = np.array(batch)
-        subjects, others = ids[found.subject[rows]].tolist(), ids[found.object[rows]].tolist()
-        kinds = [RELATIONS[kind] for kind in found.kind[rows].tolist()]
-        for kind, subject, other, values in zip(kinds, subjects, others, numbers[rows].tolist(), strict=True):
+        subjects, others = (
+            ids[found_relations.subject[rows]].tolist(),
+            ids[found_relations.object[rows]].tolist(),
+        )
+        kinds = [RELATIONS[kind] for kind in found_relations.kind[rows].tolist()]
+        for kind, subject, target, values in zip(
+            kinds, subjects, others, numbers[rows].tolist(), strict=True
+        ):
             yield {
                 "kind": kind,
                 "subject_id": subject,
-                "object_id": other,
+                "object_id": target,
                 "declared": False,
                 "entry_id": entry,
                 "superseded_id": None,

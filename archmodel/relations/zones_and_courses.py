@@ -89,7 +89,7 @@ def whole_courses(session: Session, entities: Collection[int]) -> StoneColumns:
     """Return all stones of the zones and courses to which some entities belong, or belonged until now."""
     places: set[tuple[str | None, int | None]] = set()
     zone = aliased(Structure)
-    held = (
+    query = (
         select(zone.code, Structure.number)
         .join(Membership, Membership.structure_id == Structure.id)
         .outerjoin(zone, zone.id == Structure.parent_id)
@@ -107,7 +107,7 @@ def whole_courses(session: Session, entities: Collection[int]) -> StoneColumns:
             )
         )
     for condition in id_conditions(Membership.entity_id, entities):
-        places.update((part, course) for part, course in session.execute(held.where(condition).distinct()))
+        places.update((part, course) for part, course in session.execute(query.where(condition).distinct()))
     places.discard((None, None))
     return joined(
         [
@@ -130,21 +130,21 @@ def along_the_wall(centres: Array, normals: Array) -> Ints:
     centres : (n, 3) centroids [m]; stones without one come last
     normals : (n, 3) of their faces; NaN where not known
     """
-    known = np.isfinite(centres).all(axis=1)
+    finite = np.isfinite(centres).all(axis=1)
     place = np.full(len(centres), np.inf)
-    flat = centres[known, :2] - centres[known, :2].mean(axis=0) if known.any() else np.zeros((0, 2))
+    flat = centres[finite, :2] - centres[finite, :2].mean(axis=0) if finite.any() else np.zeros((0, 2))
     looks = normals[np.isfinite(normals).all(axis=1), :2]
     mean = looks.mean(axis=0) if len(looks) else np.zeros(2)
     size = float(np.linalg.norm(mean))
     if size >= _ONE_WAY:
-        place[known] = flat @ np.array([-mean[1], mean[0]]) / size
+        place[finite] = flat @ np.array([-mean[1], mean[0]]) / size
     elif len(flat):
         _, spread, axes = np.linalg.svd(flat, full_matrices=False)
         if spread[0] >= _LONG * spread[-1]:
             axis = axes[0] * (1.0 if axes[0][np.abs(axes[0]).argmax()] > 0.0 else -1.0)
-            place[known] = flat @ axis
+            place[finite] = flat @ axis
         else:
-            place[known] = _around(flat)
+            place[finite] = _around(flat)
     return np.argsort(place, kind="stable")
 
 
@@ -189,14 +189,14 @@ def store_parts(
         for entity, rank in zip(part.members, part.ranks, strict=True)
     }
     looked_at = None if among is None else {*among, *(entity for entity, _ in wanted)}
-    held, declared = _held(session, tuple(kinds), looked_at)
-    stay = {key for key, (_, rank) in held.items() if key in wanted and wanted[key] == rank}
-    supersede(session, Membership, [number for key, (number, _) in held.items() if key not in stay], act)
+    stored, declared = _held(session, tuple(kinds), looked_at)
+    stay = {key for key, (_, rank) in stored.items() if key in wanted and wanted[key] == rank}
+    supersede(session, Membership, [number for key, (number, _) in stored.items() if key not in stay], act)
     new = [key for key in wanted if key not in stay and key not in declared]
     if new:
         entry = act.id
         insert_rows(session, Membership, (_row(*key, wanted[key], entry) for key in new))
-    return structures, Changes(len(new), len(stay), len(held) - len(stay))
+    return structures, Changes(len(new), len(stay), len(stored) - len(stay))
 
 
 def _row(entity: int, structure: int, rank: int | None, entry: int) -> dict[str, object]:
@@ -214,10 +214,10 @@ def _structures(session: Session, parts: Sequence[StructurePart], act: Act) -> t
     """Return the numbers of the structures by code; make those that are missing."""
     numbers: dict[str, int] = {}
     for batch in batches({code for part in parts for code in (part.code, part.parent) if code is not None}):
-        held = select(Structure.code, Structure.id).where(
+        query = select(Structure.code, Structure.id).where(
             Structure.code.in_(batch), Structure.superseded_id.is_(None)
         )
-        numbers.update((code, number) for code, number in session.execute(held))
+        numbers.update((code, number) for code, number in session.execute(query))
     missing = [part for part in parts if part.code not in numbers]
     for part in missing:
         made = structure_kind_named(part.kind)(
@@ -236,7 +236,7 @@ def _held(
     session: Session, kinds: tuple[str, ...], among: set[int] | None
 ) -> tuple[dict[tuple[int, int], tuple[int, int | None]], set[tuple[int, int]]]:
     """Return number and rank of the held computed memberships by entity and structure, and the declared ones."""
-    held: dict[tuple[int, int], tuple[int, int | None]] = {}
+    stored: dict[tuple[int, int], tuple[int, int | None]] = {}
     declared: set[tuple[int, int]] = set()
     statement = (
         select(
@@ -252,10 +252,10 @@ def _held(
     chosen = [statement]
     if among is not None:
         chosen = [statement.where(condition) for condition in id_conditions(Membership.entity_id, among)]
-    for one in chosen:
-        for number, entity, structure, rank, said in session.execute(one):
-            if said:
+    for query in chosen:
+        for number, entity, structure, rank, is_declared in session.execute(query):
+            if is_declared:
                 declared.add((entity, structure))
             else:
-                held[entity, structure] = (number, rank)
-    return held, declared
+                stored[entity, structure] = (number, rank)
+    return stored, declared

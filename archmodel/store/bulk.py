@@ -57,9 +57,9 @@ def batches(items: Iterable[T]) -> Iterator[list[T]]:
 
 
 def _table(table: type[Base]) -> Table:
-    found = table.__table__
-    assert isinstance(found, Table)
-    return found
+    mapped = table.__table__
+    assert isinstance(mapped, Table)
+    return mapped
 
 
 def _converter(table: Table, names: Sequence[str], dialect: Dialect) -> Callable[[Mapping[str, Any]], Row]:

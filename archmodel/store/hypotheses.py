@@ -88,30 +88,30 @@ def withdraw_hypotheses(session: Session, entry: Entry, entities: Iterable[int])
     outcome = NOTHING
     for batch in batches(entities):
         found = list(session.scalars(select(Entity).where(Entity.id.in_(batch)).order_by(Entity.id)))
-        seen = next((one for one in found if not one.hypothesis), None)
+        seen = next((entity for entity in found if not entity.hypothesis), None)
         if seen is not None:
             raise UsageError(f"{seen.code} is no hypothesis: it was surveyed", remedy="leave it out")
-        held = [one for one in found if one.x is not None]
-        outcome += RowCounts(withdrawn=len(held), unchanged=len(found) - len(held))
-        _end_geometry(session, entry, held)
+        in_space = [entity for entity in found if entity.x is not None]
+        outcome += RowCounts(withdrawn=len(in_space), unchanged=len(found) - len(in_space))
+        _end_geometry(session, entry, in_space)
     return outcome
 
 
 def _check(session: Session, stones: Sequence[StoneRecord]) -> None:
     if not stones:
         raise UsageError("there are no stones", remedy="give one at least")
-    known: set[str] = set()
+    stored_codes: set[str] = set()
     lookalikes = Lookalikes(session, Entity.code)
     for batch in batches(stones):
         codes = [stone.code for stone in batch]
         there = session.scalars(select(Entity.code).where(Entity.code.in_(codes))).all()
-        twice = [*there, *(code for code in codes if code in known or codes.count(code) > 1)]
+        twice = [*there, *(code for code in codes if code in stored_codes or codes.count(code) > 1)]
         if twice:
             raise DatabaseError(f"the code {twice[0]} is taken", remedy="give each stone a code of its own")
-        if (found := lookalikes.like(codes)) is not None:
+        if (like := lookalikes.like(codes)) is not None:
             remedy = "write both with the same characters"
-            raise DatabaseError(f"the code {explained(*found)}", remedy=remedy)
-        known |= set(codes)
+            raise DatabaseError(f"the code {explained(*like)}", remedy=remedy)
+        stored_codes |= set(codes)
         if any(not stone.hypothesis for stone in batch):
             code = next(stone.code for stone in batch if not stone.hypothesis)
             raise UsageError(f"{code} is no hypothesis", remedy="store what was surveyed by ingest")
@@ -121,22 +121,22 @@ def _end_geometry(session: Session, entry: Entry, entities: Sequence[Entity]) ->
     """End the measurements of entities and the attributes that follow from them; corrections keep the values."""
     if not entities:
         return
-    numbers = [one.id for one in entities]
+    numbers = [entity.id for entity in entities]
     measured = select(Measurement.id).where(
         Measurement.entity_id.in_(numbers), Measurement.superseded_id.is_(None)
     )
     end_rows(session, entry, Measurement, list(session.scalars(measured)))
     rows = [
         {
-            "entity_id": one.id,
+            "entity_id": entity.id,
             "entry_id": entry.id,
             "attribute": name,
-            "before": getattr(one, name),
+            "before": getattr(entity, name),
             "after": None,
         }
-        for one in entities
+        for entity in entities
         for name in _GIVEN_UP
-        if getattr(one, name) is not None
+        if getattr(entity, name) is not None
     ]
     session.execute(insert(Correction), rows)
     session.execute(update(Entity).where(Entity.id.in_(numbers)).values(dict.fromkeys(_GIVEN_UP)))

@@ -30,18 +30,18 @@ def plain_form(name: str) -> str:
     return name if name.isascii() else unicodedata.normalize("NFKC", name).translate(_LETTERS)
 
 
-def explained(name: str, other: str) -> str:
+def explained(name: str, similar: str) -> str:
     """Return what distinguishes two names that look alike, in words.
 
     >>> explained("А1", "A1")
     'А1 looks like A1, but has CYRILLIC CAPITAL LETTER A'
     """
-    odd = [one for one in dict.fromkeys(name) if one not in other] or [
-        one for one in dict.fromkeys(other) if one not in name
+    odd = [character for character in dict.fromkeys(name) if character not in similar] or [
+        character for character in dict.fromkeys(similar) if character not in name
     ]
-    told = ", ".join(unicodedata.name(one, f"U+{ord(one):04X}") for one in odd[:3])
+    characters = ", ".join(unicodedata.name(character, f"U+{ord(character):04X}") for character in odd[:3])
     holder = "has" if odd and odd[0] in name else "lacks"
-    return f"{name[:40]} looks like {other[:40]}, but {holder} {told or 'other characters'}"
+    return f"{name[:40]} looks like {similar[:40]}, but {holder} {characters or 'other characters'}"
 
 
 class Lookalikes:
@@ -68,14 +68,16 @@ class Lookalikes:
         """Return the first of new names that looks like another, new or there already, with the other; None: none."""
         ascii = {name for name in names if name.isascii()}
         for name in names:
-            other = self._odd.setdefault(plain_form(name), name) if name not in ascii else self._odd.get(name)
-            if other not in (None, name):
-                return name, str(other)
+            similar = (
+                self._odd.setdefault(plain_form(name), name) if name not in ascii else self._odd.get(name)
+            )
+            if similar not in (None, name):
+                return name, str(similar)
         odd = {form: name for form, name in self._odd.items() if name in set(names) - ascii}
         if not odd:
             return None
-        known: Iterable[str] = self._session.scalars(self._names.where(self._column.in_(list(odd))))
-        for form in (*known, *ascii):
+        stored_names: Iterable[str] = self._session.scalars(self._names.where(self._column.in_(list(odd))))
+        for form in (*stored_names, *ascii):
             if form in odd and odd[form] != form:
                 return odd[form], form
         return None

@@ -60,10 +60,10 @@ def supersede_measurements(
 def _correct(session: Session, entry_id: int, made: Mapping[int, Mapping[str, object]]) -> None:
     """Write the new values into the entities, and a correction for each that differs."""
     columns = [getattr(Entity, name) for name in MEASURED]
-    held = session.execute(select(Entity.id, *columns).where(Entity.id.in_(made))).mappings()
+    rows = session.execute(select(Entity.id, *columns).where(Entity.id.in_(made))).mappings()
     corrections: list[dict[str, Any]] = []
     changed = []
-    for row in held:
+    for row in rows:
         new = made[row["id"]]
         differing = [name for name in MEASURED if row[name] != new[name]]
         if differing:

@@ -144,8 +144,8 @@ def _end_where(session: Session, entry: Entry, cls: type[Base], **owner: int) ->
     """End the held rows that belong to a row; return their number."""
     table = table_of(cls)
     conditions = [table.c[name] == value for name, value in owner.items()]
-    held = select(func.count()).select_from(table).where(table.c.superseded_id.is_(None), *conditions)
-    count = int(session.scalar(held) or 0)
+    query = select(func.count()).select_from(table).where(table.c.superseded_id.is_(None), *conditions)
+    count = int(session.scalar(query) or 0)
     session.execute(
         update(table).where(table.c.superseded_id.is_(None), *conditions).values(superseded_id=entry.id)
     )
@@ -155,7 +155,7 @@ def _end_where(session: Session, entry: Entry, cls: type[Base], **owner: int) ->
 
 def _read_again(session: Session, cls: type[Base]) -> None:
     """Expire loaded rows of a class, which may have ended without the session's knowledge."""
-    for row in [one for one in session.identity_map.values() if isinstance(one, cls)]:
+    for row in [entity for entity in session.identity_map.values() if isinstance(entity, cls)]:
         session.expire(row, ["superseded_id"])
 
 

@@ -188,7 +188,7 @@ def stone_faces(session: Session, *conditions: ColumnElement[bool]) -> Iterator[
     for number, code, kind, course, zone, depth, depth_sigma, area, *packed in chain.from_iterable(
         _parts(session, statement)
     ):
-        outline, normal, sigma = (np.frombuffer(one, dtype="<f8") for one in packed)
+        outline, normal, sigma = (np.frombuffer(buffer, dtype="<f8") for buffer in packed)
         corners = outline.reshape(-1, 3)
         yield StoneFace(
             id=number,
@@ -240,8 +240,8 @@ def _runs(numbers: Sequence[int]) -> Iterator[tuple[int, int]]:
 def _chunks(runs: Iterable[tuple[int, int]]) -> Iterator[list[tuple[int, int]]]:
     waiting: list[tuple[int, int]] = []
     for batch in batches(runs):
-        for one in batch:
-            waiting.append(one)
+        for stone in batch:
+            waiting.append(stone)
             if len(waiting) == _RANGES:
                 yield waiting
                 waiting = []

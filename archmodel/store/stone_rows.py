@@ -110,8 +110,8 @@ def _number(value: float, name: str, place: str) -> float:
 def _array(value: Array, shape: tuple[int, ...], name: str, place: str) -> Array:
     """Return `value` as floats; refuse other shapes (-1 first: any length) and numbers that are not finite."""
     array = np.asarray(value, dtype=np.float64)
-    found = array.shape
-    if found != shape and (shape[0] != -1 or len(found) != len(shape) or found[1:] != shape[1:]):
+    actual = array.shape
+    if actual != shape and (shape[0] != -1 or len(actual) != len(shape) or actual[1:] != shape[1:]):
         raise SurveyError(f"{name} has shape {array.shape}, expected {shape}", where=place)
     # a finite sum has finite terms; the converse need not hold
     if not math.isfinite(array.sum()) and not np.isfinite(array).all():
@@ -201,7 +201,7 @@ def _restorer(field: Field[Any], column: Column[Any]) -> Restorer | None:
 
 
 def _tuples(value: Any) -> Any:
-    return tuple(_tuples(one) for one in value) if isinstance(value, list | tuple) else value
+    return tuple(_tuples(item) for item in value) if isinstance(value, list | tuple) else value
 
 
 def _known(value: object, name: str, entity: Entity) -> object:

@@ -88,11 +88,11 @@ def store_survey(
         for batch in batches(stones):
             _refuse_lookalikes(codes, batch, source_path, "code")
             _refuse_lookalikes(zones, batch, source_path, "zone")
-            known = _known_codes(session, batch)
-            _refuse_codes(batch, {} if again else known, lines, source_path)
-            insert_stones(session, [one for one in batch if one.code not in known], survey)
-            old = [one for one in batch if one.code in known]
-            numbers = [known[one.code][0] for one in old]
+            stored = _known_codes(session, batch)
+            _refuse_codes(batch, {} if again else stored, lines, source_path)
+            insert_stones(session, [stone for stone in batch if stone.code not in stored], survey)
+            old = [stone for stone in batch if stone.code in stored]
+            numbers = [stored[stone.code][0] for stone in old]
             supersede_measurements(
                 session, survey.entry_id, survey.id, numbers, old, _places(old, source_path)
             )
@@ -113,26 +113,26 @@ def survey_with_hash(session: Session, sha256: str) -> Survey | None:
 def load_stones(session: Session, entities: Iterable[Entity]) -> list[StoneRecord]:
     """Return the records of these entities, in the same order, exactly as they were stored."""
     wanted = [entity.id for entity in entities]
-    found: dict[int, StoneRecord] = {}
+    stone_records: dict[int, StoneRecord] = {}
     for batch in batches(dict.fromkeys(wanted)):
         rows = session.execute(
             select(Entity, Measurement).join(Entity.measurement).where(Entity.id.in_(batch))
         )
-        found.update((entity.id, stone_record(entity, measured)) for entity, measured in rows)
-    missing = [number for number in wanted if number not in found]
+        stone_records.update((entity.id, stone_record(entity, measured)) for entity, measured in rows)
+    missing = [number for number in wanted if number not in stone_records]
     if missing:
         raise DatabaseError(
             f"{len(missing)} entities are no longer in the database", where=f"entity {missing[0]}"
         )
-    return [found[number] for number in wanted]
+    return [stone_records[number] for number in wanted]
 
 
 def _earlier(session: Session, sha256: str, source_path: str, again: bool) -> Survey | None:
     """Return the survey that was taken in from the same bytes; refuse it unless it is read again."""
-    known = survey_with_hash(session, sha256)
-    if known is None or again:
-        return known
-    what = f"this file is in the database already, as survey {known.name!r} from {known.path}"
+    survey = survey_with_hash(session, sha256)
+    if survey is None or again:
+        return survey
+    what = f"this file is in the database already, as survey {survey.name!r} from {survey.path}"
     remedy = (
         "there is nothing to do; to read it with other options, give --again too, or another database (--db)"
     )
@@ -144,11 +144,11 @@ def _digest_again(sha256: str, entry: int) -> str:
     return hashlib.sha256(f"{entry}: {sha256}".encode()).hexdigest()
 
 
-def _refuse_others(new: range, known: Survey | None, source_path: str) -> None:
+def _refuse_others(new: range, survey: Survey | None, source_path: str) -> None:
     """Refuse stones of the same file under other codes, which would be there twice."""
-    if known is not None and len(new):
+    if survey is not None and len(new):
         what = (
-            f"{len(new)} stones have codes that the survey {known.name!r} of the same file did not give them"
+            f"{len(new)} stones have codes that the survey {survey.name!r} of the same file did not give them"
         )
         remedy = "give the options that made the codes then, or another database (--db)"
         raise DatabaseError(what, where=source_path, remedy=remedy)
@@ -156,7 +156,7 @@ def _refuse_others(new: range, known: Survey | None, source_path: str) -> None:
 
 def _known_codes(session: Session, batch: Sequence[StoneRecord]) -> dict[str, tuple[int, str]]:
     """Return the codes that were stored before this file: primary key, and place of measurement."""
-    found = session.execute(
+    rows = session.execute(
         select(Entity.code, Entity.id, Survey.path, Measurement.line)
         .outerjoin(Entity.measurement)
         .outerjoin(Measurement.survey)
@@ -164,13 +164,13 @@ def _known_codes(session: Session, batch: Sequence[StoneRecord]) -> dict[str, tu
     )
     return {
         code: (number, "the database, not measured" if path is None else f"{path}:{line}")
-        for code, number, path, line in found
+        for code, number, path, line in rows
     }
 
 
 def _refuse_codes(
     batch: Sequence[StoneRecord],
-    known: Mapping[str, tuple[int, str]],
+    stored: Mapping[str, tuple[int, str]],
     lines: dict[str, int],
     path: str,
 ) -> None:
@@ -179,8 +179,8 @@ def _refuse_codes(
         remedy = "give each stone a code of its own"
         if stone.code in lines:
             first = f"{path}:{lines[stone.code]}"
-        elif stone.code in known:
-            first = known[stone.code][1]
+        elif stone.code in stored:
+            first = stored[stone.code][1]
             remedy += "; if it was measured again, give --again"
         else:
             lines[stone.code] = stone.line
@@ -189,16 +189,16 @@ def _refuse_codes(
         raise DatabaseError(what, where=f"{path}:{stone.line}", remedy=remedy)
 
 
-def _refuse_lookalikes(known: Lookalikes, batch: Sequence[StoneRecord], path: str, name: str) -> None:
+def _refuse_lookalikes(stored_codes: Lookalikes, batch: Sequence[StoneRecord], path: str, name: str) -> None:
     """Refuse codes or zones that look like others, at their place in the file."""
     lines: dict[str, int] = {}
     for stone in batch:
         if (text := getattr(stone, name)) is not None:
             lines.setdefault(text, stone.line)
-    if (found := known.like(list(lines))) is not None:
+    if (like := stored_codes.like(list(lines))) is not None:
         remedy = "write both with the same characters"
-        place = f"{path}:{lines[found[0]]}"
-        raise DatabaseError(f"the {name} {explained(*found)}", where=place, remedy=remedy)
+        place = f"{path}:{lines[like[0]]}"
+        raise DatabaseError(f"the {name} {explained(*like)}", where=place, remedy=remedy)
 
 
 def _places(batch: Sequence[StoneRecord], path: str) -> list[str]:

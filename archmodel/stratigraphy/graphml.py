@@ -106,7 +106,7 @@ def _link(edge: etree.Element, names: Mapping[str, str]) -> Link | None:
     named = "_".join("".join(label.itertext()).split()) if label is not None else ""
     if named in DEFINITIONS:
         return Link(subject, named, target)
-    inverse = next((name for name, other in INVERSE.items() if other == named), None)
+    inverse = next((name for name, inverse_name in INVERSE.items() if inverse_name == named), None)
     if inverse is not None:
         return Link(target, inverse, subject)
     relation = _STYLES.get("line" if style is None else style.get("type", "line"))

@@ -78,7 +78,7 @@ def _sweep(rows: Sequence[list[Key]], neighbours: Mapping[Key, Sequence[Key]], d
     place = {key: float(k) for row in rows for k, key in enumerate(row)}
     for row in rows if downwards else reversed(rows):
         means = {
-            key: sum(place[near] for near in neighbours[key]) / len(neighbours[key])
+            key: sum(place[neighbour] for neighbour in neighbours[key]) / len(neighbours[key])
             if neighbours.get(key)
             else place[key]
             for key in row
@@ -101,7 +101,7 @@ def _across(
         neighbours = (above, below)[sweep % 2]
         for row in rows if sweep % 2 == 0 else reversed(rows):
             wanted = [
-                sum(across[near] for near in neighbours[key]) / len(neighbours[key])
+                sum(across[neighbour] for neighbour in neighbours[key]) / len(neighbours[key])
                 if neighbours.get(key)
                 else across[key]
                 for key in row

@@ -49,11 +49,11 @@ def matrix_page(
     head = "".join(
         f"<th>{name}</th>" for name in ("unit", "phase", "not before", "not after", "relations", "stones")
     )
-    told = "".join(f'<li class="wrong">{escape(one.text)}</li>' for one in wrong)
+    items = "".join(f'<li class="wrong">{escape(contradiction.text)}</li>' for contradiction in wrong)
     count = f"{len(wrong)} contradictions of matrix and dates" if wrong else "Matrix and dates agree"
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>Stratigraphy</title>'
-        f"<style>{_STYLE}</style></head><body><h1>Stratigraphy</h1><p>{count}.</p><ul>{told}</ul>"
+        f"<style>{_STYLE}</style></head><body><h1>Stratigraphy</h1><p>{count}.</p><ul>{items}</ul>"
         f'<div class="matrix">{matrix_svg(order, dates, doubtful, linked=True)}</div>'
         f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table></body></html>\n"
     )

@@ -157,19 +157,24 @@ def attribute(
 
 def declared_attribute(column: Column[Any], name: str | None = None) -> StoneAttribute | None:
     """Return the attribute that a column declares, if any, under the name that users write."""
-    found: StoneAttribute | None = column.info.get("attribute")
-    if found is None:
+    stone_attribute: StoneAttribute | None = column.info.get("attribute")
+    if stone_attribute is None:
         return None
-    return StoneAttribute(found.name or name or column.name, found.unit, found.definition, found.words)
+    return StoneAttribute(
+        stone_attribute.name or name or column.name,
+        stone_attribute.unit,
+        stone_attribute.definition,
+        stone_attribute.words,
+    )
 
 
 def declared_attributes(mapper: Mapper[Any]) -> Iterator[tuple[Column[Any], StoneAttribute]]:
     """Yield the columns of a class itself, not of its subclasses, that are attributes of stones."""
-    own = mapper.columns
+    columns = mapper.columns
     for column in cast(Table, mapper.local_table).columns:
-        found = declared_attribute(column)
-        if found is not None and own.contains_column(column):
-            yield column, found
+        stone_attribute = declared_attribute(column)
+        if stone_attribute is not None and columns.contains_column(column):
+            yield column, stone_attribute
 
 
 def annotation_of(column: Column[Any], mapper: Mapper[Any]) -> object:

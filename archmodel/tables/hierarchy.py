@@ -62,7 +62,7 @@ def kind_chain(cls: type[K]) -> tuple[type[K], ...]:
 
 def kinds_below(cls: type[K]) -> dict[str, type[K]]:
     """Return a kind and its subkinds by name, general before particular."""
-    return {kind_of(one): one for one in _descend(cls)}
+    return {kind_of(entity_class): entity_class for entity_class in _descend(cls)}
 
 
 def names_below(*classes: type[K]) -> set[str]:
@@ -82,13 +82,13 @@ def kinds_in(session: Session | None, cls: type[K]) -> dict[str, type[K]]:
     """Return, of a kind and its subkinds, those built in and those that the session's database registers itself."""
     user = None if session is None else session.get_bind().dialect
     return {
-        name: one
-        for name, one in kinds_below(cls).items()
-        if one.__users__ is None or (user is not None and user in one.__users__)
+        name: entity_class
+        for name, entity_class in kinds_below(cls).items()
+        if entity_class.__users__ is None or (user is not None and user in entity_class.__users__)
     }
 
 
-def kind_among(known: Mapping[str, type[K]], name: str, thing: str = "kind") -> type[K]:
+def kind_among(classes: Mapping[str, type[K]], name: str, thing: str = "kind") -> type[K]:
     """Return the kind of this name, in upper or lower case, with _, hyphen or blank between its words.
 
     Raises
@@ -96,8 +96,12 @@ def kind_among(known: Mapping[str, type[K]], name: str, thing: str = "kind") -> 
     UsageError
         if there is none; names the nearest ones
     """
-    if (cls := known.get(re.sub(r"[\s-]+", "_", name[:80].strip().lower()))) is not None:
+    if (cls := classes.get(re.sub(r"[\s-]+", "_", name[:80].strip().lower()))) is not None:
         return cls
-    near = difflib.get_close_matches(name[:40].strip().lower(), known, n=3, cutoff=0.6)
-    remedy = f"did you mean {' or '.join(near)}?" if near else f"the kinds are {', '.join(known)}"
+    close_matches = difflib.get_close_matches(name[:40].strip().lower(), classes, n=3, cutoff=0.6)
+    remedy = (
+        f"did you mean {' or '.join(close_matches)}?"
+        if close_matches
+        else f"the kinds are {', '.join(classes)}"
+    )
     raise UsageError(f"unknown {thing} {name[:40]!r}", remedy=remedy)

@@ -43,10 +43,10 @@ class OpinionRule(Recorded, Base):
 
 def rule_of(session: Session, about: str) -> OpinionRule:
     """Return the rule for a kind of statements; the latest holds where none is recorded."""
-    held = session.scalar(
+    rule = session.scalar(
         select(OpinionRule).where(OpinionRule.about == about, OpinionRule.superseded_id.is_(None))
     )
-    return held or OpinionRule(about=about, rule="latest", authors=[])
+    return rule or OpinionRule(about=about, rule="latest", authors=[])
 
 
 def preference(

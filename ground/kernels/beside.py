@@ -92,8 +92,8 @@ class _FirstCompilation(event.Listener):  # type: ignore[misc]
 def _order(command: str) -> list[str]:
     """Return the kernels to compile, each by command and place: the command's own from the last, then later ones."""
     later = COMMANDS[COMMANDS.index(command) + 1 :]
-    own = [f"{command} {place}" for place in reversed(range(len(kernels_of(command))))]
-    return own + [f"{one} {place}" for one in later for place in range(len(kernels_of(one)))]
+    kernels = [f"{command} {place}" for place in reversed(range(len(kernels_of(command))))]
+    return kernels + [f"{command} {place}" for command in later for place in range(len(kernels_of(command)))]
 
 
 def _feed(helper: "subprocess.Popen[str]", order: list[str]) -> None:
@@ -101,8 +101,8 @@ def _feed(helper: "subprocess.Popen[str]", order: list[str]) -> None:
     assert helper.stdin is not None
     assert helper.stdout is not None
     with suppress(OSError, ValueError):  # the helper has ended
-        for one in order:
-            helper.stdin.write(f"{one}\n")
+        for kernel_place in order:
+            helper.stdin.write(f"{kernel_place}\n")
             helper.stdin.flush()
             if not helper.stdout.readline():
                 return

@@ -48,13 +48,15 @@ class KernelUse:
     def compile(self) -> None:
         """Compile the kernel, or load it if the cache of kernels has it."""
         kernel = getattr(import_module(self.module), self.name)
-        kernel.compile(tuple(_decoded(one) for one in self.types))
+        kernel.compile(tuple(_decoded(text) for text in self.types))
 
 
 def kernels_of(command: str) -> tuple[KernelUse, ...]:
     """Return the kernels of a command in the order of their first calls."""
     recorded = json.loads(LISTS.read_text(encoding="utf-8"))
-    return tuple(KernelUse(one["module"], one["name"], tuple(one["types"])) for one in recorded[command])
+    return tuple(
+        KernelUse(entry["module"], entry["name"], tuple(entry["types"])) for entry in recorded[command]
+    )
 
 
 @contextmanager
@@ -79,9 +81,9 @@ def called() -> list[KernelUse]:
             if not isinstance(kernel, Dispatcher) or kernel.py_func.__module__ != name:
                 continue
             for types in kernel.overloads:
-                use = KernelUse(name, kernel.py_func.__qualname__, tuple(_encoded(one) for one in types))
+                use = KernelUse(name, kernel.py_func.__qualname__, tuple(_encoded(kind) for kind in types))
                 with suppress(AttributeError, TypeError, KeyError):  # of a type that has no name here
-                    if tuple(_decoded(one) for one in use.types) == tuple(types) and use not in uses:
+                    if tuple(_decoded(text) for text in use.types) == tuple(types) and use not in uses:
                         uses.append(use)
     return uses
 
@@ -110,7 +112,7 @@ def _encoded(kind: Any) -> Any:
     if isinstance(kind, numba.types.Array):
         return [str(kind.dtype), kind.ndim, kind.layout, *([] if kind.mutable else ["readonly"])]
     if isinstance(kind, numba.types.BaseTuple):
-        parts: dict[str, Any] = {"of": [_encoded(one) for one in kind.types]}
+        parts: dict[str, Any] = {"of": [_encoded(part) for part in kind.types]}
         named = getattr(kind, "instance_class", tuple)
         return parts if named is tuple else {"named": f"{named.__module__}:{named.__qualname__}", **parts}
     return str(kind)
@@ -121,11 +123,11 @@ def _decoded(text: Any) -> Any:
         return getattr(numba.types, "boolean" if text == "bool" else text)
     if isinstance(text, list):
         return numba.types.Array(_decoded(text[0]), text[1], text[2], readonly=len(text) > 3)
-    parts = [_decoded(one) for one in text["of"]]
+    parts = [_decoded(text) for text in text["of"]]
     if "named" not in text:
         return numba.types.Tuple(parts)
     module, _, name = text["named"].partition(":")
     named = getattr(import_module(module), name)
-    if all(one == parts[0] for one in parts):
+    if all(part == parts[0] for part in parts):
         return numba.types.NamedUniTuple(parts[0], len(parts), named)
     return numba.types.NamedTuple(parts, named)

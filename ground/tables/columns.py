@@ -81,7 +81,7 @@ _WORDS = {"metre": "m", "metres": "m", "meter": "m", "meters": "m", "millimeter"
 def plain(name: str) -> str:
     """Return a name without case, accents, blanks and punctuation, by which names are compared."""
     folded = unicodedata.normalize("NFKD", name.casefold())
-    return "".join(one for one in folded if one.isalnum())
+    return "".join(character for character in folded if character.isalnum())
 
 
 def length_unit(text: str) -> str | None:
@@ -99,12 +99,12 @@ def unit_of(name: str) -> tuple[str, str | None]:
     >>> unit_of("Rechts [mm]"), unit_of("depth_cm"), unit_of("Höhe")
     (('Rechts', 'mm'), ('depth', 'cm'), ('Höhe', None))
     """
-    found = _UNIT.fullmatch(name.strip())
-    if found is None:
+    match = _UNIT.fullmatch(name.strip())
+    if match is None:
         return name.strip(), None
-    unit = found["a"] or found["b"] or found["c"] or ""
-    known = length_unit(unit)
-    return (found["name"].strip(), known) if known is not None else (name.strip(), None)
+    unit = match["a"] or match["b"] or match["c"] or ""
+    unit_name = length_unit(unit)
+    return (match["name"].strip(), unit_name) if unit_name is not None else (name.strip(), None)
 
 
 def spellings(name: str) -> Iterable[str]:

@@ -74,13 +74,13 @@ class Decimals:
 
     def length(self, text: str, what: str, line: int, scale: float = 1.0) -> float:
         """Read one number that must be positive, in units of `scale` [m]."""
-        known = self._lengths.get(text)  # such as the one sigma that all lines repeat
-        if known is None:
+        length = self._lengths.get(text)  # such as the one sigma that all lines repeat
+        if length is None:
             self.number(text, what, line)
-            known = parse_length(text.replace(",", "."), what, f"{self._path}:{line}")
+            length = parse_length(text.replace(",", "."), what, f"{self._path}:{line}")
             if len(self._lengths) < 1000:
-                self._lengths[text] = known
-        return scale * known if scale != 1.0 else known
+                self._lengths[text] = length
+        return scale * length if scale != 1.0 else length
 
     def _plain(self, texts: tuple[str, str, str]) -> tuple[float, float, float] | None:
         """Read plain numbers, the fast path for most of a table; None for numbers that need a full check."""
@@ -96,5 +96,9 @@ class Decimals:
             a, b, c = float(texts[0]), float(texts[1]), float(texts[2])
         except ValueError:
             return None
-        far = self._far
-        return (a, b, c) if -far <= a <= far and -far <= b <= far and -far <= c <= far else None
+        farthest = self._far
+        return (
+            (a, b, c)
+            if -farthest <= a <= farthest and -farthest <= b <= farthest and -farthest <= c <= farthest
+            else None
+        )

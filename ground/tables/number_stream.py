@@ -81,7 +81,7 @@ class NumberStream:
         if not self.even and any(self._width(line) != len(self.first) for line in lines if line.strip()):
             raise self._wrong(lines, before, columns)
         texts = [line.replace(",", ".") for line in lines] if self.commas else lines
-        if any(_FORTRAN.search(one) for one in self.first):
+        if any(_FORTRAN.search(line) for line in self.first):
             texts = [_FORTRAN.sub("e", line) for line in texts]
         quote = '"' if any('"' in line for line in lines[:1]) else None
         picked = None if self.even else columns
@@ -146,7 +146,7 @@ def open_numbers(
         places = places_of(names, wanted, f"{path}:{head}")
         starts = _NUMBER.match(line) is not None and not line.strip().isdigit()
         if names and {*"xyz"} <= set(places):
-            starts = all(_is_float(cells[places[one]], commas) for one in "xyz")
+            starts = all(_is_float(cells[places[axis]], commas) for axis in "xyz")
         if starts:
             if len([cell for cell in cells if _is_float(cell, commas)]) < least:
                 break
@@ -218,7 +218,7 @@ def _check(
         raise SurveyError(
             "a grid of heights, not points", where=f"{path}:1", remedy="export it as points: x y z"
         )
-    missing = [one for one in "xyz" if one not in places]
+    missing = [axis for axis in "xyz" if axis not in places]
     if names and len(missing) == 1:
         raise SurveyError(
             f"no column {missing[0]} among {', '.join(names)[:200]}",

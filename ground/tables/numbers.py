@@ -16,18 +16,20 @@ FARTHEST = 1e8
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
-def parse_number(text: str, what: str, where: str, far: float = FARTHEST) -> float:
-    """Read one finite decimal number, no larger than `far`; `what` names it in the error."""
+def parse_number(text: str, what: str, where: str, farthest: float = FARTHEST) -> float:
+    """Read one finite decimal number, no larger than `farthest`; `what` names it in the error."""
     if not text:
         remedy = "fill it in; the formulas of a workbook have values once it is opened and saved"
         raise SurveyError(f"{what} is empty", where=where, remedy=remedy)
     if _NUMBER.fullmatch(text) is None:
         raise SurveyError(f"{what} is {shown(text)}, not a number", where=where, remedy="write e.g. 12.345")
     value = float(text)
-    if not math.isfinite(value) or abs(value) > far:
-        unit = " m" if far == FARTHEST else ""
+    if not math.isfinite(value) or abs(value) > farthest:
+        unit = " m" if farthest == FARTHEST else ""
         raise SurveyError(
-            f"{what} is {shown(text)}, beyond {far:g}{unit}", where=where, remedy="coordinates are in metres"
+            f"{what} is {shown(text)}, beyond {farthest:g}{unit}",
+            where=where,
+            remedy="coordinates are in metres",
         )
     return value
 

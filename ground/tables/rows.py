@@ -64,8 +64,8 @@ class TextRows:
         self._stated_on = 0
         for number, line in self._lines:
             text = line.strip()
-            if (found := _STATED.match(text)) and not text[found.end() :].strip(_SEPARATORS):
-                self.delimiter, self._stated_on = found[1], number
+            if (match := _STATED.match(text)) and not text[match.end() :].strip(_SEPARATORS):
+                self.delimiter, self._stated_on = match[1], number
             if text.startswith("#"):
                 self.comments.append((number, text.lstrip("# ")))
             elif text:
@@ -75,8 +75,8 @@ class TextRows:
         """Iterate over (number of the first line, text) of the rows."""
         lines = iter(self._lines)
         waiting: list[tuple[int, str]] = []
-        while one := (waiting.pop(0) if waiting else next(lines, None)):
-            number, line = one
+        while entry := (waiting.pop(0) if waiting else next(lines, None)):
+            number, line = entry
             text = line.strip(_SEPARATORS)
             if not text or text[0] == "#" or number == self._stated_on:
                 continue
@@ -140,10 +140,10 @@ class TextRows:
         if self.delimiter is not None:
             return (self.delimiter,)
         bare = re.sub(r'"[^"]*"', "", row)
-        found = sorted(
+        delimiters = sorted(
             (delimiter for delimiter in _DELIMITERS if delimiter in bare), key=bare.count, reverse=True
         )
-        return found if set(found) - {","} else (*found, _BLANKS)
+        return delimiters if set(delimiters) - {","} else (*delimiters, _BLANKS)
 
 
 class ListRows:
@@ -305,7 +305,7 @@ def _filled(rows: Sequence[Sequence[Any]]) -> list[tuple[int, list[str]]]:
     """Return the rows that are not empty or comments, as text, with their numbers."""
     found = []
     for number, row in enumerate(rows, start=1):
-        cells = [cell_text(one) for one in row]
+        cells = [cell_text(cell) for cell in row]
         full = [cell for cell in cells if cell]
         if full and not (len(full) == 1 and full[0].startswith("#")):
             found.append((number, cells))

@@ -198,20 +198,20 @@ def _separator(source: TextRows, lines: Sequence[tuple[int, Row]], is_row: IsRow
     """
     text = "".join(str(line) for _, line in lines)
     scores: dict[str, tuple[int, float]] = {}
-    for one in (*(separator for separator in _SEPARATORS if separator in text), _BLANKS):
-        source.delimiter, rows, numbers = one, 0, 0.0
+    for delimiter in (*(separator for separator in _SEPARATORS if separator in text), _BLANKS):
+        source.delimiter, rows, numbers = delimiter, 0, 0.0
         for number, line in lines:
             with suppress(SurveyError):  # wrong quotes, with this separator
                 cells = _trimmed(source, line, number)
-                if is_row(cells, one != ","):
+                if is_row(cells, delimiter != ","):
                     rows += 1
-                    numbers += sum(is_number(cell, one != ",") for cell in cells) / len(cells)
-        scores[one] = rows, numbers
+                    numbers += sum(is_number(cell, delimiter != ",") for cell in cells) / len(cells)
+        scores[delimiter] = rows, numbers
     most = max(rows for rows, _ in scores.values())
     clear = (
         separator for separator in _SEPARATORS[:-1] if separator in scores and scores[separator][0] == most
     )
-    best: str = next(clear, None) or max(scores, key=lambda one: scores[one])
+    best: str = next(clear, None) or max(scores, key=lambda separator: scores[separator])
     pairs = [str(line).strip().strip('"') for _, line in lines if _TWO_PARTS.fullmatch(str(line).strip())]
     if best == "," and len(pairs) >= scores[","][0] and _repeats([pair.partition(",")[0] for pair in pairs]):
         return _BLANKS

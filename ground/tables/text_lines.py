@@ -153,13 +153,13 @@ class TextLines:
         if block.count(b"\r") != block.count(b"\r\n") or len(block.translate(None, _CONTROLS)) < len(block):
             return True
         return not block.isascii() and any(
-            _is_control(one) for one in set(self._decoded(block)) - {"\n", "\r"}
+            _is_control(character) for character in set(self._decoded(block)) - {"\n", "\r"}
         )
 
     def _check_line(self, line: bytes, number: int) -> None:
-        for one in self._decoded(line):
-            if _is_control(one):
-                code = ord(one) & 0xFF
+        for character in self._decoded(line):
+            if _is_control(character):
+                code = ord(character) & 0xFF
                 raise self.fail(number, f"control character 0x{code:02x}: this is not plain text", _SAVE_AS)
 
     def _decoded(self, data: bytes) -> str:
@@ -193,16 +193,16 @@ class TextLines:
         """Return the block unless one of its lines is too long."""
         start = 0
         while (stop := start + self._longest) < len(block):
-            found = block.rfind(b"\n", start, stop + 1) + 1
-            if not found:
+            begin = block.rfind(b"\n", start, stop + 1) + 1
+            if not begin:
                 line += block.count(b"\n", 0, start)
                 raise self.fail(
                     line, f"a line of more than {self._longest} bytes", "this is not a survey file"
                 )
-            start = found
+            start = begin
         return block
 
 
-def _is_control(one: str) -> bool:
-    code = ord(one)
-    return (code < 32 and one != "\t") or 127 <= code < 160 or 0xDC80 <= code < 0xDD00
+def _is_control(character: str) -> bool:
+    code = ord(character)
+    return (code < 32 and character != "\t") or 127 <= code < 160 or 0xDC80 <= code < 0xDD00

@@ -68,7 +68,9 @@ def _closest(error: UnicodeError) -> tuple[str, int]:
     if not isinstance(error, UnicodeEncodeError):
         raise error
     lacking = error.object[error.start : error.end].translate(_ASCII)
-    plain = (unicodedata.normalize("NFKD", one).encode("ascii", "ignore").decode() or "?" for one in lacking)
+    plain = (
+        unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode() or "?" for name in lacking
+    )
     return "".join(plain), error.end
 
 
@@ -86,8 +88,8 @@ class PlainGroup(TyperGroup):
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Write the help of the group, and the first line of that of each command."""
-        for one in (self, *self.commands.values()):
-            _escape(one)
+        for group in (self, *self.commands.values()):
+            _escape(group)
         super().format_help(ctx, formatter)
 
 
@@ -97,9 +99,9 @@ def _escape(command: Any) -> None:
         return
     from rich.markup import escape
 
-    for one in (command, *command.params):
-        if getattr(one, "help", None):
-            one.help = escape(one.help)
+    for documented in (command, *command.params):
+        if getattr(documented, "help", None):
+            documented.help = escape(documented.help)
 
 
 def say(message: str) -> None:

@@ -129,8 +129,8 @@ class _Stages:
         if last - began < _MEASURED:
             return ""
         rest = (last - began) / (done - first) * (report.total - done) - (self._now() - last)
-        known = "at most" if report.stage in _EARLIER else "about"
-        return f"{known} {duration(rest)} left" if rest > 0.0 else ""
+        qualifier = "at most" if report.stage in _EARLIER else "about"
+        return f"{qualifier} {duration(rest)} left" if rest > 0.0 else ""
 
     def line(self) -> str | None:
         """Return one line on the present stage; None if no stage has begun."""
@@ -186,14 +186,14 @@ def _lines(stages: _Stages) -> "Iterator[Listener]":
     def listen(report: "Report") -> None:
         stages(report)
         if report.found:
-            found.append(f"[{stages.age()}] {report.found}")
+            lines.append(f"[{stages.age()}] {report.found}")
             print_found()
 
     def print_found() -> None:
-        while found and time.monotonic() - stages.begun >= _FIRST:
-            say(found.popleft())
+        while lines and time.monotonic() - stages.begun >= _FIRST:
+            say(lines.popleft())
 
-    found: deque[str] = deque()
+    lines: deque[str] = deque()
     thread = threading.Thread(target=print_lines, daemon=True)
     thread.start()
     try:

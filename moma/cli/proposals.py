@@ -84,8 +84,8 @@ def propose(
     from pipelines.propose.propose import Recording, propose_core, propose_stones
     from survey.unseen.core.settings import InfillSettings, InfillShape
 
-    given = {"--as": core.shape, "--storey-height": core.storey_height, "--facings": core.facings}
-    _refuse_others(what, given, core.shape, record, author, source)
+    options = {"--as": core.shape, "--storey-height": core.storey_height, "--facings": core.facings}
+    _refuse_others(what, options, core.shape, record, author, source)
     recording = Recording(author, source) if record else None
     if what is Subject.MISSING:
         report = propose_stones(common.db, where or (), recording=recording)
@@ -100,14 +100,14 @@ def propose(
     if report.proposals:
         print(_table(report))
     if common.verbose:
-        for one in report.proposals:
-            print("\n".join([f"{one.code}: {one.evidence}", f"  depth: {one.depth_source}"]))
+        for proposal in report.proposals:
+            print("\n".join([f"{proposal.code}: {proposal.evidence}", f"  depth: {proposal.depth_source}"]))
     say(_summary(report, record))
 
 
 def _refuse_others(
     what: Subject,
-    given: Mapping[str, object],
+    options: Mapping[str, object],
     shape: CoreShape | None,
     record: bool,
     author: str | None,
@@ -115,10 +115,10 @@ def _refuse_others(
 ) -> None:
     """Refuse options that exclude each other."""
     if what is Subject.MISSING:
-        for name, value in given.items():
+        for name, value in options.items():
             if value is not None:
                 raise UsageError(f"{name} is for the core of walls", remedy="leave it out, or propose infill")
-    height = given["--storey-height"]
+    height = options["--storey-height"]
     if height is not None and shape is not CoreShape.STOREYS:
         raise UsageError("--storey-height is for storeys", remedy="give --as storeys too")
     if isinstance(height, float) and not height > 0.0:
@@ -132,7 +132,7 @@ def _table(report: "ProposalReport") -> str:
     from moma.cli.text.formats import as_table
 
     columns = ("code", "kind", "course", "length", "height", "depth", "volume", "notes")
-    rows = [{**asdict(one), "notes": "; ".join(one.notes) or None} for one in report.proposals]
+    rows = [{**asdict(proposal), "notes": "; ".join(proposal.notes) or None} for proposal in report.proposals]
     shown = {
         name: {"length": "m", "height": "m", "depth": "m", "volume": "m³"}.get(name)
         for name in columns
@@ -146,7 +146,7 @@ def _summary(report: "ProposalReport", record: bool) -> str:
     if not count:
         return f"nothing to propose among {report.stones} stones"
     text = f"{count} proposal{'s' if count > 1 else ''} from {report.stones} stones"
-    volume = sum(one.volume for one in report.proposals)
+    volume = sum(proposal.volume for proposal in report.proposals)
     if report.what == "infill":
         text += f", {volume:.3f} m³"
     if report.entry is None:

@@ -29,7 +29,9 @@ def text(scope: Scope, call: Call, ask: Ask) -> Condition:
     def has(*columns: ColumnElement[str]) -> Condition:
         return or_(*(column.icontains(words.text, autoescape=True) for column in columns))
 
-    documents, phases, materials = (context.alias(one) for one in (Document, Phase, Material))
+    documents, phases, materials = (
+        context.alias(entity_class) for entity_class in (Document, Phase, Material)
+    )
     named = {
         "document_id": select(documents.c.id).where(
             held(documents), has(documents.c.title, documents.c.code, documents.c.place, documents.c.author)
@@ -40,9 +42,16 @@ def text(scope: Scope, call: Call, ask: Ask) -> Condition:
         ),
     }
 
-    def wanted(said: FromClause) -> list[Condition]:
-        own = has(said.c.text, said.c.place, said.c.locator, said.c.sign, said.c.type, said.c.key)
-        return [or_(own, *(said.c[column].in_(numbers) for column, numbers in named.items()))]
+    def wanted(statement: FromClause) -> list[Condition]:
+        condition = has(
+            statement.c.text,
+            statement.c.place,
+            statement.c.locator,
+            statement.c.sign,
+            statement.c.type,
+            statement.c.key,
+        )
+        return [or_(condition, *(statement.c[column].in_(numbers) for column, numbers in named.items()))]
 
     of_structures = context.statements_of_structures(*DOCUMENTING)
     stated = entities_with_statement(context.alias, of_structures, wanted, *DOCUMENTING)

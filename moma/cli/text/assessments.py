@@ -29,33 +29,33 @@ def assessment_lines(done: "Assessment", verbose: bool) -> list[str]:
     return [*lines, f"  run {done.run}", *(f"  {done.folder / name}" for name in summary["files"])]
 
 
-def _code(found: dict[str, Any] | None) -> list[str]:
+def _code(check: dict[str, Any] | None) -> list[str]:
     """Return the numbers and comparisons of a check by a code, each with its article and formula."""
-    if found is None:
+    if check is None:
         return []
     return [
-        *([f"    CAUTION: {found['caution']}"] if found["caution"] else []),
+        *([f"    CAUTION: {check['caution']}"] if check["caution"] else []),
         *(
             f"    {value['symbol']} = {value['value']:.4g} {value['unit']}   {value['formula']}   [{value['article']}]"
-            for value in found["values"]
+            for value in check["values"]
         ),
         *(
             f"    {'passed' if rule['passed'] else 'NOT PASSED'}: {rule['name']}: {rule['capacity']:.4g} against "
             f"{rule['demand']:.4g} {rule['unit']}, ratio {rule['ratio']:.2f}   {rule['formula']}   [{rule['article']}]"
-            for rule in found["checks"]
+            for rule in check["checks"]
         ),
     ]
 
 
-def _mechanism(found: dict[str, Any], verbose: bool) -> list[str]:
-    codes = [stone["code"] for stone in found["stones"]]
+def _mechanism(mechanism: dict[str, Any], verbose: bool) -> list[str]:
+    codes = [stone["code"] for stone in mechanism["stones"]]
     if not codes:
         return []
     named = codes if verbose else codes[:_FEW]
     more = f" and {len(codes) - len(named)} more" if len(codes) > len(named) else ""
     return [
         f"    moves: {', '.join(named)}{more}; "
-        f"{found['opening_joints']} joints open, {found['sliding_joints']} slide"
+        f"{mechanism['opening_joints']} joints open, {mechanism['sliding_joints']} slide"
     ]
 
 
@@ -64,7 +64,7 @@ def comparison_lines(done: "SurveyComparison", verbose: bool) -> list[str]:
     from pipelines.reports.movement import unrested
 
     summary = done.summary
-    courses = sorted(summary["courses"], key=lambda one: -_ratio(one))
+    courses = sorted(summary["courses"], key=lambda course: -_ratio(course))
     shown = courses if verbose else courses[:_COURSES]
     return [
         f"{summary['scene']}: {_misfit(summary)}{unrested(summary['outcome'])}",
@@ -72,36 +72,39 @@ def comparison_lines(done: "SurveyComparison", verbose: bool) -> list[str]:
         *(f"  {caution}" for caution in summary["cautions"]),
         *(f"  {_wall(wall)}, {wall['quantity']}: {_misfit(wall)}" for wall in summary["walls"]),
         "  courses" + ("" if len(shown) == len(courses) else " that differ most"),
-        *(f"    {_wall(one)}, course {one['course']}: {_misfit(one)}{_shape(one)}" for one in shown),
+        *(
+            f"    {_wall(course)}, course {course['course']}: {_misfit(course)}{_shape(course)}"
+            for course in shown
+        ),
         f"  run {done.run}",
         *(f"  {done.folder / name}" for name in summary["files"]),
     ]
 
 
-def _wall(one: dict[str, Any]) -> str:
-    return str(one["facade"]) + ("" if one["zone"] is None else f" {one['zone']}")
+def _wall(wall: dict[str, Any]) -> str:
+    return str(wall["facade"]) + ("" if wall["zone"] is None else f" {wall['zone']}")
 
 
-def _ratio(one: dict[str, Any]) -> float:
-    return float(one["chi2"]) / max(int(one["dof"]), 1)
+def _ratio(course: dict[str, Any]) -> float:
+    return float(course["chi2"]) / max(int(course["dof"]), 1)
 
 
-def _misfit(one: dict[str, Any]) -> str:
-    return f"χ² {one['chi2']:.4g} of {one['dof']} ({one['chi2_still']:.4g})"
+def _misfit(course: dict[str, Any]) -> str:
+    return f"χ² {course['chi2']:.4g} of {course['dof']} ({course['chi2_still']:.4g})"
 
 
-def _shape(one: dict[str, Any]) -> str:
+def _shape(course: dict[str, Any]) -> str:
     """Return slope and sag of a course, measured and simulated."""
-    slope = one["slope"]
+    slope = course["slope"]
     text = (
         f"; slope {1e3 * slope['measured']:+.1f} ± {1e3 * slope['sigma']:.1f}, "
         f"simulated {1e3 * slope['simulated']:+.1f} mm/m"
     )
-    if one["measured"] is None:
+    if course["measured"] is None:
         return text
     return (
-        f"{text}; mid-span {1e3 * one['measured']:+.1f} ± {1e3 * one['sigma']:.1f}, "
-        f"simulated {1e3 * one['simulated']:+.1f} mm"
+        f"{text}; mid-span {1e3 * course['measured']:+.1f} ± {1e3 * course['sigma']:.1f}, "
+        f"simulated {1e3 * course['simulated']:+.1f} mm"
     )
 
 

@@ -121,8 +121,9 @@ def _simplification_lines(report: "SimplificationReport", verbose: bool) -> list
         line += f"; least blocky {report.least_blocky} ({report.blockiness:.2f})"
     lines = [line]
     outside = [
-        f"    {one.code}: moved by {_mm(one.displacement)}, the survey is good to {_mm(one.tolerance)}; {one.reason}"
-        for one in report.outside
+        f"    {stone.code}: moved by {_mm(stone.displacement)}, the survey is good to {_mm(stone.tolerance)}; "
+        f"{stone.reason}"
+        for stone in report.outside
     ]
     if outside:
         lines.append(f"  {_count(len(outside), 'stone')} outside the survey's tolerance:")
@@ -219,4 +220,4 @@ def _mm(length: float) -> str:
 
 
 def _place(place: tuple[float, float, float]) -> str:
-    return f"({', '.join(f'{one:z.3f}' for one in place)})"
+    return f"({', '.join(f'{coordinate:z.3f}' for coordinate in place)})"

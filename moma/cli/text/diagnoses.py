@@ -18,7 +18,7 @@ def diagnosis_lines(done: "Diagnosis", verbose: bool) -> list[str]:
         *(
             ()
             if dating is None
-            else (f"  {dating['verdict']}", *(f"    {one}" for one in dating["evidence"]))
+            else (f"  {dating['verdict']}", *(f"    {line}" for line in dating["evidence"]))
         ),
         *(f"  {caution}" for caution in summary["cautions"]),
         "  hypotheses, by AICc; P: of so large a χ² by chance",
@@ -31,25 +31,29 @@ def diagnosis_lines(done: "Diagnosis", verbose: bool) -> list[str]:
     ]
 
 
-def _hypothesis(one: dict[str, Any]) -> list[str]:
-    stood = f" (when {', '.join(f'phase {phase}' for phase in one['stood'])} stood)" if one["stood"] else ""
-    if one["chi2"] is None:
-        return [f"    {one['name']}{stood}", *(f"      {remark}" for remark in one["remarks"])]
+def _hypothesis(hypothesis: dict[str, Any]) -> list[str]:
+    stood = (
+        f" (when {', '.join(f'phase {phase}' for phase in hypothesis['stood'])} stood)"
+        if hypothesis["stood"]
+        else ""
+    )
+    if hypothesis["chi2"] is None:
+        return [f"    {hypothesis['name']}{stood}", *(f"      {remark}" for remark in hypothesis["remarks"])]
     return [
-        f"    {one['name']}{stood}: χ² {one['chi2']:.4g} of {one['dof']}, P {one['probability']:.2g}, "
-        f"AICc {one['behind']:+.3g}",
-        *(f"      {_amplitude(own)}" for own in one["amplitudes"]),
-        *(f"      {remark}" for remark in one["remarks"]),
+        f"    {hypothesis['name']}{stood}: χ² {hypothesis['chi2']:.4g} of {hypothesis['dof']}, "
+        f"P {hypothesis['probability']:.2g}, AICc {hypothesis['behind']:+.3g}",
+        *(f"      {_amplitude(amplitude)}" for amplitude in hypothesis["amplitudes"]),
+        *(f"      {remark}" for remark in hypothesis["remarks"]),
     ]
 
 
-def _amplitude(own: dict[str, Any]) -> str:
+def _amplitude(amplitude: dict[str, Any]) -> str:
     between = (
         "not determined"
-        if own["low"] is None
-        else f"{own['low']:.4g} to {own['high']:.4g} {own['unit']} (95 %)"
+        if amplitude["low"] is None
+        else f"{amplitude['low']:.4g} to {amplitude['high']:.4g} {amplitude['unit']} (95 %)"
     )
-    return f"{own['name']} = {own['value']:.4g} {own['unit']}: {between}"
+    return f"{amplitude['name']} = {amplitude['value']:.4g} {amplitude['unit']}: {between}"
 
 
 def _groups(groups: list[dict[str, Any]]) -> list[str]:

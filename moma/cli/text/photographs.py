@@ -22,10 +22,15 @@ def orient_lines(report: "OrientReport", verbose: bool) -> list[str]:
         f"  datum: {_datum(str(values['datum']))}",
     ]
     for camera in values["cameras"]:
-        known = [(name, parameter) for name, parameter in camera["parameters"].items() if parameter["sigma"]]
-        if known:
+        estimated = [
+            (name, parameter) for name, parameter in camera["parameters"].items() if parameter["sigma"]
+        ]
+        if estimated:
             lines.append(f"  camera {camera['name']} ({camera['model']} distortion):")
-            lines += [f"    {name} {one['value']:.8g} ± {one['sigma']:.3g}" for name, one in known]
+            lines += [
+                f"    {name} {parameter['value']:.8g} ± {parameter['sigma']:.3g}"
+                for name, parameter in estimated
+            ]
     photos = [
         f"    {photo['name']}: {photo['marks']} marks, rms {photo['rms'] or 0.0:.2f} px, station ± "
         f"{1e3 * max(photo['sigma'][axis] for axis in 'xyz'):.1f} mm"
@@ -33,15 +38,15 @@ def orient_lines(report: "OrientReport", verbose: bool) -> list[str]:
     ]
     lines += ["  photographs:", *(photos if verbose else shorten(photos, 12, "    ", ", with -v"))]
     for use in ("weighted", "check"):
-        ones = [one for one in values["control"] if one["use"] == use]
+        ones = [point for point in values["control"] if point["use"] == use]
         if ones:
-            worst = max(ones, key=lambda one: one["test"])
+            worst = max(ones, key=lambda point: point["test"])
             what = "control" if use == "weighted" else "check"
             lines.append(
                 f"  {len(ones)} {what} points; farthest off is {worst['id']}, by {worst['test']:.1f} σ"
             )
     suspected = sorted(
-        (k for k, one in enumerate(marks["verdict"]) if one), key=lambda k: -(marks["test"][k] or 0.0)
+        (k for k, verdict in enumerate(marks["verdict"]) if verdict), key=lambda k: -(marks["test"][k] or 0.0)
     )
     if suspected:
         lines.append(f"  {len(suspected)} mark{'' if len(suspected) == 1 else 's'} suspected or left out:")

@@ -55,10 +55,10 @@ def listed(names: str | None) -> list[str] | None:
 
 def answer(session: "Session", question: Question, format: str) -> tuple[str, str]:
     """Answer a query in a format (table, csv, excel, json, geojson), with a note for the person at the terminal."""
-    known = {attribute.name: attribute for attribute in attributes(session, question.kind)}
+    attribute_of = {attribute.name: attribute for attribute in attributes(session, question.kind)}
     if question.count_by is not None:
-        return _counts(session, question, known, format)
-    names = _names(session, question, known, format)
+        return _counts(session, question, attribute_of, format)
+    names = _names(session, question, attribute_of, format)
     asked = (question.kind, question.where, question.run, names)
     if format == "geojson":
         if question.sort or question.top is not None:
@@ -68,30 +68,32 @@ def answer(session: "Session", question: Question, format: str) -> tuple[str, st
         faces = find_faces(session, *asked)
         from archmodel.query.geojson import feature_collection, flattened  # and with it numpy
 
-        doubts = _disputes(session, question, known, names)
+        doubts = _disputes(session, question, attribute_of, names)
         return as_geojson(feature_collection(flattened(faces) if question.flat else faces)), doubts
     order = [name.removeprefix("-") for name in question.sort]
     fetched = [*names, *(name for name in dict.fromkeys(order) if name not in names)]
     rows = sorted_rows(find_rows(session, *asked[:-1], fetched), question.sort)
-    found, rows = len(rows), rows[: question.top]
+    count, rows = len(rows), rows[: question.top]
     if format == "table":
         names = fetched
     rows = [{name: row[name] for name in names} for row in rows]
-    doubts = _disputes(session, question, known, names)
+    doubts = _disputes(session, question, attribute_of, names)
     if format != "table":
         return _written(names, rows, format), doubts
     if not rows:
-        return "", f"no {question.kind} found" + "".join(f", where {one}" for one in question.where)
+        return "", f"no {question.kind} found" + "".join(
+            f", where {condition}" for condition in question.where
+        )
     if not question.everything and question.columns is None:
         asked_for = [*asked_columns(question.where, session, question.kind), *order]
         names = shown_columns(names, rows, asked_for)
-    units = {name: known[name.partition("@")[0].lower()].unit for name in names}
-    first = "" if found == len(rows) else f", of which the first {len(rows)} are shown"
-    return as_table(units, rows), "; ".join(filter(None, (f"{found} found{first}", doubts)))
+    units = {name: attribute_of[name.partition("@")[0].lower()].unit for name in names}
+    first = "" if count == len(rows) else f", of which the first {len(rows)} are shown"
+    return as_table(units, rows), "; ".join(filter(None, (f"{count} found{first}", doubts)))
 
 
 def _counts(
-    session: "Session", question: Question, known: Mapping[str, Attribute], format: str
+    session: "Session", question: Question, attribute_of: Mapping[str, Attribute], format: str
 ) -> tuple[str, str]:
     """Answer a query with counts of groups."""
     if format == "geojson":
@@ -110,7 +112,7 @@ def _counts(
     if wrong := [name for name in question.sort if name.removeprefix("-") not in names]:
         raise UsageError(f"{wrong[0]} is not counted", remedy=f"sort by {', '.join(names)}")
     rows = sorted_rows(rows, question.sort)[: question.top]
-    note = "; ".join(filter(None, (*counted.notes, _disputes(session, question, known, by))))
+    note = "; ".join(filter(None, (*counted.notes, _disputes(session, question, attribute_of, by))))
     if format != "table":
         return _written(names, rows, format), note
     if not rows:
@@ -125,16 +127,16 @@ def _written(names: Sequence[str], rows: Sequence[Mapping[str, object]], format:
     return as_csv(names, rows, spreadsheet=format == "excel")
 
 
-def _of_structures(known: Mapping[str, Attribute]) -> bool:
+def _of_structures(attribute_of: Mapping[str, Attribute]) -> bool:
     """Return whether these are the attributes of structures, which have no zone."""
-    return "zone" not in known
+    return "zone" not in attribute_of
 
 
 def _disputes(
-    session: "Session", question: Question, known: Mapping[str, Attribute], names: Sequence[str]
+    session: "Session", question: Question, attribute_of: Mapping[str, Attribute], names: Sequence[str]
 ) -> str:
     """Say of how many entities the answer rests on an opinion beside which there is another one."""
-    if _of_structures(known):
+    if _of_structures(attribute_of):
         return ""
     asked = {*names, *asked_columns(question.where, session, question.kind)}
     notes = []
@@ -155,14 +157,16 @@ RESTS_ON = {
 """Attributes that rest on an opinion."""
 
 
-def _names(session: "Session", question: Question, known: Mapping[str, Attribute], format: str) -> list[str]:
+def _names(
+    session: "Session", question: Question, attribute_of: Mapping[str, Attribute], format: str
+) -> list[str]:
     """Choose the columns to read from the database: no more than shown, since some need a search of their own."""
     if question.columns is not None:
         return list(dict.fromkeys(question.columns))
     if format != "table" or question.everything:
-        return list(known)
+        return list(attribute_of)
     named = asked_columns(question.where, session, question.kind)
-    if _of_structures(known):  # they have few
-        return list(known)
-    usual = [name for name in known if name in USUAL_COLUMNS or name in named]
+    if _of_structures(attribute_of):  # they have few
+        return list(attribute_of)
+    usual = [name for name in attribute_of if name in USUAL_COLUMNS or name in named]
     return [*usual, *(name for name in named if name not in usual)]

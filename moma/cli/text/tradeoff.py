@@ -71,10 +71,10 @@ def _reference_lines(record: Mapping[str, Any]) -> list[str]:
     lines = [
         f"reference: {reference['name']}, the finest that was affordable; its own error is not known, only estimated"
     ]
-    own = reference["errors"][quantity]
-    if own is not None and reference["partner"]:
+    error = reference["errors"][quantity]
+    if error is not None and reference["partner"]:
         lines.append(
-            f"  {_percent(own):g} % of {quantity}, by its difference to {reference['partner']!r}, which is "
+            f"  {_percent(error):g} % of {quantity}, by its difference to {reference['partner']!r}, which is "
             f"{reference['ratio']:.3g} times as coarse"
         )
     if reference["stress_error"] is not None:
