@@ -49,8 +49,8 @@ def summarise(
         "headline": headline(result),
         "cautions": list(result.cautions),
         "bodies": {
-            str(fidelity): fidelities.count(fidelity)
-            for fidelity in (Fidelity.RIGID, Fidelity.DEFORMABLE, Fidelity.FIXED)
+            str(kind): fidelities.count(kind)
+            for kind in (Fidelity.RIGID, Fidelity.DEFORMABLE, Fidelity.FIXED)
         },
         "contacts": len(result.contacts.gap),
         "steps": result.steps,

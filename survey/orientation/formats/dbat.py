@@ -83,20 +83,7 @@ def read_dbat(path: Path) -> Network:
             x, y = (parse_number(str(row[name]), name, where) for name in "xy")
             marks.append(MarkRow(number[str(row["im"])], str(row["id"]), x, y, value, line))
     network = network_of(source, tuple(marks), cameras, photos, _DEFAULT)
-    control = [
-        _control(row)
-        for file in entries.all("ctrl_pts", "file")
-        for row in _table(file, base, ("id", "x", "y", "z"))
-    ]
-    checks = [
-        _control(row)
-        for file in entries.all("check_pts", "file")
-        for row in _table(file, base, ("id", "x", "y", "z"))
-    ]
-    control, checks = (
-        _filtered(entries.find("ctrl_pts"), control),
-        _filtered(entries.find("check_pts"), checks),
-    )
+    control, checks = (_points(entries, base, part) for part in ("ctrl_pts", "check_pts"))
     if not (control or checks):
         return network
     rows = {check.number: check for check in (*checks, *control)}
@@ -106,6 +93,12 @@ def read_dbat(path: Path) -> Network:
         if check.number not in {row.number for row in control} and check.number in network.names
     )
     return with_control(network, tuple(rows.values()), check=only)
+
+
+def _points(section: Element, base: Path, part: str) -> list[ControlRow]:
+    """Return the points of one part of a script: those of its tables that its filter keeps."""
+    tables = (_table(file, base, ("id", "x", "y", "z")) for file in section.all(part, "file"))
+    return _filtered(section.find(part), [_control(row) for table in tables for row in table])
 
 
 def _base(path: Path, section: Element) -> Path:
