@@ -12,8 +12,12 @@ else the stones begin to fall with velocities v, and the balance of power
 says with the dissipation D at which load the same mechanism would stop: λ - v·M v / (h q·v). The search goes down to
 such estimates, which are borne as a rule, and up by steps until a bracket is left to be halved.
 
-Only whole multiples of a thousandth of the bound are tried. So the answer is the same to the last digit however stones
-are turned and numbered, unless one of these loads lies within rounding of the limit.
+Only round loads are tried: multiples of 1, 2 or 5 · 10ᵏ, two thousandths of the bound apart at most. So the answer is
+the same to the last digit however stones are turned and numbered, unless one of these loads lies within rounding of the
+limit, and it is a load that was tried as it is written.
+
+Between the load at which a mechanism stops and the limit, stones may rest or move by the same law. So loads down to a
+hundredth below the limit are tried too, and one that falls lowers it.
 """
 
 from dataclasses import dataclass, replace
@@ -29,23 +33,28 @@ from mechanics.problem.problem import ContactProblem, ContactStart
 from mechanics.problem.residual import residual
 from mechanics.solvers.chain import follow
 from mechanics.solvers.kinds import standing_chain
+from mechanics.solvers.scales import ROUNDING
 from mechanics.solvers.second_order.newton import Newton
 
 __all__ = ["WIDTH", "HeldLimit", "held_limit"]
 
-WIDTH = 1e-3
-"""Width of the bracket over the bound [-]: friction without dilatancy decides no limit more closely."""
+WIDTH = 2e-3
+"""Width of the bracket over the bound, at most [-]: friction without dilatancy decides no limit more closely."""
 
 # velocity of a contact over the largest u_free from which it moves: steps solved to their tolerance leave up to a
 # third of it [-]
 _MOVES = 1e-3
+# the same of steps that are solved so well that their motion is no error: by which contacts break their laws over the
+# fastest one, of which stones may move a hundred times as fast; rests that are solved so leave 10⁻⁶ [-]
+_CREEPS, _SURE = 1e-4, 1e-2
 # tolerances of η and of velocities, and iterations of all methods of one problem
-_LIMITS, _ITERATIONS = (Newton.tolerance, Newton.velocity_tolerance), 1500
-# step up from a load that is borne, over it, doubled each time that it is borne: with Coulomb's friction stones bear up
-# to 2 % more than the load at which their mechanism would stop [-]
-_UP = 0.02
-# loads that are tried up to the bound
-_LOADS = round(1.0 / WIDTH)
+_LIMITS, _ITERATIONS = (Newton.tolerance, Newton.velocity_tolerance), 2000
+# step up from a load to begin with that is borne, over it, doubled each time that it is borne [-]
+_UP = 0.01
+# loads below the limit that are tried too, in units: down to a hundredth of it, as a rule
+_BELOW = 1, 2, 4
+# share of the bound to whose multiples a load to begin with is rounded down, as forms of a scene agree on it to 0.2 %
+_BEGIN = 0.02
 # first load that is tried where the bound is endless, and how often it is doubled before nothing limits it
 _FIRST, _DOUBLED = 1.0, 10
 
@@ -71,26 +80,6 @@ class HeldLimit:
 
 
 @dataclass(frozen=True)
-class _Bracket:
-    """Loads between which the limit lies, as multiples of a unit.
-
-    Attributes
-    ----------
-    low, high : of what is held, and of what is lost
-    unit : of both; infinite where nothing limits the load [-]
-    best, worst : the steps under both; no worst one where only the bound says that it is lost
-    problems : contact problems that were solved
-    """
-
-    low: int
-    high: int
-    unit: float
-    best: "_Trial"
-    worst: "_Trial | None"
-    problems: int
-
-
-@dataclass(frozen=True)
 class _Trial:
     """Step from rest under one load.
 
@@ -110,8 +99,12 @@ class _Trial:
     error: float
 
 
-def held_limit(on: RigidAssembly, live: LiveLoad, bound: LimitLoad) -> HeldLimit:
+def held_limit(
+    on: RigidAssembly, live: LiveLoad, bound: LimitLoad, candidate: float | None = None
+) -> HeldLimit:
     """Return between which loads the limit of stones at rest lies, below the bound of associative friction.
+
+    The search begins next to the bound, or at a `candidate` where that lies lower.
 
     Raises
     ------
@@ -121,47 +114,101 @@ def held_limit(on: RigidAssembly, live: LiveLoad, bound: LimitLoad) -> HeldLimit
     nothing = steps(0.0)
     if not bound.multiplier > 0.0 or not nothing.holds:
         return HeldLimit(0.0, 0.0, nothing.force, _falling(on, nothing), 1)
-    begun = _Bracket(0, _LOADS, bound.multiplier * WIDTH, nothing, None, 1)
-    last = _searched(steps, _limited(steps, begun) if np.isinf(bound.multiplier) else begun)
-    worst = None if last.worst is None else _falling(on, last.worst)
-    return HeldLimit(last.low * last.unit, last.high * last.unit, last.best.force, worst, last.problems)
+    if np.isinf(bound.multiplier):
+        return _without_bound(on, steps, nothing)
+    search = _Search(steps, _unit(bound.multiplier), {0: nothing})
+    # a load within rounding of the bound would be held or lost by chance
+    high = int(bound.multiplier / search.unit + 0.5)
+    first = high - 1
+    if candidate is not None and candidate < (1.0 - _BEGIN) * bound.multiplier:
+        first = int(_BEGIN * int(candidate / (_BEGIN * bound.multiplier)) * high)
+    found = search.limit(on, 0, high, first)
+    return found if found.mechanism is not None else replace(found, lost=bound.multiplier)
 
 
-def _limited(steps: "_Steps", bracket: "_Bracket") -> "_Bracket":
-    """Return the bracket below the first load that falls, doubled again and again; an endless one if none does."""
-    best, low, problems = bracket.best, 0, bracket.problems
+def _without_bound(on: RigidAssembly, steps: "_Steps", nothing: _Trial) -> HeldLimit:
+    """Return the limit below the first load that falls, doubled again and again; an endless one if none does."""
+    held, best, load = 0.0, nothing, _FIRST
     for doubled in range(_DOUBLED + 1):
-        load = _FIRST * 2.0**doubled
         trial = steps(load)
-        problems += 1
         if not trial.holds:
-            return _Bracket(low, _LOADS, load * WIDTH, best, trial, problems)
-        best, low = trial, _LOADS // 2
-    return replace(bracket, low=_LOADS, best=best, problems=problems)
+            unit = _unit(load)
+            low, high = round(held / unit), round(load / unit)
+            found = _Search(steps, unit, {0: nothing, low: best, high: trial}).limit(on, low, high, None)
+            return replace(found, problems=found.problems + doubled)
+        held, best, load = load, trial, 2.0 * load
+    return HeldLimit(np.inf, np.inf, best.force, None, _DOUBLED + 2)
 
 
-def _searched(steps: "_Steps", bracket: "_Bracket") -> "_Bracket":
-    """Return the bracket of neighbouring loads, next to the bound first."""
-    low, high, unit = bracket.low, bracket.high, bracket.unit
-    best, worst, problems, up = bracket.best, bracket.worst, bracket.problems, _UP
-    load = high - 1 if worst is None else int(worst.stops / unit)
-    while high - low > 1:
-        load = min(max(load, low + 1), high - 1)
-        trial = steps(load * unit)
-        problems += 1
-        middle = (load + high) // 2 if trial.holds else (low + load) // 2
-        if trial.holds:
-            low, best = load, trial
-            load, up = min(int((1.0 + up) * low), middle), 2.0 * up
-        else:
-            high, worst = load, trial
-            stops = int(trial.stops / unit)
-            load = stops if stops > low else middle
-    return _Bracket(low, high, unit, best, worst, problems)
+def _unit(load: float) -> float:
+    """Return the largest of 1, 2 and 5 · 10ᵏ that is no more than two thousandths of a load."""
+    most = WIDTH * load * (1.0 + ROUNDING)
+    power = 10.0 ** np.floor(np.log10(most))
+    return float(power * max(one for one in (1.0, 2.0, 5.0) if one * power <= most))
 
 
 def _falling(on: RigidAssembly, trial: _Trial) -> Mechanism:
     return mechanism(on, trial.velocity, still=10.0 * trial.error)
+
+
+@dataclass(frozen=True)
+class _Search:
+    """Search among the multiples of a unit.
+
+    Attributes
+    ----------
+    steps : from rest under any load
+    unit : of loads [-]
+    tried : the step under each multiple that was tried
+    """
+
+    steps: "_Steps"
+    unit: float
+    tried: dict[int, _Trial]
+
+    def limit(self, on: RigidAssembly, low: int, high: int, first: int | None) -> HeldLimit:
+        """Return the limit between multiples of which the lower is held and the higher lost.
+
+        Parameters
+        ----------
+        on : the stones
+        low, high : of which the higher is the bound where it has not been tried
+        first : to be tried first; None: where the mechanism of the higher would stop
+        """
+        low, high = self._neighbours(low, high, first)
+        while fallen := [one for step in _BELOW if (one := low - step) > 0 and not self._holds(one)]:
+            high = min(fallen)
+            low, high = self._neighbours(max(one for one in self.tried if one < high), high, None)
+        best, worst = self.tried[low], self.tried.get(high)
+        falls = None if worst is None else _falling(on, worst)
+        return HeldLimit(self._load(low), self._load(high), best.force, falls, len(self.tried))
+
+    def _neighbours(self, low: int, high: int, first: int | None) -> tuple[int, int]:
+        """Return neighbouring multiples of which the lower is held and the higher lost."""
+        load = self._stops(low, high) if first is None else first
+        # a load at which a mechanism stops lies next to the limit
+        step = 1 if first is None else max(1, int(_UP * first))
+        while high - low > 1:
+            load = min(max(load, low + 1), high - 1)
+            if self._holds(load):
+                low, load, step = load, min(load + step, (load + high) // 2), 2 * step
+            else:
+                high, step = load, 1
+                load = self._stops(low, high)
+        return low, high
+
+    def _stops(self, low: int, high: int) -> int:
+        """Return the multiple at which the mechanism of the higher would stop, or the one above the lower."""
+        return max(int(self.tried[high].stops / self.unit), low + 1)
+
+    def _holds(self, load: int) -> bool:
+        if load not in self.tried:
+            self.tried[load] = self.steps(self._load(load))
+        return self.tried[load].holds
+
+    def _load(self, load: int) -> float:
+        """Return a multiple of the unit, as it is written in decimals."""
+        return float(f"{load * self.unit:.8g}")
 
 
 class _Steps:
@@ -192,12 +239,13 @@ class _Steps:
         load = self._dead + multiplier * self._live
         gained = float(velocity.ravel() @ (load + on.lift @ force.ravel()))
         power = float(velocity.ravel() @ self._live)
+        error = residual(problem, found.impulse).velocity * pace / (fastest or 1.0)
         return _Trial(
-            holds=fastest <= _MOVES * pace,
+            holds=fastest <= (_CREEPS if error <= _SURE else _MOVES) * pace,
             stops=multiplier - gained / power if power > 0.0 else 0.0,
             force=force,
             velocity=velocity,
-            error=residual(problem, found.impulse).velocity * pace / (fastest or 1.0),
+            error=error,
         )
 
     def _motion(self, load: Array) -> Array:

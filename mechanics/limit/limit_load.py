@@ -39,6 +39,7 @@ __all__ = [
     "limit_load",
     "lines_of_sliding",
     "mechanism",
+    "slides_along_one_line",
     "without_friction_across",
 ]
 
@@ -62,6 +63,9 @@ _BEYOND = 1e-2
 _ACROSS = 1e-3
 # squared sine of the angle between planes of joints up to which they are one plane: 2.6° [-]
 _PLANE = 2e-3
+# share of turning in the speed of a mechanism up to which it slides, and speed over the largest from which a stone
+# belongs to it [-]
+_TURNS, _BELONGS = 0.15, 0.01
 # velocity over the largest below which a contact stays closed [-]
 _STILL = 1e-4
 
@@ -228,6 +232,30 @@ def lines_of_sliding(on: RigidAssembly, found: LimitLoad) -> Array:
         if two and 2.0 * way * way > float(velocity @ velocity):
             line[body] = np.sign(way) * axes[2]
     return line if line[moves].any(axis=1).all() else np.zeros_like(line)
+
+
+def slides_along_one_line(on: RigidAssembly, found: LimitLoad) -> bool:
+    """Return whether all stones that move slide along one line, within 2.6°.
+
+    Where they slide along several, as those of a dome that opens, no friction is across the line of sliding: that of
+    each joint holds the others.
+    """
+    motion = found.mechanism
+    moves = motion.speed > _BELONGS * motion.speed.max(initial=0.0)
+    line = lines_of_sliding(on, found)
+    if line.any():
+        way = line[moves]
+    else:
+        way = motion.velocity[moves, :3]
+        turning = 0.5 * on.model.surfaces.size * np.linalg.norm(motion.velocity[:, 3:], axis=1)
+        if turning.max() > _TURNS * motion.speed.max(initial=0.0):
+            return False
+    size = np.linalg.norm(way, axis=1)
+    if not len(way) or not size.all():
+        return False
+    way = way / size[:, None]
+    axis = np.linalg.svd(way)[2][0]
+    return bool(((way @ axis) ** 2 >= 1.0 - _PLANE).all())
 
 
 def mechanism(

@@ -24,6 +24,9 @@ __all__ = ["ENDED_PATH", "EXACT", "FURTHER", "POLISH", "SOME", "chain_of", "movi
 
 # budgets of links that others follow; what needs more is mostly solved by none of them
 _ADMM = 500  # iterations of ADMM, and sweeps over disks
+# the same from nothing: up to 2 % above a limit load the motion takes 500 to 1,000 iterations, and with fewer it is the
+# budget that decides whether stones fall, or the next method finds a rest
+_ADMM_FROM_NOTHING = 1500
 _NEWTON = 20  # steps of Newton's method
 _FAR = 100  # steps of Newton's method by way of soft joints, as the forces of a rest are far from nothing
 _PATH = 60  # factorisations of a path, and steps of Newton's method where nothing else is left
@@ -91,7 +94,12 @@ _FROM_NOTHING = Link(
     EXACT,
 )
 # Newton's method has failed twice where iterations begin: the path goes on
-_REST_FROM_NOTHING = (_FROM_NOTHING, *_REST[:2], *_REST[3:])
+_REST_FROM_NOTHING = (
+    _FROM_NOTHING,
+    _REST[0],
+    replace(_REST[1], iterations=_ADMM_FROM_NOTHING, further=FURTHER),
+    *_REST[3:],
+)
 _REST_OF_SOME = (replace(_admm, method=_rest, begin=Begin.GIVEN), _newton, _path, _newton)
 _REST_OF_MANY = (replace(_endless, method=_rest, begin=Begin.GIVEN),)
 _MOTION = (

@@ -19,8 +19,8 @@ from mechanics.limit.limit_load import (
     LimitLoad,
     Mechanism,
     limit_load,
-    lines_of_sliding,
     mechanism,
+    slides_along_one_line,
     without_friction_across,
 )
 from mechanics.limit.live_loads import Acceleration, LiveLoad
@@ -60,7 +60,6 @@ _BY_RUNS = "Coulomb's friction without dilatancy, by the rule of runs: the large
 _CRUSHED = "Coulomb's friction without dilatancy, candidate: stones crush, which rigid ones in runs do not"
 _UNSURE = "candidate or bound: the stones rest, but one step from rest moves them under the dead load alone"
 _ALIKE = 0.9  # cosine between mechanism and collapse from which they are one [-]
-_TURNS = 0.15  # share of turning in the speed of a mechanism up to which it slides [-]
 _SAME = 0.01  # by which λ without friction across the line of sliding is lower, from which it is told [-]
 _MOVES = 0.01  # speed over that of the fastest stone from which a stone belongs to a mechanism [-]
 
@@ -230,13 +229,9 @@ def _load(
 def _without_friction_across(on: RigidAssembly, live: LiveLoad, found: LimitLoad) -> float | None:
     """Return λ without friction across the line of sliding [-]; None where it is the same.
 
-    None, too, where stones turn that no two planes guide along a line. Zero where the stones do not stand without it.
+    None, too, where stones do not slide along one line. Zero where the stones do not stand without it.
     """
-    motion = found.mechanism
-    if not np.isfinite(found.multiplier) or not motion.speed.any() or len(on.free) > _SOUGHT:
-        return None
-    turning = 0.5 * on.model.surfaces.size * np.linalg.norm(motion.velocity[:, 3:], axis=1)
-    if turning.max() > _TURNS * motion.speed.max() and not lines_of_sliding(on, found).any():
+    if not np.isfinite(found.multiplier) or len(on.free) > _SOUGHT or not slides_along_one_line(on, found):
         return None
     other = without_friction_across(on, live, found)
     if other is None or np.isinf(other.multiplier):
@@ -257,7 +252,8 @@ def _limit(
         return bound, 0.0, _BY_RUNS
     if on.crushing is not None and candidate is not None:
         return candidate, bound.multiplier, _CRUSHED
-    found = held_limit(on, live, bound)
+    lowest = None if candidate is None or not candidate.converged else candidate.lowest.multiplier
+    found = held_limit(on, live, bound, lowest)
     if found.lost == 0.0:
         return candidate or bound, bound.multiplier, _UNSURE
     limit = replace(

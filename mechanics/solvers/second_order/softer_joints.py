@@ -38,9 +38,10 @@ class SofterJoints:
             solution = newton(replace(problem, delassus=operator), start)
             count += solution.iterations
             # the softest lead on even where they are not quite solved
-            if solution.converged or count == solution.iterations:
+            if solution.converged or k == 0:
                 start = ContactStart(solution.impulse, solution.velocity)
-            if count >= self.max_iterations:
+            # where joints are not solved, harder ones are not either
+            if count >= self.max_iterations or not (solution.converged or k == 0):
                 break
         if solution.converged and operator is problem.delassus:
             return replace(solution, iterations=count)

@@ -7,7 +7,14 @@ import pytest
 
 from mechanics.limit.assembly import assembly
 from mechanics.limit.held import held_limit
-from mechanics.limit.limit_load import Flow, limit_load, lines_of_sliding, without_friction_across
+from mechanics.limit.limit_load import (
+    Flow,
+    limit_load,
+    lines_of_sliding,
+    mechanism,
+    slides_along_one_line,
+    without_friction_across,
+)
 from mechanics.limit.live_loads import Acceleration
 from mechanics.scene.scene import Fidelity
 from mechanics.scene.shapes import prism
@@ -123,3 +130,32 @@ def test_a_stone_between_two_planes_has_no_line_where_another_stone_moves_that_h
     speed[0] = 0.5
     other = replace(limit, mechanism=replace(held.mechanism, speed=speed))
     assert not lines_of_sliding(on, other).any()
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "one_line"),
+    [
+        ((1.0, 0.2, 0.0), (0.5, 0.1, 0.0), True),
+        ((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), True),
+        ((1.0, 0.0, 0.0), (1.0, 0.005, 0.0), True),
+        ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), False),
+        ((1.0, 0.3, 0.0), (1.0, -0.3, 0.0), False),
+        ((1.0, 0.0, 0.0), (0.001, 0.001, 0.0), True),
+    ],
+)
+def test_stones_slide_along_one_line_or_apart(first, second, one_line):
+    """The stones of a dome that opens slide outwards on all sides: no friction of theirs is across one line."""
+    blocks = ground(), brick("a", (0, 0, 0), (1, 1, 0.2)), brick("b", (2, 0, 0), (3, 1, 0.2))
+    on = assembly(scene(*blocks, friction=FRICTION))
+    velocity = np.zeros((2, 6))
+    velocity[:, :3] = first, second
+    limit = replace(limit_load(on, ALONG), mechanism=mechanism(on, velocity))
+    assert slides_along_one_line(on, limit) == one_line
+
+
+def test_stones_that_turn_slide_along_no_line():
+    on = assembly(scene(ground(), brick("a", (0, 0, 0), (1, 1, 0.2)), friction=FRICTION))
+    limit = limit_load(on, ALONG)
+    for spin, one_line in ((0.01, True), (10.0, False)):
+        turning = replace(limit, mechanism=mechanism(on, np.array([[1.0, 0.0, 0.0, 0.0, spin, 0.0]])))
+        assert slides_along_one_line(on, turning) == one_line

@@ -7,6 +7,7 @@ import pytest
 
 from benchmarks.limit import WALLS
 from mechanics.dynamics.outcome import Outcome
+from mechanics.limit import held
 from mechanics.limit.assembly import assembly
 from mechanics.limit.held import WIDTH, held_limit
 from mechanics.limit.limit_load import limit_load
@@ -26,8 +27,8 @@ def limit_of(on, live=ALONG):
 
 
 def within(found, value):
-    """Hold a bracket of the asked width around a value; a bound is known to 10⁻⁶ of itself."""
-    assert found.lost - found.held == pytest.approx(WIDTH * found.lost)
+    """Hold a bracket of the asked width around a value, half a unit wider next to a bound, known to 10⁻⁶ of itself."""
+    assert 0.0 < found.lost - found.held <= 1.5 * WIDTH * found.lost
     assert found.held <= value * (1 + 1e-5)
     assert found.lost >= value * (1 - 1e-5)
 
@@ -56,6 +57,41 @@ def test_what_falls_by_itself_has_none_and_what_nothing_limits_has_no_end():
     assert found.mechanism is None
 
 
+class Scattered:
+    """Steps from rest under loads of which some fall by chance."""
+
+    def __init__(self, limit, *falls):
+        self.limit, self.falls, self.tried = limit, falls, []
+
+    def __call__(self, load):
+        self.tried.append(load)
+        none = np.zeros((0, 3))
+        holds = load < self.limit and load not in self.falls
+        return held._Trial(holds, 0.9 * self.limit, none, np.zeros((0, 6)), 0.0)
+
+
+@pytest.mark.parametrize(
+    ("limit", "falls", "value", "lost"),
+    [(0.66, (), 0.659, 0.66), (0.66, (0.657,), 0.656, 0.657), (0.66, (0.658, 0.655), 0.654, 0.655)],
+)
+def test_a_load_that_falls_next_below_the_limit_lowers_it(monkeypatch, limit, falls, value, lost):
+    """All that is tried below what is said to be held is held, and the least that falls is said to be lost."""
+    steps = Scattered(limit, *falls)
+    monkeypatch.setattr(held, "_Steps", lambda *_: steps)
+    monkeypatch.setattr(held, "_falling", lambda *_: "falls")
+    on = assembly(scene(ground(), SQUAT))
+    for candidate in (None, 0.6):
+        steps.tried.clear()
+        found = held.held_limit(on, ALONG, replace(limit_load(on, ALONG), multiplier=0.8), candidate)
+        assert (found.held, found.lost) == (value, lost)
+        assert {value - 0.001, value - 0.002, value - 0.004} <= {round(one, 6) for one in steps.tried} | {0.0}
+
+
+def test_loads_that_are_tried_are_round():
+    for bound, unit in ((0.676063, 1e-3), (0.2381, 2e-4), (0.999, 1e-3), (5e4, 100.0), (0.25, 5e-4)):
+        assert held._unit(bound) == pytest.approx(unit, rel=1e-12)
+
+
 @pytest.mark.slow
 def test_the_step_that_falls_shows_how():
     """Without dilatancy a wall with windows falls at less than the bound; its base course stays."""
@@ -82,8 +118,8 @@ def test_runs_hold_below_and_fall_above(name, step):
     one = WALLS[name]
     on = one.assembly()
     found = limit_of(on)
-    for factor, rests in ((0.98, True), (1.03, False)):
-        load = ALONG.applied(on, factor * (found.held if rests else found.lost))
+    for multiplier, rests in ((found.held, True), (found.lost, False)):
+        load = ALONG.applied(on, multiplier)
         time = replace(load.time, step=step, duration=max(0.2, 60 * step))
         run = simulate(replace(load, time=time, contact=ContactSettings(DryJoint(one.friction))))
         assert run.outcome.rests == rests
