@@ -25,8 +25,8 @@ _CROSSED = np.sin(
 _PARALLEL = 0.02  # sine of the angle between joints of which it cannot be told where they meet
 _POINTS_THERE = 0.1  # sine of the angle by which a joint may point past the centre
 _CANDIDATES = 400  # places that are tried for the centre
-_ROUNDS = 5  # until the centre and the joints within rings agree; two or three do
-_FEWEST = 3  # stones of an arch, with its springers
+_MAX_ITERATIONS = 5  # until the centre and the joints within rings agree; two or three do
+_MIN_ARCH_STONES = 3  # stones of an arch, with its springers
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ def _arch(
     for number, row in enumerate(rows, start=1):
         for stone in _placed(number, row, crossed, inside, stones, view):
             arch_stones.setdefault(stone.entity, stone)
-    return ArchRings(tuple(arch_stones.values())) if len(arch_stones) >= _FEWEST else None
+    return ArchRings(tuple(arch_stones.values())) if len(arch_stones) >= _MIN_ARCH_STONES else None
 
 
 class _View:
@@ -201,7 +201,7 @@ def _within_rings(
     )
     normal = view.project(np.array([joint.normal for joint in joints]))
     centre = _centre(middle, normal)
-    for _ in range(_ROUNDS):
+    for _ in range(_MAX_ITERATIONS):
         crossing = _off(centre, middle, normal) <= _CROSSED
         if crossing.sum() < 2:
             break

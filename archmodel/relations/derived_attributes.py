@@ -18,7 +18,7 @@ from archmodel.tables.relations import Relation
 
 __all__ = ["arch_values", "give_values", "tail_lengths"]
 
-_SAME = 1e-9  # values that differ by less, in m or rad, are one value computed twice
+_VALUE_ROUNDING = 1e-9  # values that differ by less, in m or rad, are one value computed twice
 
 
 def arch_values(arches: Sequence[ArchRings]) -> dict[int, dict[str, float | None]]:
@@ -109,7 +109,7 @@ def give_values(session: Session, values: Mapping[int, Mapping[str, float | None
 
 
 def _differs(before: float | None, after: float | None) -> bool:
-    return after is not None and (before is None or abs(before - after) > _SAME)
+    return after is not None and (before is None or abs(before - after) > _VALUE_ROUNDING)
 
 
 def _declared(session: Session, names: Sequence[str]) -> set[tuple[int, str]]:

@@ -20,7 +20,7 @@ from archmodel.tables.relations import RELATIONS, Relation
 __all__ = ["Act", "Changes", "held_settings", "store_relations", "supersede"]
 
 
-_SAME = 1e-6
+_NUMBER_ROUNDING = 1e-6
 """Numbers of a joint that differ by less [m, m²] are those of the same joint, computed about another place."""
 
 _NUMBERS = ("area", "gap", "x", "y", "z", "nx", "ny", "nz")
@@ -112,7 +112,8 @@ def store_relations(
         place = np.minimum(place, len(stored.keys) - 1)
         unchanged = (stored.keys[place] == keys) & ~stored.declared[place]
         unchanged[unchanged] &= (
-            np.abs(stored.numbers[place[unchanged]] - _numbers(found_relations)[unchanged]) <= _SAME
+            np.abs(stored.numbers[place[unchanged]] - _numbers(found_relations)[unchanged])
+            <= _NUMBER_ROUNDING
         ).all(axis=1)
     stays = stored.declared.copy()
     stays[place[unchanged]] = True

@@ -16,7 +16,7 @@ __all__ = ["use_packed_kernels"]
 
 _FITTING = Path(__file__).with_name("packed.json")
 
-_SAID = "MOMA_KERNELS_SAID"
+_WARNED = "MOMA_KERNELS_SAID"
 """Variable of the environment that is set once the reason has been said."""
 
 
@@ -30,8 +30,8 @@ def use_packed_kernels() -> None:
     reason = _misfit(fitting)
     if reason is None:
         os.environ.update(fitting["environment"])
-    elif _SAID not in os.environ:
-        os.environ[_SAID] = "1"  # processes that this one starts say it no more
+    elif _WARNED not in os.environ:
+        os.environ[_WARNED] = "1"  # processes that this one starts say it no more
         print(f"moma: warning: {reason}; kernels are compiled here, once", file=sys.stderr)
 
 

@@ -40,7 +40,7 @@ __all__ = ["FLAT", "THIN", "Detector"]
 
 FLAT = float(np.cos(np.radians(5.0)))  # cosine of the angle within which faces lie flat on one another
 # number of pairs or boxes from which another thread pays: 0.5 ms of work
-_PART = 500
+_THREAD_BATCH = 500
 THIN = 1e-6  # flat faces that overlap by less than this part of the smaller one do not touch
 
 
@@ -237,7 +237,7 @@ class Detector:
 
     def _in_parts(self, count: int, work: Callable[[int, int], tuple[Any, ...]]) -> tuple[Any, ...]:
         """Return the results of `work` for all pairs or boxes, in order; each thread takes a range of them."""
-        parts = min(self.threads, count // _PART)
+        parts = min(self.threads, count // _THREAD_BATCH)
         if parts < 2:
             return work(0, count)
         end = [count * k // parts for k in range(parts + 1)]

@@ -14,7 +14,9 @@ __all__ = ["face_meshes", "part_face_meshes"]
 
 Faces = Sequence[Sequence[int]]
 
-_NEAR = 1e-6  # share of the block's size: a facet nearer than this to the plane of a face lies in it
+_FACET_DISTANCE = (
+    1e-6  # share of the block's size: a facet nearer than this to the plane of a face lies in it
+)
 _SAME_AREA = 1e-6  # share of a facet's area: a smaller overlap is due to rounding
 
 
@@ -33,7 +35,7 @@ def part_face_meshes(mesh: SolidMesh, vertices: Array, faces: Faces, start: int)
     x = mesh.nodes[mesh.facets[:, :corners]]
     normal = np.cross(x[:, 1] - x[:, 0], x[:, -1] - x[:, 0])
     normal /= np.linalg.norm(normal, axis=1)[:, None]
-    near = _NEAR * float(np.ptp(mesh.nodes, axis=0).max())
+    near = _FACET_DISTANCE * float(np.ptp(mesh.nodes, axis=0).max())
     cut_meshes = []
     for face in faces:
         polygon = vertices[list(face)]

@@ -20,9 +20,9 @@ __all__ = ["BodyForm", "scaled_frames"]
 
 
 # refinement steps, at most
-_ROUNDS = 2
+_REFINEMENTS = 2
 # relative change of velocities due to rounding alone [-]
-_ROUNDING = 1e-14
+_VELOCITY_ROUNDING = 1e-14
 # smallest pivot accepted, over the largest of its column, so that the elimination order stays [-]
 _THRESHOLD = 0.01
 # largest relative residual of a solution [-]
@@ -187,13 +187,13 @@ class _Factors:
         """Return (W + Θ)⁻¹ b (3 nc,)."""
         side, mass, wanted = self.pattern.side, self.pattern.mass, b.reshape(-1, 3)
         v, r = self.once(wanted)
-        for _ in range(_ROUNDS):
+        for _ in range(_REFINEMENTS):
             first, second = kernel.corrected(self.theta, wanted, v, r, mass, side, self.geometry)
             second += kernel.pushed(self.soft, first, side, self.geometry, len(mass))
             step = self.lu.solve(second.ravel()).reshape(-1, 6)
             v += step
             r += kernel.softened(self.soft, first, step, side, self.geometry)
-            if np.abs(step).max(initial=0.0) <= _ROUNDING * np.abs(v).max(initial=0.0):
+            if np.abs(step).max(initial=0.0) <= _VELOCITY_ROUNDING * np.abs(v).max(initial=0.0):
                 break
         result: Array = r.ravel()
         return result

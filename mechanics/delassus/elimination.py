@@ -15,7 +15,7 @@ _MANY = 1000
 # size of a part that is not divided further
 _LEAF = 8
 # distance along an axis below which bodies lie in one course [m]
-_SAME = 1e-6
+_COURSE_HEIGHT = 1e-6
 
 
 def elimination(pairs: Ints, moving: Ints, centre: Array) -> Ints:
@@ -48,7 +48,7 @@ def dissection(pairs: Ints, place: Array) -> Ints:
     start = np.searchsorted(np.sort(body), np.arange(count + 1))
     near = other[np.argsort(body, kind="stable")]
     # within a course, sort along the other axes
-    axes = np.round(place.T / _SAME)
+    axes = np.round(place.T / _COURSE_HEIGHT)
     along = np.array([np.lexsort((*np.delete(axes, k, axis=0), axes[k])) for k in range(len(axes))])
     rank: Ints = dissect(start, near, along, _LEAF)
     return rank

@@ -17,9 +17,9 @@ __all__ = ["MixedForm", "MixedPattern", "mixed_fronts"]
 
 
 # refinement steps, at most
-_ROUNDS = 2
+_REFINEMENTS = 2
 # relative change of velocities due to rounding alone [-]
-_ROUNDING = 1e-14
+_VELOCITY_ROUNDING = 1e-14
 
 
 class MixedPattern:
@@ -222,14 +222,14 @@ class _Factors:
     def refined(self, b: Array) -> Array:
         """Return (W + Θ)⁻¹ b (3 nc,)."""
         r, v = self.once(b, np.zeros(self.across.shape[1]))
-        for _ in range(_ROUNDS):
+        for _ in range(_REFINEMENTS):
             own = _product(self.theta, r.reshape(-1, 3)).ravel() + self._yielded(r)
             first = b - own - self.across @ v
             second = self.across.T @ r - _product(self.mass, v.reshape(-1, 6)).ravel()
             change, step = self.once(first, second)
             r += change
             v += step
-            if np.abs(step).max(initial=0.0) <= _ROUNDING * np.abs(v).max(initial=0.0):
+            if np.abs(step).max(initial=0.0) <= _VELOCITY_ROUNDING * np.abs(v).max(initial=0.0):
                 break
         return r
 

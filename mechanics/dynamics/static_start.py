@@ -52,7 +52,7 @@ _AMONG_RIGID = _Way(5e-3, 50, 0.5, unsolved=2)
 _SETTLING = _Way(1e-2, 50)
 # tolerances of statics over those asked for, of η and of velocities [-]: Newton's last steps spare the run its first
 _NATURAL_MAP, _VELOCITY = 0.5, 0.01
-_ROUNDING = 1e-7  # least η in steps as long as 1 s, because of rounding [-]
+_MIN_RESIDUAL = 1e-7  # least η in steps as long as 1 s, because of rounding [-]
 _CLOSING = 5  # steps of the run's own length in which rigid stones close their last gaps
 _FALLS = 0.2  # displacement over the smallest width beyond which a stone falls rather than settles [-]
 
@@ -117,7 +117,7 @@ class _Search:
         self._balance: Array = np.full(1, np.inf)
         self._eta, self._first = 0.0, count
         asked = model.scene.solver
-        self._goal = max(asked.tolerance, _ROUNDING)
+        self._goal = max(asked.tolerance, _MIN_RESIDUAL)
         self._search = Simulation(
             _still(model, attempt.step, self._settings(asked)), start, elastic_scale=self._long
         )

@@ -29,7 +29,7 @@ __all__ = ["Confirmation", "ConfirmationRun", "Likeness", "confirm", "likeness"]
 
 
 # load that is lost over that which is held at the end [-]
-_NEAR = 0.03
+_LOAD_ACCURACY = 0.03
 # step in which a stone falls by this share of the least width, and steps of a run at most
 _FALL, _STEPS = 2.5e-3, 500
 # move over its width from which a stone that falls has collapsed [-]
@@ -82,7 +82,8 @@ class Confirmation:
     def agrees(self, candidate: float) -> bool:
         """Return True if the limit of the dynamics lies within 3 % of a candidate."""
         return (
-            self.held >= (1.0 - _NEAR) * candidate - 1e-12 and self.lost <= (1.0 + _NEAR) * candidate + 1e-12
+            self.held >= (1.0 - _LOAD_ACCURACY) * candidate - 1e-12
+            and self.lost <= (1.0 + _LOAD_ACCURACY) * candidate + 1e-12
         )
 
 
@@ -150,9 +151,9 @@ def confirm(
     SceneError, SolverError : see `simulate`
     """
     trials: list[ConfirmationRun] = []
-    held, lost, way = 0.0, bound, _NEAR
+    held, lost, way = 0.0, bound, _LOAD_ACCURACY
     multiplier = min(candidate, bound)
-    while len(trials) < runs and not stop() and lost > (1.0 + _NEAR) * held:
+    while len(trials) < runs and not stop() and lost > (1.0 + _LOAD_ACCURACY) * held:
         trial = _trial(on, live, multiplier, progress, stop)
         trials.append(trial)
         if trial.outcome.rests:
@@ -169,7 +170,7 @@ def confirm(
             way *= 2.0
     if np.isfinite(lost) and all(trial.outcome.rests for trial in trials) and not stop():
         # how stones fall beyond the bound
-        trials.append(_trial(on, live, (1.0 + _NEAR) * lost, progress, stop))
+        trials.append(_trial(on, live, (1.0 + _LOAD_ACCURACY) * lost, progress, stop))
     return Confirmation(held, float(lost), tuple(trials))
 
 

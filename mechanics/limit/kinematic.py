@@ -34,7 +34,7 @@ __all__ = ["Kinematics", "kinematics"]
 # speed over the fastest below which a stone stands [-]
 _STANDS = 1e-3
 # difference of the motions of two stones at their centres, over the fastest, up to which they are one block [-]
-_ONE = 1e-3
+_SAME_MOTION = 1e-3
 # places of the curve, and turn of the fastest block up to which it is followed [rad]
 _PLACES, _FARTHEST = 51, 1.5
 
@@ -152,7 +152,7 @@ def _blocks(on: RigidAssembly, mechanism: Mechanism) -> Ints:
     apart = np.linalg.norm(carried - velocity[b, :3], axis=1)
     size = on.model.surfaces.size[b]
     apart += 0.5 * size * np.linalg.norm(velocity[a, 3:] - velocity[b, 3:], axis=1)
-    one = moves[a] & moves[b] & (apart < _ONE)
+    one = moves[a] & moves[b] & (apart < _SAME_MOTION)
     count = len(on.model.mass)
     graph = coo_array((np.ones(int(one.sum())), (a[one], b[one])), shape=(count, count))
     label = connected_components(graph, directed=False)[1]

@@ -36,7 +36,7 @@ _SOFTENING_STEPS = 2
 # inertia over the largest force up to which a step is calm [-]
 _CALM = 0.01
 # of displacements, over the largest [-]
-_ROUNDING = 1e-9
+_DISPLACEMENT_ROUNDING = 1e-9
 # shares of the largest force at which laboratories take secants [-]
 _EARLY, _INITIAL = 0.15, 0.3
 # stones that an error names: so many at most, of those that moved by this share of the largest displacement
@@ -127,7 +127,7 @@ class LoadingTest:
         )
         asked = sign * displacement
         found: Array = np.interp(asked, places, forces, np.nan)
-        return np.where(asked > places[-1] * (1.0 + _ROUNDING), np.nan, found)
+        return np.where(asked > places[-1] * (1.0 + _DISPLACEMENT_ROUNDING), np.nan, found)
 
     @property
     def turning(self) -> float:
@@ -226,7 +226,7 @@ def loading_test(
     balance = EnergyBalance(model, settled)
     codes = [block.code for block in model.scene.blocks]
     jaws = np.array([codes.index(code) for code in sorted(path.stones)])
-    steps = int(np.ceil(path.until / duration - _ROUNDING))
+    steps = int(np.ceil(path.until / duration - _DISPLACEMENT_ROUNDING))
     rows: list[tuple[float, float, float, float]] = []
     unsolved, energy, peak = 0, kinetic_energy(model, settled), None
     pushed: _Pushed | None = None

@@ -22,7 +22,7 @@ __all__ = ["GeometricSafety", "geometric_safety", "shrunk"]
 
 
 # share of the width of joints to which its least value is found [-]
-_NEAR = 1e-4
+_WIDTH_ACCURACY = 1e-4
 # part of the largest load on a stone that forces may lack [-]
 _LACKING = 1e-5
 
@@ -65,7 +65,7 @@ def geometric_safety(on: RigidAssembly, widest: float = 1.0) -> GeometricSafety:
     if fallen is None:
         return GeometricSafety(0.0, at_points, mechanism(on, np.zeros((len(on.free), 6))))
     low, high = 0.0, widest
-    while high - low > _NEAR * high:
+    while high - low > _WIDTH_ACCURACY * high:
         share = 0.5 * (low + high)
         at_share, falls = _stands(on, share)
         if falls is None:

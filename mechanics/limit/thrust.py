@@ -21,7 +21,7 @@ __all__ = ["Extreme", "Thrust", "thrust"]
 
 
 # thrust over the weight that counts as none [-]
-_ROUNDING = 1e-8
+_THRUST_ROUNDING = 1e-8
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def _extreme(
     found = programme.solve(on.strength, cost=cost)
     # what rounding leaves of the weight is no thrust
     total = float((cost * found.force).sum())
-    total = total if abs(total) > _ROUNDING * on.weight else 0.0
+    total = total if abs(total) > _THRUST_ROUNDING * on.weight else 0.0
     value = {Ending.NO_BALANCE: np.nan, Ending.ENDLESS: -np.inf}.get(found.ending, total)
     still = found.ending is not Ending.FOUND
     return Extreme(

@@ -27,7 +27,7 @@ __all__ = ["PlanarDelassus", "PlanarGaussSeidel"]
 
 
 # contacts of a part from which another thread pays: 0.1 ms of work
-_PART = 10_000
+_THREAD_BATCH = 10_000
 # parts at most: the contacts between them are swept by one thread
 _PARTS = 4
 
@@ -88,7 +88,7 @@ class PlanarDelassus:
     @cached_property
     def layout(self) -> SweepOrder:
         """Order of the sweeps; it depends on the contacts alone, never on the number of threads."""
-        parts = min(max(len(self.bodies) // _PART, 1), _PARTS)
+        parts = min(max(len(self.bodies) // _THREAD_BATCH, 1), _PARTS)
         order, start, rank = cut(self.bodies, self.inertia[:, 0] > 0, parts, True)
         made: SweepOrder = layout_of(order, start, rank, self.bodies, self.inertia)
         return made

@@ -27,11 +27,11 @@ __all__ = ["Apart", "Overlaps", "refuse_deep"]
 
 
 # overlap over the largest allowed that a correction leaves, a in the equations: contacts stay closed [-]
-_LEFT = 0.5
+_REMAINING_OVERLAP = 0.5
 # overlap beyond that from which disks are moved apart, over the largest allowed; the rest is for what is not linear
 _BEYOND = 0.3
 # of overlaps at the start that are just as large as allowed [-]
-_ROUNDING = 1e-9
+_OVERLAP_ROUNDING = 1e-9
 # part of the last correction from which the next one begins: what is no longer needed fades, and what is needed has to
 # be found again by sweeps, slowly [-]
 _AGAIN = 0.97
@@ -50,7 +50,7 @@ def refuse_deep(model: PlanarModel, contacts: PlanarContacts) -> None:
     """
     scene, radius = model.scene, 0.5 * contacts.size
     part = -contacts.gap / radius
-    deep = np.flatnonzero(part > scene.start_overlap * (1.0 + _ROUNDING))
+    deep = np.flatnonzero(part > scene.start_overlap * (1.0 + _OVERLAP_ROUNDING))
     if not len(deep):
         return
     worst = deep[np.argmax(part[deep])]
@@ -128,10 +128,10 @@ class Overlaps(Carrier):
         step : h [s]
         """
         gap, state = end.gap, end.state
-        if not (-gap).max(initial=0.0) > (_LEFT + _BEYOND) * self._allowed:
+        if not (-gap).max(initial=0.0) > (_REMAINING_OVERLAP + _BEYOND) * self._allowed:
             return end
         of_start = _recalled(self._key, self._gap, contacts.key)
-        left = np.minimum(of_start, -_LEFT * self._allowed)
+        left = np.minimum(of_start, -_REMAINING_OVERLAP * self._allowed)
         limit = left - _BEYOND * self._allowed
         opening = np.maximum(operator.relative_velocity(state.velocity)[:, 0], 0.0)
         ahead = np.where(terms.bias < 0, gap + step * opening, gap)

@@ -10,7 +10,7 @@ from mechanics.arrays import Array, Bools, Ints
 __all__ = ["ContactResult", "JointResult"]
 
 
-_ROUNDING = 1e-9  # by which rounding may take a number beyond its limit of 1 [-]
+_LIMIT_ROUNDING = 1e-9  # by which rounding may take a number beyond its limit of 1 [-]
 
 
 @dataclass(frozen=True)
@@ -117,5 +117,5 @@ class JointResult:
     @property
     def in_kern(self) -> Bools:
         """(nj,) true for joints under compression within the kern."""
-        inside: Bools = self.kern <= 1.0 + _ROUNDING
+        inside: Bools = self.kern <= 1.0 + _LIMIT_ROUNDING
         return inside

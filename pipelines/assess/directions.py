@@ -15,8 +15,8 @@ __all__ = ["facade_pushes", "push", "weakest_push"]
 
 _UPRIGHT = 0.3  # vertical part of the normal of an upright face, at most [-]
 _ALIKE = np.radians(5.0)  # angle within which faces belong to one façade [rad]
-_PART = 0.25  # area of the upright faces that a façade has, those square to it included [-]
-_SAME = 0.5  # angle to an axis that is none [°]
+_PUSH_SHARE = 0.25  # area of the upright faces that a façade has, those square to it included [-]
+_AXIS_ANGLE = 0.5  # angle to an axis that is none [°]
 _COARSE, _FINE = 15, 1.0  # angles at which the weakest direction is sought, and to which [°]
 _AXES = {0.0: "x", 90.0: "y", 180.0: "-x", 270.0: "-y"}
 
@@ -24,7 +24,7 @@ _AXES = {0.0: "x", 90.0: "y", 180.0: "-x", 270.0: "-y"}
 def push(angle: float) -> LoadQuestion:
     """Return the question of a horizontal push at an angle from x towards y [°]."""
     axis = min(_AXES, key=lambda one: abs((angle - one + 180.0) % 360.0 - 180.0))
-    if abs((angle - axis + 180.0) % 360.0 - 180.0) <= _SAME:
+    if abs((angle - axis + 180.0) % 360.0 - 180.0) <= _AXIS_ANGLE:
         x, y = round(np.cos(np.radians(axis))), round(np.sin(np.radians(axis)))
         return LoadQuestion(f"horizontal {_AXES[axis]}", Acceleration((float(x), float(y), 0.0)))
     turn = np.radians(angle)
@@ -45,7 +45,7 @@ def facade_pushes(blocks: Sequence[Block]) -> tuple[LoadQuestion, ...]:
         alike = np.abs(np.angle(np.exp(4j * (angle[:, None] - angle[left])))) <= 4.0 * _ALIKE
         weight = (area * left) @ alike
         peak = int(weight.argmax())
-        if weight[peak] < _PART * area.sum():
+        if weight[peak] < _PUSH_SHARE * area.sum():
             break
         facing = alike[:, peak] & left
         turn = float(np.degrees(np.angle(area[facing] @ np.exp(4j * angle[facing])) / 4.0))

@@ -79,7 +79,7 @@ _AXES: Mapping[str, Vector] = {
     "z": (0.0, 0.0, 1.0),
     "-z": (0.0, 0.0, -1.0),
 }
-_OWN = ("confirm", "pushover", "code")
+_QUESTION_KEYS = ("confirm", "pushover", "code")
 _DOWN: Vector = (0.0, 0.0, -1.0)
 _REMEDY = (
     'give "horizontal x", "horizontal 30" (degrees from x towards y), "tilt y", "force CODE FX FY FZ", '
@@ -132,7 +132,9 @@ def scene_questions(scene: SceneFile, groups: Groups, origin: Array) -> tuple[Qu
         with scene.document.at(*entry.path):
             question = _TYPES[entry.type](entry, _codes(entry, groups), origin)
         if isinstance(question, LoadQuestion):
-            question = replace(question, **{key: entry.values[key] for key in _OWN if key in entry.values})
+            question = replace(
+                question, **{key: entry.values[key] for key in _QUESTION_KEYS if key in entry.values}
+            )
             if question.code is not None:
                 _refuse_code(scene, entry, question)
         questions.append(question)

@@ -15,7 +15,7 @@ __all__ = ["MOTION", "draw_motion"]
 MOTION = "motion.gif"
 """Name of the file."""
 
-_MOST = 60  # pictures
+_MAX_PICTURES = 60  # pictures
 _LONG = 5.0  # time that they take [s]
 _SEEN = 0.03  # largest displacement as drawn over the extent of the scene, where less would not be seen [-]
 
@@ -31,7 +31,7 @@ def draw_motion(result: Result, folder: Path, towards: Array) -> str:
     MissingLibraryError : VTK cannot be loaded or cannot draw on this machine
     """
     rows = np.unique(
-        np.linspace(0, len(result.frames) - 1, min(len(result.frames), _MOST)).round().astype(int)
+        np.linspace(0, len(result.frames) - 1, min(len(result.frames), _MAX_PICTURES)).round().astype(int)
     )
     frames = [result.frames[row] for row in rows.tolist()]
     surface = wall_surface(result)

@@ -24,7 +24,7 @@ __all__ = ["closing_surface", "draw_closing", "draw_elevations", "draw_in_space"
 _FLAT = 0.2  # largest depth of a facade over its extent [-]: a deeper one is distorted by an elevation
 _LOOKING = np.cos(np.radians(25.0))  # smallest mean component of the normals across the facade [-]
 _SHARE = 0.08  # smallest share of the visible area [-]: smaller facades are not worth an elevation
-_MOST = 4  # elevations of one scene
+_MAX_ELEVATIONS = 4  # elevations of one scene
 _NOTHING = 5e-5  # smaller movements are rounding [m]
 _MAINLY = 0.6  # least share of the visible area in flat facades together [-]
 _LEVEL = 0.25  # length of the mean normal [-]: below it the stones have no common direction
@@ -104,7 +104,7 @@ def flat_facades(shapes: ClosingShapes) -> tuple[Facade, ...]:
         if depth <= _FLAT * reach and looking >= _LOOKING and areas[members].sum() >= _SHARE * areas.sum():
             facades.append(facade)
     mainly_flat = sum(facade.area for facade in facades) >= _MAINLY * areas.sum()
-    return tuple(facades[:_MOST]) if mainly_flat else ()
+    return tuple(facades[:_MAX_ELEVATIONS]) if mainly_flat else ()
 
 
 def viewpoint(shapes: ClosingShapes) -> tuple[Array, float]:

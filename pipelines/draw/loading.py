@@ -16,7 +16,7 @@ from pipelines.draw.elevations.sheet import new_sheet
 __all__ = ["draw_curve", "draw_pushed"]
 
 _ROW = 80  # characters in a line of a title
-_WAY = 0.08  # way of the push in the picture over the extent of the stones [-]
+_DRAWN_DISPLACEMENT = 0.08  # way of the push in the picture over the extent of the stones [-]
 _OPEN = 0.05  # opening of a joint that is marked, over the displacement of the push [-]
 _SEEN = -0.5  # component of a normal towards the viewer up to which a face is drawn [-]
 
@@ -59,7 +59,7 @@ def draw_pushed(path: Path, title: str, test: LoadingTest, step: Step) -> None:
     extent = float((high - low).max())
     # by the way of the push: a stone that has fallen out would leave none for the others
     displacement = abs(float(test.displacement[np.abs(test.force).argmax() if step is test.peak else -1]))
-    factor = _WAY * extent / max(displacement, 1e-9)
+    factor = _DRAWN_DISPLACEMENT * extent / max(displacement, 1e-9)
 
     def drawn(start: Array, end: Array) -> Array:
         """Project places (n, 3) at the end of the step, their displacements exaggerated."""
@@ -81,7 +81,7 @@ def draw_pushed(path: Path, title: str, test: LoadingTest, step: Step) -> None:
     kept = ~model.fixed[contacts.bodies[wide]]
     ends = (material_points(contacts, one)[wide][kept] for one in (test.settled, step.after))
     axes.plot(*drawn(*ends).T, ".", color="#c0392b", markersize=3)
-    margin = 2 * _WAY * extent
+    margin = 2 * _DRAWN_DISPLACEMENT * extent
     axes.set_xlim(low[0] - margin, high[0] + margin)
     axes.set_ylim(low[1] - margin, high[1] + margin)
     axes.set_aspect("equal")

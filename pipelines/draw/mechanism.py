@@ -18,7 +18,7 @@ from survey.geometry.watertight import triangulate
 
 __all__ = ["draw_mechanisms"]
 
-_WAY = 0.06  # of the fastest corner over the extent of the scene [-]
+_DRAWN_DISPLACEMENT = 0.06  # of the fastest corner over the extent of the scene [-]
 
 
 def draw_mechanisms(
@@ -60,7 +60,7 @@ def draw_mechanisms(
             for block, start in zip(blocks, starts[:-1], strict=True)
         ]
     )
-    way = _WAY * float(np.ptp(corners, axis=0).max())
+    way = _DRAWN_DISPLACEMENT * float(np.ptp(corners, axis=0).max())
     moved, places, forces, kerns = [], [], [], []
     pictures: list[dict[str, Any]] = []
     arm = corners - on.state.centre[owner]

@@ -13,7 +13,7 @@ from pipelines.draw.elevations.sheet import new_sheet
 __all__ = ["draw_fragility", "draw_samples", "draw_shares", "draw_tornado"]
 
 _BLUE, _RED, _GREY = "#1f5f8b", "#8a3b12", "#b0b0b0"
-_MOST = 15  # bars of a tornado
+_MAX_BARS = 15  # bars of a tornado
 
 
 def draw_samples(path: Path, name: str, values: Array, level: float | None) -> None:
@@ -51,7 +51,7 @@ def draw_fragility(path: Path, name: str, rows: Sequence[Mapping[str, Any]]) -> 
 
 def draw_tornado(path: Path, shares: Mapping[str, float]) -> None:
     """Draw shares of the variance as bars, the largest first."""
-    rows = sorted(shares.items(), key=lambda row: -row[1])[:_MOST]
+    rows = sorted(shares.items(), key=lambda row: -row[1])[:_MAX_BARS]
     figure = new_sheet((7.0, 0.8 + 0.3 * len(rows)))
     axes = figure.subplots()
     axes.barh([name for name, _ in rows], [100.0 * share for _, share in rows], color=_BLUE)

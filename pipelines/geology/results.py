@@ -33,7 +33,7 @@ __all__ = ["Observations", "quality_of", "write_results"]
 _MOST_OVERLAP = 0.01  # over the smallest radius, beyond which a run says so first [-]
 _FABRIC = ("anisotropy", "fabric_direction", "coordination", "porosity")  # columns of a cell
 _EXPERIMENT = "experiment.csv"  # rows of what the experiment observes
-_ROUNDING = 1e-3  # of an overlap that is just as large as allowed [-]
+_OVERLAP_ROUNDING = 1e-3  # of an overlap that is just as large as allowed [-]
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ def quality_of(scene: GeologyScene, sample: PreparedSample, result: PlanarResult
         },
     }
     largest, cautions = quality["overlap"]["max"], []
-    if largest > _MOST_OVERLAP * (1.0 + _ROUNDING):
+    if largest > _MOST_OVERLAP * (1.0 + _OVERLAP_ROUNDING):
         cautions.append(f"overlaps reach {largest:.2%} of the smallest radius, more than {_MOST_OVERLAP:.0%}")
     if unsolved:
         cautions.append(

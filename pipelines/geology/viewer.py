@@ -12,7 +12,7 @@ from pipelines.reports.page.model import Column, Lines, Model, Motion, Stones
 __all__ = ["disks_model"]
 
 _CORNERS = 12  # of a disk as drawn
-_MOST = 600_000  # disks times instants in a page
+_MAX_VALUES = 600_000  # disks times instants in a page
 _CHAINS = 3000  # forces that are drawn at the end, the largest first
 _FORCE = "#8a3b12"
 
@@ -30,7 +30,7 @@ def disks_model(
     instants : with places and fields of all disks
     """
     count = len(radius)
-    most = int(np.clip(_MOST // max(count, 1), 2, 200))
+    most = int(np.clip(_MAX_VALUES // max(count, 1), 2, 200))
     rows = np.unique(np.linspace(0, len(instants) - 1, min(len(instants), most)).round().astype(int))
     chosen = [instants[row] for row in rows.tolist()]
     centres = _upright(start)

@@ -40,8 +40,8 @@ __all__ = [
     "propose_stones",
 ]
 
-_FAR = 1000.0  # distance of the viewpoint in front of the wall [m], large enough to see it squarely
-_SAME = 1e-3  # largest difference of equal proposals, in position [m] and relative volume [-]
+_MAX_DISTANCE = 1000.0  # distance of the viewpoint in front of the wall [m], large enough to see it squarely
+_PROPOSAL_DIFFERENCE = 1e-3  # largest difference of equal proposals, in position [m] and relative volume [-]
 
 _SIZE = ("code", "kind", "course", "zone", "length", "height", "depth")
 # kinds that are no stones, and those of vaults, which stand in no facing; their subkinds, too
@@ -264,7 +264,7 @@ def core_record(proposal: InfillProposal) -> StoneRecord:
     """Make the record of a part of the core: kind infill, its face being the side towards the first facing."""
     solid = proposal.solid
     record = SolidRecord(proposal.code, "infill", proposal.course, solid.vertices, solid.faces)
-    viewpoint = solid.vertices.mean(axis=0) + _FAR * proposal.normal
+    viewpoint = solid.vertices.mean(axis=0) + _MAX_DISTANCE * proposal.normal
     block = block_of_solid(record, viewpoint, "the proposal")
     face = replace(block.face, provenance=Provenance("hypothesis", proposal.evidence))
     depth = replace(block.depth, source=f"hypothesis: {proposal.evidence}")
@@ -285,8 +285,8 @@ def _is_known(proposal: InfillProposal, known_records: Sequence[StoneRecord]) ->
         if (corners.min(axis=0) >= high).any() or (corners.max(axis=0) <= low).any():
             continue
         solid = Solid(record.code, corners, record.solid_faces)
-        near = float(np.abs(corners.mean(axis=0) - middle).max()) < _SAME
-        if near and abs(volume_of(solid) / proposal.volume - 1.0) < _SAME:
+        near = float(np.abs(corners.mean(axis=0) - middle).max()) < _PROPOSAL_DIFFERENCE
+        if near and abs(volume_of(solid) / proposal.volume - 1.0) < _PROPOSAL_DIFFERENCE:
             return True
         if _contains(solid, middle) or _contains(proposal.solid, corners.mean(axis=0)):
             return True

@@ -62,7 +62,7 @@ COLUMNS: Mapping[str, Sequence[str]] = {
 """Names of columns by what they state; in doubt the first."""
 
 _LAYERS = (".geojson", ".json", ".gpkg")
-_OWN = frozenset({"code", "phase_begins", "depth_origin", "measurements"})
+_MOMA_ATTRIBUTES = frozenset({"code", "phase_begins", "depth_origin", "measurements"})
 """Attributes by which a layer is one that MOMA wrote."""
 
 _NOTHING = frozenset({"", "-", "–", "?", "n/a", "null", "none"})
@@ -132,7 +132,7 @@ def read_attribute_list(path: Path, columns: str | None = None, sheet: str | Non
                 stated.setdefault((text, code), line)
     _refuse_two(path, values)
     left_out = tuple(name for k, name in enumerate(names) if name and k not in places.values())
-    return AttributeList(str(path), values, left_out, set(names) >= _OWN)
+    return AttributeList(str(path), values, left_out, set(names) >= _MOMA_ATTRIBUTES)
 
 
 def _refuse_two(path: Path, values: Mapping[str, Mapping[tuple[str, str], int]]) -> None:

@@ -74,7 +74,7 @@ class _Cited:
 CITED = keys_of(_Cited)
 """Keys of every statement for its evidence."""
 
-_SAID = (*ABOUT, *CITED, *WHO)
+_STATEMENT_KEYS = (*ABOUT, *CITED, *WHO)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -312,12 +312,12 @@ ARRAYS: Mapping[str, tuple[Key, ...]] = {
     "relation": (*keys_of(_RelationTable), *WHO),
     "depth": (*keys_of(_DepthTable), *CITED, *WHO),
     "rule": (*keys_of(_RuleTable), *WHO),
-    "made_of": (*keys_of(_MadeOfTable), *_SAID),
-    "of_phase": (*keys_of(_OfPhaseTable), *_SAID),
-    "mark": (*keys_of(_MarkTable), *_SAID),
-    "observation": (*keys_of(_ObservationTable), *_SAID),
-    "reference": _SAID,
-    "note": (*keys_of(_NoteTable), *_SAID),
-    "decision": (*keys_of(_DecisionTable), *_SAID),
+    "made_of": (*keys_of(_MadeOfTable), *_STATEMENT_KEYS),
+    "of_phase": (*keys_of(_OfPhaseTable), *_STATEMENT_KEYS),
+    "mark": (*keys_of(_MarkTable), *_STATEMENT_KEYS),
+    "observation": (*keys_of(_ObservationTable), *_STATEMENT_KEYS),
+    "reference": _STATEMENT_KEYS,
+    "note": (*keys_of(_NoteTable), *_STATEMENT_KEYS),
+    "decision": (*keys_of(_DecisionTable), *_STATEMENT_KEYS),
 }
 """Keys of every array of tables, in the order of recording."""

@@ -55,7 +55,7 @@ _WORDS: Mapping[str, Sequence[str]] = {
 }
 """Words for relations in tables, besides their names."""
 
-_KNOWN = {
+_RELATIONS = {
     spelling: name
     for name in (*DEFINITIONS, *INVERSE.values())
     for word in (name, *_WORDS.get(name, ()))
@@ -85,7 +85,7 @@ class RelationList:
 
 def relation_of(text: str) -> str | None:
     """Return the name of a relation, whatever the language; None if the word is not known."""
-    return _KNOWN.get(plain(text)) or _KNOWN.get(text.strip())
+    return _RELATIONS.get(plain(text)) or _RELATIONS.get(text.strip())
 
 
 def read_relation_list(path: Path, sheet: str | None = None) -> RelationList | None:

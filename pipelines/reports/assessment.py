@@ -29,7 +29,7 @@ _CAPTIONS = {
     "pushover": "What the stones bear as one of them is led to collapse.",
     "forces": "Resultants of the joints at the limit: blue within the kern, red outside.",
 }
-_FEW = 12  # stones of a mechanism that are named
+_MAX_STONES = 12  # stones of a mechanism that are named
 _SHARE = 0.1  # change of friction and depth by which the sensitivity of a limit is told [-]
 
 
@@ -190,8 +190,8 @@ def _part(folder: Path, number: int, load: Mapping[str, Any]) -> dict[str, Any]:
 def _mechanism(stones: Sequence[Mapping[str, Any]]) -> str:
     if not stones:
         return "Nothing moves."
-    named = ", ".join(stone["code"] for stone in stones[:_FEW])
-    more = f" and {len(stones) - _FEW} more" if len(stones) > _FEW else ""
+    named = ", ".join(stone["code"] for stone in stones[:_MAX_STONES])
+    more = f" and {len(stones) - _MAX_STONES} more" if len(stones) > _MAX_STONES else ""
     return f"Moves, the fastest first: {named}{more}."
 
 

@@ -14,7 +14,7 @@ _CAPTIONS = {
     "tornado": "Share of the variance by what the stones have in common, and by the scatter of each.",
     "elevation": "Variance that the best measurement of each stone would take away.",
 }
-_FEW = 20  # actions that the page shows
+_MAX_ACTIONS = 20  # actions that the page shows
 
 
 def write_study(path: Path, summary: Mapping[str, Any], pictures: Sequence[str]) -> None:
@@ -47,7 +47,7 @@ def write_study(path: Path, summary: Mapping[str, Any], pictures: Sequence[str])
             )
             for row in summary["sobol"]
         ],
-        actions=[(action["text"], percent(action["share"])) for action in summary["actions"][:_FEW]],
+        actions=[(action["text"], percent(action["share"])) for action in summary["actions"][:_MAX_ACTIONS]],
         certain=summary["certain"],
         figures=[picture(path.parent / name, _CAPTIONS[Path(name).stem]) for name in pictures],
     )

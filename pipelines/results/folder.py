@@ -58,7 +58,7 @@ _INDEXES = (
     "pushover.json",
     "outlines.json",
 )  # their "files" list the files that MOMA wrote
-_LEFT = {
+_UNFINISHED_RUNS = {
     UNFINISHED: (RUN_INDEX, "run"),
     UNFINISHED_ASSESSMENT: ("assessment.json", "assessment"),
     UNFINISHED_DIAGNOSIS: ("diagnosis.json", "diagnosis"),
@@ -101,7 +101,7 @@ def check_replaceable(folder: Path, index: str = RUN_INDEX, source: Sequence[Pat
         raise UsageError(f"holds files that no run of MOMA wrote ({shown})", where=place, remedy=remedy)
     if files_by_index[RUN_INDEX] and index != RUN_INDEX:
         raise UsageError("holds the results of a run", where=place, remedy=remedy)
-    for left, (index_name, what) in _LEFT.items():
+    for left, (index_name, what) in _UNFINISHED_RUNS.items():
         if index != index_name and (folder / left).exists():
             raise UsageError(f"holds an unfinished {what}", where=place, remedy=remedy)
     if source and (earlier := _source(folder)) not in (None, source_of(source, folder)):
@@ -286,7 +286,8 @@ def _entries(folder: Path) -> set[str]:
     return {
         entry.name
         for entry in folder.iterdir()
-        if entry.name not in _LEFT and not (entry.is_symlink() and os.readlink(entry).startswith(UNFINISHED))
+        if entry.name not in _UNFINISHED_RUNS
+        and not (entry.is_symlink() and os.readlink(entry).startswith(UNFINISHED))
     }
 
 

@@ -21,7 +21,7 @@ from pipelines.scene.selection import Groups, StoneModel
 
 __all__ = ["closing_lines", "run_inputs", "scene_inputs", "stage_lines"]
 
-_MOST = 4  # surveys, sources of depths, gaps and overlaps that are named
+_MAX_NAMED = 4  # surveys, sources of depths, gaps and overlaps that are named
 
 
 def scene_inputs(
@@ -98,8 +98,8 @@ def closing_lines(report: JointsReport) -> tuple[str, ...]:
     lines += [f"{number} left open: {reason}" for reason, number in report.left_open.items()]
     for name, places in (("gaps", report.gaps), ("overlaps", report.overlaps)):
         if places:
-            shown = ", ".join(" and ".join(place.stones) for place in places[:_MOST])
-            lines.append(f"{len(places)} {name}: {shown}{', …' if len(places) > _MOST else ''}")
+            shown = ", ".join(" and ".join(place.stones) for place in places[:_MAX_NAMED])
+            lines.append(f"{len(places)} {name}: {shown}{', …' if len(places) > _MAX_NAMED else ''}")
     if report.alone:
         lines.append(f"{len(report.alone)} stones without a joint, e.g. {report.alone[0]}")
     return tuple(lines)
@@ -110,13 +110,13 @@ def _surveys(session: Session, codes: Iterable[str]) -> Iterator[str]:
     wanted = set(codes)
     rows = session.execute(select(Entity.code, Survey).join(Entity.measurement).join(Measurement.survey))
     counts = Counter(survey for code, survey in rows if code in wanted)
-    for survey, count in counts.most_common(_MOST):
+    for survey, count in counts.most_common(_MAX_NAMED):
         yield (
             f"{survey.name}: {count} stones; {survey.path}, taken in on {survey.entry.recorded_at:%Y-%m-%d} "
             f"(SHA-256 {survey.sha256[:12]}…)"
         )
-    if len(counts) > _MOST:
-        yield f"and {len(counts) - _MOST} more"
+    if len(counts) > _MAX_NAMED:
+        yield f"and {len(counts) - _MAX_NAMED} more"
 
 
 def _depths(models: Iterable[StoneModel]) -> Iterator[str]:
@@ -124,15 +124,15 @@ def _depths(models: Iterable[StoneModel]) -> Iterator[str]:
     sources: dict[str, list[StoneRecord]] = {}
     for model in models:
         sources.setdefault(model.record.depth_source, []).append(model.record)
-    for source, records in sorted(sources.items(), key=lambda one: -len(one[1]))[:_MOST]:
+    for source, records in sorted(sources.items(), key=lambda one: -len(one[1]))[:_MAX_NAMED]:
         depths = [record.depth for record in records]
         least, most = (f"{value:.3g}" for value in (min(depths), max(depths)))
         span = least if least == most else f"{least} to {most}"
         sigmas = [record.depth_sigma for record in records if record.depth_sigma is not None]
         known = f"σ up to {1e3 * max(sigmas):.2g} mm" if sigmas else "taken as certain"
         yield f"{source or 'source not stated'}, {len(records)} stones: {span} m, {known}"
-    if len(sources) > _MOST:
-        yield f"and {len(sources) - _MOST} more sources"
+    if len(sources) > _MAX_NAMED:
+        yield f"and {len(sources) - _MAX_NAMED} more sources"
 
 
 def _material(material: Material, count: int) -> str:

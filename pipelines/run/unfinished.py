@@ -26,7 +26,12 @@ _INPUTS = "inputs.json"
 _SHARE = 0.04  # most of the time that checkpoints may take; those that would take more are left out [-]
 _NAMED = 4  # changes that an error names
 
-_KEPT = (".h5", ".json", ".csv", ".npz")  # files of an unfinished run: checkpoints, inputs, observations
+_STORED_ENDINGS = (
+    ".h5",
+    ".json",
+    ".csv",
+    ".npz",
+)  # files of an unfinished run: checkpoints, inputs, observations
 
 
 def finished_run(folder: Path, text: str) -> dict[str, Any] | None:
@@ -206,7 +211,7 @@ class UnfinishedRun:
         there = folder / UNFINISHED
         there.mkdir()
         for path in self._place.glob("[!.]*.*"):
-            if path.suffix not in _KEPT:
+            if path.suffix not in _STORED_ENDINGS:
                 continue
             try:
                 os.link(path, there / path.name)

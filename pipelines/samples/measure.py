@@ -39,7 +39,7 @@ BLUNDER = (0.03, 0.30)  # size of a gross error [m]
 COUNTS = (17, 20)  # points on one face
 _TILT = 0.003  # standard deviation of each tilt of a measured plane: SIGMA over half a stone's width [rad]
 _BEYOND = 0.1  # room around a stone for its measured planes [m]
-_ROUNDING = 1e-9  # distance of corners that lie on one plane [m]
+_PLANE_ROUNDING = 1e-9  # distance of corners that lie on one plane [m]
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,7 @@ def modelled_solid(solid: Solid, joints: Iterable[int], rng: Random) -> Solid:
         at = float(tilted @ (centre - middle)) - half + rng.gauss(0.0, SIGMA)
         planes.append((*tilted.tolist(), at))
     low, high = solid.vertices.min(axis=0) - middle - _BEYOND, solid.vertices.max(axis=0) - middle + _BEYOND
-    cut = intersection(solid.code, planes, low, high, _ROUNDING)
+    cut = intersection(solid.code, planes, low, high, _PLANE_ROUNDING)
     assert cut is not None
     return Solid(solid.code, cut.vertices + middle, cut.faces)
 

@@ -40,7 +40,7 @@ __all__ = ["SAMPLES", "Recipe", "Sample", "recipe_of"]
 
 _COURSES = 40  # of the tower
 _SMALL = 12  # courses of the small one
-_LEAST = 2  # courses that a tower may have
+_MIN_COURSES = 2  # courses that a tower may have
 
 
 @dataclass(frozen=True)
@@ -125,8 +125,8 @@ def recipe_of(
         return SAMPLES[name]
     if kind != "tower":
         raise UsageError(f"--courses with the sample {kind!r}", remedy="it is for the tower")
-    if courses < _LEAST:
-        raise UsageError(f"a tower of {courses} courses", remedy=f"give at least {_LEAST}")
+    if courses < _MIN_COURSES:
+        raise UsageError(f"a tower of {courses} courses", remedy=f"give at least {_MIN_COURSES}")
     return _tower_settled(courses) if moved else _tower(courses, elaborate=not small)
 
 
@@ -147,7 +147,7 @@ stones = ["{stones}"]
 set = {{ zone = "{zone}", course = {course} }}
 reason = "the file of solids has neither zones nor courses"
 """
-_KNOWN = """\
+_KNOWLEDGE = """\
 # What is "known" of the synthetic {what} besides its geometry; as invented as the {what}.
 
 [record]
@@ -200,7 +200,7 @@ def _rib_vault() -> Sample:
     vault = rib_vault(RibVaultShape(wall_rib=WALL_RIB))
     axes = {f"R{rib}": (np.round(vault.rib_axis(rib, 3), 6) + 0.0).tolist() for rib in range(1, 5)}
     truth = _truth_of(vault.building, axes=axes)
-    knowledge = _KNOWN.format(what="rib vault") + _structures(vault.shape)
+    knowledge = _KNOWLEDGE.format(what="rib vault") + _structures(vault.shape)
     return Sample(vault.building.survey, truth, knowledge, vault.building.modelled)
 
 
@@ -208,7 +208,9 @@ def _structures(shape: RibVaultShape) -> str:
     """Return what belongs to which web and rib of a vault with wall ribs."""
     count = shape.segments
     parts = [
-        _PART.format(kind="web", code=web, title=f"Web {web}", stones=f"zone = 'web {web}'", ordered="false")
+        _STRUCTURE.format(
+            kind="web", code=web, title=f"Web {web}", stones=f"zone = 'web {web}'", ordered="false"
+        )
         for web in WEBS
     ]
     for code, (up, down) in {"D1": (1, 3), "D2": (2, 4)}.items():
@@ -216,12 +218,12 @@ def _structures(shape: RibVaultShape) -> str:
         row += [*(f"R{down}-{k:02d}" for k in range(count, 0, -1)), f"T{down}"]
         title = f"Diagonal rib from T{up} to T{down}"
         parts.append(
-            _PART.format(kind="rib", code=code, title=title, stones='", "'.join(row), ordered="true")
+            _STRUCTURE.format(kind="rib", code=code, title=title, stones='", "'.join(row), ordered="true")
         )
     for web in WEBS:
         row = [f"F{web}-{k:02d}" for k in range(1, 2 * count + 2)]
         parts.append(
-            _PART.format(
+            _STRUCTURE.format(
                 kind="wall_rib",
                 code=f"F{web}",
                 title=f"Wall rib of the web {web}",
@@ -244,7 +246,7 @@ code = "VAULT"
 title = "Rib vault"
 """
 
-_PART = """
+_STRUCTURE = """
 [[structure]]
 kind = "{kind}"
 code = "{code}"
@@ -302,7 +304,7 @@ def _tower(courses: int, elaborate: bool) -> Recipe:
         storey = tower_storey(courses, elaborate=elaborate)
         building, vault = storey.building, storey.vault
         phases = _PHASES.format(last=storey.level_break, walls="" if vault is None else _NOT_WEBS)
-        knowledge = _KNOWN.format(what="building") + phases + "".join(_places(building))
+        knowledge = _KNOWLEDGE.format(what="building") + phases + "".join(_places(building))
         if vault is not None:
             knowledge += _OF_VAULT + _structures(vault)
         return Sample(building.survey, _truth_of(building), knowledge, building.modelled)
@@ -330,7 +332,7 @@ def _moved(title: str, cause: Cause, fixed: str = "course = 1", core: bool = Fal
         last = cause.stood or site.level_break
         knowledge = ""
         if last is not None:
-            knowledge = _KNOWN.format(what="building") + _PHASES.format(last=last, walls="")
+            knowledge = _KNOWLEDGE.format(what="building") + _PHASES.format(last=last, walls="")
         causes = {"settlement": cause.heights(site), "forces": cause.forces(site), "jerk": cause.jerk(site)}
         return Sample(site.building.survey, _truth_of(site.building, causes), knowledge)
 

@@ -17,7 +17,7 @@ _STIFF_DRY = 15e9
 # mean pressure above which measured dry walls lost force after their peak [Pa]
 _PRESSED_DRY = 0.5e6
 # of lengths and forces, over themselves [-]
-_ROUNDING = 1e-6
+_SIZE_ROUNDING = 1e-6
 
 
 def rig_cautions(stones: Scene, rig: Rig, step: float | None) -> list[str]:
@@ -31,13 +31,13 @@ def rig_cautions(stones: Scene, rig: Rig, step: float | None) -> list[str]:
     """
     resolved = softening_step(stones)
     cautions = list(_stiff_joints(stones))
-    if step is not None and step > resolved * (1.0 + _ROUNDING):
+    if step is not None and step > resolved * (1.0 + _SIZE_ROUNDING):
         cautions.append(
             f"steps of {1e3 * step:.3g} mm are too long for the softening of bonds, whose whole way is 2 G/c: forces "
             f"after the first crack depend on them; leave step out, or give {1e3 * resolved:.3g} mm at most"
         )
     pressure = _mean_pressure(stones, rig)
-    if all(_is_dry(law) for law in _laws(stones)) and pressure > _PRESSED_DRY * (1.0 + _ROUNDING):
+    if all(_is_dry(law) for law in _laws(stones)) and pressure > _PRESSED_DRY * (1.0 + _SIZE_ROUNDING):
         cautions.append(
             f"dry joints under {1e-6 * pressure:.3g} MPa on average: loss of force after the peak is not modelled "
             f"(above {1e-6 * _PRESSED_DRY:g} MPa, measured forces fall by 25 to 45 % by 15 to 25 mm)"

@@ -11,13 +11,13 @@ from mechanics.stones.settings import Setting, check_settings
 __all__ = ["Site", "damping_factor"]
 
 _USUAL = 5.0  # damping of the code's spectrum [%]
-_LEAST = 0.55  # of the factor of damping η [-]
+_MIN_DAMPING_FACTOR = 0.55  # of the factor of damping η [-]
 _LAST, _LASTED = 1.6, 4.0  # T_D = 1.6 + 4 ag/g [s]
 
 
 def damping_factor(damping: float) -> float:
     """Return η = √(10/(5 + ξ)) ≥ 0.55 for a damping ξ [%]."""
-    return max(float(np.sqrt(10.0 / (5.0 + damping))), _LEAST)
+    return max(float(np.sqrt(10.0 / (5.0 + damping))), _MIN_DAMPING_FACTOR)
 
 
 @dataclass(frozen=True)

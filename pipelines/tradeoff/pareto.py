@@ -21,7 +21,7 @@ __all__ = [
 ]
 
 _CHANCE = 1.25  # ratio of processor times of the same work, run after run on a busy machine [-]
-_OWN = ("natural_map", "penetration", "balance", "reaction", "energy")
+_SOLVER_ERRORS = ("natural_map", "penetration", "balance", "reaction", "energy")
 _COARSER = 1.2  # least ratio of sizes at which one mesh gives an error estimate of another [-]
 
 
@@ -169,7 +169,7 @@ def _bound(judged: Judged, reference: ErrorReference, quantity: str) -> float | 
     error, own_error = counted(judged, quantity), reference.errors[quantity]
     if error is None or own_error is None:
         return None
-    return error if judged.run.name == reference.name or quantity in _OWN else error + own_error
+    return error if judged.run.name == reference.name or quantity in _SOLVER_ERRORS else error + own_error
 
 
 def _fineness(setting: Variant, run: Measured) -> tuple[float, ...]:
@@ -192,13 +192,13 @@ def _reference(
     match = _partner(settings, finest, others)
     assert finest.quantities is not None
     if match is None:
-        own = dict.fromkeys(QUANTITIES) | {name: finest.quantities.errors[name] for name in _OWN}
+        own = dict.fromkeys(QUANTITIES) | {name: finest.quantities.errors[name] for name in _SOLVER_ERRORS}
         return ErrorReference(finest.name, own, "", 1.0, finest.quantities.stress_error)
     partner, ratio = match
     assert partner.quantities is not None
     apart = differences(partner.quantities, finest.quantities)
     errors = {name: None if value is None else value / (ratio - 1.0) for name, value in apart.items()}
-    errors |= {"outcome": 0.0} | {name: finest.quantities.errors[name] for name in _OWN}
+    errors |= {"outcome": 0.0} | {name: finest.quantities.errors[name] for name in _SOLVER_ERRORS}
     return ErrorReference(finest.name, errors, partner.name, ratio, finest.quantities.stress_error)
 
 

@@ -17,9 +17,9 @@ _COLOURS = {
     "hex8": "#7fb3d5",
     "hex20": "#1f5f8b",
 }
-_OTHER = "#8e6c8a"
+_COLOUR = "#8e6c8a"
 _FRONT, _BAND = "#555555", "#dddddd"
-_LEAST = 1e-7  # a logarithmic axis has no zero
+_AXIS_MINIMUM = 1e-7  # a logarithmic axis has no zero
 _HIDDEN = 0.1  # share of the error of the reference at which smaller errors are drawn [-]
 _COLUMNS = 3
 
@@ -87,7 +87,7 @@ def _draw(axes: Any, panel: Panel, asked: float) -> None:
         axis.set_minor_locator(NullLocator())
         axis.set_major_formatter(StrMethodFormatter("{x:g}"))
     # errors far below that of the reference cannot be distinguished, so the axis ends there
-    least = max(_LEAST, _HIDDEN * (panel.reference_error or 0.0))
+    least = max(_AXIS_MINIMUM, _HIDDEN * (panel.reference_error or 0.0))
 
     def seen(error: float) -> float:
         return 100.0 * max(error, least)
@@ -103,7 +103,7 @@ def _draw(axes: Any, panel: Panel, asked: float) -> None:
             seen(point.error),
             marker="D" if estimated else "o",
             markersize=5.5 if point in front else 3.5,
-            color=_COLOURS.get(point.kind, _OTHER),
+            color=_COLOURS.get(point.kind, _COLOUR),
             fillstyle="none" if estimated else "full",
             linestyle="none",
             zorder=2,
@@ -137,7 +137,7 @@ def _legend(figure: Any, panels: Sequence[Panel]) -> None:
 
     kinds = dict.fromkeys(point.kind for panel in panels for point in panel.points)
     handles: list[Any] = [
-        Line2D([], [], marker="o", linestyle="none", color=_COLOURS.get(kind, _OTHER), label=kind)
+        Line2D([], [], marker="o", linestyle="none", color=_COLOURS.get(kind, _COLOUR), label=kind)
         for kind in kinds
     ]
     handles += [

@@ -45,7 +45,7 @@ BOUNDS = (
 
 _MOVEMENTS = ("displacement", "stone_displacement", "settlement")
 _FORCES = ("joint_forces", "support_reactions")
-_LEAST = 1e-4  # expected relative error from solver and balance alone, where statics determines all [-]
+_MIN_ERROR = 1e-4  # expected relative error from solver and balance alone, where statics determines all [-]
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ def expected_errors(
     for quantity in (*TYPICAL, *BOUNDS):
         value = _expected(name, quantity, quantities_found.stress_error, free, rigid)
         if value is not None:
-            value = max(min(value, 1.0), _LEAST)
+            value = max(min(value, 1.0), _MIN_ERROR)
             expected[quantity] = Expected(value, QUANTITIES[quantity], quantity in BOUNDS)
     of = "load of collapse, if it is sought at this profile"
     return expected | {"collapse": Expected(COLLAPSE[name], of, bound=True)}

@@ -36,13 +36,13 @@ Progress = Callable[[int, int | None], None]
 """A function that is told how many points are read, and how many there are."""
 
 _WIDE = 3.0  # standard deviations of an outline within which its edge lies
-_NEAR = 4.0  # standard deviations of a point within which it lies on a plane
+_ON_PLANE_SIGMAS = 4.0  # standard deviations of a point within which it lies on a plane
 _NEAREST = 0.008  # the same for a very precise scan: stones are rough [m]
 _BAND = 0.025  # roughness of a dressed face from its plane [m]
-_LEAST = 0.0001  # standard deviation of a patch: no scanner is better [m]
+_MIN_PATCH_SIGMA = 0.0001  # standard deviation of a patch: no scanner is better [m]
 _LARGEST_CORRELATION = 0.6  # of neighbouring patches: beyond, they are one
 _PRIOR = 50.0  # pairs of patches without correlation, as if they had been seen before
-_ROUNDS = 5  # until the correlation and what a fit takes of it agree
+_MAX_ITERATIONS = 5  # until the correlation and what a fit takes of it agree
 _AWAY = 10.0  # distance of the viewer of an orthophoto from the wall [m]
 _ROOM = 0.25  # part of the width of a stone that margins may take
 
@@ -181,7 +181,7 @@ def _correlation(fitted: Sequence[_Fitted]) -> float:
         (plane.numbers[4:7] for plane in fitted if plane.status == FINE), np.array([0, 0, _PRIOR])
     )
     correlation = 0.0
-    for _ in range(_ROUNDS):
+    for _ in range(_MAX_ITERATIONS):
         factor = 1.0 + 4.0 * (correlation + correlation**1.414 + correlation**2) + 8.0 * correlation**2.236
         correlation = min(max((products + factor * hat) / pairs, 0.0), _LARGEST_CORRELATION)
     return float(correlation)
@@ -196,7 +196,11 @@ def _stones(
     name: str,
     review: list[Doubtful],
 ) -> Iterator[BlockRecord | Reject]:
-    rules = Rules(max(_NEAR * options.sigma, _NEAREST), max(_BAND, _NEAR * options.sigma), _LEAST)
+    rules = Rules(
+        max(_ON_PLANE_SIGMAS * options.sigma, _NEAREST),
+        max(_BAND, _ON_PLANE_SIGMAS * options.sigma),
+        _MIN_PATCH_SIGMA,
+    )
     fitted = [_Fitted(*fit_patches(*collected.of(k), rules)) for k in range(len(placed))]
     correlation = _correlation(fitted)
     first = first_codes([one.outline.code for one in placed])
@@ -228,7 +232,7 @@ def _record(
     attributes, rows = outline.outline.said, fitted.rows
     patch_sigma, worth = patch_sigmas(rows, fitted.cells, fitted.numbers, correlation)
     local = np.column_stack([outline.ring, outline.ring @ fitted.plane[:2] + fitted.plane[2]])
-    sigmas = np.concatenate([np.maximum(patch_sigma, _LEAST), np.full(len(local), sigma)])
+    sigmas = np.concatenate([np.maximum(patch_sigma, _MIN_PATCH_SIGMA), np.full(len(local), sigma)])
     clear, count = fitted.numbers[2:4].tolist()
     notes = {
         "points": f"{int(count)} in {len(rows)} patches, as good as {worth:.0f} independent ones",

@@ -1,7 +1,7 @@
 """One pass over a cloud, which keeps a random sample of the points of each patch of each stone.
 
 Memory is bounded by the number of stones, not by that of points: a face is divided into some 36 patches, and each keeps
-up to `_KEPT` points. Chunks are read while the chunk before is sorted.
+up to `_PATCH_POINTS` points. Chunks are read while the chunk before is sorted.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,10 +20,12 @@ __all__ = ["Collected", "collect_points", "divide"]
 
 _PATCHES = 36  # of a face: the fit of planes tells outliers apart best among 20 to 50 points
 _DENSE = 5  # points of a patch whose mean says something
-_FEWEST = 9  # patches from which a plane and its scatter are known
-_KEPT = 24  # points of a patch: beyond, the mean of a patch is known better than its roughness lets it matter
+_MIN_PATCHES = 9  # patches from which a plane and its scatter are known
+_PATCH_POINTS = (
+    24  # points of a patch: beyond, the mean of a patch is known better than its roughness lets it matter
+)
 _SMALLEST = 0.01  # side of a patch: less than the roughness of a stone is long [m]
-_MOST = 144  # patches of a face that is much longer than high
+_MAX_PATCHES = 144  # patches of a face that is much longer than high
 _CUBES = 2_000_000  # of space, 8 bytes each
 _FINEST = 0.02  # side of a cube [m]
 
@@ -56,7 +58,7 @@ class Collected:
             self.samples.places[rows],
             int(self.patches.columns[k]),
         )
-        while len(counts) >= 2 * _FEWEST and np.count_nonzero(counts >= _DENSE) < _FEWEST:
+        while len(counts) >= 2 * _MIN_PATCHES and np.count_nonzero(counts >= _DENSE) < _MIN_PATCHES:
             counts, places, columns = _coarser(counts, places, columns)
         return counts, places, columns
 
@@ -91,7 +93,7 @@ def divide(placed: Sequence[PlacedOutline], margins: Array) -> Patches:
     inner = np.minimum(np.array([one.area for one in placed]), extent.prod(axis=1))
     side = np.maximum(np.sqrt(inner / _PATCHES), _SMALLEST)
     # a slanting face fills little of its box
-    side = np.maximum(side, np.sqrt(extent.prod(axis=1) / _MOST))
+    side = np.maximum(side, np.sqrt(extent.prod(axis=1) / _MAX_PATCHES))
     shape = np.maximum(np.ceil(extent / side[:, None]), 1).astype(np.int64)
     first = np.concatenate([[0], np.cumsum(shape.prod(axis=1))]).astype(np.int64)
     return Patches(first, np.ascontiguousarray(shape[:, 0]), low, high, side)
@@ -122,7 +124,7 @@ def collect_points(
     rings = Rings(start, np.ascontiguousarray(np.concatenate([one.ring for one in placed])), margins)
     patches = divide(placed, margins)
     count = int(patches.first[-1])
-    samples = Samples(np.zeros(count, np.int64), np.zeros((count, _KEPT, 3), np.float32))
+    samples = Samples(np.zeros(count, np.int64), np.zeros((count, _PATCH_POINTS, 3), np.float32))
     grid = _grid(placed, origin, slab)
     counts = [cloud.count for cloud in clouds]
     total = None if None in counts else sum(count or 0 for count in counts)

@@ -27,9 +27,9 @@ _SOLID = (
 )
 _ODD = 4.5  # robust standard deviations of the logarithm of the area beyond which a size is odd
 _SPREAD = 0.25  # least standard deviation of that logarithm, since stones of one course differ by more
-_FEWEST = 12  # outlines from which sizes have a usual range
+_MIN_OUTLINES = 12  # outlines from which sizes have a usual range
 _UNSURE = 0.5  # score below which a program is not sure of a mask
-_FEW = 100  # points of a stone that is hardly measured
+_FEW_POINTS = 100  # points of a stone that is hardly measured
 _COVERED = 0.7  # share of clear patches below which something covers a stone, or its mask leaks
 _TURNED = 20.0  # angle of a face from the plane of its outline [degrees]
 
@@ -82,7 +82,7 @@ def _shape_doubts(
             yield Doubtful(outline.code, reason, text, outline.where)
         if outline.said.score is not None and outline.said.score < _UNSURE:
             yield Doubtful(outline.code, "low score", f"a score of {outline.said.score:g}", outline.where)
-        if len(outlines) >= _FEWEST and abs(log - middle) > _ODD * spread:
+        if len(outlines) >= _MIN_OUTLINES and abs(log - middle) > _ODD * spread:
             text = f"{area:.3g} m², the usual outline has {np.exp(middle):.3g} m²"
             yield Doubtful(outline.code, "odd size", text, outline.where)
         if (solid := area / max(_hull_area(ring), 1e-12)) < _SOLID:
@@ -116,7 +116,7 @@ def measured_doubts(outline: PlacedOutline, plane: Array, numbers: Array) -> Ite
     """
     code, where = outline.outline.code, outline.outline.where
     clear, count = numbers[2:4].tolist()
-    if count < _FEW:
+    if count < _FEW_POINTS:
         yield Doubtful(code, "few points", f"{int(count)} points", where)
     if clear < _COVERED:
         text = f"{clear:.0%} of its patches are clear: something covers it, or its mask reaches beyond it"

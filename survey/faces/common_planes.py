@@ -27,9 +27,9 @@ __all__ = ["CommonPlane", "PlaneEstimate", "common_plane"]
 Indices = NDArray[np.intp]
 
 _MOST_STUDENT = 3.0  # ν/(ν - 2) where ν is 3; it does not exist for two
-_ROUNDS = 50  # of the alternation between plane and variances; a dozen suffice
+_MAX_ITERATIONS = 50  # of the alternation between plane and variances; a dozen suffice
 _LEAST_FACES = 3  # a plane has three parameters
-_FEW = 30  # number of faces up to which they are examined one by one
+_FEW_FACES = 30  # number of faces up to which they are examined one by one
 _LEVEL = 1e-3  # probability that some face of a wall is called an outlier by chance
 
 
@@ -199,12 +199,12 @@ def _without_outliers(faces: _Faces) -> tuple[Indices, _Adjusted]:
     everything = np.arange(len(faces.heights))
     members, best = everything, _adjust(faces)
     answer = members, best
-    most = len(members) // 3 if len(members) <= _FEW else len(members)
+    most = len(members) // 3 if len(members) <= _FEW_FACES else len(members)
     for _ in range(most):
         some = faces.only(members)
         inner = _studentised(some, best)
         # one at a time where each counts; among many, all that are at least half as far out as the farthest
-        out = inner >= (inner.max() if len(members) <= _FEW else 0.5 * inner.max())
+        out = inner >= (inner.max() if len(members) <= _FEW_FACES else 0.5 * inner.max())
         rest = np.flatnonzero(~out)
         if len(rest) < max(_LEAST_FACES + 1, len(everything) // 2):
             break
@@ -214,7 +214,7 @@ def _without_outliers(faces: _Faces) -> tuple[Indices, _Adjusted]:
         members = members[rest]
         if tests.min() > limit:
             answer = members, best
-        elif len(members) > _FEW:
+        elif len(members) > _FEW_FACES:
             break
     return answer
 
@@ -242,7 +242,7 @@ def _adjust(faces: _Faces) -> _Adjusted:
     step: Array = np.append(slopes.mean(axis=0), 0.0)
     step[2] = (heights - arms @ step).mean()
     freedom, before = (count - 1.0, 2.0 * count - 2.0), 0.0
-    for _ in range(_ROUNDS):
+    for _ in range(_MAX_ITERATIONS):
         left = float(((heights - arms @ step) ** 2).sum()), float(((slopes - step[:2]) ** 2).sum())
         variances = max(left[0] / freedom[0], least[0]), max(left[1] / freedom[1], least[1])
         inverse = np.linalg.inv(by_heights / variances[0] + by_slopes / variances[1])

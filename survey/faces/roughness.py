@@ -26,7 +26,7 @@ SIGNIFICANT = 3.0
 TOLERANCE = 0.1
 """Relative error below which a stated standard deviation is right, since nobody states it better."""
 
-_FEWEST = 30  # degrees of freedom from which a scatter is known to a fifth
+_MIN_FREEDOM = 30  # degrees of freedom from which a scatter is known to a fifth
 _CLIPPED = 1.4  # standard deviation of a clipped scatter over that of all of n normal values
 _CURVED = 9  # least points of a face from which its curvature is told from its roughness: 6 unknowns
 
@@ -54,7 +54,7 @@ def estimate_roughness(records: Sequence[BlockRecord]) -> float:
     ]
     fits = _fits(places, 0.0)
     freedom = sum(len(points) - 3 for points, *_ in places)
-    if freedom < _FEWEST or not fits:
+    if freedom < _MIN_FREEDOM or not fits:
         return 0.0
     least = 1.0 + max(TOLERANCE, SIGNIFICANT * _CLIPPED / math.sqrt(2.0 * freedom))
     if _ratio(fits) <= least:
@@ -104,7 +104,7 @@ def _without_curvature(places: Sequence[Measured], rough: float) -> float:
         squares.append((fit.residuals[inliers] - design @ solved) ** 2)
         variances.append(sigma[inliers] ** 2)
         freedom += len(inliers) - 6
-    if freedom < _FEWEST:
+    if freedom < _MIN_FREEDOM:
         return math.inf
     square, variance = np.concatenate(squares), np.concatenate(variances)
 

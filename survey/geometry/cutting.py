@@ -14,10 +14,10 @@ __all__ = ["CutStone", "common_part", "cut_stones", "joins_three", "moves"]
 
 Faces = tuple[tuple[int, ...], ...]
 
-_NEAR = 1e-10  # metres: distance within which a corner lies on a plane
+_ON_PLANE_DISTANCE = 1e-10  # metres: distance within which a corner lies on a plane
 _CLEAR = 1e-6  # metres: least depth of a corner below all other planes for the faces to stay as they were
 _THIN = 1e-5  # metres: thickness below which a face of the intersection is due to rounding
-_MOST = 64
+_MAX_FACE_CORNERS = 64
 
 
 @dataclass(frozen=True)
@@ -194,10 +194,10 @@ def _intersect(planes: Array, centre: Array, reach: float, code: str) -> CutSton
     local[:, 3] -= planes[:, :3] @ centre
     room = len(planes) + 6
     vertices = np.empty((16 * room, 3))
-    loops, sizes = np.empty((room + 1, _MOST), np.int64), np.empty(room + 1, np.int64)
+    loops, sizes = np.empty((room + 1, _MAX_FACE_CORNERS), np.int64), np.empty(room + 1, np.int64)
     of_face, meeting = np.empty(room + 1, np.int64), np.empty((16 * room, 3), np.int64)
     status, corners, faces = cut_out(
-        local, np.zeros(3), reach, _NEAR, CutSolid(vertices, loops, sizes, of_face, meeting)
+        local, np.zeros(3), reach, _ON_PLANE_DISTANCE, CutSolid(vertices, loops, sizes, of_face, meeting)
     )
     if status != FULL:
         return None

@@ -14,7 +14,7 @@ __all__ = ["Seamless", "inside", "ring_area", "seamless"]
 _WIDEST = 0.05  # gap between two stones that is a joint [m]
 _PARALLEL = math.cos(math.radians(10.0))  # of the angle between the two sides of a joint
 _ALONG = 0.5  # of the shorter of two sides: their common length, at least
-_FEWEST = 8  # joints from which a usual one is known
+_MIN_JOINTS = 8  # joints from which a usual one is known
 _NONE = 0.25  # of the usual joint: a gap below is none
 _SNAPPED = 0.1  # of the usual joint: distance of two corners that are one
 _RARE = 0.05  # part of all joints: more that touch are a habit
@@ -45,7 +45,7 @@ def seamless(rings: Sequence[Array], pairs: Iterable[tuple[int, int]]) -> list[S
     pairs : of neighbours, by number
     """
     gaps = [(i, j, *gap) for i, j in pairs if (gap := _gap(rings[i], rings[j])) is not None]
-    if len(gaps) < _FEWEST:
+    if len(gaps) < _MIN_JOINTS:
         return []
     widths = np.array([width for *_, width, _ in gaps])
     usual = float(np.median(widths))

@@ -33,7 +33,7 @@ def stone_parts(solid: Solid) -> tuple[Solid, ...]:
 Box = tuple[tuple[int, int], ...]
 
 _FAMILY = float(np.cos(np.radians(25.0)))  # cosine of 25°: planes nearer to parallel are of one family
-_SAME = 1e-7  # metres: distance of corners from each other's planes within which faces are coplanar
+_COPLANAR = 1e-7  # metres: distance of corners from each other's planes within which faces are coplanar
 _VOLUME = 1e-6  # of a solid's volume: largest difference of its parts' volume
 _AT_ONCE = 2_000_000  # solid angles that are computed together, which bounds the memory
 
@@ -79,7 +79,7 @@ def _families(solid: Solid) -> list[Array] | None:
             groups.append(group := [])
         elif group[0][:3] @ plane[:3] < 0.0:
             plane = -plane
-        if not any(np.abs(polygon @ plane[:3] - plane[3]).max() < _SAME for plane in group):
+        if not any(np.abs(polygon @ plane[:3] - plane[3]).max() < _COPLANAR for plane in group):
             group.append(plane)
     if len(groups) != 3:
         return None

@@ -21,12 +21,12 @@ __all__ = ["fit_bent_bed"]
 
 
 _FINE = 0.5  # of the straightness: distance from the chain that is preferred for corners
-_FEW = 0.1  # largest part of the sound corners that may be off the chain
+_MAX_OFF_SHARE = 0.1  # largest part of the sound corners that may be off the chain
 _WORN = 0.01  # weight of a worn corner
-_LEAST = 3  # least number of links of a chain
-_MOST = 12  # largest number of chains of a bed
+_MIN_LINKS = 3  # least number of links of a chain
+_MAX_CHAINS = 12  # largest number of chains of a bed
 _TURNS = 3  # largest number of iterations that classify a chain's valleys and ridges
-_ROUNDS = 10
+_MAX_ITERATIONS = 10
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def fit_bent_bed(
     bed = _bed(planes, facing, links)
     extents = _extents(solids, bed)
     reach = [end for face in extents.values() for end in face]
-    most = min(_FEW, 0.25 * off)
+    most = min(_MAX_OFF_SHARE, 0.25 * off)
     coarse: list[_Chain] = []
     for ends in _chains(bed.place, bed.height):
         slopes = _slopes(bed, ends)
@@ -113,7 +113,7 @@ def fit_bent_bed(
                 if chain.off(settings.straightness) <= most:
                     coarse.append(chain)
                 break
-        if coarse and coarse[-1].off(_FINE * settings.straightness) <= _FEW:
+        if coarse and coarse[-1].off(_FINE * settings.straightness) <= _MAX_OFF_SHARE:
             return _planes(bed, coarse[-1]), coarse[-1].number
     return (_planes(bed, coarse[0]), coarse[0].number) if coarse else None
 
@@ -150,7 +150,7 @@ def _chains(place: Array, height: Array) -> Iterator[list[int]]:
     """Yield the ends (in order along the bed) of two straight chains that the links make, of three, and so on."""
     order = np.argsort(place, kind="stable")
     x, y = place[order], median_filter(height[order], size=5, mode="mirror")
-    for count in range(2, min(len(x) // _LEAST, _MOST) + 1):
+    for count in range(2, min(len(x) // _MIN_LINKS, _MAX_CHAINS) + 1):
         yield _divided(x, y, count)
 
 
@@ -179,7 +179,7 @@ def _squares(x: Array, y: Array) -> Array:
     safe = np.maximum(n, 1.0)
     xx, xy, yy = sxx - sx * sx / safe, sxy - sx * sy / safe, syy - sy * sy / safe
     off = yy - np.where(xx > 1e-12, xy * xy / np.maximum(xx, 1e-12), 0.0)
-    out: Array = np.where(n >= _LEAST, np.maximum(off, 0.0), np.inf)
+    out: Array = np.where(n >= _MIN_LINKS, np.maximum(off, 0.0), np.inf)
     return out
 
 
@@ -232,7 +232,7 @@ def _fitted(solids: SolidArrays, sound: Bools, bed: _Bed, posts: Array, number: 
     weight = np.where(sound[corner], 1.0, _WORN)
     solution: Array = np.zeros(design.shape[1])
     residual: Array = np.zeros(len(corner))
-    for _ in range(_ROUNDS):
+    for _ in range(_MAX_ITERATIONS):
         root = np.sqrt(weight)
         fitted = np.linalg.lstsq(design * root[:, None], local[:, 2] * root, rcond=None)[0]
         solution = fitted.astype(np.float64)

@@ -20,12 +20,14 @@ from survey.simplify.simplify import BlockyStone
 __all__ = ["Cut", "LocalStones", "as_building", "close_within_bounds"]
 
 
-_ROUNDS = 10  # rounds in which single joints are left open; then all joints of a stone that moves too far
+_OPENING_ROUNDS = (
+    10  # rounds in which single joints are left open; then all joints of a stone that moves too far
+)
 _CONVEX = 1e-6  # of a stone's size: height of a corner above a face's plane that is due to rounding
 _CORE = "infill"  # kind of the parts of the core of a wall
 _INFERRED = ("rule", "kind", "structure")  # origins of a depth that nobody has measured on the stone itself
 _BOTH_KEPT = "both stones keep their shape"
-_KEPT = "one of the stones keeps its shape, and the other is led by its other joints"
+_KEEPS_SHAPE = "one of the stones keeps its shape, and the other is led by its other joints"
 
 
 @dataclass(frozen=True)
@@ -123,11 +125,11 @@ def close_within_bounds(
     """
     notched = set(np.flatnonzero(building.notched).tolist())
     reasons, unmended = [""] * len(facing), set[int]()
-    for number in range(_ROUNDS + len(building.stones)):
+    for number in range(_OPENING_ROUNDS + len(building.stones)):
         links = np.array([k for k, reason in enumerate(reasons) if not reason], np.int64)
         some = contact_planes(building.faces, some_links(facing, links), settings)
         for k in links[some.of_link < 0].tolist():
-            reasons[k] = _BOTH_KEPT if building.faces.kept[facing.faces[k]].all() else _KEPT
+            reasons[k] = _BOTH_KEPT if building.faces.kept[facing.faces[k]].all() else _KEEPS_SHAPE
         contact = _of_all(some, links, len(facing))
         planes, free = _stone_planes(building, facing, contact, known, settings)
         planes |= {i: building.planes[building.rows(i)] for i in unmended if free[i].all()}
@@ -143,7 +145,9 @@ def close_within_bounds(
                 if free[i].all():
                     unmended.add(i)
                 else:
-                    _leave_open(building, facing, contact, i, moved, settings, reasons, number >= _ROUNDS)
+                    _leave_open(
+                        building, facing, contact, i, moved, settings, reasons, number >= _OPENING_ROUNDS
+                    )
         if not offended:
             break
     return Cut(contact, reasons, solids, planes, free, of_face)

@@ -27,9 +27,9 @@ __all__ = ["ContactPlanes", "StoneFaces", "contact_planes", "some_links"]
 
 
 _ALIKE = 0.985  # cosine of 10°: largest angle between faces of neighbours that continue each other
-_FEW = 0.25  # largest part of the corners of a joint that may be off it
+_MAX_OFF_SHARE = 0.25  # largest part of the corners of a joint that may be off it
 _FINE = 0.5  # of the straightness: distance within which the inliers of a straight bed lie
-_SAME = 1e-8  # metres: distance within which a face that must stay lies in a plane
+_SAME_PLANE = 1e-8  # metres: distance within which a face that must stay lies in a plane
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,7 @@ def _add_joints(builder: "_Found", links: Ints, settings: JointSettings, core: I
     usual = float(np.median(values[:, 0])) if count else 0.0
     few = np.flatnonzero(_few_known(faces, groups))
     planes[few], values[few] = _fitted(faces, _some_groups(groups, few), usual, settings)
-    few_are_odd = (values[:, 3] <= _FEW) & (values[:, 4] <= _FINE * settings.straightness)
+    few_are_odd = (values[:, 3] <= _MAX_OFF_SHARE) & (values[:, 4] <= _FINE * settings.straightness)
     straight = (values[:, 2] <= settings.straightness) | few_are_odd
     builder.add_many(
         planes[straight], links[straight[label]], (np.cumsum(straight)[label] - 1)[straight[label]]
@@ -171,7 +171,7 @@ def _add_joints(builder: "_Found", links: Ints, settings: JointSettings, core: I
         joint_links = links[order[first[joint] : first[joint + 1]]]
         if builder.add_bent(joint_links, settings, float(values[joint, 3])):
             continue
-        if values[joint, 3] <= _FEW:
+        if values[joint, 3] <= _MAX_OFF_SHARE:
             builder.add_many(planes[[joint]], joint_links, np.zeros(len(joint_links), np.int64))
         else:
             builder.add_each(joint_links, usual, settings)
@@ -269,7 +269,7 @@ class _Found:
         """Return whether a face also lies in another plane, within rounding."""
         corners = self.faces.solids.vertices[self.faces.corners(face)]
         alike = float(plane[:3] @ second[:3]) > 0.0
-        return alike and bool(np.abs(corners @ second[:3] - second[3]).max() <= _SAME)
+        return alike and bool(np.abs(corners @ second[:3] - second[3]).max() <= _SAME_PLANE)
 
     def planes(self) -> ContactPlanes:
         """Return all planes found, with the side of each on which the first face of each pair lies."""

@@ -16,7 +16,7 @@ from survey.arrays import Array, Bools, Ints
 __all__ = ["HiddenSides", "common_planes"]
 
 # rounds in which the members of a plane and the plane itself are found from each other, at most
-_ROUNDS = 10
+_MAX_PLANE_ITERATIONS = 10
 
 
 class HiddenSides(NamedTuple):
@@ -68,7 +68,7 @@ def _grown(sides: HiddenSides, graph: "coo_array[np.float64]", seed: int, free: 
     """Return the plane that begins with a side, and its members among the sides that have none yet."""
     alone = sides.planes[seed], np.array([seed])
     plane, members = alone
-    for _ in range(_ROUNDS):
+    for _ in range(_MAX_PLANE_ITERATIONS):
         on_plane = free & (_off(sides, plane) <= sides.slack)
         on_plane[seed] = True
         grown = _linked(graph, on_plane, seed)

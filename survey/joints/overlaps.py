@@ -14,7 +14,7 @@ from survey.geometry.solids import Solid, volume_of
 __all__ = ["Overlapping", "find_overlaps", "part_stones"]
 
 
-_LEAST = 1e-10  # metres: depth of overlap of solids that share a plane that is due to rounding
+_DEPTH_ROUNDING = 1e-10  # metres: depth of overlap of solids that share a plane that is due to rounding
 _ON_PLANE = 1e-8  # metres: distance within which a corner lies on a plane
 _LEAST_VOLUME = 1e-12  # cubic metres: smallest overlap
 _ALIKE = 0.3  # difference of unit normals below which two faces have no plane between them
@@ -58,8 +58,8 @@ def find_overlaps(solids: Sequence[Solid], planes: Mapping[int, Array]) -> list[
     all_vertices, all_planes = np.concatenate(vertices), np.concatenate(rows)
     out = []
     for pair in near_pairs(boxes_of(boxes, starts, 0.0), np.ones(len(chosen), np.bool_)):
-        depth = deepest_overlaps(pair, all_vertices, vertex_starts, all_planes, plane_starts, _LEAST)
-        for k in np.flatnonzero(depth > _LEAST):
+        depth = deepest_overlaps(pair, all_vertices, vertex_starts, all_planes, plane_starts, _DEPTH_ROUNDING)
+        for k in np.flatnonzero(depth > _DEPTH_ROUNDING):
             i, j = sorted((chosen[pair[k, 0]], chosen[pair[k, 1]]))
             if solids[i].code == solids[j].code:
                 continue
@@ -220,7 +220,7 @@ def _turns(plane: Array, polygon: Array, part: Array) -> list[tuple[float, Array
         normals /= np.linalg.norm(normals, axis=1)[:, None]
         normals *= np.where(normals @ plane[:3] < 0.0, -1.0, 1.0)[:, None]
         for normal in normals:
-            if ((part - start) @ normal).min() >= -_LEAST:
+            if ((part - start) @ normal).min() >= -_DEPTH_ROUNDING:
                 far = float(((polygon - start) @ normal).max())
                 out.append((far, np.array([*normal, float(start @ normal)])))
                 break

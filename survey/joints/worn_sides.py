@@ -18,7 +18,7 @@ __all__ = ["mended_planes"]
 
 
 _ALIKE = 0.985  # cosine of 10°: largest angle between sides that continue each other or are parallel
-_NEAR = 0.03  # metres: distance of a neighbour's corner from a side that it continues
+_CORNER_DISTANCE = 0.03  # metres: distance of a neighbour's corner from a side that it continues
 
 
 def mended_planes(
@@ -69,7 +69,7 @@ def _continuing(faces: StoneFaces, rows: Array, free: Bools, face: int, beside: 
     for stone in beside:
         for candidate in range(int(starts[stone]), int(starts[stone + 1])):
             alike = free[candidate] and rows[candidate, :3] @ rows[face, :3] > _ALIKE
-            if alike and np.abs(sound @ rows[candidate, :3] - rows[candidate, 3]).max() <= _NEAR:
+            if alike and np.abs(sound @ rows[candidate, :3] - rows[candidate, 3]).max() <= _CORNER_DISTANCE:
                 points.append(_sound(faces, candidate))
     return np.concatenate(points)
 

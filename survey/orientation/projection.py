@@ -7,7 +7,7 @@ from survey.orientation.network import Camera
 
 __all__ = ["brown", "corrected", "directions", "project"]
 
-_MOST = 50  # iterations of the inverse of the distortion
+_MAX_ITERATIONS = 50  # iterations of the inverse of the distortion
 _CLOSE = 1e-13  # its precision, relative to the camera constant
 
 
@@ -31,7 +31,7 @@ def _undo(places: Array, inner: Array) -> Array:
     Where the polynomials have no inverse, far outside the photograph, the places are nan.
     """
     out = places.copy()
-    for _ in range(_MOST):
+    for _ in range(_MAX_ITERATIONS):
         with np.errstate(over="ignore", invalid="ignore"):
             off = places - brown(out, inner)
             out = out + off

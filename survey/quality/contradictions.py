@@ -35,7 +35,7 @@ SIGNIFICANT = 3.0
 """Standard deviations of the measurement beyond which a stone contradicts its kind."""
 
 _BESIDE = 4  # stretchers of its course next to a header with which it is compared, fewer at the ends
-_FEWEST = 3  # least number of stones for a median of the survey
+_MIN_STONES = 3  # least number of stones for a median of the survey
 _MEDIAN = 1.2533  # standard deviation of a median over that of a mean, of a normal distribution [-]
 _PARALLEL = math.radians(1.0)  # least convergence of a wedge: an arch of 1 m would have more than 180 stones
 _SLOPED = math.radians(5.0)  # least slope of a springing; sides of ashlars are plumb or level to a degree
@@ -177,7 +177,7 @@ def _stretchers_beside(
     """Return for every header the median length of the stretchers next to it in its course, or of the survey."""
     expected = {}
     every = [stone for stone in stones if stone.kind == "stretcher"]
-    whole = _middle(every, "stretchers of the survey have") if len(every) >= _FEWEST else None
+    whole = _middle(every, "stretchers of the survey have") if len(every) >= _MIN_STONES else None
     for headers, stretchers, places in _courses(stones, facades):
         order = np.argsort(places[1])
         beside = np.array(stretchers, dtype=np.intp)[order]
@@ -221,6 +221,6 @@ def _middle(stones: Sequence[StoneQuality], words: str) -> tuple[float, float, s
 
 def _least_convergence(measured: Mapping[int, SideConvergence]) -> float:
     """Return half the median convergence of the survey's arch stones; 1° if there are too few."""
-    if len(measured) < _FEWEST:
+    if len(measured) < _MIN_STONES:
         return _PARALLEL
     return max(_PARALLEL, float(np.median([wedge.convergence for wedge in measured.values()])) / 2.0)

@@ -16,7 +16,7 @@ WIDEST = 30.0
 LEVEL = 45.0
 """Inclination above which a face belongs to no facade: a floor, a soffit, a coping [degrees]."""
 
-_ROUNDS = 50  # until the mean direction and its stones agree; usually three or four
+_MAX_ITERATIONS = 50  # until the mean direction and its stones agree; usually three or four
 
 
 @dataclass(frozen=True)
@@ -107,9 +107,9 @@ def _turns(normals: Array, areas: Array, standing: NDArray[np.intp]) -> Iterable
 def _gather(level: Array, areas: Array) -> Bools:
     """Return the plan directions (n, 2) that belong to the facade of the largest area."""
     mean, mine = _peak(level, areas), np.ones(len(level), dtype=bool)
-    for count in range(_ROUNDS):
+    for count in range(_MAX_ITERATIONS):
         within = level @ mean >= np.cos(np.radians(WIDEST))
-        if count > _ROUNDS // 2:
+        if count > _MAX_ITERATIONS // 2:
             within &= mine  # two faces that keep excluding each other: drop both
         if not within.any():
             break

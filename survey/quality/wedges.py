@@ -31,7 +31,7 @@ _CONVERGES = math.radians(2.0)  # least angle between the joints of an arch ston
 _FAN = math.radians(
     20.0
 )  # least angle that the joints of an arch turn by: a flat arch's turn by 30° and more
-_FEWEST = 3  # least number of stones in such a fan
+_MIN_FAN_STONES = 3  # least number of stones in such a fan
 _SOME = 0.25  # of the shorter of two sides: common length beyond which one lies along the other
 
 
@@ -137,7 +137,7 @@ def spanning_stones(stones: Sequence[StoneQuality], sides: Side) -> frozenset[in
     links = list(zip(joints.stone[between].tolist(), joints.neighbour[between].tolist(), strict=True))
     fans: set[int] = set()
     for group in _connected(angles, links):
-        if len(group) >= _FEWEST and sum(angles[i] for i in group) >= _FAN:
+        if len(group) >= _MIN_FAN_STONES and sum(angles[i] for i in group) >= _FAN:
             ends = np.isin(joints.stone, list(group)) & np.isin(joints.side, list(radial))
             fans |= group | set(joints.neighbour[ends].tolist())
     return frozenset(named | fans)

@@ -26,7 +26,7 @@ __all__ = ["LiftedFace", "lift", "lift_faces", "plane_of_wall"]
 
 _COARSEST = 0.1  # largest standard deviation of a corner over the size of the stone
 _SMALLEST = 1e-3  # least distance between the farthest corners [m]
-_ROUNDING = 1e-9  # standard deviation that is rounding [rad, m]
+_MIN_SIGMA = 1e-9  # standard deviation that is rounding [rad, m]
 _CRITICAL = 3.29  # two-sided normal quantile of Baarda's α₀ = 0.1 %
 _GRAZING = float(np.sin(np.radians(10.0)))  # flattest useful line of sight
 
@@ -234,13 +234,13 @@ def _moved(
 def _as_fit(plane: PlaneEstimate, outline: Array) -> FaceFit:
     """Express a predicted plane as a fit, about the place where its height does not depend on its tilts."""
     tilts, directions = np.linalg.eigh(plane.covariance[:2, :2])
-    axes, tilts = directions.T @ plane.axes, np.maximum(tilts, _ROUNDING**2)
+    axes, tilts = directions.T @ plane.axes, np.maximum(tilts, _MIN_SIGMA**2)
     # limit correlations to 1 where a variance is rounding alone
     most = np.sqrt(tilts * plane.covariance[2, 2])
     across = np.clip(directions.T @ plane.covariance[:2, 2], -most, most)
     # smallest spread of the tilts first, as the axis along which a measured face is longest
     centroid = plane.centroid - (across / tilts) @ axes
-    height = max(plane.covariance[2, 2] - float((across**2 / tilts).sum()), _ROUNDING**2)
+    height = max(plane.covariance[2, 2] - float((across**2 / tilts).sum()), _MIN_SIGMA**2)
     return FaceFit(
         normal=plane.normal,
         offset=float(plane.normal @ centroid),

@@ -13,7 +13,7 @@ from mechanics.planar.measures.surface import profile
 __all__ = ["Blocks", "blocks_of"]
 
 _SEVERAL = 5  # disks of a block, at least; fewer are debris
-_ROUNDING = 1e-9  # of the height of a disk's top, over its radius [-]
+_HEIGHT_ROUNDING = 1e-9  # of the height of a disk's top, over its radius [-]
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def blocks_of(start: Array, now: Array, radius: Array, reach: float) -> Blocks:
     rank[order] = np.arange(len(order))
     label, size = rank[label], size[order]
     tops = now[:, 1] + radius
-    free = profile(now, radius, now[:, 0]) <= tops + _ROUNDING * radius
+    free = profile(now, radius, now[:, 0]) <= tops + _HEIGHT_ROUNDING * radius
     bottoms = start[:, 1] - radius
     on_base = bottoms - bottoms.min() < radius
     off = np.setdiff1d(label[free], label[on_base])

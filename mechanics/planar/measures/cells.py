@@ -9,7 +9,7 @@ from mechanics.arrays import Array, Ints
 
 __all__ = ["Cell", "Shape", "layer_members", "members", "shape_of"]
 
-_FEWEST = 5  # disks of a cell: fewer have no mean deformation
+_MIN_CELL_DISKS = 5  # disks of a cell: fewer have no mean deformation
 
 
 @dataclass(frozen=True)
@@ -69,11 +69,11 @@ def members(cell: Cell, centre: Array) -> Ints:
     """
     away = np.linalg.norm(centre - np.array(cell.centre), axis=1)
     disks = np.flatnonzero(away <= cell.radius)
-    if len(disks) < _FEWEST:
+    if len(disks) < _MIN_CELL_DISKS:
         raise SceneError(
             f"holds {len(disks)} disks",
             where=f"cell {cell.name!r}",
-            remedy=f"place it within the sample, with a radius that holds {_FEWEST} or more",
+            remedy=f"place it within the sample, with a radius that holds {_MIN_CELL_DISKS} or more",
         )
     return disks
 
@@ -90,7 +90,8 @@ def layer_members(layer: Ints) -> dict[str, Ints]:
     """
     count = np.bincount(layer)
     return {
-        f"layer {number + 1}": np.flatnonzero(layer == number) for number in np.flatnonzero(count >= _FEWEST)
+        f"layer {number + 1}": np.flatnonzero(layer == number)
+        for number in np.flatnonzero(count >= _MIN_CELL_DISKS)
     }
 
 

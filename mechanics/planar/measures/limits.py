@@ -14,7 +14,7 @@ RIGID = 0.95
 RESTING = 0.05
 """Share of the slip below which a disk rests with the footwall [-]."""
 _BANDS = 8  # of the height, in each of which a limit has a place
-_FEWEST = 20  # disks of a band
+_MIN_BAND_DISKS = 20  # disks of a band
 _CERTAIN = 2.0  # standard errors beyond which a surface is bent [-]
 
 
@@ -60,7 +60,7 @@ def shear_limits(now: Array, share: Array) -> ShearLimits:
     angles = []
     for least in (RIGID, RESTING):
         chosen = [np.flatnonzero(band == number) for number in range(_BANDS)]
-        chosen = [group for group in chosen if len(group) >= _FEWEST]
+        chosen = [group for group in chosen if len(group) >= _MIN_BAND_DISKS]
         splits = [_split(now[group, 0], share[group] > least) for group in chosen]
         middles = [float(height[group].mean()) for group in chosen]
         finite = np.isfinite(splits)

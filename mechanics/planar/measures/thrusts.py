@@ -19,7 +19,7 @@ _MIDDLE = 1.0 / 3.0  # part of the height in which bands are looked for: below, 
 _BESIDE, _TALL = 0.6, 0.6
 _SHIFTS = 3  # of its line to both sides, in half columns
 _ANGLES = np.radians(np.arange(10.0, 171.0))  # among which it is looked for
-_FEWEST = 5  # disks of a band whose dip is told
+_MIN_BAND_DISKS = 5  # disks of a band whose dip is told
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,9 @@ def thrusts_of(start: Array, now: Array, shear: Array, radius: Array, layer: flo
         beside = finite & (np.abs(start - [at, 0.5 * layer]) < [_BESIDE * layer, 0.5 * _TALL * layer]).all(
             axis=1
         )
-        dips.append(_dip(now[beside], shear[beside], 0.5 * width) if beside.sum() >= _FEWEST else np.nan)
+        dips.append(
+            _dip(now[beside], shear[beside], 0.5 * width) if beside.sum() >= _MIN_BAND_DISKS else np.nan
+        )
     return Thrusts(place, np.array(dips))
 
 

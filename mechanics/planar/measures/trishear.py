@@ -24,7 +24,7 @@ _HALF_ANGLES = np.radians([10.0, 20.0, 30.0, 45.0, 60.0])  # from which fits sta
 _RATIOS = (0.0, 1.0, 2.0, 4.0)  # P/S from which fits start [-]
 _MOST_HALF_ANGLE = np.radians(85.0)  # [rad]
 _MOST_RATIO = 10.0  # P/S [-]
-_FAR = 0.02  # distance over the slip from which a disk counts by its distance, not its square [-]
+_OUTSIDE = 0.02  # distance over the slip from which a disk counts by its distance, not its square [-]
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ def trishear_fit(
             x_scale=[0.1, 0.5],
             diff_step=[1e-3, 1e-3],
             loss="soft_l1",  # a disk that the tip just passes, or just not, jumps by the whole slip
-            f_scale=_FAR * abs(slip),
+            f_scale=_OUTSIDE * abs(slip),
         )
         if best is None or fit.cost < best.cost:
             best = fit

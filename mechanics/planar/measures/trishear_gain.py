@@ -19,7 +19,7 @@ _BLOCK = 10.0  # side of the squares whose disks are drawn together, over the me
 _DRAWS = 1000  # of the blocks
 _INTERVAL = (0.025, 0.975)  # quantiles of the interval [-]
 _WORSE = 2.0  # standard errors by which a worse angle or ratio is excluded [-]
-_FEWEST = 3  # blocks, of which an interval can be drawn
+_MIN_BLOCKS = 3  # blocks, of which an interval can be drawn
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def trishear_gain(
     sheared = np.flatnonzero((share > RESTING) & (share < RIGID))
     place, motion = start[sheared], (moved - start)[sheared]
     block = np.unique(np.floor(place / (_BLOCK * diameter)), axis=0, return_inverse=True)[1].ravel()
-    if len(sheared) == 0 or block.max() + 1 < _FEWEST:
+    if len(sheared) == 0 or block.max() + 1 < _MIN_BLOCKS:
         return None
     misfit = _by_block(_misfit(model, place, motion, slip), block)
     plain = _by_block(_plain_misfit(place, motion, slip * along), block)

@@ -17,7 +17,7 @@ __all__ = ["Course", "Force", "GravityChange", "Loads", "Motion", "Pose"]
 
 _STRONG = 0.95  # of the integral of the square, at which strong motion ends by its usual definition (Trifunac 1975) [-]
 _SAMPLES = 1000  # instants beside those given, so that long pieces are integrated too
-_ROUNDING = 1e-9  # of an instant, by which rounding may place the end of a run before it [-]
+_TIME_ROUNDING = 1e-9  # of an instant, by which rounding may place the end of a run before it [-]
 
 
 @dataclass(frozen=True)
@@ -50,14 +50,14 @@ class Course:
 
     def missed(self, end: float) -> bool:
         """Return True where a run that ends at `end` [s] ends before the peak or the end of the strong part."""
-        return end < max(self.peak, self.strong) * (1.0 - _ROUNDING)
+        return end < max(self.peak, self.strong) * (1.0 - _TIME_ROUNDING)
 
     def beyond(self, end: float) -> str:
         """Return the lack of a run that ends at `end` [s], in words; nothing where the load is over by then."""
-        if not end < self.until * (1.0 - _ROUNDING):
+        if not end < self.until * (1.0 - _TIME_ROUNDING):
             return ""
         rest = "" if math.isinf(self.until) else f", and it goes on until {self.until:.4g} s"
-        if end < self.peak * (1.0 - _ROUNDING):
+        if end < self.peak * (1.0 - _TIME_ROUNDING):
             return (
                 f"the run ends at {end:.4g} s, before the peak of the {self.name} at {self.peak:.4g} s{rest}"
             )

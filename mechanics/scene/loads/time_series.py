@@ -13,7 +13,7 @@ from mechanics.arrays import Array
 __all__ = ["History", "Outside"]
 
 
-_ROUNDING = 1e-9  # of its span, by which rounding may place a time outside a history that ends [-]
+_TIME_ROUNDING = 1e-9  # of its span, by which rounding may place a time outside a history that ends [-]
 
 
 class Outside(StrEnum):
@@ -135,7 +135,7 @@ class History:
     def _inside(self, time: float) -> float:
         """Return the instant nearest to `time` within the history [s]."""
         first, last = float(self.time[0]), float(self.time[-1])
-        slack = _ROUNDING * max(last - first, abs(last))
+        slack = _TIME_ROUNDING * max(last - first, abs(last))
         if self.outside is Outside.ERROR and not first - slack <= time <= last + slack:
             what = f"t = {time:g} s lies outside {first:g} s to {last:g} s"
             raise _wrong(what, "give the history for the whole run, or let it hold its last value")

@@ -16,7 +16,7 @@ __all__ = ["InteriorPoint"]
 
 # complementarity, relative to typical impulses, at which a path begins near the impulses of a start: those of the step
 # before cost 10 iterations at 1e-4, 13 at 1e-2 and 15 at 1e-6 [-]
-_NEAR = 1e-4
+_START_COMPLEMENTARITY = 1e-4
 # η over the least so far below which an iteration is progress [-]
 _PROGRESS = 0.9
 # iterations without progress after which the path has stalled: masses 10⁶ apart take a few short steps on the way
@@ -56,7 +56,11 @@ class InteriorPoint:
             return _solution(best, 0)
         even, unit = equilibrated(problem)
         units = unit[:, None]
-        path = CentralPath(even, start.impulse / units, _NEAR) if start.impulse.any() else CentralPath(even)
+        path = (
+            CentralPath(even, start.impulse / units, _START_COMPLEMENTARITY)
+            if start.impulse.any()
+            else CentralPath(even)
+        )
         count = idle = 0
         least = np.inf
         while count < self.max_iterations and idle < _STALLED and best.excess > 1.0:

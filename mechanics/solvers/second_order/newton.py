@@ -26,9 +26,9 @@ __all__ = ["Newton"]
 # α over η and the scale of W, at first and at least: α falls with η, so convergence stays fast (Fan & Yuan 2005) [-]
 _SHARE = 0.1
 # η above which a start is far from a solution, and the contacts that bear are held first [-]
-_FAR = 0.3
+_FAR_RESIDUAL = 0.3
 # smallest α over the scale of W: rounding in self-stress is ε/α of it, and α itself as large [-]
-_LEAST = float(np.sqrt(np.finfo(float).eps))
+_MIN_PROXIMAL_WEIGHT = float(np.sqrt(np.finfo(float).eps))
 # factor by which α grows after steps shortened by more than that, and falls after whole ones [-]
 _ADAPT = 4.0
 # iterates whose worst merit a step must improve on (Grippo, Lampariello & Lucidi 1986)
@@ -66,7 +66,7 @@ class Newton:
         limits = self.tolerance, self.velocity_tolerance
         run = _Run(problem, start.impulse)
         best, idle = (run.left, run.r), 0
-        if run.left.natural_map > _FAR:
+        if run.left.natural_map > _FAR_RESIDUAL:
             run.hold()
         while True:
             gains = run.left.natural_map < best[0].natural_map
@@ -145,8 +145,8 @@ class _Run:
 
     def step(self) -> bool:
         """Make one step of Newton's method; return whether there was one."""
-        alpha = max(self._share * min(self.left.natural_map, 1.0), _LEAST)
-        self.exact = alpha == _LEAST
+        alpha = max(self._share * min(self.left.natural_map, 1.0), _MIN_PROXIMAL_WEIGHT)
+        self.exact = alpha == _MIN_PROXIMAL_WEIGHT
         alpha *= self._scale
         step = self._system.step(self._first, self._second, self._error, alpha)
         if step is None:

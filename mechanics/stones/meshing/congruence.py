@@ -16,7 +16,7 @@ __all__ = ["Congruence", "classes", "motion", "translation"]
 Faces = tuple[tuple[int, ...], ...]
 
 _EQUAL = 1e-11  # distance of two corners that are the same, over the stone's size
-_ROUNDING = (
+_COORDINATE_ROUNDING = (
     16.0 * np.finfo(float).eps
 )  # the same over the coordinates: far from the origin rounding exceeds _EQUAL
 
@@ -113,7 +113,7 @@ def motion(
 
 def _tolerance(*corners: Array) -> float:
     size = float(np.ptp(corners[0], axis=0).max())
-    return _EQUAL * size + _ROUNDING * max(float(np.abs(corner).max()) for corner in corners)
+    return _EQUAL * size + _COORDINATE_ROUNDING * max(float(np.abs(corner).max()) for corner in corners)
 
 
 def _off(a: Array, b: Array, turn: Array) -> float:

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
 __all__ = ["assessment_lines", "comparison_lines", "pushover_lines"]
 
-_FEW = 6  # stones of a mechanism that are named without -v
+_MAX_STONES = 6  # stones of a mechanism that are named without -v
 _COURSES = 5  # courses with the largest misfits that are listed without -v
 
 
@@ -51,7 +51,7 @@ def _mechanism(mechanism: dict[str, Any], verbose: bool) -> list[str]:
     codes = [stone["code"] for stone in mechanism["stones"]]
     if not codes:
         return []
-    named = codes if verbose else codes[:_FEW]
+    named = codes if verbose else codes[:_MAX_STONES]
     more = f" and {len(codes) - len(named)} more" if len(codes) > len(named) else ""
     return [
         f"    moves: {', '.join(named)}{more}; "

@@ -6,7 +6,7 @@ from pipelines.assess.study.study import Study
 
 __all__ = ["part_line", "study_lines"]
 
-_FEW = 5  # actions that are told without --verbose
+_MAX_ACTIONS = 5  # actions that are told without --verbose
 
 
 def part_line(done: Study) -> str:
@@ -37,7 +37,7 @@ def study_lines(done: Study, verbose: bool) -> Iterator[str]:
         yield f"{row['input']}: S {row['first']:.4f}, ST {row['total']:.4f}"
     for name, share in sorted(summary["shares"]["by_input"].items(), key=lambda row: -row[1]):
         yield f"share of the variance: {name} {100 * share:.1f} %"
-    actions = summary["actions"] if verbose else summary["actions"][:_FEW]
+    actions = summary["actions"] if verbose else summary["actions"][:_MAX_ACTIONS]
     for action in actions:
         yield f"measure next: {action['text']}: takes away {100 * action['share']:.1f} % of the variance"
     yield f"study {done.run}: {done.folder / 'report.html'}"

@@ -19,7 +19,7 @@ from survey.quality.movement import CourseMovement, compare_courses
 
 __all__ = ["Dating", "Share", "date_movement"]
 
-_TOLD = 3  # courses of a phase that are told, nearest to the break
+_MAX_NAMED = 3  # courses of a phase that are told, nearest to the break
 _FELT = 2.0  # standard deviations of a movement below which a phase says nothing
 
 
@@ -122,7 +122,7 @@ def _evidence(
         # the last courses of a phase before the break, the first of the later one
         near = sorted(dated, key=lambda line: line.line.course, reverse=index == 0)
         texts = [text for line in near if (text := _course(line, measurements.resting)) is not None]
-        yield from texts[:_TOLD]
+        yield from texts[:_MAX_NAMED]
 
 
 def _course(line: CourseMovement, resting: frozenset[str]) -> str | None:

@@ -10,7 +10,7 @@ __all__ = ["doubts_of", "headline_of", "mechanism_of"]
 # share of turning, or of sliding, from which it is the whole mechanism [-]
 _MOSTLY = 0.85
 # share of steps that may be left unsolved, or that inertia may disturb, without a caution [-]
-_FEW = 0.02
+_MAX_UNSOLVED_SHARE = 0.02
 # energy that no term explains, up to which there is no caution [-]
 _BALANCE = 1e-3
 
@@ -37,9 +37,9 @@ def doubts_of(test: LoadingTest) -> list[str]:
     """Return why the curve may be wrong, the gravest reason first."""
     steps, disturbed = len(test.force), int(np.sum(~test.calm))
     cautions = ["it was stopped before its end"] if test.stopped else []
-    if test.unsolved > _FEW * steps:
+    if test.unsolved > _MAX_UNSOLVED_SHARE * steps:
         cautions.append(f"{test.unsolved} of {steps} steps were not solved to the tolerance")
-    if disturbed > _FEW * steps:
+    if disturbed > _MAX_UNSOLVED_SHARE * steps:
         cautions.append(
             f"in {disturbed} of {steps} steps stones gathered speed: their forces are not those of rest"
         )

@@ -31,7 +31,7 @@ _WORDS = {
     InputType.RECORD: "state the earthquake",
     InputType.STATION: "measure the stations against one another",
 }
-_LEAST = 1e-12  # share of the variance that is worth a line [-]
+_MIN_SHARE = 1e-12  # share of the variance that is worth a line [-]
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def actions(problem: Problem, gradient: Array) -> list[Action]:
     found = [
         Action(text, stone, share)
         for text, stone, numbers in _measurable(problem)
-        if (share := _taken(problem, gradient, numbers) / total) > _LEAST
+        if (share := _taken(problem, gradient, numbers) / total) > _MIN_SHARE
     ]
     return sorted(found, key=lambda action: (-action.share, action.text))
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Orthophoto", "read_orthophoto"]
 
-_MOST = 3000  # pixels of the longer side that are drawn: more than a sheet shows
+_MAX_PIXELS = 3000  # pixels of the longer side that are drawn: more than a sheet shows
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Orthophoto:
         flat = self.places.place(pixels)
         o, a, b = project(self.wall.origin + flat @ self.wall.axes[:2], facade)
         move = Affine2D.from_values(*(a - o), *(b - o), *o)
-        step = max(1, max(self.pixels.shape[:2]) // _MOST)
+        step = max(1, max(self.pixels.shape[:2]) // _MAX_PIXELS)
         height, width = self.pixels.shape[:2]
         axes.imshow(
             self.pixels[::step, ::step],

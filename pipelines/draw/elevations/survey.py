@@ -36,7 +36,7 @@ __all__ = ["draw_departure", "draw_elevation", "draw_residuals"]
 
 _UNKNOWN = "#dcd9d4"
 _DIVERGING = "RdBu_r"  # blue behind, red in front: safe for colour-blind readers
-_LEAST = 1.0  # shortest scale of departures [mm]
+_MIN_SCALE = 1.0  # shortest scale of departures [mm]
 _OVER_PHOTO = 0.45  # opacity of stones on a photograph [-]
 _FINEST = 0.01  # shortest colour scale: smaller residuals are not worth a colour [mm]
 
@@ -126,7 +126,7 @@ def draw_departure(
         for name in ("plane", "plumb")
     }
     end = max(
-        _LEAST,
+        _MIN_SCALE,
         *(
             float(np.percentile(np.abs(list(values.values())), 98))
             for values in departures.values()

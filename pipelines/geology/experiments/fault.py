@@ -30,7 +30,9 @@ _APICAL = "trishear: apical angle [°]"
 _RATIO = "trishear: propagation to slip [-]"
 _RISEN = 0.1  # rise of the surface over that of the basement, at the front of the fold [-]
 _CREST = (0.5, 0.95)  # rise of the surface over that of the basement, between which its crest bends [-]
-_PART = 4.0  # lengths over which the surface is averaged, over the mean radius: those of two disks [-]
+_AVERAGING_LENGTH = (
+    4.0  # lengths over which the surface is averaged, over the mean radius: those of two disks [-]
+)
 _SLIPPED = 2.0  # slip over the mean radius, before which a fault has no zone of shear to measure [-]
 
 
@@ -114,7 +116,7 @@ class Fault:
         slip, angle = self.speed * time, float(np.radians(self.dip))
         if slip < _SLIPPED * radius.mean():
             return {_SLIP: slip, **dict.fromkeys(_OBSERVED, float("nan"))}
-        where, risen = rise(start, now, radius, self.length, _PART * float(radius.mean()))
+        where, risen = rise(start, now, radius, self.length, _AVERAGING_LENGTH * float(radius.mean()))
         uplift = slip * np.sin(angle)
         share = (now - start) @ np.array([np.cos(angle), np.sin(angle)]) / slip
         limits = shear_limits(now, share)

@@ -20,7 +20,7 @@ from pipelines.geology.observe import Fields
 __all__ = ["Fold"]
 
 _RISEN = 0.1  # rise of the surface over its largest rise, at the front [-]
-_PART = 20.0  # lengths over which it is averaged, over the mean radius [-]
+_AVERAGING_LENGTH = 20.0  # lengths over which it is averaged, over the mean radius [-]
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class Fold:
         two mean radii, over lengths of ten disks.
         """
         mean = float(radius.mean())
-        where, risen = rise(start, now, radius, self.length, _PART * mean)
+        where, risen = rise(start, now, radius, self.length, _AVERAGING_LENGTH * mean)
         least = max(_RISEN * float(risen.max()), 2.0 * mean)
         return {
             "rear [m]": self.speed * time,

@@ -9,7 +9,7 @@ from pipelines.reports.html import picture, write_page
 
 __all__ = ["draw_photographs", "photographs_section", "write_photographs_page"]
 
-_MOST = 200  # rows of a table; orientation.json has them all
+_MAX_ROWS = 200  # rows of a table; orientation.json has them all
 
 Row = tuple[str, ...]
 
@@ -74,15 +74,15 @@ def photographs_section(
         "pictures": [picture(folder / name, caption) for name, caption in pictures.items()],
         "adjustment": _adjustment(values),
         "cameras": [_camera(camera) for camera in values["cameras"]],
-        "photos": [_photo(photo) for photo in values["photos"][:_MOST]],
-        "control": [_control(one) for one in values["control"][:_MOST]],
-        "suspected": [_mark(marks, k) for k in suspected[:_MOST]],
+        "photos": [_photo(photo) for photo in values["photos"][:_MAX_ROWS]],
+        "control": [_control(one) for one in values["control"][:_MAX_ROWS]],
+        "suspected": [_mark(marks, k) for k in suspected[:_MAX_ROWS]],
         "suspects": len(suspected),
         "correlations": [
             (correlation["of"], correlation["a"], correlation["b"], f"{100.0 * correlation['value']:.1f} %")
-            for correlation in values["correlations"][:_MOST]
+            for correlation in values["correlations"][:_MAX_ROWS]
         ],
-        "most": _MOST,
+        "most": _MAX_ROWS,
     }
 
 

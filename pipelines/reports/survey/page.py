@@ -22,7 +22,7 @@ from survey.quality.remeasure import Remeasure
 
 __all__ = ["write_survey_page"]
 
-_MOST = 300  # rows of a table; survey.json has them all
+_MAX_ROWS = 300  # rows of a table; survey.json has them all
 
 T = TypeVar("T")
 Row = tuple[str, ...]
@@ -118,7 +118,7 @@ def _located(study: SurveyStudy) -> Iterator[Row]:
 
 def _first(items: Sequence[T], row: Callable[[T], Row]) -> dict[str, Any]:
     """Describe the first items by a row each, and count all of them."""
-    return {"rows": [row(item) for item in items[:_MOST]], "count": len(items)}
+    return {"rows": [row(item) for item in items[:_MAX_ROWS]], "count": len(items)}
 
 
 def _lead(study: SurveyStudy) -> str:
@@ -309,7 +309,7 @@ def _kinds(study: SurveyStudy) -> list[Row]:
             kind.source,
             ", ".join(
                 f"{odd.code} ({odd.length * 1e3:+z.0f} mm long, {odd.height * 1e3:+z.0f} mm high)"
-                for odd in sorted(study.deviations, key=lambda odd: -odd.worst)[:_MOST]
+                for odd in sorted(study.deviations, key=lambda odd: -odd.worst)[:_MAX_ROWS]
                 if odd.kind == kind.kind and odd.worst > 3.0
             )
             or "none",

@@ -49,7 +49,7 @@ _LENGTH = 0.5  # of a stone of a web [m]
 _SHORTEST = 0.15  # part of a stone of a web beyond the seat that it rests on [m]
 _JITTER = 0.04  # largest deviation of head joints from a regular bond [m]
 _PENDANT = 0.03  # drop of the boss below the ribs [m]
-_ROUNDING = 1e-12  # distance of corners that lie on one plane [m]
+_PLANE_ROUNDING = 1e-12  # distance of corners that lie on one plane [m]
 
 
 @dataclass(frozen=True)
@@ -436,6 +436,6 @@ def _both(normal: Array, offset: float) -> list[tuple[Array, float]]:
 def _cut(code: str, planes: Sequence[tuple[Array, float]], shape: RibVaultShape) -> Solid:
     reach = np.full(3, 2.0 * shape.radius)
     rows = [(*normal.tolist(), offset) for normal, offset in planes]
-    solid = intersection(code, rows, -reach, reach, _ROUNDING)
+    solid = intersection(code, rows, -reach, reach, _PLANE_ROUNDING)
     assert solid is not None
     return solid

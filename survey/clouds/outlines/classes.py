@@ -13,11 +13,11 @@ __all__ = ["check_stones", "neck", "of_class", "refuse_mortar"]
 
 _PIECES = 4  # pieces of one number, of which none has half of its area, that make it a class
 _HALF = 0.5  # share of an area that is most of it [-]
-_FEWEST = 3  # pieces of black that stones in black have at least
+_MIN_PIECES = 3  # pieces of black that stones in black have at least
 _SMALLEST = 12  # pixels of the smallest piece that can be a stone
 _BRIDGE = 2.0  # pixels: half of the widest bridge that a slip of the brush makes
 _SLENDER = 0.02  # of the side of a stone: half the width of a neck that is questioned
-_PART = 0.1  # least share of a stone's area in each of the parts that hang together by a neck [-]
+_MIN_PIECE_SHARE = 0.1  # least share of a stone's area in each of the parts that hang together by a neck [-]
 _EXPORT = "export it as it is, in its own size and without smoothing, e.g. as PNG"
 
 
@@ -91,7 +91,9 @@ def check_stones(numbers: NDArray[np.int32], values: Ints, colours: bool, path: 
             classes[_named(int(values[number]), colours)] = pieces
     if classes:
         most = max(classes, key=lambda one: classes[one])
-        what = " and ".join(f"{name} has {pieces} pieces" for name, pieces in list(classes.items())[:_FEWEST])
+        what = " and ".join(
+            f"{name} has {pieces} pieces" for name, pieces in list(classes.items())[:_MIN_PIECES]
+        )
         remedy = (
             f"say which number or colour the stones have, e.g. --layer {most}: each of its pieces is a stone"
         )
@@ -112,7 +114,7 @@ def refuse_mortar(white: Bools, path: Path) -> None:
         return
     sizes = np.bincount(label(~white)[0].ravel())[1:]
     pieces = int(np.count_nonzero(sizes >= _SMALLEST))
-    if pieces < _FEWEST or sizes.max() > _HALF * sizes.sum():
+    if pieces < _MIN_PIECES or sizes.max() > _HALF * sizes.sum():
         return
     if distance_transform_edt(white).max() < distance_transform_edt(~white).max():
         what = f"one piece has most of the white, and black has {pieces} pieces: white is the mortar"
@@ -133,7 +135,7 @@ def neck(mask: Bools) -> tuple[str, str] | None:
     half = max(_BRIDGE, _SLENDER * float(np.sqrt(area)))
     deep = distance_transform_edt(np.pad(mask, 1)) > half
     sizes = np.bincount(label(deep)[0].ravel())[1:]
-    large = np.sort(sizes[sizes > _PART * area])[::-1]
+    large = np.sort(sizes[sizes > _MIN_PIECE_SHARE * area])[::-1]
     if len(large) < 2:
         return None
     shares = " and ".join(f"{one / area:.0%}" for one in large.tolist())

@@ -16,7 +16,7 @@ _SAGITTA = 0.001  # by which arcs may differ from their chords [drawing units]
 _DEEPEST = 16  # blocks within blocks
 _CURVES = ("LWPOLYLINE", "POLYLINE", "SPLINE", "CIRCLE", "ELLIPSE")
 _SILENT = ("POINT", "ATTDEF", "VIEWPORT", "XLINE", "RAY")  # of which nobody makes a stone
-_SAME = 0.02  # difference of two boxes that are of one stone, of their size
+_SAME_BOX = 0.02  # difference of two boxes that are of one stone, of their size
 
 
 @dataclass(frozen=True)
@@ -193,7 +193,7 @@ def _box(ring: Array) -> Array:
 
 def _alike(one: Array, second: Array) -> bool:
     size = float((second[2:] - second[:2]).max())
-    return bool(np.abs(one - second).max() <= _SAME * size)
+    return bool(np.abs(one - second).max() <= _SAME_BOX * size)
 
 
 def _within(inner: Array, outer: Array) -> bool:

@@ -23,7 +23,7 @@ _GREY = 0.02  # share of pixels that are neither black nor white in a picture of
 _DARK, _WHITE = 32, 223  # of 255
 _SPECK = 0.02  # area of a piece over the median of all below which it is a speck, not a stone [-]
 _SMALLEST = 12  # pixels of the smallest piece that can be a stone
-_MOST = 0.5  # share of a picture above which a piece is rather the wall than a stone
+_WALL_SHARE = 0.5  # share of a picture above which a piece is rather the wall than a stone
 _WHOLE = 0.95  # share of the largest piece above which the others are specks
 
 
@@ -115,7 +115,7 @@ def outlines_of(labels: Labels, tolerance: float) -> Iterator[Outline]:
         if outline is not None:
             share = np.count_nonzero(mask) / labels.numbers.size
             whole = ("whole wall", f"it fills {share:.0%} of the picture: joints may be missing in the mask")
-            doubts = (*outline.doubts, *([whole] if share > _MOST else []))
+            doubts = (*outline.doubts, *([whole] if share > _WALL_SHARE else []))
             yield replace(outline, code=f"S{value:03d}", doubts=doubts)
 
 

@@ -14,7 +14,7 @@ _SHARP = math.sin(
     math.radians(12.0)
 )  # sine of the angle between sides below which they do not meet in a corner
 _SPAN = 0.15  # part of a side at either end that rounds its corners off, and does not count for its line
-_FEWEST = 3  # corners of an outline
+_MIN_CORNERS = 3  # corners of an outline
 
 
 def trace(mask: Bools) -> tuple[Array, int, float]:
@@ -67,11 +67,11 @@ def few_corners(ring: Array, tolerance: float) -> Array:
     -------
     (m, 2) m ≥ 3, whose sides do not cross; the ring itself if it has three corners or fewer, or winds too closely
     """
-    if len(ring) <= _FEWEST:
+    if len(ring) <= _MIN_CORNERS:
         return ring
     for finer in (1.0, 0.5, 0.25):
         douglas_peucker = _douglas_peucker(ring, finer * tolerance)
-        if len(douglas_peucker) < _FEWEST:
+        if len(douglas_peucker) < _MIN_CORNERS:
             return ring[_extreme(ring)]
         for corners in (_met(ring, douglas_peucker, tolerance), ring[douglas_peucker]):
             if not _crosses(corners):
@@ -114,7 +114,7 @@ def _extreme(ring: Array) -> NDArray[np.intp]:
         int(np.argmin(ring[:, 1])),
         int(np.argmax(ring[:, 1])),
     }
-    return np.array(sorted(extremes) if len(extremes) >= _FEWEST else range(len(ring)))
+    return np.array(sorted(extremes) if len(extremes) >= _MIN_CORNERS else range(len(ring)))
 
 
 def _douglas_peucker(ring: Array, tolerance: float) -> list[int]:

@@ -12,8 +12,8 @@ from survey.clouds.pictures.proposal import Proposal
 
 __all__ = ["Mark", "mark_outlines"]
 
-_PART = 0.25  # part of a proposed stone within an outline from which the outline holds it
-_MOST = 0.6  # part of an outline within a proposed stone from which it lies in it
+_STONE_SHARE = 0.25  # part of a proposed stone within an outline from which the outline holds it
+_SHARE_WITHIN_STONE = 0.6  # part of an outline within a proposed stone from which it lies in it
 _OVERLAP = 0.05  # shared part of the smaller of two outlines from which they overlap
 _SURE = 0.7  # probability of a joint from which it parts stones
 
@@ -46,8 +46,8 @@ def mark_outlines(rings: Sequence[Array], proposal: Proposal) -> list[Mark]:
     )
     first, second = shapely.STRtree(polygons).query(drawn, predicate="intersects")
     shared = shapely.area(shapely.intersection(drawn[first], polygons[second]))
-    holds = shared > _PART * shapely.area(polygons[second])
-    lies = shared > _MOST * shapely.area(drawn[first])
+    holds = shared > _STONE_SHARE * shapely.area(polygons[second])
+    lies = shared > _SHARE_WITHIN_STONE * shapely.area(drawn[first])
     joints = {tuple(sorted(border.stones)): border for border in proposal.borders}
     for k in np.unique(first[holds]).tolist():
         inside = second[holds & (first == k)].tolist()

@@ -13,10 +13,10 @@ from survey.geometry.polygons import ring_area
 __all__ = ["Shape", "outline_shapes", "without_mortar"]
 
 _STRAIGHT = 1.5  # distance of a traced boundary from the sides of its outline [px of the work]
-_FEWEST = 4  # corners of an outline that has none to spare
+_MIN_CORNERS = 4  # corners of an outline that has none to spare
 _BEVEL = 1.5  # length of a side that cuts a corner off, over the width of a joint
 _SQUARE = 0.6  # sine of the angle between the sides beside it: 37°
-_LEAST = 1.5  # width of a stone over that of a joint
+_MIN_STONE_WIDTH = 1.5  # width of a stone over that of a joint
 _SEEN = 0.25  # contrast of mortar over the scatter of the wall from which its edge can be seen
 _PIXEL = (
     0.45  # standard deviation of a corner where two straight sides meet [px of the work]: of rendered walls
@@ -94,13 +94,13 @@ def outline_shapes(regions: Ints, stone: Bools) -> list[Shape]:
             continue
         mask: NDArray[np.bool_] = np.pad((regions[box] == number) & stone[box], 1)
         mask = binary_fill_holes(binary_opening(mask, np.ones((3, 3), dtype=bool)))
-        if not mask.any() or np.sqrt(mask.sum()) < _LEAST * WIDTH:
+        if not mask.any() or np.sqrt(mask.sum()) < _MIN_STONE_WIDTH * WIDTH:
             continue
         dense, _, _ = trace(mask)
         if len(dense) < 3:
             continue
         ring = _sharp(few_corners(dense, _STRAIGHT))
-        if abs(ring_area(ring)) < (_LEAST * WIDTH) ** 2:
+        if abs(ring_area(ring)) < (_MIN_STONE_WIDTH * WIDTH) ** 2:
             continue
         sigma = float(np.hypot(_PIXEL, _scatter(dense, ring)))
         out.append(Shape(number, ring + np.array([box[1].start - 1, box[0].start - 1]), sigma))
@@ -110,7 +110,7 @@ def outline_shapes(regions: Ints, stone: Bools) -> list[Shape]:
 def _sharp(ring: Array) -> Array:
     """Return an outline whose corners are not cut off: short sides between long ones about square to each other."""
     k = 0
-    while k < len(ring) > _FEWEST:
+    while k < len(ring) > _MIN_CORNERS:
         before, start, stop, after = (ring[(k + n) % len(ring)] for n in (-1, 0, 1, 2))
         first, second = start - before, after - stop
         lengths = np.linalg.norm(first), np.linalg.norm(second)

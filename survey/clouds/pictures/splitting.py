@@ -23,7 +23,7 @@ _ACROSS = 0.6  # part of the height of a region that a line crosses at least
 _LEAN = 4  # pixels by which the ends of a line lean to either side
 _CLEAR = 2.0  # distance from the ends of a region over the width of a joint
 _STRONGEST, _GAP = 1.5, 0.25  # as along borders
-_ROUNDS = 6  # lines across one region at most
+_MAX_LINES = 6  # lines across one region at most
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ def propose_missing(
         if best is None:
             continue
         out[box][best[1]] = following
-        if depth + 1 < _ROUNDS:
+        if depth + 1 < _MAX_LINES:
             waiting += [(number, box, depth + 1), (following, box, depth + 1)]
         following += 1
     return out

@@ -16,7 +16,7 @@ _FAINT = 0.35  # contrast of joints over grain below which none stands out
 _TILTED = 2.0  # angle of the beds from level [degrees]: a surveyed wall leans less, its beds sag less
 _CONVERGING = 3.0  # change of the direction of beds or head joints over the picture [degrees]
 _CERTAIN = 4.0  # standard errors beyond which a change of direction is none by chance
-_FEWEST = 4  # stones from which a wall can be judged
+_MIN_STONES = 4  # stones from which a wall can be judged
 _UNSURE = 0.5  # mean score below which stones are more likely false
 _SOFT = 0.10  # detail of a pixel over that of two in a sharp picture; a blur of two pixels leaves a tenth
 
@@ -95,7 +95,7 @@ def judge_result(
     """
     if findings.refused:
         return findings
-    if len(rings) < _FEWEST or float(np.mean(scores)) < _UNSURE:
+    if len(rings) < _MIN_STONES or float(np.mean(scores)) < _UNSURE:
         text = f"hardly any stone is sure ({len(rings)} regions): it may show no wall; crop it, or choose --masonry"
         return replace(findings, refused=True, texts=(*findings.texts, text))
     if not coursed:

@@ -29,7 +29,7 @@ Polygon = tuple[int, ...]
 _COARSEST = 1e-3  # a third of the precision of a measured point [m]
 _TOLERANCE = 1e-5  # of repairs, over the size of the body
 _MORE = (10.0, 100.0, 1000.0)  # times the tolerance, with which a repair is tried to advise on it
-_MOST = 0.01  # largest tolerance that is advised [m]
+_MAX_ADVISED_TOLERANCE = 0.01  # largest tolerance that is advised [m]
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,7 @@ def _repaired(vertices: Array, polygons: list[Polygon], tolerance: float) -> Rep
     least = max(tolerance, _TOLERANCE * float(np.linalg.norm(np.ptp(vertices, axis=0))))
     for wider in (least, *(least * more for more in _MORE)):
         if (
-            wider <= max(_MOST, tolerance)
+            wider <= max(_MAX_ADVISED_TOLERANCE, tolerance)
             and (wider > tolerance)
             and not repair(vertices, polygons, wider).left
         ):

@@ -23,9 +23,9 @@ _FLAT = 1e-6  # one minus cosine of the angle across a flat edge
 _DIRECTIONS = 400  # facets whose normals are tried for each plane
 _ALIGNED = 0.8  # cosine of the angle between a facet and its plane while the plane is sought
 _LEANING = 0.5  # the same when facets are given to the plane found: those of a rough face lean
-_ROUNDS = 10  # of refinement of one plane
-_FEWEST = 0.01  # least area of a face over the whole surface
-_MOST = 30  # planes
+_PLANE_REFINEMENTS = 10  # of refinement of one plane
+_MIN_FACE_SHARE = 0.01  # least area of a face over the whole surface
+_MAX_PLANES = 30  # planes
 _COVERED = 0.7  # least part of the surface that lies in the planes
 _VOLUME = 0.05  # largest change of the volume: broken corners and edges are filled
 _CUT = 1e-9  # distance within which corners are on a plane while cutting [m]
@@ -82,9 +82,9 @@ def plane_faces(
     total = float(areas.sum())
     left: Bools = np.ones(len(triangles), np.bool_)
     planes: list[Array] = []
-    while areas[left].sum() > _FEWEST * total and len(planes) < _MOST:
+    while areas[left].sum() > _MIN_FACE_SHARE * total and len(planes) < _MAX_PLANES:
         plane, taken = _largest(normals, areas, centres, left, tolerance)
-        if areas[taken].sum() < _FEWEST * total:
+        if areas[taken].sum() < _MIN_FACE_SHARE * total:
             break
         planes.append(plane)
         left &= ~taken
@@ -135,13 +135,13 @@ def _largest(
     tried = normals[some[:: max(1, len(some) // _DIRECTIONS)]]
     scores = ((tried @ normals[some].T > _ALIGNED) * areas[some]).sum(axis=1)
     normal = tried[int(scores.argmax())]
-    for _ in range(_ROUNDS):
+    for _ in range(_PLANE_REFINEMENTS):
         aligned = some[normals[some] @ normal > _ALIGNED]
         mean = (normals[aligned] * areas[aligned, None]).sum(axis=0)
         normal = mean / np.linalg.norm(mean)
     aligned = some[normals[some] @ normal > _ALIGNED]
     offset = _densest(centres[aligned] @ normal, areas[aligned], tolerance)
-    for _ in range(_ROUNDS):
+    for _ in range(_PLANE_REFINEMENTS):
         heights = centres @ normal - offset
         taken = left & (np.abs(heights) <= tolerance) & (normals @ normal > _LEANING)
         if taken.sum() < 3:

@@ -42,7 +42,7 @@ _FIELDS = {  # pattern of each field, and its characters
     "role": (rf"(?i:{_ROLE_WORDS})", _ROLE_LETTERS + _ROLE_LETTERS.upper()),
 }
 _IGNORED = "*"
-_PART = re.compile(r"\{([^{}]*)\}")
+_FIELD = re.compile(r"\{([^{}]*)\}")
 _REMEDY = "write e.g. {block}:{role} or {block} {kind} {course} {role}"
 _USUAL = (
     *("{block}:{role}", "{block} {role}", "{block} {kind} {role}", "{block} {kind} {course} {role}"),
@@ -104,7 +104,7 @@ class CodeTemplate:
 
     def __init__(self, text: str) -> None:
         self.text = text
-        parts = _PART.split(text.strip())
+        parts = _FIELD.split(text.strip())
         self.fields = tuple(name.removesuffix("?") for name in parts[1::2])
         self._literals = parts[::2]
         self._optional = [name.endswith("?") for name in parts[1::2]]

@@ -171,7 +171,7 @@ def read_map(text: str | None) -> ColumnMap:
     return ColumnMap(names, frozenset(ignored))
 
 
-_KNOWN: Mapping[str, str] = {
+_MEANINGS: Mapping[str, str] = {
     spelling: what
     for what, names in reversed(list(ALIASES.items()))
     for name in (*names, what)
@@ -233,7 +233,7 @@ def find_columns(names: Sequence[str], column_map: ColumnMap, where: str, codes:
 
 def kind_of_column(name: str) -> str | None:
     """Return what a column of this name is; None if it is not known."""
-    return _KNOWN.get(plain(_BRACKETS.sub("", unit_of(name)[0]))) or _KNOWN.get(plain(name))
+    return _MEANINGS.get(plain(_BRACKETS.sub("", unit_of(name)[0]))) or _MEANINGS.get(plain(name))
 
 
 def _place(names: Sequence[str], name: str, what: str, where: str, numbered: bool) -> int:
@@ -289,10 +289,10 @@ def _check_missing(names: Sequence[str], at: Mapping[str, int], where: str) -> N
 
 def _check_spelling(name: str, at: Mapping[str, int], where: str) -> None:
     """Refuse a column that is nearly one that is missing, rather than keep it as a note."""
-    spelled = [spelling for misspelt in _MISSPELT if _KNOWN[spelling := plain(misspelt)] not in at]
+    spelled = [spelling for misspelt in _MISSPELT if _MEANINGS[spelling := plain(misspelt)] not in at]
     close_matches = difflib.get_close_matches(plain(unit_of(name)[0]), spelled, n=1, cutoff=_ALIKE)
     if close_matches:
-        what = _KNOWN[close_matches[0]]
+        what = _MEANINGS[close_matches[0]]
         raise SurveyError(
             f"unknown column {shown(name)}, nearly {what}",
             where=where,

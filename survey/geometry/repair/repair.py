@@ -28,7 +28,7 @@ _CORNERS = 400  # most corners of such a hole
 _SLIT = 0.005  # widest slit that is brought together, over the size of the surface
 _REACH = 4.0  # distance across which a slit is brought together, over its mean width
 _FLAT = 1e-4  # warp of a hole that is covered by one face, over its size
-_ROUNDS = 4  # of welding and dividing
+_WELDING_ROUNDS = 4  # of welding and dividing
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ def _joined(
 ) -> tuple[list[Polygon], tuple[str, ...]]:
     """Weld and divide open edges within the tolerance; return the polygons, and what was done."""
     welded, dropped, divided, farthest = 0, 0, 0, [0.0, 0.0]
-    for _ in range(_ROUNDS):
+    for _ in range(_WELDING_ROUNDS):
         edges = open_edges(polygons)
         if not edges:
             break

@@ -29,7 +29,7 @@ _INSET = (
     1.0 / 16.0
 )  # of the sampling distance: samples lie within outlines by this, so that those that touch differ
 _TOUCHING = 1.0 / 64.0  # of the sampling distance: samples of two stones nearer than this belong to neither
-_NEAR = 2.0  # sampling distances within which another outline calls for finer samples
+_FINER_WITHIN = 2.0  # sampling distances within which another outline calls for finer samples
 _WIDEST = 4.0  # widths of the usual joint that mortar fills; traced rubble has pockets three of them wide
 _NEIGHBOURS = 16  # samples that are looked at for one of another stone
 
@@ -147,7 +147,7 @@ def _samples(
 ) -> tuple[Array, Ints, tuple[tuple[int, int], ...]]:
     """Return samples (n, 2) of the outlines, the stones that they are of, and the pairs of stones that touch."""
     places, owner = _sampled(outlines, [np.full(len(outline), step) for outline in outlines], _INSET * step)
-    too_close = _apart(places, owner, _NEAR * step)
+    too_close = _apart(places, owner, _FINER_WITHIN * step)
     # each side of an outline is sampled as finely as its nearest neighbour asks for
     finest, at = [], 0
     for outline in outlines:

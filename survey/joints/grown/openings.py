@@ -17,7 +17,9 @@ from survey.geometry.polygons import inside
 
 __all__ = ["open_places", "usual_width"]
 
-_SAME = 1e-3  # of the distance of a sample of an opening from its edge: samples as near to each other are one
+_SAME_SAMPLE = (
+    1e-3  # of the distance of a sample of an opening from its edge: samples as near to each other are one
+)
 
 
 def usual_width(lengths: Array, apart: Array) -> float:
@@ -78,7 +80,7 @@ def open_places(
     of = np.concatenate([opening[vertex], opening[vertex]])
     own = np.concatenate([sides[:, 0], sides[:, 1]]) < len(points)
     own &= ((places > frame[0]) & (places < frame[1])).all(axis=1)
-    return _single(places[own], of[own], _SAME * inset)
+    return _single(places[own], of[own], _SAME_SAMPLE * inset)
 
 
 def _open_vertices(

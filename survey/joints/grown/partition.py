@@ -16,11 +16,11 @@ from survey.joints.grown.medial_lines import Line, MedialLines
 __all__ = ["Edge", "Partition", "partition"]
 
 _CHORD = 0.5  # of the mean thickness of a joint: largest distance of an edge from the medial line, within the mortar
-_ROUNDS = 10  # in each of which edges that cross others follow their lines twice as closely
+_STRAIGHTENINGS = 10  # in each of which edges that cross others follow their lines twice as closely
 _STEPS = 3  # of Newton's rule
 _FLATTEST = 0.05  # square of the growth of a difference of distances below which it tells no place
 _SHIFT = 0.5  # of its distance from the stones: farthest that a place moves
-_FEWEST = 3  # lines about a stone
+_MIN_LINES = 3  # lines about a stone
 _PIECES = 24  # places of an edge at which its thickness is taken
 
 
@@ -224,7 +224,7 @@ class _Network:
         sides_a, sides_b = ({side for side in self.about[node] if side < 0} for node in (a, b))
         if not (sides_a <= sides_b or sides_b <= sides_a):
             return False
-        if any(stone >= 0 and self.sides[stone] <= _FEWEST for stone in (line.left, line.right)):
+        if any(stone >= 0 and self.sides[stone] <= _MIN_LINES for stone in (line.left, line.right)):
             return False
         if sides_a == sides_b:
             self.nodes[a] = 0.5 * (self.nodes[a] + self.nodes[b])
@@ -251,7 +251,7 @@ def _straightened(
 ) -> tuple[Array, Chains, tuple[tuple[int, ...], ...]] | None:
     """Return corners, the corners of each line, and the rings of the stones; None if they cross to the last."""
     closely = dict.fromkeys(network.lines, 1.0)
-    for _ in range(_ROUNDS):
+    for _ in range(_STRAIGHTENINGS):
         corners = list(network.nodes)
         chains: Chains = []
         of_stone: dict[int, list[int]] = defaultdict(list)

@@ -29,9 +29,9 @@ __all__ = [
     "with_datum",
 ]
 
-_MOST = 100  # iterations
+_MAX_ITERATIONS = 100  # iterations
 _STILL = 1e-13  # predicted decrease of the sum of squares, relative, at which the iteration has converged
-_ROUNDING = 1e-10  # relative change of the sum of squares that is rounding
+_SQUARES_ROUNDING = 1e-10  # relative change of the sum of squares that is rounding
 _FIRST = 1e-4  # first damping tried [-]
 _STRONGEST = 1e12  # damping beyond which no step brings the residuals down [-]
 
@@ -190,7 +190,7 @@ def adjust(network: Network, prepared: Prepared) -> Solution:
     unknowns = prepared.unknowns
     damping, taken = 0.0, 0
     normal, right, square, behind = normals(network, prepared, unknowns, 0.0)
-    while taken < _MOST:
+    while taken < _MAX_ITERATIONS:
         step = _step(normal, right, prepared, unknowns, damping)
         if step is not None:
             tried = _moved(unknowns, *_corrections(prepared, unknowns, damping, step))
@@ -198,7 +198,7 @@ def adjust(network: Network, prepared: Prepared) -> Solution:
             if damping == 0.0 and abs(float(step @ right)) <= _STILL * max(square, 1e-12):
                 return Solution(tried, square, taken, behind)
             equations = normals(network, prepared, tried, 0.0)
-            if equations[2] <= square * (1.0 + _ROUNDING):
+            if equations[2] <= square * (1.0 + _SQUARES_ROUNDING):
                 unknowns, (normal, right, square, behind) = tried, equations
                 damping = 0.0 if damping <= _FIRST else 0.1 * damping
                 if damping:
@@ -213,7 +213,7 @@ def adjust(network: Network, prepared: Prepared) -> Solution:
             )
         normal, right, _, _ = normals(network, prepared, unknowns, damping)
     raise GeometryError(
-        f"the adjustment has not converged in {_MOST} iterations",
+        f"the adjustment has not converged in {_MAX_ITERATIONS} iterations",
         where=network.path,
         remedy="check the marks, the control points and the start values",
     )

@@ -19,7 +19,8 @@ MISSES = 2.33
 FAR_OFF = 10.0
 """The same, beyond which it is a mistake, not chance."""
 
-_NEAR = 0.3  # distance of a station from where it was given, over that from the control points, up to which they agree
+# distance of a station from where it was given, over that from the control points, up to which they agree
+_STATION_DISTANCE = 0.3
 _FOOTPRINT = 0.5  # of a pixel on the object, beyond which coordinates are hardly in metres [m]
 _FINE = 3e-3  # standard deviation of coordinates over that, below which they are not
 
@@ -76,7 +77,7 @@ def control_remarks(network: Network, solution: Solution, photos: Sequence[Photo
     _, sizes, axes = np.linalg.svd(places - places.mean(axis=0), full_matrices=False)
     stations = zip((photo.station for photo in photos), solution.unknowns.station, strict=True)
     off = [float(np.linalg.norm(here - there)) for there, here in stations if there is not None]
-    placed = bool(off) and np.median(off) < _NEAR * np.linalg.norm(towards)
+    placed = bool(off) and np.median(off) < _STATION_DISTANCE * np.linalg.norm(towards)
     placed = placed or any(photo.observed_station is not None or photo.fixed for photo in photos)
     if sizes[2] < FLAT * sizes[0] and not placed:
         normal = axes[2] * np.sign(axes[2] @ towards)

@@ -33,8 +33,8 @@ CRITICAL = 3.29
 """Two-sided normal quantile of Baarda's α₀ = 0.1 %, beyond which a standardised residual is a blunder."""
 
 _DETECTABLE = 4.13  # noncentrality δ₀ for α₀ = 0.1 % and a power of 80 %
-_LEAST = 1e-6  # redundancy number below which a coordinate is not checked by any other
-_ROUNDING = 1e-11  # smallest eigenvalue of the scaled normal matrix that is more than rounding
+_MIN_REDUNDANCY = 1e-6  # redundancy number below which a coordinate is not checked by any other
+_MIN_EIGENVALUE = 1e-11  # smallest eigenvalue of the scaled normal matrix that is more than rounding
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,9 @@ class Statistics:
         """(n, 2) residuals over their own standard deviation, with the stated σ of the marks; 0 where unchecked."""
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.where(
-                self.parts > _LEAST, self.residuals / np.sqrt(np.maximum(self.parts, _LEAST)), 0.0
+                self.parts > _MIN_REDUNDANCY,
+                self.residuals / np.sqrt(np.maximum(self.parts, _MIN_REDUNDANCY)),
+                0.0,
             )
 
     @property
@@ -75,7 +77,9 @@ class Statistics:
         """(n, 2) smallest blunder that the test finds with a probability of 80 %, in σ; inf where unchecked."""
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.where(
-                self.parts > _LEAST, _DETECTABLE / np.sqrt(np.maximum(self.parts, _LEAST)), np.inf
+                self.parts > _MIN_REDUNDANCY,
+                _DETECTABLE / np.sqrt(np.maximum(self.parts, _MIN_REDUNDANCY)),
+                np.inf,
             )
 
     @property
@@ -137,7 +141,7 @@ def _inverse(normal: Array, network: Network, prepared: Prepared) -> Array:
         else:
             pivots = np.diag(factor) ** 2
             worst, smallest = int(np.argmin(pivots)), float(pivots.min())
-            if smallest > _ROUNDING:
+            if smallest > _MIN_EIGENVALUE:
                 upper = dpotri(factor, lower=0, overwrite_c=1)[0]
                 out: Array = np.tril(upper.T)
                 out += np.tril(out, -1).T

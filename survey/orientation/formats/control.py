@@ -31,7 +31,8 @@ _COLUMNS: Mapping[str, Sequence[str]] = {
     },
 }
 _REMEDY = "write: number, name, X, Y, Z, and deviations: none, one, three, or nine covariances, with commas"
-_FAR = 10.0  # mean offset between two lists of the same points over its spread, from which it is a shift of the origin
+# mean offset between two lists of the same points over its spread, from which it is a shift of the origin
+_MAX_SHIFT = 10.0
 
 
 @dataclass(frozen=True)
@@ -235,7 +236,7 @@ def with_control(
     shift, remarks = np.zeros(3), list(network.remarks)
     if len(pairs) >= 2:
         off = np.array([a - b for a, b in pairs])
-        if np.linalg.norm(off.mean(axis=0)) > _FAR * np.ptp(off, axis=0).max():
+        if np.linalg.norm(off.mean(axis=0)) > _MAX_SHIFT * np.ptp(off, axis=0).max():
             shift = off.mean(axis=0)
             place = ", ".join(f"{coordinate:.3f}" for coordinate in shift)
             remarks.append(f"{network.path} has another origin: control points are moved by ({place}) m")

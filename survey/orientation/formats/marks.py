@@ -29,7 +29,7 @@ _COLUMNS: Mapping[str, Sequence[str]] = {
     "y": ("y", "v", "row", "line", "y px", "py", "pixel y", "Zeile"),
     "sigma": SIGMA,
 }
-_FEWEST = 3  # marks by which a photograph can be oriented
+_MIN_MARKS = 3  # marks by which a photograph can be oriented
 _PLACES = {column: k for k, column in enumerate(_COLUMNS)}
 _REMEDY = "write: photograph, point, x, y, sigma if it has one"
 
@@ -183,7 +183,7 @@ def numbered(network: Network, table: Path) -> tuple[str, ...]:
 def marked_well(network: Network) -> Network:
     """Leave out photographs with too few marks to be oriented, with a remark that names them."""
     counts = np.bincount(network.photo, minlength=len(network.photos))
-    enough = counts >= _FEWEST
+    enough = counts >= _MIN_MARKS
     if enough.all() or not enough.any():
         return network
     place, rays = np.cumsum(enough) - 1, enough[network.photo]
@@ -198,7 +198,7 @@ def marked_well(network: Network) -> Network:
         lines=network.lines[rays],
         remarks=(
             *network.remarks,
-            f"photographs with fewer than {_FEWEST} marks are left out: {listed(names)}",
+            f"photographs with fewer than {_MIN_MARKS} marks are left out: {listed(names)}",
         ),
     )
 

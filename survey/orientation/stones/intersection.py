@@ -21,7 +21,7 @@ from survey.orientation.stones.located import Located, Mark, Sight, line_up
 
 __all__ = ["intersect", "sight"]
 
-_MOST = 20  # iterations
+_MAX_ITERATIONS = 20  # iterations
 _STILL = 1e-11  # movement of a point over its distance, below which it has converged
 _NARROWEST = 1.0  # angle between the outer rays of a point below which it is refused [°]
 _CHECKED = 1e-3  # deviation of a residual, over that of its mark, below which nothing checks it
@@ -55,7 +55,7 @@ def intersect(oriented: Oriented, name: str, marks: Sequence[Mark]) -> Located:
             f"the rays of point {name} from {seen} meet at {np.degrees(angle):.1f}°",
             remedy="mark it on photographs taken from places further apart",
         )
-    for _ in range(_MOST):
+    for _ in range(_MAX_ITERATIONS):
         rows = [line_up(oriented, mark, place) for mark in marks]
         by_point = np.concatenate([row[2] for row in rows])
         inverse = np.linalg.inv(by_point.T @ by_point)

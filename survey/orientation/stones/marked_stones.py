@@ -23,7 +23,7 @@ from survey.records.survey import BlockRecord, PointMark, Reject, SolidRecord, S
 
 __all__ = ["located_stones"]
 
-_LEAST = 1e-5  # standard deviation along the normal below which a point counts no more [m]
+_MIN_SIGMA = 1e-5  # standard deviation along the normal below which a point counts no more [m]
 
 Item = BlockRecord | SolidRecord | Reject
 
@@ -198,7 +198,7 @@ def _in_space(
     joint = joint_covariance(every, oriented)
     covariances = [joint_covariance([point], oriented, shared=False) for point in every]
     normal = np.linalg.svd(places - places.mean(axis=0))[2][2]
-    sigmas = np.maximum([np.sqrt(normal @ covariance @ normal) for covariance in covariances], _LEAST)
+    sigmas = np.maximum([np.sqrt(normal @ covariance @ normal) for covariance in covariances], _MIN_SIGMA)
     photos = {sight.photo for each in every for sight in each.sights}
     stations = [oriented.station(f) for f, photo in enumerate(oriented.photos) if photo.name in photos]
     return replace(

@@ -14,10 +14,10 @@ from survey.orientation.stones.located import Located, joint_covariance
 
 __all__ = ["Cylinder", "Plane", "Surface", "fit_surface"]
 
-_FEWEST = 6  # points of a cylinder: five parameters, and one that checks them
+_MIN_CYLINDER_POINTS = 6  # points of a cylinder: five parameters, and one that checks them
 _DIRECTIONS = 300  # directions of the axis tried
 _TRIED = 6  # of these, the best, from which the fit starts
-_MOST = 60  # iterations
+_MAX_ITERATIONS = 60  # iterations
 _VAGUE = 0.25  # standard deviation of the radius over it, beyond which an arc is too short
 
 
@@ -195,10 +195,10 @@ def _plane(points: tuple[Located, ...], covariances: Array, towards: Array, scat
 def _cylinder(
     points: tuple[Located, ...], covariances: Array, towards: Array, scatter: float | None
 ) -> Cylinder:
-    if len(points) < _FEWEST:
+    if len(points) < _MIN_CYLINDER_POINTS:
         raise GeometryError(
             f"{len(points)} points define no cylinder",
-            remedy=f"mark {_FEWEST} or more points of the faces on two photographs",
+            remedy=f"mark {_MIN_CYLINDER_POINTS} or more points of the faces on two photographs",
         )
     places = np.array([point.place for point in points])
     best = min(
@@ -275,7 +275,7 @@ def _refined(
     """Fit by Gauss–Newton steps; return square, centre, axis, axes across, radius, normal matrix, σ along it."""
     _, centre, radius = _circle(points, axis)
     square, normal, sigma, across = np.inf, np.eye(5), np.ones(len(points)), _frame(axis)
-    for _ in range(_MOST):
+    for _ in range(_MAX_ITERATIONS):
         across = _frame(axis)
         distance, rows = _slopes(points, centre, axis, across)
         outward = rows[:, :2] @ across

@@ -47,7 +47,9 @@ CHANCE = 0.003
 _PLACES = 24  # most places of a wall at which a step is looked for
 _CLOSE = 0.5  # of the median length of a stone: distance of two such places
 _REACH = 1.2  # of the median length of a stone: distance from the step at which a course may be broken
-_FEWEST = 3  # stones on either side of a step or an edge; fewer are odd stones, not a part of the wall
+_MIN_STONES_BESIDE = (
+    3  # stones on either side of a step or an edge; fewer are odd stones, not a part of the wall
+)
 _PER_DIFFERENCE = (
     0.45  # degrees of freedom that a difference of neighbours gives: each stone is in two of them
 )
@@ -489,7 +491,7 @@ def _shapes(sample: Sample, length: float) -> tuple[list[Shape], Array]:
             for stop in places[i + 1 :]
             if stop - start >= 0.9 * length
         ]
-    fewest = min(_FEWEST, max(1, len(along) // 4))
+    fewest = min(_MIN_STONES_BESIDE, max(1, len(along) // 4))
     supported = [
         shape
         for shape in named

@@ -22,7 +22,7 @@ from survey.statistics.scale import deviation
 __all__ = ["DoubtfulDepth", "doubtful_depths"]
 
 _ENOUGH = 5  # least number of stones for a median and its scatter
-_LEAST = 0.12  # scatter of depths that needs no reason, over the depth [-]
+_DEPTH_SCATTER = 0.12  # scatter of depths that needs no reason, over the depth [-]
 _WITHOUT = 0.25  # standard deviation of a rule that states none, over its depth [-]
 _BESIDE = 8  # neighbours with which a stone is compared
 _PARALLEL = 20.0  # largest angle of two opposite faces [degrees]
@@ -98,7 +98,7 @@ def _against_rules(
         if rule is not None:
             sigma = (
                 _relative(stone, rule.depth) ** 2
-                + max((rule.sigma or _WITHOUT * rule.depth) / rule.depth, _LEAST) ** 2
+                + max((rule.sigma or _WITHOUT * rule.depth) / rule.depth, _DEPTH_SCATTER) ** 2
             )
             yield from _doubt(
                 stone, rule.depth, math.sqrt(sigma), limit, "rule", f"the rule for it, {rule.source},"
@@ -135,7 +135,7 @@ def _among(
 ) -> Iterator[DoubtfulDepth]:
     logs = np.log([stones[i].depth or math.nan for i in beside])
     middle = float(np.median(logs))
-    spread = max(deviation(logs, middle), _LEAST)
+    spread = max(deviation(logs, middle), _DEPTH_SCATTER)
     for i in own:
         yield from _doubt(
             stones[i],
@@ -240,7 +240,7 @@ def _against_face(stones: Sequence[StoneQuality], known: Sequence[int]) -> Itera
             text = (
                 f"it is {stone.depth:.2f} m deep behind a face of {stone.length:.2f} by {stone.height:.2f} m"
             )
-            score = abs(math.log(stone.depth / expected)) / _LEAST
+            score = abs(math.log(stone.depth / expected)) / _DEPTH_SCATTER
             yield DoubtfulDepth(stone.code, stone.line, "own face", stone.depth, expected, score, text)
 
 

@@ -42,8 +42,8 @@ __all__ = ["FaceKind", "FaceMovement", "OddStone", "WallFace", "find_face_depart
 
 _JOINED = 0.10  # departure of neighbours from each other's plane within which they are of one wall [m]
 _WALL = 6  # least number of stones of a wall of its own; fewer stand out of the one behind them
-_NEAR = 10  # neighbours with which a stone is compared
-_FEW = 5  # least number of neighbours of a plane
+_NEIGHBOURS = 10  # neighbours with which a stone is compared
+_MIN_NEIGHBOURS = 5  # least number of neighbours of a plane
 _REACH = 6.0  # of the median size of a stone: distance of neighbours
 _TURNED = 12.0  # largest angle of a face to its wall [degrees]: splayed jambs are not of the wall
 _BISQUARE = 4.685  # limit of Tukey's weights [standard deviations]
@@ -54,8 +54,8 @@ _RANKS = {
     "right corner": 3, "leaning part": 3, "local bulge": 4,
 }  # fmt: skip
 _GRID = 8  # places along and up the wall at which ends, offsets and bulges are looked for
-_FEWEST = 3  # stones that a shape must move
-_ROUNDS = 3  # of odd stones and movements in turn, until the odd stones stay the same
+_MIN_MOVED_STONES = 3  # stones that a shape must move
+_MAX_ROUNDS = 3  # of odd stones and movements in turn, until the odd stones stay the same
 _BESIDE = 1.0  # of the median size of a stone: distance from a straight joint to which a crack zigzags
 _TRIALS = 12  # by which the place of a shape is sharpened
 
@@ -310,7 +310,7 @@ def _wall(name: str, zone: str | None, face: _Face, alpha: float, tilt: float) -
     limit = critical(alpha / 2.0, 3 * len(face.codes), freedom)
     movements: list[Found] = []
     odd: list[OddStone] = []
-    for _ in range(_ROUNDS):
+    for _ in range(_MAX_ROUNDS):
         # what the wall has taken is taken out: a stone beside a crack is no odd one
         moved = sum(
             (movement.amount * _field(movement.shape, face) for movement in movements),
@@ -391,10 +391,10 @@ def _beside(face: _Face) -> tuple[Array, Array, float]:
     """Return the departure of each stone from the plane of its neighbours, its σ, and the scatter of faces [m]."""
     count = len(face.codes)
     places = np.column_stack([face.along, face.up])
-    near = _NEAR if count > _NEAR else count - 1
+    near = _NEIGHBOURS if count > _NEIGHBOURS else count - 1
     distance, index = _nearest(places, near + 1)
     distant = distance[:, 1:] > _REACH * face.size
-    distant[:, :_FEW] = False
+    distant[:, :_MIN_NEIGHBOURS] = False
     index = index[:, 1:]
     rows = np.stack([np.ones(index.shape), *(places[index] - places[:, None]).transpose(2, 0, 1)], axis=2)
     values = face.out[index]
@@ -439,7 +439,7 @@ def _turned(face: _Face) -> tuple[Array, Array]:
     """Return the turn of each face about the upright and the level axis against its neighbours, and its σ [rad]."""
     count = len(face.codes)
     places = np.column_stack([face.along, face.up])
-    neighbours = _NEAR if count > _NEAR else count - 1
+    neighbours = _NEIGHBOURS if count > _NEIGHBOURS else count - 1
     index = _nearest(places, neighbours + 1)[1][:, 1:]
     turned = face.turn - np.median(face.turn[index], axis=1)
     measured = np.where(np.isfinite(face.turn_sigma), face.turn_sigma, np.inf)
@@ -520,8 +520,8 @@ def _shapes(face: _Face) -> Iterator[Shape]:
     for name, places in named:
         shape = Shape(name, places, _RANKS[name])
         moved = np.abs(_field(shape, face)) > 0.1
-        if int(moved.sum()) >= _FEWEST and (
-            name in ("lean", "bulge", "bow") or int((~moved).sum()) >= _FEWEST
+        if int(moved.sum()) >= _MIN_MOVED_STONES and (
+            name in ("lean", "bulge", "bow") or int((~moved).sum()) >= _MIN_MOVED_STONES
         ):
             yield shape
 
@@ -609,7 +609,7 @@ def _is_sound(shape: Shape, face: _Face) -> bool:
     if shape.name.endswith("end") and at[1] - at[0] > 0.5 * float(np.ptp(face.along)):
         return False
     moved = np.abs(_field(shape, face)) > 0.1
-    return _FEWEST <= int(moved.sum()) <= len(moved) - _FEWEST
+    return _MIN_MOVED_STONES <= int(moved.sum()) <= len(moved) - _MIN_MOVED_STONES
 
 
 def _gain(sample: Sample, values: Array) -> float:

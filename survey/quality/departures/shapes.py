@@ -48,7 +48,9 @@ LIKELY = 1.645
 MOST = 5
 """Shapes that are taken by one wall; more are noise that the shapes before have left."""
 
-_LEAST = 0.25  # of the largest amount taken: smaller ones are what the shapes do not fit exactly
+_MIN_SHARE_OF_LARGEST = (
+    0.25  # of the largest amount taken: smaller ones are what the shapes do not fit exactly
+)
 _AS_GOOD = 6.0  # difference of Σ r²/v below which the simpler of two shapes is taken: odds of 20 to 1
 _NEARLY = 0.01  # the same, of the whole reduction: no wall moves exactly like a shape
 _NOTHING = 1e-9  # part of a shape's sum of squares that is left if the nuisance explains it [-]
@@ -195,7 +197,7 @@ def fit_shapes(
         if not fits:
             tests = int(trials.tells.sum())
             limit = critical(alpha, tests, sample.freedom)
-        enough = max(LEAST, _LEAST * max((abs(fit.amount) for fit in fits), default=0.0))
+        enough = max(LEAST, _MIN_SHARE_OF_LARGEST * max((abs(fit.amount) for fit in fits), default=0.0))
         score = np.where(np.abs(trials.amount) < enough, 0.0, trials.score)
         if float(score.max(initial=0.0)) <= limit**2:
             break
@@ -214,7 +216,11 @@ def fit_shapes(
     while fits:
         judged = [_judged(sample, fits, k, fields, tests) for k in range(len(fits))]
         most = max(abs(one.amount) for one in judged)
-        weak = [fit for fit in judged if abs(fit.amount) <= max(limit * fit.sigma, LEAST, _LEAST * most)]
+        weak = [
+            fit
+            for fit in judged
+            if abs(fit.amount) <= max(limit * fit.sigma, LEAST, _MIN_SHARE_OF_LARGEST * most)
+        ]
         if not weak:
             return judged, limit
         least = min(weak, key=lambda fit: abs(fit.amount) / fit.sigma)

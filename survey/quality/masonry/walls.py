@@ -44,13 +44,13 @@ from survey.statistics.scale import deviation
 
 __all__ = ["MasonryQuality", "WallStone", "judge_masonry"]
 
-_FEWEST = 8  # least number of stones of a wall
+_MIN_WALL_STONES = 8  # least number of stones of a wall
 _ARCH = frozenset({"voussoir", "keystone", "springer", "rib_segment", "boss", "rib_springer", "web_stone"})
 _SIZES = (0.20, 0.40)  # sides of small and of large stones [m]
 _CUT = 0.85  # area over that of the convex hull above which sides are straight [-]
 _CORNERS = 8  # most corners of a cut face
 _THROUGH = 0.02  # height of a step at a head joint up to which a bed runs through: a joint [m]
-_NEAR = 0.06  # distance of corners at one head joint [m]
+_HEAD_JOINT_DISTANCE = 0.06  # distance of corners at one head joint [m]
 _TRACE = (1.4, 1.6)  # of the line of minimum trace on a face, partly and wholly staggered
 _SECTION = (1.25, 1.55)  # of that in a section, partly and wholly bonded
 _HEADERS = (2.0, 5.0)  # per square metre, partly and wholly bonded
@@ -149,7 +149,7 @@ def judge_masonry(
         for facade in facades
         if facade.azimuth is not None
         for zone, rows in _zones(stones, facade).items()
-        if len(rows) >= _FEWEST
+        if len(rows) >= _MIN_WALL_STONES
     ]
     return tuple(_judge(stones, facade, zone, rows, facades, grades or {}) for facade, zone, rows in walls)
 
@@ -281,9 +281,9 @@ def _level(stones: Sequence[WallStone], facade: Facade) -> Grade:
         (abs(high - low), first, second)
         for corners in courses.values()
         for (left, low, first), (right, high, second) in pairwise(sorted(corners))
-        if first != second and right - left < _NEAR
+        if first != second and right - left < _HEAD_JOINT_DISTANCE
     ]
-    if len(steps) < _FEWEST // 2:
+    if len(steps) < _MIN_WALL_STONES // 2:
         return UNKNOWN
     share = float(np.mean([step <= _THROUGH for step, *_ in steps]))
     text = f"beds run through at {100.0 * share:.0f} % of {len(steps)} head joints"

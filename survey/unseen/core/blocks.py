@@ -18,7 +18,7 @@ __all__ = ["CoreBlock", "core_blocks"]
 _OUT = np.array([0.0, 0.0, 1.0])
 _ON_PLANE = 1e-10  # metres: distance within which corners lie on a plane
 _NOTHING = 1e-11  # cubic metres: smallest volume
-_SAME = 1e-6  # metres: distance within which head joints are the same
+_SAME_JOINT = 1e-6  # metres: distance within which head joints are the same
 _MARGIN = 1.0  # metres around the cut region
 
 
@@ -78,7 +78,7 @@ def _cuts(sides: Iterable[Sequence[Stretch]]) -> list[_Cut]:
     cuts.sort(key=lambda cut: cut.place)
     distinct: list[_Cut] = []
     for cut in cuts:
-        if not distinct or cut.place - distinct[-1].place > _SAME:
+        if not distinct or cut.place - distinct[-1].place > _SAME_JOINT:
             distinct.append(cut)
     return distinct
 

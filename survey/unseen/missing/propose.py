@@ -30,7 +30,7 @@ _LEFT, _RIGHT, _UPRIGHT = np.array([-1.0, 0.0]), np.array([1.0, 0.0]), np.array(
 _USUAL_JOINT = 0.01  # metres, where no joint can be measured
 _SCATTER = 0.003  # metres: standard deviation of a stone's end about the middle of its joint
 _TALL = 0.04  # metres: distance of ends of gaps of two courses below which they belong to one stone
-_ROUNDS = 4  # rounds of proposals, each of which rests on the one before
+_PROPOSAL_ROUNDS = 4  # rounds of proposals, each of which rests on the one before
 _BEHIND = 0.05  # metres: depth behind the face at which stones seen from elsewhere are compared
 _SPLIT_SIGMA = 0.08  # metres: standard deviation of the joint between two missing stones
 
@@ -112,7 +112,7 @@ def propose_missing(
         mine = {id(stone.block) for stone in elevation.stones}
         others = [block for block in blocks if id(block) not in mine]
         # the space beside a missing jamb is a hole of its own once the jamb is there
-        for _ in range(_ROUNDS):
+        for _ in range(_PROPOSAL_ROUNDS):
             new = []
             for propose in (_voussoirs, _of_courses):
                 proposed = list(propose(elevation, settings, codes))

@@ -340,7 +340,7 @@ def test_any_number_of_threads_finds_the_same_contacts_in_the_same_order(monkeyp
     model, state = build_model(scene(ground(), *turned))
     reach = np.zeros(len(model.mass))
     parts = []
-    monkeypatch.setattr(detection, "_PART", 4)
+    monkeypatch.setattr(detection, "_THREAD_BATCH", 4)
     runs = [Detector(model.surfaces, model.fixed, 0.1, threads=count) for count in (1, 2, 5)]
     monkeypatch.setattr(detection, "at_once", lambda count: parts.append(count) or at_once(count))
     # the second time with the faces that kept pairs apart the first time

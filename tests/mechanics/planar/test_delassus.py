@@ -185,7 +185,7 @@ def lattice(side):
 
 @pytest.mark.parametrize("side", [3, 12, 40])
 def test_groups_hold_every_contact_once_and_share_no_body_that_moves(monkeypatch, side):
-    monkeypatch.setattr(delassus, "_PART", 500)
+    monkeypatch.setattr(delassus, "_THREAD_BATCH", 500)
     operator = lattice(side)
     layout, moves = operator.layout, operator.inertia[:, 0] > 0
     np.testing.assert_array_equal(np.sort(in_order(operator)), np.arange(len(operator.bodies)))
@@ -219,7 +219,7 @@ def test_any_number_of_threads_gives_the_same_bits():
         "from dataclasses import replace\n"
         "from mechanics.planar import delassus\n"
         "from tests.mechanics.planar.test_delassus import lattice, with_loads\n"
-        "delassus._PART = 1000\n"
+        "delassus._THREAD_BATCH = 1000\n"
         "operator = lattice(60)\n"
         "count = len(operator.bodies)\n"
         "assert len(operator.layout.start) == 6  # four parts\n"
@@ -272,7 +272,7 @@ def test_the_rate_of_a_column_is_that_of_theory(count):
 
 
 def test_the_rate_is_the_same_in_parts(monkeypatch):
-    monkeypatch.setattr(delassus, "_PART", 10)
+    monkeypatch.setattr(delassus, "_THREAD_BATCH", 10)
     operator = column(40)
     assert len(operator.layout.start) == 6
     errors = settling(operator, 1.0, 2400)

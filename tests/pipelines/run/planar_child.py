@@ -19,7 +19,7 @@ from tests.mechanics.planar.test_overlaps import pushed_bed
 def main():
     folder, steps, last, threads = Path(sys.argv[1]), *map(int, sys.argv[2:])
     # parts of few contacts, so that threads have something to do
-    delassus._PART = 100
+    delassus._THREAD_BATCH = 100
     unfinished._SHARE = np.inf
     assert threads == numba.config.NUMBA_NUM_THREADS
     bed = pushed_bed(20, 10, steps, 20, 0.002)

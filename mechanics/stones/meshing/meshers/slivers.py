@@ -14,7 +14,7 @@ __all__ = ["improve_cells", "improved"]
 Faces = tuple[tuple[int, ...], ...]
 
 _GOOD = 0.4  # shape of tetrahedra that are left alone (1: regular, 0: flat)
-_ROUNDS = 4  # of improvement, at most
+_MAX_IMPROVEMENTS = 4  # of improvement, at most
 _COPLANAR = 1e-3  # sine of the angle between two faces below which their edge has no certain direction
 # the 26 directions to the neighbours in a cubic lattice
 _TRIES = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if x or y or z])
@@ -29,7 +29,7 @@ def improve_cells(nodes: Array, cells: Ints, free: Array) -> None:
     flat = cells.ravel()
     around = (np.argsort(flat, kind="stable") // 4).astype(np.int64)
     start = np.concatenate([[0], np.cumsum(np.bincount(flat, minlength=len(nodes)))]).astype(np.int64)
-    improve(nodes, cells, free, around, start, _DIRECTIONS, _GOOD, _ROUNDS)
+    improve(nodes, cells, free, around, start, _DIRECTIONS, _GOOD, _MAX_IMPROVEMENTS)
 
 
 def improved(mesh: SolidMesh, vertices: Array, faces: Faces) -> SolidMesh:

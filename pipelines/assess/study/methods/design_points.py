@@ -20,7 +20,7 @@ _STILL = 1e-3
 
 P changes by β times as much, less than a hundredth.
 """
-_MOST = 30  # samples of a search
+_MAX_SAMPLES = 30  # samples of a search
 _STARTS = 8
 """Unknowns along which further searches begin, at most."""
 _OUT = 3.0  # distance of their starts from the mean [-]
@@ -68,7 +68,7 @@ def design_point(evaluate: Evaluate, failure: Failure, start: Array) -> Design |
     point, previous = start.copy(), None
     last: tuple[Array, Array, float] | None = None
     used, scale = 0, 1.0
-    while used < _MOST:
+    while used < _MAX_SAMPLES:
         (sample,) = evaluate(point[None], gradient=True)
         used += 1
         state, gradient = failure.state(sample), failure.gradient(sample)

@@ -17,7 +17,7 @@ from pipelines.assess.study.methods.failure import Evaluate, Failure
 __all__ = ["Subset", "subset"]
 
 _SHARE = 0.1  # of the samples of a level from which the next begins [-]
-_KEPT = 0.8
+_CORRELATION = 0.8
 """Correlation of a move with the point before: less is refused too often, more moves too little [-]."""
 _LEVELS = 12  # at most: P of 10⁻¹²
 
@@ -93,7 +93,7 @@ def _grown(
         wanted = min(len(points), count - total)
         random = np.random.default_rng([*seed, move])
         here, state = every[-1][:wanted], known[-1][:wanted]
-        trial = _KEPT * here + np.sqrt(1.0 - _KEPT**2) * random.standard_normal(here.shape)
+        trial = _CORRELATION * here + np.sqrt(1.0 - _CORRELATION**2) * random.standard_normal(here.shape)
         found = failure.states(evaluate(trial))
         missing += int(np.isnan(found).sum())
         taken = np.where(np.isnan(found), False, found <= threshold)
