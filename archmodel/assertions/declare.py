@@ -12,7 +12,6 @@ from sqlalchemy.orm import Session
 
 from archmodel.assertions.edtf import year_bounds
 from archmodel.assertions.validation import (
-    checked_choice,
     checked_label,
     checked_number,
     checked_text,
@@ -24,10 +23,10 @@ from archmodel.store.revisions import RowCounts, revise, supersede
 from archmodel.tables.entries import Entry
 from archmodel.tables.knowledge import Document, Material, MaterialProperty, Phase
 from archmodel.tables.structures import Structure
+from archmodel.tables.terms import term_for, vocabulary
 from ground.errors import UsageError
 
 __all__ = [
-    "DOCUMENT_TYPES",
     "PROPERTIES",
     "PropertyValue",
     "declare_document",
@@ -36,8 +35,6 @@ __all__ = [
     "declare_phase",
     "declare_property",
 ]
-
-DOCUMENT_TYPES = ("document", "drawing", "photograph")
 
 PROPERTIES: Mapping[str, tuple[str, str]] = {
     "density": ("kg/m³", "mass by volume"),
@@ -81,7 +78,8 @@ def declare_material(
 ) -> RowCounts:
     """Declare a stone or a mortar under one name, with its properties; properties not named stay as they are."""
     values = {"description": checked_text("description", description)}
-    outcome = declare_named(session, entry, Material, {"name": checked_label("name", name)}, values)
+    name = term_for(session, "material", checked_label("name", name))
+    outcome = declare_named(session, entry, Material, {"name": name}, values)
     for key, given in (properties or {}).items():
         outcome += declare_property(session, entry, name, key, given)
     return outcome
@@ -172,7 +170,7 @@ def declare_document(
 ) -> RowCounts:
     """Declare a document, drawing or photograph, by reference: `place` is where it can be found."""
     values = {
-        "type": checked_choice("type of document", type, DOCUMENT_TYPES),
+        "type": vocabulary(session, "document").named(type),
         "title": checked_text("title", title),
         "place": checked_text("place", place),
         "author": checked_text("author", author),

@@ -1,17 +1,15 @@
 """Registration of a user's own kind of stone or structure in a database."""
 
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import fields, is_dataclass
+from collections.abc import Mapping
 
 from sqlalchemy.orm import Session
 
+from archmodel.assertions.canons import check_canon
 from archmodel.assertions.validation import checked_label, checked_text
 from archmodel.query.attributes import ATTRIBUTES
-from archmodel.query.compile import condition
 from archmodel.query.functions.registry import FUNCTIONS, STRUCTURE_FUNCTIONS
-from archmodel.query.grammar import Call, parse
-from archmodel.query.tokens import KEYWORDS, Token, complaint
+from archmodel.query.tokens import KEYWORDS
 from archmodel.store.revisions import RowCounts
 from archmodel.tables.base import StoneAttribute
 from archmodel.tables.entities import Entity, kinds, own_attributes
@@ -47,13 +45,13 @@ def register_kind(
     definition : one sentence: one word, one role
     canon : canonical proportions, as a query expression; None: those of the parent
     attributes : of its own, by name: unit ("-" for numbers without one, None for texts) and definition;
-        kinds of structures have neither
+        kinds of structures have none
 
     Raises
     ------
     UsageError
         if the name is taken, the parent unknown, an attribute is named like another one, or a kind of structure
-        has proportions or attributes
+        has attributes
     QueryError
         if the canon is no expression, or asks for what is not known
     """
@@ -81,16 +79,15 @@ def register_kind(
         raise UsageError(f"there is a kind {name} already", remedy="give yours another name")
     if issubclass(above, Entity):
         _check_attributes(given, own_attributes(above))
-    elif row.canon is not None or given:
-        raise UsageError(f"{name} is {NO_ATTRIBUTES}", remedy="leave out canon and attributes")
+    elif given:
+        raise UsageError(f"{name} is {NO_ATTRIBUTES}", remedy="leave out attributes")
     try:
         with session.begin_nested():
             session.add(row)
             session.flush()
             declare_registered(session)
             if row.canon is not None:
-                _check_canon(row.canon)
-                condition(session, row.canon)
+                check_canon(session, all_kinds()[name], row.canon)
     except QueryError:
         declare_registered(session)
         raise
@@ -116,25 +113,6 @@ def _check_attributes(
         if name in units and units[name] != unit:
             what = f"{name} [{unit or 'text'}] is an attribute of another kind, in {units[name] or 'text'}"
             raise UsageError(what, remedy="give it the same unit, or another name")
-
-
-def _check_canon(canon: str) -> None:
-    """Refuse proportions that depend on runs, other stones or structures, which may be gone later."""
-    for node in _nodes(parse(canon)):
-        if isinstance(node, Call):
-            raise complaint(node.function, "canonical proportions cannot ask functions", "compare attributes")
-        if isinstance(node, Token) and node.role == "word" and "@" in node.text:
-            raise complaint(node, "canonical proportions cannot ask a run", "leave out @ and what follows")
-
-
-def _nodes(node: object) -> Iterator[object]:
-    """Iterate over a node of an expression and all nodes in it."""
-    yield node
-    if is_dataclass(node) and not isinstance(node, Token):
-        for part in fields(node):
-            value = getattr(node, part.name)
-            for one in value if isinstance(value, tuple) else (value,):
-                yield from _nodes(one)
 
 
 def _checked_name(thing: str, name: str) -> str:

@@ -14,7 +14,6 @@ from sqlalchemy import insert, select
 from sqlalchemy.orm import Session, aliased
 
 from archmodel.assertions.validation import (
-    checked_choice,
     checked_label,
     checked_number,
     checked_text,
@@ -26,7 +25,6 @@ from archmodel.store.revisions import NOTHING, RowCounts, end_rows, table_of
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Entry
 from archmodel.tables.knowledge import (
-    OBSERVATIONS,
     DepthEvidence,
     Document,
     MadeOf,
@@ -39,6 +37,7 @@ from archmodel.tables.knowledge import (
     Reference,
     Statement,
 )
+from archmodel.tables.terms import term_for, vocabulary
 from ground.errors import UsageError
 
 __all__ = [
@@ -92,7 +91,7 @@ def say_made_of(
     session: Session, entry: Entry, about: Subjects, material: str, remark: Remark = PLAIN
 ) -> RowCounts:
     """State their material, which must have been declared."""
-    number = held_named(session, Material, material).id
+    number = held_named(session, Material, term_for(session, "material", material)).id
     return _say(session, entry, MadeOf, about, {"material_id": number}, remark)
 
 
@@ -113,7 +112,8 @@ def say_mason_mark(
     remark: Remark = PLAIN,
 ) -> RowCounts:
     """State a mason's mark; `sign` is the same for the same mark, `place` is where on the stone, in words."""
-    values = {"sign": checked_label("sign", sign), "place": checked_text("place", place)}
+    named = term_for(session, "mark", checked_label("sign", sign))
+    values = {"sign": named, "place": checked_text("place", place)}
     return _say(session, entry, MasonMark, about, values, remark)
 
 
@@ -132,7 +132,7 @@ def say_observation(
 
     Parameters
     ----------
-    type : one of ``knowledge.OBSERVATIONS``
+    type : term of the vocabulary of observations, or a label of it
     severity : from 0 (traces) to 4 (lost, or about to be)
     place : on the stone, in words
     at : (x, y, z) in the frame of the site [m]
@@ -141,7 +141,7 @@ def say_observation(
     if at is not None:
         _refuse_far(session, about, at)
     values = {
-        "type": checked_choice("type of observation", type, OBSERVATIONS),
+        "type": vocabulary(session, "observation").named(type),
         "severity": checked_whole("severity", severity, 0, 4),
         "place": checked_text("place", place),
         "x": x,
@@ -230,7 +230,6 @@ def _say(
     remark: Remark,
 ) -> RowCounts:
     """Store one statement about each subject that lacks it."""
-    _refuse_future(remark)
     full = {**values, **remark_row(session, entry, remark)}
     outcome = NOTHING
     for owner, batch in about.batches():
@@ -273,7 +272,8 @@ def _say_of_batch(
 
 
 def remark_row(session: Session, entry: Entry, remark: Remark) -> dict[str, object]:
-    """Return the columns of a statement that say whose it is, of which day, and its details."""
+    """Return the columns of a statement that say whose it is, of which day, and its details; no day to come."""
+    _refuse_future(remark)
     document = remark.document
     if remark.locator is not None and document is None:
         raise UsageError(f"the locator {remark.locator[:40]!r} is in no document", remedy="name the document")

@@ -9,11 +9,12 @@ from sqlalchemy.orm import Session, joinedload
 
 from archmodel.assertions.plain_values import entry_values
 from archmodel.database.as_known import as_known
+from archmodel.describe.canons import canon_values
 from archmodel.describe.knowledge import knowledge, memberships, owners_of, owners_of_structure
 from archmodel.describe.rows import entity_row, structures_named
 from archmodel.describe.runs import JOINT_VALUES
 from archmodel.store.find_by_code import no_such_code
-from archmodel.tables.entities import Entity, canon_of, kind_named, own_attributes
+from archmodel.tables.entities import Entity, kind_named, own_attributes
 from archmodel.tables.entries import held_at
 from archmodel.tables.hierarchy import definition_of, kind_chain, kind_of
 from archmodel.tables.knowledge import Correction
@@ -43,7 +44,7 @@ def describe(session: Session, code: str, at: int | None = None) -> dict[str, ob
         of a stone: code, kind, definition, kinds (general to particular, each with its definition), canon,
         course, zone, hypothesis, own (attributes of its kind: value, unit, definition), face, solid, depth, structures,
         relations, knowledge, survey, measured, notes, runs (latest first), joints (of the latest run),
-        corrections; of a structure: code, kind, definition, title, number, side, part_of, parts, members,
+        corrections; of a structure: code, kind, definition, canon, title, number, side, part_of, parts, members,
         knowledge, recorded, withdrawn; SI units
 
     Raises
@@ -93,7 +94,7 @@ def _entity(session: Session, number: int) -> Values:
         "kind": row["kind"],
         "definition": definition_of(cls),
         "kinds": [{"kind": kind_of(one), "definition": definition_of(one)} for one in kind_chain(cls)],
-        "canon": canon_of(cls),
+        "canon": canon_values(session, "entity", row["code"], row["kind"]),
         "course": row["course"],
         "zone": row["zone"],
         "hypothesis": row["hypothesis"],
@@ -133,6 +134,7 @@ def _structure(session: Session, row: Structure) -> Values:
         "code": row.code,
         "kind": row.kind,
         "definition": definition_of(type(row)),
+        "canon": canon_values(session, "structure", row.code, row.kind),
         "title": row.title,
         "number": row.number,
         "side": row.side,

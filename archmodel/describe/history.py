@@ -12,14 +12,16 @@ from sqlalchemy import or_, select
 from sqlalchemy.orm import Session, joinedload
 
 from archmodel.assertions.plain_values import entry_values, statement_values
+from archmodel.describe.canons import canons_of
 from archmodel.describe.entity import describe
 from archmodel.describe.knowledge import ancestors
 from archmodel.describe.rows import first_values, structures_named
 from archmodel.store.find_by_code import no_such_code
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Entry, Recorded
+from archmodel.tables.hierarchy import Kind
 from archmodel.tables.knowledge import Correction, Statement
-from archmodel.tables.registered import refuse_unknown_kinds
+from archmodel.tables.registered import Canon, refuse_unknown_kinds
 from archmodel.tables.relations import INVERSE, Membership, Relation
 from archmodel.tables.runs import EntityResult, Run
 from archmodel.tables.structures import Structure
@@ -123,6 +125,7 @@ def _of_entity(session: Session, number: int) -> Iterator[Event]:
         session.scalars(member).all(), "membership", _structure_of, lambda one: one.structure_id
     )
     yield from _relations(session, number)
+    yield from _canons(session, type(entity))
     runs = (
         select(EntityResult)
         .where(EntityResult.entity_id == number)
@@ -175,9 +178,30 @@ def _of_structure(session: Session, held: Structure) -> Iterator[Event]:
         lambda one: {"code": one.entity.code, "rank": one.rank},
         lambda one: one.entity_id,
     )
+    yield from _canons(session, type(held))
     yield from _statements(session, "structure_id", held.id)
     if held.superseded_by is not None:
         yield _event(held.superseded_by, "withdrawn", "structure", before or {})
+
+
+def _canons(session: Session, cls: type[Kind]) -> Iterator[Event]:
+    """Collect the canonical proportions that were stated of its kind and of those above it."""
+    rows = canons_of(session, cls)
+    by_number = {one.id: one for one in rows}
+    replaced = {one.supersedes_id for one in rows}
+    for one in rows:
+        told = _canon(one)
+        if one.proportions is None:
+            yield _event(one.entry, "withdrawn", "canon", told)
+            continue
+        old = None if one.supersedes_id is None else by_number.get(one.supersedes_id)
+        yield _event(one.entry, "said" if old is None else "replaced", "canon", told, old and _canon(old))
+        if one.superseded_by is not None and one.id not in replaced:
+            yield _event(one.superseded_by, "withdrawn", "canon", told)
+
+
+def _canon(one: Canon) -> Values:
+    return {"kind": one.kind, "proportions": one.proportions, "tolerance": one.tolerance}
 
 
 def _inherited(session: Session, number: int) -> Iterator[Event]:

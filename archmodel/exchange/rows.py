@@ -10,7 +10,7 @@ from archmodel.exchange.sections import Section
 from archmodel.exchange.values import Mismatch, quoted
 from archmodel.query.grammar import parse
 from archmodel.tables.hierarchy import Kind, kinds_below
-from archmodel.tables.registered import RegisteredKind
+from archmodel.tables.registered import Canon, RegisteredKind
 from ground.errors import ExchangeError, QueryError
 
 __all__ = ["Row", "RowReader", "nearest", "quoted_key"]
@@ -125,6 +125,9 @@ class RowReader:
         if self._section.table is RegisteredKind.__table__:
             _check_registered(row)
             self._registered.add(row.values["name"])
+        elif self._section.table is Canon.__table__:
+            _check_proportions(row, "proportions")
+            return
         if self._kind is None:
             return
         kind = row.values[self._kind]
@@ -145,16 +148,21 @@ def _known(section: Section, registered: set[str]) -> frozenset[str]:
 
 def _check_registered(row: Row) -> None:
     """Refuse a registered kind that queries could not name, or with proportions that they could not parse."""
-    name, canon = row.values["name"], row.values["canon"]
+    name = row.values["name"]
     if not re.fullmatch(r"[a-z][a-z0-9]*(_[a-z0-9]+)*", name):
         raise row.wrong(
             f"is {quoted(name)}, which is not the name of a kind", ".name", "as corner_merlon, say"
         )
+    _check_proportions(row, "canon")
+
+
+def _check_proportions(row: Row, key: str) -> None:
+    """Refuse canonical proportions that queries could not parse."""
     try:
-        if canon is not None:
-            parse(canon)
+        if row.values[key] is not None:
+            parse(row.values[key])
     except QueryError as error:
-        raise row.wrong(str(error), ".canon") from None
+        raise row.wrong(str(error), f".{key}") from None
 
 
 def quoted_key(key: tuple[Any, ...]) -> str:

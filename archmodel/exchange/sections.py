@@ -28,6 +28,7 @@ _READING_ORDER = (
     "structures",
     "relations",
     "knowledge",
+    "terms",
     "opinions",
     "runs",
 )

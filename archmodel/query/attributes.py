@@ -4,15 +4,17 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import Boolean, ColumnElement, func
+from sqlalchemy import Boolean, ColumnElement, func, null
 from sqlalchemy.orm import Session
 
 from archmodel.quantities import quantities_of
 from archmodel.query.columns import (
+    Compiler,
     Test,
     Value,
     any_mark,
     count,
+    departure,
     different_marks,
     documents,
     of_entity,
@@ -35,7 +37,7 @@ from archmodel.tables.knowledge import Correction
 from archmodel.tables.runs import EntityResult
 from archmodel.tables.surveys import Measurement, Simplification
 
-__all__ = ["ATTRIBUTES", "Attribute", "attributes_of", "own_attributes_of"]
+__all__ = ["ATTRIBUTES", "CANON", "Attribute", "attributes_of", "own_attributes_of"]
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,8 @@ class Attribute:
     is_truth : it is true or false
     order : years by which texts are compared with < and >; None where they have no order
     several : test of any of several values that it can have; None where it has one
+    measure : what makes it of expressions; None where it is found at `value`
+    vocabulary : whose terms its values are; None: texts that mean themselves
     """
 
     name: str
@@ -64,6 +68,8 @@ class Attribute:
     is_truth: bool = False
     order: Value | None = None
     several: Callable[[Scope, Test], ColumnElement[bool]] | None = None
+    measure: Callable[[Any, Compiler], ColumnElement[Any]] | None = None
+    vocabulary: str | None = None
 
     @property
     def is_number(self) -> bool:
@@ -101,6 +107,18 @@ _MEASURED = (
         "how often it was measured, or its solid made anew",
         rows(Measurement, "entity_id", now=False),
     ),
+    Attribute(
+        "moved",
+        "m",
+        "distance from its place in an earlier campaign: that of moved_since, else the first that measured it",
+        lambda scope, run: scope.displacement().c.moved,
+    ),
+    Attribute(
+        "moved_sigma",
+        "m",
+        "standard deviation of that; moved/moved_sigma is its significance",
+        lambda scope, run: scope.displacement().c.moved_sigma,
+    ),
 )
 
 _KNOWN = (
@@ -124,7 +142,13 @@ _KNOWN = (
         lambda scope, run: scope.phase().c.begins,
     ),
     Attribute("phase_ends", "year", "of that phase, at the latest", lambda scope, run: scope.phase().c.ends),
-    Attribute("material", None, "name of its material", lambda scope, run: scope.material().c.name),
+    Attribute(
+        "material",
+        None,
+        "name of its material",
+        lambda scope, run: scope.material().c.name,
+        vocabulary="material",
+    ),
     Attribute(
         "material_author",
         None,
@@ -141,6 +165,7 @@ _KNOWN = (
         "name of its mason mark, the first by the alphabet; a comparison is true of any of several",
         of_marks(lambda said: func.min(said.c.sign)),
         several=any_mark,
+        vocabulary="mark",
     ),
     Attribute("observations", "-", "observations of damage and change", of_observations(count)),
     Attribute(
@@ -154,6 +179,14 @@ _KNOWN = (
         "corrections", "-", "attributes of it that were corrected", rows(Correction, "entity_id", now=False)
     ),
     Attribute("structures", "-", "structures that it is a member of", structures),
+)
+
+CANON = Attribute(
+    "departs_from_canon",
+    "-",
+    "how far it misses the canonical proportions of its kind, in tolerances; 0 if it has them",
+    lambda scope, run: null(),
+    measure=departure,
 )
 
 _RELATED = (
@@ -186,7 +219,8 @@ _COMPUTED = (
 )
 
 ATTRIBUTES: Mapping[str, Attribute] = {
-    one.name: one for one in (*_declared(Entity, of_entity), *_MEASURED, *_KNOWN, *_RELATED, *_COMPUTED)
+    one.name: one
+    for one in (*_declared(Entity, of_entity), *_MEASURED, CANON, *_KNOWN, *_RELATED, *_COMPUTED)
 }
 """The attributes of every entity by name."""
 

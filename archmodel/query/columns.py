@@ -1,22 +1,50 @@
-"""Sources of attributes: columns of joined tables, or a search for each entity."""
+"""Sources of attributes: columns of joined tables, a search for each entity, or a measure of expressions."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import ColumnElement, FromClause, distinct, func, literal, select
+from sqlalchemy import (
+    ColumnElement,
+    Double,
+    FromClause,
+    and_,
+    case,
+    distinct,
+    func,
+    literal,
+    null,
+    or_,
+    select,
+)
 
+from archmodel.query.grammar import (
+    All,
+    Amount,
+    AmountComparison,
+    AnyOf,
+    Comparison,
+    Node,
+    Not,
+    Term,
+    parse,
+)
 from archmodel.query.inherited import held, observations_of, statements_of
-from archmodel.query.scope import Scope
+from archmodel.query.scope import Scope, StructureScope
 from archmodel.tables.knowledge import Statement
+from archmodel.tables.registered import TOLERANCE, Proportions, canons
 from archmodel.tables.relations import Membership, Relation
 from archmodel.tables.structures import Structure
+from ground.errors import QueryError
 
 __all__ = [
     "DOCUMENTING",
+    "Compiler",
     "Test",
     "Value",
     "any_mark",
     "count",
+    "departure",
     "different_marks",
     "documents",
     "of_entity",
@@ -167,3 +195,100 @@ def structures(scope: Scope, run: int | None) -> ColumnElement[int]:
         .where(rows.c.entity_id == scope.entity.c.id, held(rows), held(structure))
     )
     return count.correlate(scope.entity).scalar_subquery()
+
+
+@dataclass(frozen=True)
+class Compiler:
+    """Makers of SQL for the parts of an expression.
+
+    Attributes
+    ----------
+    test : condition of a node
+    amount : number of a sum of terms
+    """
+
+    test: Callable[[Any, Node], ColumnElement[bool]]
+    amount: Callable[[Any, Amount], ColumnElement[Any]]
+
+
+def departure(scope: Scope | StructureScope, compiler: Compiler) -> ColumnElement[Any]:
+    """Return how far it departs from the canonical proportions of its kind, in tolerances; null if it has none."""
+    context = scope.context
+    kind = scope.entity.c.kind if isinstance(scope, Scope) else scope.structure.c.kind
+    kinds: dict[Proportions, list[str]] = {}
+    for name, canon in context.once("canons", lambda: canons(context.session)).items():
+        kinds.setdefault(canon, []).append(name)
+    cases = []
+    for canon, names in kinds.items():
+        measure = _Departure(scope, compiler, TOLERANCE if canon.tolerance is None else canon.tolerance)
+        try:
+            cases.append((kind.in_(names), measure.of(parse(canon.expression))))
+        except QueryError:
+            continue  # of a kind of the other hierarchy
+    return case(*cases, else_=null()) if cases else null()
+
+
+@dataclass(frozen=True)
+class _Departure:
+    """Measure of how far an expression is from being true: 0 if it is, null if that is not known.
+
+    A comparison of numbers departs by the missing share of its right side, over the tolerance. Of tests joined by
+    and the largest counts, of tests joined by or the smallest. What is no number has no measure.
+    """
+
+    scope: Scope | StructureScope
+    compiler: Compiler
+    tolerance: float
+
+    def of(self, node: Node, opposite: bool = False) -> ColumnElement[Any]:
+        """Return the departure from a node, or from its opposite."""
+        match node:
+            case Not(operand):
+                return self.of(operand, not opposite)
+            case All(operands) | AnyOf(operands):
+                parts = [self.of(operand, opposite) for operand in operands]
+                return self._all(parts) if isinstance(node, All) is not opposite else self._any(parts)
+            case AmountComparison(left, sign, right):
+                return self._missing(left, sign, right, opposite)
+            case Comparison(attribute, sign, value) if value.role in ("number", "word"):
+                number = value.role == "number"
+                term = Term(float(value.text)) if number else Term(1.0, value)
+                try:
+                    left = Amount((Term(1.0, attribute),), False)
+                    return self._missing(left, sign, Amount((term,), False), opposite)
+                except QueryError:
+                    return self._truth(node, opposite)
+            case _:
+                return self._truth(node, opposite)
+
+    def _truth(self, node: Node, opposite: bool) -> ColumnElement[Any]:
+        test = self.compiler.test(self.scope, Not(node) if opposite else node)
+        return case((test, literal(0.0, Double)), else_=null())
+
+    def _missing(self, left: Amount, sign: str, right: Amount, opposite: bool) -> ColumnElement[Any]:
+        amounts = [self.compiler.amount(self.scope, one) for one in (left, right)]
+        larger = amounts[0] - amounts[1]
+        missing = {"<": larger, "<=": larger, ">": -larger, ">=": -larger}.get(sign)
+        if missing is None:
+            equal = (sign == "=") is not opposite
+            missing = func.abs(larger) if equal else case((larger != 0.0, 0.0), else_=null())
+        elif opposite:
+            missing = -missing
+        unit = func.nullif(func.abs(amounts[1]) * self.tolerance, 0.0)
+        return case((missing > 0.0, missing / unit), (missing <= 0.0, literal(0.0, Double)), else_=null())
+
+    def _all(self, parts: list[ColumnElement[Any]]) -> ColumnElement[Any]:
+        largest = self._extreme("max", "greatest", [func.coalesce(one, -1.0) for one in parts])
+        unknown = or_(*(one.is_(None) for one in parts))
+        return case((largest > 0.0, largest), (unknown, null()), else_=literal(0.0, Double))
+
+    def _any(self, parts: list[ColumnElement[Any]]) -> ColumnElement[Any]:
+        known = and_(*(one.is_not(None) for one in parts))
+        smallest = self._extreme("min", "least", parts)
+        met = or_(*(one == 0.0 for one in parts))
+        return case((met, literal(0.0, Double)), (known, smallest), else_=null())
+
+    def _extreme(self, sqlite: str, other: str, parts: list[ColumnElement[Any]]) -> ColumnElement[Any]:
+        dialect = self.scope.context.session.get_bind().dialect.name
+        found: ColumnElement[Any] = getattr(func, sqlite if dialect == "sqlite" else other)(*parts)
+        return found

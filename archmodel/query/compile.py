@@ -13,7 +13,7 @@ from sqlalchemy import Boolean, ColumnElement, Double, Integer, and_, func, lite
 from sqlalchemy.orm import Session
 
 from archmodel.query.attributes import ATTRIBUTES, Attribute, attributes_of
-from archmodel.query.columns import Test
+from archmodel.query.columns import Compiler, Test
 from archmodel.query.functions.registry import FUNCTIONS, STRUCTURE_FUNCTIONS, Function
 from archmodel.query.grammar import (
     All,
@@ -29,7 +29,7 @@ from archmodel.query.grammar import (
     Not,
     parse,
 )
-from archmodel.query.names import meant, phase_begins, run_with_number
+from archmodel.query.names import meant, phase_begins, run_with_number, terms_named
 from archmodel.query.scope import Context, Scope, StructureScope
 from archmodel.query.structures import STRUCTURE_ATTRIBUTES
 from archmodel.query.tokens import Token, complaint
@@ -118,6 +118,13 @@ def condition_in(scope: Where, node: Node) -> ColumnElement[bool]:
             attribute, column = _column(scope, name)
             if attribute.name == "kind":
                 return column.in_(_kinds(scope, *values))
+            if attribute.vocabulary is not None:
+                named = [
+                    name
+                    for value in values
+                    for name in terms_named(scope.context, attribute.vocabulary, value)
+                ]
+                return _tested(scope, attribute, column, lambda one: one.in_(named))
             constants = [_constant(scope, attribute, value) for value in values]
             return _tested(scope, attribute, column, lambda one: one.in_(constants))
         case Comparison(name, sign, value):
@@ -126,10 +133,11 @@ def condition_in(scope: Where, node: Node) -> ColumnElement[bool]:
                 return _of_kind(scope, column, sign, value)
             if sign not in ("=", "!=") and not attribute.is_number and attribute.name != "code":
                 return _ordered(scope, name, attribute, sign, value)
+            if attribute.vocabulary is not None:
+                terms = terms_named(scope.context, attribute.vocabulary, value)
+                named_so = _tested(scope, attribute, column, lambda one: one.in_(terms))
+                return named_so if sign == "=" else and_(column.is_not(None), not_(named_so))
             operand = _operand(scope, attribute, value)
-            if attribute.several is not None:
-                same = _tested(scope, attribute, column, lambda one: one == operand)
-                return same if sign == "=" else and_(column.is_not(None), not_(same))
             compared: ColumnElement[bool] = _OPERATORS[sign](column, operand)
             return compared
         case AmountComparison(left, sign, right):
@@ -224,6 +232,10 @@ def _column(scope: Where, token: Token) -> tuple[Attribute, ColumnElement[Any]]:
         what = f"{attribute.name} does not depend on a run"
         raise complaint(token, what, f"write {attribute.name} without @{number[:20]}")
     run = run_with_number(scope.context, token, number) if at else None
+    if attribute.measure is not None:
+        if scope.context.within_canon:
+            raise complaint(token, "canonical proportions cannot ask for the departure from themselves")
+        return attribute, attribute.measure(scope, Compiler(condition_in, _amount))
     return attribute, attribute.value(scope, run)  # type: ignore[arg-type]
 
 

@@ -12,18 +12,22 @@ from archmodel.tables.entities import Entity
 from archmodel.tables.knowledge import Document, MasonMark, Phase, Statement
 from archmodel.tables.runs import Run
 from archmodel.tables.structures import Structure
-from ground.errors import QueryError
+from archmodel.tables.surveys import Survey
+from archmodel.tables.terms import vocabulary
+from ground.errors import QueryError, UsageError
 
 __all__ = [
     "author_named",
+    "campaign_named",
     "document_named",
-    "mark_named",
+    "marks_named",
     "meant",
     "phase_begins",
     "refuse_unknown_run",
     "run_with_number",
     "stone_named",
     "structure_named",
+    "terms_named",
 ]
 
 MAX_SHOWN = 12
@@ -71,14 +75,15 @@ def structure_named(context: Context, code: Token) -> int:
     return int(context.once(("structure", code.text), look))
 
 
-def mark_named(context: Context, sign: Token) -> str:
-    """Return the sign of a mason mark that is held; an error if there is none."""
+def marks_named(context: Context, sign: Token) -> list[str]:
+    """Return the signs of a mason mark and of narrower terms; an error if none of them is held."""
     known = select(MasonMark.sign).where(MasonMark.superseded_id.is_(None), MasonMark.sign.is_not(None))
     signs = context.once("marks", lambda: sorted(set(context.session.scalars(known))))
-    if sign.text not in signs:
+    named = terms_named(context, "mark", sign)
+    if not set(named) & set(signs):
         what = f"there is no mason mark {sign.text[:40]!r} in the database"
         raise complaint(sign, what, meant(sign.text, signs, "the marks"))
-    return sign.text
+    return named
 
 
 def author_named(context: Context, author: Token) -> str:
@@ -89,6 +94,31 @@ def author_named(context: Context, author: Token) -> str:
         what = f"nothing that is held was stated by {author.text[:40]!r}"
         raise complaint(author, what, meant(author.text, names, "the authors"))
     return author.text
+
+
+def terms_named(context: Context, name: str, word: Token) -> list[str]:
+    """Return the term of a vocabulary that is written so, in any language, and all narrower ones.
+
+    Raises
+    ------
+    QueryError
+        in a closed vocabulary, if there is no such term
+    """
+    known = context.once(("vocabulary", name), lambda: vocabulary(context.session, name))
+    try:
+        return list(known.below(known.named(word.text)))
+    except UsageError as error:
+        raise complaint(word, error.what, error.remedy) from None
+
+
+def campaign_named(context: Context, campaign: Token) -> str:
+    """Return the name of a survey that was taken in; an error if there is none."""
+    known = select(Survey.name).distinct().order_by(Survey.name)
+    names = context.once("campaigns", lambda: list(context.session.scalars(known)))
+    if campaign.text not in names:
+        what = f"there is no survey {campaign.text[:40]!r} in the database"
+        raise complaint(campaign, what, meant(campaign.text, names, "the surveys"))
+    return campaign.text
 
 
 def phase_begins(context: Context, phase: Token) -> int:

@@ -1,12 +1,25 @@
 """Scope of a query: a table of entities, and tables joined to it only when an expression needs them."""
 
 from collections import Counter
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from threading import Lock
 from typing import Any, TypeVar
 
-from sqlalchemy import CTE, ColumnElement, FromClause, Select, and_, func, select
+from sqlalchemy import (
+    CTE,
+    ColumnElement,
+    Double,
+    FromClause,
+    Integer,
+    Select,
+    and_,
+    bindparam,
+    column,
+    func,
+    select,
+    values,
+)
 from sqlalchemy.orm import Session
 
 from archmodel.query.inherited import Opinions, held, statements_of_structures
@@ -18,7 +31,7 @@ from archmodel.tables.opinions import rule_of
 from archmodel.tables.runs import STUDIED, EntityResult, Run
 from archmodel.tables.surveys import Measurement, Simplification, Survey
 
-__all__ = ["MAX_FUNCTIONS", "MAX_RUNS", "Context", "Scope", "StructureScope"]
+__all__ = ["MAX_FUNCTIONS", "MAX_RUNS", "Context", "Scope", "StructureScope", "among"]
 
 MAX_FUNCTIONS = 40
 """Most functions in one query, those within functions and within canonical proportions included."""
@@ -32,6 +45,11 @@ _ALIASES: dict[tuple[type[Base], int], list[FromClause]] = {}
 _MAKING = Lock()
 
 
+def among(number: ColumnElement[int], wanted: Collection[int]) -> ColumnElement[bool]:
+    """Return whether a primary key is among some, of which there may be more than a statement takes as parameters."""
+    return number.in_(bindparam(None, sorted(wanted), expanding=True, literal_execute=True))
+
+
 @dataclass
 class Context:
     """State that the parts of one query share.
@@ -41,11 +59,13 @@ class Context:
     session : of the database that is asked
     run : the run of results whose run is not named; None: the latest that holds the entity
     within_canon : the part that is being understood is the canonical proportions of a kind
+    campaign : name of the campaign since which displacements count; None: the first measurement of each stone
     """
 
     session: Session
     run: int | None = None
     within_canon: bool = field(default=False, init=False)
+    campaign: str | None = field(default=None, init=False)
     _functions: int = field(default=0, init=False)
     _aliases: Counter[type[Base]] = field(default_factory=Counter, init=False)
     _shared: dict[Hashable, Any] = field(default_factory=dict, init=False)
@@ -80,6 +100,28 @@ class Context:
         if key not in self._shared:
             self._shared[key] = make()
         return self._shared[key]
+
+    def computed(
+        self, key: Hashable, names: Sequence[str], make: Callable[[], Mapping[int, Sequence[float]]]
+    ) -> CTE:
+        """Return a table of numbers that no table stores, computed once in a query: ``id`` and a column for each name.
+
+        Parameters
+        ----------
+        make : numbers of each entity or structure by its primary key
+        """
+
+        def table() -> CTE:
+            """Write the numbers into a list of values."""
+            columns = (column("id", Integer), *(column(name, Double) for name in names))
+            # no entity has the number 0, and a list of values cannot be empty
+            rows = [(number, *map(float, one)) for number, one in make().items()] or [
+                (0, *(0.0 for _ in names))
+            ]
+            return values(*columns, name=f"computed_{len(self._shared)}", literal_binds=True).data(rows).cte()
+
+        cte: CTE = self.once(("computed", key), table)
+        return cte
 
     def statements_of_structures(self, *kinds: str) -> CTE:
         """Return statements of some kinds about structures, for every structure that is a part of theirs."""
@@ -179,6 +221,23 @@ class Scope:
             MaterialProperty,
             lambda rows: and_(rows.c.material_id == number, rows.c.name == name, held(rows)),
         )
+
+    def displacement(self) -> FromClause:
+        """Join the displacement since the campaign of the query: ``moved`` and ``moved_sigma``."""
+        campaign = self.context.campaign
+        key = ("displacement", campaign)
+        if key not in self._joins:
+            rows = self.context.computed(key, ("moved", "moved_sigma"), self._displacements)
+            self._joins[key] = rows, rows.c.id == self.entity.c.id
+        return self._joins[key][0]
+
+    def _displacements(self) -> Mapping[int, Sequence[float]]:
+        # numpy is loaded only by those who ask
+        from archmodel.store.campaigns import campaigns, displacements
+
+        session, campaign = self.context.session, self.context.campaign
+        surveys = None if campaign is None else campaigns(session)[campaign]
+        return {number: (one.distance, one.sigma) for number, one in displacements(session, surveys).items()}
 
     def _latest_run(self) -> ColumnElement[int]:
         """Return the number of the latest run that holds the entity: one step in the primary key."""

@@ -1,13 +1,15 @@
 """Attributes of structures that expressions and lists can ask for."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from sqlalchemy import ColumnElement, func, select
+from sqlalchemy import ColumnElement, and_, case, func, select
 
-from archmodel.query.attributes import Attribute
+from archmodel.query.attributes import CANON, Attribute
 from archmodel.query.inherited import held
 from archmodel.query.scope import StructureScope
+from archmodel.tables.entities import Entity, Header, Stretcher
+from archmodel.tables.hierarchy import kinds_below
 from archmodel.tables.knowledge import Material, OfPhase, Phase, Statement
 from archmodel.tables.opinions import preference, rule_of
 from archmodel.tables.relations import Membership
@@ -37,11 +39,49 @@ def _members(scope: StructureScope, run: int | None) -> ColumnElement[int]:
     return count.correlate(scope.structure).scalar_subquery()
 
 
+def _bond(scope: StructureScope, run: int | None) -> ColumnElement[str]:
+    """Return whether its members are headers, stretchers or both; null if they are neither."""
+    rows, stones = scope.context.alias(Membership), scope.context.alias(Entity)
+    headers, stretchers = (
+        func.sum(case((stones.c.kind.in_(kinds_below(cls)), 1), else_=0)) for cls in (Header, Stretcher)
+    )
+    bond = case(
+        (and_(headers > 0, stretchers > 0), "mixed"), (headers > 0, "header"), (stretchers > 0, "stretcher")
+    )
+    found = (
+        select(bond)
+        .select_from(rows)
+        .join(stones, stones.c.id == rows.c.entity_id)
+        .where(rows.c.structure_id == scope.structure.c.id, held(rows))
+    )
+    return found.correlate(scope.structure).scalar_subquery()
+
+
 def _parts(scope: StructureScope, run: int | None) -> ColumnElement[int]:
     """Count the structures that are parts of it."""
     rows = scope.context.alias(Structure)
     count = select(func.count(rows.c.id)).where(rows.c.parent_id == scope.structure.c.id, held(rows))
     return count.correlate(scope.structure).scalar_subquery()
+
+
+def _shape(name: str) -> Source:
+    """Return a source in the shape of an arch, as its voussoirs were measured."""
+
+    def value(scope: StructureScope, run: int | None) -> ColumnElement[float]:
+        """Return the number of the structure; null where it has no shape."""
+        context = scope.context
+
+        def shapes() -> Mapping[int, Sequence[float]]:
+            """Measure all arches [m]."""
+            # numpy is loaded only by those who ask
+            from archmodel.store.arch_shapes import arch_shapes
+
+            return {number: (one.span, one.rise) for number, one in arch_shapes(context.session).items()}
+
+        rows = context.computed("arches", ("span", "rise"), shapes)
+        return select(rows.c[name]).where(rows.c.id == scope.structure.c.id).scalar_subquery()
+
+    return value
 
 
 def _opinion(about: str, column: str, named: type[Phase] | type[Material]) -> Source:
@@ -85,6 +125,13 @@ STRUCTURE_ATTRIBUTES: Mapping[str, Attribute] = {
         _attribute("side", None, "outer or inner, of a wall facing", _own("side"), ("outer", "inner")),
         _attribute("parent", None, "code of the structure that it is a part of", _parent),
         _attribute("parts", "-", "structures that are parts of it", _parts),
+        _attribute(
+            "bond",
+            None,
+            "of its stones: header, stretcher, or mixed",
+            _bond,
+            ("header", "stretcher", "mixed"),
+        ),
         _attribute("members", "-", "stones that are its members, without those of its parts", _members),
         _attribute(
             "phase",
@@ -92,7 +139,18 @@ STRUCTURE_ATTRIBUTES: Mapping[str, Attribute] = {
             "name of the phase that it is of",
             _opinion(OfPhase.__kind__, "phase_id", Phase),
         ),
-        _attribute("material", None, "name of its material", _opinion("made_of", "material_id", Material)),
+        Attribute(
+            "material",
+            None,
+            "name of its material",
+            _opinion("made_of", "material_id", Material),  # type: ignore[arg-type]
+            vocabulary="material",
+        ),
+        _attribute("span", "m", "of an arch: between the springings of its intrados", _shape("span")),
+        _attribute(
+            "rise", "m", "of an arch: from its springings up to the crown of its intrados", _shape("rise")
+        ),
+        CANON,
     )
 }
 """Attributes of a structure, in lists of structures and within ``member_of(…)``."""

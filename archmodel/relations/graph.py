@@ -1,7 +1,7 @@
 """Walks along relations: loads above and below a stone, its neighbours, the courses.
 
-Each question is a statement or two, whatever the size of the building, and can be asked of what was known at an
-earlier entry (`as_of`). A relation that is both computed and declared counts once.
+Each question is a statement or two, whatever the size of the building; `archmodel.database.as_known` asks them of an
+earlier day. A relation that is both computed and declared counts once.
 """
 
 import math
@@ -12,7 +12,7 @@ from sqlalchemy import ColumnElement, func, select, union_all
 from sqlalchemy.orm import Session, aliased
 
 from archmodel.relations.load_paths import LoadPath, LoadPathStone, load_path, place_of
-from archmodel.store.find_by_code import check_entry, no_such_code
+from archmodel.store.find_by_code import no_such_code
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import held_at
 from archmodel.tables.hierarchy import kinds_below
@@ -87,7 +87,7 @@ class NearStone:
     distance: float
 
 
-def carries(session: Session, code: str, as_of: int | None = None) -> tuple[Neighbour, ...]:
+def carries(session: Session, code: str) -> tuple[Neighbour, ...]:
     """List the stones that rest directly on this one.
 
     Raises
@@ -95,28 +95,22 @@ def carries(session: Session, code: str, as_of: int | None = None) -> tuple[Neig
     UsageError
         if there is no stone of this code or no such entry, here as in what follows; names the nearest codes
     """
-    return tuple(
-        neighbour for neighbour in neighbours(session, code, as_of) if neighbour.relation == "supports"
-    )
+    return tuple(neighbour for neighbour in neighbours(session, code) if neighbour.relation == "supports")
 
 
-def carried_by(session: Session, code: str, as_of: int | None = None) -> tuple[Neighbour, ...]:
+def carried_by(session: Session, code: str) -> tuple[Neighbour, ...]:
     """List the stones on which this one rests directly."""
-    return tuple(
-        neighbour for neighbour in neighbours(session, code, as_of) if neighbour.relation == "rests_on"
-    )
+    return tuple(neighbour for neighbour in neighbours(session, code) if neighbour.relation == "rests_on")
 
 
-def neighbours(session: Session, code: str, as_of: int | None = None) -> tuple[Neighbour, ...]:
+def neighbours(session: Session, code: str) -> tuple[Neighbour, ...]:
     """List every stone in any relation to this one, by relation and code.
 
     Parameters
     ----------
     session : reading or writing
     code : of the stone
-    as_of : number of an entry; None: what is held now
     """
-    check_entry(session, as_of)
     me = place_of(session, code).id
     sides = ((Relation.subject_id, Relation.object_id), (Relation.object_id, Relation.subject_id))
     rows = union_all(
@@ -124,7 +118,7 @@ def neighbours(session: Session, code: str, as_of: int | None = None) -> tuple[N
             select(Entity.code, Entity.kind, Relation.kind.label("relation"), Relation.subject_id)
             .add_columns(Relation.area, Relation.gap, Relation.declared)
             .join(Relation, theirs == Entity.id)
-            .where(mine == me, held_at(Relation, as_of))
+            .where(mine == me, held_at(Relation))
             for mine, theirs in sides
         )
     )
@@ -139,24 +133,19 @@ def neighbours(session: Session, code: str, as_of: int | None = None) -> tuple[N
     return tuple(found[key] for key in sorted(found))
 
 
-def courses_in_order(
-    session: Session, zone: str | None = None, as_of: int | None = None
-) -> tuple[CourseStones, ...]:
+def courses_in_order(session: Session, zone: str | None = None) -> tuple[CourseStones, ...]:
     """List the courses by zone and number, each with its stones from left to right.
 
     Parameters
     ----------
     session : reading or writing
     zone : code of the zone; None: all, the stones without a zone first
-    as_of : number of an entry, of which the members are; the structures have their names of now. None: what is
-        held now
 
     Raises
     ------
     UsageError
         if there is no such zone; names the nearest ones
     """
-    check_entry(session, as_of)
     part = aliased(Structure)
     statement = (
         select(Structure.code, part.code, Structure.number, Entity.code)
@@ -166,7 +155,7 @@ def courses_in_order(
         .where(
             Structure.kind.in_(kinds_below(Course)),
             Structure.superseded_id.is_(None),
-            held_at(Membership, as_of),
+            held_at(Membership),
         )
         .order_by(
             func.coalesce(part.code, ""), Structure.number, Structure.code, Membership.rank, Membership.id

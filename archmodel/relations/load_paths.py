@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import Any, Literal
 
-from sqlalchemy import CTE, ColumnElement, Row, and_, literal, or_, select
+from sqlalchemy import CTE, ColumnElement, Row, and_, literal, select
 from sqlalchemy.orm import Session
 
-from archmodel.store.find_by_code import check_entry, no_such_code
+from archmodel.store.find_by_code import no_such_code
 from archmodel.store.revisions import table_of
 from archmodel.tables.entities import Entity
 from archmodel.tables.relations import Relation
@@ -65,7 +65,7 @@ class LoadPath:
         return tuple(stone for stone in self.stones if stone.last)
 
 
-def load_path(session: Session, code: str, *, up: bool = False, as_of: int | None = None) -> LoadPath:
+def load_path(session: Session, code: str, *, up: bool = False) -> LoadPath:
     """Return the load path of a stone down to the ground or, upwards, of all stones that rest on it.
 
     Parameters
@@ -73,11 +73,9 @@ def load_path(session: Session, code: str, *, up: bool = False, as_of: int | Non
     session : reading or writing
     code : of the stone
     up : what it carries, instead of what carries it
-    as_of : number of an entry; None: what is held now
     """
-    check_entry(session, as_of)
     me = place_of(session, code).id
-    reached, holds, start, end = _reached(me, up, as_of)
+    reached, holds, start, end = _reached(me, up)
     entity = table_of(Entity)
     facts = (entity.c.code, entity.c.kind, entity.c.course, entity.c.zone)
     edges = (
@@ -109,17 +107,11 @@ def load_path(session: Session, code: str, *, up: bool = False, as_of: int | Non
     )
 
 
-def _reached(
-    me: int, up: bool, as_of: int | None
-) -> tuple[CTE, ColumnElement[bool], ColumnElement[int], ColumnElement[int]]:
+def _reached(me: int, up: bool) -> tuple[CTE, ColumnElement[bool], ColumnElement[int], ColumnElement[int]]:
     """Select the stones on the path, the condition of its steps, and start and end of a step; UNION ends circles."""
     columns = table_of(Relation).c
     start, end = (columns.object_id, columns.subject_id) if up else (columns.subject_id, columns.object_id)
-    ended = columns.superseded_id
-    holds = and_(columns.kind == "rests_on", ended.is_(None))
-    if as_of is not None:
-        known = or_(ended.is_(None), ended > as_of)
-        holds = and_(columns.kind == "rests_on", columns.entry_id <= as_of, known)
+    holds = and_(columns.kind == "rests_on", columns.superseded_id.is_(None))
     reached = select(literal(me).label("id")).cte("reached", recursive=True)
     reached = reached.union(select(end).join(reached, start == reached.c.id).where(holds))
     return reached, holds, start, end

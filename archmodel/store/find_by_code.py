@@ -11,14 +11,12 @@ from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from archmodel.store.bulk import batches
 from archmodel.tables.entities import Entity
-from archmodel.tables.entries import Entry, latest_entry
 from archmodel.tables.knowledge import Correction, Document, Material, Phase
 from archmodel.tables.structures import Structure
 from ground.errors import UsageError
 
 __all__ = [
     "Subjects",
-    "check_entry",
     "entity_numbers",
     "held_named",
     "held_or_none",
@@ -56,21 +54,6 @@ class Subjects:
         for owner, numbers in (("entity_id", self.entities), ("structure_id", self.structures)):
             for batch in batches(numbers):
                 yield owner, batch
-
-
-def check_entry(session: Session, at: int | None) -> None:
-    """Refuse a number that is not that of an entry; None means now.
-
-    Raises
-    ------
-    UsageError
-        naming the last entry
-    """
-    if at is not None and session.get(Entry, at) is None:
-        remedy = (
-            f"the last one is {latest_entry(session)}; list those of a stone by: moma show CODE --history"
-        )
-        raise UsageError(f"there is no entry {at}", remedy=remedy)
 
 
 def subjects(session: Session, stones: Iterable[str] = (), structures: Iterable[str] = ()) -> Subjects:

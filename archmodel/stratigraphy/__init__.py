@@ -1,6 +1,5 @@
-"""Stratigraphy: relations between units, their order in time, contradictions with dates, the matrix and its files.
+"""Stratigraphy: relations between units, their order in time, contradictions with dates, and GraphML.
 
-Public: `Link`, `Order`, `check_order`, `order_of` (order); `load_links`, `load_dates` (stored); `Contradiction`,
-`contradictions`, `date_bounds` (dates); `Matrix`, `draw`, `study` (report); `matrix_svg` (drawing); `matrix_page`
-(page); `read_graphml`, `write_graphml` (graphml).
+Public: `Link`, `Order`, `check_order`, `order_of` (order); `load_links`, `load_stones`, `load_units` (stored);
+`Contradiction`, `Dated`, `contradictions`, `date_bounds` (dates); `read_graphml`, `write_graphml` (graphml).
 """

@@ -8,10 +8,28 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from archmodel.stratigraphy.order import Link, Order
-from archmodel.stratigraphy.stored import Dated
 from archmodel.tables.stratigraphy import SYMMETRIC
 
-__all__ = ["Bounds", "Contradiction", "contradictions", "date_bounds"]
+__all__ = ["Bounds", "Contradiction", "Dated", "contradictions", "date_bounds"]
+
+
+@dataclass(frozen=True)
+class Dated:
+    """Phase of a unit.
+
+    Attributes
+    ----------
+    phase : its name
+    begins, ends : years; None if not known
+    """
+
+    phase: str
+    begins: int | None
+    ends: int | None
+
+    def __str__(self) -> str:
+        years = "–".join("?" if year is None else str(year) for year in (self.begins, self.ends))
+        return f"phase {self.phase}" if years == "?–?" else f"phase {self.phase}, {years}"
 
 
 @dataclass(frozen=True)

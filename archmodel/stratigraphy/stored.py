@@ -1,45 +1,18 @@
-"""Stratigraphy as the database has it: relations by code, units, and the dates of their phases."""
+"""Stratigraphy as the database has it: relations by code, units, and their members."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
-from sqlalchemy import FromClause, func, select
+from sqlalchemy import func, select
 from sqlalchemy.orm import Session, aliased
 
-from archmodel.query.api import find_rows
-from archmodel.query.inherited import statements_of_structures
-from archmodel.store.bulk import batches
-from archmodel.store.revisions import table_of
 from archmodel.stratigraphy.order import Link
-from archmodel.tables.base import Base
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import held_at
-from archmodel.tables.knowledge import OfPhase, Phase, Statement
-from archmodel.tables.opinions import preference, rule_of
 from archmodel.tables.relations import Membership
 from archmodel.tables.stratigraphy import Stratigraphy
 from archmodel.tables.structures import StratigraphicUnit, Structure
 
-__all__ = ["Dated", "load_dates", "load_links", "load_stones", "load_units"]
-
-
-@dataclass(frozen=True)
-class Dated:
-    """Phase of a unit.
-
-    Attributes
-    ----------
-    phase : its name
-    begins, ends : years; None if not known
-    """
-
-    phase: str
-    begins: int | None
-    ends: int | None
-
-    def __str__(self) -> str:
-        years = "–".join("?" if year is None else str(year) for year in (self.begins, self.ends))
-        return f"phase {self.phase}" if years == "?–?" else f"phase {self.phase}, {years}"
+__all__ = ["load_links", "load_stones", "load_units"]
 
 
 def load_links(session: Session, author: str | None = None) -> list[Link]:
@@ -79,25 +52,6 @@ def load_units(session: Session) -> list[str]:
     return list(session.scalars(units.order_by(Structure.id)))
 
 
-def load_dates(session: Session, codes: Sequence[str]) -> Mapping[str, Dated]:
-    """Return the phases of units and stones, by the opinion that holds: their own, or of the nearest structure."""
-    wanted = set(codes)
-    dated: dict[str, Dated] = {}
-    by_structure = _phases_of_structures(session)
-    for number, code in session.execute(select(Structure.id, Structure.code).where(held_at(Structure))):
-        if code in wanted and number in by_structure:
-            dated[code] = by_structure[number]
-    rest = sorted(wanted - dated.keys())
-    stones = {
-        code
-        for batch in batches(rest)
-        for code in session.scalars(select(Entity.code).where(Entity.code.in_(batch)))
-    }
-    if stones:
-        dated |= _phases_of_stones(session, stones)
-    return dated
-
-
 def load_stones(session: Session, codes: Sequence[str]) -> Mapping[str, tuple[str, ...]]:
     """Return the codes of the members of each unit, those of its parts too."""
     wanted, parents, names = set(codes), dict[int, int | None](), dict[int, str]()
@@ -118,35 +72,3 @@ def load_stones(session: Session, codes: Sequence[str]) -> Mapping[str, tuple[st
                 stones.setdefault(names[step], {})[stone] = None
             step = parents[step]
     return {code: tuple(members) for code, members in stones.items()}
-
-
-def _alias(cls: type[Base]) -> FromClause:
-    return table_of(cls).alias()
-
-
-def _phases_of_structures(session: Session) -> dict[int, Dated]:
-    """Return the phase of each structure, from the first opinion by distance and rule."""
-    of_structures = statements_of_structures(_alias, OfPhase.__kind__)
-    table, decisions = _alias(Statement), _alias(Statement)
-    rows = (
-        select(of_structures.c.structure_id, Phase.name, Phase.begins, Phase.ends)
-        .select_from(of_structures)
-        .join(table, table.c.id == of_structures.c.statement_id)
-        .join(Phase, Phase.id == table.c.phase_id)
-        .order_by(of_structures.c.distance, *preference(rule_of(session, OfPhase.__kind__), table, decisions))
-    )
-    phases: dict[int, Dated] = {}
-    for number, *values in session.execute(rows):
-        phases.setdefault(number, Dated(*values))
-    return phases
-
-
-def _phases_of_stones(session: Session, codes: set[str]) -> dict[str, Dated]:
-    rows = find_rows(session, "entity", columns=["code", "phase", "phase_begins", "phase_ends"])
-    dated: dict[str, Dated] = {}
-    for row in rows:
-        code, phase, begins, ends = row.values()
-        if code in codes and phase is not None:
-            years = [year if isinstance(year, int) else None for year in (begins, ends)]
-            dated[str(code)] = Dated(str(phase), *years)
-    return dated

@@ -13,6 +13,7 @@ from archmodel.tables import (
     stratigraphy,  # noqa: F401
     structures,  # noqa: F401
     surveys,  # noqa: F401
+    terms,  # noqa: F401
 )
 from archmodel.tables.base import Base
 

@@ -1,7 +1,11 @@
-"""Kinds that users register, of stones or of structures: rows of the database, and classes while it is open."""
+"""Kinds that users register, of stones or of structures: rows of the database, and classes while it is open.
+
+Canonical proportions are statements about kinds, registered or built in: they are replaced and withdrawn.
+"""
 
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 from weakref import WeakSet
 
@@ -10,23 +14,30 @@ from sqlalchemy.orm import Mapped, Session, mapped_column
 
 from archmodel.tables.base import JSON_TYPE, Base, StoneAttribute
 from archmodel.tables.entities import Entity, kinds
-from archmodel.tables.hierarchy import Kind, kinds_below
+from archmodel.tables.entries import Recorded, held_at, held_index
+from archmodel.tables.hierarchy import Kind, kind_chain, kind_of, kinds_below, kinds_in
 from archmodel.tables.structures import Structure, structure_kinds
 from ground.errors import DatabaseError
 
 __all__ = [
     "NO_ATTRIBUTES",
+    "TOLERANCE",
+    "Canon",
+    "Proportions",
     "RegisteredKind",
     "all_kinds",
+    "canons",
     "declare_registered",
     "refuse_unknown_kinds",
     "release_registered",
 ]
 
-NO_ATTRIBUTES = (
-    "a kind of structure, and those have neither canonical proportions nor attributes of their own"
-)
+NO_ATTRIBUTES = "a kind of structure, and those have no attributes of their own"
 """What is wrong with a kind of structure that has them."""
+
+TOLERANCE = 1.0 / 24.0
+"""Tolerance of canonical proportions without a stated one, as a share of the canonical number [-]: half an inch in a
+foot of twelve. Rules of proportion count whole inches, and a stone cut to the nearest one departs by half of one."""
 
 
 def all_kinds() -> Mapping[str, type[Kind]]:
@@ -44,7 +55,7 @@ class RegisteredKind(Base):
     definition : one sentence
     canon : canonical proportions, as a query expression; None: those of the parent
     attributes : of its own, {name: [unit, definition]}; the unit is "-" for numbers without one, None for texts;
-        kinds of structures have neither proportions nor attributes
+        kinds of structures have none
     """
 
     __tablename__ = "kind"
@@ -62,6 +73,67 @@ class RegisteredKind(Base):
         return self.name, self.parent, self.definition, self.canon, tuple(own.items())
 
 
+class Canon(Recorded, Base):
+    """Canonical proportions of a kind, as somebody states them.
+
+    Attributes
+    ----------
+    kind : name of the kind, of stones or of structures
+    proportions : query expression over its attributes; None: those that the program or the registration of the kind
+        gave it were withdrawn
+    tolerance : share of the canonical number by which it may be missed [-]; None: not stated
+    """
+
+    __tablename__ = "canon"
+    __table_args__ = (held_index("ix_canon_kind", "kind"),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    kind: Mapped[str]
+    proportions: Mapped[str | None]
+    tolerance: Mapped[float | None]
+    supersedes_id: Mapped[int | None] = mapped_column(ForeignKey("canon.id"))
+
+
+@dataclass(frozen=True)
+class Proportions:
+    """Canonical proportions that hold for a kind.
+
+    Attributes
+    ----------
+    kind : of which they were stated: itself, or a more general one
+    expression : query expression
+    tolerance : share of the canonical number [-]; None: not stated
+    entry : number of the entry that states them; None: they came with the kind
+    """
+
+    kind: str
+    expression: str
+    tolerance: float | None = None
+    entry: int | None = None
+
+
+def canons(session: Session | None) -> dict[str, Proportions]:
+    """Return the canonical proportions of all kinds that have some: their own, or those of the nearest kind above."""
+    held = {}
+    if session is not None:
+        session.flush()
+        held = {one.kind: one for one in session.scalars(select(Canon).where(held_at(Canon)))}
+    known: dict[str, type[Kind]] = {**kinds_in(session, Entity), **kinds_in(session, Structure)}
+    found: dict[str, Proportions] = {}
+    for name, cls in known.items():
+        for one in reversed(kind_chain(cls)):
+            kind, own = kind_of(one), one.__dict__.get("__canon__")
+            if (row := held.get(kind)) is not None:
+                if row.proportions is not None:
+                    found[name] = Proportions(kind, row.proportions, row.tolerance, row.entry_id)
+                    break
+            elif "__canon__" in one.__dict__:
+                if own is not None:
+                    found[name] = Proportions(kind, own)
+                break
+    return found
+
+
 _CLASSES: dict[tuple[object, ...], type[Kind]] = {}
 """Every class made in this process, by its parent and definition: a class cannot be unmade, but it can be reused."""
 
@@ -75,7 +147,7 @@ def declare_registered(session: Session) -> None:
     ------
     DatabaseError
         if another open database gives one of the names to something else, a parent is not known, or a kind of
-        structure has proportions or attributes
+        structure has attributes
     """
     user = session.get_bind().dialect
     declared: set[type[Kind]] = set()
@@ -115,8 +187,8 @@ def _declared(kind: RegisteredKind) -> type[Kind]:
     """Return the class of a kind, made or reused."""
     known = all_kinds()
     held, parent = known.get(kind.name), known[kind.parent]
-    if issubclass(parent, Structure) and (kind.canon is not None or kind.attributes):
-        raise DatabaseError(f"{kind.name} is {NO_ATTRIBUTES}", remedy="leave out canon and attributes")
+    if issubclass(parent, Structure) and kind.attributes:
+        raise DatabaseError(f"{kind.name} is {NO_ATTRIBUTES}", remedy="leave out attributes")
     key = (parent, *kind.says())
     cls = _CLASSES.get(key)
     if held is not None and held is not cls:

@@ -9,7 +9,7 @@ import typer
 
 from ground.errors import UsageError
 from moma.cli.console import reporting, say
-from moma.cli.options import DEFAULT_DB, Common, Db, Verbose, check_ending
+from moma.cli.options import DEFAULT_DB, At, Common, Db, Verbose, check_ending
 
 __all__ = ["export", "import_", "migrate", "serve", "view"]
 
@@ -165,6 +165,7 @@ def view(
             "--scale", metavar="N", min=1, help="1 : N of the elevation; default: fits a sheet of A4."
         ),
     ] = None,
+    at: At = None,
     common: Common,
 ) -> None:
     """Write one page, without network, in which the stones can be turned, searched and coloured."""
@@ -174,12 +175,12 @@ def view(
     check_ending(out, ".html", ".htm")
     check_ending(elevation, ".svg")
     if pages:
-        for name, given in (("--where", where), ("--run", run), ("--elevation", elevation)):
+        for name, given in (("--where", where), ("--run", run), ("--elevation", elevation), ("--at", at)):
             if given:
                 raise UsageError(f"{name} with pages", remedy="it is for the stones of a database")
         done = write_comparison_view(pages, out)
     else:
-        done = write_view(common.db, out, kind, where or (), run, title, elevation, scale)
+        done = write_view(common.db, out, kind, where or (), run, title, elevation, scale, at)
     if common.json:
         print(as_json({"page": str(done.path), "stones": done.stones, "scale": done.scale}))
         return

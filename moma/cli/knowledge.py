@@ -97,9 +97,9 @@ def matrix(
     """Order stratigraphic units in time: matrix of Harris, relative dates, contradictions with phases."""
     from archmodel.database.as_known import as_known, entry_named
     from archmodel.database.session import open_database
-    from archmodel.stratigraphy.report import draw, study
     from moma.cli.text.formats import as_json
     from moma.cli.text.matrix import matrix_lines
+    from pipelines.draw.stratigraphy.matrix import draw, study
 
     with open_database(common.db, create=False) as database, database.session(read_only=True) as session:
         entry = None if at is None else entry_named(session, at)

@@ -73,13 +73,15 @@ def load_path(
     common: Common,
 ) -> None:
     """Show all stones that carry a stone, directly or through others; with --up, all that it carries."""
-    from archmodel.database.as_known import entry_named
+    from archmodel.database.as_known import as_known, entry_named
     from archmodel.database.session import open_database
     from archmodel.relations.graph import load_path as follow
     from moma.cli.text.formats import as_json, as_table, some
 
     with open_database(common.db, create=False) as database, database.session(read_only=True) as session:
-        path = follow(session, code, up=up, as_of=None if at is None else entry_named(session, at))
+        entry = None if at is None else entry_named(session, at)
+        with as_known(session, entry) as then:
+            path = follow(then, code, up=up)
     if common.json:
         print(as_json(asdict(path)))
         return

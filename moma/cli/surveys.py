@@ -297,6 +297,14 @@ def survey_report(
         Path | None,
         typer.Option("--out", metavar="DIR", help="Folder for the report; default: out/survey-FILE."),
     ] = None,
+    since: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--since",
+            metavar="FILE",
+            help="Survey of an earlier campaign: compare stone by stone; repeatable.",
+        ),
+    ] = None,
     mortar: Annotated[
         Level | None, typer.Option(help="Quality of the mortar, for the masonry quality index.")
     ] = None,
@@ -317,7 +325,9 @@ def survey_report(
     levels = {"MM": mortar, "SM": state}
     given = {name: given_grade(level.value) for name, level in levels.items() if level is not None}
     with progress_bars() as listener:
-        report = report_surveys(paths, folder, name, options, listener, given, overwrite, orthophoto)
+        report = report_surveys(
+            paths, folder, name, options, listener, given, overwrite, orthophoto, since or ()
+        )
     for warning in report.study.warnings:
         say(f"warning: {warning}")
     lines = survey_report_lines(report, verbose)

@@ -22,6 +22,7 @@ from archmodel.assertions.statements import (
     say_made_of,
     say_mason_mark,
     say_note,
+    say_observation,
     say_of_phase,
     without_replaced,
 )
@@ -31,8 +32,18 @@ from archmodel.store.find_by_code import Subjects, held_or_none, no_such_code
 from archmodel.store.revisions import NOTHING, RowCounts
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Entry
-from archmodel.tables.knowledge import MadeOf, MasonMark, Material, Note, OfPhase, Phase, Statement
+from archmodel.tables.knowledge import (
+    MadeOf,
+    MasonMark,
+    Material,
+    Note,
+    Observation,
+    OfPhase,
+    Phase,
+    Statement,
+)
 from archmodel.tables.structures import Structure
+from archmodel.tables.terms import term_for
 from ground.errors import UsageError
 from ground.tables.columns import places_of, plain
 from ground.tables.table import read_table
@@ -57,6 +68,10 @@ COLUMNS: Mapping[str, Sequence[str]] = {
         *("mark", "mason mark", "masons mark", "mason's mark"),
         *("Steinmetzzeichen", "Zeichen", "Marke", "SMZ"),
     ),
+    "observation": (
+        *("observation", "damage", "type of damage", "damage type"),
+        *("Schaden", "Schadensart", "Schadensbild", "Schadbild", "Beobachtung"),
+    ),
     "remark": ("remark", "remarks", "note", "comment", "Bemerkung", "Bemerkungen", "Anmerkung", "Notiz"),
 }
 """Names of columns by what they state; in doubt the first."""
@@ -70,6 +85,7 @@ _STATED: Mapping[str, type[Statement]] = {
     "phase": OfPhase,
     "material": MadeOf,
     "mark": MasonMark,
+    "observation": Observation,
     "remark": Note,
 }
 _REMEDY = "name the columns in the first line: stone;phase;material;mark"
@@ -284,7 +300,7 @@ def record_attribute_list(
     outcome: dict[str, RowCounts] = {}
     for what, stated in listed.values.items():
         codes: dict[str, list[str]] = {}
-        known = _known(session, what) if listed.own and what != "remark" else {}
+        known = _known(session, what) if listed.own and what not in ("observation", "remark") else {}
         same = 0
         for value, code in stated:
             if known.get(code) == value:
@@ -318,7 +334,7 @@ def _subjects(things: Sequence[Thing]) -> Subjects:
 def _declare(session: Session, entry: Entry, what: str, value: str) -> RowCounts:
     if what == "phase" and held_or_none(session, Phase, value) is None:
         return declare_phase(session, entry, value)
-    if what == "material" and held_or_none(session, Material, value) is None:
+    if what == "material" and held_or_none(session, Material, term_for(session, what, value)) is None:
         return declare_material(session, entry, value)
     return NOTHING
 
@@ -331,5 +347,7 @@ def _say(session: Session, entry: Entry, what: str, value: str, about: Subjects,
             return say_made_of(session, entry, about, value, remark)
         case "mark":
             return say_mason_mark(session, entry, about, value, remark=remark)
+        case "observation":
+            return say_observation(session, entry, about, value, remark=remark)
         case _:
             return say_note(session, entry, about, "remark", Remark(text=value, stated_on=remark.stated_on))

@@ -5,11 +5,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated
 
-from archmodel.assertions.declare import DOCUMENT_TYPES
-from archmodel.tables.knowledge import OBSERVATIONS
 from archmodel.tables.opinions import DISPUTABLE, RULES
 from archmodel.tables.relations import RELATIONS
 from archmodel.tables.stratigraphy import DEFINITIONS, INVERSE
+from archmodel.tables.terms import VOCABULARIES
 from pipelines.toml.keys import Setting, Stones, Table, Texts, Vector, Year, keys_of
 from pipelines.toml.schema import Key
 
@@ -17,7 +16,7 @@ __all__ = ["ABOUT", "ARRAYS", "ATTRIBUTE", "CITED", "PROPERTY", "RECORD", "WHO",
 
 WITHDRAWN = (
     "made_of", "of_phase", "decision", "mark", "observation", "reference", "note", "relation", "member", "material",
-    "property", "phase", "document", "structure", "hypothesis",
+    "property", "phase", "document", "structure", "hypothesis", "canon", "term",
 )  # fmt: skip
 """Records that can be withdrawn; a depth is replaced by another one, a registered kind stays."""
 
@@ -77,6 +76,36 @@ CITED = keys_of(_Cited)
 _STATEMENT_KEYS = (*ABOUT, *CITED, *WHO)
 
 
+_TOLERANCE = Setting("Share of the canonical number by which it may be missed.", "-", above=0, below=1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _CanonTable:
+    """Table [[canon]]."""
+
+    kind: Annotated[str, Setting("Kind of stones or of structures.")]
+    proportions: Annotated[str, Setting("Query expression over its attributes.")]
+    tolerance: Annotated[float | None, _TOLERANCE] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _TermTable:
+    """Table [[term]]."""
+
+    vocabulary: Annotated[str, Setting("Which one it extends.", choices=tuple(VOCABULARIES))]
+    name: Annotated[str, Setting("The term.")]
+    definition: Annotated[
+        str | None, Setting("One sentence; needed for new types of observations and documents.")
+    ] = None
+    broader: Annotated[str | None, Setting("The term of which it is a case.")] = None
+    labels: Annotated[
+        Table,
+        Setting(
+            'Labels by language, the preferred one first: `{ de = "Riss", fr = ["fissure", "lézarde"] }`.'
+        ),
+    ] = field(default_factory=dict)
+
+
 @dataclass(frozen=True, kw_only=True)
 class _KindTable:
     """Table [[kind]]."""
@@ -87,10 +116,10 @@ class _KindTable:
     canon: Annotated[
         str | None,
         Setting(
-            "Canonical proportions, as a query expression over attributes of the stone; default: those of "
-            "the parent."
+            "Canonical proportions, as a query expression over its attributes; default: those of the parent."
         ),
     ] = None
+    tolerance: Annotated[float | None, _TOLERANCE] = None
     attributes: Annotated[Table, Setting("Attributes of this kind: `{ name = { unit, definition } }`.")] = (
         field(default_factory=dict)
     )
@@ -153,7 +182,7 @@ class _DocumentTable:
     """Table [[document]]."""
 
     code: Annotated[str, Setting("Its name in this database.")]
-    type: Annotated[str, Setting("What it is.", choices=DOCUMENT_TYPES)]
+    type: Annotated[str, Setting("What it is: a term of the vocabulary `document`.")]
     title: Annotated[str, Setting("In words.")]
     place: Annotated[str | None, Setting("Where to find it: a path, a URL, an archive number.")] = None
     by: Annotated[str | None, Setting("Author of the document itself.")] = None
@@ -226,7 +255,7 @@ class _DepthTable:
 class _ObservationTable:
     """Table [[observation]]."""
 
-    type: Annotated[str, Setting("Type of damage or remark.", choices=tuple(OBSERVATIONS))]
+    type: Annotated[str, Setting("Type of damage or remark: a term of the vocabulary `observation`.")]
     severity: Annotated[
         int | None, Setting("From 0 (traces) to 4 (lost, or about to be).", at_least=0, at_most=4)
     ] = None
@@ -262,9 +291,13 @@ class _WithdrawTable:
 
     what: Annotated[str, Setting("What is withdrawn.", choices=WITHDRAWN)]
     name: Annotated[
-        str | None, Setting("Of a material, phase, document or structure; or of the property's material.")
+        str | None,
+        Setting(
+            "Of a material, phase, document, structure, term or kind with a canon; or of the property's material."
+        ),
     ] = None
     property: Annotated[str | None, Setting("Name of the property.")] = None
+    vocabulary: Annotated[str | None, Setting("Of the term.", choices=tuple(VOCABULARIES))] = None
     kind: Annotated[str | None, Setting("Of the relation.", choices=_RELATIONS)] = None
     to: Annotated[Texts, Setting("The objects of the relation.")] = ()
     match: Annotated[Table, Setting('Only statements with these values: `{ sign = "A" }`.')] = field(
@@ -303,6 +336,8 @@ class _NoteTable:
 
 ARRAYS: Mapping[str, tuple[Key, ...]] = {
     "kind": (*keys_of(_KindTable), *WHO),
+    "canon": (*keys_of(_CanonTable), *WHO),
+    "term": (*keys_of(_TermTable), *WHO),
     "withdraw": (*keys_of(_WithdrawTable), *ABOUT, *WHO),
     "correction": (*keys_of(_CorrectionTable), *WHO),
     "material": (*keys_of(_MaterialTable), *WHO),

@@ -9,6 +9,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from archmodel.assertions.arrange import declare_members, declare_relation, declare_structure
+from archmodel.assertions.canons import declare_canon, withdraw_canon
 from archmodel.assertions.correct import correct
 from archmodel.assertions.declare import PropertyValue, declare_document, declare_material, declare_phase
 from archmodel.assertions.opinions import decide, set_rule
@@ -29,6 +30,7 @@ from archmodel.assertions.stratigraphy import (
     subjects_named,
     withdraw_stratigraphy,
 )
+from archmodel.assertions.terms import declare_term, withdraw_term
 from archmodel.assertions.withdraw import withdraw_members, withdraw_relations, withdraw_statements
 from archmodel.query.api import find
 from archmodel.store.find_by_code import Subjects, entity_numbers, held_or_none, structure_numbers, subjects
@@ -129,14 +131,30 @@ def record_table(
 
 def _kind(work: _Work) -> RowCounts:
     own = {name: (one["unit"], one["definition"]) for name, one in work["attributes"].items()}
-    return register_kind(
+    canon, tolerance = work["canon"], work["tolerance"]
+    if tolerance is not None and canon is None:
+        raise UsageError("a tolerance without canonical proportions", remedy="give canon = …")
+    names = work["name"], work["parent"], work["definition"]
+    plain = canon if tolerance is None else None
+    outcome = register_kind(work.session, work.entry, *names, canon=plain, attributes=own)
+    if tolerance is not None and not outcome.unchanged:
+        outcome += declare_canon(work.session, work.entry, work["name"], canon, tolerance)
+    return outcome
+
+
+def _canon(work: _Work) -> RowCounts:
+    return declare_canon(work.session, work.entry, work["kind"], work["proportions"], work["tolerance"])
+
+
+def _term(work: _Work) -> RowCounts:
+    return declare_term(
         work.session,
         work.entry,
+        work["vocabulary"],
         work["name"],
-        work["parent"],
         work["definition"],
-        canon=work["canon"],
-        attributes=own,
+        broader=work["broader"],
+        labels=work["labels"],
     )
 
 
@@ -260,7 +278,13 @@ def _correction(work: _Work) -> RowCounts:
 
 
 def _withdraw(work: _Work) -> RowCounts:
-    what = work["what"]
+    what, name = work["what"], work["name"]
+    if what in ("canon", "term") and name is None:
+        raise UsageError(f"the {what} has no name", remedy="give name = …")
+    if what == "canon":
+        return withdraw_canon(work.session, work.entry, name)
+    if what == "term":
+        return withdraw_term(work.session, work.entry, work["vocabulary"] or "observation", name)
     if what in _NAMED:
         return _withdraw_named(work, what)
     if what == "relation":
@@ -314,6 +338,8 @@ def _withdraw_named(work: _Work, what: str) -> RowCounts:
 
 _RECORDERS: Mapping[str, Callable[[_Work], RowCounts]] = {
     "kind": _kind,
+    "canon": _canon,
+    "term": _term,
     "withdraw": _withdraw,
     "rule": _rule,
     "correction": _correction,

@@ -10,10 +10,12 @@ import numpy as np
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
+from archmodel.database.as_known import as_known, entry_named
 from archmodel.database.session import open_database
 from archmodel.query.api import FoundFace, find_faces, find_rows
 from archmodel.store.stone_arrays import ENTITY, id_conditions, stone_shapes
 from archmodel.tables.entities import Entity
+from archmodel.tables.entries import Entry
 from archmodel.tables.surveys import Survey
 from ground.errors import UsageError
 from mechanics.arrays import Array
@@ -25,7 +27,15 @@ from pipelines.reports.page.model import Model
 from pipelines.reports.page.scenes import with_known
 from pipelines.reports.page.surfaces import stones_of
 
-__all__ = ["View", "database_model", "view_page", "write_comparison_view", "write_elevation", "write_view"]
+__all__ = [
+    "View",
+    "as_known_text",
+    "database_model",
+    "view_page",
+    "write_comparison_view",
+    "write_elevation",
+    "write_view",
+]
 
 _FACING = 0.2  # length of the mean normal from which stones have one direction [-]
 _MOST = 500  # rows of the table of stones
@@ -127,6 +137,7 @@ def write_view(
     title: str | None = None,
     drawing: Path | None = None,
     scale: int | None = None,
+    at: str | None = None,
 ) -> View:
     """Write the page of the stones of a database that a query finds.
 
@@ -138,6 +149,7 @@ def write_view(
     title : of the building; None: the name of the first survey
     drawing : SVG of the main elevation; None: none
     scale : 1 : scale of it; None: so that it fits a sheet of A4
+    at : number of an entry, or a date: as it was known then; None: now
 
     Raises
     ------
@@ -145,14 +157,25 @@ def write_view(
     DatabaseError : the database cannot be read
     """
     with open_database(url, create=False) as database, database.session(read_only=True) as session:
-        name = title or session.scalar(select(Survey.name).order_by(Survey.id)) or "MOMA"
-        text, stones = view_page(session, name, kind, where, run)
-        model = None if drawing is None else database_model(session, name, kind, where, run)
+        entry = None if at is None else entry_named(session, at)
+        with as_known(session, entry) as then:
+            name = title or then.scalar(select(Survey.name).order_by(Survey.id)) or "MOMA"
+            if entry is not None:
+                name = f"{name}, {as_known_text(then, entry)}"
+            text, stones = view_page(then, name, kind, where, run)
+            model = None if drawing is None else database_model(then, name, kind, where, run)
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text, encoding="utf-8")
     if model is None or drawing is None:
         return View(path, stones)
     return View(path, stones, write_elevation(model, drawing, scale))
+
+
+def as_known_text(session: Session, entry: int) -> str:
+    """Return which knowledge the page shows, for its title."""
+    recorded = session.scalar(select(Entry.recorded_at).where(Entry.id == entry))
+    day = "" if recorded is None else f" of {recorded.date().isoformat()}"
+    return f"as known at entry {entry}{day}"
 
 
 def write_comparison_view(pages: Sequence[Path], path: Path) -> View:

@@ -91,6 +91,8 @@ def _row(table: Table, number: int, rows: int, random: Random, known: dict[str, 
             row[column.name] = one[target.name]
         elif column.primary_key and isinstance(column.type, Integer):
             row[column.name] = 1 + 3 * number
+        elif table.name == "canon" and column.name in ("kind", "proportions"):
+            row[column.name] = f"kind_{number}" if column.name == "kind" else "depth > 1"
         elif column.name == "kind":
             row[column.name] = _kind(table, random)
         elif column.name in ("code", "name", "sha256") or (

@@ -7,10 +7,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from archmodel.assertions.declare import DOCUMENT_TYPES, PROPERTIES
+from archmodel.assertions.declare import PROPERTIES
 from archmodel.tables.knowledge import OBSERVATIONS
 from archmodel.tables.relations import RELATIONS
 from archmodel.tables.structures import structure_kinds
+from archmodel.tables.terms import DOCUMENT_TYPES
 from moma.cli import app
 from pipelines.record.file import read_record
 from pipelines.record.keys import ABOUT, ARRAYS, ATTRIBUTE, CITED, PROPERTY, RECORD, WHO, WITHDRAWN

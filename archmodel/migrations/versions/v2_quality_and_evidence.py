@@ -1,4 +1,4 @@
-"""Version 2: quality of masonry, joint and evidence of measurements, cells of disks, opinions, stratigraphy.
+"""Version 2: quality of masonry, joint and evidence, cells of disks, opinions, stratigraphy, canons, terms.
 
 Statements of phase and material that those of other authors superseded are held again beside them. Programs between
 both versions made databases that have some of these columns and say that they are of version 1; what they have stays.
@@ -47,6 +47,8 @@ _NEWER = (
 _OBJECTS = {"object_entity_id": "entity", "object_structure_id": "structure"}
 """References of stratigraphic relations, and what they are to."""
 
+_NEW = ("opinion_rule", "canon", "term")
+
 _QUALITY = [f"mqi_{way}_{end}" for way in ("vertical", "in_plane", "out_of_plane") for end in ("low", "high")]
 
 
@@ -67,27 +69,50 @@ def _added() -> Mapping[str, tuple[Column[object], ...]]:
     }
 
 
-def _rules() -> Table:
-    """Return the new table, beside those that it refers to."""
+def _tables() -> MetaData:
+    """Return the new tables, beside those that they refer to."""
     layout = MetaData()
     metadata.tables["entry"].to_metadata(layout)
-    return Table(
-        "opinion_rule",
-        layout,
-        Column("id", Integer, primary_key=True),
-        Column("about", TEXT, nullable=False),
-        Column("rule", TEXT, nullable=False),
-        Column("authors", JSON, nullable=False),
-        Column("entry_id", Integer, ForeignKey("entry.id"), nullable=False),
-        Column("superseded_id", Integer, ForeignKey("entry.id")),
-        Index(
-            "ix_opinion_rule_about",
-            "about",
-            unique=True,
-            sqlite_where=text("superseded_id IS NULL"),
-            postgresql_where=text("superseded_id IS NULL"),
+    contents = {
+        "opinion_rule": (
+            ("ix_opinion_rule_about", "about"),
+            Column("about", TEXT, nullable=False),
+            Column("rule", TEXT, nullable=False),
+            Column("authors", JSON, nullable=False),
         ),
-    )
+        "canon": (
+            ("ix_canon_kind", "kind"),
+            Column("kind", TEXT, nullable=False),
+            Column("proportions", TEXT),
+            Column("tolerance", Double),
+            Column("supersedes_id", Integer, ForeignKey("canon.id")),
+        ),
+        "term": (
+            ("ix_term_name", "vocabulary", "name"),
+            Column("vocabulary", TEXT, nullable=False),
+            Column("name", TEXT, nullable=False),
+            Column("definition", TEXT),
+            Column("broader", TEXT),
+            Column("labels", JSON, nullable=False),
+            Column("supersedes_id", Integer, ForeignKey("term.id")),
+        ),
+    }
+    for name, (index, *columns) in contents.items():
+        Table(
+            name,
+            layout,
+            Column("id", Integer, primary_key=True),
+            *columns,
+            Column("entry_id", Integer, ForeignKey("entry.id"), nullable=False),
+            Column("superseded_id", Integer, ForeignKey("entry.id")),
+            Index(
+                *index,
+                unique=True,
+                sqlite_where=text("superseded_id IS NULL"),
+                postgresql_where=text("superseded_id IS NULL"),
+            ),
+        )
+    return layout
 
 
 def upgrade() -> None:
@@ -107,7 +132,10 @@ def upgrade() -> None:
             f"CREATE INDEX ix_statement_chosen ON statement (chosen_id){where}",
         ):
             connection.execute(text(sql))
-        _rules().create(connection)
+    tables = _tables().tables
+    for name in _NEW:
+        if not inspect(connection).has_table(name):
+            tables[name].create(connection)
     there = {one["name"] for one in inspect(connection).get_columns("statement")}
     for name, target in _OBJECTS.items():
         if name not in there:
@@ -124,7 +152,7 @@ def downgrade() -> None:
         "DELETE FROM statement WHERE kind IN ('decision', 'stratigraphy')",
         f"UPDATE statement SET superseded_id = ({_NEWER.format('MAX(n.entry_id)')}) "
         f"WHERE {_HELD} AND EXISTS ({_NEWER.format('1')})",
-        "DROP TABLE opinion_rule",
+        *(f"DROP TABLE {name}" for name in _NEW),
         "DROP INDEX ix_statement_chosen",
     ):
         connection.execute(text(sql))
@@ -193,6 +221,8 @@ def losses(connection: Connection) -> Iterator[str]:
         ("decisions", "SELECT COUNT(*) FROM statement WHERE kind = 'decision'"),
         ("stratigraphic relations", "SELECT COUNT(*) FROM statement WHERE kind = 'stratigraphy'"),
         ("rules of opinions", "SELECT COUNT(*) FROM opinion_rule"),
+        ("canonical proportions", "SELECT COUNT(*) FROM canon"),
+        ("terms", "SELECT COUNT(*) FROM term"),
         (
             "opinions beside later ones",
             f"SELECT COUNT(*) FROM statement WHERE {_HELD} AND EXISTS ({_NEWER.format('1')})",

@@ -2,23 +2,24 @@
 
 from collections.abc import Mapping
 
-from sqlalchemy import FromClause, case, exists, func, null, or_, select
+from sqlalchemy import FromClause, case, exists, func, literal, null, or_, select
 
 from archmodel.query.attributes import attributes_of
 from archmodel.query.columns import DOCUMENTING
 from archmodel.query.functions.usages import Ask, Condition, tokens
 from archmodel.query.grammar import Call, parse
 from archmodel.query.inherited import entities_with_statement, held
-from archmodel.query.names import author_named, document_named, mark_named, meant
+from archmodel.query.names import author_named, document_named, marks_named, meant, terms_named
 from archmodel.query.scope import Scope, StructureScope
 from archmodel.query.tokens import Token, complaint
-from archmodel.tables.entities import Entity, canon_of, kind_named
+from archmodel.tables.entities import Entity, kind_named
 from archmodel.tables.entries import Entry
 from archmodel.tables.hierarchy import kinds_below, kinds_in
-from archmodel.tables.knowledge import OBSERVATIONS, Correction, Statement
+from archmodel.tables.knowledge import Correction, Statement
 from archmodel.tables.opinions import DISPUTABLE
+from archmodel.tables.registered import Proportions, canons
 from archmodel.tables.runs import MechanismStone
-from archmodel.tables.structures import structure_kind_named
+from archmodel.tables.structures import Structure, structure_kind_named
 from ground.errors import QueryError, UsageError
 
 __all__ = [
@@ -55,23 +56,18 @@ def has_mark(scope: Scope, call: Call, ask: Ask) -> Condition:
         said.c.entity_id == scope.entity.c.id,
         said.c.kind == "mason_mark",
     ]
-    conditions += [said.c.sign == mark_named(scope.context, sign) for sign in tokens(call, 0, 1)]
+    conditions += [said.c.sign.in_(marks_named(scope.context, sign)) for sign in tokens(call, 0, 1)]
     return _any_row(scope, *conditions)
 
 
 def observed(scope: Scope, call: Call, ask: Ask) -> Condition:
     """Test for observations of the stone, and of its structures if it has none of their type."""
     values = tokens(call, 0, 1, 2)
-    wanted = {}
-    if values:
-        wanted["type"] = type_ = values[0].text.lower()
-        if type_ not in OBSERVATIONS:
-            remedy = meant(type_, OBSERVATIONS, "the types")
-            raise complaint(values[0], f"unknown type of observation {values[0].text[:40]!r}", remedy)
+    types = terms_named(scope.context, "observation", values[0]) if values else []
     least = _severity(values[1]) if len(values) == 2 else None
 
     def conditions(said: FromClause) -> list[Condition]:
-        of_type = [said.c[name] == value for name, value in wanted.items()]
+        of_type = [said.c.type.in_(types)] if types else []
         return of_type if least is None else [*of_type, said.c.severity >= least]
 
     context = scope.context
@@ -177,23 +173,31 @@ def is_a(scope: Scope | StructureScope, call: Call, ask: Ask) -> Condition:
         raise complaint(name, error.what, error.remedy) from None
 
 
-def canonical(scope: Scope, call: Call, ask: Ask) -> Condition:
-    """Test for the proportions that theory asks of its kind, stated in the query language itself."""
+def canonical(scope: Scope | StructureScope, call: Call, ask: Ask) -> Condition:
+    """Test for the proportions that theory asks of its kind, within their tolerance where one is stated."""
     tokens(call, 0)
-    with_canon: dict[str, list[str]] = {}
-    for kind, cls in kinds_in(scope.context.session, Entity).items():
-        if (canon := canon_of(cls)) is not None:
-            with_canon.setdefault(canon, []).append(kind)
-    if scope.context.within_canon:
+    context, kind = scope.context, scope.entity.c.kind if isinstance(scope, Scope) else scope.structure.c.kind
+    root = Entity if isinstance(scope, Scope) else Structure
+    if context.within_canon:
         raise complaint(call.function, "canonical proportions cannot refer to canonical()")
-    scope.context.within_canon = True
+    known = kinds_in(context.session, root)
+    with_canon: dict[Proportions, list[str]] = {}
+    for name, canon in context.once("canons", lambda: canons(context.session)).items():
+        if name in known:
+            with_canon.setdefault(canon, []).append(name)
     cases = []
     for canon, names in with_canon.items():
         try:
-            cases.append((scope.entity.c.kind.in_(names), ask(scope, parse(canon))))
+            if canon.tolerance is None:
+                context.within_canon = True
+                met = ask(scope, parse(canon.expression))
+            else:
+                context.within_canon = False
+                met = ask(scope, parse("departs_from_canon <= 1"))
+            cases.append((kind.in_(names), met))
         except QueryError as error:
             what = f"the canonical proportions of {' and '.join(names)} cannot be understood: {error}"
             raise complaint(call.function, what) from None
-    scope.context.within_canon = False
+    context.within_canon = False
     # Neither true nor false for kinds that have none.
-    return case(*cases, else_=null())
+    return case(*cases, else_=null()) if cases else null().is_(literal(True))

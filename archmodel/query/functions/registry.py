@@ -7,6 +7,8 @@ from typing import Any
 from archmodel.query.functions import knowledge as told
 from archmodel.query.functions import relations as related
 from archmodel.query.functions import spatial as places
+from archmodel.query.functions import stratigraphy as layered
+from archmodel.query.functions import structures as whole
 from archmodel.query.functions import texts
 from archmodel.query.functions.usages import STRUCTURE_USAGES, USAGES, Ask, Condition
 from archmodel.query.grammar import Call
@@ -42,6 +44,9 @@ _SQL: Mapping[str, Sql] = {
     "across_the_wall": related.related("across_the_wall", "subject_id", "object_id"),
     "above": related.load_path("object_id", "subject_id"),
     "below": related.load_path("subject_id", "object_id"),
+    "after": layered.in_time(later=True),
+    "before": layered.in_time(later=False),
+    "contradicted": layered.contradicted,
     "member_of": related.member_of,
     "has_mark": told.has_mark,
     "observed": told.observed,
@@ -53,6 +58,21 @@ _SQL: Mapping[str, Sql] = {
     "in_mechanism": told.in_mechanism,
     "is_a": told.is_a,
     "canonical": told.canonical,
+    "moved_since": places.moved_since,
+}
+
+_SQL_OF_STRUCTURES: Mapping[str, Sql] = {
+    "part_of": related.part_of,
+    "has": whole.has,
+    "is_a": told.is_a,
+    "above": layered.on_one_another(upwards=True),
+    "below": layered.on_one_another(upwards=False),
+    "after": layered.in_time(later=True),
+    "before": layered.in_time(later=False),
+    "contradicted": layered.contradicted,
+    "disputed": whole.disputed_structure,
+    "changes": whole.changes,
+    "canonical": told.canonical,
 }
 
 FUNCTIONS: Mapping[str, Function] = {
@@ -61,7 +81,6 @@ FUNCTIONS: Mapping[str, Function] = {
 """What can be asked of an entity."""
 
 STRUCTURE_FUNCTIONS: Mapping[str, Function] = {
-    "part_of": Function("part_of", STRUCTURE_USAGES["part_of"], related.part_of),
-    "is_a": Function("is_a", STRUCTURE_USAGES["is_a"], told.is_a),
+    name: Function(name, usages, _SQL_OF_STRUCTURES[name]) for name, usages in STRUCTURE_USAGES.items()
 }
-"""What can be asked of a structure, within ``member_of(…)``."""
+"""What can be asked of a structure, in a list of structures and within ``member_of(…)``."""

@@ -14,7 +14,7 @@ from archmodel.query.tokens import Token
 from archmodel.tables.relations import SYMMETRIC, Membership, Relation
 from archmodel.tables.structures import Structure
 
-__all__ = ["load_path", "member_of", "part_of", "related"]
+__all__ = ["load_path", "member_of", "part_of", "related", "with_parts"]
 
 Wanted = Callable[[ColumnElement[int]], Condition]
 
@@ -87,19 +87,27 @@ def member_of(scope: Scope, call: Call, ask: Ask) -> Condition:
         source = rows.join(structure, structure.c.id == rows.c.structure_id)
         held_now = (held(rows), held(structure), rows.c.entity_id == scope.entity.c.id)
         return exists().select_from(source).where(*held_now).correlate(scope.entity)
-    parts = _with_parts(scope.context, argument, ask)
+    parts = _named_with_parts(scope.context, argument, ask)
     members = select(rows.c.entity_id).where(held(rows), rows.c.structure_id.in_(select(parts.c.id)))
     return scope.entity.c.id.in_(members)
 
 
-def _with_parts(context: Context, argument: Token | Node, ask: Ask) -> FromClause:
+def _named_with_parts(context: Context, argument: Token | Node, ask: Ask) -> FromClause:
     """Return the numbers of the given structures and of their parts."""
+
+    def wanted(whole: FromClause) -> Condition:
+        """Test for a structure that the argument names."""
+        if isinstance(argument, Token):
+            return whole.c.id == structure_named(context, argument)
+        return ask(StructureScope(context, whole), argument)
+
+    return with_parts(context, wanted)
+
+
+def with_parts(context: Context, wanted: Callable[[FromClause], Condition]) -> FromClause:
+    """Return the numbers of the structures that satisfy a condition, and of their parts."""
     whole, part = context.alias(Structure), context.alias(Structure)
-    if isinstance(argument, Token):
-        meant_here: Condition = whole.c.id == structure_named(context, argument)
-    else:
-        meant_here = ask(StructureScope(context, whole), argument)
-    parts = select(whole.c.id).where(held(whole), meant_here).cte(recursive=True)
+    parts = select(whole.c.id).where(held(whole), wanted(whole)).cte(recursive=True)
     return parts.union(
         select(part.c.id).join_from(parts, part, part.c.parent_id == parts.c.id).where(held(part))
     )
@@ -110,5 +118,5 @@ def part_of(scope: StructureScope, call: Call, ask: Ask) -> Condition:
     argument = only(call)
     if argument is None:
         return scope.structure.c.parent_id.is_not(None)
-    parts = _with_parts(scope.context, argument, ask)
+    parts = _named_with_parts(scope.context, argument, ask)
     return scope.structure.c.id.in_(select(parts.c.id))

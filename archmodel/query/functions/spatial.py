@@ -1,14 +1,14 @@
-"""Query functions on places."""
+"""Query functions on places, and on their change."""
 
 from sqlalchemy import Double, and_, literal
 
 from archmodel.query.functions.usages import Ask, Condition, metres, tokens
 from archmodel.query.grammar import Call
-from archmodel.query.names import stone_named
+from archmodel.query.names import campaign_named, stone_named
 from archmodel.query.scope import Scope
 from archmodel.query.tokens import complaint
 
-__all__ = ["within", "within_box"]
+__all__ = ["moved_since", "within", "within_box"]
 
 
 def within(scope: Scope, call: Call, ask: Ask) -> Condition:
@@ -53,3 +53,17 @@ def _box(scope: Scope, low: list[float], high: list[float]) -> Condition:
             for axis, a, b in zip("xyz", low, high, strict=True)
         )
     )
+
+
+def moved_since(scope: Scope, call: Call, ask: Ask) -> Condition:
+    """Test for a place that differs from that of an earlier campaign by more than both can err."""
+    (token,) = tokens(call, 1)
+    context, name = scope.context, campaign_named(scope.context, token)
+    if context.campaign not in (None, name):
+        raise complaint(token, f"displacements since {context.campaign} and {name}", "ask in two queries")
+    context.campaign = name
+    # numpy is loaded only by those who ask
+    from archmodel.store.campaigns import SIGNIFICANT
+
+    rows = scope.displacement()
+    return rows.c.moved > SIGNIFICANT * rows.c.moved_sigma

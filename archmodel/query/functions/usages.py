@@ -44,6 +44,22 @@ USAGES: Mapping[str, Usages] = {
     ),
     "above": (("above(CODE or expression)", "it rests on such a stone, directly or through others"),),
     "below": (("below(CODE or expression)", "such a stone rests on it, directly or through others"),),
+    "after": (
+        (
+            "after(CODE)",
+            "it is, or belongs to, a unit that came later than this one by any chain of relations",
+        ),
+        ("after(expression)", "the same of units of which the expression is true"),
+    ),
+    "before": (
+        ("before(CODE or expression)", "it is, or belongs to, a unit that came earlier than such a unit"),
+    ),
+    "contradicted": (
+        (
+            "contradicted()",
+            "it is, or belongs to, a unit whose stratigraphic relations and dates cannot both be right",
+        ),
+    ),
     "member_of": (
         ("member_of(CODE)", "it is a member of the structure of that code, or of a part of it"),
         ("member_of(expression)", "the same of a structure of which the expression is true"),
@@ -55,7 +71,10 @@ USAGES: Mapping[str, Usages] = {
     ),
     "observed": (
         ("observed()", "there is an observation of it"),
-        ("observed(TYPE)", f"there is one of that type: {', '.join(OBSERVATIONS)}"),
+        (
+            "observed(TYPE)",
+            f"there is one of that type, or of a narrower term: {', '.join(OBSERVATIONS)}, or your own",
+        ),
         ("observed(TYPE, n)", "there is one of that type whose severity is at least n (0 to 4)"),
     ),
     "documented": (
@@ -95,6 +114,13 @@ USAGES: Mapping[str, Usages] = {
             "it has the canonical proportions of its kind; null if there are none, or a number is not known",
         ),
     ),
+    "moved_since": (
+        (
+            "moved_since(CAMPAIGN)",
+            "its place differs from that in the survey of this name by more than both can err, at 1 %; null if it was "
+            "not measured in both; `moved` and `moved_sigma` are then since that survey",
+        ),
+    ),
 }
 """The functions of entities: ways to write them, and what each says."""
 
@@ -103,9 +129,26 @@ STRUCTURE_USAGES: Mapping[str, Usages] = {
         ("part_of(CODE or expression)", "it is such a structure, or a part of one"),
         ("part_of()", "it is a part of any structure"),
     ),
+    "has": (("has(CODE or expression)", "such a stone is a member of it, or of a part of it"),),
     "is_a": (("is_a(KIND)", "it is of that kind of structure or of a subkind"),),
+    "above": (("above(CODE or expression)", "it lies above such a unit, directly or through others"),),
+    "below": (("below(CODE or expression)", "it lies below such a unit, directly or through others"),),
+    "after": (("after(CODE or expression)", "it came later than such a unit by any chain of relations"),),
+    "before": (("before(CODE or expression)", "it came earlier than such a unit"),),
+    "contradicted": (("contradicted()", "its stratigraphic relations and dates cannot both be right"),),
+    "disputed": (
+        ("disputed()", "opinions on its phase or its material differ"),
+        ("disputed(phase)", "opinions on its phase differ; or material"),
+    ),
+    "canonical": (("canonical()", "it has the canonical proportions of its kind; null as for stones"),),
+    "changes": (
+        (
+            "changes(attribute)",
+            "the attribute differs from that of the one below: of its kind and parent, with the number before",
+        ),
+    ),
 }
-"""The functions of structures, within ``member_of(…)``."""
+"""The functions of structures, in lists of structures and within ``member_of(…)``."""
 
 
 def _refusal(call: Call) -> QueryError:

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from archmodel.stratigraphy.report import Matrix
+    from pipelines.draw.stratigraphy.matrix import Matrix
 
 __all__ = ["matrix_lines"]
 

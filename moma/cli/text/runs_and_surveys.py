@@ -260,6 +260,10 @@ def survey_report_lines(report: "SurveyReport", verbose: bool) -> list[str]:
         + ("" if facade.azimuth is None else f", looks to {facade.azimuth:.0f}°")
         for facade in study.facades
     ]
+    if study.since is not None:
+        from pipelines.reports.survey.campaigns import comparison_lines
+
+        lines += [f"  {line}" for line in comparison_lines(study.since)]
     lines += _movement_lines(report, verbose)
     masonry = _masonry_lines(report)
     lines += masonry if verbose else shorten(masonry, _SHOWN, "  ", ", with -v")

@@ -38,6 +38,10 @@ def schema_lines(schema: Branch) -> Iterator[str]:
             yield title
             width = max(len(one[name]) for one in schema[key])
             yield from (f"  {one[name]:<{width}}  {_origin(one)}{one['definition']}" for one in schema[key])
+    if schema.get("terms"):
+        yield ""
+        yield "Terms"
+        yield from (f"  {_term(one)}" for one in schema["terms"])
     if "attributes" in schema:
         yield ""
         yield "Attributes of every entity"
@@ -62,6 +66,13 @@ def _origin(one: Branch) -> str:
     if not one.get("registered"):
         return ""
     return f"registered, a case of {one['parent']}: " if "parent" in one else "registered: "
+
+
+def _term(one: Branch) -> str:
+    """Format a term: observation lichen, a case of stain: definition (de Flechten)."""
+    above = f", a case of {one['broader']}" if one["broader"] else ""
+    labels = ", ".join(f"{language} {' / '.join(names)}" for language, names in one["labels"].items())
+    return f"{one['vocabulary']} {one['term']}{above}: {one['definition'] or ''}{f' ({labels})' if labels else ''}"
 
 
 def _attribute(one: Branch) -> str:

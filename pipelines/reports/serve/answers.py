@@ -15,7 +15,7 @@ from archmodel.tables.entities import Entity
 from archmodel.tables.runs import Run
 from archmodel.tables.surveys import Survey
 from ground.errors import UsageError
-from pipelines.reports.view import database_model, view_page
+from pipelines.reports.view import as_known_text, database_model, view_page
 from pipelines.results.table_csv import csv_text
 
 __all__ = ["COLUMNS", "Answers"]
@@ -76,10 +76,17 @@ class Answers:
         return feature_collection(find_faces(session, kind, where, run, columns))
 
     def view(
-        self, session: Session, entry: int | None, kind: str, where: Sequence[str], run: int | None
+        self,
+        session: Session,
+        entry: int | None,
+        kind: str,
+        where: Sequence[str],
+        run: int | None,
+        *,
+        dated: bool = False,
     ) -> str:
-        """Return the page with a viewer; kept until an entry is made."""
-        key = (entry, kind, tuple(where), run)
+        """Return the page with a viewer; kept until an entry is made. `dated`: it says of which entry it is."""
+        key = (entry, kind, tuple(where), run, dated)
         with self._lock:
             if key in self._views:
                 self._views.move_to_end(key)
@@ -87,6 +94,8 @@ class Answers:
         with self._room:
             self._refuse_more(session, kind, where, run)
             name = session.scalar(select(Survey.name).order_by(Survey.id)) or "MOMA"
+            if dated and entry is not None:
+                name = f"{name}, {as_known_text(session, entry)}"
             text, _ = view_page(session, name, kind, where, run)
         with self._lock:
             self._views[key] = text

@@ -19,6 +19,7 @@ from starlette.exceptions import HTTPException as StarletteHTTPException
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from archmodel.database.as_known import as_known, entry_named
 from archmodel.database.limits import deadline
 from archmodel.database.session import Database
 from archmodel.describe.entity import describe
@@ -45,6 +46,9 @@ Where = Annotated[
     Query(max_length=_MOST, description="Conditions; all must hold."),
 ]
 Run = Annotated[int | None, Query(ge=1, le=2**31 - 1, description="Run whose results are meant.")]
+When = Annotated[
+    str | None, Query(max_length=20, description="As it was known then: a date, or the number of an entry.")
+]
 Columns = Annotated[str | None, Query(max_length=_LONGEST, description="Attributes, separated by commas.")]
 Format = Annotated[str, Query(pattern="^(html|json|csv|geojson)$")]
 Page = Annotated[str, Query(pattern="^(html|json)$")]
@@ -70,13 +74,14 @@ def application(database: Database, settings: ServeSettings) -> FastAPI:
     _guards(app, settings)
 
     @contextmanager
-    def asking() -> Iterator[Session]:
+    def asking(at: str | None = None) -> Iterator[Session]:
         if not room.acquire(timeout=settings.patience):
             raise HTTPException(503, "Too many questions at once; try again.", {"Retry-After": "5"})
         try:
             with database.session(read_only=True) as session, deadline(session, settings.seconds) as limit:
                 try:
-                    yield session
+                    with as_known(session, entry_named(session, at) if at else None) as then:
+                        yield then
                 except Exception as error:
                     if limit.stopped(error):
                         told = f"The query took longer than {settings.seconds:g} s and was stopped."
@@ -96,13 +101,14 @@ def application(database: Database, settings: ServeSettings) -> FastAPI:
         where: Where = (),
         columns: Columns = None,
         run: Run = None,
+        at: When = None,
         format: Format = "html",
     ) -> Response:
         asked = tuple(one for one in where if one.strip())
         names = (
             COLUMNS if columns is None else tuple(one.strip() for one in columns.split(",") if one.strip())
         )
-        with asking() as session:
+        with asking(at) as session:
             if format == "geojson":
                 return JSONResponse(
                     answers.geojson(session, kind, asked, run, names), media_type="application/geo+json"
@@ -117,6 +123,7 @@ def application(database: Database, settings: ServeSettings) -> FastAPI:
             kind=kind,
             where=asked,
             run=run,
+            at=at,
             columns=names,
             rows=rows,
             more=more,
@@ -124,8 +131,8 @@ def application(database: Database, settings: ServeSettings) -> FastAPI:
         )
 
     @app.get("/entity/{code:path}")
-    def entity(code: str, format: Page = "html") -> Response:
-        with asking() as session:
+    def entity(code: str, at: When = None, format: Page = "html") -> Response:
+        with asking(at) as session:
             told = describe(session, code)
             events = [asdict(event) for event in history(session, code)]
         if format == "json":
@@ -153,10 +160,10 @@ def application(database: Database, settings: ServeSettings) -> FastAPI:
         return JSONResponse(tree) if format == "json" else _page("told.html", title="Schema", told=tree)
 
     @app.get("/view", response_class=HTMLResponse)
-    def view(kind: Kind = "entity", where: Where = (), run: Run = None) -> Response:
+    def view(kind: Kind = "entity", where: Where = (), run: Run = None, at: When = None) -> Response:
         asked = tuple(one for one in where if one.strip())
-        with asking() as session:
-            text = answers.view(session, latest_entry(session), kind, asked, run)
+        with asking(at) as session:
+            text = answers.view(session, latest_entry(session), kind, asked, run, dated=bool(at))
         return HTMLResponse(text, headers={"Content-Security-Policy": _policy(text)})
 
     @app.get("/stones.glb")

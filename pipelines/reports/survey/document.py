@@ -30,6 +30,7 @@ def survey_json(study: SurveyStudy, version: str) -> dict[str, Any]:
         "quality": _quality(study.quality, len(study.rejects)),
         "facades": [_facade(facade) for facade in study.facades],
         "kinds": [_record(one) for one in study.usual.values()],
+        "since": None if study.since is None else study.since.as_values(),
     }
     plain: dict[str, Any] = _plain(content)
     return plain

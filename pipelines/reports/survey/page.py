@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 from pipelines.reports.html import picture, write_page
 from pipelines.reports.page.model import Column
 from pipelines.reports.page.surveys import survey_model
+from pipelines.reports.survey.campaigns import MovedStone, comparison_lines
 from pipelines.reports.survey.document import finding_of
 from pipelines.reports.survey.study import SurveyFile, SurveyStudy
 from survey.quality.canon import Deviation
@@ -74,6 +75,8 @@ def write_survey_page(
         control=list(_control(study.files)),
         courses=list(_courses(study)),
         kinds=_kinds(study),
+        since=None if study.since is None else list(comparison_lines(study.since)),
+        displacements=_first(() if study.since is None else study.since.stones, _moved_row),
         photographs=photographs,
         located=_first(list(_located(study)), lambda row: row),
         contradictions=_first(study.contradictions, _contradiction_row),
@@ -84,6 +87,20 @@ def write_survey_page(
             ),
         ),
         version=version,
+    )
+
+
+def _moved_row(one: MovedStone) -> Row:
+    """Return the displacement of a stone since the earlier campaign."""
+    x, y, z = (f"{1e3 * value:+.1f}" for value in one.displacement.vector)
+    moved = one.displacement
+    return (
+        one.code,
+        f"{1e3 * moved.distance:.1f} ± {1e3 * moved.sigma:.1f}",
+        f"{moved.distance / moved.sigma:.1f} σ",
+        f"{x}, {y}, {z}",
+        f"{1e3 * one.outwards:+.1f}",
+        "moved" if moved.significant else "–",
     )
 
 

@@ -58,6 +58,7 @@ def report_surveys(
     grades: Mapping[str, Grade] | None = None,
     overwrite: bool = False,
     orthophoto: str | Path | None = None,
+    since: Sequence[str | Path] = (),
 ) -> SurveyReport:
     """Judge survey files and write the report, which includes the stones that could not be made.
 
@@ -71,6 +72,7 @@ def report_surveys(
     grades : grades of the masonry that no survey tells: "SM", the state of the stones, and "MM", the mortar
     overwrite : replace a report on other files in the folder
     orthophoto : picture of a wall on which its elevation is drawn, with a world file and the wall's frame, FILE.toml
+    since : files of an earlier campaign with which the stones are compared
 
     Raises
     ------
@@ -79,12 +81,12 @@ def report_surveys(
     SurveyError : a file that cannot be read at all, or control points that contradict each other
     """
     folder = Path(folder)
-    source = [Path(path) for path in paths]
+    source = [Path(path) for path in (*paths, *since)]
     if isinstance(options, CloudOptions):
         source.append(options.outlines)
     check_replaceable(folder, INDEX, () if overwrite else source)
     photo = None if orthophoto is None else read_orthophoto(Path(orthophoto))
-    study = study_surveys(paths, format, options or ReadingOptions(), progress, grades)
+    study = study_surveys(paths, format, options or ReadingOptions(), progress, grades, since)
     with replacing(folder, INDEX) as fresh:
         content = write_survey_report(study, fresh, progress, source, photo)
     return SurveyReport(folder, study, content)

@@ -13,6 +13,7 @@ from mechanics.arrays import Array
 from mechanics.dynamics.progress import Listener, Progress, silent
 from pipelines.ingest.outlined import open_source
 from pipelines.ingest.reading_options import Source, survey_sources
+from pipelines.reports.survey.campaigns import CampaignComparison, compare_campaigns
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.formats.options import ReadingOptions
 from survey.quality.canon import Deviation, KindStandard, deviations, standards
@@ -84,6 +85,7 @@ class SurveyStudy:
     remeasures : all reasons to measure a stone again, most urgent first
     again : the short list of them
     warnings : reasons why the database would refuse the survey, and sizes that hardly any stone has
+    since : the stones beside those of an earlier campaign; None: none was named
     """
 
     name: str
@@ -104,6 +106,7 @@ class SurveyStudy:
     remeasures: tuple[Remeasure, ...]
     again: ShortList
     warnings: tuple[str, ...]
+    since: CampaignComparison | None = None
 
 
 def study_surveys(
@@ -112,6 +115,7 @@ def study_surveys(
     options: ReadingOptions,
     progress: Listener = silent,
     grades: Mapping[str, Grade] | None = None,
+    since: Sequence[str | Path] = (),
 ) -> SurveyStudy:
     """Read, fit and judge the stones of survey files.
 
@@ -122,26 +126,39 @@ def study_surveys(
     options : defaults for what the files leave out
     progress : called now and then
     grades : grades of the masonry that no survey tells: "SM", the state of the stones, and "MM", the mortar
+    since : files of an earlier campaign with which the stones are compared
 
     Raises
     ------
-    UsageError : no such file or format, or files that measure the same stones: campaigns are not pooled
+    UsageError : no such file or format, or files of one campaign that measure the same stones: they are not pooled
     SurveyError : a file that cannot be read at all, or control points that contradict each other
     """
-    sources = survey_sources(paths, format)
+    files, stones, rejects = _read_campaign(paths, format, options, progress)
+    study = _judge(files, tuple(stones), tuple(rejects), grades or {}, progress)
+    if since:
+        before, earlier, _ = _read_campaign(since, format, options, progress)
+        named = [str(one.head.path) for one in before]
+        compared = compare_campaigns(before[0].head.name, named, earlier, stones)
+        study = replace(study, since=compared)
+    if format != "cloud" or not stones:
+        return study
+    return replace(study, quality=replace(study.quality, verdict=_OF_PATCHES))
+
+
+def _read_campaign(
+    paths: Sequence[str | Path], format: str, options: ReadingOptions, progress: Listener
+) -> tuple[tuple[SurveyFile, ...], list[StoneQuality], list[Reject]]:
+    """Read the files of one campaign, which measure no stone twice."""
     seen: dict[str, Path] = {}
     stones: list[StoneQuality] = []
     rejects: list[Reject] = []
     files = []
-    for source in sources:
+    for source in survey_sources(paths, format):
         before = len(stones), len(rejects)
         file = _read(source, format, options, stones, rejects, progress)
         _refuse_second_campaign([stone.code for stone in stones[before[0] :]], source.path, seen)
         files.append(replace(file, stones=len(stones) - before[0], rejects=len(rejects) - before[1]))
-    study = _judge(tuple(files), tuple(stones), tuple(rejects), grades or {}, progress)
-    if format != "cloud" or not stones:
-        return study
-    return replace(study, quality=replace(study.quality, verdict=_OF_PATCHES))
+    return tuple(files), stones, rejects
 
 
 def _refuse_second_campaign(codes: Sequence[str], path: Path, seen: dict[str, Path]) -> None:
@@ -151,8 +168,8 @@ def _refuse_second_campaign(codes: Sequence[str], path: Path, seen: dict[str, Pa
         some = ", ".join(again[:3]) + (", …" if len(again) > 3 else "")
         what = f"measures {len(again)} of its {len(codes)} stones a second time, after {seen[again[0]].name}: {some}"
         remedy = (
-            "report on each campaign by itself, since what moved between them is no scatter; ingest the second with "
-            "--again, and `moma query entity --where 'measurements > 1'` and `moma show CODE --history` compare them"
+            "say which is the earlier campaign, since what moved between them is no scatter: "
+            "moma survey-report LATER --since EARLIER; in a database: moma ingest LATER --again, moved_since(…)"
         )
         raise UsageError(what, where=str(path), remedy=remedy)
     seen.update(dict.fromkeys(codes, path))

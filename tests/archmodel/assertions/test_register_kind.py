@@ -145,9 +145,10 @@ def test_what_cannot_be_registered_is_refused(empty: Database) -> None:
         ({"parent": "ribb"}, "unknown kind 'ribb'; did you mean rib"),
         (
             {"parent": "rib", "canon": "depth > 1"},
-            "slab_of_merlon is a kind of structure, and those have neither",
+            "unknown attribute 'depth'; the attributes are code, kind, title",
         ),
-        ({"parent": "rib", "attributes": {"slit": ("m", "x")}}, "leave out canon and attributes"),
+        ({"canon": "depth/length = 2"}, "no measured number equals another exactly; give a tolerance"),
+        ({"parent": "rib", "attributes": {"slit": ("m", "x")}}, "leave out attributes"),
         ({"name": "merlon"}, "registered already, with another definition"),
         ({"name": "Merlon"}, "'Merlon' is not the name of a kind; write it in small letters"),
         ({"name": "x" * 41}, "is not the name of a kind"),

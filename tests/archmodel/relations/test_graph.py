@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from sqlalchemy import select
 
 from archmodel.assertions.withdraw import withdraw_relations
+from archmodel.database.as_known import as_known
 from archmodel.database.session import open_database
 from archmodel.relations.graph import (
     carried_by,
@@ -51,9 +52,9 @@ def declare(database, kind, pairs):
         return entry.id
 
 
-def asked(database, question, *arguments, **options):
-    with database.session(read_only=True) as session:
-        return question(session, *arguments, **options)
+def asked(database, question, *arguments, at=None, **options):
+    with database.session(read_only=True) as session, as_known(session, at) as then:
+        return question(then, *arguments, **options)
 
 
 def codes(found):
@@ -172,11 +173,11 @@ def test_a_relation_that_is_computed_and_declared_counts_once(empty):
 def test_questions_can_be_asked_of_an_earlier_state(empty):
     first = stand(empty, wall(2, 2))
     second = declare(empty, "rests_on", [("1-1", "1-2")])
-    assert "1-1" not in codes(asked(empty, carries, "1-2", as_of=first))
-    assert "1-1" in codes(asked(empty, carries, "1-2", as_of=second))
-    assert "1-2" not in codes(asked(empty, load_path, "1-1", as_of=first).stones)
+    assert "1-1" not in codes(asked(empty, carries, "1-2", at=first))
+    assert "1-1" in codes(asked(empty, carries, "1-2", at=second))
+    assert "1-2" not in codes(asked(empty, load_path, "1-1", at=first).stones)
     assert "1-2" in codes(asked(empty, load_path, "1-1").stones)
-    assert asked(empty, load_path, "1-1", as_of=first - 1).stones == ()
+    assert asked(empty, load_path, "1-1", at=first - 1).stones == ()
 
 
 def test_a_relation_that_was_withdrawn_is_on_no_path_and_between_no_neighbours(empty):
@@ -194,7 +195,7 @@ def test_a_relation_that_was_withdrawn_is_on_no_path_and_between_no_neighbours(e
         (carried_by, "1-1", "1-2", {}),
         (carries, "1-2", "1-1", {}),
     ):
-        found = [asked(empty, question, code, as_of=entry, **options) for entry in entries]
+        found = [asked(empty, question, code, at=entry, **options) for entry in entries]
         known = [other in codes(one.stones if question is load_path else one) for one in found]
         assert known == [False, True, False, False]
 
@@ -348,9 +349,9 @@ def test_the_load_path_through_a_hundred_courses_takes_less_than_a_fifth_of_a_se
 @pytest.mark.parametrize("entry", [-1, 0, 99])
 def test_an_entry_that_is_not_there_is_an_error(filled, question, entry):
     with pytest.raises(UsageError, match=f"there is no entry {entry}; the last one is 1"):
-        asked(filled, question, "V2", as_of=entry)
+        asked(filled, question, "V2", at=entry)
 
 
 def test_courses_of_an_entry_that_is_not_there_are_an_error(filled):
     with pytest.raises(UsageError, match="there is no entry 99"):
-        asked(filled, courses_in_order, as_of=99)
+        asked(filled, courses_in_order, at=99)

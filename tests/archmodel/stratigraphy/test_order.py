@@ -7,13 +7,12 @@ from xml.etree import ElementTree as etree
 
 import pytest
 
-from archmodel.stratigraphy.dates import contradictions, date_bounds
-from archmodel.stratigraphy.drawing import matrix_svg
+from archmodel.stratigraphy.dates import Dated, contradictions, date_bounds
 from archmodel.stratigraphy.graphml import read_graphml, write_graphml
 from archmodel.stratigraphy.order import Link, check_order, find_loop, order_of
-from archmodel.stratigraphy.stored import Dated
 from archmodel.tables.stratigraphy import DEFINITIONS, LATER
 from ground.errors import UsageError
+from pipelines.draw.stratigraphy.drawing import matrix_svg
 
 
 def links(text: str) -> list[Link]:

@@ -15,9 +15,9 @@ from archmodel.query.api import find_faces, find_rows
 from archmodel.query.geojson import feature_collection
 from archmodel.store.revisions import RowCounts
 from archmodel.store.stones import store_survey
-from archmodel.stratigraphy.report import draw, study
 from archmodel.tables.knowledge import Note, Statement
 from ground.errors import UsageError
+from pipelines.draw.stratigraphy.matrix import draw, study
 from pipelines.record.record import record
 from tests.archmodel.stones import SHA, box_stone
 

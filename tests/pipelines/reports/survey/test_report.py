@@ -6,6 +6,7 @@ import sys
 from copy import copy
 from dataclasses import fields, is_dataclass
 from enum import Enum
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,9 +15,11 @@ from ground.errors import SurveyError, UsageError
 from moma.cli.text.runs_and_surveys import survey_report_lines
 from pipelines.ingest.reading_options import reading_options
 from pipelines.reports.survey import report as survey_report
+from pipelines.reports.survey.campaigns import compare_campaigns, comparison_lines
 from pipelines.reports.survey.page import write_survey_page
 from pipelines.reports.survey.report import report_surveys
 from pipelines.reports.survey.study import study_surveys
+from survey.quality.precision import StoneQuality
 from tests.moma.commands import answer, fails, prints
 from tests.paths import ROOT
 from tests.pipelines.reports.page import Page
@@ -512,5 +515,60 @@ def test_two_campaigns_of_one_wall_are_not_pooled(tmp_path):
         UsageError, match=r"1 of its 1 stones a second time, after first\.moma: A2"
     ) as refused:
         study_surveys([first, second], "moma", options)
-    assert "each campaign by itself" in str(refused.value.remedy)
+    assert "--since EARLIER" in str(refused.value.remedy)
     assert len(study_surveys([first, other], "moma", options).stones) == 3
+    # said which is the earlier one, they are compared, and the later one alone is judged
+    study = study_surveys([second], "moma", options, since=[first])
+    assert [stone.code for stone in study.stones] == ["A2"]
+    assert study.since is not None
+    assert (study.since.name, study.since.gone, study.since.moved) == ("first", ("A1",), ())
+
+
+def campaign(chance: np.random.Generator, moved: dict[str, Any], blur: float = 0.0) -> list[StoneQuality]:
+    """Forty stones of a wall, measured with 1 mm; corners found with a scatter more along the face."""
+    square = np.array([[0.0, 0, 0], [0.4, 0, 0], [0.4, 0, 0.3], [0.0, 0, 0.3]])
+    blank = dict.fromkeys(StoneQuality.__dataclass_fields__)
+    return [
+        StoneQuality(
+            **blank
+            | {
+                "code": f"S{k}",
+                "normal": np.array([0.0, -1.0, 0.0]),
+                "outline": square
+                + [0.5 * k, chance.normal(0.0, 5e-4), 0.0]
+                + chance.normal(0.0, 1e-3, (4, 3)) * [1, 0, 1]
+                + chance.normal(0.0, blur, 3) * [1, 0, 1]
+                + moved.get(f"S{k}", np.zeros(3)),
+                "corner_sigma": np.full((4, 3), 1e-3),
+                "tilt_sigma": 0.05,
+                "offset_sigma": 5e-4,
+            }
+        )
+        for k in range(40)
+    ]
+
+
+def test_stones_that_moved_between_two_campaigns_are_found_with_their_sigma() -> None:
+    chance = np.random.default_rng(11)
+    sunk = {"S7": np.array([0.0, 0.0, -0.012]), "S9": np.array([0.0, -0.008, 0.0])}
+    found = compare_campaigns("1992", ["a"], campaign(chance, {}), campaign(chance, sunk))
+    assert {one.code for one in found.moved} == {"S7", "S9"}
+    by_code = {one.code: one for one in found.stones}
+    assert by_code["S7"].displacement.distance == pytest.approx(0.012, abs=0.002)
+    assert by_code["S9"].outwards == pytest.approx(0.008, abs=0.002)
+    # the mean of four corners, twice
+    assert by_code["S7"].displacement.sigma == pytest.approx(1e-3 / 2 * 2**0.5, rel=0.25)
+    assert found.scatter < 4e-4
+    first, *_ = comparison_lines(found)
+    assert first.startswith("since 1992: 2 of 40 stones moved: S7 by 1")
+
+
+def test_corners_that_are_not_the_same_points_make_no_movement() -> None:
+    """A scatter of corners by 4 mm is found among the stones, and allowed for."""
+    chance = np.random.default_rng(12)
+    found = compare_campaigns("1992", ["a"], campaign(chance, {}, 0.004), campaign(chance, {}, 0.004))
+    assert found.scatter == pytest.approx(0.004, rel=0.25)
+    assert len(found.moved) <= 2
+    everything = {f"S{k}": np.array([0.0, 0.02, 0.0]) for k in range(40)}
+    shifted = compare_campaigns("1992", ["a"], campaign(chance, {}), campaign(chance, everything))
+    assert any("the frames of both campaigns differ" in line for line in comparison_lines(shifted))

@@ -6,14 +6,15 @@ from pathlib import Path
 
 from sqlalchemy.orm import Session
 
-from archmodel.stratigraphy.dates import Bounds, Contradiction, contradictions, date_bounds
-from archmodel.stratigraphy.drawing import matrix_svg
+from archmodel.query.dated import load_dates
+from archmodel.stratigraphy.dates import Bounds, Contradiction, Dated, contradictions, date_bounds
 from archmodel.stratigraphy.graphml import write_graphml
-from archmodel.stratigraphy.layout import layout_of
 from archmodel.stratigraphy.order import Link, Order, order_of
-from archmodel.stratigraphy.page import matrix_page
-from archmodel.stratigraphy.stored import Dated, load_dates, load_links, load_stones, load_units
+from archmodel.stratigraphy.stored import load_links, load_stones, load_units
 from ground.errors import UsageError
+from pipelines.draw.stratigraphy.drawing import matrix_svg
+from pipelines.draw.stratigraphy.layout import layout_of
+from pipelines.draw.stratigraphy.page import matrix_page
 
 __all__ = ["Matrix", "draw", "study"]
 

@@ -3,10 +3,9 @@
 from collections.abc import Mapping, Sequence
 from html import escape
 
-from archmodel.stratigraphy.dates import Bounds, Contradiction
-from archmodel.stratigraphy.drawing import matrix_svg
+from archmodel.stratigraphy.dates import Bounds, Contradiction, Dated
 from archmodel.stratigraphy.order import Link, Order
-from archmodel.stratigraphy.stored import Dated
+from pipelines.draw.stratigraphy.drawing import matrix_svg
 
 __all__ = ["matrix_page"]
 

@@ -4,9 +4,9 @@ from collections.abc import Collection, Mapping
 from html import escape
 from itertools import pairwise
 
-from archmodel.stratigraphy.layout import Key, Layout, layout_of
+from archmodel.stratigraphy.dates import Dated
 from archmodel.stratigraphy.order import Order
-from archmodel.stratigraphy.stored import Dated
+from pipelines.draw.stratigraphy.layout import Key, Layout, layout_of
 
 __all__ = ["matrix_svg"]
 

@@ -1,0 +1,144 @@
+"""Terms of vocabularies that users extend: types of observations and documents, materials, marks.
+
+A term is a concept in the sense of SKOS: a name, labels in several languages of which the first of each is preferred,
+a definition, and the broader term of which it is a case. Labels are other ways to write the name; a broader term
+stands for its narrower ones in questions.
+"""
+
+import difflib
+import unicodedata
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from sqlalchemy import ForeignKey, select
+from sqlalchemy.orm import Mapped, Session, mapped_column
+
+from archmodel.tables.base import JSON_TYPE, Base
+from archmodel.tables.entries import Recorded, held_at, held_index
+from archmodel.tables.knowledge import OBSERVATIONS
+from ground.errors import UsageError
+
+__all__ = ["DOCUMENT_TYPES", "VOCABULARIES", "Term", "Vocabulary", "term_for", "vocabulary"]
+
+DOCUMENT_TYPES: Mapping[str, str] = {
+    "document": "a text: a charter, an account, a report",
+    "drawing": "a plan, an elevation, a sketch",
+    "photograph": "a picture taken by a camera",
+}
+"""Types of documents and their definitions."""
+
+VOCABULARIES: Mapping[str, tuple[Mapping[str, str], bool]] = {
+    "observation": (OBSERVATIONS, True),
+    "document": (DOCUMENT_TYPES, True),
+    "material": ({}, False),
+    "mark": ({}, False),
+}
+"""Built-in terms of each vocabulary, and whether words that are no terms are refused there."""
+
+
+class Term(Recorded, Base):
+    """Term of a vocabulary.
+
+    Attributes
+    ----------
+    vocabulary : one of VOCABULARIES
+    name : unique in it among the terms that are held now
+    definition : one sentence; None: that of the built-in term, or none
+    broader : name of the term that it is a case of; None if there is none
+    labels : by language (BCP 47), the preferred one first
+    """
+
+    __tablename__ = "term"
+    __table_args__ = (held_index("ix_term_name", "vocabulary", "name"),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    vocabulary: Mapped[str]
+    name: Mapped[str]
+    definition: Mapped[str | None]
+    broader: Mapped[str | None]
+    labels: Mapped[dict[str, list[str]]] = mapped_column(JSON_TYPE)
+    supersedes_id: Mapped[int | None] = mapped_column(ForeignKey("term.id"))
+
+
+@dataclass(frozen=True)
+class Vocabulary:
+    """Terms of a vocabulary, those of the program and those of a database.
+
+    Attributes
+    ----------
+    name : one of VOCABULARIES
+    definitions : by name of the term
+    broader : of each narrower term
+    labels : in each language, by name of the term
+    closed : whether other words than terms are refused
+    """
+
+    name: str
+    definitions: Mapping[str, str | None]
+    broader: Mapping[str, str]
+    labels: Mapping[str, Mapping[str, list[str]]]
+    closed: bool
+
+    def named(self, text: str) -> str:
+        """Return the name of the term that is written so: its name or a label in any language; in upper or lower case.
+
+        Raises
+        ------
+        UsageError
+            in a closed vocabulary, if there is none; names the nearest ones. In an open one the text itself is returned
+        """
+        if text in self.definitions:
+            return text
+        spellings = self.spellings()
+        if (name := spellings.get(_plain(text))) is not None or not self.closed:
+            return name or text
+        likely = difflib.get_close_matches(_plain(text[:40]), spellings, n=3, cutoff=0.5)
+        names = dict.fromkeys(spellings[term] for term in likely)
+        remedy = f"did you mean {' or '.join(names)}?" if names else f"they are {', '.join(self.definitions)}"
+        raise UsageError(
+            f"unknown type of {self.name} {text[:40]!r}", remedy=f"{remedy} Or add it as a [[term]]"
+        )
+
+    def spellings(self) -> dict[str, str]:
+        """Return the name of the term by each of its labels and by the name, in small letters."""
+        names = {
+            _plain(label): name
+            for name, labels in self.labels.items()
+            for several in labels.values()
+            for label in several
+        }
+        return names | {_plain(name): name for name in self.definitions}
+
+    def below(self, name: str) -> list[str]:
+        """Return a term and all narrower ones."""
+        names = [name]
+        for above in names:
+            names += [
+                term for term, broader in self.broader.items() if broader == above and term not in names
+            ]
+        return names
+
+
+def _plain(text: str) -> str:
+    return unicodedata.normalize("NFC", text.strip()).casefold().replace("_", " ")
+
+
+def term_for(session: Session, name: str, text: str) -> str:
+    """Return the name of the term that a word stands for in a vocabulary; the word itself where it is none."""
+    return vocabulary(session, name).named(text)
+
+
+def vocabulary(session: Session, name: str) -> Vocabulary:
+    """Return a vocabulary as it is held now."""
+    built_in, closed = VOCABULARIES[name]
+    session.flush()
+    terms = session.scalars(
+        select(Term).where(Term.vocabulary == name, held_at(Term)).order_by(Term.id)
+    ).all()
+    return Vocabulary(
+        name,
+        {**built_in, **{term.name: term.definition or built_in.get(term.name) for term in terms}},
+        {term.name: term.broader for term in terms if term.broader is not None},
+        {term.name: term.labels for term in terms},
+        closed,
+    )
