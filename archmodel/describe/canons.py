@@ -55,5 +55,5 @@ def _source(session: Session, entry: int | None) -> Mapping[str, object]:
 
 def canons_of(session: Session, cls: type[Kind]) -> list[Canon]:
     """Return all canonical proportions ever stated of a kind and of the kinds above it, in the order of recording."""
-    names = [kind_of(one) for one in kind_chain(cls)]
+    names = [kind_of(ancestor) for ancestor in kind_chain(cls)]
     return list(session.scalars(select(Canon).where(Canon.kind.in_(names)).order_by(Canon.id)))

@@ -187,21 +187,27 @@ def _of_structure(session: Session, held: Structure) -> Iterator[Event]:
 def _canons(session: Session, cls: type[Kind]) -> Iterator[Event]:
     """Collect the canonical proportions that were stated of its kind and of those above it."""
     rows = canons_of(session, cls)
-    by_number = {one.id: one for one in rows}
-    replaced = {one.supersedes_id for one in rows}
-    for one in rows:
-        told = _canon(one)
-        if one.proportions is None:
-            yield _event(one.entry, "withdrawn", "canon", told)
+    by_number = {canon.id: canon for canon in rows}
+    replaced = {canon.supersedes_id for canon in rows}
+    for canon in rows:
+        values = _canon(canon)
+        if canon.proportions is None:
+            yield _event(canon.entry, "withdrawn", "canon", values)
             continue
-        old = None if one.supersedes_id is None else by_number.get(one.supersedes_id)
-        yield _event(one.entry, "said" if old is None else "replaced", "canon", told, old and _canon(old))
-        if one.superseded_by is not None and one.id not in replaced:
-            yield _event(one.superseded_by, "withdrawn", "canon", told)
+        earlier = None if canon.supersedes_id is None else by_number.get(canon.supersedes_id)
+        yield _event(
+            canon.entry,
+            "said" if earlier is None else "replaced",
+            "canon",
+            values,
+            earlier and _canon(earlier),
+        )
+        if canon.superseded_by is not None and canon.id not in replaced:
+            yield _event(canon.superseded_by, "withdrawn", "canon", values)
 
 
-def _canon(one: Canon) -> Values:
-    return {"kind": one.kind, "proportions": one.proportions, "tolerance": one.tolerance}
+def _canon(canon: Canon) -> Values:
+    return {"kind": canon.kind, "proportions": canon.proportions, "tolerance": canon.tolerance}
 
 
 def _inherited(session: Session, number: int) -> Iterator[Event]:

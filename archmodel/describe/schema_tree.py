@@ -80,13 +80,13 @@ def _terms(session: Session) -> list[dict[str, object]]:
     terms = session.scalars(select(Term).where(held_at(Term)).order_by(Term.vocabulary, Term.id))
     return [
         {
-            "vocabulary": one.vocabulary,
-            "term": one.name,
-            "definition": one.definition or VOCABULARIES[one.vocabulary][0].get(one.name),
-            "broader": one.broader,
-            "labels": one.labels,
+            "vocabulary": term.vocabulary,
+            "term": term.name,
+            "definition": term.definition or VOCABULARIES[term.vocabulary][0].get(term.name),
+            "broader": term.broader,
+            "labels": term.labels,
         }
-        for one in terms
+        for term in terms
     ]
 
 

@@ -266,7 +266,7 @@ class _Departure:
         return case((test, literal(0.0, Double)), else_=null())
 
     def _missing(self, left: Amount, sign: str, right: Amount, opposite: bool) -> ColumnElement[Any]:
-        amounts = [self.compiler.amount(self.scope, one) for one in (left, right)]
+        amounts = [self.compiler.amount(self.scope, measure) for measure in (left, right)]
         larger = amounts[0] - amounts[1]
         missing = {"<": larger, "<=": larger, ">": -larger, ">=": -larger}.get(sign)
         if missing is None:
@@ -278,17 +278,17 @@ class _Departure:
         return case((missing > 0.0, missing / unit), (missing <= 0.0, literal(0.0, Double)), else_=null())
 
     def _all(self, parts: list[ColumnElement[Any]]) -> ColumnElement[Any]:
-        largest = self._extreme("max", "greatest", [func.coalesce(one, -1.0) for one in parts])
-        unknown = or_(*(one.is_(None) for one in parts))
+        largest = self._extreme("max", "greatest", [func.coalesce(measure, -1.0) for measure in parts])
+        unknown = or_(*(measure.is_(None) for measure in parts))
         return case((largest > 0.0, largest), (unknown, null()), else_=literal(0.0, Double))
 
     def _any(self, parts: list[ColumnElement[Any]]) -> ColumnElement[Any]:
-        known = and_(*(one.is_not(None) for one in parts))
+        complete = and_(*(measure.is_not(None) for measure in parts))
         smallest = self._extreme("min", "least", parts)
-        met = or_(*(one == 0.0 for one in parts))
-        return case((met, literal(0.0, Double)), (known, smallest), else_=null())
+        met = or_(*(measure == 0.0 for measure in parts))
+        return case((met, literal(0.0, Double)), (complete, smallest), else_=null())
 
     def _extreme(self, sqlite: str, other: str, parts: list[ColumnElement[Any]]) -> ColumnElement[Any]:
         dialect = self.scope.context.session.get_bind().dialect.name
-        found: ColumnElement[Any] = getattr(func, sqlite if dialect == "sqlite" else other)(*parts)
-        return found
+        extreme: ColumnElement[Any] = getattr(func, sqlite if dialect == "sqlite" else other)(*parts)
+        return extreme

@@ -115,7 +115,7 @@ class Context:
             """Write the numbers into a list of values."""
             columns = (column("id", Integer), *(column(name, Double) for name in names))
             # no entity has the number 0, and a list of values cannot be empty
-            rows = [(number, *map(float, one)) for number, one in make().items()] or [
+            rows = [(number, *map(float, numbers)) for number, numbers in make().items()] or [
                 (0, *(0.0 for _ in names))
             ]
             return values(*columns, name=f"computed_{len(self._shared)}", literal_binds=True).data(rows).cte()
@@ -237,7 +237,9 @@ class Scope:
 
         session, campaign = self.context.session, self.context.campaign
         surveys = None if campaign is None else campaigns(session)[campaign]
-        return {number: (one.distance, one.sigma) for number, one in displacements(session, surveys).items()}
+        return {
+            number: (moved.distance, moved.sigma) for number, moved in displacements(session, surveys).items()
+        }
 
     def _latest_run(self) -> ColumnElement[int]:
         """Return the number of the latest run that holds the entity: one step in the primary key."""

@@ -76,7 +76,9 @@ def _shape(name: str) -> Source:
             # numpy is loaded only by those who ask
             from archmodel.store.arch_shapes import arch_shapes
 
-            return {number: (one.span, one.rise) for number, one in arch_shapes(context.session).items()}
+            return {
+                number: (shape.span, shape.rise) for number, shape in arch_shapes(context.session).items()
+            }
 
         rows = context.computed("arches", ("span", "rise"), shapes)
         return select(rows.c[name]).where(rows.c.id == scope.structure.c.id).scalar_subquery()

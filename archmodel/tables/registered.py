@@ -114,24 +114,26 @@ class Proportions:
 
 def canons(session: Session | None) -> dict[str, Proportions]:
     """Return the canonical proportions of all kinds that have some: their own, or those of the nearest kind above."""
-    held = {}
+    stated = {}
     if session is not None:
         session.flush()
-        held = {one.kind: one for one in session.scalars(select(Canon).where(held_at(Canon)))}
-    known: dict[str, type[Kind]] = {**kinds_in(session, Entity), **kinds_in(session, Structure)}
-    found: dict[str, Proportions] = {}
-    for name, cls in known.items():
-        for one in reversed(kind_chain(cls)):
-            kind, own = kind_of(one), one.__dict__.get("__canon__")
-            if (row := held.get(kind)) is not None:
+        stated = {
+            ancestor.kind: ancestor for ancestor in session.scalars(select(Canon).where(held_at(Canon)))
+        }
+    kinds_here: dict[str, type[Kind]] = {**kinds_in(session, Entity), **kinds_in(session, Structure)}
+    proportions: dict[str, Proportions] = {}
+    for name, cls in kinds_here.items():
+        for ancestor in reversed(kind_chain(cls)):
+            kind, inherent = kind_of(ancestor), ancestor.__dict__.get("__canon__")
+            if (row := stated.get(kind)) is not None:
                 if row.proportions is not None:
-                    found[name] = Proportions(kind, row.proportions, row.tolerance, row.entry_id)
+                    proportions[name] = Proportions(kind, row.proportions, row.tolerance, row.entry_id)
                     break
-            elif "__canon__" in one.__dict__:
-                if own is not None:
-                    found[name] = Proportions(kind, own)
+            elif "__canon__" in ancestor.__dict__:
+                if inherent is not None:
+                    proportions[name] = Proportions(kind, inherent)
                 break
-    return found
+    return proportions
 
 
 _CLASSES: dict[tuple[object, ...], type[Kind]] = {}

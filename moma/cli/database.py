@@ -1,7 +1,7 @@
 """Commands for whole databases: their layout, export and import, a view of them, and a server."""
 
 import sys
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -126,6 +126,22 @@ def _lines(report: "ExchangeReport", way: str, verbose: bool) -> list[str]:
     return lines + [f"  {count:>8} {name}" for name, count in report.rows.items() if count or verbose]
 
 
+@dataclass(frozen=True)
+class ElevationChoices:
+    """Drawing of the main elevation beside a page."""
+
+    elevation: Annotated[
+        Path | None,
+        typer.Option("--elevation", metavar="FILE.svg", help="Draw the main elevation to scale there too."),
+    ] = None
+    scale: Annotated[
+        int | None,
+        typer.Option(
+            "--scale", metavar="N", min=1, help="1 : N of the elevation; default: fits a sheet of A4."
+        ),
+    ] = None
+
+
 @reporting
 def view(
     *,
@@ -155,16 +171,7 @@ def view(
         str | None,
         typer.Option("--title", metavar="TEXT", help="Name of the building; default: the survey's."),
     ] = None,
-    elevation: Annotated[
-        Path | None,
-        typer.Option("--elevation", metavar="FILE.svg", help="Draw the main elevation to scale there too."),
-    ] = None,
-    scale: Annotated[
-        int | None,
-        typer.Option(
-            "--scale", metavar="N", min=1, help="1 : N of the elevation; default: fits a sheet of A4."
-        ),
-    ] = None,
+    drawing: ElevationChoices,
     at: At = None,
     common: Common,
 ) -> None:
@@ -173,6 +180,7 @@ def view(
     from pipelines.reports.view import write_comparison_view, write_view
 
     check_ending(out, ".html", ".htm")
+    elevation, scale = drawing.elevation, drawing.scale
     check_ending(elevation, ".svg")
     if pages:
         for name, given in (("--where", where), ("--run", run), ("--elevation", elevation), ("--at", at)):

@@ -280,6 +280,18 @@ def ingest(
     print(as_json(asdict(report)) if common.json else "\n".join(ingest_lines(report, common.verbose)))
 
 
+@dataclass(frozen=True)
+class MasonryChoices:
+    """What no survey tells of masonry."""
+
+    mortar: Annotated[
+        Level | None, typer.Option(help="Quality of the mortar, for the masonry quality index.")
+    ] = None
+    state: Annotated[
+        Level | None, typer.Option(help="State and strength of the stones, for the masonry quality index.")
+    ] = None
+
+
 @reporting
 def survey_report(
     *,
@@ -305,12 +317,7 @@ def survey_report(
             help="Survey of an earlier campaign: compare stone by stone; repeatable.",
         ),
     ] = None,
-    mortar: Annotated[
-        Level | None, typer.Option(help="Quality of the mortar, for the masonry quality index.")
-    ] = None,
-    state: Annotated[
-        Level | None, typer.Option(help="State and strength of the stones, for the masonry quality index.")
-    ] = None,
+    masonry: MasonryChoices,
     overwrite: Overwrite = False,
     json: Json = False,
     verbose: Verbose = False,
@@ -322,7 +329,7 @@ def survey_report(
 
     name, paths, options = _sources(survey, drawn)
     folder = out or Path("out") / f"survey-{(drawn.outlines or paths[0]).resolve().stem}"
-    levels = {"MM": mortar, "SM": state}
+    levels = {"MM": masonry.mortar, "SM": masonry.state}
     given = {name: given_grade(level.value) for name, level in levels.items() if level is not None}
     with progress_bars() as listener:
         report = report_surveys(

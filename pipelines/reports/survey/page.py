@@ -90,16 +90,16 @@ def write_survey_page(
     )
 
 
-def _moved_row(one: MovedStone) -> Row:
+def _moved_row(stone: MovedStone) -> Row:
     """Return the displacement of a stone since the earlier campaign."""
-    x, y, z = (f"{1e3 * value:+.1f}" for value in one.displacement.vector)
-    moved = one.displacement
+    x, y, z = (f"{1e3 * value:+.1f}" for value in stone.displacement.vector)
+    moved = stone.displacement
     return (
-        one.code,
+        stone.code,
         f"{1e3 * moved.distance:.1f} ± {1e3 * moved.sigma:.1f}",
         f"{moved.distance / moved.sigma:.1f} σ",
         f"{x}, {y}, {z}",
-        f"{1e3 * one.outwards:+.1f}",
+        f"{1e3 * stone.outwards:+.1f}",
         "moved" if moved.significant else "–",
     )
 
