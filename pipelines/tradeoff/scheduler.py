@@ -1,26 +1,18 @@
 """Runs of a tradeoff study: processes that are started, awaited, stopped, and never left behind."""
 
-import json
-import os
-import signal
-import subprocess
-import sys
-import tempfile
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import dataclass, replace
 from types import TracebackType
-from typing import IO, Any, Self
+from typing import Any, Self
 
 from mechanics.dynamics.progress import Listener, Progress
-from pipelines.results.quantities import quantities_from
+from pipelines.assess.workers.pool import Lost, Worker
 from pipelines.tradeoff.forecast import Choice, Forecast, next_run
 from pipelines.tradeoff.grid import Variant
 from pipelines.tradeoff.pareto import models_of_interest
 from pipelines.tradeoff.store import Measured, Status, Store
-from pipelines.tradeoff.worker import FAILED, Job
-from pipelines.tuning.overlay import overlay_record
+from pipelines.tradeoff.worker import Job, measured
 
 __all__ = ["Limits", "carry_out"]
 
@@ -101,26 +93,15 @@ def _described(run: Measured) -> str:
 
 @dataclass
 class _Run:
-    """A running process."""
+    """A run that has begun, and its process."""
 
     choice: Choice
-    process: "subprocess.Popen[bytes]"
-    answer: IO[bytes]
-    complaint: IO[bytes]
+    worker: Worker
     begun: float
-
-    def stop(self) -> None:
-        """Kill the process if it still runs, and close its files."""
-        self.process.kill()
-        self.process.wait()
-        if self.process.stdin is not None:
-            self.process.stdin.close()
-        self.answer.close()
-        self.complaint.close()
 
 
 class _Runs:
-    """Running processes; a context manager that leaves none behind.
+    """Runs that have begun, each in a fresh process; a context manager that leaves none behind.
 
     Parameters
     ----------
@@ -139,7 +120,7 @@ class _Runs:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         for run in self._runs:
-            run.stop()
+            run.worker.end()
         self._runs.clear()
 
     @property
@@ -149,35 +130,18 @@ class _Runs:
 
     def begin(self, choice: Choice) -> None:
         """Start a process."""
-        # files, closed by _Run.stop, since unread pipes would block the process
-        answer, complaint = tempfile.TemporaryFile(), tempfile.TemporaryFile()  # noqa: SIM115
-        process = subprocess.Popen(
-            [sys.executable, "-m", "pipelines.tradeoff.worker"],
-            stdin=subprocess.PIPE,
-            stdout=answer,
-            stderr=complaint,
-            env=self._environment(),
-            start_new_session=True,  # Ctrl-C reaches this process alone, which ends the others
-        )
-        self._runs.append(_Run(choice, process, answer, complaint, time.monotonic()))
-        asked = asdict(self._job) | {
-            "overlay": overlay_record(choice.setting.overlay),
-            "parent": os.getpid(),
-        }
-        assert process.stdin is not None
-        try:
-            process.stdin.write(json.dumps(asked).encode() + b"\n")
-            process.stdin.flush()
-        except BrokenPipeError:
-            return  # it has ended already; its exit code will show that
+        begun = time.monotonic()
+        worker = Worker(measured, dict.fromkeys(_THREADS, str(self._limits.threads)))
+        self._runs.append(_Run(choice, worker, begun))
+        worker.ask(replace(self._job, overlay=choice.setting.overlay))
 
     def collect(self) -> list[Measured]:
         """Return the runs that have ended, or exceeded their limit and are stopped."""
         over = []
         for run in tuple(self._runs):
-            elapsed = time.monotonic() - run.begun
-            if run.process.poll() is not None:
-                ending = _ending(run)
+            ready, elapsed = run.worker.ready(0.0), time.monotonic() - run.begun
+            if ready:
+                ending = _ending(run.worker.answer())
             elif elapsed > run.choice.limit:
                 ending = {
                     "status": Status.STOPPED,
@@ -186,7 +150,7 @@ class _Runs:
                 }
             else:
                 continue
-            run.stop()
+            run.worker.end()
             self._runs.remove(run)
             setting = run.choice.setting
             over.append(
@@ -194,33 +158,10 @@ class _Runs:
             )
         return over
 
-    def _environment(self) -> dict[str, str]:
-        root = str(Path(__file__).resolve().parents[2])
-        path = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
-        return os.environ | dict.fromkeys(_THREADS, str(self._limits.threads)) | {"PYTHONPATH": path}
 
-
-def _ending(run: _Run) -> dict[str, Any]:
-    """Return the status and the answer of a process that has ended by itself."""
-    code, complaint = run.process.returncode, _text(run.complaint)
-    try:
-        answer: dict[str, Any] = json.loads(_text(run.answer))
-    except ValueError:
-        answer = {}
-    if code == 0 and "quantities" in answer:
-        return answer | {"status": Status.DONE, "quantities": quantities_from(answer["quantities"])}
-    known = answer.get("reason") if code == FAILED else None
-    return {"status": Status.FAILED, "reason": known or _last_words(complaint, code)}
-
-
-def _text(file: IO[bytes]) -> str:
-    file.seek(0)
-    return file.read().decode("utf-8", errors="replace")
-
-
-def _last_words(complaint: str, code: int) -> str:
-    if code < 0:
-        name = signal.Signals(-code).name
-        return f"killed by {name}" + (", maybe for its memory" if code == -signal.SIGKILL else "")
-    lines = [line.strip() for line in complaint.splitlines() if line.strip()]
-    return lines[-1] if lines else f"ended with code {code}"
+def _ending(answer: dict[str, Any] | Lost) -> dict[str, Any]:
+    """Return the status and the results of a run that has ended by itself."""
+    reason = answer.reason if isinstance(answer, Lost) else answer.get("reason")
+    if isinstance(answer, Lost) or reason is not None:
+        return {"status": Status.FAILED, "reason": reason}
+    return answer | {"status": Status.DONE}

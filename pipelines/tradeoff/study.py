@@ -114,7 +114,7 @@ def run_trade(
     limits = Limits(
         asked.budget, asked.jobs, _MEMORY_SHARE * machine_memory(), quantity, scene.solver.threads
     )
-    job = Job(scene.text, str(path), url, {}, width)
+    job = Job(scene.text, str(path), url, width)
     forecast, left = carry_out(job, settings, store, limits, progress)
     goal = Goal(scene.name, quantity, asked.error, width)
     record = study_record(goal, forecast, left, limits) | {

@@ -11,13 +11,13 @@ import signal
 import sys
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
-__all__ = ["Lost", "Work", "workers"]
+__all__ = ["Lost", "Work", "Worker", "workers"]
 
 Work = Callable[[Any], Any]
 """Function of one task, in a module."""
@@ -53,13 +53,13 @@ def workers(
     if count == 1:
         yield lambda tasks: ((number, work(task)) for number, task in enumerate(tasks))
         return
-    crew: list[_Worker] = []
+    crew: list[Worker] = []
 
     def run(tasks: Sequence[Any]) -> Iterator[tuple[int, Any]]:
         while len(crew) < min(count, len(tasks)):
-            crew.append(_Worker(work))
+            crew.append(Worker(work))
         waiting, losses = deque(range(len(tasks))), dict[int, int]()
-        running: dict[int, _Worker] = {}
+        running: dict[int, Worker] = {}
         while waiting or running:
             for worker in crew:
                 if waiting and worker not in running.values():
@@ -83,18 +83,25 @@ def workers(
             worker.end()
 
 
-class _Worker:
-    """A process that works on one task at a time; where it has ended, the next task starts another."""
+class Worker:
+    """A process that works on one task at a time; where it has ended, the next task starts another.
 
-    def __init__(self, work: Work) -> None:
-        self._work = work
+    Parameters
+    ----------
+    work : the function of a task
+    environment : variables of the process beside those of this one, as threads that libraries read when they are loaded
+    """
+
+    def __init__(self, work: Work, environment: Mapping[str, str] | None = None) -> None:
+        self._work, self._environment = work, dict(environment or {})
         self._start()
 
     def _start(self) -> None:
         context = multiprocessing.get_context("spawn")
         self.channel, remote = context.Pipe()
         self._process = context.Process(target=_serve, args=(remote, os.getpid(), self._work), daemon=True)
-        self._process.start()
+        with _variables(self._environment):
+            self._process.start()
         remote.close()
 
     def ask(self, task: Any) -> None:
@@ -105,6 +112,10 @@ class _Worker:
             self.end()
             self._start()
             self.channel.send(task)
+
+    def ready(self, seconds: float) -> bool:
+        """Return true as soon as its answer has arrived or it has ended; false where neither is so by then."""
+        return bool(wait([self.channel], seconds))
 
     def answer(self) -> Any:
         """Return its answer, which has arrived, or how the process has ended without one."""
@@ -128,6 +139,21 @@ class _Worker:
         self._process.kill()
         self._process.join()
         self.channel.close()
+
+
+@contextmanager
+def _variables(added: Mapping[str, str]) -> Iterator[None]:
+    """Add environment variables within a with-block."""
+    before = {name: os.environ.get(name) for name in added}
+    os.environ.update(added)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
 
 
 def _serve(channel: "Connection[Any, Any]", parent: int, work: Work) -> None:

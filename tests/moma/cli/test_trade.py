@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from mechanics.stones.meshing.elements import Element
+from pipelines.assess.workers import pool
 from pipelines.ingest.ingest import ingest
 from pipelines.results.quantities import QUANTITIES
 from pipelines.tradeoff import study as trade_module
@@ -132,7 +133,7 @@ def test_the_table_is_for_people_and_the_files_for_programs(study, place):
 def test_a_study_that_is_done_is_printed_again_and_nothing_runs(study, monkeypatch):
     arguments, first = study
     monkeypatch.setattr(trade_module, "grid", few_settings)
-    monkeypatch.setattr(subprocess, "Popen", None)  # no process can be begun
+    monkeypatch.setattr(pool.Worker, "_start", None)  # no process can be begun
     again = invoke(
         "trade", *arguments, "--error", "0.5", "--budget", "20", "--of", "support_reactions", "--jobs", JOBS
     )
@@ -218,7 +219,7 @@ def children(pid):
             words = (entry / "cmdline").read_bytes()
         except OSError:
             continue
-        if parent == pid and b"pipelines.tradeoff.worker" in words:
+        if parent == pid and b"spawn_main" in words:
             found.append(int(entry.name))
     return found
 
