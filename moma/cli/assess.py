@@ -208,6 +208,14 @@ def study(
             "the same command without it writes the results.",
         ),
     ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            "--scheduler",
+            metavar="ADDRESS",
+            help="Take the samples by the workers of a Dask scheduler, tcp://HOST:PORT, that share the folder.",
+        ),
+    ] = None,
     resume: Annotated[
         bool,
         typer.Option("--resume", help="Go on with the stones as they were, whatever the database holds now."),
@@ -226,7 +234,9 @@ def study(
     folder = out or Path("out") / f"{file.stem}-study"
     with progress_bars() as listener:
         try:
-            done = run_study(file, common.db, folder, listener, workers, _part(part), resume, overwrite)
+            done = run_study(
+                file, common.db, folder, listener, workers, _part(part), resume, overwrite, scheduler
+            )
         except KeyboardInterrupt:
             say(f"stopped; its samples are kept in {folder}, and the same command goes on from there")
             raise

@@ -35,6 +35,7 @@ __all__ = [
     "assemble",
     "assemble_stones",
     "closed_stones",
+    "convex_parts_of",
     "local_origin",
     "stone_about",
     "wishes_of",
@@ -258,12 +259,12 @@ def _block(model: StoneModel, chosen: Modelled, solid: Solid, mesh: MeshSettings
         contact_size=mesh.contact_size,
         growth=mesh.growth,
         mesher=mesh.mesher,
-        parts=_parts(solid),
+        parts=convex_parts_of(solid),
         stress=chosen.stress,
     )
 
 
-def _parts(solid: Solid) -> tuple[Part, ...]:
+def convex_parts_of(solid: Solid) -> tuple[Part, ...]:
     """Return the convex parts of a stone that is not convex."""
     parts = stone_parts(solid)
     return tuple(Part(one.vertices, one.faces) for one in parts) if len(parts) > 1 else ()

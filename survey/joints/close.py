@@ -25,12 +25,12 @@ from survey.joints.contact_planes import ContactPlanes
 from survey.joints.facing import FacingFaces, find_facing, planes_of
 from survey.joints.grown.grow import GrownStones, grow
 from survey.joints.grown.leaf import Leaf, find_leaves
-from survey.joints.overlaps import find_overlaps, part_stones
+from survey.joints.overlaps import Overlapping, find_overlaps, part_stones
 from survey.joints.report import ClosingReport, StoneJoint, closing_report
 from survey.joints.settings import JointMode, JointSettings
 from survey.simplify.simplify import BlockShape, BlockyStone, simplify
 
-__all__ = ["ClosedStones", "close_joints", "newly_facing"]
+__all__ = ["ClosedStones", "close_joints", "closed_solids", "newly_facing"]
 
 _ROUNDS = 4  # rounds in which closing joints reveals further ones, beside worn corners
 _MEETS = 1e-6  # metres: distance within which faces share a plane
@@ -92,6 +92,27 @@ def close_joints(
     blocky = tuple(stone if isinstance(stone, BlockyStone) else simplify(stone) for stone in stones)
     if not blocky:
         return ClosedStones((), (), ClosingReport(settings.mode, (), {}, {}, (), (), ()))
+    building, facing, cut, overlaps = _cut(blocky, settings)
+    report = closing_report(building, facing, cut, overlaps, settings)
+    return ClosedStones(_placed(blocky, building, cut), blocky, report)
+
+
+def closed_solids(stones: Sequence[BlockyStone], settings: JointSettings) -> tuple[Solid, ...]:
+    """Return the solids of `close_joints` without the report, of stones none of which grows.
+
+    Raises
+    ------
+    GeometryError
+        as `close_joints`
+    """
+    building, _, cut, _ = _cut(tuple(stones), settings)
+    return _placed(stones, building, cut)
+
+
+def _cut(
+    blocky: tuple[BlockyStone, ...], settings: JointSettings
+) -> tuple[LocalStones, FacingFaces, Cut, list[Overlapping]]:
+    """Return the building, the faces that face each other, the stones with closed joints, and what still overlaps."""
     building = as_building(blocky)
     facing = find_facing(building.faces.solids, building.faces.planes, settings)
     if settings.mode is JointMode.AS_SURVEYED:
@@ -110,13 +131,16 @@ def close_joints(
             settings.max_displacement,
         )
         cut = replace(cut, solids=parted[: len(building.solids)])
-    report = closing_report(building, facing, cut, overlaps, settings)
+    return building, facing, cut, overlaps
+
+
+def _placed(stones: Sequence[BlockyStone], building: LocalStones, cut: Cut) -> tuple[Solid, ...]:
+    """Return the solids in the frame of the stones; those that did not change as they were."""
     placed = (replace(solid, vertices=solid.vertices + building.origin) for solid in cut.solids)
-    changed = tuple(
+    return tuple(
         stone.solid if solid is old else new
-        for stone, old, solid, new in zip(blocky, building.solids, cut.solids, placed, strict=True)
+        for stone, old, solid, new in zip(stones, building.solids, cut.solids, placed, strict=True)
     )
-    return ClosedStones(changed, blocky, report)
 
 
 def _with_leaves(

@@ -12,8 +12,10 @@ _MAX_ACTIONS = 5  # actions that are told without --verbose
 def part_line(done: Study) -> str:
     """Return how far the samples of a part are."""
     summary = done.summary
-    rest = f"; {summary['missing']} of other parts are not there yet" if summary["missing"] else ""
-    return f"part {summary['part']}/{summary['parts']} is done, {summary['done']} samples are there{rest}"
+    return (
+        f"part {summary['part']}/{summary['parts']} is done: its {summary['done']} samples are there; when all parts "
+        "are, the same command without --part writes the results"
+    )
 
 
 def study_lines(done: Study, verbose: bool) -> Iterator[str]:

@@ -1,5 +1,6 @@
 """Estimates of a study by its method: moments, probability of failure, shares of the variance, fragility curve."""
 
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -23,7 +24,7 @@ from pipelines.assess.study.methods.sobol import Indices, sobol
 from pipelines.assess.study.methods.subset import Subset, subset
 from pipelines.assess.study.problem import Problem
 from pipelines.assess.study.quantities import quantity_name
-from pipelines.assess.study.sampling import Sampler
+from pipelines.assess.study.sampling import IncompleteError, Sampler
 from pipelines.assess.study.settings import Method, StudyTable
 from pipelines.assess.workers.store import Sample
 
@@ -82,10 +83,12 @@ def estimated(study: StudyTable, problem: Problem, sampler: Sampler) -> Estimate
     Raises
     ------
     SceneError : the method has nothing to go by
-    IncompleteError : samples of other parts are not there yet
+    IncompleteError : a part has taken its samples
     """
     name, failure = quantity_name(problem.quantities[0]), failure_of(problem)
-    linear = first_order(sampler, name, problem.dimension) if problem.differentiable else None
+    # parts of a plan need no prediction: whoever gathers them makes it once
+    gathers = sampler.part.count == 1 or study.method is Method.FORM
+    linear = first_order(sampler, name, problem.dimension) if problem.differentiable and gathers else None
     match study.method:
         case Method.MONTE_CARLO:
             plan = monte_carlo(study.samples, problem.dimension, study.seed)
@@ -112,14 +115,21 @@ def _counted(
     failure: Failure | None,
 ) -> Estimates:
     """Return the estimates from samples of equal weight."""
+    with suppress(IncompleteError):
+        control = _control(study, problem, sampler)
     samples = sampler.divided(points)
     values = _values(problem, samples)
     first = quantity_name(problem.quantities[0])
     means = {}
     for name, numbers in values.items():
-        if linear is not None and name == first:
-            predicted = linear.predicted(points)
-            means[name] = controlled(numbers, predicted, linear.mean, study.confidence)
+        if control is not None and name == control[0]:
+            means[name] = control[1]
+        elif control is not None:
+            half = 0.5 * (control[1].high - control[1].low)
+            other, expected = values[control[0]], control[1].value
+            means[name] = controlled(numbers, other, expected, study.confidence, half)
+        elif linear is not None:
+            means[name] = controlled(numbers, linear.predicted(points), linear.mean, study.confidence)
         else:
             means[name] = mean_of(numbers, study.confidence)
     table = problem.quantities[0]
@@ -135,6 +145,19 @@ def _counted(
         linear,
         gradient=linear.gradient if linear is not None else _regressed(points, values[first]),
     )
+
+
+def _control(study: StudyTable, problem: Problem, sampler: Sampler) -> tuple[str, Estimate] | None:
+    """Return the name and the mean of the bound that is the control variate of runs; None where there is none."""
+    bounds = [number for number, table in enumerate(problem.quantities) if table.type == "bound"]
+    if study.controls < 2 or not bounds:
+        return None
+    name = quantity_name(problem.quantities[bounds[0]])
+    # another seed: the mean must not know of the samples that it corrects
+    points = monte_carlo(study.controls, problem.dimension, study.seed + 1)
+    samples = sampler.alone(bounds[0]).divided(points)
+    values = np.array([sample.values.get(name, np.nan) if sample.done else np.nan for sample in samples])
+    return name, mean_of(values, study.confidence)
 
 
 def _values(problem: Problem, samples: list[Sample]) -> dict[str, Array]:

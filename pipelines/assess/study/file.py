@@ -103,7 +103,7 @@ def read_study(path: str | Path) -> StudyFile:
         scene,
         base,
         inputs,
-        _quantities(document, given, study.method),
+        _quantities(document, given, study.method, study.controls),
         _correlations(document, given, inputs),
     )
 
@@ -169,7 +169,7 @@ def _check_law(table: InputTable, scene: SceneFile) -> None:
 
 
 def _quantities(
-    document: TomlDocument, given: Mapping[str, Any], method: Method
+    document: TomlDocument, given: Mapping[str, Any], method: Method, controls: int
 ) -> tuple[QuantityTable, ...]:
     found: list[QuantityTable] = []
     for path, table in tables_of(document, given, "quantities"):
@@ -186,6 +186,11 @@ def _quantities(
     if needs and first.type is not QuantityType.BOUND:
         what = f"{method} needs a gradient, and {first.type} has none"
         document.fail(what, "study", "method", remedy="ask for a bound first, or give method = 'subset'")
+    if controls and not any(table.type is QuantityType.BOUND for table in found):
+        what = "controls without a bound among the quantities"
+        document.fail(
+            what, "study", "controls", remedy='write [[quantities]] with type = "bound", or leave it out'
+        )
     fails = first.fails_below is not None or first.fails_above is not None
     if method in (Method.FORM, Method.SUBSET) and not fails:
         what = f"{method} needs to know when the first quantity fails"

@@ -8,9 +8,9 @@ Densities, strengths and directions of joints and loads change p, q, μ, k and s
 and q through the chain that a run takes, so these are differences of assemblies, without a programme. Frames of
 contacts may turn in their plane from one assembly to the next: forces are carried over in world axes.
 
-A stone that moves takes its neighbours along by all of its movement, and others of its course by a hundredth at most.
-So of many stones those that are far apart are moved together, and each change belongs to the nearest of them. Few are
-moved one by one.
+A stone that changes moves the contact planes of its joints, and with them all stones on these planes, and no other. So
+of many stones those whose moved stones share no joint are changed together, and each change belongs to one of them.
+Where contacts come and go with the sense of a change, as in perfectly regular masonry, it is made in both.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -18,24 +18,19 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
-from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import cKDTree
 
-from mechanics.arrays import Array
+from mechanics.arrays import Array, Bools, Ints
 from mechanics.limit.assembly import RigidAssembly, Strength
 from mechanics.limit.live_loads import LiveLoad
 from pipelines.assess.study.quantities import Limited
 
 __all__ = ["Changed", "Dual", "by_density", "by_strength", "difference", "dual", "together"]
 
-_FEW = 60
-"""Unknowns of single stones up to which each is moved alone, as exactly as rounding allows."""
-_REACH = 1
-"""Joints within which stones move with a stone; those beyond, of its course, by a hundredth of it at most."""
-_STRAY = 0.2
-"""Share of the changes that may lie beyond the reach of all stones that move together [-].
-
-In the window bay derivatives are then wrong by 6·10⁻⁴ of the largest; a reach of two joints takes three times as long.
-"""
+_KINK = 1e-2
+"""Difference of the changes in the two senses over the change, from which both are needed: curvature makes 1e-4 [-]."""
+_SLIGHT = 1e-6
+"""Change over the largest of a contact that matters to no derivative: a tenth of the error that these may have [-]."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +100,7 @@ def _strength_power(at: Dual, strength: Strength, change: Strength, force: Array
 def difference(at: Dual, plus: Changed, minus: Changed, step: float) -> float | None:
     """Return the central difference of λ between two assemblies by their geometry, loads and strength alone.
 
-    None where their contacts are not those of the solution, one by one.
+    None where their contacts are not those of the solution, one by one, or joints may crush.
 
     Parameters
     ----------
@@ -119,113 +114,157 @@ def difference(at: Dual, plus: Changed, minus: Changed, step: float) -> float | 
 
 def together(
     at: Dual,
-    sources: Sequence[Sequence[int]],
-    steps: Sequence[float],
+    reach: Bools,
+    steps: Array,
     changed: Callable[[Mapping[int, float]], Changed],
 ) -> Array:
-    """Return the derivatives by unknowns that each move some stones; NaN where contacts come and go.
+    """Return the derivatives (k,) by unknowns that each change some stones; NaN where contacts come and go.
 
     Parameters
     ----------
-    sources : bodies that each unknown moves
-    steps : half of the differences
+    reach : (k, nb) bodies that change with each unknown
+    steps : (k,) half of the differences
     changed : assembly and load with unknowns, by their number, changed by so much
     """
-    derivatives = np.full(len(sources), np.nan)
-    distance = _distances(at.limited.on)
-    few = sum(len(bodies) == 1 for bodies in sources) <= _FEW
-    for batch in [[number] for number in range(len(sources))] if few else _batches(sources, distance):
-        shares = _shared(at, batch, sources, steps, changed, distance) if len(batch) > 1 else None
-        for place, number in enumerate(batch):
+    derivatives = np.full(len(reach), np.nan)
+    start = _power(at, (at.limited.on, at.limited.live))
+    if start is None:
+        return derivatives
+    kinked, scale = _kinked(at, start, steps, changed)
+    for batch in _batches(reach, _touching(at.limited.on)):
+        own = [batch]
+        while own:
+            some = own.pop()
+            both = bool(reach[some][:, kinked].any())
+            shares = _shared(at, start, some, reach[some], steps, changed, both, scale)
             if shares is not None:
-                derivatives[number] = shares[place]
-                continue
-            step = steps[number]
-            found = difference(at, changed({number: step}), changed({number: -step}), step)
-            derivatives[number] = np.nan if found is None else found
+                derivatives[some] = shares
+            elif len(some) > 1:
+                own += [[number] for number in some]
     return derivatives
+
+
+def _kinked(
+    at: Dual,
+    start: tuple[Array, Array],
+    steps: Array,
+    changed: Callable[[Mapping[int, float]], Changed],
+) -> tuple[Bools, float]:
+    """Return the bodies (nb,) at whose contacts a change in one sense is not the opposite of that in the other.
+
+    The second answer is the largest change of a contact as all unknowns change.
+    """
+    on = at.limited.on
+    ends = [_power(at, changed(dict(enumerate((sign * steps).tolist())))) for sign in (1.0, -1.0)]
+    kinked = np.zeros(len(on.model.mass), dtype=np.bool_)
+    if ends[0] is None or ends[1] is None:
+        return ~kinked, 0.0
+    plus, minus = (end[1] - start[1] for end in ends)
+    largest = np.maximum(np.abs(plus), np.abs(minus))
+    off = np.abs(plus + minus)
+    scale = float(largest.max(initial=0.0))
+    kinked[on.contacts.bodies[(off > _KINK * largest) & (off > _SLIGHT * scale)]] = True
+    return kinked, scale
 
 
 def _shared(
     at: Dual,
+    start: tuple[Array, Array],
     batch: Sequence[int],
-    sources: Sequence[Sequence[int]],
-    steps: Sequence[float],
+    reach: Bools,
+    steps: Array,
     changed: Callable[[Mapping[int, float]], Changed],
-    distance: Array,
+    both: bool,
+    scale: float,
 ) -> Array | None:
-    """Return the derivatives (k,) by unknowns whose stones move together; None where they cannot be told apart."""
+    """Return the derivatives (k,) by unknowns that change together; None where they cannot be told apart."""
     on = at.limited.on
-    end = _power(at, changed({number: steps[number] for number in batch}))
-    start = _power(at, (on, at.limited.live))
-    if end is None or start is None:
+    end = _power(at, changed({number: float(steps[number]) for number in batch}))
+    other = _power(at, changed({number: -float(steps[number]) for number in batch})) if both else start
+    if end is None or other is None:
         return None
-    rows = np.array([distance[list(sources[number])].min(axis=0) for number in batch])
-    nearest, far = rows.argmin(axis=0), rows.min(axis=0)
-    by_body, by_contact = end[0] - start[0], end[1] - start[1]
-    pair = on.contacts.bodies
-    first = far[pair[:, 0]] <= far[pair[:, 1]]
-    owner = np.where(first, nearest[pair[:, 0]], nearest[pair[:, 1]])
-    away = np.concatenate([far[on.free], np.minimum(far[pair[:, 0]], far[pair[:, 1]])])
-    moves = np.concatenate([by_body, by_contact])
-    if np.abs(moves[away > _REACH]).sum() > _STRAY * np.abs(moves).sum():
+    moves = [(one - two) / (2.0 if both else 1.0) for one, two in zip(end, other, strict=True)]
+    # the last place is of bodies that none of them changes
+    owner = np.where(reach.any(axis=0), reach.argmax(axis=0), len(batch))
+    of_contact = owner[on.contacts.bodies].min(axis=1)
+    total = np.bincount(owner[on.free], moves[0], len(batch) + 1)
+    total += np.bincount(of_contact, moves[1], len(batch) + 1)
+    stray = (
+        np.abs(moves[0][owner[on.free] == len(batch)]).sum()
+        + np.abs(moves[1][of_contact == len(batch)]).sum()
+    )
+    # the median width of all joints leads a few of them, which 2e-5 of a change reaches
+    if stray > max(_SLIGHT * scale, _SLIGHT * sum(float(np.abs(move).sum()) for move in moves)):
         return None
-    total = np.bincount(nearest[on.free], by_body, len(batch))
-    total += np.bincount(owner, by_contact, len(batch))
-    shares: Array = total / np.array([steps[number] for number in batch])
+    shares: Array = total[:-1] / steps[batch]
     return shares
 
 
 def _power(at: Dual, changed: Changed) -> tuple[Array, Array] | None:
-    """Return -z·(p + λ q) by body (n,) and the power of forces and strength by contact (nc,) after a change."""
+    """Return -z·(p + λ q) by body (n,) and the power of forces and strength by contact (nc,) after a change.
+
+    None where their contacts are not those of the solution, or joints may crush: the multipliers of that are not known.
+    """
     on, live = changed
     base, optimum = at.limited.on, at.limited.optimum
-    if len(on.contacts) != len(base.contacts) or not np.array_equal(on.contacts.bodies, base.contacts.bodies):
+    rows = _matched(base, on) if base.crushing is None else None
+    if rows is None:
         return None
     load = (on.dead + optimum.multiplier * live(on)).reshape(-1, 6)
     by_body = -np.einsum("bi,bi->b", at.velocity, load)
-    relative = (on.lift.T @ at.velocity.ravel()).reshape(-1, 3)
-    force = _carried(base, on, optimum.force)
+    relative = (on.lift.T @ at.velocity.ravel()).reshape(-1, 3)[rows]
+    force = _carried(base.contacts.frame, on.contacts.frame[rows], optimum.force)
     change = Strength(
-        on.strength.friction - base.strength.friction,
-        on.strength.cohesion - base.strength.cohesion,
-        on.strength.tension - base.strength.tension,
+        on.strength.friction[rows] - base.strength.friction,
+        on.strength.cohesion[rows] - base.strength.cohesion,
+        on.strength.tension[rows] - base.strength.tension,
     )
     by_contact = -np.einsum("ci,ci->c", relative, force)
     return by_body, by_contact + _strength_power(at, base.strength, change, optimum.force)
 
 
-def _carried(base: RigidAssembly, on: RigidAssembly, force: Array) -> Array:
-    """Return forces (nc, 3) in the frames of another assembly, tangential ones carried over in world axes."""
-    world = np.einsum("ci,cij->cj", force[:, 1:], base.contacts.frame[:, 1:])
+def _matched(base: RigidAssembly, on: RigidAssembly) -> Ints | None:
+    """Return the contact of another assembly (nc,) that is nearest to each; None where they are not the same.
+
+    Corners of a common face come in another order where edges of two stones align, and one of them moves.
+    """
+    if not np.array_equal(on.contacts.bodies, base.contacts.bodies):
+        return None
+    places = [one.state.centre[one.contacts.bodies[:, 0]] + one.contacts.arm[:, 0] for one in (base, on)]
+    _, joint = np.unique(base.contacts.bodies, axis=0, return_inverse=True)
+    apart = 10.0 * np.ptp(places[0], axis=0).max()
+    (known, found) = (np.column_stack([place, apart * joint.ravel()]) for place in places)
+    rows: Ints = cKDTree(found).query(known)[1]
+    return rows if len(np.unique(rows)) == len(rows) else None
+
+
+def _carried(base: Array, frame: Array, force: Array) -> Array:
+    """Return forces (nc, 3) in other frames (nc, 3, 3), tangential ones carried over in world axes."""
+    world = np.einsum("ci,cij->cj", force[:, 1:], base[:, 1:])
     carried = np.empty_like(force)
     carried[:, 0] = force[:, 0]
-    carried[:, 1:] = np.einsum("cij,cj->ci", on.contacts.frame[:, 1:], world)
+    carried[:, 1:] = np.einsum("cij,cj->ci", frame[:, 1:], world)
     return carried
 
 
-def _distances(on: RigidAssembly) -> Array:
-    """Return the number of joints between bodies (nb, nb); infinite where none connects them."""
+def _touching(on: RigidAssembly) -> "csr_array[np.float64]":
+    """Return the matrix (nb, nb) of bodies that are the same or have a contact."""
     count = len(on.model.mass)
-    first, second = on.contacts.bodies.T
-    graph = csr_array(coo_array((np.ones(len(first)), (first, second)), shape=(count, count)))
-    distance: Array = dijkstra(graph, directed=False, unweighted=True)
-    return distance
+    first, second = np.concatenate([on.contacts.bodies, np.tile(np.arange(count)[:, None], 2)]).T
+    rows, columns = np.concatenate([first, second]), np.concatenate([second, first])
+    return csr_array(coo_array((np.ones(len(rows)), (rows, columns)), shape=(count, count)))
 
 
-def _batches(sources: Sequence[Sequence[int]], distance: Array) -> list[list[int]]:
-    """Return unknowns in batches, so that the stones of a batch lie apart by more than twice their reach."""
-    batches: list[tuple[list[int], Array]] = []
-    for number, bodies in enumerate(sources):
-        around = distance[list(bodies)].min(axis=0)
-        if len(bodies) == 1:
-            for batch, reached in batches:
-                if reached[bodies[0]] > 2 * _REACH:
-                    batch.append(number)
-                    np.minimum(reached, around, out=reached)
-                    break
-            else:
-                batches.append(([number], around.copy()))
+def _batches(reach: Bools, touching: "csr_array[np.float64]") -> list[list[int]]:
+    """Return unknowns in batches within which no contact joins bodies that two of them change."""
+    near: Bools = (reach.astype(float) @ touching) > 0.0
+    batches: list[tuple[list[int], Bools]] = []
+    for number in np.argsort(-reach.sum(axis=1), kind="stable").tolist():
+        for batch, covered in batches:
+            if not (near[number] & covered).any():
+                batch.append(number)
+                covered |= reach[number]
+                break
         else:
-            batches.append(([number], np.zeros(len(around))))
+            batches.append(([number], reach[number].copy()))
     return [batch for batch, _ in batches]

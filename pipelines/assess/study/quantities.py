@@ -1,6 +1,7 @@
 """Quantities of a sample: limit loads, geometric factor, outcome and summary of a run, aggregates of stones."""
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from statistics import fmean
 from typing import Any
@@ -26,8 +27,11 @@ from pipelines.scene.selection import StoneModel
 
 __all__ = ["Limited", "UndecidedError", "bound", "evaluate", "live_load", "quantity_name"]
 
-_EXACT = 1e-12
-"""Tolerance of programmes whose velocities are derivatives: at 10⁻⁹ those of six walls are wrong by 6·10⁻⁴ [-]."""
+_EXACT = (1e-12, 1e-10)
+"""Tolerances of programmes whose velocities are derivatives: at 10⁻⁹ those of six walls are wrong by 6·10⁻⁴ [-].
+
+Where rounding ends the first without an answer, as in some regular arches, the second has one.
+"""
 
 _WIDEST = 2.0
 """Share of their width to which joints of stones that fall are widened: factors are known down to a half [-]."""
@@ -143,11 +147,10 @@ def bound(on: RigidAssembly, live: LiveLoad, name: str) -> Limited:
     SolverError : Clarabel came to no answer
     """
     load = live(on)
-    try:
-        optimum = Programme(on, load, name, _EXACT).solve(on.strength)
-    except SolverError:
-        optimum = Programme(on, load, name).solve(on.strength)
-    return Limited(on, live, load, optimum)
+    for tolerance in _EXACT:
+        with suppress(SolverError):
+            return Limited(on, live, load, Programme(on, load, name, tolerance).solve(on.strength))
+    return Limited(on, live, load, Programme(on, load, name).solve(on.strength))
 
 
 def _coulomb(on: RigidAssembly, live: LiveLoad, kind: QuantityType) -> float:

@@ -18,6 +18,7 @@ __all__ = ["ATTEMPTS", "IncompleteError", "Part", "Sampler", "Task", "take"]
 
 _NUMBER = re.compile(r"[+-]?[0-9.]+(e[+-]?[0-9]+)?")
 
+_CONTROLS = "controls"
 ATTEMPTS = 11
 """Processes that a sample may lose, one more than the kills that a study must survive.
 
@@ -26,11 +27,14 @@ A sample that kills its process each time, as it needs more memory than there is
 
 
 class IncompleteError(Exception):
-    """Raised where a batch has samples of other parts that are not there yet."""
+    """Raised where a part has taken its samples.
 
-    def __init__(self, done: int, missing: int) -> None:
-        super().__init__(f"{missing} samples are not there yet")
-        self.done, self.missing = done, missing
+    It does not look those of others up: 1,000 parts would look up 10⁸ files of 10⁵.
+    """
+
+    def __init__(self, done: int) -> None:
+        super().__init__("samples of other parts are theirs")
+        self.done = done
 
 
 @dataclass(frozen=True)
@@ -92,22 +96,30 @@ class Sampler:
 
     def __call__(self, points: Array, gradient: bool = False) -> list[Sample]:
         """Return the samples at points (m, n) in their order, all taken here."""
-        return self._taken(points, gradient, Part())
+        return self._taken(points, gradient)
 
     def divided(self, points: Array, gradient: bool = False) -> list[Sample]:
-        """Return the samples at points (m, n) of a plan in their order, of which each part takes its own.
+        """Return the samples at points (m, n) of a plan in their order; a part takes its share and ends.
 
         Raises
         ------
-        IncompleteError : samples of other parts are not there yet
+        IncompleteError : this is a part
         """
-        return self._taken(points, gradient, self.part)
+        if self.part.count == 1:
+            return self._taken(points, gradient)
+        raise IncompleteError(len(self._taken(points[self.part.number - 1 :: self.part.count], gradient)))
 
-    def _taken(self, points: Array, gradient: bool, part: Part) -> list[Sample]:
+    def alone(self, number: int) -> "Sampler":
+        """Return a sampler of one quantity alone, by its number, whose records stand in a folder of their own."""
+        content = self.snapshot.content()
+        content["quantities"] = [content["quantities"][number]]
+        snapshot = Snapshot.write(self.snapshot.folder / _CONTROLS, content)
+        return Sampler(snapshot, self.run, self.part, self.progress)
+
+    def _taken(self, points: Array, gradient: bool) -> list[Sample]:
         store, count = SampleStore(self.snapshot), len(points)
         found = [store.get(point, gradient) for point in points]
         todo = [number for number, sample in enumerate(found) if sample is None]
-        todo = [number for number in todo if number % part.count == part.number - 1]
         tasks = [Task(self.snapshot, points[number], gradient) for number in todo]
         done = count - sum(sample is None for sample in found)
         for place, answer in self.run(tasks):
@@ -119,8 +131,6 @@ class Sampler:
             self.taken, self.cpu, done = self.taken + 1, self.cpu + answer.cpu, done + 1
             self.progress(Progress("assess", done, count, "samples"))
         answers = [sample for sample in found if sample is not None]
-        if len(answers) < count:
-            raise IncompleteError(len(answers), count - len(answers))
         for sample in answers:
             if not sample.done:
                 # reasons that differ in their numbers alone are one

@@ -89,6 +89,15 @@ class StudyTable:
             at_most=10_000_000,
         ),
     ] = 500
+    controls: Annotated[
+        int,
+        Setting(
+            "Further samples of the first bound among the quantities, alone: its mean, so known better, corrects those "
+            "of the others. 0: none.",
+            at_least=0,
+            at_most=10_000_000,
+        ),
+    ] = 0
     seed: Annotated[int, Setting("Seed of the random numbers.", at_least=0)] = 1
     confidence: Annotated[float, Setting("Confidence of intervals.", "-", above=0.5, below=1)] = 0.95
 

@@ -21,8 +21,9 @@ from pipelines.assess.study.prepare import problem_of, snapshot_content
 from pipelines.assess.study.problem import Problem
 from pipelines.assess.study.results import write_results
 from pipelines.assess.study.sampling import ATTEMPTS, IncompleteError, Part, Sampler, take
-from pipelines.assess.study.settings import Method
+from pipelines.assess.study.settings import InputType, Method
 from pipelines.assess.study.summary import summary_of
+from pipelines.assess.workers.cluster import cluster
 from pipelines.assess.workers.pool import workers
 from pipelines.assess.workers.store import Snapshot
 from pipelines.results.folder import locked
@@ -31,6 +32,11 @@ from pipelines.run.record import store_record, versions
 __all__ = ["Study", "run_study"]
 
 _SNAPSHOTS = "snapshot-*.json"
+_WHOLE: Mapping[Method, str] = {
+    Method.SUBSET: "each level begins from all samples of the one before",
+    Method.FIRST_ORDER: "its few samples surround the mean",
+}
+"""Methods without parts, and why."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +47,7 @@ class Study:
     ----------
     folder : of the files
     summary : contents of study.json; of a part, how many of its samples are there
-    complete : all samples that it needs are there
+    complete : it has results, and is no part
     run : its number in the database; None where it is not complete
     """
 
@@ -60,6 +66,7 @@ def run_study(
     part: Part | None = None,
     resume: bool = False,
     overwrite: bool = False,
+    scheduler: str | None = None,
 ) -> Study:
     """Carry what is not known of a scene to its quantities; keep each sample, and go on from those that are there.
 
@@ -73,37 +80,40 @@ def run_study(
     part : of the samples that this call takes; the results are written by a call for all
     resume : go on with the snapshot of the folder, whatever the database holds now
     overwrite : take the folder of another study
+    scheduler : address of a Dask scheduler whose workers take the samples, in place of processes here
 
     Raises
     ------
-    UsageError : the folder holds other files, or another study
+    UsageError : the folder holds other files, or another study; the scheduler does not answer
     SceneError : with file and line, at the first mistake; the scene does not stand at the mean of all inputs
     DatabaseError : the database cannot be read or written
     """
     folder, file, part = Path(folder), read_study(path), part or Part()
-    if part.count > 1 and file.study.method is Method.SUBSET:
+    if part.count > 1 and file.study.method in _WHOLE:
         raise UsageError(
-            "subset simulation has no parts: each level begins from all samples of the one before",
+            f"{file.study.method} has no parts: {_WHOLE[file.study.method]}",
             where="--part",
-            remedy="leave out --part, and give --workers",
+            remedy="leave out --part, and give --workers or --scheduler",
         )
     progress(Progress("blocks", 0, None, "reading the stones"))
     with open_database(url, create=False) as database, database.session(read_only=True) as session:
         as_of = latest_entry(session)
         content = None if resume else snapshot_content(file, session)
-    snapshot = _snapshot(folder, content, overwrite)
+    # workers elsewhere stand in another folder
+    snapshot = _snapshot(folder.absolute(), content, overwrite)
     problem = problem_of(snapshot)
-    with workers(count, take, ATTEMPTS) as run:
+    if scheduler is not None and count > 1:
+        raise UsageError(
+            "both a scheduler and processes here", where="--workers", remedy="give one of the two"
+        )
+    crew = workers(count, take, ATTEMPTS) if scheduler is None else cluster(scheduler, take, ATTEMPTS)
+    with crew as run:
         sampler = Sampler(snapshot, run, part, progress)
         _refuse_fallen(file, problem, sampler)
         try:
             estimates = estimated(file.study, problem, sampler)
         except IncompleteError as error:
-            told = {"part": part.number, "parts": part.count, "done": error.done, "missing": error.missing}
-            return Study(folder, told, False)
-    if part.count > 1:
-        told = {"part": part.number, "parts": part.count, "done": len(estimates.points), "missing": 0}
-        return Study(folder, told, True)
+            return Study(folder, {"part": part.number, "parts": part.count, "done": error.done}, False)
     summary = summary_of(file, problem, estimates, sampler, snapshot)
     progress(Progress("write", 0, 1, "pictures"))
     with locked(_made(folder / ".writing")):
@@ -145,7 +155,12 @@ def _snapshot(folder: Path, content: dict[str, Any] | None, overwrite: bool) -> 
 
 
 def _refuse_fallen(file: StudyFile, problem: Problem, sampler: Sampler) -> None:
-    """Refuse a scene that does not stand at the mean of all inputs, before anything else runs."""
+    """Refuse a scene that does not stand at the mean of all inputs, before anything else runs.
+
+    Records have no mean, so a scene that one of them may throw down runs with all.
+    """
+    if any(table.type is InputType.RECORD for table in problem.inputs):
+        return
     (middle,) = sampler(np.zeros((1, problem.dimension)))
     where = file.document.where("study", "scene")
     if not middle.done:

@@ -126,6 +126,10 @@ def _linear(problem: Problem, found: Estimates) -> dict[str, Any] | None:
             "departure": linear.departure,
             "along": along,
             "linear": bool(linear.linear),
+            "sides": [
+                {"along": problem.unknowns.each[one.along].label, "below": one.below, "above": one.above}
+                for one in linear.sides
+            ],
         }
     )
 
@@ -195,6 +199,12 @@ def _cautions(problem: Problem, found: Estimates, summary: Mapping[str, Any]) ->
             f"first order is not good enough: along {linear['along'] or 'the gradient'} the quantity departs from it "
             f"{size} (limit {100 * NOT_LINEAR:.0f} %); several mechanisms may govern"
         )
+    if linear is not None:
+        told += [
+            f"the derivative by {one['along']} is {one['below']:.3g} below its mean and {one['above']:.3g} above, a "
+            "standard deviation: several mechanisms meet there, and shares and actions are those of one between them"
+            for one in linear["sides"]
+        ]
     told += [
         f"{fault['count']} samples have no answer, as the first: {fault['reason']}; they bound the probability from "
         "both sides"

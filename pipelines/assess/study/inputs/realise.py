@@ -18,7 +18,7 @@ from pipelines.scene.file import SceneFile, parse_scene
 from pipelines.scene.selection import StoneModel
 from pipelines.toml.writer import toml_text
 
-__all__ = ["GEOMETRY", "Realised", "law_value", "realise", "records_of"]
+__all__ = ["GEOMETRY", "LAW_KEYS", "Realised", "changed_stones", "law_value", "realise", "records_of"]
 
 GEOMETRY = frozenset({InputType.DEPTH, InputType.PLANE, InputType.POINT, InputType.STATION})
 """Inputs that change the shape of stones, so that joints are closed again."""
@@ -76,16 +76,11 @@ def realise(
     SceneError : a value is out of the bounds of what it stands for
     """
     tables, turn = deepcopy(dict(base)), 0.0
-    by_code = {model.record.code: model for model in models}
     for number, table in enumerate(inputs):
         values = [(unknown, value) for unknown, value in valued if unknown.input == number]
         match table.type:
             case kind if kind in LAW_KEYS:
                 _change_laws(tables, scene, table, values)
-            case kind if kind in _MATERIAL:
-                _change_stones(by_code, values, _material_changer(_MATERIAL[kind]))
-            case InputType.DEPTH:
-                _change_stones(by_code, values, _deepened)
             case InputType.LOAD:
                 for _, value in values:
                     _scale_load(tables, table, value)
@@ -94,10 +89,29 @@ def realise(
                     _name_record(tables, scene, table, value)
             case InputType.DIRECTION:
                 turn += float(np.radians(sum(value for _, value in values)))
-            case _:
-                _shift_stones(by_code, values)
     changed = scene if tables == base else parse_scene(toml_text(tables), scene.document.path)
-    return Realised(changed, tuple(by_code.values()), turn)
+    return Realised(changed, changed_stones(models, inputs, valued), turn)
+
+
+def changed_stones(
+    models: Sequence[StoneModel], inputs: Sequence[InputTable], valued: Sequence[tuple[Unknown, float]]
+) -> tuple[StoneModel, ...]:
+    """Return stones of the survey, some or all, with values of the unknowns that act on them.
+
+    Raises
+    ------
+    SceneError : a value is out of the bounds of what it stands for
+    """
+    by_code = {model.record.code: model for model in models}
+    for number, table in enumerate(inputs):
+        values = [(unknown, value) for unknown, value in valued if unknown.input == number]
+        if table.type in _MATERIAL:
+            _change_stones(by_code, values, _material_changer(_MATERIAL[table.type]))
+        elif table.type is InputType.DEPTH:
+            _change_stones(by_code, values, _deepened)
+        elif table.type in GEOMETRY:
+            _shift_stones(by_code, values)
+    return tuple(by_code.values())
 
 
 def law_value(scene: SceneFile, table: InputTable) -> float | None:
@@ -153,7 +167,7 @@ def _change_stones(
         if scatters:
             acts, value = (Acts.FACTOR, 1.0 + value) if acts is Acts.FACTOR else (Acts.CHANGE, value)
         new = partial(_changed, acts, value)
-        for code in unknown.stones:
+        for code in by_code.keys() & set(unknown.stones):
             by_code[code] = change(by_code[code], new)
 
 
@@ -210,7 +224,7 @@ def _name_record(tables: dict[str, Any], scene: SceneFile, table: InputTable, va
 def _shift_stones(by_code: dict[str, StoneModel], values: Sequence[tuple[Unknown, float]]) -> None:
     """Move the measured points of faces: by heights and tilts of their plane, by corner, or as a whole."""
     for unknown, value in values:
-        for code in unknown.stones:
+        for code in by_code.keys() & set(unknown.stones):
             model = by_code[code]
             by_code[code] = replace(model, record=_shifted(model.record, unknown.part, value))
 

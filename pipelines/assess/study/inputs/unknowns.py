@@ -111,6 +111,9 @@ def expand(
             yield from _points(number, name, chosen)
         case InputType.STATION:
             yield from _stations(number, name, chosen, table)
+        case InputType.RECORD:
+            # each of n files stands for a share of 1/n
+            yield Unknown(number, name, Distribution(Shape.UNIFORM, low=0.0, high=1.0))
         case InputType.DEPTH if table.sigma is table.cov is table.mean is table.low is None:
             yield from _surveyed_depths(number, name, chosen, table.scatter)
         case _:

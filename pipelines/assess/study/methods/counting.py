@@ -122,7 +122,9 @@ def mean_of(values: Array, confidence: float) -> Estimate:
     return Estimate(mean, sigma, mean - half, mean + half, count)
 
 
-def controlled(values: Array, control: Array, expected: float, confidence: float) -> Estimate:
+def controlled(
+    values: Array, control: Array, expected: float, confidence: float, error: float = 0.0
+) -> Estimate:
     """Return the mean of values (m,) by a control variate of known mean, with its interval.
 
     The mean of values - b (control - expected) is that of the values, with less variance where both go together; b
@@ -132,6 +134,7 @@ def controlled(values: Array, control: Array, expected: float, confidence: float
     ----------
     control : (m,) another quantity of the same samples
     expected : its mean
+    error : half of the interval of that mean at the same confidence, from other samples; 0: it is exact
     """
     chosen = np.isfinite(values) & np.isfinite(control)
     known, other = values[chosen], control[chosen] - expected
@@ -142,7 +145,7 @@ def controlled(values: Array, control: Array, expected: float, confidence: float
     rest = float(np.sum((known - mean - slope * other) ** 2)) / (count - 2)
     # variance of the intercept of the regression
     lever = 1.0 / count + other.mean() ** 2 / float(np.sum((other - other.mean()) ** 2))
-    half = float(t.isf(0.5 * (1.0 - confidence), count - 2)) * np.sqrt(rest * lever)
+    half = float(np.hypot(t.isf(0.5 * (1.0 - confidence), count - 2) * np.sqrt(rest * lever), slope * error))
     value = float(mean)
     return Estimate(value, float(np.sqrt(spread)), value - half, value + half, count, rest / spread)
 

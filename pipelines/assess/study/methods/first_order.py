@@ -7,7 +7,7 @@ import numpy as np
 from mechanics.arrays import Array
 from pipelines.assess.study.methods.failure import Evaluate
 
-__all__ = ["NOT_LINEAR", "FirstOrder", "first_order"]
+__all__ = ["NOT_LINEAR", "FirstOrder", "Sides", "first_order"]
 
 _MOST = 8
 """Unknowns that the linear prediction is tried along, the largest first."""
@@ -17,6 +17,30 @@ NOT_LINEAR = 0.1
 
 A tenth shifts a mean by a twentieth of the standard deviation at most.
 """
+
+
+_BESIDE = 1e-3
+"""Distance from the mean at which derivatives of either side are taken, in standard deviations [-].
+
+A second mechanism within 10⁻⁶ of a limit load takes over nearer than that: λ moves by 5·10⁻⁵ of itself.
+"""
+_SMOOTH = 1e-2
+"""Difference of both sides over the standard deviation up to which they are one: curvature leaves 10⁻³ [-]."""
+
+
+@dataclass(frozen=True)
+class Sides:
+    """Derivatives by an unknown to either side of the mean, where they differ.
+
+    Attributes
+    ----------
+    along : number of the unknown
+    below, above : derivatives for values less and greater than the mean, by the standard normal unknown
+    """
+
+    along: int
+    below: float
+    above: float
 
 
 @dataclass(frozen=True)
@@ -30,6 +54,7 @@ class FirstOrder:
     departure : largest difference from it at one standard deviation, over `sigma` [-]; NaN if not tried
     along : number of the unknown where it is largest; -1: none
     evaluations : samples taken
+    sides : unknowns, of the largest, by which the quantity has two derivatives: several mechanisms meet at the mean
     """
 
     mean: float
@@ -38,6 +63,7 @@ class FirstOrder:
     departure: float
     along: int
     evaluations: int
+    sides: tuple[Sides, ...] = ()
 
     @property
     def shares(self) -> Array:
@@ -73,14 +99,20 @@ def first_order(evaluate: Evaluate, quantity: str, dimension: int, check: bool =
         return FirstOrder(mean, sigma, gradient, float("nan") if sigma else 0.0, -1, 1)
     largest = np.argsort(-np.abs(gradient), kind="stable")[:_MOST]
     largest = largest[gradient[largest] != 0.0]
-    points = np.zeros((2 * len(largest) + 2, dimension))
-    for row, number in enumerate(largest):
-        points[2 * row, number], points[2 * row + 1, number] = 1.0, -1.0
-    points[-2:] = np.outer([1.0, -1.0], gradient / sigma)
+    axes = np.eye(dimension)[largest]
+    points = np.vstack(
+        [axes, -axes, np.outer([1.0, -1.0], gradient / sigma), _BESIDE * axes, -_BESIDE * axes]
+    )
     found = evaluate(points)
     values = np.array([sample.values.get(quantity, np.nan) for sample in found])
-    off = np.abs(values - mean - points @ gradient) / sigma
+    count = len(largest)
+    off = np.abs(values - mean - points @ gradient)[: 2 * count + 2] / sigma
     off[np.isnan(off)] = np.inf
     worst = int(np.argmax(off))
-    along = int(largest[worst // 2]) if worst < 2 * len(largest) else -1
-    return FirstOrder(mean, sigma, gradient, float(off[worst]), along, 1 + len(points))
+    along = int(largest[worst % count]) if worst < 2 * count else -1
+    above, below = (values[2 * count + 2 :].reshape(2, count) - mean) / _BESIDE * [[1.0], [-1.0]]
+    sides = tuple(
+        Sides(int(largest[row]), float(below[row]), float(above[row]))
+        for row in np.flatnonzero(np.abs(above - below) > _SMOOTH * sigma)
+    )
+    return FirstOrder(mean, sigma, gradient, float(off[worst]), along, 1 + len(points), sides)

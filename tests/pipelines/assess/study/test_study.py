@@ -44,11 +44,19 @@ def test_parts_resumption_and_one_process_give_the_same_bits(place, tmp_path):
         assert not part.complete
     gathered = run_study(path, url, tmp_path / "parts")
     assert gathered.summary["samples"]["digest"] == whole.summary["samples"]["digest"]
-    # the third of the samples that had no record, of nine
-    assert gathered.summary["samples"]["taken"] == 3
+    # the third of the nine that no part has taken, and eleven of the prediction about the mean
+    assert gathered.summary["samples"]["taken"] == 3 + 11
     again = run_study(path, url, tmp_path / "parts", resume=True)
     assert again.summary["samples"]["taken"] == 0
     assert again.summary["failure"] == whole.summary["failure"]
+
+
+def test_methods_whose_samples_depend_on_one_another_have_no_parts(place, tmp_path):
+    folder, url = place
+    for method, why in (("subset", "each level begins"), ("first_order", "few samples")):
+        path = study_file(folder, method, FRICTIONAL, BOUND, samples=9)
+        with pytest.raises(UsageError, match=why):
+            run_study(path, url, tmp_path / "parts", part=Part(1, 3))
 
 
 def test_samples_that_fail_bound_the_probability_on_both_sides(place, tmp_path):
@@ -64,6 +72,33 @@ def test_samples_that_fail_bound_the_probability_on_both_sides(place, tmp_path):
     (fault,) = done.summary["faults"]
     assert fault["count"] == failure["unknown"]
     assert "friction" in fault["reason"]
+
+
+def test_a_bound_corrects_the_mean_of_runs(place, tmp_path):
+    """U7: the mean of min(μ, d/h) is .34007; of twelve samples alone it is known to .013."""
+    folder, url = place
+    coulomb = BOUND.replace('"bound"', '"candidate"')
+    plain = BOUND.replace("fails_below = 0.30\n", "")
+    path = study_file(folder, "monte_carlo", FRICTIONAL, DEEP, coulomb, plain, samples=12)
+    path.write_text(
+        path.read_text().replace("samples = 12", "samples = 12\ncontrols = 150"), encoding="utf-8"
+    )
+    means = run_study(path, url, tmp_path / "out").summary["means"]
+    runs, control = means["candidate horizontal y"], means["bound horizontal y"]
+    assert control["count"] == 150
+    assert runs["share"] < 0.05
+    assert runs["low"] < 0.34007 < runs["high"]
+    assert runs["high"] - runs["low"] < 0.6 * 2.2 * 2.0 * runs["sigma"] / np.sqrt(12.0)
+
+
+def test_both_sides_of_a_derivative_stand_in_the_study(place, tmp_path):
+    """At μ = d/h friction decides below its mean, and not above."""
+    folder, url = place
+    path = study_file(folder, "first_order", FRICTIONAL + "mean = 0.36\n", DEEP, BOUND)
+    summary = run_study(path, url, tmp_path / "out").summary
+    sides = {one["along"]: (one["below"], one["above"]) for one in summary["linear"]["sides"]}
+    assert sides["friction"] == (pytest.approx(0.03, rel=1e-3), pytest.approx(0.0, abs=1e-4))
+    assert any("several mechanisms meet" in text for text in summary["cautions"])
 
 
 def test_another_study_in_the_folder_is_refused(place, tmp_path):
