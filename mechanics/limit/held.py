@@ -20,6 +20,7 @@ Between the load at which a mechanism stops and the limit, stones may rest or mo
 hundredth below the limit are tried too, and one that falls lowers it.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,8 +32,9 @@ from mechanics.limit.live_loads import LiveLoad
 from mechanics.model.rigid import inverse_inertia_world
 from mechanics.problem.problem import ContactProblem, ContactStart
 from mechanics.problem.residual import residual
+from mechanics.solvers.auto import Auto
 from mechanics.solvers.chain import follow
-from mechanics.solvers.kinds import standing_chain
+from mechanics.solvers.kinds import FURTHER, standing_chain
 from mechanics.solvers.scales import ROUNDING
 from mechanics.solvers.second_order.newton import Newton
 
@@ -44,19 +46,15 @@ WIDTH = 2e-3
 # velocity of a contact over the largest u_free from which it moves: steps solved to their tolerance leave up to a
 # third of it [-]
 _MOVES = 1e-3
-# the same of steps that are solved so well that their motion is no error: by which contacts break their laws over the
-# fastest one, of which stones may move a hundred times as fast; rests that are solved so leave 10⁻⁶ [-]
-_CREEPS, _SURE = 1e-4, 1e-2
+# the same of steps that are solved so well that their motion is no error, as methods go that far below their tolerance;
+# and by what contacts break their laws there, over the fastest one: stones may move a hundred times as fast [-]
+_CREEPS, _SURE = FURTHER * _MOVES, 1e-2
 # tolerances of η and of velocities, and iterations of all methods of one problem
-_LIMITS, _ITERATIONS = (Newton.tolerance, Newton.velocity_tolerance), 2000
-# step up from a load to begin with that is borne, over it, doubled each time that it is borne [-]
-_UP = 0.01
-# loads below the limit that are tried too, in units: down to a hundredth of it, as a rule
-_BELOW = 1, 2, 4
-# share of the bound to whose multiples a load to begin with is rounded down, as forms of a scene agree on it to 0.2 %
-_BEGIN = 0.02
-# first load that is tried where the bound is endless, and how often it is doubled before nothing limits it
-_FIRST, _DOUBLED = 1.0, 10
+_LIMITS, _ITERATIONS = (Newton.tolerance, Newton.velocity_tolerance), Auto.max_iterations
+# share of a load within which loads beside it are tried: up from one to begin with that is held, and below the limit
+_BESIDE = 0.01
+# first load that is tried where the bound is endless; it is doubled up to one over the width before nothing limits it
+_FIRST = 1.0
 
 
 @dataclass(frozen=True)
@@ -120,31 +118,34 @@ def held_limit(
     # a load within rounding of the bound would be held or lost by chance
     high = int(bound.multiplier / search.unit + 0.5)
     first = high - 1
-    if candidate is not None and candidate < (1.0 - _BEGIN) * bound.multiplier:
-        first = int(_BEGIN * int(candidate / (_BEGIN * bound.multiplier)) * high)
+    if candidate is not None and candidate < (1.0 - _BESIDE) * bound.multiplier:
+        # in whole hundredths of the bound, as forms of a scene agree on a candidate to 0.2 %
+        first = int(_BESIDE * int(candidate / (_BESIDE * bound.multiplier)) * high)
     found = search.limit(on, 0, high, first)
     return found if found.mechanism is not None else replace(found, lost=bound.multiplier)
 
 
 def _without_bound(on: RigidAssembly, steps: "_Steps", nothing: _Trial) -> HeldLimit:
     """Return the limit below the first load that falls, doubled again and again; an endless one if none does."""
-    held, best, load = 0.0, nothing, _FIRST
-    for doubled in range(_DOUBLED + 1):
+    held, best, load, problems = 0.0, nothing, _FIRST, 1
+    while load * WIDTH <= _FIRST:
         trial = steps(load)
+        problems += 1
         if not trial.holds:
             unit = _unit(load)
             low, high = round(held / unit), round(load / unit)
-            found = _Search(steps, unit, {0: nothing, low: best, high: trial}).limit(on, low, high, None)
-            return replace(found, problems=found.problems + doubled)
+            tried = {0: nothing, low: best, high: trial}
+            found = _Search(steps, unit, tried).limit(on, low, high, None)
+            return replace(found, problems=problems + found.problems - len(tried))
         held, best, load = load, trial, 2.0 * load
-    return HeldLimit(np.inf, np.inf, best.force, None, _DOUBLED + 2)
+    return HeldLimit(np.inf, np.inf, best.force, None, problems)
 
 
 def _unit(load: float) -> float:
     """Return the largest of 1, 2 and 5 · 10ᵏ that is no more than two thousandths of a load."""
     most = WIDTH * load * (1.0 + ROUNDING)
     power = 10.0 ** np.floor(np.log10(most))
-    return float(power * max(one for one in (1.0, 2.0, 5.0) if one * power <= most))
+    return float(power * max(digit for digit in (1.0, 2.0, 5.0) if digit * power <= most))
 
 
 def _falling(on: RigidAssembly, trial: _Trial) -> Mechanism:
@@ -176,18 +177,25 @@ class _Search:
         first : to be tried first; None: where the mechanism of the higher would stop
         """
         low, high = self._neighbours(low, high, first)
-        while fallen := [one for step in _BELOW if (one := low - step) > 0 and not self._holds(one)]:
+        while fallen := [load for load in self._below(low) if not self._holds(load)]:
             high = min(fallen)
-            low, high = self._neighbours(max(one for one in self.tried if one < high), high, None)
+            low, high = self._neighbours(max(load for load in self.tried if load < high), high, None)
         best, worst = self.tried[low], self.tried.get(high)
         falls = None if worst is None else _falling(on, worst)
         return HeldLimit(self._load(low), self._load(high), best.force, falls, len(self.tried))
+
+    def _below(self, low: int) -> Iterator[int]:
+        """Yield multiples below one, ever farther, down to a hundredth of it."""
+        step = 1
+        while step <= max(_BESIDE * low, 1.0) and step < low:
+            yield low - step
+            step *= 2
 
     def _neighbours(self, low: int, high: int, first: int | None) -> tuple[int, int]:
         """Return neighbouring multiples of which the lower is held and the higher lost."""
         load = self._stops(low, high) if first is None else first
         # a load at which a mechanism stops lies next to the limit
-        step = 1 if first is None else max(1, int(_UP * first))
+        step = 1 if first is None else max(1, int(_BESIDE * first))
         while high - low > 1:
             load = min(max(load, low + 1), high - 1)
             if self._holds(load):

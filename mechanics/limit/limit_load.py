@@ -63,9 +63,6 @@ _BEYOND = 1e-2
 _ACROSS = 1e-3
 # squared sine of the angle between planes of joints up to which they are one plane: 2.6° [-]
 _PLANE = 2e-3
-# share of turning in the speed of a mechanism up to which it slides, and speed over the largest from which a stone
-# belongs to it [-]
-_TURNS, _BELONGS = 0.15, 0.01
 # velocity over the largest below which a contact stays closed [-]
 _STILL = 1e-4
 
@@ -240,22 +237,14 @@ def slides_along_one_line(on: RigidAssembly, found: LimitLoad) -> bool:
     Where they slide along several, as those of a dome that opens, no friction is across the line of sliding: that of
     each joint holds the others.
     """
-    motion = found.mechanism
-    moves = motion.speed > _BELONGS * motion.speed.max(initial=0.0)
-    line = lines_of_sliding(on, found)
-    if line.any():
-        way = line[moves]
-    else:
-        way = motion.velocity[moves, :3]
+    motion, way = found.mechanism, lines_of_sliding(on, found)
+    if not way.any():
+        way = motion.velocity[:, :3]
         turning = 0.5 * on.model.surfaces.size * np.linalg.norm(motion.velocity[:, 3:], axis=1)
-        if turning.max() > _TURNS * motion.speed.max(initial=0.0):
+        if turning @ turning > _PLANE * motion.speed @ motion.speed:
             return False
-    size = np.linalg.norm(way, axis=1)
-    if not len(way) or not size.all():
-        return False
-    way = way / size[:, None]
-    axis = np.linalg.svd(way)[2][0]
-    return bool(((way @ axis) ** 2 >= 1.0 - _PLANE).all())
+    along, *across = np.linalg.svd(way, compute_uv=False) ** 2
+    return bool(along > 0.0 and sum(across) <= _PLANE * along)
 
 
 def mechanism(
