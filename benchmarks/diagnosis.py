@@ -25,12 +25,12 @@ from pipelines.assess.motions import Motions
 from pipelines.ingest.ingest import ingest
 from pipelines.propose.propose import Recording, propose_core
 from pipelines.record.record import record
-from pipelines.samples.building import SyntheticBuilding
-from pipelines.samples.samples import recipe_of
-from pipelines.samples.true_movement import true_movement
-from pipelines.samples.write import write_sample
 from survey.formats.native.writer import write_moma
 from survey.quality.precision import appraise
+from synthetic.building import SyntheticBuilding
+from synthetic.samples import recipe_of
+from synthetic.true_movement import true_movement
+from synthetic.write import write_sample
 
 __all__ = ["Laboratory", "drawn", "laboratory", "main", "outcome"]
 

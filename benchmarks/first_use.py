@@ -34,7 +34,7 @@ sample wall --moved settlement --small --out settled
 ingest settled/wall.moma --db sqlite:///settled.db
 run settled/wall.toml --db sqlite:///settled.db --out settled-run
 diagnose settled/diagnosis.toml --db sqlite:///settled.db --out diagnosis
-sample tower --small --courses 2 --out tower
+sample tower --small --out tower
 ingest tower/tower.moma --db sqlite:///tower.db
 run tower/tower.toml --profile fast --db sqlite:///tower.db --out tower-run
 sample rubble-wall --out rubble

@@ -29,8 +29,6 @@ from ground.errors import SurveyError
 from mechanics.arrays import Array
 from pipelines.ingest.exchange import export_database, import_database
 from pipelines.ingest.ingest import ingest
-from pipelines.samples.buildings.openings import ArchShape
-from pipelines.samples.buildings.walls import wall
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.formats.reading import open_survey
 from survey.joints.close import close_joints
@@ -38,6 +36,8 @@ from survey.joints.settings import JointSettings
 from survey.records.survey import BlockRecord
 from survey.registration.stones import survey_stones
 from survey.simplify.simplify import simplify
+from synthetic.buildings.openings import ArchShape
+from synthetic.buildings.walls import wall
 
 __all__ = ["closed", "main", "measured", "write"]
 

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from benchmarks.outlines_fit import fitted
 from benchmarks.report import ROOT, Row, columns, options_of, progress, show
-from pipelines.samples.buildings.rendered_walls import STYLES, RenderedWall, rasterised, render_wall
 from survey.arrays import Array, Ints
 from survey.clouds.pictures.photograph import Photograph
 from survey.clouds.pictures.proposal import Proposal, propose_outlines
 from survey.clouds.world import PixelPlace
+from synthetic.buildings.rendered_walls import STYLES, RenderedWall, rasterised, render_wall
 
 __all__ = ["corner_errors", "main", "panoptic_quality", "picture_of"]
 

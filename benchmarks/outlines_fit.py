@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.report import progress
-from pipelines.samples.buildings.rendered_walls import STYLES, rasterised, render_wall
 from survey.arrays import Array, Bools, Ints
 from survey.clouds.pictures.bond import Bond, bond_of, join_weak, renumbered
 from survey.clouds.pictures.joints import WIDTH
@@ -16,6 +15,7 @@ from survey.clouds.pictures.regions import closed_regions
 from survey.clouds.pictures.scale import joint_width
 from survey.clouds.pictures.splitting import line_features, lines_across
 from survey.clouds.world import PixelPlace
+from synthetic.buildings.rendered_walls import STYLES, rasterised, render_wall
 
 __all__ = ["fitted"]
 

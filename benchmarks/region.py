@@ -19,15 +19,15 @@ from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
 from pipelines.results.quantities import Quantities, differences, quantities
 from pipelines.run.fidelity import Wishes, modelled, neighbours
-from pipelines.samples.buildings.openings import ArchShape
-from pipelines.samples.buildings.vaults import semicircular_arch
-from pipelines.samples.buildings.walls import wall
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.formats.reading import open_survey
 from survey.geometry.solids import Solid
 from survey.joints.close import close_joints
 from survey.joints.report import StoneJoint
 from survey.registration.stones import survey_stones
+from synthetic.buildings.openings import ArchShape
+from synthetic.buildings.vaults import semicircular_arch
+from synthetic.buildings.walls import wall
 
 __all__ = ["main"]
 

@@ -22,8 +22,8 @@ from mechanics.results.result import Result
 from mechanics.simulate import simulate_stages
 from pipelines.ingest.ingest import ingest
 from pipelines.run.assemble import assemble
-from pipelines.samples.write import write_sample
 from pipelines.scene.file import parse_scene
+from synthetic.write import write_sample
 
 __all__ = ["CASES", "main", "rows"]
 

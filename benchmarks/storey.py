@@ -17,8 +17,8 @@ from pipelines.ingest.reading_options import reading_options
 from pipelines.propose.propose import Recording, propose_core
 from pipelines.record.record import record
 from pipelines.run.assemble import assemble
-from pipelines.samples.write import write_sample
 from pipelines.scene.file import read_scene
+from synthetic.write import write_sample
 
 __all__ = ["main", "measured"]
 

@@ -72,14 +72,8 @@ class _SampleChoices:
     scan: Annotated[
         bool, typer.Option("--scan", help="With a scan and outlines of the stones: the window.")
     ] = False
-    courses: Annotated[
-        int | None, typer.Option(help="Courses of the tower; default: 40, or 12 with --small.")
-    ] = None
     photographs: Annotated[
-        bool, typer.Option("--photographs", help="Twelve photographs of the window too, to orient.")
-    ] = False
-    pictures: Annotated[
-        bool, typer.Option("--pictures", help="With --photographs: render the pictures themselves.")
+        bool, typer.Option("--photographs", help="Marks on twelve photographs of the window too, to orient.")
     ] = False
 
 
@@ -100,10 +94,9 @@ def sample(
 ) -> None:
     """Write a survey with its truth and a scene that runs, to start from: synthetic, but of granite-wall."""
     from moma.cli.text.formats import as_json
-    from pipelines.samples.write import write_sample
+    from pipelines.samples.copy import copy_sample
 
-    with progress_bars() as listener:
-        written = write_sample(kind, out or Path(kind), listener, **vars(variant))
+    written = copy_sample(kind, out or Path(kind), **vars(variant))
     lines = [
         f"{written.title}: {'a synthetic survey of ' if written.synthetic else ''}{written.stones} stones",
         *(f"  {path}" for path in written.files),

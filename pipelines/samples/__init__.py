@@ -1,5 +1,4 @@
-"""Synthetic samples: buildings measured as a surveyor would, with their truth, and a scene that runs.
+"""Samples that are shipped, as the generators in `synthetic/` wrote them.
 
-Public: `SyntheticBuilding`, `measured_building` (building); `true_joints` (true_joints); `SAMPLES`,
-`recipe_of` (samples); `WrittenSample`, `write_sample` (write).
+Public: `WrittenSample`, `copy_sample`, `sample_names`, `write_new` (copy).
 """

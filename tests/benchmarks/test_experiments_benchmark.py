@@ -7,7 +7,7 @@ import tomllib
 import pytest
 
 from benchmarks import experiments
-from pipelines.samples.granite_wall import GRANITE_SCENE
+from synthetic.granite_wall import GRANITE_SCENE
 
 
 def test_a_brick_wall_on_two_edges_bears_what_was_measured(monkeypatch, capsys, tmp_path):

@@ -26,8 +26,8 @@ def test_panoptic_quality_is_the_mean_overlap_of_what_is_found_less_what_is_not(
 @pytest.mark.slow
 def test_rendered_ashlar_is_found_with_corners_as_sure_as_stated():
     from benchmarks.outlines import corner_errors, panoptic_quality, picture_of
-    from pipelines.samples.buildings.rendered_walls import rasterised, render_wall
     from survey.clouds.pictures.proposal import propose_outlines
+    from synthetic.buildings.rendered_walls import rasterised, render_wall
 
     wall = render_wall("ashlar", 100)
     proposal = propose_outlines(picture_of(wall.picture, wall.pixel))

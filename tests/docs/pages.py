@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from synthetic.__main__ import written
 from tests.moma.commands import prints
 from tests.paths import ROOT
 
@@ -30,7 +31,11 @@ def ran(folder: Path, commands: str) -> dict[str, str]:
         patch.chdir(folder)
         patch.delenv("MOMA_DB", raising=False)
         for line in commands.splitlines():
-            said[line] = prints(*shlex.split(line)[1:])
+            words = shlex.split(line)
+            if words[:3] == ["python", "-m", "synthetic"]:
+                said[line] = written(words[3:]).title
+            else:
+                said[line] = prints(*words[1:])
     return said
 
 

@@ -8,13 +8,13 @@ import pytest
 from PIL import Image
 
 from pipelines.reports.photographs.project import read_project
-from pipelines.samples.buildings.window import make_window
-from pipelines.samples.measure import inset
-from pipelines.samples.photographs import true_cameras
 from survey.formats.reading import open_survey
 from survey.orientation.bundle.orient import orient
 from survey.orientation.formats.control import read_control
 from survey.registration.stones import survey_stones
+from synthetic.buildings.window import make_window
+from synthetic.measure import inset
+from synthetic.photographs import true_cameras
 from tests.docs.pages import blocks, ran
 
 PAGE = "docs/howto/photographs.md"

@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.samples.buildings.window import make_window
-from pipelines.samples.write import write_sample
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.solids import Solid
 from survey.geometry.watertight import check_watertight
 from survey.joints.close import ClosedStones
 from survey.records.survey import Survey
+from synthetic.buildings.window import make_window
+from synthetic.write import write_sample
 from tests.paths import ROOT
 from tests.survey.unseen.statics import area_of, can_stand, contacts, near_pairs, overlap_depth, side_planes
 

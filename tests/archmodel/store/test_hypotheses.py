@@ -16,11 +16,11 @@ from archmodel.tables.entries import Entry, new_entry
 from archmodel.tables.surveys import Measurement
 from ground.errors import DatabaseError, UsageError
 from pipelines.ingest.records import stone_record, surveyed_block
-from pipelines.samples.buildings.window import make_window
 from survey.extrusion.depth import depth_for
 from survey.extrusion.extrusion import extrude
 from survey.faces.faces import outline_face
 from survey.unseen.missing.propose import propose_missing
+from synthetic.buildings.window import make_window
 
 
 @pytest.fixture(scope="module")

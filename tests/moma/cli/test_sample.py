@@ -1,21 +1,17 @@
 """`moma sample`: every sample it writes is taken to its results by the commands that it prints."""
 
 import json
-import re
 import shlex
 
 import pytest
 
 from moma.cli.surveys import Moved
-from pipelines.samples.granite_wall import GRANITE_WALL
-from pipelines.samples.rubble_wall import RUBBLE_WALL
-from pipelines.samples.samples import SAMPLES
+from pipelines.samples.copy import sample_names
+from synthetic.samples import SAMPLES
 from tests.moma.commands import answer, fails, invoke, prints
 
-SLOWEST = {
-    "tower --moved settlement",
-    "tower --moved settlement --small",
-}  # whose diagnosis makes dozens of runs
+NAMES = [name for name in sample_names() if name in SAMPLES]
+SLOWEST = "tower --moved settlement --small"  # whose diagnosis makes dozens of runs
 FORMER = {
     "core-sunk": "facings --moved settlement",
     "pushed": "wall --moved thrust",
@@ -23,7 +19,6 @@ FORMER = {
     "settled-phases": "wall --moved settlement --phases",
     "settled-small": "wall --moved settlement --small",
     "shaken": "wall --moved earthquake",
-    "tower-settled": "tower --moved settlement",
     "tower-settled-small": "tower --moved settlement --small",
     "tower-small": "tower --small",
 }
@@ -32,9 +27,9 @@ LARGE = {name for name, recipe in SAMPLES.items() if recipe.cause is not None or
 
 def test_the_help_names_the_samples_and_the_causes_of_movement():
     said = " ".join(invoke("sample", "--help").stdout.replace("│", " ").split())
-    names = [*(name for name in SAMPLES if " " not in name), RUBBLE_WALL, GRANITE_WALL]
+    names = [name for name in sample_names() if " " not in name]
     assert f"{', '.join(names[:-1])} or {names[-1]}." in said
-    causes = {name.split()[name.split().index("--moved") + 1] for name in SAMPLES if "--moved" in name}
+    causes = {name.split()[name.split().index("--moved") + 1] for name in sample_names() if "--moved" in name}
     assert causes == {one.value for one in Moved}
 
 
@@ -47,35 +42,25 @@ def test_samples_and_options_that_there_are_not_are_refused(tmp_path, monkeypatc
     said = fails(2, "sample", "facings", "--moved", "thrust")
     assert "no sample 'facings --moved thrust'; there is 'facings', 'facings --moved settlement'" in said
     assert "'wall --moved settlement --phases'" in fails(2, "sample", "wall", "--phases")
-    assert "--courses with the sample 'wall'; it is for the tower" in fails(
-        2, "sample", "wall", "--courses", 3
-    )
-    assert "at least 2" in fails(2, "sample", "tower", "--courses", 1)
     assert not list(tmp_path.iterdir())
 
 
 def test_former_names_are_refused_with_the_new_ones():
     for name, now in FORMER.items():
         assert f"no sample '{name}' any more; it is now: moma sample {now}" in fails(2, "sample", name)
-    assert set(FORMER.values()) <= set(SAMPLES)
-
-
-def test_a_tower_has_as_many_courses_as_are_asked_for(tmp_path):
-    assert "Storey of a tower, of 5 courses:" in prints("sample", "tower", "--courses", 5, "--out", tmp_path)
-    survey = (tmp_path / "tower.moma").read_text(encoding="utf-8")
-    assert {int(found) for found in re.findall(r" course (\d+) ", survey)} == {1, 2, 3, 4, 5}
+    assert set(FORMER.values()) <= set(sample_names())
 
 
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(name, marks=[pytest.mark.slow] if name in LARGE else []) for name in SAMPLES],
+    [pytest.param(name, marks=[pytest.mark.slow] if name in LARGE else []) for name in NAMES],
 )
 def test_a_sample_runs_to_equilibrium(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     written = answer("sample", *name.split())
     kind = name.split()[0]
     for command in written["commands"]:
-        if name in SLOWEST and command.startswith("moma diagnose"):
+        if name == SLOWEST and command.startswith("moma diagnose"):
             continue
         prints(*shlex.split(command)[1:])
     summary = json.loads((tmp_path / kind / "results/summary.json").read_text(encoding="utf-8"))

@@ -22,13 +22,13 @@ from pipelines.assess.diagnosis.smoothness import probes, with_unevenness
 from pipelines.assess.diagnosis.trials import Trial, Tried, runner
 from pipelines.assess.kept import kept_answers
 from pipelines.assess.motions import Motions
-from pipelines.samples.buildings.walls import wall
-from pipelines.samples.frame import RigidMotion
 from pipelines.scene.file import parse_scene
 from pipelines.toml.lines import parse_toml
 from pipelines.toml.writer import toml_text
 from survey.quality.deformation import Deformation
 from survey.quality.precision import appraise
+from synthetic.buildings.walls import wall
+from synthetic.frame import RigidMotion
 from tests.paths import ROOT
 
 SCENE = """

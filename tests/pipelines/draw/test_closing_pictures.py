@@ -17,11 +17,11 @@ from pipelines.draw.elevations.closing_shapes import Stages, closing_shapes, pla
 from pipelines.draw.elevations.sheet import FLAG
 from pipelines.draw.offscreen.closing import ClosingSurface
 from pipelines.draw.offscreen.jobs import load_surface, save_surface
-from pipelines.samples.buildings.quoins import corner
-from pipelines.samples.buildings.vaults import barrel_vault
 from survey.geometry.solids import Solid, area_vector
 from survey.joints.report import ClosingReport, Gap, Overlap, StoneJoint
 from survey.joints.settings import JointMode
+from synthetic.buildings.quoins import corner
+from synthetic.buildings.vaults import barrel_vault
 from tests.pipelines.results_by_hand import BOX_FACES, box
 
 pytestmark = pytest.mark.draws

@@ -12,10 +12,10 @@ from pipelines.ingest.ingest import ingest
 from pipelines.run.check import check_scene
 from pipelines.run.check_report import CheckReport
 from pipelines.run.closing_check import joints_report, simplification_report
-from pipelines.samples.buildings.walls import wall
 from survey.joints.report import ClosingReport, Gap, Overlap, StoneJoint
 from survey.joints.settings import JointMode
 from survey.simplify.simplify import simplify
+from synthetic.buildings.walls import wall
 from tests.pipelines.scenes import TWO_COURSES, survey_text
 
 PLACE, UP = np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.0, 1.0])

@@ -12,11 +12,11 @@ from mechanics.simulate import simulate
 from mechanics.stones.materials import Material
 from pipelines.ingest.records import surveyed_block
 from pipelines.propose.propose import core_record
-from pipelines.samples.buildings.facings import two_facings
 from survey.joints.close import close_joints
 from survey.joints.settings import JointSettings
 from survey.unseen.core.facings import facing_stone
 from survey.unseen.core.propose import propose_infill
+from synthetic.buildings.facings import two_facings
 
 STONE = Material("limestone", density=2350.0, young=12e9, poisson=0.2)
 RUBBLE = Material("core", density=1900.0, young=1e9, poisson=0.2)

@@ -10,8 +10,8 @@ from mechanics.simulate import simulate
 from pipelines.propose.propose import Recording, propose_core
 from pipelines.record.record import record
 from pipelines.run.assemble import assemble
-from pipelines.samples.write import write_sample
 from pipelines.scene.file import read_scene
+from synthetic.write import write_sample
 from tests.moma.commands import answer, prints
 
 SPRINGERS = ("T1", "T2", "T3", "T4")

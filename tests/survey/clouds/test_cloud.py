@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 
 from ground.errors import SurveyError, UsageError
-from pipelines.samples.buildings.window import make_window
-from pipelines.samples.scan import outlines_text, scan_window, visible_corners
 from survey.clouds import cloud as cloud_module
 from survey.clouds.cloud import open_cloud
 from survey.clouds.collecting import collect_points
@@ -17,6 +15,8 @@ from survey.clouds.wall import Wall, read_wall
 from survey.faces.faces import outline_face
 from survey.records.survey import Reject
 from survey.registration.stones import survey_stones
+from synthetic.buildings.window import make_window
+from synthetic.scan import outlines_text, scan_window, visible_corners
 from tests.survey.clouds import scans
 
 

@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ground.errors import GeometryError
-from pipelines.samples.buildings.window import make_window
 from survey.extrusion.depth import Depth
 from survey.extrusion.extrusion import SurveyedBlock, extrude
 from survey.faces.faces import outline_face
@@ -21,6 +20,7 @@ from survey.joints.close import ClosedStones, close_joints
 from survey.joints.settings import JointMode, JointSettings
 from survey.records.survey import BlockRecord
 from survey.simplify.simplify import BlockShape, simplify
+from synthetic.buildings.window import make_window
 from tests.survey.plain_blocks import DEPTH, as_stone, box, cuboid, drawn, moved, stone
 from tests.survey.unseen.statics import contact_area, contacts, near_pairs, overlap_depth, side_planes
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from pipelines.assess.compare import facades_of
-from pipelines.samples.buildings.walls import wall
-from pipelines.samples.measure import HALF_JOINT
 from survey.quality.deformation import Built, measure_deformation
 from survey.quality.precision import appraise
+from synthetic.buildings.walls import wall
+from synthetic.measure import HALF_JOINT
 
 
 def surveyed(building):

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from pipelines.samples.buildings.walls import wall
-from pipelines.samples.frame import RigidMotion
 from survey.quality.courses import measure_courses
 from survey.quality.facades import find_facades
 from survey.quality.movement import compare_courses, compare_plumb
 from survey.quality.precision import appraise
+from synthetic.buildings.walls import wall
+from synthetic.frame import RigidMotion
 from tests.survey.quality.departures import walls_by_hand
 from tests.survey.quality.plain_stones import facades_of
 

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
-from pipelines.samples.true_joints import TrueJoint, true_joints
 from survey.arrays import Array
 from survey.extrusion.extrusion import prism
 from survey.geometry.solids import Solid
+from synthetic.true_joints import TrueJoint, true_joints
 
 __all__ = ["RoundedAssembly", "angled_pier", "hexagonal_dome", "rounded"]
 

@@ -7,10 +7,10 @@ from itertools import permutations
 import numpy as np
 
 from mechanics.arrays import Array
-from pipelines.samples.true_joints import TrueJoint, true_joints
 from survey.geometry.solids import Solid, area_vector
 from survey.geometry.watertight import check_watertight
 from survey.joints.close import ClosedStones
+from synthetic.true_joints import TrueJoint, true_joints
 from tests.validation.closing.convex_overlap import overlaps
 
 Pair = tuple[str, str]

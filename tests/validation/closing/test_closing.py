@@ -10,12 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from pipelines.samples.buildings.openings import ArchShape
-from pipelines.samples.buildings.quoins import corner
-from pipelines.samples.buildings.vaults import barrel_vault, semicircular_arch
-from pipelines.samples.buildings.walls import wall
-from pipelines.samples.buildings.window import make_window
-from pipelines.samples.true_joints import TrueJoint, true_joints
 from survey.extrusion.depth import depth_for
 from survey.extrusion.extrusion import SurveyedBlock, extrude
 from survey.faces.faces import outline_face
@@ -23,6 +17,12 @@ from survey.formats.native.reader import read_moma
 from survey.joints.close import ClosedStones, close_joints
 from survey.joints.settings import JointMode, JointSettings
 from survey.simplify.simplify import simplify
+from synthetic.buildings.openings import ArchShape
+from synthetic.buildings.quoins import corner
+from synthetic.buildings.vaults import barrel_vault, semicircular_arch
+from synthetic.buildings.walls import wall
+from synthetic.buildings.window import make_window
+from synthetic.true_joints import TrueJoint, true_joints
 from tests.paths import ROOT
 from tests.validation.closing.closing_truth import Verdict, judge
 

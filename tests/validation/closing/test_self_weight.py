@@ -25,11 +25,11 @@ from mechanics.scene.scene import (
 from mechanics.simulate import simulate
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
-from pipelines.samples.buildings.openings import ArchShape
-from pipelines.samples.buildings.quoins import corner
-from pipelines.samples.buildings.vaults import barrel_vault, semicircular_arch
-from pipelines.samples.buildings.walls import wall
 from survey.joints.close import close_joints
+from synthetic.buildings.openings import ArchShape
+from synthetic.buildings.quoins import corner
+from synthetic.buildings.vaults import barrel_vault, semicircular_arch
+from synthetic.buildings.walls import wall
 
 STONE = Material("stone", density=2400.0, young=10e9, poisson=0.2)
 RIGID = {

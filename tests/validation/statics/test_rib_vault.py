@@ -34,8 +34,8 @@ from mechanics.scene.scene import (
 from mechanics.simulate import simulate
 from mechanics.stones.materials import Material
 from mechanics.stones.polyhedra import mass_properties
-from pipelines.samples.buildings.ribs import RibVaultShape, rib_vault
 from survey.joints.close import close_joints
+from synthetic.buildings.ribs import RibVaultShape, rib_vault
 
 STONE = Material("stone", density=2350.0, young=12e9, poisson=0.2)
 GAMMA = STONE.density * 9.81  # N/m³

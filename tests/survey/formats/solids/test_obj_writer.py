@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipelines.samples.buildings.ribs import RibVaultShape, rib_vault
 from survey.formats.native.reader import read_head
 from survey.formats.native.writer import write_head
 from survey.formats.options import ReadingOptions
 from survey.formats.reading import open_survey
 from survey.formats.solids.obj_writer import write_obj
 from survey.records.survey import SolidRecord
+from synthetic.buildings.ribs import RibVaultShape, rib_vault
 
 
 def test_solids_are_read_back_to_the_last_bit(tmp_path):

@@ -10,8 +10,6 @@ from hypothesis import strategies as st
 from ground.errors import GeometryError, UsageError
 from pipelines.ingest.records import surveyed_block
 from pipelines.propose.propose import core_record
-from pipelines.samples.buildings.facings import two_facings
-from pipelines.samples.buildings.tower import tower_storey
 from survey.geometry.solids import volume_of
 from survey.geometry.watertight import check_watertight
 from survey.joints.close import close_joints
@@ -19,6 +17,8 @@ from survey.joints.settings import JointSettings
 from survey.unseen.core.facings import facing_stone
 from survey.unseen.core.propose import propose_infill
 from survey.unseen.core.settings import InfillSettings
+from synthetic.buildings.facings import two_facings
+from synthetic.buildings.tower import tower_storey
 from tests.survey.unseen.core.two_facings import (
     HALF,
     boxes_meet,

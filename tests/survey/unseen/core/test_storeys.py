@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipelines.samples.buildings.facings import two_facings
 from survey.geometry.solids import Solid, volume_of
 from survey.geometry.stone_parts import grid_parts
 from survey.geometry.watertight import check_watertight
@@ -13,6 +12,7 @@ from survey.unseen.core.cells import CellGrid, grid_solids
 from survey.unseen.core.facings import facing_stone
 from survey.unseen.core.propose import propose_infill
 from survey.unseen.core.settings import InfillSettings, InfillShape
+from synthetic.buildings.facings import two_facings
 from tests.survey.unseen.core.two_facings import contains, core_volume, facing
 
 STOREYS = InfillSettings(shape=InfillShape.STOREYS)

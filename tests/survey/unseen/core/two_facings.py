@@ -4,12 +4,12 @@ import numpy as np
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from pipelines.samples.buildings.facings import TwoFacings
-from pipelines.samples.frame import wall_frame
 from survey.extrusion.extrusion import prism
 from survey.geometry.solids import Solid, area_vector
 from survey.geometry.watertight import triangulate
 from survey.unseen.core.facings import FacingStone
+from synthetic.buildings.facings import TwoFacings
+from synthetic.frame import wall_frame
 from tests.survey.largest_ball import largest_ball
 
 HALF = 0.5  # of the thickness of the wall [m]

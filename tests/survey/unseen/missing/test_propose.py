@@ -9,16 +9,16 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from pipelines.samples.buildings.facings import two_facings
-from pipelines.samples.buildings.openings import ArchShape
-from pipelines.samples.buildings.walls import wall
-from pipelines.samples.buildings.window import make_window
 from survey.extrusion.depth import depth_for
 from survey.extrusion.extrusion import extrude
 from survey.faces.faces import outline_face
 from survey.geometry.watertight import check_watertight
 from survey.unseen.missing.propose import propose_missing
 from survey.unseen.missing.settings import MissingSettings
+from synthetic.buildings.facings import two_facings
+from synthetic.buildings.openings import ArchShape
+from synthetic.buildings.walls import wall
+from synthetic.buildings.window import make_window
 
 
 def blocks_of(survey):
