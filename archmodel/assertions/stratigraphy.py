@@ -9,6 +9,7 @@ from sqlalchemy.orm import Session
 from archmodel.assertions.statements import PLAIN, Remark, remark_row
 from archmodel.assertions.validation import checked_choice, checked_label
 from archmodel.store.bulk import batches
+from archmodel.store.find_by_code import Subjects
 from archmodel.store.revisions import RowCounts, end_rows, table_of
 from archmodel.stratigraphy.order import check_order
 from archmodel.stratigraphy.stored import load_links
@@ -24,6 +25,7 @@ __all__ = [
     "relation_named",
     "say_stratigraphy",
     "subjects_named",
+    "subjects_of",
     "withdraw_stratigraphy",
 ]
 
@@ -59,6 +61,13 @@ def subjects_named(session: Session, codes: Iterable[str]) -> dict[str, Thing]:
         for code, number in session.execute(units):
             things[code] = (None, number)
     return things
+
+
+def subjects_of(things: Iterable[Thing]) -> Subjects:
+    """Return stones and structures as the subjects of a statement."""
+    pairs = list(things)
+    stones = tuple(stone for stone, _ in pairs if stone is not None)
+    return Subjects(stones, tuple(structure for _, structure in pairs if structure is not None))
 
 
 def declare_units(session: Session, entry: Entry, codes: Sequence[str]) -> RowCounts:

@@ -26,7 +26,7 @@ from archmodel.assertions.statements import (
     say_of_phase,
     without_replaced,
 )
-from archmodel.assertions.stratigraphy import Thing, subjects_named
+from archmodel.assertions.stratigraphy import subjects_named, subjects_of
 from archmodel.query.api import find_rows
 from archmodel.store.find_by_code import Subjects, held_or_none, no_such_code
 from archmodel.store.revisions import NOTHING, RowCounts
@@ -312,7 +312,7 @@ def record_attribute_list(
             declared = _declare(session, entry, what, value)
             if declared.changes:
                 outcome[f"new {what}"] = outcome.get(f"new {what}", NOTHING) + declared
-            about = _subjects([things[code] for code in named])
+            about = subjects_of(things[code] for code in named)
             if again:
                 about = without_replaced(session, _STATED[what], about, entry.author)
             counts += _say(session, entry, what, value, about, remark)
@@ -324,11 +324,6 @@ def _known(session: Session, what: str) -> dict[str, str]:
     """Return what holds of each stone."""
     rows = find_rows(session, "entity", columns=["code", what])
     return {str(row["code"]): str(row[what]) for row in rows if row[what] is not None}
-
-
-def _subjects(things: Sequence[Thing]) -> Subjects:
-    stones = tuple(stone for stone, _ in things if stone is not None)
-    return Subjects(stones, tuple(structure for _, structure in things if structure is not None))
 
 
 def _declare(session: Session, entry: Entry, what: str, value: str) -> RowCounts:

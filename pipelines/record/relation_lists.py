@@ -1,14 +1,22 @@
 """Lists of stratigraphic relations: a table of unit, relation, unit, or GraphML of the Extended Matrix."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from sqlalchemy.orm import Session
 
-from archmodel.assertions.statements import PLAIN, Remark
-from archmodel.assertions.stratigraphy import declare_units, say_stratigraphy, subjects_named
-from archmodel.store.revisions import RowCounts
+from archmodel.assertions.declare import declare_phase
+from archmodel.assertions.statements import PLAIN, Remark, say_of_phase
+from archmodel.assertions.stratigraphy import (
+    Thing,
+    declare_units,
+    say_stratigraphy,
+    subjects_named,
+    subjects_of,
+)
+from archmodel.store.revisions import NOTHING, RowCounts
+from archmodel.stratigraphy.dates import Dated
 from archmodel.stratigraphy.graphml import read_graphml
 from archmodel.tables.entries import Entry
 from archmodel.tables.stratigraphy import DEFINITIONS, INVERSE
@@ -19,8 +27,9 @@ from ground.tables.table import TableRow, read_table
 __all__ = ["RelationList", "read_relation_list", "record_relation_list", "relation_of"]
 
 _WORDS: Mapping[str, Sequence[str]] = {
-    # English; German
+    # English; German; Italian, as in the palette of the Extended Matrix
     "above": (
+        *("copre", "sta sopra"),
         "over",
         "overlies",
         "covers",
@@ -32,6 +41,7 @@ _WORDS: Mapping[str, Sequence[str]] = {
         "bedeckt",
     ),
     "below": (
+        *("coperto da", "è coperto da", "sta sotto"),
         "under",
         "underlies",
         "covered by",
@@ -41,17 +51,49 @@ _WORDS: Mapping[str, Sequence[str]] = {
         "supports",
         "bedeckt von",
     ),
-    "cuts": ("cut", "schneidet", "stört"),
-    "cut_by": ("is cut by", "geschnitten von", "wird geschnitten von", "gestört von"),
-    "fills": ("fill of", "füllt", "verfüllt", "Verfüllung von"),
-    "filled_by": ("is filled by", "verfüllt von", "gefüllt von", "wird verfüllt von"),
-    "abuts": ("butts against", "stößt an", "lehnt an", "läuft an", "setzt an", "zieht an"),
-    "abutted_by": ("is abutted by", "angebaut von", "gestoßen von"),
+    "cuts": ("cut", "schneidet", "stört", "taglia"),
+    "cut_by": (
+        "is cut by",
+        "tagliato da",
+        "è tagliato da",
+        "geschnitten von",
+        "wird geschnitten von",
+        "gestört von",
+    ),
+    "fills": ("fill of", "riempie", "füllt", "verfüllt", "Verfüllung von"),
+    "filled_by": (
+        "is filled by",
+        "riempito da",
+        "è riempito da",
+        "verfüllt von",
+        "gefüllt von",
+        "wird verfüllt von",
+    ),
+    "abuts": ("butts against", "si appoggia a", "stößt an", "lehnt an", "läuft an", "setzt an", "zieht an"),
+    "abutted_by": ("is abutted by", "gli si appoggia", "angebaut von", "gestoßen von"),
     "later_than": ("after", "is after", "jünger als", "nach"),
     "earlier_than": ("before", "is before", "älter als", "vor"),
-    "bonded_with": ("bonded", "bonds with", "im Verband mit", "verzahnt mit", "bindet in", "Verband"),
+    "bonded_with": (
+        "bonded",
+        "si lega a",
+        "bonds with",
+        "im Verband mit",
+        "verzahnt mit",
+        "bindet in",
+        "Verband",
+    ),
     "contemporary_with": ("same time as", "contemporary", "gleichzeitig mit", "zeitgleich", "zeitgleich mit"),
-    "equal_to": ("equal", "equals", "same as", "=", "gleich", "identisch mit", "ist gleich", "entspricht"),
+    "equal_to": (
+        "equal",
+        "uguale a",
+        "equals",
+        "same as",
+        "=",
+        "gleich",
+        "identisch mit",
+        "ist gleich",
+        "entspricht",
+    ),
 }
 """Words for relations in tables, besides their names."""
 
@@ -75,12 +117,15 @@ class RelationList:
     units : that it names
     relations : line (0 without lines), unit, name of the relation, unit
     ignored : number of nodes and lines of a drawing that are no stratigraphy
+    epochs, epoch_of : epochs of a drawing, and that of each unit in one
     """
 
     path: str
     units: tuple[str, ...]
     relations: tuple[tuple[int, str, str, str], ...]
     ignored: int = 0
+    epochs: tuple[Dated, ...] = ()
+    epoch_of: Mapping[str, str] = field(default_factory=dict)
 
 
 def relation_of(text: str) -> str | None:
@@ -97,9 +142,9 @@ def read_relation_list(path: Path, sheet: str | None = None) -> RelationList | N
         at the line of the mistake
     """
     if path.suffix.lower() == ".graphml":
-        drawn = read_graphml(path)
+        drawn = read_graphml(path, relation_of)
         relations = tuple((0, link.subject, link.relation, link.target) for link in drawn.links)
-        return RelationList(str(path), drawn.units, relations, drawn.ignored)
+        return RelationList(str(path), drawn.units, relations, drawn.ignored, drawn.epochs, drawn.epoch_of)
     try:
         table = read_table(path, _is_row, _REMEDY, sheet)
     except SurveyError as error:
@@ -141,7 +186,7 @@ def record_relation_list(
     Returns
     -------
     dict
-        outcome by name: "unit", "stratigraphy"
+        outcome by name: "unit", "stratigraphy"; of a drawing with epochs "phase" and "of_phase"
 
     Raises
     ------
@@ -161,6 +206,20 @@ def record_relation_list(
         outcome["stratigraphy"] = say_stratigraphy(session, entry, relations, remark)
     except UsageError as error:
         raise _at_lines(listed, error) from None
+    return outcome | _record_epochs(session, entry, listed, things, remark)
+
+
+def _record_epochs(
+    session: Session, entry: Entry, listed: RelationList, things: Mapping[str, Thing], remark: Remark
+) -> dict[str, RowCounts]:
+    """Declare the epochs of a drawing as phases, and state them of its units."""
+    outcome: dict[str, RowCounts] = {}
+    for epoch in listed.epochs:
+        declared = declare_phase(session, entry, epoch.phase, epoch.begins, epoch.ends)
+        units = [things[code] for code, name in listed.epoch_of.items() if name == epoch.phase]
+        stated = say_of_phase(session, entry, subjects_of(units), epoch.phase, remark)
+        for key, counts in (("phase", declared), ("of_phase", stated)):
+            outcome[key] = outcome.get(key, NOTHING) + counts
     return outcome
 
 

@@ -112,7 +112,7 @@ def draw(matrix: Matrix, path: Path) -> str:
             return matrix_page(matrix.order, matrix.links, matrix.dates, matrix.bounds, matrix.stones, wrong)
         case ".graphml":
             places = {key: x for key, x in layout_of(matrix.order).across.items() if isinstance(key, str)}
-            return write_graphml(matrix.order, matrix.links, places)
+            return write_graphml(matrix.order, matrix.links, places, matrix.dates)
     raise UsageError(
         f"{path.name} is no drawing", where="--out", remedy="name a file that ends in .svg, .html or .graphml"
     )

@@ -10,6 +10,7 @@ from sqlalchemy.orm import Session
 
 from archmodel.database.session import open_database
 from ground.errors import ExchangeError, UsageError
+from pipelines.draw.stratigraphy.matrix import draw, study
 from pipelines.record.export.building import Building, read_building
 from pipelines.record.export.compas import model_content, results_content
 from pipelines.record.export.dxf import dxf_content
@@ -50,6 +51,11 @@ def _results(order: _Order) -> bytes:
     return results_content(order.building, order.session)
 
 
+def _matrix(session: Session) -> bytes:
+    """Return the stratigraphic matrix for yEd."""
+    return draw(study(session), Path("matrix.graphml")).encode()
+
+
 _CONTENTS: Mapping[str, Callable[[_Order], bytes]] = {
     ".ifc": lambda order: ifc_content(order.building, order.crs),
     ".dxf": lambda order: dxf_content(order.building),
@@ -59,6 +65,7 @@ _CONTENTS: Mapping[str, Callable[[_Order], bytes]] = {
     ".lmgc90.py": lambda order: lmgc90_content(
         order.building, same_scene(order.session, order.building.run, "LMGC90")
     ),
+    ".graphml": lambda order: _matrix(order.session),
     ".3ddat": lambda order: threedec_content(
         order.building, same_scene(order.session, order.building.run, "3DEC")
     ),

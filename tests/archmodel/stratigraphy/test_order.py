@@ -3,6 +3,7 @@
 import random
 import time
 from itertools import pairwise
+from pathlib import Path
 from xml.etree import ElementTree as etree
 
 import pytest
@@ -13,6 +14,7 @@ from archmodel.stratigraphy.order import Link, check_order, find_loop, order_of
 from archmodel.tables.stratigraphy import DEFINITIONS, LATER
 from ground.errors import UsageError
 from pipelines.draw.stratigraphy.drawing import matrix_svg
+from pipelines.record.relation_lists import relation_of
 
 
 def links(text: str) -> list[Link]:
@@ -156,6 +158,34 @@ def test_graphml_of_the_palette_is_read_by_shapes_and_styles(tmp_path):
     assert read.units == ("USM01", "USM02", "USV1")
     assert read.links == (Link("USM01", "later_than", "USM02"), Link("USM02", "contemporary_with", "USV1"))
     assert read.ignored == 2
+
+
+def test_a_drawing_with_swimlanes_is_read_as_yed_writes_it() -> None:
+    """Groups within the table, names of the palette as data, labels in Italian, continuity nodes, dashed paradata."""
+    path = Path(__file__).with_name("swimlanes.graphml")
+    drawn = read_graphml(path, relation_of)
+    assert drawn.units == ("USM03", "USM01", "USD10", "SF01")
+    assert drawn.epochs == (Dated("II", 1238, 1260), Dated("I", None, None))
+    assert drawn.epoch_of == {"USM03": "II", "USM01": "I", "USD10": "I"}
+    assert drawn.links == (
+        Link("USM03", "later_than", "USM01"),
+        Link("USM01", "bonded_with", "USD10"),
+        Link("USM03", "above", "USD10"),
+    )
+    # the table, the group, the node of continuity and the dashed line
+    assert drawn.ignored == 4
+
+
+def test_phases_come_back_as_swimlanes(tmp_path: Path) -> None:
+    relations = links("1 above 2\n2 cuts 3\n4 equal_to 3\n5 above 1")
+    order = order_of(["6"], relations)
+    dates = {"1": Dated("II", 1238, 1260), "2": Dated("I", 1180, None), "3": Dated("I", 1180, None)}
+    path = tmp_path / "m.graphml"
+    path.write_text(write_graphml(order, relations, {}, dates), encoding="utf-8")
+    drawn = read_graphml(path)
+    assert set(drawn.links) == set(relations)
+    assert drawn.epochs == (Dated("II", 1238, 1260), Dated("I", 1180, None))
+    assert drawn.epoch_of == {"1": "II", "2": "I", "3": "I", "4": "I"}
 
 
 @pytest.mark.slow
