@@ -135,7 +135,7 @@ def test_the_questions_of_the_how_to_on_queries_have_the_answers_it_shows(here):
             else:
                 assert set(untimed(shown)) <= set(untimed(done.stdout)), command
             questions += command[1] not in ("ingest", "record", "run")
-    assert questions >= 15
+    assert questions >= 33
     (script,) = blocks(page, "python")
     assert printed(here, script).split() == ["W10-03", "10", "W10-06", "10"]
 

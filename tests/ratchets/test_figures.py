@@ -13,10 +13,10 @@ MOST = {
     "numbers of survey": 995,
     "numbers of archmodel": 98,
     "numbers of mechanics": 740,
-    "numbers of pipelines": 918,
-    "long functions": 55,
+    "numbers of pipelines": 917,
+    "long functions": 46,
     "wide functions": 5,
-    "undocumented functions": 175,
+    "undocumented functions": 174,
 }
 """Today's figures: whoever lowers one lowers its bound, and nobody raises one."""
 

@@ -36,6 +36,8 @@ def url(tmp_path_factory):
     folder = tmp_path_factory.mktemp("export")
     url = f"sqlite:///{folder}/window.db"
     invoke("ingest", str(SAMPLE / "window.moma"), "--db", url)
+    (folder / "units.csv").write_text("unit;relation;unit\n102;cuts;101\n", encoding="utf-8")
+    invoke("record", str(folder / "units.csv"), "--author", "A", "--source", "seen", "--db", url)
     (folder / "scene.toml").write_text(SCENE, encoding="utf-8")
     invoke("run", str(folder / "scene.toml"), "--db", url, "--out", str(folder / "out"))
     return url

@@ -207,3 +207,24 @@ def test_a_relation_of_stones_by_geometry_is_none_of_structures(url: str, tmp_pa
     wrong = RELATIONS.replace("rests_on", "across_the_wall")
     with pytest.raises(UsageError, match="SU 1 is a structure, and across_the_wall a relation of stones"):
         record([file(tmp_path, "r.toml", wrong)], url)
+
+
+def test_a_column_of_damage_takes_terms_in_any_language(new_url: Callable[[], str], tmp_path: Path):
+    made = new_url()
+    with open_database(made) as database, database.session() as session:
+        store_survey(session, "wall", "wall.moma", SHA, STONES)
+    terms = file(
+        tmp_path,
+        "terms.toml",
+        '[[term]]\nvocabulary = "observation"\nname = "crack"\nlabels = { de = "Riss" }\n',
+    )
+    record([terms], made, author="A", source="glossary")
+    assert stated(made)(file(tmp_path, "damage.csv", "Stein;Schaden\nS1;Riss\n"))["observation"] == RowCounts(
+        new=1
+    )
+    with pytest.raises(UsageError, match="unknown type of observation 'Sprung'"):
+        stated(made)(file(tmp_path, "wrong.csv", "Stein;Schaden\nS1;Sprung\n"))
+    with open_database(made) as database, database.session(read_only=True) as session:
+        assert [
+            row["code"] for row in find_rows(session, "entity", ["observed(Riss)"], columns=["code"])
+        ] == ["S1"]
