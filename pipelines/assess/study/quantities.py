@@ -27,11 +27,8 @@ from pipelines.scene.selection import StoneModel
 
 __all__ = ["Limited", "UndecidedError", "bound", "evaluate", "live_load", "quantity_name"]
 
-_EXACT = (1e-12, 1e-10)
-"""Tolerances of programmes whose velocities are derivatives: at 10⁻⁹ those of six walls are wrong by 6·10⁻⁴ [-].
-
-Where rounding ends the first without an answer, as in some regular arches, the second has one.
-"""
+_EXACT = 1e-12
+"""Tolerance of programmes whose velocities are derivatives: at 10⁻⁹ those of six walls are wrong by 6·10⁻⁴ [-]."""
 
 _WIDEST = 2.0
 """Share of their width to which joints of stones that fall are widened: factors are known down to a half [-]."""
@@ -147,9 +144,8 @@ def bound(on: RigidAssembly, live: LiveLoad, name: str) -> Limited:
     SolverError : Clarabel came to no answer
     """
     load = live(on)
-    for tolerance in _EXACT:
-        with suppress(SolverError):
-            return Limited(on, live, load, Programme(on, load, name, tolerance).solve(on.strength))
+    with suppress(SolverError):
+        return Limited(on, live, load, Programme(on, load, name, _EXACT).solve(on.strength))
     return Limited(on, live, load, Programme(on, load, name).solve(on.strength))
 
 

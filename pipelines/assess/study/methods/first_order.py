@@ -24,8 +24,6 @@ _BESIDE = 1e-3
 
 A second mechanism within 10⁻⁶ of a limit load takes over nearer than that: λ moves by 5·10⁻⁵ of itself.
 """
-_SMOOTH = 1e-2
-"""Difference of both sides over the standard deviation up to which they are one: curvature leaves 10⁻³ [-]."""
 
 
 @dataclass(frozen=True)
@@ -113,6 +111,6 @@ def first_order(evaluate: Evaluate, quantity: str, dimension: int, check: bool =
     above, below = (values[2 * count + 2 :].reshape(2, count) - mean) / _BESIDE * [[1.0], [-1.0]]
     sides = tuple(
         Sides(int(largest[row]), float(below[row]), float(above[row]))
-        for row in np.flatnonzero(np.abs(above - below) > _SMOOTH * sigma)
+        for row in np.flatnonzero(np.abs(above - below) > NOT_LINEAR * sigma)
     )
     return FirstOrder(mean, sigma, gradient, float(off[worst]), along, 1 + len(points), sides)
