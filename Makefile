@@ -1,6 +1,7 @@
 # make demo   from a survey file to a picture of the stresses, in out/window
 # make test   the tests, but those of over 0.7 s
 # make tower  a synthetic storey of 2,508 stones with a core, from its survey to a report, in out/tower
+# make site   these pages as a site, in out/site
 # make clean  remove .venv and out
 #
 # Another interpreter: make demo PYTHON=python3.12
@@ -17,10 +18,10 @@ OUT := out
 KERNELS := $(shell find survey mechanics benchmarks -path "*/_kernels*" -name "*.py")
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test tower clean
+.PHONY: help demo test tower site clean
 
 help:
-	@sed -n 's/^# \{0,1\}//p' Makefile | head -6
+	@sed -n 's/^# \{0,1\}//p' Makefile | head -7
 
 demo: $(VENV)/.kernels $(VENV)/.installed
 	@mkdir -p $(OUT)
@@ -46,6 +47,10 @@ tower: $(VENV)/.kernels $(VENV)/.installed
 test: $(VENV)/.tests $(VENV)/.kernels
 	$(VENV)/bin/python -m pytest
 
+site: $(VENV)/.docs $(VENV)/.kernels
+	$(VENV)/bin/python -m sphinx --fail-on-warning --keep-going --jobs auto docs $(OUT)/site
+	@echo "The site:    $(OUT)/site/index.html"
+
 # A mark is newer than pyproject.toml as long as what it stands for is installed. What compiles kernels comes first, so
 # that the rest is installed while a second process compiles.
 $(VENV)/.installed: pyproject.toml | $(VENV)/.kernels
@@ -59,6 +64,10 @@ $(VENV)/.tests: pyproject.toml | $(VENV)/bin/python
 	@echo "Installing into $(VENV) with what the tests need; the first time this takes some minutes."
 	@$(PIP) --editable '.[test]'
 	@touch $@ $(VENV)/.installed
+
+$(VENV)/.docs: pyproject.toml | $(VENV)/.installed
+	@$(PIP) --editable '.[docs]'
+	@touch $@
 
 # numba keeps compiled kernels, and does not see that one in another file which they call has changed.
 $(VENV)/.kernels: $(KERNELS) | $(VENV)/bin/python

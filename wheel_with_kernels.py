@@ -7,6 +7,7 @@ here; wheels of other systems have no kernels, nor have editable installations.
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -43,6 +44,10 @@ _TARGET = {"NUMBA_CPU_NAME": "x86-64-v3", "NUMBA_CPU_FEATURES": ",".join(f"+{one
 """Processors with AVX2 and FMA: Intel's since 2013, AMD's since 2015. numba would add the features of the processor at
 hand to a name without features."""
 
+_TAG = "manylinux_2_28_x86_64"
+"""Tag of the wheels, which PyPI takes: kernels are no shared libraries, and call nothing but what numba finds in the
+process; numba's own wheels need glibc 2.27."""
+
 _SOURCES = ("ground", "moma", "survey", "archmodel", "mechanics", "pipelines")
 
 
@@ -68,12 +73,24 @@ def build_wheel(
             shutil.copy(name, folder)
         os.chdir(folder)
         try:
+            _pin_numba()
             _compile_kernels()
             python = f"cp{sys.version_info.major}{sys.version_info.minor}"
-            tags = ["--python-tag", python, "--plat-name", _PLATFORM]
+            tags = ["--python-tag", python, "--plat-name", _TAG]
             return build_meta.build_wheel(str(wheels), {**(config_settings or {}), "--build-option": tags})
         finally:
             os.chdir(home)
+
+
+def _pin_numba() -> None:
+    """Have the wheel require the version of numba that reads its kernels: another would compile everything anew."""
+    project = Path("pyproject.toml")
+    text, count = re.subn(
+        r'"numba>=[^"]*"', f'"numba=={version("numba")}"', project.read_text(encoding="utf-8")
+    )
+    if count != 1:
+        raise RuntimeError(f"pyproject.toml requires numba {count} times")
+    project.write_text(text, encoding="utf-8")
 
 
 def _compile_kernels() -> None:

@@ -1,9 +1,9 @@
-"""First use of MOMA: ``python -m benchmarks.first_use [--record | --record-others]``; see benchmarks/README.md.
+"""First use of MOMA: ``python -m benchmarks.first_use [--record | --record-others | --installed [--write]]``.
 
 The sample is taken in and run with an empty cache of kernels, and again with the full one; the difference is what
 compiling takes. ``--record`` renews the lists of kernels in ``ground/kernels``, after a change of what kernels are
 called with (Linux): first those of the sample, by command, then what a matrix of small samples, profiles and commands
-calls beyond them, which ``--record-others`` renews alone.
+calls beyond them, which ``--record-others`` renews alone. ``--installed`` measures a wheel (`benchmarks.installation`).
 """
 
 import json
@@ -18,11 +18,11 @@ from benchmarks.report import machine
 from ground.kernels.uses import COMMANDS, LISTS, OTHERS
 from tests.pipelines.scenes import small_geology
 
-__all__ = ["main"]
+__all__ = ["MATRIX", "SAMPLE", "main", "small_geology"]
 
-_SAMPLE = Path("data/samples/window")
+SAMPLE = Path("data/samples/window")
 
-_MATRIX = """
+_LINES = """
 sample arch --out arch
 ingest arch/arch.moma --db sqlite:///arch.db
 run arch/arch.toml --db sqlite:///arch.db --out arch-run
@@ -47,6 +47,8 @@ geology fault {geology}/fault.toml --out fault
 geology fold {geology}/fold.toml --out fold
 """
 """Commands in a folder of their own, in this order: every engine, on the smallest sample that comes with it."""
+
+MATRIX = tuple(_LINES.strip().splitlines())
 
 # processor time after which a command of the matrix is ended: it has called its kernels by then [s]
 _LONGEST = 60
@@ -110,8 +112,8 @@ def _arguments(command: str, folder: Path, use: str = "") -> list[str]:
             subprocess.run(call, check=True, stdout=subprocess.DEVNULL)
         return [command, f"{bay}/photographs.toml", "--out", f"{folder}/{use}-photographs"]
     if command == "ingest":
-        return [command, f"{_SAMPLE}/window.moma", *database]
-    return [command, f"{_SAMPLE}/window.toml", *database, "--out", f"{folder}/{use}"]
+        return [command, f"{SAMPLE}/window.moma", *database]
+    return [command, f"{SAMPLE}/window.toml", *database, "--out", f"{folder}/{use}"]
 
 
 def _timed(call: list[str], folder: str) -> float:
@@ -129,8 +131,8 @@ def _matrix(folder: Path, known: list[dict[str, object]]) -> list[dict[str, obje
     uses: list[dict[str, object]] = []
     found = folder / "called.json"
     path = os.pathsep.join((os.getcwd(), *filter(None, sys.path)))
-    for line in _MATRIX.strip().splitlines():
-        arguments = line.format(sample=_SAMPLE.resolve(), geology=folder / "geology").split()
+    for line in MATRIX:
+        arguments = line.format(sample=SAMPLE.resolve(), geology=folder / "geology").split()
         found.unlink(missing_ok=True)
         call = [sys.executable, "-c", _CALLED, str(found), str(_LONGEST), *arguments]
         subprocess.run(call, env=os.environ | {"PYTHONPATH": path}, cwd=folder, stdout=subprocess.DEVNULL)
@@ -160,4 +162,9 @@ def _text(named: tuple[str, list[dict[str, object]]]) -> str:
 
 
 if __name__ == "__main__":
+    if "--installed" in sys.argv:
+        from benchmarks import installation
+
+        installation.main("--write" in sys.argv)
+        sys.exit()
     main({"--record": "all", "--record-others": OTHERS}.get(" ".join(sys.argv[1:]), ""))

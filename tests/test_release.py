@@ -4,6 +4,8 @@ import json
 import re
 import tomllib
 
+import pytest
+
 from tests.paths import ROOT
 
 
@@ -25,3 +27,48 @@ def test_citation_and_deposit_state_the_version_and_the_licence_of_the_package()
 
 def test_the_readme_says_under_which_licence_gmsh_comes():
     assert "GPL-2.0-or-later" in (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def test_the_changelog_has_a_part_for_what_is_to_come_and_later_parts_have_versions():
+    parts = re.findall(r"^## \[(.*?)\]", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert parts[0] == "Unreleased"
+    assert all(re.fullmatch(r"\d+\.\d+\.\d+", version) for version in parts[1:])
+    with (ROOT / "pyproject.toml").open("rb") as file:
+        version = tomllib.load(file)["project"]["version"]
+    # the version in the making is the latest that the changelog has, or none was released yet
+    assert not parts[1:] or parts[1] == version
+
+
+def test_the_packages_that_were_asked_for_stand_in_the_base():
+    with (ROOT / "pyproject.toml").open("rb") as file:
+        needed = tomllib.load(file)["project"]["dependencies"]
+    names = {re.split(r"[<>=~ ]", one)[0] for one in needed}
+    assert {"gmsh", "meshio", "pyvista", "numpy", "scipy", "numba", "sqlalchemy"} <= names
+
+
+WORKFLOWS = sorted((ROOT / ".github/workflows").glob("*.yml"))
+
+
+@pytest.mark.parametrize("path", WORKFLOWS, ids=lambda path: path.stem)
+def test_jobs_use_pinned_actions_and_no_addresses(path):
+    text = path.read_text(encoding="utf-8")
+    used = re.findall(r"uses: (\S+)", text)
+    assert used
+    assert all(re.fullmatch(r"[\w./-]+@[0-9a-f]{40}", one) for one in used)
+    assert "://" not in text.replace("sqlite:///", "")
+
+
+def test_the_main_job_runs_on_windows_and_macos_and_wheels_are_built_for_each_python():
+    checks = (ROOT / ".github/workflows/checks.yml").read_text(encoding="utf-8")
+    assert "windows-2022" in checks
+    assert "macos-14" in checks
+    assert ".ci/main-job" in checks
+    with (ROOT / "pyproject.toml").open("rb") as file:
+        project = tomllib.load(file)
+    assert project["tool"]["cibuildwheel"]["build"] == [f"cp3{minor}-*" for minor in (11, 12, 13, 14)]
+
+
+def test_every_tool_of_the_jobs_is_there():
+    for path in WORKFLOWS:
+        for script in re.findall(r"(?<![\w/])(\.ci/[\w-]+)", path.read_text(encoding="utf-8")):
+            assert (ROOT / script).is_file()

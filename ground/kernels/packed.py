@@ -32,7 +32,7 @@ def use_packed_kernels() -> None:
         os.environ.update(fitting["environment"])
     elif _WARNED not in os.environ:
         os.environ[_WARNED] = "1"  # processes that this one starts say it no more
-        print(f"moma: warning: {reason}; kernels are compiled here, once", file=sys.stderr)
+        print(f"moma: warning: {reason}; kernels are compiled here, once: moma warm-up", file=sys.stderr)
 
 
 def _misfit(fitting: dict[str, Any]) -> str | None:
@@ -50,7 +50,14 @@ def _misfit(fitting: dict[str, Any]) -> str | None:
     lacking = sorted(needed - _features())
     if lacking:
         return f"the kernels of this wheel need a processor with {', '.join(lacking)}"
+    if not _is_writable(_FITTING.parent):
+        return f"numba reads no kernels of a folder that is read-only, {_FITTING.parent}"
     return None
+
+
+def _is_writable(folder: Path) -> bool:
+    """Return whether files can be made in a folder: numba looks for kernels only where it could keep them."""
+    return os.access(folder, os.W_OK)
 
 
 def _features() -> set[str]:

@@ -18,7 +18,7 @@ import numba
 from numba.core import event
 from numba.core.dispatcher import Dispatcher
 
-__all__ = ["COMMANDS", "LISTS", "OTHERS", "KernelUse", "called", "kernels_of", "recording"]
+__all__ = ["COMMANDS", "LISTS", "OTHERS", "KernelUse", "all_kernels", "called", "kernels_of", "recording"]
 
 COMMANDS = ("orient", "ingest", "run")
 """Commands with a list, in their usual order."""
@@ -57,6 +57,11 @@ def kernels_of(command: str) -> tuple[KernelUse, ...]:
     return tuple(
         KernelUse(entry["module"], entry["name"], tuple(entry["types"])) for entry in recorded[command]
     )
+
+
+def all_kernels() -> tuple[KernelUse, ...]:
+    """Return the kernels of all lists, each once."""
+    return tuple(use for name in (*COMMANDS, OTHERS) for use in kernels_of(name))
 
 
 @contextmanager

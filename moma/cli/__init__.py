@@ -15,7 +15,7 @@ from moma.cli.knowledge import entries, matrix, record
 from moma.cli.proposals import outlines, propose
 from moma.cli.relations import load_path, relate
 from moma.cli.runs import report, runs
-from moma.cli.scenes import check, run, trade
+from moma.cli.scenes import check, run, trade, warm_up
 from moma.cli.surveys import cloud, ingest, orient, sample, survey_report
 
 __all__ = ["app", "main"]
@@ -91,6 +91,7 @@ _COMMANDS = (
     export,
     import_,
     migrate,
+    warm_up,
 )
 for _command in _COMMANDS:
     app.command(_command.__name__.strip("_").replace("_", "-"), cls=PlainCommand)(_command)

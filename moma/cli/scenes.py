@@ -19,7 +19,7 @@ from moma.cli.options import (
 )
 from moma.cli.progress import Interruption, progress_bars
 
-__all__ = ["check", "run", "trade"]
+__all__ = ["check", "run", "trade", "warm_up"]
 
 
 @reporting
@@ -182,3 +182,25 @@ def trade(
     print(as_json(done.record) if common.json else "\n".join(trade_lines(done, common.verbose)))
     if done.record["reference"] is None:
         raise typer.Exit(1)
+
+
+@reporting
+def warm_up(*, common: Common) -> None:
+    """Compile all kernels once, so that no later command has to; those of a wheel that fit are only loaded."""
+    from ground.kernels.uses import all_kernels, recording
+    from mechanics.dynamics.progress import Progress
+    from moma.cli.text.formats import as_json
+
+    uses, failed = all_kernels(), list[str]()
+    with progress_bars() as listener, recording() as compiled:
+        for number, use in enumerate(uses, start=1):
+            try:
+                use.compile()
+            except Exception as error:
+                failed.append(f"{use.module}.{use.name}: {type(error).__name__}")
+            listener(Progress("compile", number, len(uses), use.name))
+    for name in failed:
+        say(f"warning: not compiled: {name}; commands that need it compile it")
+    done = {"kernels": len(uses), "compiled": len(compiled), "failed": len(failed)}
+    text = f"{len(uses)} kernels: {len(compiled)} compiled now, {len(uses) - len(compiled)} were there"
+    print(as_json(done) if common.json else text)

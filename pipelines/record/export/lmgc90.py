@@ -73,7 +73,7 @@ def lmgc90_content(building: Building, same: SameScene) -> bytes:
             gravity=[float(each) for each in scene.gravity],
             step=scene.time.step,
             duration=scene.time.duration,
-            alert=scene.contact.alert_distance,
+            alert=scene.contact.alert_distance * _largest(same),
         )
     ]
     names = {
@@ -110,6 +110,11 @@ def lmgc90_content(building: Building, same: SameScene) -> bytes:
                 f"colorAntagoniste={_color(second)!r}, behav=law, alert=ALERT))"
             )
     return ("\n".join(lines) + "\n\n" + _TAIL).encode()
+
+
+def _largest(same: SameScene) -> float:
+    """Return the largest extent of a body along an axis [m]: distances of alert are relative to the size of stones."""
+    return max(float(np.ptp(np.asarray(part.vertices), axis=0).max()) for part in same.parts)
 
 
 def _color(group: int) -> str:

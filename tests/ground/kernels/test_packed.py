@@ -1,10 +1,13 @@
 """Kernels that a wheel carries: where they are used, and that the sample then compiles nothing."""
 
+import importlib.util
 import json
 import os
+import shutil
 import subprocess
 import sys
 import sysconfig
+import tomllib
 import venv
 import zipfile
 from importlib.metadata import version
@@ -88,6 +91,27 @@ def test_kernels_of_another_python_numba_or_processor_are_not_and_one_line_says_
     assert capsys.readouterr().err == ""
 
 
+def test_an_installation_that_is_read_only_says_so_and_compiles(told, before_numba, monkeypatch, capsys):
+    monkeypatch.setattr(packed, "_is_writable", lambda folder: False)
+    assert not told(THIS).keys() & TARGET.keys()
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "read-only" in line
+    assert line.endswith("kernels are compiled here, once: moma warm-up")
+
+
+def test_a_wheel_pins_numba_and_the_source_does_not(tmp_path, monkeypatch):
+    backend = importlib.util.spec_from_file_location("backend", ROOT / "wheel_with_kernels.py")
+    module = importlib.util.module_from_spec(backend)
+    backend.loader.exec_module(module)
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    monkeypatch.chdir(tmp_path)
+    module._pin_numba()
+    required = tomllib.loads(Path("pyproject.toml").read_text(encoding="utf-8"))["project"]["dependencies"]
+    assert [one for one in required if one.startswith("numba")] == [f"numba=={version('numba')}"]
+    source = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["dependencies"]
+    assert [one for one in source if one.startswith("numba")] == ["numba>=0.68"]
+
+
 def test_a_source_tree_has_none(told, before_numba):
     assert told(None) == {}
 
@@ -114,7 +138,9 @@ def test_the_sample_compiles_nothing_where_a_wheel_is_installed(tmp_path):
         [sys.executable, "-c", build, str(tmp_path)], cwd=ROOT, check=True, stdout=subprocess.DEVNULL
     )
     (wheel,) = tmp_path.glob("*.whl")
-    assert wheel.stem.endswith(f"-cp{sys.version_info.major}{sys.version_info.minor}-none-linux_x86_64")
+    assert wheel.stem.endswith(
+        f"-cp{sys.version_info.major}{sys.version_info.minor}-none-manylinux_2_28_x86_64"
+    )
     venv.create(tmp_path / "new")
     (packages,) = (tmp_path / "new").glob("lib/python*/site-packages")
     shared = [path for path in sys.path if Path(path).name == "site-packages"]

@@ -124,6 +124,12 @@ def __getattr__(name):
 """,
         encoding="utf-8",
     )
+    script = Path("w.lmgc90.py").read_text(encoding="utf-8")
+    compile(script, "w.lmgc90.py", "exec")
+    # pairs are looked at within a twentieth of the largest stone, which is in metres
+    (alert,) = re.findall(r"^ALERT = (\S+)", script, re.MULTILINE)
+    largest = max(one["length"] for one in answer("query", "entity", "--db", url, "--columns", "length"))
+    assert 0.5 < float(alert) / (0.05 * largest) < 2.0
     subprocess.run([sys.executable, "w.lmgc90.py"], check=True, env={"PYTHONPATH": str(tmp_path)})
     calls = json.loads(Path("calls.json").read_text(encoding="utf-8"))
     names = [name for name, _ in calls]
@@ -147,3 +153,8 @@ def test_the_file_for_3dec_has_closed_blocks_and_the_angle_of_friction(url):
         sides = {(a, b) for face in faces for a, b in zip(face, face[1:] + face[:1], strict=True)}
         assert {(b, a) for a, b in sides} == sides
     assert re.search(r"friction 28\.81\d*", text)
+    # every command is one of 3DEC 7's that are written here, with a line that goes on where it ends in dots
+    lines = [line for line in text.replace(" ...\n", " ").splitlines() if not line.startswith(";")]
+    known = r"(model (new|large-strain on|gravity \(.*\))|block (create polyhedron|property|fix|contact|mechanical) .*)"
+    assert [line for line in lines if not re.fullmatch(known, line)] == []
+    assert all(line.count("(") == line.count(")") and line.count("'") % 2 == 0 for line in lines)
