@@ -60,6 +60,7 @@ def weakest_push(on: RigidAssembly) -> LoadQuestion:
     found_at: dict[float, float] = {}
 
     def bound(angle: float) -> float:
+        """Return the limit load at an angle [°], solved once [-]."""
         if angle not in found_at:
             found_at[angle] = limit_load(on, push(angle).live).multiplier
         return found_at[angle]

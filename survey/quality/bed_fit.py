@@ -142,6 +142,7 @@ def _paule_mandel(rows: Array, variances: Array) -> float:
     redundancy: int = rows.shape[0] - (rows.shape[1] - 1)
 
     def excess(square: float) -> float:
+        """Return the weighted sum of squares minus its expectation, for an added variance [m²]."""
         weights = 1.0 / (variances + square)
         residuals: Array = rows @ np.append(-_solve(rows, weights), 1.0)
         return float(np.sum(weights * residuals**2)) - redundancy

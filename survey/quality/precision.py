@@ -214,6 +214,7 @@ def _left_out(block: SurveyedBlock) -> tuple[tuple[str, ...], tuple[str, ...]]:
     count, rejected = len(record.points), block.face.fit.rejected
 
     def name(index: int) -> str:
+        """Return the name of a point or corner, or its number where it has none."""
         if record.names and record.names[index]:
             return record.names[index]
         return f"point {index + 1}" if index < count else f"corner {index - count + 1}"

@@ -302,6 +302,7 @@ def _missing(reject: Reject, made: Set[str]) -> Remeasure:
 
 def _reasons(stone: StoneQuality, scale: float, chance: float) -> Iterator[Remeasure]:
     def reason(urgency: Urgency, severity: float, words: str, action: str) -> Remeasure:
+        """Return a reason to measure the stone again."""
         return Remeasure(stone.code, stone.line, urgency, severity, words, action)
 
     if stone.measured and stone.redundancy == 0:

@@ -155,6 +155,7 @@ def runs_of(file: DiagnosisFile, url: str, run: Runner) -> Runs:
     rest: dict[tuple[str, ...], Tried] = {}
 
     def made(places: Sequence[Place]) -> Iterator[Tried]:
+        """Run the trials of places, and yield their results in order."""
         scenes = [_scene_or_fault(file, case, x) for case, x in places]
         trials = [Trial(scene, file.scene_path, url) for scene in scenes if isinstance(scene, str)]
         fresh = [later for later in dict.fromkeys(case.later for case, _ in places) if later not in rest]
@@ -188,6 +189,7 @@ def kept_runner(file: DiagnosisFile, solids: str, store: Kept, run: Runner) -> R
     """
 
     def decides(trial: Trial) -> list[str]:
+        """Return everything that decides the result of a trial: stones, scene, and the files it names."""
         scene = tomllib.loads(trial.text)
         return [
             solids,
@@ -196,6 +198,7 @@ def kept_runner(file: DiagnosisFile, solids: str, store: Kept, run: Runner) -> R
         ]
 
     def made(trials: Sequence[Trial]) -> Iterator[Tried]:
+        """Run trials that have no stored result; yield all results in order."""
         tried_before = [(trial, keys, store.get(keys)) for trial in trials for keys in [decides(trial)]]
         others = iter(run([one for one, _, tried in tried_before if tried is None]))
         for _, keys, tried in tried_before:
@@ -248,6 +251,7 @@ def fit_cases(
     turns: Counter[int] = Counter()
 
     def make(places: Mapping[int, Sequence[tuple[float, ...]]], text: str = "") -> None:
+        """Run all places that have no result yet, and report progress."""
         fresh = [place for k, xs in places.items() for x in xs if (place := (k, x)) not in known]
         fresh = list(dict.fromkeys(fresh))
         turns.update(list(places))

@@ -58,6 +58,7 @@ def contents(page: str) -> str:
     titles: list[str] = []
 
     def named(match: re.Match[str]) -> str:
+        """Give a heading an anchor, and note its title."""
         titles.append(match[1])
         return f'<a id="part-{len(titles)}"></a><h2>{match[1]}</h2>'
 

@@ -111,10 +111,12 @@ def _motion(
 
 def _columns(stones: Sequence[StoneQuality]) -> list[Column]:
     def numbers(name: str) -> Array:
+        """Return an attribute of all stones (n,), NaN where it is absent."""
         values = (getattr(stone, name) for stone in stones)
         return np.array([np.nan if value is None else value for value in values], dtype=float)
 
     def texts(name: str) -> list[str | None]:
+        """Return an attribute of all stones as texts, None where it is absent."""
         return [None if (value := getattr(stone, name)) is None else str(value) for stone in stones]
 
     return [

@@ -312,6 +312,7 @@ def _verdicts(
     texts, walls = _findings(beds, faces), (len(beds), len(faces))
 
     def ask(code: str) -> str | None:
+        """Return the verdict on the course of a stone without that stone, or None where it has none."""
         if code not in places:
             return None
         facade, k = places[code]

@@ -55,6 +55,7 @@ def open_e57(path: Path) -> PointCloud:
         raise SurveyError("has no scan", where=str(path), remedy="export the points, not only pictures")
 
     def chunks(origin: Array, colours: bool) -> Iterator[Chunk]:
+        """Yield chunks of points (n, 3) from `origin` [m], with colours (n, 3) on request."""
         try:
             opened = pye57.E57(str(path))
             for k in range(opened.scan_count):

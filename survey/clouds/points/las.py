@@ -46,6 +46,7 @@ def open_las(path: Path) -> PointCloud:
         middle = np.zeros(3)
 
     def chunks(origin: Array, colours: bool) -> Iterator[Chunk]:
+        """Yield chunks of points (n, 3) from `origin` [m], with colours (n, 3) on request."""
         try:
             with laspy.open(path, **_selection(laspy, path, colours)) as file:
                 read = 0

@@ -46,6 +46,7 @@ def open_pcd(path: Path) -> PointCloud:
     place = _places(first)[0]
 
     def chunks(origin: Array, colours: bool) -> Iterator[Chunk]:
+        """Yield chunks of points (n, 3) from `origin` [m], with colours (n, 3) on request."""
         for rows in _rows(path, head, CHUNK):
             yield Chunk(_places(rows) - origin, _tints(rows) if colours else None)
 

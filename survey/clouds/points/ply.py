@@ -61,6 +61,7 @@ def open_ply(path: Path) -> PointCloud:
     warnings = lost_digits(path, float(np.abs(place).max())) if single else ()
 
     def chunks(origin: Array, colours: bool) -> Iterator[Chunk]:
+        """Yield chunks of points (n, 3) from `origin` [m], with colours (n, 3) on request."""
         for rows in _rows(path, head, CHUNK):
             tints = rows[:, 3:].astype(np.uint8) if colours and rows.shape[1] == 6 else None
             places = rows[:, :3]

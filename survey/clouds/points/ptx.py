@@ -60,6 +60,7 @@ def open_ptx(path: Path) -> PointCloud:
     )
 
     def chunks(origin: Array, colours: bool) -> Iterator[Chunk]:
+        """Yield chunks of points (n, 3) from `origin` [m], with colours (n, 3) on request."""
         with path.open(encoding="ascii", errors="replace") as file:
             for scan in scans:
                 for _ in range(_HEAD):

@@ -41,6 +41,7 @@ def open_text(path: Path) -> PointCloud:
     columns = (*places, *coloured)
 
     def rows(lines: int) -> Iterator[Array]:
+        """Yield rows of numbers (n, columns) whose coordinates are finite, up to `lines` at a time."""
         for numbers in stream.chunks(lines, columns):
             yield (
                 numbers
@@ -49,6 +50,7 @@ def open_text(path: Path) -> PointCloud:
             )
 
     def chunks(origin: Array, colours: bool) -> Iterator[Chunk]:
+        """Yield chunks of points (n, 3) from `origin` [m], with colours (n, 3) on request."""
         for numbers in rows(_LINES):
             tinted = colours and coloured
             tints = np.clip(numbers[:, 3:], 0.0, 255.0).astype(np.uint8) if tinted else None

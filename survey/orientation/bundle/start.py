@@ -95,6 +95,7 @@ def check_mirrored(source: Array, target: Array, network: Network) -> None:
         return
 
     def misfit(mirrored: bool) -> float:
+        """Return the root mean square distance [m] that a similarity leaves, mirrored or not."""
         rotation, shift, scale = similarity_between(source, target, mirrored=mirrored)
         return float(np.sqrt(((scale * source @ rotation.T + shift - target) ** 2).sum(axis=1).mean()))
 

@@ -71,6 +71,7 @@ class _Bytes:
             raise self.fail(f"the file announces {self.count} records, more than it has room for")
 
     def fail(self, what: str) -> SurveyError:
+        """Return the error of this place in the file."""
         return SurveyError(what, where=f"{self.path}, byte {self.place}", remedy="export the model again")
 
     def skip(self, count: int) -> int:
@@ -82,9 +83,11 @@ class _Bytes:
         return before
 
     def take(self, form: str) -> tuple[int, ...]:
+        """Read numbers of a `struct` format and move past them."""
         return struct.unpack_from(form, self.data, self.skip(struct.calcsize(form)))
 
     def text(self) -> str:
+        """Read a text up to its zero byte and move past it; raise `SurveyError` where it has none."""
         end = self.data.find(b"\0", self.place)
         if end < 0:
             raise self.fail("a name without its end")

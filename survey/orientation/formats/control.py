@@ -122,6 +122,7 @@ def _by_name(table: Table, row: TableRow, header: TableRow, places: Mapping[str,
     commented = header in table.comments
 
     def length(column: int, what: str) -> float:
+        """Return the length [m] in a column, converted from the unit that its title names."""
         name = header.cells[min(column, len(header.cells) - 1)]
         return (length_scale(name, where) or 1.0) * table.number(row.cells[column], what, row.line)
 

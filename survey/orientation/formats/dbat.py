@@ -137,6 +137,7 @@ def _placed(photo: Photo, row: Mapping[str, object], where: str, radian: float) 
     """Return a photograph with one row of a table of stations and angles."""
 
     def three(names: tuple[str, str, str], *common: str) -> Array | None:
+        """Return three numbers (3,) of named columns, None where all are absent; raise `SurveyError` where some are."""
         texts = [
             row.get(name, next((row[alias] for alias in common if alias in row), None)) for name in names
         ]
@@ -232,6 +233,7 @@ def _cameras(section: Element, base: Path) -> list[Element]:
 
 def _camera(element: Element, free: tuple[str, ...]) -> Camera:
     def values(name: str, count: int) -> list[float]:
+        """Return the numbers of a child element, or as many zeros where it is absent or empty."""
         value = element.find(name)
         return [0.0] * count if value is None or not value.text.strip() else value.numbers()
 

@@ -270,9 +270,11 @@ def write_photomodeler(network: Network, path: Path, title: str = "moma") -> Non
     names = numbered(network, path.with_name(f"{path.stem}-points.txt"))
 
     def row(values: Sequence[float] | Array) -> str:
+        """Return numbers as text that reads back to the same values."""
         return " ".join(repr(float(value)) for value in values)
 
     def of(camera: Camera) -> list[float]:
+        """Return the parameters of a camera in the order of the file; lengths in mm."""
         inner = camera.inner.tolist()
         return [*inner[:3], camera.pixel * camera.size[0], camera.pixel * camera.size[1], *inner[5:]]
 

@@ -89,17 +89,21 @@ def read_xml(path: Path, root: str) -> Element:
     parser = expat.ParserCreate()
 
     def begin(name: str, attributes: dict[str, str]) -> None:
+        """Open an element, with the line on which it stands."""
         made = Element(name, attributes, f"{path}:{parser.CurrentLineNumber}")
         open_[-1].children.append(made)
         open_.append(made)
 
     def end(name: str) -> None:
+        """Close the innermost element."""
         open_.pop()
 
     def text(data: str) -> None:
+        """Add text to the innermost element."""
         open_[-1].text += data
 
     def doctype(*_: object) -> None:
+        """Refuse a document type, which may name other files."""
         raise SurveyError(
             "the document has a DOCTYPE",
             where=f"{path}:{parser.CurrentLineNumber}",

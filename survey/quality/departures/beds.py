@@ -381,6 +381,7 @@ def _wall(
     runs = _runs(len(sound.numbers))
 
     def follow(sample: Sample, fit: Found) -> Found:
+        """Extend a fitted shape over the courses that it moves."""
         if fit.shape.name.endswith("end"):
             return _hinged(sample, fit, length)
         return _extended(sample, _follow(sample, fit, fit.run, length), length)
@@ -414,6 +415,7 @@ def _left(
     inliers = (np.abs(rest) <= OUTLIER * np.sqrt(share * sample.variance)) & (share > 0.0)
 
     def excess(square: float) -> float:
+        """Return the weighted sum of squares minus its expectation, for an added variance [m²]."""
         return float(
             (rest[inliers] ** 2 / (share[inliers] * (measured[inliers] + square))).sum()
         ) - WITHIN * int(inliers.sum())

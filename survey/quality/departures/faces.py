@@ -565,6 +565,7 @@ def _sharpener(face: _Face) -> Callable[[Sample, Found], Found]:
     """Return what moves the places of a shape to where they fit best."""
 
     def sharpen(sample: Sample, fit: Found) -> Found:
+        """Return a fitted shape with its places adjusted to the samples."""
         free = {
             "offset": (0,),
             "setback": (0,),

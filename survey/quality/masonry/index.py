@@ -151,6 +151,7 @@ def index_range(grades: Mapping[Parameter, Grade], direction: Direction) -> tupl
     k = DIRECTIONS.index(direction)
 
     def index(end: int) -> float:
+        """Return the masonry quality index at one end of the possible grades [-]."""
         value = {name: _VALUES[name][k][grades[name].possible[end]] for name in PARAMETERS}
         return value.pop(Parameter.SM) * sum(value.values())
 

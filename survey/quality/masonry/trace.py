@@ -38,10 +38,12 @@ class _Network:
     ways: list[tuple[int, int]]
 
     def add(self, place: Array) -> int:
+        """Add a node at a place (2,) [m]; return its number."""
         self.places.append(place)
         return len(self.places) - 1
 
     def matrix(self) -> csr_array:
+        """Return the lengths of the edges [m] as a sparse matrix (n, n)."""
         size = len(self.places)
         if not self.ways:
             return csr_array((size, size))
