@@ -75,9 +75,9 @@ class Kept:
             parts = {field.name: self.plain(getattr(value, field.name)) for field in fields(value)}
             return ["record", type(value).__name__, parts]
         if isinstance(value, Mapping):
-            return ["mapping", {key: self.plain(one) for key, one in value.items()}]
+            return ["mapping", {key: self.plain(item) for key, item in value.items()}]
         if isinstance(value, list | tuple):
-            return [type(value).__name__, [self.plain(one) for one in value]]
+            return [type(value).__name__, [self.plain(item) for item in value]]
         raise TypeError(f"a {type(value).__name__} cannot be kept")
 
     def revived(self, value: Any) -> Any:
@@ -88,13 +88,13 @@ class Kept:
             case ["array", kind, shape, numbers]:
                 return np.array(numbers, dtype=kind).reshape(shape)
             case ["record", name, parts]:
-                return self._records[name](**{key: self.revived(one) for key, one in parts.items()})
+                return self._records[name](**{key: self.revived(item) for key, item in parts.items()})
             case ["mapping", parts]:
-                return {key: self.revived(one) for key, one in parts.items()}
+                return {key: self.revived(item) for key, item in parts.items()}
             case ["tuple", parts]:
-                return tuple(self.revived(one) for one in parts)
+                return tuple(self.revived(item) for item in parts)
             case ["list", parts]:
-                return [self.revived(one) for one in parts]
+                return [self.revived(item) for item in parts]
         raise ValueError(f"no answer: {value!r}")
 
 

@@ -33,7 +33,9 @@ class Motions:
 
     def since(self, earlier: "Motions") -> "Motions":
         """Return the motions since an earlier state of the same stones; those that took no part in it count whole."""
-        field = {code: one - earlier.field.get(code, 0.0) for code, one in self.field.items()}
+        field = {
+            code: displacement - earlier.field.get(code, 0.0) for code, displacement in self.field.items()
+        }
         return Motions(self.middle, field)
 
 

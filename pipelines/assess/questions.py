@@ -215,7 +215,7 @@ def _listed(codes: frozenset[str]) -> str:
 
 
 def _named(entry: ArrayTable, vector: Any) -> str:
-    return f"{entry.type} ({', '.join(f'{one:g}' for one in vector)})"
+    return f"{entry.type} ({', '.join(f'{component:g}' for component in vector)})"
 
 
 _TYPES: Mapping[str, Callable[[ArrayTable, frozenset[str], Array], Question]] = {

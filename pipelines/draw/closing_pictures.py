@@ -154,7 +154,7 @@ def closing_surface(shapes: ClosingShapes, step: str = "moved") -> ClosingSurfac
         moved=np.concatenate([stone.simplified if simplified else stone.moved for stone in shapes.stones]),
         joint_points=joint_points,
         joint_triangles=joint_triangles,
-        joint_width=np.array([one.joint.width for one in shut])[of_joint],
+        joint_width=np.array([drawn.joint.width for drawn in shut])[of_joint],
         gap_points=gap_points,
         gap_triangles=gap_triangles,
         gaps=np.array([place.centroid for place in shapes.places if place.kind == "gap"]).reshape(-1, 3),

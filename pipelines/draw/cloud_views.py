@@ -193,5 +193,7 @@ def _write_sections(lines: dict[str, list[Array]], folder: Path) -> None:
             drawing.layers.add(layer)
             for number, line in enumerate(own, start=1):
                 drawing.modelspace().add_polyline3d(line.tolist(), dxfattribs={"layer": layer})
-                rows.writerows((name, number, *(f"{one:.4f}" for one in place)) for place in line)
+                rows.writerows(
+                    (name, number, *(f"{coordinate:.4f}" for coordinate in place)) for place in line
+                )
     drawing.saveas(folder / "sections.dxf")

@@ -79,7 +79,7 @@ def draw_pushed(path: Path, title: str, test: LoadingTest, step: Step) -> None:
     axes.add_collection(PolyCollection(shown, facecolor="#e6dfd0", edgecolor="#4a4a4a", linewidth=0.6))
     contacts, wide = step.active.contacts, step.active.gap > _OPEN * displacement
     kept = ~model.fixed[contacts.bodies[wide]]
-    ends = (material_points(contacts, one)[wide][kept] for one in (test.settled, step.after))
+    ends = (material_points(contacts, state)[wide][kept] for state in (test.settled, step.after))
     axes.plot(*drawn(*ends).T, ".", color="#c0392b", markersize=3)
     margin = 2 * _DRAWN_DISPLACEMENT * extent
     axes.set_xlim(low[0] - margin, high[0] + margin)

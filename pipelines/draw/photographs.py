@@ -43,7 +43,7 @@ def draw_network(path: Path, values: Mapping[str, Any]) -> float:
     stations = np.array([[photo["x"], photo["y"], photo["z"]] for photo in values["photos"]])
     points = np.array([point["xyz"] for point in values["points"]]).reshape(-1, 3)
     covariances = np.array([point["covariance"] for point in values["points"]]).reshape(-1, 3, 3)
-    control = {one["id"] for one in values["control"]}
+    control = {point["id"] for point in values["control"]}
     controlled = np.array([point["id"] in control for point in values["points"]], dtype=bool)
     rays = _rays(values, stations, points)
     some = np.linspace(0, len(points) - 1, min(len(points), _ELLIPSES)).astype(int)
@@ -160,7 +160,7 @@ def _vectors(axes: "Axes", at: Array, off: Array, wrong: Sequence[bool] | Array)
     from matplotlib.collections import LineCollection
 
     lines = np.stack([at, at + off], axis=1)
-    colours = [FLAG if one else PLAIN for one in wrong]
+    colours = [FLAG if is_wrong else PLAIN for is_wrong in wrong]
     axes.add_collection(LineCollection(list(lines), colors=colours, linewidths=0.7))
     axes.plot(*at.T, ".", color=INK, markersize=1.0)
 

@@ -111,10 +111,10 @@ def missing(result: Result, name: str) -> str | None:
     if PICTURES[name].shows == "stress" and not stressed:
         deforms = any(body.fidelity is Fidelity.DEFORMABLE for body in result.bodies)
         return "no stress was asked for" if deforms else "no stone deforms"
-    if name == "utilisation" and all(one.utilisation is None for one in stressed):
+    if name == "utilisation" and all(stress.utilisation is None for stress in stressed):
         return "no material of a deformable stone has a strength"
     if name == "principal_tension" and all(
-        without_rounding(one.principal_tension, "Pa") <= 0.0 for one in stressed
+        without_rounding(stress.principal_tension, "Pa") <= 0.0 for stress in stressed
     ):
         return "no stone is in tension"
     least = length_tolerance(result)  # [m]
@@ -165,7 +165,7 @@ def _heading(result: Result, name: str) -> list[str]:
         value, place = largest
         top = _top(result, name) or value
         factor, unit = picture.unit_of(value)
-        written = [f"{one * factor:.4g}{f' {unit}' if unit else ''}" for one in (top, value)]
+        written = [f"{number * factor:.4g}{f' {unit}' if unit else ''}" for number in (top, value)]
         if picture.shows == "stress":
             lines.append(f"1 % of the volume exceeds {written[0]}; at a corner up to {written[1]}, {place}")
         else:
@@ -182,7 +182,7 @@ def _largest(result: Result, name: str) -> tuple[float, str] | None:
         for body, block in zip(result.bodies, result.scene.blocks, strict=True)
         if np.isfinite(values := _fields_of(body, block.material, name)).any()
     ]
-    value, body = max(found, key=lambda one: one[0], default=(0.0, None))
+    value, body = max(found, key=lambda value: value[0], default=(0.0, None))
     if body is None or value <= 0.0:
         return None
     error = "" if body.values is None else f" (error of its stress {100.0 * body.values.error:.0f} %)"

@@ -120,28 +120,28 @@ def read_geology(path: str | Path, kind: str) -> GeologyScene:
 
 def parse_geology(text: str, path: str, kind: str) -> GeologyScene:
     """Check the text of the scene file of an experiment; `path` is for the messages."""
-    given = parse_toml(text, path, SceneError, _START)
+    toml = parse_toml(text, path, SceneError, _START)
     document = TomlDocument(path, key_lines(text))
-    known = ["scene", *_TABLES, kind, "cells", "layers"]
-    for name in given:
-        if name not in known:
+    allowed = ["scene", *_TABLES, kind, "cells", "layers"]
+    for name in toml:
+        if name not in allowed:
             other = (
-                f"this is a scene of `moma geology {name}`" if name in EXPERIMENTS else nearest(name, known)
+                f"this is a scene of `moma geology {name}`" if name in EXPERIMENTS else nearest(name, allowed)
             )
             document.fail(f"unknown table [{name}]", name, remedy=other)
-    if kind not in given:
+    if kind not in toml:
         document.fail(f"no table [{kind}]", remedy=_START)
-    title = read_table(document, ("scene",), _table(document, given, "scene"), _Title)
-    tables = {name: _built(document, given, name, owner) for name, owner in _TABLES.items()}
+    title = read_table(document, ("scene",), _table(document, toml, "scene"), _Title)
+    tables = {name: _built(document, toml, name, owner) for name, owner in _TABLES.items()}
     scene = GeologyScene(
         document=document,
         text=text,
         name=title.name or Path(path).stem,
         note=title.note,
         kind=kind,
-        experiment=cast(Experiment, _built(document, given, kind, EXPERIMENTS[kind])),
-        cells=_cells(document, given),
-        layers=_layers(document, given),
+        experiment=cast(Experiment, _built(document, toml, kind, EXPERIMENTS[kind])),
+        cells=_cells(document, toml),
+        layers=_layers(document, toml),
         **tables,
     )
     _check_cells(scene)
@@ -151,17 +151,18 @@ def parse_geology(text: str, path: str, kind: str) -> GeologyScene:
 
 def _check_cells(scene: GeologyScene) -> None:
     """Refuse a cell that reaches out of the sample by more than a disk."""
-    own, slack, turn = scene.experiment, scene.sample.largest, np.linspace(0.0, 2.0 * np.pi, _CORNERS)
+    experiment, slack, turn = scene.experiment, scene.sample.largest, np.linspace(0.0, 2.0 * np.pi, _CORNERS)
     for number, cell in enumerate(scene.cells):
         x = cell.centre[0] + cell.radius * np.cos(turn)
         y = cell.centre[1] + cell.radius * np.sin(turn)
-        top = own.top(np.clip(x, 0.0, own.length))
-        out = np.max([-x, x - own.length, -y, y - top], axis=0)
+        top = experiment.top(np.clip(x, 0.0, experiment.length))
+        out = np.max([-x, x - experiment.length, -y, y - top], axis=0)
         worst = int(np.argmax(out))
         if out[worst] > slack:
             scene.document.fail(
                 f"cell {cell.name!r} reaches out of the sample by {out[worst]:.4g} m at "
-                f"({x[worst]:.4g}, {y[worst]:.4g}); it is {own.length:g} m long, and {top[worst]:.4g} m high there",
+                f"({x[worst]:.4g}, {y[worst]:.4g}); it is {experiment.length:g} m long, "
+                f"and {top[worst]:.4g} m high there",
                 "cells",
                 str(number),
                 remedy="place it within the sample, or make it smaller",
@@ -185,22 +186,22 @@ def _check_motion(scene: GeologyScene) -> None:
             )
 
 
-def _table(document: TomlDocument, given: Mapping[str, Any], name: str) -> Mapping[str, Any]:
-    content = given.get(name, {})
+def _table(document: TomlDocument, toml: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    content = toml.get(name, {})
     if not isinstance(content, dict):
         document.fail(f"{name!r} is not a table", name, remedy=f"write [{name}] on a line of its own")
     return content
 
 
-def _built(document: TomlDocument, given: Mapping[str, Any], name: str, owner: type[Any]) -> Any:
-    values = check_table(document, (name,), _table(document, given, name), keys_of(owner))
+def _built(document: TomlDocument, toml: Mapping[str, Any], name: str, owner: type[Any]) -> Any:
+    values = check_table(document, (name,), _table(document, toml, name), keys_of(owner))
     with document.at(name):
         return build(owner, values)
 
 
-def _layers(document: TomlDocument, given: Mapping[str, Any]) -> tuple[Layer, ...]:
+def _layers(document: TomlDocument, toml: Mapping[str, Any]) -> tuple[Layer, ...]:
     layers: list[Layer] = []
-    for number, (place, content) in enumerate(tables_of(document, given, "layers")):
+    for number, (place, content) in enumerate(tables_of(document, toml, "layers")):
         layers.append(read_table(document, place, content, Layer, f"[[layers]] {number + 1}"))
         if number and layers[-1].top <= layers[-2].top:
             document.fail(
@@ -212,9 +213,9 @@ def _layers(document: TomlDocument, given: Mapping[str, Any]) -> tuple[Layer, ..
     return tuple(layers)
 
 
-def _cells(document: TomlDocument, given: Mapping[str, Any]) -> tuple[Cell, ...]:
+def _cells(document: TomlDocument, toml: Mapping[str, Any]) -> tuple[Cell, ...]:
     cells: dict[str, Cell] = {}
-    for number, (place, content) in enumerate(tables_of(document, given, "cells")):
+    for number, (place, content) in enumerate(tables_of(document, toml, "cells")):
         cell = read_table(document, place, content, _CellTable, f"[[cells]] {number + 1}")
         if len(cell.centre) != 2:
             document.fail(f"centre = {list(cell.centre)}", *place, "centre", remedy="give x and y")

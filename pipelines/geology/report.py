@@ -66,7 +66,7 @@ def write_report(
         quality=_quality(summary),
         head=_HEAD,
         cells=[_cell(name, columns) for name, columns in rows.items()],
-        figures=[picture(one, f"{words} Quality: {summary['headline']}.") for one, words in figures],
+        figures=[picture(path, f"{words} Quality: {summary['headline']}.") for path, words in figures],
         settings=_settings(scene),
     )
 

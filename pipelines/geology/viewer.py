@@ -34,17 +34,17 @@ def disks_model(
     rows = np.unique(np.linspace(0, len(instants) - 1, min(len(instants), most)).round().astype(int))
     chosen = [instants[row] for row in rows.tolist()]
     centres = _upright(start)
-    shift = np.stack([_upright(one.position[:count, :2]) - centres for one in chosen])
+    shift = np.stack([_upright(frame.position[:count, :2]) - centres for frame in chosen])
     turn = np.zeros_like(shift)
-    turn[:, :, 1] = -np.stack([one.position[:count, 2] for one in chosen])
+    turn[:, :, 1] = -np.stack([frame.position[:count, 2] for frame in chosen])
     fields = (
-        ("mean pressure", "Pa", np.stack([one.pressure for one in chosen])),
-        ("shear since the start", "-", np.stack([one.shear for one in chosen])),
-        ("change of area", "-", np.stack([one.volume for one in chosen])),
-        ("speed", "m/s", np.stack([np.hypot(*one.velocity[:count, :2].T) for one in chosen])),
+        ("mean pressure", "Pa", np.stack([frame.pressure for frame in chosen])),
+        ("shear since the start", "-", np.stack([frame.shear for frame in chosen])),
+        ("change of area", "-", np.stack([frame.volume for frame in chosen])),
+        ("speed", "m/s", np.stack([np.hypot(*frame.velocity[:count, :2].T) for frame in chosen])),
     )
     motion = Motion(
-        np.array([one.time for one in chosen]),
+        np.array([frame.time for frame in chosen]),
         centres,
         shift,
         turn,

@@ -87,7 +87,7 @@ def rejects_text(
     if by_lines and header:
         head = [line for _, line in _picked(survey, set(range(1, header + 1)), sheet)]
     ordered = sorted(rejects, key=lambda one: one.spans[0].start if one.spans else 0)
-    wanted = {line for one in ordered for span in one.spans for line in span} if by_lines else set()
+    wanted = {line for reject in ordered for span in reject.spans for line in span} if by_lines else set()
     lines = dict(_picked(survey, wanted.union(also), sheet)) if wanted else {}
     text = head + [lines[line] for line in sorted(also) if line in lines]
     for reject in ordered:

@@ -184,7 +184,7 @@ def propose_core(
         infill_proposals = propose_infill(stones, settings, facings=named, taken=_codes(session))
         measured = _measured(session, find(session, "infill"))
         new = [proposal for proposal in infill_proposals if not _is_known(proposal, measured)]
-        pairs: list[tuple[StoneRecord, tuple[str, ...]]] = [(core_record(one), ()) for one in new]
+        pairs: list[tuple[StoneRecord, tuple[str, ...]]] = [(core_record(proposal), ()) for proposal in new]
         given = {**asdict(settings), "facings": None if facings is None else list(facings)}
         return _report("infill", session, len(records), pairs, given, recording)
 
@@ -298,7 +298,7 @@ def _contains(solid: Solid, point: Array) -> bool:
     if (point < solid.vertices.min(axis=0)).any() or (point > solid.vertices.max(axis=0)).any():
         return False
     a, b, c = np.moveaxis(solid.vertices[triangulate(solid)] - point, 1, 0)
-    la, lb, lc = (np.linalg.norm(one, axis=1) for one in (a, b, c))
+    la, lb, lc = (np.linalg.norm(vectors, axis=1) for vectors in (a, b, c))
     volume = (a * np.cross(b, c)).sum(axis=1)
     scale = la * lb * lc + (a * b).sum(axis=1) * lc + (b * c).sum(axis=1) * la + (c * a).sum(axis=1) * lb
     return abs(2.0 * float(np.arctan2(volume, scale).sum())) > 2.0 * np.pi

@@ -85,7 +85,7 @@ def _verdict(file: DiagnosisFile, ranking: Ranking, best: Ranked) -> str:
     ]
     if not others:
         return f"not dated: {best.name!r} could be tried at one time only"
-    margin = min(one.aicc for one in others) - best.aicc
+    margin = min(hypothesis.aicc for hypothesis in others) - best.aicc
     last, later = best.stood[-1], file.phases[len(best.stood) :]
     when = f"younger than phase {last}" + (f" and older than phase {later[0]}" if later else "")
     return f"the movement is {when} (AICc of other dates larger by {margin:.3g} or more)"

@@ -159,17 +159,17 @@ def read_diagnosis(path: str | Path) -> DiagnosisFile:
     SceneError : with file and line, at the first mistake
     """
     text = read_text(path, SceneError, missing="no such file")
-    given = parse_toml(text, str(path), SceneError, "see docs/howto/diagnose.md for one to start from")
+    toml = parse_toml(text, str(path), SceneError, "see docs/howto/diagnose.md for one to start from")
     document = TomlDocument(str(path), key_lines(text))
-    head = read_table(document, ("diagnosis",), given.get("diagnosis", {}), DiagnosisTable)
+    head = read_table(document, ("diagnosis",), toml.get("diagnosis", {}), DiagnosisTable)
     if head.scene is None:
-        scene_path, base = str(path), {name: one for name, one in given.items() if name not in BESIDE}
+        scene_path, base = str(path), {name: content for name, content in toml.items() if name not in BESIDE}
     else:
         beside = Path(path).parent / head.scene
         with document.at("diagnosis", "scene"):
             inner = read_text(beside, SceneError, missing="no such scene file")
         scene_path, base = str(beside), parse_toml(inner, str(beside), SceneError, "see docs/scene.md")
-        for name in given:
+        for name in toml:
             if name not in BESIDE:
                 what = f"unknown table [{name}] beside a scene in another file"
                 document.fail(what, name, remedy="write it into the scene, or under [hypotheses.scene]")
@@ -182,8 +182,8 @@ def read_diagnosis(path: str | Path) -> DiagnosisFile:
     return DiagnosisFile(
         document=document,
         scene_path=scene_path,
-        base={name: one for name, one in base.items() if name not in (*BESIDE, *head.without)},
-        hypotheses=tuple(_hypotheses(document, given)),
+        base={name: content for name, content in base.items() if name not in (*BESIDE, *head.without)},
+        hypotheses=tuple(_hypotheses(document, toml)),
         **vars(head),
     )
 
@@ -194,11 +194,11 @@ def _check_phases(document: TomlDocument, phases: Texts) -> None:
         document.fail(what, "diagnosis", "phases", remedy="name two or more, the oldest first, or none")
 
 
-def _hypotheses(document: TomlDocument, given: Mapping[str, Any]) -> Iterator[Hypothesis]:
-    if not given.get("hypotheses"):
+def _hypotheses(document: TomlDocument, toml: Mapping[str, Any]) -> Iterator[Hypothesis]:
+    if not toml.get("hypotheses"):
         document.fail("no hypothesis", "hypotheses", remedy="write [[hypotheses]] above each")
     names: dict[str, str] = {}
-    for path, table in tables_of(document, given, "hypotheses"):
+    for path, table in tables_of(document, toml, "hypotheses"):
         plain = {key: value for key, value in table.items() if key != "unknowns"}
         head = read_table(document, path, plain, HypothesisTable, "[[hypotheses]]")
         if head.name in names.values():
@@ -212,18 +212,18 @@ def _hypotheses(document: TomlDocument, given: Mapping[str, Any]) -> Iterator[Hy
 
 
 def _unknowns(document: TomlDocument, path: tuple[str, ...], table: Mapping[str, Any]) -> Iterator[Unknown]:
-    for own, content in tables_of(document, table, "unknowns", path):
-        unknown = read_table(document, own, content, Unknown, "[[hypotheses.unknowns]]")
+    for table_path, content in tables_of(document, table, "unknowns", path):
+        unknown = read_table(document, table_path, content, Unknown, "[[hypotheses.unknowns]]")
         low, start, high = unknown.low, unknown.start, unknown.high
         if not unknown.name.isidentifier():
             what = f"name = {unknown.name!r} is no name for a formula"
-            document.fail(what, *own, "name", remedy="use letters, digits and _")
+            document.fail(what, *table_path, "name", remedy="use letters, digits and _")
         if not low <= start <= high or low == high:
             what = f"start = {start:g} is not between low = {low:g} and high = {high:g}"
-            document.fail(what, *own, "start", remedy="give low < high, and a start between them")
+            document.fail(what, *table_path, "start", remedy="give low < high, and a start between them")
         if unknown.change > 0.5 * (high - low):
             what = f"step = {unknown.change:g} is more than half of the range of {unknown.name}"
-            document.fail(what, *own, "step", remedy="give less, or leave it out")
+            document.fail(what, *table_path, "step", remedy="give less, or leave it out")
         yield unknown
 
 
@@ -254,11 +254,11 @@ def _formulas(change: Any, path: tuple[str, ...]) -> Iterator[tuple[tuple[str, .
     if isinstance(change, str) and change.startswith("="):
         yield path, change
     elif isinstance(change, Mapping):
-        for name, one in change.items():
-            yield from _formulas(one, (*path, name))
+        for name, entry in change.items():
+            yield from _formulas(entry, (*path, name))
     elif isinstance(change, list):
-        for index, one in enumerate(change):
-            yield from _formulas(one, (*path, str(index)))
+        for index, entry in enumerate(change):
+            yield from _formulas(entry, (*path, str(index)))
 
 
 def _filled(change: Any, values: Mapping[str, float]) -> Any:
@@ -269,8 +269,8 @@ def _filled(change: Any, values: Mapping[str, float]) -> Any:
         except ValueError as fault:
             raise SceneError(f"{_shortened(change)}: {fault}") from None
     if isinstance(change, Mapping):
-        return {key: _filled(one, values) for key, one in change.items()}
-    return [_filled(one, values) for one in change] if isinstance(change, list) else change
+        return {key: _filled(entry, values) for key, entry in change.items()}
+    return [_filled(entry, values) for entry in change] if isinstance(change, list) else change
 
 
 def _shortened(formula: str) -> str:

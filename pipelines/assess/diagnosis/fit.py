@@ -98,7 +98,7 @@ def fit(unknowns: Sequence[Unknown]) -> Ask:
         promised = residuals @ residuals - float(((residuals + jacobian @ change) ** 2).sum())
         if promised < _ENOUGH:
             break
-        found = None
+        trial = None
         for _ in range(_HALVINGS + 1):
             if turns == _TURNS:
                 trouble = f"not converged in {_TURNS} turns"
@@ -106,14 +106,14 @@ def fit(unknowns: Sequence[Unknown]) -> Ask:
             turns += 1
             there = np.clip(best + change, low, high)
             answer = yield _asked(there, step, high)
-            found = _read(answer, there, step, high)
-            if found[0] is not None and found[0] @ found[0] < residuals @ residuals:
+            trial = _read(answer, there, step, high)
+            if trial[0] is not None and trial[0] @ trial[0] < residuals @ residuals:
                 break
-            found, change = None, 0.5 * change
-        if found is None:
+            trial, change = None, 0.5 * change
+        if trial is None:
             # the model answers more coarsely than the step that is left
             break
-        best, (residuals, jacobian, trouble) = there, found
+        best, (residuals, jacobian, trouble) = there, trial
         assert residuals is not None
     covariance, undetermined = _covariance(jacobian, span)
     return Fit(tuple(best.tolist()), residuals, covariance, undetermined, turns, trouble)
@@ -146,9 +146,9 @@ def _least(
 ) -> tuple[float, ...] | None:
     """Return the place with the least χ², if it is less than that of the start."""
     known = [
-        (float(one @ one), place)
-        for one, place in zip(answer, places, strict=True)
-        if not isinstance(one, str)
+        (float(residual @ residual), place)
+        for residual, place in zip(answer, places, strict=True)
+        if not isinstance(residual, str)
     ]
     chi2, best = min(known, default=(np.inf, None))
     return best if residuals is None or chi2 < float(residuals @ residuals) - _ENOUGH else None
@@ -158,7 +158,7 @@ def _asked(place: Array, step: Array, high: Array) -> list[tuple[float, ...]]:
     """Return a place and, for each amplitude, one beside it, within the bounds."""
     return [
         tuple(place.tolist()),
-        *(tuple((place + one).tolist()) for one in np.diag(_steps(place, step, high))),
+        *(tuple((place + step_of).tolist()) for step_of in np.diag(_steps(place, step, high))),
     ]
 
 
@@ -174,10 +174,10 @@ def _read(
     if isinstance(first, str):
         return None, None, first
     columns = []
-    for one, delta in zip(others, _steps(place, step, high), strict=True):
-        if isinstance(one, str):
-            return first, None, one
-        columns.append((one - first) / delta)
+    for residual, delta in zip(others, _steps(place, step, high), strict=True):
+        if isinstance(residual, str):
+            return first, None, residual
+        columns.append((residual - first) / delta)
     return first, np.array(columns).reshape(len(columns), len(first)).T, ""
 
 

@@ -96,7 +96,7 @@ class Ranked:
     def title(self) -> str:
         """Name, with its date."""
         return (
-            f"{self.name}, when {' and '.join(f'phase {one}' for one in self.stood)} stood"
+            f"{self.name}, when {' and '.join(f'phase {phase}' for phase in self.stood)} stood"
             if self.stood
             else self.name
         )
@@ -157,10 +157,10 @@ def estimates(unknowns: Sequence[Unknown], fit: Fit, dof: int) -> Iterator[Estim
     for k, (unknown, value) in enumerate(zip(unknowns, fit.amplitudes, strict=True)):
         variance = fit.covariance[k, k]
         # a part of a direction that nothing feels may be as large as the bounds allow
-        known = blind[k] < 0.1 and math.isfinite(variance)
-        half = wide * math.sqrt(variance) if known else math.inf
-        near = 1e-6 * (unknown.high - unknown.low)
-        bound = min(value - unknown.low, unknown.high - value) <= near
+        determined = blind[k] < 0.1 and math.isfinite(variance)
+        half = wide * math.sqrt(variance) if determined else math.inf
+        margin = 1e-6 * (unknown.high - unknown.low)
+        bound = min(value - unknown.low, unknown.high - value) <= margin
         yield Estimate(unknown.name, unknown.unit, value, value - half, value + half, bound)
 
 
@@ -175,8 +175,8 @@ def _remarks(unknowns: Sequence[Unknown], fit: Fit, own: Sequence[Estimate]) -> 
         parts = [
             f"{part:+.2f} {name}" for part, name in zip(direction, names, strict=True) if abs(part) > 0.1
         ]
-        told = " ".join(parts) if len(parts) > 1 else parts[0].split()[1]
-        yield f"not determined, as it moves nothing that was measured: {told}"
+        directions = " ".join(parts) if len(parts) > 1 else parts[0].split()[1]
+        yield f"not determined, as it moves nothing that was measured: {directions}"
 
 
 def _tied(unknowns: Sequence[Unknown], fit: Fit) -> Iterator[str]:

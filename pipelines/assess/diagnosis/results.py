@@ -252,7 +252,7 @@ class _Copies:
     def named(self, part: Any) -> Any:
         """Return part of a scene with the names of the copies."""
         if isinstance(part, list):
-            return [self.named(one) for one in part]
+            return [self.named(entry) for entry in part]
         if not isinstance(part, Mapping):
             return part
         names = RECORDS if part.get("type") == "ground_motion" else ("file",)

@@ -200,7 +200,7 @@ def kept_runner(file: DiagnosisFile, solids: str, store: Kept, run: Runner) -> R
     def made(trials: Sequence[Trial]) -> Iterator[Tried]:
         """Run trials that have no stored result; yield all results in order."""
         tried_before = [(trial, keys, store.get(keys)) for trial in trials for keys in [decides(trial)]]
-        others = iter(run([one for one, _, tried in tried_before if tried is None]))
+        others = iter(run([trial for trial, _, tried in tried_before if tried is None]))
         for _, keys, tried in tried_before:
             if tried is None:
                 tried = next(others)
@@ -270,8 +270,10 @@ def fit_cases(
             except StopIteration as end:
                 fits[k] = end.value
                 del asked[k]
-                found = _found(cases[k], fits[k], deformation.dof)
-                progress(Progress("run", len(known), len(known) + _to_come(cases, asked, turns), found=found))
+                headline = _found(cases[k], fits[k], deformation.dof)
+                progress(
+                    Progress("run", len(known), len(known) + _to_come(cases, asked, turns), found=headline)
+                )
     ranked, motions = list[Ranked](), {}
     for k, case in enumerate(cases):
         unknowns = case.hypothesis.unknowns
@@ -282,7 +284,7 @@ def fit_cases(
         ranked.append(one)
         motions[one.name, one.stood] = last.motions or _NOWHERE
     # those that may be reported: the best, and what cannot be told apart from it
-    least = min(one.aicc for one in ranked)
+    least = min(hypothesis.aicc for hypothesis in ranked)
     near = {
         k: [x for probe in probes(case.hypothesis.unknowns, fits[k].amplitudes) for x in probe]
         for k, case in enumerate(cases)
@@ -307,10 +309,10 @@ def fit_cases(
     residuals = deformation.residuals(_NOWHERE.displacement)
     still = Fit((), residuals, np.zeros((0, 0)), (), 0)
     ranking = Ranking(
-        tuple(sorted(ranked, key=lambda one: one.aicc)),
+        tuple(sorted(ranked, key=lambda hypothesis: hypothesis.aicc)),
         rank(STILL, (), (), still, deformation.dof, deformation.freedom),
     )
-    return Fitted(ranking, motions, len(known), sum(one.cpu for one in known.values()))
+    return Fitted(ranking, motions, len(known), sum(trial.cpu for trial in known.values()))
 
 
 def _to_come(cases: Sequence[Case], asked: Iterable[int], turns: Mapping[int, int]) -> int:

@@ -46,7 +46,7 @@ def with_unevenness(ranked: Ranked, unknowns: Sequence[Unknown], answers: Mappin
     answers : residuals (m,) at the places of `probes`; a text where a run has failed
     """
     rows = [[answers[place] for place in own] for own in probes(unknowns, ranked.fit.amplitudes)]
-    failed = next((one for row in rows for one in row if isinstance(one, str)), None)
+    failed = next((answer for row in rows for answer in row if isinstance(answer, str)), None)
     if failed is not None:
         remark = f"runs beside its best amounts fail, so that its intervals may be too narrow: {failed}"
         return replace(ranked, remarks=(*ranked.remarks, remark))

@@ -185,7 +185,7 @@ def _rig(asked: Pushing) -> tuple[str, ...]:
     scatter = ", ".join(f"{name} {100 * value:g} %" for name, value in asked.scatter.items())
     return (
         f"head {rig.head}, vertical force {1e-3 * rig.load:g} kN, pushed at {rig.height:g} m above the lowest point",
-        f"push along ({', '.join(f'{one:z.4g}' for one in rig.direction)}) to {way} mm in turn",
+        f"push along ({', '.join(f'{component:z.4g}' for component in rig.direction)}) to {way} mm in turn",
         f"coefficients of variation: {scatter}" if scatter else "no scatter: all values are taken as certain",
     )
 

@@ -97,7 +97,9 @@ def _fitted(line: CourseLine, moved: Sequence[BedMovement], along: Array) -> Arr
     ends = float(line.along[0]), float(line.along[-1])
 
     def lift(places: Array) -> Array:
-        return np.asarray(np.sum([one.lift(places, ends) for one in moved], axis=0), dtype=np.float64)
+        return np.asarray(
+            np.sum([movement.lift(places, ends) for movement in moved], axis=0), dtype=np.float64
+        )
 
     raised: Array = lift(along) + float((line.height - lift(line.along)).mean())
     return raised
@@ -140,8 +142,8 @@ def _exaggerations(lines: Sequence[CourseLine], levels: Array) -> list[float]:
     gaps = np.diff(np.unique(np.round(levels, 3)))
     room = float(np.median(gaps)) if len(gaps) else 0.3
     largest = [float((np.abs(line.height - line.level) + line.sigma).max()) for line in lines]
-    wanted = [_LARGEST * room / max(one, 1e-6) for one in largest]
-    return [max(1.0, _round_down(min(one, _FINER * min(wanted)))) for one in wanted]
+    wanted = [_LARGEST * room / max(extreme, 1e-6) for extreme in largest]
+    return [max(1.0, _round_down(min(factor, _FINER * min(wanted)))) for factor in wanted]
 
 
 def _round_down(value: float) -> float:

@@ -89,7 +89,7 @@ def draw_moved(path: Path, shapes: ClosingShapes, facade: Facade, step: str) -> 
 def back_to_front(stones: Sequence[DrawnStone], facade: Facade) -> list[DrawnStone]:
     """Sort the facade's stones, the farthest from the viewer first, so that nearer ones are drawn over them."""
     out = facade.frame.axes[2]
-    return sorted((stones[i] for i in facade.members.tolist()), key=lambda one: float(one.centroid @ out))
+    return sorted((stones[i] for i in facade.members.tolist()), key=lambda stone: float(stone.centroid @ out))
 
 
 def visible_faces(solid: Solid, facade: Facade) -> list[VisibleFace]:

@@ -192,7 +192,7 @@ def _mark(axes: "Axes", marked: Sequence[Place], facade: Facade) -> None:
 def _title(scene: str, facade: Facade, closed: Sequence[DrawnJoint], left: Sequence[DrawnJoint]) -> str:
     mean = ""
     if closed:
-        width = float(np.mean([one.joint.width for one in closed]))
+        width = float(np.mean([drawn.joint.width for drawn in closed]))
         mean = f", {1e3 * width:.1f} mm wide on average"
     return f"{scene}, {facade.name}: {len(closed)} joints closed{mean}; {len(left)} left open"
 
@@ -202,15 +202,15 @@ def _keys(shown: Sequence[DrawnJoint], marked: Sequence[Place], places: int, gue
     from matplotlib.lines import Line2D
 
     keys: list[Any] = [guess_key()] if guessed else []
-    if any(one.joint.left_open for one in shown) or any(one.kind == "gap" for one in marked):
+    if any(drawn.joint.left_open for drawn in shown) or any(drawn.kind == "gap" for drawn in marked):
         keys.append(
             Line2D([], [], color=FLAG, marker="o", linewidth=5.0, markersize=9.0, label="gap: left open")
         )
-    if any(one.kind == "overlap" for one in marked):
+    if any(place.kind == "overlap" for place in marked):
         keys.append(
             Line2D([], [], color=_OVERLAP, marker="D", linewidth=0.0, markersize=8.0, label="overlap")
         )
-    if any(one.joint.width < 0.0 for one in shown):
+    if any(drawn.joint.width < 0.0 for drawn in shown):
         keys.append(Line2D([], [], color=_NEGATIVE, linewidth=3.0, label="the faces overlapped as surveyed"))
     lines = [
         textwrap.shorten(f"{number}: {place.text}", _WIDE, placeholder=" …")

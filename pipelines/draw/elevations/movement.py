@@ -47,8 +47,8 @@ def draw_bed_movement(path: Path, courses: Sequence[CourseMovement]) -> None:
         for (measured, _), own in zip(lines, simulated, strict=True)
     ]
     # one bent course does not flatten the others, and their scatter does not look like movement
-    reach = [max(one, max(largest) / _FINER) for one in largest]
-    factors = [max(1.0, float(f"{_LARGEST * room / one:.1g}")) for one in reach]
+    reach = [max(extreme, max(largest) / _FINER) for extreme in largest]
+    factors = [max(1.0, float(f"{_LARGEST * room / extreme:.1g}")) for extreme in reach]
     figure = new_sheet((10.0, float(np.clip(2.0 + 0.42 * len(courses), 3.5, 24.0))))
     axes = figure.subplots()
     right = max(float(course.line.along.max()) for course in courses)

@@ -133,7 +133,7 @@ def draw_departure(
             if values
         ),
     )
-    odd = {one.code for wall in of_facade for one in wall.odd}
+    odd = {stone.code for wall in of_facade for stone in wall.odd}
     titles = {"plane": "departure from its plane", "plumb": "departure from plumb"}
     for axes, (name, values) in zip(panels, departures.items(), strict=True):
         _shade(axes, polygons, values, end, [polygons[i] for i in members if stones[i].code in odd])

@@ -69,7 +69,7 @@ def _draw_forces(
     number = job["number"]
     pressed = np.isfinite(surface.places[number]).all(axis=1)
     add_glass(pyvista, plotter, surface.points, surface.triangles)
-    rows = (one[number][pressed] for one in (surface.places, surface.forces, surface.in_kern))
+    rows = (values[number][pressed] for values in (surface.places, surface.forces, surface.in_kern))
     add_resultants(pyvista, plotter, surface.points, DrawnResultants(*rows))
     place_camera(pyvista, plotter, surface.points, np.array(job["towards"]), np.array(job["up"]))
     add_edges(pyvista, plotter, surface.points, surface.edges)

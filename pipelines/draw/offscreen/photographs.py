@@ -96,7 +96,7 @@ def _places(
 ) -> tuple[Array, Array]:
     """Return where each pixel of the photograph lies on the ideal one, from its middle, right and down [pixels]."""
     camera = Camera("camera", np.array(inner), size, pixel, forward=forward)
-    width, height = (one // reduced for one in size)
+    width, height = (side // reduced for side in size)
     x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
     ideal = corrected(camera, reduced * np.column_stack([x.ravel(), y.ravel()])) / (pixel * reduced)
     return ideal[:, 0].reshape(height, width), -ideal[:, 1].reshape(height, width)
@@ -114,7 +114,7 @@ def _sampled(pixels: NDArray[np.uint8], columns: Array, rows: Array) -> Array:
     """Sample a picture between the middles of its pixels."""
     columns, rows = columns - 0.5, rows - 0.5
     left, above = np.floor(columns).astype(int), np.floor(rows).astype(int)
-    across, down = ((one % 1.0).astype(np.float32)[..., None] for one in (columns, rows))
+    across, down = ((coordinate % 1.0).astype(np.float32)[..., None] for coordinate in (columns, rows))
     upper = (1.0 - across) * pixels[above, left] + across * pixels[above, left + 1]
     lower = (1.0 - across) * pixels[above + 1, left] + across * pixels[above + 1, left + 1]
     out: Array = (1.0 - down) * upper + down * lower
