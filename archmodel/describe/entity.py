@@ -20,7 +20,7 @@ from archmodel.tables.hierarchy import definition_of, kind_chain, kind_of
 from archmodel.tables.knowledge import Correction
 from archmodel.tables.registered import refuse_unknown_kinds
 from archmodel.tables.relations import INVERSE, Membership, Relation
-from archmodel.tables.runs import EntityResult, JointResult, Run
+from archmodel.tables.runs import EntityResult, JointResult, Run, StructureResult
 from archmodel.tables.structures import Structure
 from archmodel.tables.surveys import Measurement, Survey
 from ground.errors import UsageError
@@ -141,10 +141,25 @@ def _structure(session: Session, row: Structure) -> Values:
         "part_of": [owner.structure.code for owner in owners],
         "parts": sorted(session.scalars(parts)),
         "members": list(session.scalars(members)),
+        "runs": _results_of_structure(session, number),
         "knowledge": knowledge(session, "structure_id", number, owners),
         "recorded": entry_values(row.entry),
         "withdrawn": None if ended is None else entry_values(ended),
     }
+
+
+def _results_of_structure(session: Session, number: int) -> list[Values]:
+    """List the results of runs for a structure, latest first."""
+    statement = (
+        select(StructureResult)
+        .where(StructureResult.structure_id == number)
+        .options(joinedload(StructureResult.run))
+        .order_by(StructureResult.run_id.desc())
+    )
+    return [
+        {"run": row.run_id, "scene": row.run.scene, "outcome": row.run.outcome, **row.values}
+        for row in session.scalars(statement)
+    ]
 
 
 def _own(cls: type[Entity], row: Values) -> Values:

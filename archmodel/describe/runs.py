@@ -8,7 +8,8 @@ from sqlalchemy.orm import InstrumentedAttribute, Session, aliased, joinedload
 
 from archmodel.quantities import quantities_of
 from archmodel.tables.entities import Entity
-from archmodel.tables.runs import CellResult, EntityResult, JointResult, Run
+from archmodel.tables.runs import CellResult, EntityResult, JointResult, Run, StructureResult
+from archmodel.tables.structures import Structure, structure_kinds
 from archmodel.tables.surveys import Simplification
 from ground.errors import UsageError
 
@@ -113,6 +114,7 @@ def describe_run(session: Session, number: int, count: int = 5) -> dict[str, Any
         "largest_openings": _joints(session, number, JointResult.opening, 0.0, count),
         "least_centred": _joints(session, number, JointResult.kern, 1.0, count),
         "most_used_friction": _joints(session, number, JointResult.friction_use, 0.0, count),
+        "structures": _structures(session, number, count),
         "scene_text": run.scene_text,
     }
 
@@ -142,6 +144,7 @@ def compare_runs(session: Session, number: int, against: int, count: int = 10) -
         "only_against": _alone(session, against, number),
         "stresses": _changes(session, number, against, "von_mises_max", count),
         "displacements": _changes(session, number, against, "displacement_max", count),
+        "structures": _structure_changes(session, number, against, count),
     }
 
 
@@ -264,6 +267,51 @@ def _joints(
         .order_by(worst.desc(), JointResult.number)
     )
     return [dict(row) for row in session.execute(statement).mappings()]
+
+
+def _values_of_structures(session: Session, run: int) -> dict[str, dict[str, float]]:
+    """Return the results of the structures of a run by code, in the order of recording."""
+    statement = (
+        select(Structure.code, StructureResult.values)
+        .join(StructureResult.structure)
+        .where(StructureResult.run_id == run)
+        .order_by(Structure.id)
+    )
+    return {code: dict(values) for code, values in session.execute(statement)}
+
+
+def _structures(session: Session, run: int, count: int) -> list[dict[str, object]]:
+    """List for each result of structures those with the largest values."""
+    results, rows = _values_of_structures(session, run), list[dict[str, object]]()
+    for name, quantity in quantities_of(*structure_kinds()).items():
+        known = {code: values[name] for code, values in results.items() if name in values}
+        rows += [
+            {"structure": code, "result": name, "value": known[code], "unit": quantity.unit}
+            for code in sorted(known, key=lambda code, known=known: -known[code])[:count]
+        ]
+    return rows
+
+
+def _structure_changes(session: Session, run: int, other: int, count: int) -> list[dict[str, object]]:
+    """List for each result of structures those that changed most, largest change first."""
+    now, then = _values_of_structures(session, run), _values_of_structures(session, other)
+    rows: list[dict[str, object]] = []
+    for name, quantity in quantities_of(*structure_kinds()).items():
+        both = [code for code in now if name in now[code] and name in then.get(code, {})]
+        changes = {code: now[code][name] - then[code][name] for code in both}
+        rows += [
+            {
+                "structure": code,
+                "result": name,
+                "run": now[code][name],
+                "against": then[code][name],
+                "change": changes[code],
+                "unit": quantity.unit,
+            }
+            for code in sorted(changes, key=lambda code, changes=changes: -abs(changes[code]))[:count]
+            if changes[code]
+        ]
+    return rows
 
 
 def _flat(settings: Mapping[str, Any], prefix: str = "") -> dict[str, object]:

@@ -40,7 +40,7 @@ READ = (1, SCHEMA_VERSION)
 SINCE: Mapping[int, Mapping[str, Mapping[str, Any]]] = {1: {"measurement": {"evidence": []}}}
 """Values that rows of older documents lack and must have, by version and table; what may be null is null."""
 
-ADDED: Mapping[int, frozenset[str]] = {1: frozenset({"canon", "opinion_rule", "term"})}
+ADDED: Mapping[int, frozenset[str]] = {1: frozenset({"canon", "opinion_rule", "structure_result", "term"})}
 """Tables that older documents do not have, by version."""
 
 UNITS = {

@@ -111,7 +111,7 @@ def find_rows(
     limit : most rows; None: all
     """
     if _is_of_structures(kind):
-        return _find_structures(session, kind, where, columns, limit)
+        return _find_structures(session, kind, where, run, columns, limit)
     names = list(ATTRIBUTES) if columns is None else columns
     rows = _select(session, kind, where, run, lambda scope: _columns(scope, names), limit)
     return [dict(zip(names, row, strict=True)) for row in rows]
@@ -185,11 +185,17 @@ def _is_of_structures(kind: str) -> bool:
 
 
 def _find_structures(
-    session: Session, kind: str, where: Sequence[str], columns: Sequence[str] | None, limit: int | None
+    session: Session,
+    kind: str,
+    where: Sequence[str],
+    run: int | None,
+    columns: Sequence[str] | None,
+    limit: int | None,
 ) -> list[dict[str, object]]:
     """Return attributes of the structures of a kind, as `find_rows` does."""
-    context = Context(session)
+    context = Context(session, run)
     scope = StructureScope(context, context.alias(Structure))
+    refuse_unknown_run(context)
     conditions = [condition_in(scope, parse(one)) for one in _listed(where)]
     refuse_unknown_kinds(session, Structure)
     names = list(STRUCTURE_ATTRIBUTES) if columns is None else columns

@@ -5,6 +5,7 @@ from typing import Any
 
 from sqlalchemy import ColumnElement, and_, case, func, select
 
+from archmodel.quantities import quantities_of
 from archmodel.query.attributes import CANON, Attribute
 from archmodel.query.inherited import held
 from archmodel.query.scope import StructureScope
@@ -13,7 +14,8 @@ from archmodel.tables.hierarchy import kinds_below
 from archmodel.tables.knowledge import Material, OfPhase, Phase, Statement
 from archmodel.tables.opinions import preference, rule_of
 from archmodel.tables.relations import Membership
-from archmodel.tables.structures import Structure
+from archmodel.tables.runs import StructureResult
+from archmodel.tables.structures import Structure, structure_kinds
 
 __all__ = ["STRUCTURE_ATTRIBUTES"]
 
@@ -111,6 +113,21 @@ def _opinion(about: str, column: str, named: type[Phase] | type[Material]) -> So
     return value
 
 
+def _result(name: str) -> Source:
+    """Return a source in a named number of the structure's result: in a run, or in the latest that has it."""
+
+    def value(scope: StructureScope, run: int | None) -> ColumnElement[float]:
+        rows, newest = scope.context.alias(StructureResult), scope.context.alias(StructureResult)
+        number = scope.context.run if run is None else run
+        latest = select(func.max(newest.c.run_id)).where(newest.c.structure_id == scope.structure.c.id)
+        wanted = latest.correlate(scope.structure).scalar_subquery() if number is None else number
+        of_run = (rows.c.structure_id == scope.structure.c.id, rows.c.run_id == wanted)
+        result = select(rows.c["values"][name].as_float()).where(*of_run)
+        return result.correlate(scope.structure).scalar_subquery()
+
+    return value
+
+
 def _attribute(
     name: str, unit: str | None, meaning: str, source: Any, words: tuple[str, ...] | None = None
 ) -> Attribute:
@@ -153,6 +170,10 @@ STRUCTURE_ATTRIBUTES: Mapping[str, Attribute] = {
             "rise", "m", "of an arch: from its springings up to the crown of its intrados", _shape("rise")
         ),
         CANON,
+        *(
+            Attribute(quantity.name, quantity.unit, quantity.meaning, _result(quantity.name), of_run=True)
+            for quantity in quantities_of(*structure_kinds()).values()
+        ),
     )
 }
 """Attributes of a structure, in lists of structures and within ``member_of(…)``."""

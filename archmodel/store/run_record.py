@@ -19,6 +19,7 @@ __all__ = [
     "RunRecord",
     "SimplificationRecord",
     "StoneResult",
+    "StructureValues",
     "without_rounding",
 ]
 
@@ -60,6 +61,25 @@ class StoneResult:
     displacement_max: float
     contact_force_max: float | None
     values: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class StructureValues:
+    """Results of a run for one structure.
+
+    Attributes
+    ----------
+    number : its primary key
+    code, kind : of the structure
+    members : codes of its stones
+    values : by name, as in `archmodel.quantities`
+    """
+
+    number: int
+    code: str
+    kind: str
+    members: frozenset[str]
+    values: Mapping[str, float]
 
 
 @dataclass(frozen=True)
@@ -142,6 +162,7 @@ class RunRecord:
     summary : the contents of summary.json
     versions : of the programs and libraries, by name; at least of "moma"
     results : one per stone of the scene
+    structures : those of courses, arches and other structures that have any
     settings : of time, solver and contacts as they were used, defaults filled in, in values that JSON can hold
     as_of : the last entry in the database when its stones were read; None if that is not known
     steps : how many were done
@@ -171,3 +192,4 @@ class RunRecord:
     simplifications: tuple[SimplificationRecord, ...] = ()
     mechanisms: Mapping[str, tuple[MovingStone, ...]] = field(default_factory=dict)
     cells: Mapping[str, Mapping[str, Array]] = field(default_factory=dict)
+    structures: tuple[StructureValues, ...] = ()

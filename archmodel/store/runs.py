@@ -32,6 +32,7 @@ from archmodel.tables.runs import (
     JointResult,
     MechanismStone,
     Run,
+    StructureResult,
 )
 from archmodel.tables.surveys import Simplification
 from ground.errors import DatabaseError
@@ -256,6 +257,7 @@ def store_run(session: Session, run: RunRecord) -> int:
         entities = _primary_keys(session, codes, place)
         numbers = dict(zip(codes, entities.tolist(), strict=True))
         insert_rows(session, EntityResult, _results(run, numbers, stored.id, place))
+        insert_rows(session, StructureResult, _structures(run, stored.id, place))
         insert_rows(session, Simplification, _simplifications(run, numbers, stored.id, place))
         if run.joints is not None:
             rows = table_rows(JointResult, run.joints, entities, stored.id, f"{place}, joints")
@@ -272,6 +274,13 @@ def _results(run: RunRecord, numbers: dict[str, int], stored: int, place: str) -
     for result in run.results:
         keys = {"run_id": stored, "entity_id": numbers[result.code]}
         yield keys | result_row(result, f"{place}, stone {result.code}")
+
+
+def _structures(run: RunRecord, stored: int, place: str) -> Iterator[dict[str, object]]:
+    for structure in run.structures:
+        where = f"{place}, {structure.code}"
+        values = {name: _finite(value, name, where) for name, value in structure.values.items()}
+        yield {"structure_id": structure.number, "run_id": stored, "values": values}
 
 
 def _simplifications(

@@ -9,6 +9,7 @@ from archmodel.quantities import quantities_of
 from archmodel.tables.base import JSON_TYPE, Base, attribute
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Entry
+from archmodel.tables.structures import Structure
 
 __all__ = [
     "FIDELITIES",
@@ -19,6 +20,7 @@ __all__ = [
     "JointResult",
     "MechanismStone",
     "Run",
+    "StructureResult",
 ]
 
 FIDELITIES = ("fixed", "rigid", "deformable")
@@ -101,6 +103,25 @@ class EntityResult(Base):
 
     entity: Mapped[Entity] = relationship()
     run: Mapped[Run] = relationship(back_populates="results")
+
+
+class StructureResult(Base):
+    """Results of one run for one structure: a course, an arch, a wall.
+
+    Attributes
+    ----------
+    values : by name, as in `archmodel.quantities`
+    """
+
+    __tablename__ = "structure_result"
+    __table_args__ = (Index("ix_structure_result_run_id", "run_id"),)
+
+    structure_id: Mapped[int] = mapped_column(ForeignKey("structure.id"), primary_key=True)
+    run_id: Mapped[int] = mapped_column(ForeignKey("run.id"), primary_key=True)
+    values: Mapped[dict[str, float]] = mapped_column(JSON_TYPE)
+
+    structure: Mapped[Structure] = relationship()
+    run: Mapped[Run] = relationship()
 
 
 class JointResult(Base):

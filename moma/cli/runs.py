@@ -46,6 +46,7 @@ _TABLES: dict[str, tuple[str, tuple[str, ...] | None]] = {
     "largest_openings": ("joints that have opened most", None),
     "least_centred": ("joints with the resultant farthest out of the kern", None),
     "most_used_friction": ("joints that use most of their friction", None),
+    "structures": ("largest results of courses and other structures", None),
 }
 """Tables of a run: heading, and columns; None: all."""
 
@@ -115,12 +116,15 @@ def _comparison(change: dict[str, Any]) -> str:
     names = {"stresses": ("largest changes of Von Mises stress", "Pa")}
     names["displacements"] = ("largest changes of displacement", "m")
     tables = {name: change.pop(name) for name in names}
+    structures = change.pop("structures")
     parts = [as_lines(change)]
     for name, rows in tables.items():
         heading, unit = names[name]
         if rows:
             columns = {"code": None, "run": unit, "against": unit, "change": unit}
             parts.append(f"{heading}\n{as_table(columns, rows)}")
+    if structures:
+        parts.append(f"largest changes of courses and other structures\n{_table(structures)}")
     return "\n\n".join(parts)
 
 

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from archmodel.database.session import open_database
+from archmodel.relations.zones_and_courses import course_code
+from archmodel.store.members import members_of_structures
 from archmodel.store.run_record import StoneResult
 from archmodel.tables.entries import latest_entry
 from mechanics.dynamics.progress import Listener, Progress, silent
@@ -25,6 +27,7 @@ from pipelines.reports.page.scenes import run_model
 from pipelines.reports.page.surveys import bed_lines
 from pipelines.results.folder import check_replaceable, replacing, source_of
 from pipelines.results.stone_values import stone_results
+from pipelines.results.structure_values import structure_results
 from pipelines.results.summary import as_json, summarise
 from pipelines.run.assemble import Assembly, assemble_stones
 from pipelines.run.inputs import run_inputs
@@ -112,7 +115,9 @@ def compare(
             groups = select_groups(scene, session, models)
             assembly = assemble_stones(scene, models, groups)
             inputs = run_inputs(scene, assembly, groups, session)
-            known = known_stones(session, [model.record.code for model in models])
+            codes = [model.record.code for model in models]
+            assembly = replace(assembly, structures=members_of_structures(session, codes))
+            known = known_stones(session, codes)
         built = build_model(assembly.scene, lambda done, total: progress(Progress("mesh", done, total)))
         problems = problems_of(scene, assembly, loose_blocks(*built))
         if not accept_unsound:
@@ -123,7 +128,11 @@ def compare(
         courses = compare_courses(measure_beds(stones, facades)[0], moved)
         plumb = compare_plumb(stones, facades, moved, battered)
         progress(Progress("write", 0, 1, "pictures"))
+        structures = structure_results(result, assembly.structures)
+        of_courses = {structure.code: structure.values for structure in structures}
         summary = _summary(result, assembly, courses, plumb, battered)
+        for course in summary["courses"]:
+            course["results"] = of_courses.get(course_code(course["zone"], course["course"]), {})
         summary["inputs"] = {title: list(lines) for title, lines in inputs.items()}
         values = _values(courses, plumb)
         results = tuple(_with_values(result, values.get(result.code, {})) for result in stone_results(result))
@@ -131,7 +140,7 @@ def compare(
             Lines(one.name, one.colour, [line - assembly.origin for line in one.lines])
             for one in bed_lines(courses, {facade.name: facade.frame.axes[2] for facade in facades})
         ]
-        model = run_model(result, results, assembly.towards, assembly.origin, known, lines)
+        model = run_model(result, results, assembly.towards, assembly.origin, known, lines, structures)
         with replacing(folder, INDEX) as fresh:
             _draw(fresh, facades, stones, courses)
             write_comparison(fresh / REPORT, summary, model)
@@ -139,7 +148,7 @@ def compare(
             summary["source"] = source_of([path], fresh)
             summary["files"] = sorted([INDEX, *(entry.name for entry in fresh.iterdir())])
             (fresh / INDEX).write_text(as_json(summary), encoding="utf-8")
-        kept = summarise(result, version=versions()["moma"], seconds=result.wall_time)
+        kept = summarise(result, version=versions()["moma"], seconds=result.wall_time, structures=structures)
         run = store_record(database, folder, run_record(result, results, scene, assembly, kept, as_of))
     progress(Progress("write", 1, 1))
     return SurveyComparison(folder, summary, run)

@@ -4,7 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pipelines.reports.html import input_rows, millimetres, picture, ratio, write_page
+from archmodel.quantities import quantities_of
+from pipelines.reports.html import in_words, input_rows, millimetres, picture, ratio, write_page
 from pipelines.reports.page.model import Model
 
 __all__ = ["unrested", "write_comparison", "write_diagnosis_page"]
@@ -69,7 +70,7 @@ def write_comparison(path: Path, summary: Mapping[str, Any], model: Model | None
         figures=_figures(path.parent),
         tables=[
             ("Walls", _WALLS, [_wall(wall) for wall in summary["walls"]]),
-            ("Courses", _COURSES, [_course(course) for course in summary["courses"]]),
+            ("Courses", (*_COURSES, *_results()), [_course(course) for course in summary["courses"]]),
         ],
         notes=(),
     )
@@ -147,7 +148,17 @@ def _course(course: Mapping[str, Any]) -> tuple[str, ...]:
             for key in ("measured", "simulated", "sigma")
         ),
         *(f"{1e3 * slope[key]:z.3g} mm/m" for key in ("measured", "simulated", "sigma")),
+        *(
+            in_words(course["results"][name], quantity.unit) if name in course["results"] else "–"
+            for name, quantity in quantities_of("course").items()
+        ),
     )
+
+
+def _results() -> list[str]:
+    """Return the headings of the simulated results of courses."""
+    labels = (quantity.label for quantity in quantities_of("course").values())
+    return [f"{label[:1].upper()}{label[1:]}" for label in labels]
 
 
 def _hypothesis(hypothesis: Mapping[str, Any]) -> list[tuple[str, ...]]:

@@ -7,12 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from archmodel.quantities import quantities_of
+from archmodel.quantities import Quantity, quantities_of
 from archmodel.store.run_record import StoneResult
+from archmodel.tables.structures import structure_kinds
 from mechanics.arrays import Array
 from mechanics.results.result import Result
 from pipelines.draw.plots import history_svg
 from pipelines.reports.html import (
+    in_words,
     input_rows,
     kilonewtons,
     kilopascals,
@@ -139,6 +141,7 @@ def write_report(
             _pulled(stones),
             _uncertain(stones),
             *_joints(result, summary),
+            *_structures(summary),
         ],
         history=history or history_svg(result.history),
         stages=[(stage, f"{seconds:.2f} s") for stage, seconds in summary["time"]["by_stage"].items()],
@@ -359,6 +362,27 @@ def _joints(result: Result, summary: Mapping[str, Any]) -> list[_Section]:
         _Section("Joints that slid most", head, _joint_rows(result, slid, least)),
         _Section("Joints that opened most", head, _joint_rows(result, opened, least)),
     ]
+
+
+def _structures(summary: Mapping[str, Any]) -> list[_Section]:
+    """List the results of structures, those with the largest values by the first of them, in a table for each kind."""
+    sections = []
+    for kind in dict.fromkeys(structure["kind"] for structure in summary["structures"]):
+        quantities = quantities_of(*structure_kinds(), kind)
+        of_kind = [structure for structure in summary["structures"] if structure["kind"] == kind]
+        shown = [name for name in quantities if any(name in structure for structure in of_kind)]
+        of_kind.sort(key=lambda structure: -structure.get(shown[0], -np.inf))
+        rows = [
+            (structure["code"], *(_value(structure.get(name), quantities[name], summary) for name in shown))
+            for structure in of_kind[:_MOST]
+        ]
+        head = (_capital(kind.replace("_", " ")), *(_capital(quantities[name].label) for name in shown))
+        sections.append(_Section(f"Results by {kind.replace('_', ' ')}", head, rows))
+    return sections
+
+
+def _value(value: float | None, quantity: Quantity, summary: Mapping[str, Any]) -> str:
+    return "–" if value is None else in_words(value, quantity.unit, summary["tolerance"]["length"])
 
 
 def _joint_rows(result: Result, order: Array, least: float) -> list[tuple[str, ...]]:

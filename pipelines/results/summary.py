@@ -2,12 +2,13 @@
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
+from archmodel.store.run_record import StructureValues
 from mechanics.arrays import Bools, Ints
 from mechanics.model.model import laws_between
 from mechanics.results.contact_result import JointResult
@@ -25,7 +26,12 @@ _ROUNDING = 1e-13  # of the farthest coordinate [-]: the spacing of floating-poi
 
 
 def summarise(
-    result: Result, *, version: str, seconds: Mapping[str, float], profile: Mapping[str, Any] | None = None
+    result: Result,
+    *,
+    version: str,
+    seconds: Mapping[str, float],
+    profile: Mapping[str, Any] | None = None,
+    structures: Sequence[StructureValues] = (),
 ) -> dict[str, Any]:
     """Return the contents of summary.json, in SI units.
 
@@ -35,6 +41,7 @@ def summarise(
     version : of MOMA
     seconds : wall time by stage, of the simulation and of what went before and after it [s]
     profile : the report of the profile at which it ran
+    structures : results of courses, arches and other structures
 
     Numbers that are not finite become None, as JSON cannot express them.
     """
@@ -66,6 +73,9 @@ def summarise(
         "von_mises": None if stress is None else asdict(stress),
         "stress": _stress(result),
         "joints": _joints(result.joints),
+        "structures": [
+            {"code": structure.code, "kind": structure.kind, **structure.values} for structure in structures
+        ],
         "energies": asdict(result.energies),
         "displacement": {
             "max": largest["value"],

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from sqlalchemy.orm import Session
 
+from archmodel.store.members import StructureMembers
 from archmodel.store.stone_record import StoneRecord
 from mechanics.arrays import Array
 from mechanics.scene.scene import Block, Fidelity, LawRule, Part, Scene
@@ -64,6 +65,7 @@ class Assembly:
     origin : (3,) of the scene, in the frame of the site [m]
     remarks : keys and laws without effect, limits of the stresses, and stones whose warped faces were made plane
     inputs : what went into the run, lines of text by title, for its report
+    structures : courses, arches and other structures of the database, with those of its stones that are here
     stages : of building, for `mechanics.simulate_stages`; the loads are theirs, and `scene` has none. None: one scene
     """
 
@@ -77,6 +79,7 @@ class Assembly:
     remarks: tuple[str, ...] = ()
     inputs: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     stages: tuple[Stage, ...] = ()
+    structures: tuple[StructureMembers, ...] = ()
 
     @property
     def wall(self) -> WallAxes | None:

@@ -31,6 +31,7 @@ from mechanics.results.contact_result import ContactResult, JointResult
 from mechanics.results.result import Errors, Result
 from mechanics.scene.scene import Scene
 from pipelines.results.stone_values import joint_values
+from pipelines.results.structure_values import structure_results
 from pipelines.run.assemble import Assembly
 from pipelines.scene.file import SceneFile
 from survey.joints.report import ClosingReport, StoneJoint
@@ -78,6 +79,7 @@ def run_record(
         summary=summary,
         versions=versions(),
         results=stones,
+        structures=structure_results(result, assembly.structures),
         settings=settings_of(scene, assembly.scene),
         as_of=as_of,
         steps=result.steps,

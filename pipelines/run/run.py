@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from archmodel.database.session import open_database
+from archmodel.store.members import members_of_structures
 from archmodel.store.run_record import StoneResult
 from archmodel.tables.entries import latest_entry
 from ground.errors import MissingLibraryError, MomaError, UsageError, storing
@@ -36,6 +37,7 @@ from pipelines.results.notebook import notebook_html
 from pipelines.results.peaks import rocking_caution
 from pipelines.results.run_csv import write_joints, write_series
 from pipelines.results.stone_values import stone_results
+from pipelines.results.structure_values import structure_results
 from pipelines.results.summary import as_json, summarise
 from pipelines.results.vtk import write_frames, write_joint_grid
 from pipelines.results.vtkhdf import RESULTS, write_vtkhdf
@@ -148,6 +150,7 @@ def run_scene(
                     *unsupported_stages(scene, assembly),
                 ),
                 inputs=run_inputs(scene, assembly, groups, session),
+                structures=members_of_structures(session, [model.record.code for model in models]),
             )
             known = known_stones(session, [model.record.code for model in models])
         if meshes is not None:
@@ -272,12 +275,19 @@ def write_results(
                 warnings.append(f"no pictures: {error}")
     progress(Progress("write", 2, 3, "report.html"))
     reached = None if profile is None else asdict(profile)
-    summary = summarise(result, version=version("moma-masonry"), seconds=seconds, profile=reached)
+    structures = structure_results(result, assembly.structures)
+    summary = summarise(
+        result,
+        version=version("moma-masonry"),
+        seconds=seconds,
+        profile=reached,
+        structures=structures,
+    )
     summary["inputs"] = {title: list(lines) for title, lines in assembly.inputs.items()}
     summary["filling"] = asdict(filling(scene, assembly))
     summary["wall"] = wall_record(assembly.wall, result.bodies)
     summary["versions"] = dict(versions())
-    model = run_model(result, stones, assembly.towards, assembly.origin, known)
+    model = run_model(result, stones, assembly.towards, assembly.origin, known, structures=structures)
     write_report(folder / "report.html", result, summary, stones, warnings, history, model)
     (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
     summary["resumed"] = [] if unfinished is None else unfinished.resumed

@@ -47,7 +47,7 @@ _NEWER = (
 _OBJECTS = {"object_entity_id": "entity", "object_structure_id": "structure"}
 """References of stratigraphic relations, and what they are to."""
 
-_NEW = ("opinion_rule", "canon", "term")
+_NEW = ("opinion_rule", "canon", "term", "structure_result")
 
 _QUALITY = [f"mqi_{way}_{end}" for way in ("vertical", "in_plane", "out_of_plane") for end in ("low", "high")]
 
@@ -72,7 +72,8 @@ def _added() -> Mapping[str, tuple[Column[object], ...]]:
 def _tables() -> MetaData:
     """Return the new tables, beside those that they refer to."""
     layout = MetaData()
-    metadata.tables["entry"].to_metadata(layout)
+    for name in ("entry", "run", "structure"):
+        metadata.tables[name].to_metadata(layout)
     contents = {
         "opinion_rule": (
             ("ix_opinion_rule_about", "about"),
@@ -112,6 +113,14 @@ def _tables() -> MetaData:
                 postgresql_where=text("superseded_id IS NULL"),
             ),
         )
+    Table(
+        "structure_result",
+        layout,
+        Column("structure_id", Integer, ForeignKey("structure.id"), primary_key=True),
+        Column("run_id", Integer, ForeignKey("run.id"), primary_key=True),
+        Column("values", JSON, nullable=False),
+        Index("ix_structure_result_run_id", "run_id"),
+    )
     return layout
 
 
@@ -223,6 +232,7 @@ def losses(connection: Connection) -> Iterator[str]:
         ("rules of opinions", "SELECT COUNT(*) FROM opinion_rule"),
         ("canonical proportions", "SELECT COUNT(*) FROM canon"),
         ("terms", "SELECT COUNT(*) FROM term"),
+        ("results of structures", "SELECT COUNT(*) FROM structure_result"),
         (
             "opinions beside later ones",
             f"SELECT COUNT(*) FROM statement WHERE {_HELD} AND EXISTS ({_NEWER.format('1')})",

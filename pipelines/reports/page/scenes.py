@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from archmodel.quantities import quantities_of
-from archmodel.store.run_record import StoneResult
+from archmodel.store.run_record import StoneResult, StructureValues
+from archmodel.tables.structures import structure_kinds
 from mechanics.arrays import Array, Ints
 from mechanics.limit.assembly import RigidAssembly
 from mechanics.limit.joints import Resultants
@@ -56,6 +57,7 @@ def run_model(
     origin: Array,
     known: Known | None = None,
     lines: Sequence[Lines] = (),
+    structures: Sequence[StructureValues] = (),
 ) -> Model:
     """Return the model of a run: motion, joints at the end, results of the stones, and what is known of them.
 
@@ -65,6 +67,7 @@ def run_model(
     towards, origin : (3,) of the assembly
     known : from the database
     lines : further polylines, in the frame of the scene
+    structures : results of courses, arches and other structures, shown with their stones
     """
     bodies = result.bodies
     codes = [body.code for body in bodies]
@@ -85,7 +88,7 @@ def run_model(
         _in_time(frames, bodies),
     )
     stress = _stress_field(bodies, rows)
-    columns = _result_columns(stones)
+    columns = [*_result_columns(stones), *_structure_columns(codes, structures)]
     notes = []
     if len(frames) < len(result.frames):
         notes.append(
@@ -224,6 +227,25 @@ def _result_columns(stones: Sequence[StoneResult]) -> list[Column]:
         if np.isfinite(values).any():
             found.append(Column(name, quantity.label, quantity.unit, values, "Results"))
     return found
+
+
+def _structure_columns(codes: Sequence[str], structures: Sequence[StructureValues]) -> list[Column]:
+    """Return the results of the structures of each stone; of several of a kind, the largest."""
+    values: dict[tuple[str, str], dict[str, float]] = {}
+    for structure in structures:
+        for name, value in structure.values.items():
+            stones = values.setdefault((structure.kind, name), {})
+            stones |= {code: max(value, stones.get(code, value)) for code in structure.members}
+    return [
+        Column(
+            f"{kind}_{name}",
+            f"{quantities_of(*structure_kinds(), kind)[name].label} of its {kind.replace('_', ' ')}",
+            quantities_of(*structure_kinds(), kind)[name].unit,
+            np.array([stones.get(code, np.nan) for code in codes]),
+            "Results",
+        )
+        for (kind, name), stones in values.items()
+    ]
 
 
 def _joints(joints: JointResult, centres: Array, shift: Array, turn: Array) -> Joints:
