@@ -167,6 +167,12 @@ QUANTITIES: tuple[Quantity, ...] = (
         """,
     ),
     *_of(
+        "course",
+        """
+        crack_width | m | of a course: largest opening of a joint of its stones at the end
+        """,
+    ),
+    *_of(
         "peak",
         """
         displacement | m | of the points of a stone that is not fixed | Displacement

@@ -43,6 +43,12 @@ def computed(function: Callable[[Share], float]) -> Callable[[Share], float]:
     return function
 
 
+@computed
+def crack_width(share: Share) -> float:
+    """Return the largest opening of the joints [m]."""
+    return float(share.result.joints.opening[share.joints].max(initial=-np.inf))
+
+
 def structure_results(result: Result, structures: Sequence[StructureMembers]) -> tuple[StructureValues, ...]:
     """Return the results of those structures that have any, by what the catalogue has for their kinds."""
     numbers = {body.code: number for number, body in enumerate(result.bodies)}
