@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from archmodel.database.session import open_database
+from archmodel.relations.members import members_of_structures
 from archmodel.relations.zones_and_courses import course_code
-from archmodel.store.members import members_of_structures
 from archmodel.store.run_record import StoneResult
 from archmodel.tables.entries import latest_entry
 from mechanics.dynamics.progress import Listener, Progress, silent

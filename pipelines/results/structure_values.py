@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from archmodel.quantities import quantities_of
-from archmodel.store.members import StructureMembers
+from archmodel.relations.members import StructureMembers
 from archmodel.store.run_record import StructureValues
 from mechanics.arrays import Ints
 from mechanics.results.result import Result

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from sqlalchemy.orm import Session
 
-from archmodel.store.members import StructureMembers
+from archmodel.relations.members import StructureMembers
 from archmodel.store.stone_record import StoneRecord
 from mechanics.arrays import Array
 from mechanics.scene.scene import Block, Fidelity, LawRule, Part, Scene

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from archmodel.database.session import open_database
-from archmodel.store.members import members_of_structures
+from archmodel.relations.members import members_of_structures
 from archmodel.store.run_record import StoneResult
 from archmodel.tables.entries import latest_entry
 from ground.errors import MissingLibraryError, MomaError, UsageError, storing

@@ -8,7 +8,7 @@ from archmodel.database.session import Database
 from archmodel.describe.entity import describe
 from archmodel.describe.runs import compare_runs, describe_run
 from archmodel.query.api import find, find_rows
-from archmodel.store.members import members_of_structures
+from archmodel.relations.members import members_of_structures
 from archmodel.store.run_record import StructureValues
 from archmodel.store.runs import store_run
 from archmodel.tables.entities import Entity

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from archmodel.quantities import QUANTITIES, quantities_of
-from archmodel.store.members import StructureMembers
+from archmodel.relations.members import StructureMembers
 from archmodel.tables.structures import structure_kinds
 from pipelines.reports.page.scenes import run_model
 from pipelines.reports.run import write_report
