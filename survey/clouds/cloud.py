@@ -82,8 +82,8 @@ def open_cloud(
     head = options.head_for(options.outlines)
     stations = head.stations or tuple(station for cloud in clouds for station in cloud.stations)
     placed = place_outlines(drawing.outlines, options.wall, stations)
-    if options.wall is None and not head.stations and stations:
-        _check_sides(placed, options.outlines)
+    if options.wall is None and stations:
+        _check_sides(placed, stations, bool(head.stations), options.outlines)
     sigmas = np.array([_outline_sigma(one, drawing, options) for one in placed])
     margins = _margins(placed, sigmas, options.margin)
     collected = collect_points(clouds, placed, margins, options.slab, progress)
@@ -97,17 +97,30 @@ def open_cloud(
     return SurveyStream(head, iter(stones), review=tuple(review))
 
 
-def _check_sides(placed: Sequence[PlacedOutline], path: Path) -> None:
-    """Refuse stations of a scan that see most outlines from behind: these run counter-clockwise from outside."""
+def _check_sides(
+    placed: Sequence[PlacedOutline], stations: Sequence[Station], stated: bool, path: Path
+) -> None:
+    """Refuse stations that see most outlines from behind: these run counter-clockwise from outside.
+
+    An `observer` is the word of a person on where outside is, and counts more than the order of corners.
+    """
+    facing = [facing_station(outline.origin, stations) for outline in placed]
     behind = sum(
-        float(outline.axes[2] @ area_vector(outline.corners - outline.origin)) < 0.0 for outline in placed
+        float(outline.axes[2] @ area_vector(outline.corners - outline.origin)) < 0.0
+        for outline, station in zip(placed, facing, strict=True)
+        if station is not None and station.name != OBSERVER
     )
-    if 2 * behind > len(placed):
-        raise SurveyError(
-            f"{behind} of {len(placed)} outlines run clockwise seen from where the scanner is said to have stood",
-            where=str(path),
-            remedy="give true stations in a file: --header; or draw outlines counter-clockwise as seen from outside",
-        )
+    if 2 * behind <= len(placed):
+        return
+    place = "its station in the header file" if stated else "where the scanner is said to have stood"
+    remedy = (
+        "correct the station; if it is right, write observer X Y Z instead, and faces look there in any order"
+        if stated
+        else "give true stations in a file: --header; or draw outlines counter-clockwise as seen from outside"
+    )
+    raise SurveyError(
+        f"{behind} of {len(placed)} outlines run clockwise seen from {place}", where=str(path), remedy=remedy
+    )
 
 
 def _outline_sigma(outline: PlacedOutline, drawing: Drawing, options: CloudOptions) -> float:
@@ -134,8 +147,21 @@ def _apart(
 
 
 def viewed(head: SurveyHead, wall: Wall, middle: Array) -> SurveyHead:
-    """Return a head whose observer stands before a wall, unless it has stations already."""
-    if head.stations:
+    """Return a head whose observer stands before a wall, unless it has stations already.
+
+    Raises
+    ------
+    SurveyError
+        if a wall is seen from behind by the station that is nearest to it
+    """
+    if (station := facing_station(middle, head.stations)) is not None:
+        if float(wall.axes[2] @ (station.position - middle)) <= 0.0:
+            raise SurveyError(
+                f"station {station.name} of the header file stands behind the wall, which would be seen from behind",
+                where=f"{head.path}",
+                remedy="correct the station, or leave it out: a frame of a wall says where outside is; if the station "
+                "is right, exchange left and right of the frame",
+            )
         return head
     return replace(head, stations=(Station(OBSERVER, middle + _AWAY * wall.axes[2]),))
 

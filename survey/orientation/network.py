@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from survey.arrays import Array
 
-__all__ = ["INTERIOR", "Camera", "Control", "Network", "Photo", "listed"]
+__all__ = ["INTERIOR", "Camera", "Control", "Network", "Photo", "PlumbLine", "ScaleBar", "listed"]
 
 INTERIOR = ("c", "xp", "yp", "as", "sk", "K1", "K2", "K3", "P1", "P2")
 """Parameters of the interior orientation, in the order of the kernels."""
@@ -103,6 +103,39 @@ class Control:
 
 
 @dataclass(frozen=True)
+class ScaleBar:
+    """A measured distance between two points.
+
+    Attributes
+    ----------
+    points : indices of the two points in the network
+    length, sigma : measured, and its standard deviation [m]
+    where : ``file:line``
+    """
+
+    points: tuple[int, int]
+    length: float
+    sigma: float
+    where: str = ""
+
+
+@dataclass(frozen=True)
+class PlumbLine:
+    """Points that lie above each other.
+
+    Attributes
+    ----------
+    points : indices in the network, from the lowest to the highest
+    sigma : standard deviation of the level distance of a point from the plumb line of the lowest, in x and in y [m]
+    where : ``file:line``
+    """
+
+    points: tuple[int, ...]
+    sigma: float
+    where: str = ""
+
+
+@dataclass(frozen=True)
 class Network:
     """Everything that a bundle adjustment starts from.
 
@@ -118,6 +151,8 @@ class Network:
     sigma : (n, 2) standard deviation of these [px]
     lines : (n,) line of the file
     remarks : what the reader changed or left out, in words
+    bars, plumb_lines : measured distances, and points above each other
+    start_datum : the user has said that scale and vertical of the start values are right
     """
 
     path: str
@@ -133,6 +168,9 @@ class Network:
     lines: NDArray[np.int64]
     remarks: tuple[str, ...] = ()
     frame: Mapping[str, object] = field(default_factory=dict)
+    bars: tuple[ScaleBar, ...] = ()
+    plumb_lines: tuple[PlumbLine, ...] = ()
+    start_datum: bool = False
 
     def where(self, ray: int) -> str:
         """Return ``file:line`` of a marked point."""

@@ -1,6 +1,7 @@
 """Oriented photographs, as `moma orient` leaves them behind for the stones that are measured on them."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,8 @@ class Oriented:
         without error
     covariance : (nr, nr) of all of them together, with σ₀² in it [rad, m, camera unit]
     mark_sigma : standard deviation of a coordinate marked on them, as the adjustment found it [px]
+    unknown : of "scale" and "vertical", what nothing tells
+    left_out : photographs that were left out, with the reason
     """
 
     path: str
@@ -33,6 +36,8 @@ class Oriented:
     table: NDArray[np.int64]
     covariance: Array
     mark_sigma: float
+    unknown: tuple[str, ...] = ()
+    left_out: Mapping[str, str] = field(default_factory=dict)
 
     def index(self, name: str, where: str) -> int:
         """Return the index of a photograph.

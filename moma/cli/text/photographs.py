@@ -1,6 +1,7 @@
 """Report of `moma orient` as text."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 from moma.cli.text.formats import shorten
 
@@ -19,7 +20,7 @@ def orient_lines(report: "OrientReport", verbose: bool) -> list[str]:
         f"{len(marks['x'])} marks",
         f"  {values['observations']} observations, {values['unknowns']} unknowns, redundancy {values['redundancy']}"
         + ("" if values["sigma0"] is None else f", σ₀ {values['sigma0']:.6g}"),
-        f"  datum: {_datum(str(values['datum']))}",
+        f"  datum: {_datum(values)}",
     ]
     for camera in values["cameras"]:
         estimated = [
@@ -45,6 +46,12 @@ def orient_lines(report: "OrientReport", verbose: bool) -> list[str]:
             lines.append(
                 f"  {len(ones)} {what} points; farthest off is {worst['id']}, by {worst['test']:.1f} σ"
             )
+    if values["lengths"]:
+        worst = max(values["lengths"], key=lambda line: line["test"])
+        lines.append(
+            f"  {len(values['lengths'])} observations of scale bars and plumb lines; farthest off is {worst['kind']} "
+            f"{'–'.join(worst['points'])}, by {1e3 * worst['residual']:z.2f} mm, {worst['test']:.1f} σ"
+        )
     suspected = sorted(
         (k for k, verdict in enumerate(marks["verdict"]) if verdict), key=lambda k: -(marks["test"][k] or 0.0)
     )
@@ -60,8 +67,16 @@ def orient_lines(report: "OrientReport", verbose: bool) -> list[str]:
     return lines
 
 
-def _datum(name: str) -> str:
+def _datum(values: Mapping[str, Any]) -> str:
     """Describe what place, orientation and scale come from."""
-    if name == "control":
+    if values["datum"] == "control":
         return "control points, or observed stations and angles"
-    return f"{name}: without control, scale and vertical are those of the start values, and nothing tells their error"
+    sources = [f"{name} by {values[name]}" for name in ("scale", "vertical") if values[name]]
+    unknown = [name for name in ("scale", "vertical") if not values[name]]
+    text = f"{values['datum']}{'; ' if sources else ''}{', '.join(sources)}"
+    if not unknown:
+        return text
+    return (
+        f"{text}: without control, {' and '.join(unknown)} are those of the start values, and nothing tells their "
+        "error; moma ingest asks for them"
+    )

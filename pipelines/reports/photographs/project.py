@@ -17,15 +17,17 @@ from survey.orientation.formats.dbat import read_dbat
 from survey.orientation.formats.marks import network_of, read_marks
 from survey.orientation.formats.metashape import read_metashape
 from survey.orientation.formats.photomodeler import read_photomodeler
-from survey.orientation.network import INTERIOR, Camera, Network, Photo
+from survey.orientation.network import INTERIOR, Camera, Network, Photo, PlumbLine, ScaleBar
 from survey.orientation.rotations import from_angles
 
 __all__ = [
     "CAMERA_KEYS",
     "WRITTEN",
     "PhotoTable",
+    "PlumbLineTable",
     "Project",
     "ProjectTable",
+    "ScaleBarTable",
     "calibrated",
     "exported_control",
     "read_project",
@@ -71,6 +73,13 @@ class ProjectTable:
     sigma: Annotated[
         float, Setting("Standard deviation of marks without one of their own.", "px", above=0)
     ] = 1.0
+    datum: Annotated[
+        str | None,
+        Setting(
+            "`start`: scale and vertical of the start values are right, as of a model that was placed before.",
+            choices=("start",),
+        ),
+    ] = None
     blunders: Annotated[
         str,
         Setting(
@@ -155,6 +164,26 @@ class PhotoTable:
     fixed: Annotated[bool, Setting("Station and angles are not estimated.")] = False
 
 
+@dataclass(frozen=True, kw_only=True)
+class ScaleBarTable:
+    """Table [[scale_bars]]."""
+
+    points: Annotated[Texts, Setting("Its two ends, as in the marks.")]
+    length: Annotated[float, Setting("Measured distance between them.", "m", above=0)]
+    sigma: Annotated[float, Setting("Standard deviation of the length.", "m", above=0)] = 5e-4
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlumbLineTable:
+    """Table [[plumb_lines]]."""
+
+    points: Annotated[Texts, Setting("Points above each other, the lowest first, as in the marks.")]
+    sigma: Annotated[
+        float,
+        Setting("Standard deviation of their level distance from a plumb line, in x and in y.", "m", above=0),
+    ] = 2e-3
+
+
 @dataclass(frozen=True)
 class Project:
     """A project that was read.
@@ -189,7 +218,8 @@ def read_project(path: Path) -> Project:
     tables = parse_toml(text, str(path), SceneError, "see docs/howto/photographs.md")
     document = TomlDocument(str(path), key_lines(text))
     cameras, photos = tables_of(document, tables, "cameras"), tables_of(document, tables, "photos")
-    plain = {name: value for name, value in tables.items() if name not in ("cameras", "photos")}
+    bars, plumb_lines = (tables_of(document, tables, name) for name in ("scale_bars", "plumb_lines"))
+    plain = {name: value for name, value in tables.items() if name not in _TABLES}
     values = read_table(document, (), plain, ProjectTable, "the project")
     network = _network(document, values, cameras, photos, path.parent)
     if (control := values.control) is not None:
@@ -200,12 +230,49 @@ def read_project(path: Path) -> Project:
     elif values.check or values.fixed_control:
         key = "check" if values.check else "fixed_control"
         document.fail(f"{key} without control points", key, remedy="give control = FILE")
+    network = replace(
+        _with_lengths(document, network, bars, plumb_lines), start_datum=values.datum == "start"
+    )
     network = calibrated(network, values.calibrate, document.where("calibrate"))
     for name in values.write:
         if name not in WRITTEN:
             document.fail(f"no format {name!r}", "write", remedy=nearest(name, WRITTEN))
     pictures = {} if values.pictures is None else _pictures(document, path.parent / values.pictures, network)
     return Project(values.name or path.stem, network, values.blunders, values.write, pictures)
+
+
+_TABLES = ("cameras", "photos", "scale_bars", "plumb_lines")
+
+
+def _with_lengths(
+    document: TomlDocument,
+    network: Network,
+    bars: list[Mapping[str, Any]],
+    plumb_lines: list[Mapping[str, Any]],
+) -> Network:
+    """Give a network its scale bars and plumb lines."""
+    index = {name: k for k, name in enumerate(network.names)}
+
+    def points(names: Texts, *path: str) -> tuple[int, ...]:
+        for name in names:
+            if name not in index:
+                document.fail(f"no point {name!r} is marked", *path, remedy=nearest(name, tuple(index)))
+        if len(set(names)) < len(names) or len(names) < 2 or (path[0] == "scale_bars" and len(names) > 2):
+            count = "two different points" if path[0] == "scale_bars" else "two or more different points"
+            document.fail(f"points are not {count}", *path, remedy='e.g. points = ["T01", "T02"]')
+        return tuple(index[name] for name in names)
+
+    made_bars, made_lines = list[ScaleBar](), list[PlumbLine]()
+    for k, given in enumerate(bars):
+        path = ("scale_bars", str(k))
+        bar = read_table(document, path, given, ScaleBarTable, "[[scale_bars]]")
+        first, second = points(bar.points, *path)
+        made_bars.append(ScaleBar((first, second), bar.length, bar.sigma, document.where(*path)))
+    for k, given in enumerate(plumb_lines):
+        path = ("plumb_lines", str(k))
+        line = read_table(document, path, given, PlumbLineTable, "[[plumb_lines]]")
+        made_lines.append(PlumbLine(points(line.points, *path), line.sigma, document.where(*path)))
+    return replace(network, bars=tuple(made_bars), plumb_lines=tuple(made_lines))
 
 
 def exported_control(network: Network, fixed: bool) -> Network:

@@ -21,12 +21,15 @@ __all__ = [
     "Solution",
     "adjust",
     "cholesky",
+    "corrected_unknowns",
+    "gauss_newton_step",
     "inner_constraints",
     "normals",
     "prepare",
     "prior",
     "similarity",
     "with_datum",
+    "without_datum",
 ]
 
 _MAX_ITERATIONS = 100  # iterations
@@ -193,7 +196,7 @@ def adjust(network: Network, prepared: Prepared) -> Solution:
     while taken < _MAX_ITERATIONS:
         step = _step(normal, right, prepared, unknowns, damping)
         if step is not None:
-            tried = _moved(unknowns, *_corrections(prepared, unknowns, damping, step))
+            tried = corrected_unknowns(unknowns, *_corrections(prepared, unknowns, damping, step))
             taken += 1
             if damping == 0.0 and abs(float(step @ right)) <= _STILL * max(square, 1e-12):
                 return Solution(tried, square, taken, behind)
@@ -323,6 +326,48 @@ def with_datum(normal: Array, prepared: Prepared, unknowns: Unknowns) -> Array:
     return bordered
 
 
+def gauss_newton_step(
+    network: Network, prepared: Prepared, unknowns: Unknowns
+) -> tuple[Array, Array, Array, float, int]:
+    """Return one undamped step, and the covariance that it comes with.
+
+    Returns
+    -------
+    (nr, nr) covariance of what is estimated at the cameras' side for σ₀ = 1, without movements that inner constraints
+    hold; corrections (nr,) and (np, 3); sum of squares; rays from behind
+
+    Raises
+    ------
+    GeometryError
+        if the observations do not determine the unknowns
+    """
+    normal, right, square, behind = normals(network, prepared, unknowns, 0.0)
+    regular = with_datum(normal, prepared, unknowns)
+    full = np.tril(regular) + np.tril(regular, -1).T
+    scale = 1.0 / np.sqrt(np.diag(full))
+    try:
+        covariance = np.linalg.inv(full * scale[:, None] * scale) * scale[:, None] * scale
+    except np.linalg.LinAlgError as error:
+        raise GeometryError(
+            "the marks do not determine the orientation",
+            where=network.path,
+            remedy="mark more points that are spread over the photographs",
+        ) from error
+    covariance = without_datum(covariance, prepared, unknowns)
+    step = covariance @ right
+    step, moved = _corrections(prepared, unknowns, 0.0, step)
+    return covariance, step, moved, square, behind
+
+
+def without_datum(covariance: Array, prepared: Prepared, unknowns: Unknowns) -> Array:
+    """Take out of a covariance the weight that the datum added along the free movements, which is no variance."""
+    if not prepared.datum or not len(covariance):
+        return covariance
+    free = np.linalg.qr(inner_constraints(prepared, unknowns))[0]
+    out: Array = covariance - free @ (free.T @ covariance @ free) @ free.T
+    return out
+
+
 def _step(
     normal: Array, right: Array, prepared: Prepared, unknowns: Unknowns, damping: float
 ) -> Array | None:
@@ -367,7 +412,7 @@ def _corrections(prepared: Prepared, unknowns: Unknowns, damping: float, step: A
     return step, moved
 
 
-def _moved(unknowns: Unknowns, step: Array, moved: Array) -> Unknowns:
+def corrected_unknowns(unknowns: Unknowns, step: Array, moved: Array) -> Unknowns:
     """Apply corrections."""
     padded = np.append(step, 0.0)  # fixed parameters have the column -1, and no correction
     exterior = padded[unknowns.column[:, :6]]

@@ -1,8 +1,8 @@
 """Photographs, from marks to a checked orientation: soundness, start values, adjustment, blunders, statistics."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -12,8 +12,22 @@ from threadpoolctl import ThreadpoolController
 from ground.errors import GeometryError, MomaError, SurveyError
 from survey.arrays import Array
 from survey.orientation.bundle.adjustment import Prepared, Solution, adjust, prepare
+from survey.orientation.bundle.agreement import (
+    AGREE,
+    ENOUGH,
+    POOR,
+    adjusted_alone,
+    contradicted_control,
+    exchanged_control,
+    fitted_places,
+    median_misfit,
+    sigma0_of,
+    useful_marks,
+    with_marks,
+)
 from survey.orientation.bundle.control import FAR_OFF, MISSES, control_remarks, control_tests
-from survey.orientation.bundle.resection import similarity_between
+from survey.orientation.bundle.gross_errors import healed
+from survey.orientation.bundle.lengths import with_lengths
 from survey.orientation.bundle.soundness import check_network
 from survey.orientation.bundle.start import aligned, check_mirrored, start_values, swapped, without_start
 from survey.orientation.bundle.statistics import CRITICAL, Statistics, statistics
@@ -25,15 +39,12 @@ __all__ = ["Blunders", "Orientation", "orient"]
 Blunders = Literal["report", "remove"]
 """Treatment of marks that the test finds wrong."""
 
-_POOR = 3e-3  # median residual over the longer side of a photograph, beyond which an orientation is none
 _GOOD = 5e-4  # the same, below which no other start is tried
 _SEARCHES = 60  # rounds of data snooping
-_ENOUGH = 4  # control points that must be left where one is left out
 _LARGE = 3.0  # σ₀ from which the model is doubted rather than the marks
 _MANY = 0.1  # part of the marks left out, from which it is
-_AGREE = 3.0  # σ₀ up to which photographs agree with each other without control points
+_MOST = 0.5  # part of the marks of one photograph left out, from which it is doubted as a whole
 _STATIONS = 5  # observed stations of which one that is off can be told
-_TRIPLES = 200  # random triples of stations tried
 _NORMAL = 0.6745  # median of the absolute value of a standard normal variable
 _SMALL = 1500  # parameters of the cameras below which one thread of BLAS is faster than several
 
@@ -49,6 +60,7 @@ class Orientation:
     removed : marks left out as blunders, each with its standardised residual before
     suspected : marks whose standardised residual exceeds the limit, those left out among them
     remarks : what was changed or left out, in words
+    left_out : photographs that were left out, with the reason
     """
 
     network: Network
@@ -58,6 +70,7 @@ class Orientation:
     removed: dict[int, float]
     suspected: tuple[int, ...]
     remarks: tuple[str, ...]
+    left_out: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def scale(self) -> float:
@@ -71,7 +84,7 @@ class Orientation:
         used = np.asarray(np.isfinite(self.statistics.residuals).all(axis=1))
         pairs = zip(network.photos, values.rotation, values.station, strict=True)
         return replace(
-            _only(network, used),
+            with_marks(network, used),
             cameras=tuple(
                 replace(camera, inner=inner)
                 for camera, inner in zip(network.cameras, values.inner, strict=True)
@@ -102,22 +115,71 @@ def orient(network: Network, blunders: Blunders = "report") -> Orientation:
         if the marks do not determine the orientation
     """
     check_network(network)
-    used, remarks = _useful(network)
-    photos = network.photos
     with _few_threads(network):
-        network, prepared, solution = _oriented(network, used)
+        failure: MomaError | None = None
+        result: Orientation | None = None
         try:
-            result = statistics(network, prepared, solution)
-        except GeometryError:
-            if _sigma0(prepared, solution) > _AGREE:
-                _check_control_alone(network)
-            raise
-        _check_control(network, solution, result, blunders)
-        removed, control = dict[int, float](), network.control
-        if blunders == "remove":
-            network, used, prepared, solution, result = _snooped(
-                network, used, prepared, solution, result, removed
-            )
+            result = _checked(network, blunders)
+        except MomaError as error:
+            failure = error
+        if result is not None and (blunders == "report" or not _doubted(result)):
+            return result
+        if blunders == "report" and not isinstance(failure, GeometryError):
+            assert failure is not None
+            raise failure
+        without = healed(network, None if result is None else _removed_parts(result))
+        if without is None:
+            if result is None:
+                assert failure is not None
+                raise failure
+            return result
+        if blunders == "report":
+            raise SurveyError(
+                "; ".join(without.remarks).replace(" left out, which", ":"),
+                where=network.path,
+                remedy='correct it, or let it be left out: blunders = "remove"',
+            ) from failure
+        again = _checked(without.network, blunders)
+    return replace(again, remarks=(*without.remarks, *again.remarks), left_out=without.photos)
+
+
+def _doubted(result: Orientation) -> bool:
+    """Return whether the marks fit badly, or so many were left out that something else is wrong."""
+    return _misfits(result) or bool((_removed_parts(result) > _MOST).any())
+
+
+def _misfits(result: Orientation) -> bool:
+    statistics_found = result.statistics
+    return (statistics_found.redundancy > 0 and statistics_found.sigma0 > _LARGE) or len(
+        result.removed
+    ) > _MANY * len(result.network.photo)
+
+
+def _removed_parts(result: Orientation) -> Array:
+    """Return the part of the marks of each photograph that was left out, (nf,)."""
+    network = result.network
+    count = len(network.photos)
+    removed = np.bincount(network.photo[list(result.removed)].astype(np.int64), minlength=count)
+    return np.asarray(removed / np.maximum(np.bincount(network.photo, minlength=count), 1))
+
+
+def _checked(network: Network, blunders: Blunders) -> Orientation:
+    """Orient the photographs of a network that is sound, and leave out single blunders."""
+    used, remarks = useful_marks(network)
+    photos = network.photos
+    network, prepared, solution = _oriented(network, used)
+    try:
+        result = statistics(network, prepared, solution)
+    except GeometryError:
+        if sigma0_of(prepared, solution) > AGREE:
+            _check_control_alone(network)
+        raise
+    _check_control(network, solution, result, blunders)
+    removed, control = dict[int, float](), network.control
+    if blunders == "remove":
+        network, used, prepared, solution, result = _snooped(
+            network, used, prepared, solution, result, removed
+        )
     remarks += _left_out(control, network, solution, result)
     remarks += _tested_control(network, solution, result)
     remarks += control_remarks(network, solution, photos)
@@ -154,7 +216,10 @@ def _left_out(
         if new.check and not old.check
         for off in [float(np.linalg.norm(new.place - solution.unknowns.point[new.point]))]
     ]
-    return [f"control points left out, which the others contradict: {listed(names)}"] if names else []
+    out = [new for old, new in zip(controls, network.control, strict=True) if new.check and not old.check]
+    places = {gcp.point: solution.unknowns.point[gcp.point] for gcp in out}
+    pair = exchanged_control(network, out, places)
+    return [f"control points left out, which the others contradict: {listed(names)}{pair}"] if names else []
 
 
 def _tested_control(network: Network, solution: Solution, result: Statistics) -> list[str]:
@@ -184,13 +249,13 @@ def _check_control(network: Network, solution: Solution, result: Statistics, blu
     """
     tests = control_tests(network, solution, result)
     scores = np.array([test for gcp, test in zip(network.control, tests, strict=True) if not gcp.check])
-    if not (scores > FAR_OFF).any() or (alone := _alone(network)) is None:
+    if not (scores > FAR_OFF).any() or (agreed := adjusted_alone(network)) is None:
         return
-    _check_hand(network, alone[0])
-    if np.median(scores) <= FAR_OFF or alone[1] >= _AGREE:
+    _check_hand(network, agreed[0])
+    if np.median(scores) <= FAR_OFF or agreed[1] >= AGREE:
         return
-    if blunders == "report" or not _minority(network, alone[0]):
-        raise _control_misfit(network, alone[0])
+    if blunders == "report" or not contradicted_control(network, agreed[0]):
+        raise _control_misfit(network, agreed[0])
 
 
 @contextmanager
@@ -201,25 +266,11 @@ def _few_threads(network: Network) -> Iterator[None]:
         yield
 
 
-def _useful(network: Network) -> tuple[NDArray[np.bool_], list[str]]:
-    """Return the marks that take part: those of points with two rays, or of control points."""
-    rays = np.bincount(network.point, minlength=len(network.names))
-    control = np.zeros(len(network.names), dtype=bool)
-    control[[gcp.point for gcp in network.control if not gcp.check]] = True
-    lone = (rays == 1) & ~control
-    remarks = []
-    if lone.any():
-        names = [network.names[i] for i in np.flatnonzero(lone)]
-        what = "1 point is" if len(names) == 1 else f"{len(names)} points are"
-        remarks.append(f"{what} marked on one photograph only and left out: {listed(names)}")
-    return ~lone[network.point], remarks
-
-
 def _oriented(network: Network, used: NDArray[np.bool_]) -> tuple[Network, Prepared, Solution]:
     """Adjust from the start values of the file, and from none if these lead nowhere."""
     rests: list[tuple[float, Network, Prepared, Solution]] = []
     failure: MomaError | None = None
-    chosen = aligned(_only(network, used))
+    chosen = aligned(with_marks(network, used))
     for with_start in (True, False):
         try:
             for start in start_values(chosen if with_start else without_start(chosen)):
@@ -232,13 +283,13 @@ def _oriented(network: Network, used: NDArray[np.bool_]) -> tuple[Network, Prepa
                     lines=network.lines,
                 )
                 prepared = prepare(candidate, keep=used)
-                solution = adjust(candidate, prepared)
-                rests.append((_misfit(candidate, prepared, solution), candidate, prepared, solution))
+                solution = with_lengths(candidate, prepared, adjust(candidate, prepared))
+                rests.append((median_misfit(candidate, prepared, solution), candidate, prepared, solution))
                 if rests[-1][0] < _GOOD:
                     break
         except MomaError as error:
             failure = error
-        if rests and min(misfit_of[0] for misfit_of in rests) < _POOR:
+        if rests and min(misfit_of[0] for misfit_of in rests) < POOR:
             break
     if not rests:
         assert failure is not None
@@ -247,32 +298,6 @@ def _oriented(network: Network, used: NDArray[np.bool_]) -> tuple[Network, Prepa
     misfit, candidate, prepared, solution = min(rests, key=lambda one: one[0])
     _check_contradictions(network, candidate, solution, misfit, failure)
     return candidate, prepared, solution
-
-
-def _only(network: Network, used: NDArray[np.bool_]) -> Network:
-    return replace(
-        network,
-        photo=network.photo[used],
-        point=network.point[used],
-        image=network.image[used],
-        sigma=network.sigma[used],
-        lines=network.lines[used],
-    )
-
-
-def _misfit(network: Network, prepared: Prepared, solution: Solution) -> float:
-    """Return the median residual over the longer side of the photographs; infinite if they look the other way."""
-    off = np.empty(len(prepared.order))
-    values = solution.unknowns
-    photo = network.photo[prepared.order]
-    for f, one in enumerate(network.photos):
-        mine = photo == f
-        camera = replace(network.cameras[one.camera], inner=values.inner[one.camera])
-        rows = prepared.order[mine]
-        seen = project(camera, values.rotation[f], values.station[f], values.point[network.point[rows]])
-        off[mine] = np.linalg.norm(seen - network.image[rows], axis=1) / max(camera.size)
-    off[~np.isfinite(off)] = np.inf
-    return float(np.median(off)) if len(off) else 0.0
 
 
 def _check_contradictions(
@@ -288,7 +313,7 @@ def _check_contradictions(
     if pair is not None:
         raise _swapped(network, *pair)
     _check_stations(network, solution)
-    if misfit < _POOR:
+    if misfit < POOR:
         return
     _check_control_alone(network)
     if failure is not None:
@@ -304,15 +329,15 @@ def _check_contradictions(
 def _check_control_alone(network: Network) -> None:
     """Refuse control points that do not fit photographs which agree with each other without them."""
     adjusted_points = [gcp for gcp in network.control if not gcp.check]
-    if not adjusted_points or (alone := _alone(network)) is None:
+    if not adjusted_points or (agreed := adjusted_alone(network)) is None:
         return
-    _check_hand(network, alone[0])
-    raise _control_misfit(network, alone[0])
+    _check_hand(network, agreed[0])
+    raise _control_misfit(network, agreed[0])
 
 
 def _control_misfit(network: Network, alone: Solution) -> SurveyError:
     """Return the error that names the few control points that are wrong, or tells that they do not fit as a whole."""
-    if wrong := _minority(network, alone):
+    if wrong := contradicted_control(network, alone):
         names = [f"{network.names[gcp.point]} ({off:.3g} m)" for gcp, off in wrong]
         return SurveyError(
             f"control points are far from where the others put them: {listed(names)}",
@@ -325,22 +350,6 @@ def _control_misfit(network: Network, alone: Solution) -> SurveyError:
         where=first.where or network.path,
         remedy="check the numbers, the order and the unit of their coordinates",
     )
-
-
-def _minority(network: Network, alone: Solution) -> list[tuple[Control, float]]:
-    """Return the control points that most others contradict, the worst first, and how far off they are [m]."""
-    gcps = [
-        gcp for gcp in network.control if not gcp.check and np.isfinite(alone.unknowns.point[gcp.point]).all()
-    ]
-    if len(gcps) <= _ENOUGH:
-        return []
-    there = np.array([gcp.place for gcp in gcps])
-    off = np.linalg.norm(_fitted(alone.unknowns.point[[gcp.point for gcp in gcps]], there) - there, axis=1)
-    sigma = np.sqrt([np.trace(gcp.covariance) / 3.0 for gcp in gcps])
-    wrong = off > FAR_OFF * np.maximum(np.median(off), sigma)
-    if len(gcps) - wrong.sum() < _ENOUGH:
-        return []
-    return [(gcps[k], float(off[k])) for k in np.argsort(-off) if wrong[k]]
 
 
 def _check_stations(network: Network, solution: Solution) -> None:
@@ -360,9 +369,9 @@ def _check_stations(network: Network, solution: Solution) -> None:
             replace(photo, observed_station=None, observed_rotation=None) for photo in network.photos
         ),
     )
-    if (alone := _alone(free)) is None:
+    if (agreed := adjusted_alone(free)) is None:
         return
-    here = _fitted(alone[0].unknowns.station[seen], there)
+    here = fitted_places(agreed[0].unknowns.station[seen], there)
     distances = np.linalg.norm(here - there, axis=1)
     apart = np.linalg.norm(here[:, None] - there[None], axis=2)
     worst = int(np.argmax(distances))
@@ -380,20 +389,6 @@ def _check_stations(network: Network, solution: Solution) -> None:
         )
 
 
-def _fitted(source: Array, target: Array) -> Array:
-    """Move places by the similarity that most of them agree with: of all triples, that of the least median misfit."""
-    best, least = source, np.inf
-    rng = np.random.default_rng(0)
-    for _ in range(_TRIPLES):
-        three = rng.choice(len(source), 3, replace=False)
-        rotation, shift, scale = similarity_between(source[three], target[three])
-        moved = scale * source @ rotation.T + shift
-        misfit = float(np.median(np.linalg.norm(moved - target, axis=1)))
-        if misfit < least:
-            best, least = moved, misfit
-    return best
-
-
 def _swapped(network: Network, a: int, b: int) -> SurveyError:
     first, second = network.photos[a], network.photos[b]
     return SurveyError(
@@ -401,30 +396,6 @@ def _swapped(network: Network, a: int, b: int) -> SurveyError:
         where=first.where or network.path,
         remedy="give the marks to the photograph that they were made on",
     )
-
-
-def _alone(network: Network) -> tuple[Solution, float] | None:
-    """Adjust the photographs without their control points; None if they do not agree with each other either.
-
-    Returns
-    -------
-    the solution and its σ₀
-    """
-    free = without_start(replace(network, control=()))
-    try:
-        start = next(iter(start_values(free)))
-        prepared = prepare(start, keep=_useful(start)[0])
-        alone = adjust(start, prepared)
-    except MomaError:
-        return None
-    if _misfit(start, prepared, alone) >= _POOR:
-        return None
-    return alone, _sigma0(prepared, alone)
-
-
-def _sigma0(prepared: Prepared, solution: Solution) -> float:
-    redundancy = prepared.observations - prepared.count + prepared.datum
-    return float(np.sqrt(solution.square / max(redundancy, 1)))
 
 
 def _check_hand(network: Network, alone: Solution) -> None:
@@ -499,7 +470,7 @@ def _snooped(
             used[out] = False
             free = prepared.unknowns.free
         prepared = prepare(network, solution.unknowns._replace(free=free), used)
-        solution = adjust(network, prepared)
+        solution = with_lengths(network, prepared, adjust(network, prepared))
         result = statistics(network, prepared, solution)
     return network, used, prepared, solution, result
 
@@ -517,7 +488,7 @@ def _wrong_control(
         return None
     worst = int(np.argmax(tests))
     left = [gcp.place for k, gcp in enumerate(network.control) if not gcp.check and k != worst]
-    return worst if len(left) >= _ENOUGH else None
+    return worst if len(left) >= ENOUGH else None
 
 
 def _worst_marks(network: Network, rays: NDArray[np.intp], suspects: NDArray[np.intp]) -> list[int]:

@@ -23,7 +23,9 @@ from survey.orientation.bundle.adjustment import (
     prior,
     similarity,
     with_datum,
+    without_datum,
 )
+from survey.orientation.bundle.lengths import LengthFit, fit_lengths
 from survey.orientation.network import Network
 from survey.orientation.rotations import angle_slopes
 
@@ -52,6 +54,8 @@ class Statistics:
         left out
     parts : (n, 2) redundancy number of each coordinate of a mark, between 0 and 1
     reach : (n, 2) movement of the point if a coordinate is wrong by one σ [m]
+    lengths, length_tests : (m,) observed minus adjusted [m] of scale bars, then of plumb lines (x and y of each point
+        above the first), and over their standard deviations; None: there are none
     """
 
     redundancy: int
@@ -61,6 +65,8 @@ class Statistics:
     residuals: Array
     parts: Array
     reach: Array
+    lengths: Array | None = None
+    length_tests: Array | None = None
 
     @property
     def standardised(self) -> Array:
@@ -99,28 +105,47 @@ def statistics(network: Network, prepared: Prepared, solution: Solution) -> Stat
     unknowns = solution.unknowns
     normal = normals(network, prepared, unknowns, 0.0)[0]
     cameras = _inverse(with_datum(normal, prepared, unknowns), network, prepared)
-    if prepared.datum and len(cameras):
-        # the datum added a weight along the free movements, which is no variance
-        free = np.linalg.qr(inner_constraints(prepared, unknowns))[0]
-        cameras = cameras - free @ (free.T @ cameras @ free) @ free.T
+    cameras = without_datum(cameras, prepared, unknowns)
     points = np.empty((len(network.names), 3, 3))
     per_ray = np.empty((len(prepared.order), 3, 2))
     known = prior(prepared, unknowns)
     point_statistics(prepared.rays, unknowns, known, cameras, points, per_ray)
-    if prepared.datum:
+    lengths = fit_lengths(network, prepared, unknowns, cameras)
+    if lengths is not None:
+        cameras, points = _by_lengths(lengths, cameras, points)
+    elif prepared.datum:
         cameras, points = _to_points(prepared, solution, known, cameras, points)
     spread = np.full((len(network.photo), 3, 2), np.nan)
     spread[prepared.order] = per_ray
     redundancy = prepared.observations - prepared.count + prepared.datum
+    square = solution.square
+    if lengths is not None:
+        redundancy, square = redundancy + lengths.redundancy, square + lengths.square
     return Statistics(
         redundancy,
-        float(np.sqrt(solution.square / redundancy)) if redundancy > 0 else float("nan"),
+        float(np.sqrt(square / redundancy)) if redundancy > 0 else float("nan"),
         cameras,
         points,
         spread[:, 0],
         spread[:, 1],
         spread[:, 2],
+        None if lengths is None else lengths.residual,
+        None if lengths is None else lengths.test,
     )
+
+
+def _by_lengths(fit: LengthFit, cameras: Array, points: Array) -> tuple[Array, Array]:
+    """Return covariances of cameras and points with what scale bars and plumb lines tell."""
+    weight, free = fit.weight, fit.free_covariance
+    cameras = (
+        cameras - fit.by_cameras.T @ weight @ fit.by_cameras + fit.free_cameras @ free @ fit.free_cameras.T
+    )
+    points = (
+        points
+        - np.einsum("imx,mn,iny->ixy", fit.by_points, weight, fit.by_points)
+        + np.einsum("ixg,gh,iyh->ixy", fit.free_points, free, fit.free_points)
+    )
+    return cameras, points
 
 
 def _inverse(normal: Array, network: Network, prepared: Prepared) -> Array:

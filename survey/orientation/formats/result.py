@@ -67,7 +67,11 @@ def orientation_values(result: Orientation, *, name: str = "") -> dict[str, Any]
         "observations": result.prepared.observations,
         "unknowns": result.prepared.count,
         "iterations": result.solution.iterations,
-        "datum": "inner constraints of the points" if result.prepared.datum else "control",
+        "datum": _datum(result),
+        "scale": _source(result, "scale bars" if network.bars else None),
+        "vertical": _source(result, "plumb lines" if network.plumb_lines else None),
+        "lengths": _lengths(result),
+        "left_out": dict(result.left_out),
         "camera": cameras[0]["parameters"],
         "cameras": cameras,
         "photos": _photos(result),
@@ -90,6 +94,51 @@ def orientation_values(result: Orientation, *, name: str = "") -> dict[str, Any]
         },
         "mark_sigma": float(np.sqrt((network.sigma**2).mean())) * result.scale,
     }
+
+
+def _datum(result: Orientation) -> str:
+    if not result.prepared.datum:
+        return "control"
+    observed = [
+        name
+        for name, lines in (("scale bars", result.network.bars), ("plumb lines", result.network.plumb_lines))
+        if lines
+    ]
+    rest = "inner constraints of the photographs" if observed else "inner constraints of the points"
+    return ", ".join([*observed, rest])
+
+
+def _source(result: Orientation, observed: str | None) -> str | None:
+    """Return what scale or vertical come from; None if nothing tells them."""
+    if not result.prepared.datum:
+        return "control"
+    return observed or ("start values" if result.network.start_datum else None)
+
+
+def _lengths(result: Orientation) -> list[dict[str, Any]]:
+    """Describe scale bars, and the points of plumb lines above the first in x and y."""
+    network, statistics = result.network, result.statistics
+    if statistics.lengths is None or statistics.length_tests is None:
+        return []
+    names = [("scale bar", bar.points, bar.sigma) for bar in network.bars]
+    names += [
+        (f"plumb line, {axis}", (line.points[0], top), line.sigma)
+        for line in network.plumb_lines
+        for top in line.points[1:]
+        for axis in "xy"
+    ]
+    return [
+        {
+            "kind": kind,
+            "points": [network.names[i] for i in points],
+            "sigma": sigma,
+            "residual": float(residual),
+            "test": float(test),
+        }
+        for (kind, points, sigma), residual, test in zip(
+            names, statistics.lengths, statistics.length_tests, strict=True
+        )
+    ]
 
 
 def _photos(result: Orientation) -> list[dict[str, Any]]:
@@ -279,4 +328,17 @@ def _oriented(path: Path, values: dict[str, Any]) -> Oriented:
         ],
         dtype=np.int64,
     )
-    return Oriented(str(path), cameras, photos, table, covariance, float(values["mark_sigma"]))
+    controlled = values.get("datum") == "control"
+    unknown = tuple(
+        name for name in ("scale", "vertical") if not values.get(name, "control" if controlled else None)
+    )
+    return Oriented(
+        str(path),
+        cameras,
+        photos,
+        table,
+        covariance,
+        float(values["mark_sigma"]),
+        unknown,
+        dict(values.get("left_out", {})),
+    )

@@ -9,6 +9,7 @@ so that the covariance is V⁻¹ + V⁻¹Wᵀ C W V⁻¹, W = Σ AᵀB, and the 
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from ground.errors import GeometryError
 from survey.arrays import Array
 from survey.orientation.bundle.resection import intersect_rays
 from survey.orientation.oriented import Oriented
-from survey.orientation.projection import directions
+from survey.orientation.projection import directions, project
 from survey.orientation.stones.located import Located, Mark, Sight, line_up
 
 __all__ = ["intersect", "sight"]
@@ -25,11 +26,12 @@ _MAX_ITERATIONS = 20  # iterations
 _STILL = 1e-11  # movement of a point over its distance, below which it has converged
 _NARROWEST = 1.0  # angle between the outer rays of a point below which it is refused [°]
 _CHECKED = 1e-3  # deviation of a residual, over that of its mark, below which nothing checks it
+_ENOUGH = 3  # marks of a point of which one can be told to be wrong
 _MISSES = 6.0  # test of a mark beyond which it is of another point
 
 
 def intersect(oriented: Oriented, name: str, marks: Sequence[Mark]) -> Located:
-    """Intersect a point.
+    """Intersect a point; of three marks or more, the one without which alone the others agree is left out.
 
     Parameters
     ----------
@@ -41,6 +43,33 @@ def intersect(oriented: Oriented, name: str, marks: Sequence[Mark]) -> Located:
     GeometryError
         if its rays run nearly the same way, it lies behind a photograph, or its marks are not of one point
     """
+    try:
+        return _intersected(oriented, name, marks)
+    except GeometryError:
+        sound = list[tuple[Mark, Located]]()
+        for wrong in marks if len(marks) >= _ENOUGH else ():
+            try:
+                sound.append(
+                    (wrong, _intersected(oriented, name, [mark for mark in marks if mark is not wrong]))
+                )
+            except GeometryError:
+                continue
+        if len(sound) != 1:
+            raise
+    wrong, located = sound[0]
+    photo = oriented.photos[wrong.photo].name
+    seen = project(
+        oriented.camera(wrong.photo),
+        oriented.rotation(wrong.photo),
+        oriented.station(wrong.photo),
+        located.place[None],
+    )[0]
+    off = float(np.linalg.norm(seen - wrong.image))
+    text = f"the mark on {photo}, {off:.0f} px from where the others put it"
+    return replace(located, text=f"{located.text}, without {text}", left_out=text)
+
+
+def _intersected(oriented: Oriented, name: str, marks: Sequence[Mark]) -> Located:
     rays = np.array(
         [
             oriented.rotation(mark.photo) @ directions(oriented.camera(mark.photo), mark.image[None])[0]

@@ -67,6 +67,7 @@ class Located:
     by_source : derivatives (3, k) by errors of variance 1, of marks and of surfaces, by the name of the source
     sights : its marks
     text : how it was located
+    left_out : a mark that the others contradict, in words; empty: none
     """
 
     name: str
@@ -75,6 +76,7 @@ class Located:
     by_source: dict[str, Array]
     sights: tuple[Sight, ...]
     text: str
+    left_out: str = ""
 
     def covariance(self, oriented: Oriented) -> Array:
         """Return the covariance of the point, (3, 3) [m²]."""

@@ -40,6 +40,7 @@ def located_stones(items: Iterator[Item], head: SurveyHead) -> Iterator[Item]:
     """
     assert head.orientation is not None
     oriented = read_orientation(Path(head.path).parent / head.orientation)
+    _check_datum(oriented, head)
     homographies = {photograph.name for photograph in head.photographs}
     marked = list[BlockRecord]()
     for item in items:
@@ -50,6 +51,23 @@ def located_stones(items: Iterator[Item], head: SurveyHead) -> Iterator[Item]:
         else:
             yield item
     yield from _located(marked, head, oriented)
+
+
+def _check_datum(oriented: Oriented, head: SurveyHead) -> None:
+    """Refuse photographs of which nobody knows how large they are, or what is upright in them."""
+    if not oriented.unknown:
+        return
+    ways = {
+        "scale": "[[scale_bars]] with a measured length",
+        "vertical": "[[plumb_lines]] with points above each other",
+    }
+    raise SurveyError(
+        f"nothing tells the {' and the '.join(oriented.unknown)} of the photographs in {oriented.path}: they were "
+        "oriented without control points, and stones would come in at any size",
+        where=head.path,
+        remedy=f"add control points, or {' and '.join(ways[name] for name in oriented.unknown)} to the project of "
+        'moma orient, or datum = "start" if its start values are right in this, and orient again',
+    )
 
 
 def _located(records: Sequence[BlockRecord], head: SurveyHead, oriented: Oriented) -> Iterator[Item]:
@@ -74,11 +92,23 @@ def _located(records: Sequence[BlockRecord], head: SurveyHead, oriented: Oriente
             yield Reject(record.code, error.at(f"{where}: stone {record.code}"), record.spans)
 
 
-def _marks(record: BlockRecord) -> dict[str, list[PointMark]]:
-    """Group the marks of a stone by their points; corners drawn on one photograph are points of their own."""
+def _marks(record: BlockRecord, head: SurveyHead, oriented: Oriented) -> dict[str, list[PointMark]]:
+    """Group the marks of a stone by their points; corners drawn on one photograph are points of their own.
+
+    Marks on a photograph that `moma orient` left out are left out too, as long as others show the point.
+    """
     out: dict[str, list[PointMark]] = {}
     for mark in record.marks:
-        out.setdefault(mark.name, []).append(mark)
+        if mark.photograph not in oriented.left_out:
+            out.setdefault(mark.name, []).append(mark)
+    for mark in record.marks:
+        if mark.name not in out:
+            raise SurveyError(
+                f"point {mark.name} is marked only on photograph {mark.photograph}, which moma orient left out: "
+                f"{oriented.left_out[mark.photograph]}",
+                where=f"{head.path}:{mark.line}",
+                remedy="correct the photograph and orient again, or mark the point on others",
+            )
     for number, image in enumerate(record.image, start=1):
         name = f"corner {number}"
         out[name] = [PointMark(name, "vertex", record.photograph or "", image, None, record.line)]
@@ -112,7 +142,7 @@ def _intersected(record: BlockRecord, head: SurveyHead, oriented: Oriented) -> d
         out[name] = Located(
             name, place, still, {f"{record.code} {name}": sigma * np.eye(3)}, (), "measured in space"
         )
-    for name, ones in _marks(record).items():
+    for name, ones in _marks(record, head, oriented).items():
         marks = [_mark(mark, head, oriented) for mark in ones]
         if len(marks) >= 2:
             try:
@@ -154,7 +184,7 @@ def _record(
     intersected: Mapping[str, Located],
     surfaces: Mapping[str, Surface | MomaError],
 ) -> BlockRecord:
-    grouped = _marks(record)
+    grouped = _marks(record, head, oriented)
     single = [name for name in grouped if name not in intersected]
     plotted = {}
     if single:
@@ -201,8 +231,10 @@ def _in_space(
     sigmas = np.maximum([np.sqrt(normal @ covariance @ normal) for covariance in covariances], _MIN_SIGMA)
     photos = {sight.photo for each in every for sight in each.sights}
     stations = [oriented.station(f) for f, photo in enumerate(oriented.photos) if photo.name in photos]
+    left_out = "; ".join(f"{point.name}: {point.left_out}" for point in every if point.left_out)
     return replace(
         record,
+        notes={**record.notes, "marks_left_out": left_out} if left_out else record.notes,
         points=np.array([point.place for point in located]).reshape(-1, 3),
         vertices=np.array([corner.place for corner in corners]).reshape(-1, 3),
         sigma=float(np.sqrt((sigmas**2).mean())),

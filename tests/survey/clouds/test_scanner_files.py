@@ -10,6 +10,8 @@ from survey.clouds.cloud import open_cloud
 from survey.clouds.points import las, pcd, ptx
 from survey.clouds.points.reading import open_points
 from survey.clouds.settings import CloudOptions
+from survey.clouds.wall import read_wall
+from survey.records.survey import OBSERVER, Station, SurveyHead
 from tests.pipelines.ingest.test_cases import CASES, needs_shared
 from tests.survey.clouds import scans
 from tests.survey.clouds.test_points import COLOURS, POINTS, e57_file, read
@@ -180,6 +182,43 @@ def test_a_scanner_behind_most_faces_is_refused(tmp_path, y, sound):
         return
     with pytest.raises(SurveyError, match=r"6 of 6 outlines run clockwise.*--header"):
         open_cloud([tmp_path / "a.e57"], options)
+
+
+@pytest.mark.parametrize(
+    ("name", "y", "sound"), [("S1", -5.0, True), ("S1", 6.0, False), (OBSERVER, 6.0, True)]
+)
+def test_a_station_of_the_header_file_behind_most_faces_is_refused_and_an_observer_is_believed(
+    tmp_path, name, y, sound
+):
+    shapes = [scans.in_space(ring) for ring in scans.rings()]
+    place = np.mean(np.concatenate(shapes), axis=0) + y * -scans.OUT
+    options = CloudOptions(
+        outlines=scans.geojson(tmp_path / "a.geojson", shapes),
+        sigma=0.001,
+        head=SurveyHead("w", "head.moma", stations=(Station(name, place),)),
+    )
+    cloud = scans.xyz(tmp_path / "a.xyz", scans.scan())
+    if sound:
+        assert len(list(open_cloud([cloud], options).blocks)) == len(shapes)
+        return
+    with pytest.raises(SurveyError, match=r"6 of 6 outlines run clockwise seen from its station") as caught:
+        open_cloud([cloud], options)
+    assert "observer X Y Z" in caught.value.remedy
+
+
+@pytest.mark.parametrize(("y", "sound"), [(-4.0, True), (2.0, False)])
+def test_a_station_behind_the_frame_of_the_wall_is_refused(tmp_path, y, sound):
+    wall = read_wall(str(scans.frame(tmp_path)))
+    head = SurveyHead(
+        "w", "head.moma", stations=(Station("S1", scans.ORIGIN + 0.7 * scans.RIGHT + y * -scans.OUT),)
+    )
+    options = CloudOptions(outlines=scans.geojson(tmp_path / "a.geojson"), sigma=0.001, wall=wall, head=head)
+    cloud = scans.xyz(tmp_path / "a.xyz", scans.scan())
+    if sound:
+        assert len(list(open_cloud([cloud], options).blocks)) == 6
+        return
+    with pytest.raises(SurveyError, match="stands behind the wall"):
+        open_cloud([cloud], options)
 
 
 @needs_shared
