@@ -14,13 +14,13 @@ MOST = {
     "numbers of archmodel": 98,
     "numbers of mechanics": 740,
     "numbers of pipelines": 545,
-    "long functions": 46,
+    "long functions": 44,
     "wide functions": 5,
-    "undocumented functions": 174,
+    "undocumented functions": 135,
 }
 """Today's figures: whoever lowers one lowers its bound, and nobody raises one."""
 
-MOST_OF_10_000 = {"all": 170, "one": 41}
+MOST_OF_10_000 = {"all": 168, "one": 41}
 """Empty words among identifiers: all that are listed, and the most frequent."""
 
 REMEDY = {
