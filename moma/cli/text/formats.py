@@ -32,7 +32,7 @@ _UNITS = {
     "volume": "m³",
     "mass": "kg",
     "tilt_sigma": "rad",
-    **units_of("stone"),
+    **units_of("stone", "course"),
 }
 
 _PLACES = frozenset({"x", "y", "z", "centroid", "offset"})
