@@ -62,7 +62,7 @@ def _collect(
 ) -> None:
     """Add the borders of a wall before and after regions are joined, and the lines across regions."""
     regions = closed_regions(fields.strength.evidence, fields.typical, fields.void)
-    bond = bond_of(regions, fields.strength, fields.typical, kind)
+    bond = bond_of(regions, fields.strength, fields.typical, fields.colours, kind)
     if weights is not None:
         bond.weights = weights
     borders += _samples(bond, regions, true)

@@ -22,6 +22,7 @@ STYLES = ("ashlar", "coursed", "arch", "rubble")
 """Kinds of walls."""
 
 _FINER = 3  # pixels along the side of one, of the drawing before it is averaged
+_QUARRIES = (2.0, 9.0)  # scatter of the colours of stones, from one bed of one quarry to many [of 255]
 _REPAIRED = 0.05  # part of the stones of ashlar that have a repair let in
 _DOOR = (0.55, 1.25, 0.34, 11)  # half width, springing and thickness of its arch [m], number of voussoirs
 
@@ -236,7 +237,9 @@ def _painted(
 
     count = int(fine.max())
     base = np.array([188.0, 180.0, 165.0]) + chance.normal(0.0, 3.0, 3)
-    colours = base + chance.normal(0.0, 7.0, (count + 1, 1)) + chance.normal(0.0, 3.0, (count + 1, 3))
+    quarries = chance.uniform(*_QUARRIES)
+    colours = base + chance.normal(0.0, quarries, (count + 1, 1))
+    colours += chance.normal(0.0, 0.4 * quarries, (count + 1, 3))
     recessed = bool(chance.random() < 0.5)
     sign = -1.0 if recessed or chance.random() < 0.7 else 0.7
     colours[0] = base + sign * chance.uniform(24.0, 45.0) + chance.normal(0.0, 4.0, 3)

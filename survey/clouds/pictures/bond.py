@@ -1,7 +1,7 @@
 """Knowledge of masonry about borders: the probability that two regions are two stones, and regions that are one.
 
 The probability is a logistic function of what was measured along a border and of the shapes on both sides of it: the
-mean strength of its joint, the share of it without a joint, how far the union of both is a fuller rectangle
+mean strength of its joint, the share of it without a joint, the step of colour from one side to the other, how far the union of both is a fuller rectangle
 than each alone (a stone of
 ashlar is one, a course of two half-height stones is not), how level or upright it is, and the size of the
 smaller. Its weights were
@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 import numpy as np
+from numpy.typing import NDArray
 
 from survey.arrays import Array, Ints
 from survey.clouds.pictures.joints import WIDTH, Strength
@@ -21,13 +22,13 @@ from survey.clouds.pictures.regions import borders_of
 
 __all__ = ["FEATURES", "LIKELY", "WEIGHTS", "Bond", "Border", "bond_of", "join_weak", "renumbered"]
 
-FEATURES = ("constant", "strength", "gaps", "fuller", "askew", "size")
+FEATURES = ("constant", "strength", "gaps", "fuller", "askew", "size", "step")
 """Names of what the probability depends on."""
 
 WEIGHTS: Mapping[str, tuple[float, ...]] = MappingProxyType(
     {
-        "coursed": (-2.97, 1.75, -4.56, -6.69, -3.10, 2.43),
-        "rubble": (-7.36, 2.52, -2.81, -7.53, -0.82, 3.77),
+        "coursed": (-2.97, 1.75, -4.56, -6.69, -3.10, 2.43, 0.0),
+        "rubble": (-7.36, 2.52, -2.81, -7.53, -0.82, 3.77, 0.0),
     }
 )
 """Weights of `FEATURES` by the kind of masonry."""
@@ -38,19 +39,30 @@ stones on twelve photographs were split, at 0.65 4 %, with as many found."""
 
 _STRONGEST = 1.5  # strength over that of a usual joint above which more says nothing
 _GAP = 0.25  # strength over that of a usual joint below which there is none
+_PLAIN = 5  # sums of a border before its steps
+_GRAINS = 8.0  # step of colour over the grain of the stone above which more says nothing
 _LARGE = 20.0  # size of a region over the width of a joint from which it is surely no fragment
 
 
 @dataclass
 class Border:
-    """A border: pixels along it, and sums of strength, gaps, rows, columns, and of steps across columns."""
+    """A border: pixels along it, and sums of strength, gaps, rows, columns, and of pixels that part columns.
+
+    After these, `steps` has the number of pixels beyond which both regions go on, and the sums of the steps of the
+    colours there, from the region of the lower number to the other.
+    """
 
     length: float
     sums: Array
+    steps: Array
 
     def joined(self, other: "Border") -> "Border":
         """Return both as one."""
-        return Border(self.length + other.length, self.sums + other.sums)
+        return Border(self.length + other.length, self.sums + other.sums, self.steps + other.steps)
+
+    def turned(self) -> "Border":
+        """Return it as the other region sees it."""
+        return Border(self.length, self.sums, np.concatenate([self.steps[:1], -self.steps[1:]]))
 
 
 @dataclass
@@ -73,7 +85,7 @@ class Bond:
     joined: dict[int, int] = field(default_factory=dict)
 
     def features(self, a: int, b: int) -> Array:
-        """Return the features (6,) of the border between two regions."""
+        """Return the features (7,) of the border between two regions."""
         border = self.borders[a][b]
         strength, gaps, _, _, across = border.sums / border.length
         first, second = self.areas[a], self.areas[b]
@@ -82,7 +94,8 @@ class Bond:
         fuller = (first + second) / _box_area(box) - fill
         askew = 1.0 - abs(2.0 * across - 1.0)
         size = np.log(min(np.sqrt(min(first, second)) / WIDTH, _LARGE))
-        return np.array([1.0, strength, gaps, fuller, askew, size])
+        step = np.linalg.norm(border.steps[1:]) / max(border.steps[0], 1.0)
+        return np.array([1.0, strength, gaps, fuller, askew, size, np.log1p(min(step, _GRAINS))])
 
     def probability(self, a: int, b: int) -> float:
         """Return the probability that there is a joint between two regions."""
@@ -96,6 +109,7 @@ class Bond:
             del self.borders[c][b]
             if c == a:
                 continue
+            border = border if (b < c) == (a < c) else border.turned()
             merged = border if c not in self.borders[a] else self.borders[a][c].joined(border)
             self.borders[a][c] = self.borders[c][a] = merged
         self.joined[b] = a
@@ -104,7 +118,9 @@ class Bond:
         return self.areas[a] / _box_area(self.boxes[a])
 
 
-def bond_of(regions: Ints, strength: Strength, typical: float, kind: str) -> Bond:
+def bond_of(
+    regions: Ints, strength: Strength, typical: float, colours: NDArray[np.float32], kind: str
+) -> Bond:
     """Gather the regions of a picture and their borders.
 
     Parameters
@@ -112,13 +128,14 @@ def bond_of(regions: Ints, strength: Strength, typical: float, kind: str) -> Bon
     regions : (h, w) numbers; 0 is no region
     strength : of joints
     typical : strength of a usual joint
+    colours : (c, h, w) each over its grain
     kind : of masonry, a key of `WEIGHTS`
     """
     from scipy.ndimage import find_objects
 
     ratio = np.minimum(strength.evidence / typical, _STRONGEST).astype(np.float32)
     rows, columns = (one.astype(np.float32) for one in np.indices(regions.shape))
-    found = borders_of(regions, np.stack([ratio, (ratio >= _GAP).astype(np.float32), rows, columns]))
+    found = borders_of(regions, np.stack([ratio, (ratio >= _GAP).astype(np.float32), rows, columns]), colours)
     sums = found.sums.copy()
     sums[:, 1] = found.lengths - sums[:, 1]  # a gap where neither side has a joint
     borders: dict[int, dict[int, Border]] = {}
@@ -128,7 +145,7 @@ def bond_of(regions: Ints, strength: Strength, typical: float, kind: str) -> Bon
         if k:
             borders[k] = {}
     for (a, b), length, row in zip(found.pairs.tolist(), found.lengths.tolist(), sums, strict=True):
-        borders[a][b] = borders[b][a] = Border(length, row)
+        borders[a][b] = borders[b][a] = Border(length, row[:_PLAIN], row[_PLAIN:])
     limits = {
         k: (boxes[k - 1][0].start, boxes[k - 1][0].stop, boxes[k - 1][1].start, boxes[k - 1][1].stop)
         for k in borders

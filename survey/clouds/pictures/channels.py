@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from survey.arrays import Bools
 from survey.clouds.pictures.joints import WIDTH, Field
 
-__all__ = ["channels_of", "covered", "lightness", "openings"]
+__all__ = ["channels_of", "covered", "grains", "lightness", "openings"]
 
 _DARK = 0.40  # lightness over that of the wall below which it is an opening: the darkest shade leaves more than half
 _BEHIND = 0.12  # distance of an opening behind the faces [m], more than joints are deep
@@ -49,6 +49,16 @@ def lightness(pixels: NDArray[np.uint8]) -> tuple[Field, Field, Field]:
     x, y, z = root[..., 0], root[..., 1], root[..., 2]
     light, green, blue = 116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)
     return light.astype(np.float32), green.astype(np.float32), blue.astype(np.float32)
+
+
+def grains(channels: list[Field]) -> NDArray[np.float32]:
+    """Return smoothed channels (c, h, w), each over the usual difference between places two joints apart."""
+    from scipy.ndimage import uniform_filter
+
+    out = np.stack([uniform_filter(one, round(WIDTH)) for one in channels])
+    apart = 2 * round(WIDTH)
+    usual = [np.median(np.abs(one[:, apart:] - one[:, :-apart])) for one in out]
+    return (out / np.maximum(1.4826 * np.array(usual, dtype=np.float32), 1e-6)[:, None, None]).astype(np.float32)
 
 
 def _relief(depth: Field) -> Field:

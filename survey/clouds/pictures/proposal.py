@@ -4,10 +4,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from survey.arrays import Array, Bools, Ints
 from survey.clouds.pictures.bond import bond_of, join_weak, renumbered
-from survey.clouds.pictures.channels import channels_of
+from survey.clouds.pictures.channels import channels_of, grains
 from survey.clouds.pictures.joints import WIDTH, Field, Strength, combined, line_strength
 from survey.clouds.pictures.masonry import Named, name_stones
 from survey.clouds.pictures.photograph import Photograph
@@ -239,6 +240,7 @@ class Fields:
     strength : of joints
     typical : strength of a usual joint
     hidden, void : (h, w) where something stands before the wall, and where there is none
+    colours : (c, h, w) of the stones, each over its grain
     """
 
     image: Field
@@ -246,6 +248,7 @@ class Fields:
     typical: float
     hidden: Bools
     void: Bools
+    colours: NDArray[np.float32]
 
 
 def measured_fields(photograph: Photograph, part: tuple[slice, slice], factor: float) -> Fields:
@@ -258,13 +261,13 @@ def measured_fields(photograph: Photograph, part: tuple[slice, slice], factor: f
     channels, hidden, void = channels_of(pixels, depth, left_out)
     image = combined(channels)
     strength = line_strength(image)
-    return Fields(image, strength, typical_strength(strength), hidden, void)
+    return Fields(image, strength, typical_strength(strength), hidden, void, grains(channels))
 
 
 def joined_regions(fields: Fields, kind: str) -> Ints:
     """Return the regions (h, w) of a part of a picture, those that are one stone joined."""
     regions = closed_regions(fields.strength.evidence, fields.typical, fields.void)
-    bond = bond_of(regions, fields.strength, fields.typical, kind)
+    bond = bond_of(regions, fields.strength, fields.typical, fields.colours, kind)
     join_weak(bond)
     return renumbered(regions, bond)
 
@@ -297,7 +300,7 @@ def _kind_of(strength: Strength, typical: float) -> str:
 
 def _stones_of(regions: Ints, fields: Fields, kind: str) -> list[_Found]:
     """Return the stones of regions, in pixels of the work."""
-    bond = bond_of(regions, fields.strength, fields.typical, kind)
+    bond = bond_of(regions, fields.strength, fields.typical, fields.colours, kind)
     shapes = outline_shapes(regions, without_mortar(regions, fields.image, _REACH[kind]))
     count = np.bincount(regions.ravel())
     veiled = np.bincount(regions.ravel(), fields.hidden.ravel().astype(np.float64), len(count))

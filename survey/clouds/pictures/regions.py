@@ -14,6 +14,7 @@ __all__ = ["Borders", "borders_of", "closed_regions", "typical_strength"]
 
 _WEAK = 0.3  # strength over that of a joint below which there is stone
 _APART = 2.0 * WIDTH  # distance between the middles of two regions [px]
+_REACH = round(WIDTH)  # distance from the middle of a joint at which the colour is that of the stone [px]
 
 
 @dataclass(frozen=True)
@@ -24,7 +25,9 @@ class Borders:
     ----------
     pairs : (n, 2) numbers of the regions, the smaller first
     lengths : (n,) pixels along each
-    sums : (n, k + 1) sums of what is measured along each, and the number of its pixels that part columns
+    sums : (n, k + 2 + c) sums along each: what is measured, the number of its pixels that part columns, the number
+        of those beyond which the regions go on on both sides, and there the steps of the colours from the first to
+        the second
     """
 
     pairs: Ints
@@ -89,25 +92,31 @@ def _watershed(height: Field, seeds: Ints, wall: Bools) -> Ints:
     return np.asarray(segmentation.watershed(height, seeds, mask=wall), dtype=np.int64)
 
 
-def borders_of(regions: Ints, measures: NDArray[np.float32]) -> Borders:
+def borders_of(regions: Ints, measures: NDArray[np.float32], sides: NDArray[np.float32]) -> Borders:
     """Measure the borders between regions.
 
     Parameters
     ----------
     regions : (h, w) numbers; 0 is no region
     measures : (k, h, w) what is summed along borders; of two pixels on both sides the larger counts
+    sides : (c, h, w) colours, of which the steps across borders are summed
     """
     pairs, values = [], []
-    whole, but_last, but_first = slice(None), slice(None, -1), slice(1, None)
-    for first, second, columns in (
-        ((whole, but_last), (whole, but_first), 1.0),
-        ((but_last, whole), (but_first, whole), 0.0),
-    ):
-        a, b = regions[first], regions[second]
-        at = (a != b) & (a > 0) & (b > 0)
-        pairs.append(np.sort(np.column_stack([a[at], b[at]]), axis=1))
-        here = np.maximum(measures[:, *first][:, at], measures[:, *second][:, at]).T
-        values.append(np.column_stack([here, np.full(len(here), columns, dtype=np.float32)]))
+    for axis in (1, 0):
+        count = regions.shape[axis]
+        a, b = (np.take(regions, np.arange(k, count - 1 + k), axis=axis) for k in (0, 1))
+        at = np.nonzero((a != b) & (a > 0) & (b > 0))
+        first, second = a[at], b[at]
+        pairs.append(np.sort(np.column_stack([first, second]), axis=1))
+        here, there = ([*at], [*at])
+        there[axis] = at[axis] + 1
+        larger = np.maximum(measures[:, *here], measures[:, *there]).T
+        here[axis] = np.maximum(at[axis] - _REACH, 0)
+        there[axis] = np.minimum(at[axis] + 1 + _REACH, count - 1)
+        inside = (regions[*here] == first) & (regions[*there] == second)
+        turned = np.where(first < second, inside, -1.0 * inside)
+        steps = ((sides[:, *there] - sides[:, *here]) * turned).T
+        values.append(np.column_stack([larger, np.full(len(first), float(axis)), inside, steps]))
     every, found = np.concatenate(pairs), np.concatenate(values)
     base = int(regions.max()) + 1
     keys, where = np.unique(every[:, 0] * base + every[:, 1], return_inverse=True)
