@@ -135,7 +135,9 @@ class Entity(Kind, Base):
     y: Mapped[float | None] = attribute("m", "centroid of its solid")
     z: Mapped[float | None] = attribute("m", "centroid of its solid")
     hypothesis: Mapped[bool] = attribute(
-        None, "nobody has seen it: missing, or hidden in the wall", default=False
+        None,
+        "nobody has seen it, missing or hidden in the wall, or looked at its proposed outline",
+        default=False,
     )
     own: Mapped[dict[str, object] | None]
 

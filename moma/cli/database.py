@@ -1,7 +1,7 @@
 """Commands for whole databases: their layout, export and import, a view of them, and a server."""
 
 import sys
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,7 +9,17 @@ import typer
 
 from ground.errors import UsageError
 from moma.cli.console import reporting, say
-from moma.cli.options import DEFAULT_DB, At, Common, Db, Verbose, check_ending
+from moma.cli.options import (
+    DEFAULT_DB,
+    At,
+    Common,
+    Db,
+    DrawnChoices,
+    SurveyChoices,
+    Verbose,
+    check_ending,
+)
+from moma.cli.surveys import sources
 
 __all__ = ["export", "import_", "migrate", "serve", "view"]
 
@@ -47,6 +57,7 @@ def migrate(
 
 if TYPE_CHECKING:
     from pipelines.ingest.exchange import ExchangeReport
+    from pipelines.propose.outlines.editing import OutlineEditor
     from pipelines.record.export.export import Exported
 
 
@@ -201,6 +212,7 @@ def view(
 
 @reporting
 def serve(
+    *,
     host: Annotated[
         str,
         typer.Option(
@@ -226,11 +238,58 @@ def serve(
     rows: Annotated[
         int, typer.Option("--row-limit", metavar="N", min=1, help="Most rows of one answer.")
     ] = 10_000,
+    edit: Annotated[
+        Path | None,
+        typer.Option(
+            "--edit",
+            metavar="DIR",
+            help="Correct the outlines in a folder of moma outlines; with --depth, or --cloud and the like, saves go "
+            "into the database.",
+        ),
+    ] = None,
+    drawn: DrawnChoices,
+    header: Annotated[
+        Path | None, typer.Option("--header", metavar="FILE", help="Header, as for moma ingest.")
+    ] = None,
+    sigma: Annotated[
+        float | None, typer.Option("--sigma", metavar="S", help="Standard deviation, as for moma ingest.")
+    ] = None,
     db: Db = DEFAULT_DB,
     verbose: Verbose = False,
 ) -> None:
-    """Serve a database over HTTP, to be read only: viewer, queries, entities, runs, schema, downloads."""
+    """Serve a database over HTTP, to be read: viewer, queries, entities, runs, schema, downloads; or edit outlines."""
     from pipelines.reports.serve.serve import serve_database
     from pipelines.reports.serve.settings import ServeSettings
 
-    serve_database(db, ServeSettings(host=host, port=port, token=token, seconds=seconds, rows=rows), say)
+    editor = _editor(edit, drawn, SurveyChoices(header=header, sigma=sigma), db)
+    settings = ServeSettings(host=host, port=port, token=token, seconds=seconds, rows=rows)
+    serve_database(db, settings, say, editor)
+
+
+def _editor(
+    folder: Path | None, drawn: DrawnChoices, survey: SurveyChoices, url: str
+) -> "OutlineEditor | None":
+    """Return the editor of a folder of outlines; None without one.
+
+    Raises
+    ------
+    UsageError
+        if options of ingest are given without a folder, or do not fit together
+    """
+    from pipelines.propose.outlines.editing import SAVED, IngestChoice, OutlineEditor
+
+    given = [name for name, value in {**vars(drawn), **vars(survey)}.items() if value is not None]
+    if folder is None:
+        if given:
+            raise UsageError(
+                f"--{given[0]} without --edit", remedy="name the folder of the outlines: --edit DIR"
+            )
+        return None
+    if drawn.outlines is not None or drawn.masks is not None:
+        raise UsageError(
+            "other outlines beside --edit", remedy="leave them out: those of the folder are meant"
+        )
+    if not given:
+        return OutlineEditor(folder, url)
+    name, files, options = sources(survey, replace(drawn, outlines=folder / SAVED))
+    return OutlineEditor(folder, url, IngestChoice(name, tuple(files), options))

@@ -26,7 +26,7 @@ from moma.cli.progress import progress_bars
 if TYPE_CHECKING:
     from survey.formats.options import ReadingOptions
 
-__all__ = ["Blunders", "Level", "Moved", "cloud", "ingest", "orient", "sample", "survey_report"]
+__all__ = ["Blunders", "Level", "Moved", "cloud", "ingest", "orient", "sample", "sources", "survey_report"]
 
 
 class Level(StrEnum):
@@ -252,7 +252,7 @@ def ingest(
     if rejects is not None and not keep_going:
         raise UsageError("--rejects without --keep-going", remedy="give --keep-going too")
     rules = kind_rules(solids.kind_where or (), solids.support or ())
-    name, paths, options = _sources(survey, drawn, solids)
+    name, paths, options = sources(survey, drawn, solids)
     if review is not None and name not in ("cloud", "masks"):
         raise UsageError("--review without --cloud or --masks", remedy="it lists outlines")
     with compiling_beside("ingest"), progress_bars() as listener:
@@ -320,7 +320,7 @@ def survey_report(
     from pipelines.reports.survey.report import INDEX, report_surveys
     from survey.quality.masonry.index import given_grade
 
-    name, paths, options = _sources(survey, drawn)
+    name, paths, options = sources(survey, drawn)
     folder = out or Path("out") / f"survey-{(drawn.outlines or paths[0]).resolve().stem}"
     levels = {"MM": masonry.mortar, "SM": masonry.state}
     given = {name: given_grade(level.value) for name, level in levels.items() if level is not None}
@@ -394,7 +394,7 @@ def cloud(
     print(as_json(asdict(drawn)) if json else "\n".join(lines))
 
 
-def _sources(
+def sources(
     survey: SurveyChoices, drawn: CloudChoices, solids: SolidChoices | None = None
 ) -> "tuple[str, list[Path], ReadingOptions]":
     """Return the format of survey files, the files, and the options with which they are read.

@@ -9,6 +9,7 @@ from typing import Any, get_args
 import numpy as np
 
 from archmodel.store.stone_record import StoneRecord
+from survey.clouds.outlines.outline import PROPOSED
 from survey.extrusion.depth import Depth, Origin
 from survey.extrusion.extrusion import SurveyedBlock, extrude
 from survey.faces.faces import Face, Provenance, Source, face_on, outline_face
@@ -58,7 +59,7 @@ def stone_record(block: SurveyedBlock) -> StoneRecord:
         direction=block.extrusion.direction,
         tail=block.extrusion.tail,
         remarks=face.remarks,
-        hypothesis=face.provenance.source == "hypothesis",
+        hypothesis=face.provenance.source == "hypothesis" or record.notes.get("evidence") == PROPOSED,
     )
     notes = {_composed(key): _composed(text) for key, text in stone.notes.items()}
     zone = None if stone.zone is None else _composed(stone.zone)

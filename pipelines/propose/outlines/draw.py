@@ -12,28 +12,31 @@ from ground.errors import UsageError
 from mechanics.dynamics.progress import Listener, Progress, silent
 from pipelines.propose.outlines.features import (
     CORRECTED,
-    PROPOSED,
     Feature,
     corrected_features,
     proposed_features,
     reviewed_features,
 )
+from pipelines.propose.outlines.quality import quality_facts
 from pipelines.propose.outlines.write import NAMES, write_outlines
 from pipelines.reports.outlines.page import PageDoubt, editor_html
 from pipelines.results.folder import check_replaceable, replacing
 from survey.clouds.extras import optional
+from survey.clouds.outlines.outline import PROPOSED
 from survey.clouds.pictures.marks import mark_outlines
 from survey.clouds.pictures.photograph import Photograph, open_photograph
 from survey.clouds.pictures.proposal import Proposal, propose_outlines
 from survey.clouds.pictures.settings import OutlineSettings
 from survey.clouds.pictures.statistics import bond_statistics
 
-__all__ = ["INDEX", "DrawnOutlines", "OutlineRequest", "draw_outlines"]
+__all__ = ["INDEX", "PAGE", "DrawnOutlines", "OutlineRequest", "draw_outlines"]
 
 INDEX = "outlines.json"
 """Name of the file that lists all files of the folder."""
 
-_PAGE = "outlines.html"
+PAGE = "outlines.html"
+"""Name of the page that corrects the outlines."""
+
 _SURE = 0.9  # probability of a joint from which it is no doubt
 
 
@@ -173,11 +176,11 @@ def _written(
 ) -> DrawnOutlines:
     kinds = [feature.said.get("kind") for feature in features]
     courses = [feature.said.get("course") for feature in features]
-    facts = bond_statistics([feature.ring for feature in features], kinds, courses)
+    facts = bond_statistics([feature.ring for feature in features], kinds, courses) + quality_facts(features)
     by_hand = sum(feature.said.get("evidence") == CORRECTED for feature in features)
     there = {feature.code for feature in features}
     gone = sorted(stone.named.code for stone in proposal.stones if stone.named.code not in there)
-    names = [*(NAMES if features else ()), _PAGE]
+    names = [*(NAMES if features else ()), PAGE]
     made = DrawnOutlines(
         stones=len(features),
         courses=len({course for course in courses if course is not None}),
@@ -206,7 +209,7 @@ def _written(
             doubts,
             facts,
         )
-        (fresh / _PAGE).write_text(page, encoding="utf-8")
+        (fresh / PAGE).write_text(page, encoding="utf-8")
         content = asdict(made) | {"files": [INDEX, *names], "borders": _borders(proposal)}
         (fresh / INDEX).write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     return made

@@ -9,16 +9,16 @@ import numpy as np
 
 from ground.errors import SurveyError
 from survey.arrays import Array
-from survey.clouds.outlines.outline import Outline
+from survey.clouds.outlines.outline import PROPOSED, Outline
 from survey.clouds.outlines.reading import read_outlines
 from survey.clouds.pictures.proposal import Proposal
 from survey.clouds.world import PixelPlace
 from survey.geometry.polygons import ring_area
 
-__all__ = ["CORRECTED", "PROPOSED", "Feature", "corrected_features", "proposed_features", "reviewed_features"]
+__all__ = ["CORRECTED", "Feature", "corrected_features", "proposed_features", "reviewed_features"]
 
-PROPOSED, CORRECTED = "proposed from image", "corrected by hand"
-"""Evidence of an outline."""
+CORRECTED = "corrected by hand"
+"""Evidence of an outline that a person drew or changed."""
 
 
 @dataclass(frozen=True)

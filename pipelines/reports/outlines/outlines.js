@@ -141,12 +141,20 @@ function download(content) {
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }
+// A page that moma serve --edit shows sends its stones there; any other one hands a file to the browser.
+async function send(content) {
+  const answer = await fetch(document.body.dataset.save, { method: "POST", body: content, headers: { "Content-Type": "application/geo+json" } });
+  const told = await answer.json();
+  if (!answer.ok) throw new Error(told.error);
+  return told.text;
+}
 async function save() {
+  const now = stones;
   try {
-    await window.momaOutlines.download(text());
-    saved = stones;
+    const told = await window.momaOutlines.download(text());
+    saved = now;
     show();
-    say("Saved. Take it back with: moma outlines PICTURE --corrected corrected.geojson");
+    say(told || "Saved. Take it back with: moma outlines PICTURE --corrected corrected.geojson");
   } catch (error) {
     say(`Not saved: ${error.message}. All edits are still here; try again.`);
   }
@@ -326,7 +334,7 @@ function resize() {
 new ResizeObserver(resize).observe(canvas);
 at("kinds").replaceChildren(...KINDS.map((one) => { const option = document.createElement("option"); option.value = one; return option; }));
 at("title").textContent = data.title;
-window.momaOutlines = { download, text, stones: () => stones, select: (many) => { selected = many; show(); }, join, split, draw, remove, moveCorner, setSaid, undo, redo, save, paint, view: (x, y, z) => { view = { x, y, zoom: z }; repaint(); } };
+window.momaOutlines = { download: document.body.dataset.save ? send : download, text, stones: () => stones, select: (many) => { selected = many; show(); }, join, split, draw, remove, moveCorner, setSaid, undo, redo, save, paint, view: (x, y, z) => { view = { x, y, zoom: z }; repaint(); } };
 picture.onload = () => { resize(); fit(); document.documentElement.dataset.ready = "true"; };
 picture.src = data.picture;
 show();

@@ -15,6 +15,7 @@ from fastapi import FastAPI, HTTPException, Query, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import HTMLResponse, JSONResponse, PlainTextResponse
 from sqlalchemy.orm import Session
+from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException as StarletteHTTPException
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -30,15 +31,17 @@ from archmodel.tables.entries import latest_entry
 from ground.errors import DatabaseError, MomaError, UsageError
 from pipelines.reports.html import render
 from pipelines.reports.serve.answers import COLUMNS, Answers
-from pipelines.reports.serve.settings import ServeSettings
+from pipelines.reports.serve.settings import Editor, ServeSettings
 
 __all__ = ["application"]
 
 _LONGEST = 2000  # characters of an expression
 _MOST = 20  # expressions
-_SCRIPTS = re.compile(r'<script type="module">(.*?)</script>', re.DOTALL)
+_SCRIPTS = re.compile(r'<script(?: type="module")?>(.*?)</script>', re.DOTALL)
 _STYLES = re.compile(r"<style>(.*?)</style>", re.DOTALL)
 _COOKIE = "moma_token"
+_EDITED = "/outlines"
+_HEAVIEST = 100_000_000  # bytes of a save: 5,000 outlines take two million
 
 Kind = Annotated[str, Query(max_length=100, description="Kind of entity, with its subkinds.")]
 Where = Annotated[
@@ -54,24 +57,27 @@ Format = Annotated[str, Query(pattern="^(html|json|csv|geojson)$")]
 Page = Annotated[str, Query(pattern="^(html|json)$")]
 
 
-def application(database: Database, settings: ServeSettings) -> FastAPI:
-    """Return the application that serves a database; it reads, and nothing else.
+def application(database: Database, settings: ServeSettings, editor: Editor | None = None) -> FastAPI:
+    """Return the application that serves a database; without an editor it reads, and nothing else.
 
     Parameters
     ----------
     database : open
     settings : limits and token
+    editor : of outlines, at ``/outlines``
     """
     app = FastAPI(
         title="MOMA",
         version=version("moma-masonry"),
-        summary="An architectural database of masonry, to be read only",
+        summary="An architectural database of masonry",
         docs_url=None,
         redoc_url=None,
     )
     answers, room = Answers(settings.rows), threading.Semaphore(settings.at_once)
     _refusals(app)
-    _guards(app, settings)
+    _guards(app, settings, editor is not None)
+    if editor is not None:
+        _edits(app, editor)
 
     @contextmanager
     def asking(at: str | None = None) -> Iterator[Session]:
@@ -176,6 +182,25 @@ def application(database: Database, settings: ServeSettings) -> FastAPI:
     return app
 
 
+def _edits(app: FastAPI, editor: Editor) -> None:
+    """Add the page of outlines, and the way by which it saves."""
+
+    @app.get(_EDITED, response_class=HTMLResponse)
+    def outlines() -> Response:
+        text = editor.page()
+        policy = _policy(text).replace("default-src 'none';", "default-src 'none'; connect-src 'self';")
+        return HTMLResponse(text, headers={"Content-Security-Policy": policy})
+
+    @app.post(_EDITED)
+    async def save(request: Request) -> Response:
+        content = bytearray()
+        async for part in request.stream():
+            content += part
+            if len(content) > _HEAVIEST:
+                raise HTTPException(413, "These outlines are too many for one save.")
+        return JSONResponse(await run_in_threadpool(editor.save, bytes(content)))
+
+
 def _page(template: str, **values: Any) -> Response:
     text = render(f"serve/{template}", version=version("moma-masonry"), **values)
     return HTMLResponse(text, headers={"Content-Security-Policy": _policy(text)})
@@ -226,14 +251,15 @@ def _refusal(request: Request, status: int, told: str, headers: Any = None) -> R
     return HTMLResponse(text, status, {**dict(headers or {}), "Content-Security-Policy": _policy(text)})
 
 
-def _guards(app: FastAPI, settings: ServeSettings) -> None:
+def _guards(app: FastAPI, settings: ServeSettings, edits: bool) -> None:
     """Ask for the token, and add the headers that every response carries."""
 
     @app.middleware("http")
     async def guarded(request: Request, answer: Callable[[Request], Awaitable[Response]]) -> Response:
         given = _given(request)
         allowed = settings.token is None or hmac.compare_digest(given.encode(), settings.token.encode())
-        if request.method != "GET":
+        posted = edits and request.method == "POST" and request.url.path == _EDITED
+        if request.method != "GET" and not posted:
             response: Response = PlainTextResponse("read only\n", 405, {"Allow": "GET, HEAD"})
         elif not allowed:
             response = PlainTextResponse("a token is needed\n", 401, {"WWW-Authenticate": "Bearer"})

@@ -1,11 +1,23 @@
 """Settings of the server."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any, Protocol
 
-__all__ = ["LOCAL", "ServeSettings"]
+__all__ = ["LOCAL", "Editor", "ServeSettings"]
 
 LOCAL = ("127.0.0.1", "localhost", "::1")
 """Names of this machine for itself."""
+
+
+class Editor(Protocol):
+    """Page that a person edits, and what becomes of a save."""
+
+    def page(self) -> str:
+        """Return the page as HTML; it posts to ``outlines``."""
+
+    def save(self, content: bytes) -> Mapping[str, Any]:
+        """Take in what the page posts, and return what was done, with its words under "text"."""
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,16 @@ import numpy as np
 from ground.errors import SurveyError, UsageError
 from survey.arrays import Array
 
-__all__ = ["FIELDS", "Attributes", "Outline", "attributes_of", "distinct", "field_map", "made_code"]
+__all__ = [
+    "FIELDS",
+    "PROPOSED",
+    "Attributes",
+    "Outline",
+    "attributes_of",
+    "distinct",
+    "field_map",
+    "made_code",
+]
 
 FIELDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
@@ -33,6 +42,9 @@ FIELDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     }
 )  # fmt: skip
 """Names under which attributes are known, in English, German, French, Italian and Spanish."""
+
+PROPOSED = "proposed from image"
+"""Evidence of an outline that a program proposes: a hypothesis, until a person has looked at it."""
 
 _PLAIN = str.maketrans("àáâäãåçèéêëìíîïñòóôöõùúûü", "aaaaaaceeeeiiiinooooouuuu")
 

@@ -1,11 +1,10 @@
 """Knowledge of masonry about borders: the probability that two regions are two stones, and regions that are one.
 
 The probability is a logistic function of what was measured along a border and of the shapes on both sides of it: the
-mean strength of its joint, the share of it without a joint, the step of colour from one side to the other, how far the union of both is a fuller rectangle
-than each alone (a stone of
-ashlar is one, a course of two half-height stones is not), how level or upright it is, and the size of the
-smaller. Its weights were
-fitted to rendered walls with known stones (`python -m benchmarks.outlines --fit`), not to photographs.
+mean strength of its joint, the share of it without a joint, the step of colour across it, how far the union of both is
+a fuller rectangle than each alone (a stone of ashlar is one, a course of two half-height stones is not), how level or
+upright it is, and the size of the smaller. Its weights were fitted to rendered walls with known stones
+(`python -m benchmarks.outlines --fit`), not to photographs.
 """
 
 import heapq

@@ -58,7 +58,9 @@ def grains(channels: list[Field]) -> NDArray[np.float32]:
     out = np.stack([uniform_filter(one, round(WIDTH)) for one in channels])
     apart = 2 * round(WIDTH)
     usual = [np.median(np.abs(one[:, apart:] - one[:, :-apart])) for one in out]
-    return (out / np.maximum(1.4826 * np.array(usual, dtype=np.float32), 1e-6)[:, None, None]).astype(np.float32)
+    return (out / np.maximum(1.4826 * np.array(usual, dtype=np.float32), 1e-6)[:, None, None]).astype(
+        np.float32
+    )
 
 
 def _relief(depth: Field) -> Field:

@@ -17,6 +17,8 @@ _LEANS = 3.5  # angle of a side from upright from which it is radial [degrees]
 _STEEP = 12.0  # and from which it is the skewback of an arch, beside it
 _TOUCHES = 0.20  # distance from an opening, over the height of a stone, up to which a stone bounds it
 _EDGE = 0.35  # part of the height of an opening, of its top, in which its arch or lintel lies
+_CORNER = 0.15  # distance of an end of a course from the end of the wall, over its height, up to which they are flush
+_FLUSH = (4, 0.75)  # courses of a wall, and part of them that end flush, from which it has a corner there
 _BESIDE = 0.5  # part of a stone's height that lies beside an opening, for a jamb
 
 
@@ -38,7 +40,9 @@ class Named:
     place: int
 
 
-def name_stones(rings: Sequence[Array], openings: Sequence[Array], coursed: bool) -> list[Named]:
+def name_stones(
+    rings: Sequence[Array], openings: Sequence[Array], coursed: bool, cut: Sequence[bool] | None = None
+) -> list[Named]:
     """Name stones by their place.
 
     Parameters
@@ -46,6 +50,7 @@ def name_stones(rings: Sequence[Array], openings: Sequence[Array], coursed: bool
     rings : (n, 2) outlines, to the right and upwards [m]
     openings : (2, 2) lower left and upper right corner of each opening [m]
     coursed : whether the wall has courses
+    cut : stones that the edge of the picture cuts; None: none
     """
     if not rings:
         return []
@@ -55,6 +60,8 @@ def name_stones(rings: Sequence[Array], openings: Sequence[Array], coursed: bool
         _around(rings, boxes, opening, kinds, coursed)
     arch = np.array([kind in ("voussoir", "keystone") for kind in kinds])
     courses = _courses(boxes, arch) if coursed else _rows(boxes)
+    if coursed:
+        _corners(boxes, courses, kinds, cut or [False] * len(rings))
     out: list[Named | None] = [None] * len(rings)
     for number, members in enumerate(courses, start=1):
         for place, k in enumerate(members, start=1):
@@ -167,6 +174,21 @@ def _around(rings: Sequence[Array], boxes: Array, opening: Array, kinds: list[st
             best = min(crown, key=lambda k: abs(float(boxes[k, :, 0].mean()) - middle))
             if abs(float(boxes[best, :, 0].mean()) - middle) < 0.25 * (boxes[best, 1, 0] - boxes[best, 0, 0]):
                 kinds[best] = "keystone"
+
+
+def _corners(boxes: Array, courses: Sequence[Sequence[int]], kinds: list[str], cut: Sequence[bool]) -> None:
+    """Name the quoins: the last stones of courses that end flush, where the wall is seen to end."""
+    for side, place in ((0, 0), (1, -1)):
+        ends = [members[place] for members in courses if not cut[members[place]]]
+        if len(ends) < _FLUSH[0]:
+            continue
+        outer = boxes[ends, side, 0]
+        height = boxes[ends, 1, 1] - boxes[ends, 0, 1]
+        flush = np.abs(outer - np.median(outer)) < _CORNER * height
+        if flush.sum() < max(_FLUSH[0], _FLUSH[1] * len(courses)):
+            continue
+        for k in np.array(ends)[flush].tolist():
+            kinds[k] = kinds[k] or "quoin"
 
 
 def _touch(one: Array, other: Array, reach: float) -> bool:

@@ -181,7 +181,12 @@ def _assembled(
     rings = [_counter_clockwise(places.place(one.ring)) for one in stones]
     openings = [np.sort(places.place(box), axis=0) for box in voids]
     coursed = kind != "rubble"
-    named = name_stones(rings, openings, coursed)
+    last = np.array([shape[1], shape[0]]) - 1.0 - 0.5 * width
+    cut = [
+        bool((one.ring.min(axis=0) < 0.5 * width).any() or (one.ring.max(axis=0) > last).any())
+        for one in stones
+    ]
+    named = name_stones(rings, openings, coursed, cut)
     order = sorted(
         range(len(stones)), key=lambda k: (named[k].course or 0, named[k].course is None, named[k].code)
     )
@@ -189,11 +194,7 @@ def _assembled(
     out, borders = [], []
     for k in order:
         one = stones[k]
-        low, high = one.ring.min(axis=0), one.ring.max(axis=0)
-        cut = bool(
-            (low < 0.5 * width).any() or (high > np.array([shape[1], shape[0]]) - 1.0 - 0.5 * width).any()
-        )
-        out.append(ProposedStone(named[k], rings[k], one.score, one.sigma * places.pixel, cut))
+        out.append(ProposedStone(named[k], rings[k], one.score, one.sigma * places.pixel, cut[k]))
         for other, chance, place, length in one.borders:
             if other >= 0 and number[k] < number.get(other, -1):
                 x, y = places.place(np.array([place]))[0].tolist()
