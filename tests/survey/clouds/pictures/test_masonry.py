@@ -1,5 +1,7 @@
 """Corners of walls: stones that end flush are quoins where the wall is seen to end, and nowhere else."""
 
+import itertools
+
 import numpy as np
 
 from survey.clouds.pictures.masonry import name_stones
@@ -13,7 +15,7 @@ def wall(courses=5, ragged=0.0, joint=0.01):
     rings = []
     for k in range(courses):
         heads = np.cumsum([ragged * (k % 2), FRONT[k % 2], 0.5, 0.5, FRONT[(k + 1) % 2]])
-        for left, right in zip(heads[:-1], heads[1:], strict=True):
+        for left, right in itertools.pairwise(heads):
             low, high = k * HEIGHT, (k + 1) * HEIGHT - joint
             rings.append(np.array([[left, low], [right - joint, low], [right - joint, high], [left, high]]))
     return rings
