@@ -275,7 +275,7 @@ def ingest(
 
 @dataclass(frozen=True)
 class MasonryChoices:
-    """What no survey tells of masonry."""
+    """Qualities of masonry that no survey tells."""
 
     mortar: Annotated[
         Level | None, typer.Option(help="Quality of the mortar, for the masonry quality index.")

@@ -99,7 +99,9 @@ class OutlineEditor:
             by_hand = sum(feature.said.get("evidence") == CORRECTED for feature in features)
             codes = {feature.code for feature in features}
             gone = sorted(
-                one.code for one in read_outlines(self.folder / NAMES[0]).outlines if one.code not in codes
+                outline.code
+                for outline in read_outlines(self.folder / NAMES[0]).outlines
+                if outline.code not in codes
             )
             write_shared(self.folder / SAVED, content)
             text = f"Saved: {len(features)} stones, {by_hand} by hand, {len(gone)} proposals superseded."
@@ -123,4 +125,4 @@ class OutlineEditor:
                 entry = new_entry(session, "declaration", f"deleted in the page of {self.folder.name}")
                 withdraw_hypotheses(session, entry, deleted)
                 relate(session)
-        return [f"{one.code}: {one.reason}" for file in report.files for one in file.refused]
+        return [f"{stone.code}: {stone.reason}" for file in report.files for stone in file.refused]

@@ -14,6 +14,7 @@ from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import expit
 
 from survey.arrays import Array, Ints
 from survey.clouds.pictures.joints import WIDTH, Strength
@@ -38,8 +39,6 @@ stones on twelve photographs were split, at 0.65 2 %, with one in 138 fewer foun
 
 _STRONGEST = 1.5  # strength over that of a usual joint above which more says nothing
 _GAP = 0.25  # strength over that of a usual joint below which there is none
-_PLAIN = 5  # sums of a border before its steps
-_GRAINS = 8.0  # step of colour over the grain of the stone above which more says nothing
 _LARGE = 20.0  # size of a region over the width of a joint from which it is surely no fragment
 
 
@@ -94,11 +93,11 @@ class Bond:
         askew = 1.0 - abs(2.0 * across - 1.0)
         size = np.log(min(np.sqrt(min(first, second)) / WIDTH, _LARGE))
         step = np.linalg.norm(border.steps[1:]) / max(border.steps[0], 1.0)
-        return np.array([1.0, strength, gaps, fuller, askew, size, np.log1p(min(step, _GRAINS))])
+        return np.array([1.0, strength, gaps, fuller, askew, size, np.log1p(step)])
 
     def probability(self, a: int, b: int) -> float:
         """Return the probability that there is a joint between two regions."""
-        return float(1.0 / (1.0 + np.exp(-np.clip(self.features(a, b) @ self.weights, -30.0, 30.0))))
+        return float(expit(self.features(a, b) @ self.weights))
 
     def join(self, a: int, b: int) -> None:
         """Make one region of two; it keeps the number `a`."""
@@ -143,8 +142,9 @@ def bond_of(
     for k in np.flatnonzero(areas).tolist():
         if k:
             borders[k] = {}
-    for (a, b), length, row in zip(found.pairs.tolist(), found.lengths.tolist(), sums, strict=True):
-        borders[a][b] = borders[b][a] = Border(length, row[:_PLAIN], row[_PLAIN:])
+    every = zip(found.pairs.tolist(), found.lengths.tolist(), sums, found.steps, strict=True)
+    for (a, b), length, row, steps in every:
+        borders[a][b] = borders[b][a] = Border(length, row, steps)
     limits = {
         k: (boxes[k - 1][0].start, boxes[k - 1][0].stop, boxes[k - 1][1].start, boxes[k - 1][1].stop)
         for k in borders

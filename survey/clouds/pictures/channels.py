@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from survey.arrays import Bools
 from survey.clouds.pictures.joints import WIDTH, Field
+from survey.statistics.scale import CONSISTENT
 
 __all__ = ["channels_of", "covered", "grains", "lightness", "openings"]
 
@@ -55,12 +56,10 @@ def grains(channels: list[Field]) -> NDArray[np.float32]:
     """Return smoothed channels (c, h, w), each over the usual difference between places two joints apart."""
     from scipy.ndimage import uniform_filter
 
-    out = np.stack([uniform_filter(one, round(WIDTH)) for one in channels])
+    out = np.stack([uniform_filter(channel, round(WIDTH)) for channel in channels])
     apart = 2 * round(WIDTH)
-    usual = [np.median(np.abs(one[:, apart:] - one[:, :-apart])) for one in out]
-    return (out / np.maximum(1.4826 * np.array(usual, dtype=np.float32), 1e-6)[:, None, None]).astype(
-        np.float32
-    )
+    usual = CONSISTENT * np.median(np.abs(out[:, :, apart:] - out[:, :, :-apart]), axis=(1, 2))
+    return (out / np.where(usual > 0.0, usual, 1.0)[:, None, None]).astype(np.float32)
 
 
 def _relief(depth: Field) -> Field:

@@ -15,10 +15,11 @@ _SHARED = 0.5  # part of the lesser height that two neighbours of one course sha
 _NEAR = 0.25  # distance between neighbours of a course, over their height
 _LEANS = 3.5  # angle of a side from upright from which it is radial [degrees]
 _STEEP = 12.0  # and from which it is the skewback of an arch, beside it
-_TOUCHES = 0.20  # distance from an opening, over the height of a stone, up to which a stone bounds it
+_TOUCHES = (
+    0.20  # distance from an opening or a corner, over the height of a stone, up to which a stone bounds it
+)
 _EDGE = 0.35  # part of the height of an opening, of its top, in which its arch or lintel lies
-_CORNER = 0.15  # distance of an end of a course from the end of the wall, over its height, up to which they are flush
-_FLUSH = (4, 0.75)  # courses of a wall, and part of them that end flush, from which it has a corner there
+_FEWEST = 3  # stones of an arch, and courses that end flush at a corner
 _BESIDE = 0.5  # part of a stone's height that lies beside an opening, for a jamb
 
 
@@ -167,7 +168,7 @@ def _around(rings: Sequence[Array], boxes: Array, opening: Array, kinds: list[st
         beside = [j for j in over if _touch(boxes[j], boxes[k], _TOUCHES * (boxes[k, 1, 1] - boxes[k, 0, 1]))]
         if kinds[k] in ("", "jamb") and beside and _radial_sides(ring, _STEEP) == 1:
             kinds[k] = "springer"
-    if len(over) >= 3:
+    if len(over) >= _FEWEST:
         middle = 0.5 * (left + right)
         crown = [k for k in over if boxes[k, 0, 0] < middle < boxes[k, 1, 0]]
         if crown:
@@ -180,12 +181,12 @@ def _corners(boxes: Array, courses: Sequence[Sequence[int]], kinds: list[str], c
     """Name the quoins: the last stones of courses that end flush, where the wall is seen to end."""
     for side, place in ((0, 0), (1, -1)):
         ends = [members[place] for members in courses if not cut[members[place]]]
-        if len(ends) < _FLUSH[0]:
+        if not ends:
             continue
         outer = boxes[ends, side, 0]
         height = boxes[ends, 1, 1] - boxes[ends, 0, 1]
-        flush = np.abs(outer - np.median(outer)) < _CORNER * height
-        if flush.sum() < max(_FLUSH[0], _FLUSH[1] * len(courses)):
+        flush = np.abs(outer - np.median(outer)) < _TOUCHES * height
+        if flush.sum() < max(_FEWEST, 2 * len(courses) / _FEWEST):  # two of three
             continue
         for k in np.array(ends)[flush].tolist():
             kinds[k] = kinds[k] or "quoin"

@@ -183,8 +183,8 @@ def _assembled(
     coursed = kind != "rubble"
     last = np.array([shape[1], shape[0]]) - 1.0 - 0.5 * width
     cut = [
-        bool((one.ring.min(axis=0) < 0.5 * width).any() or (one.ring.max(axis=0) > last).any())
-        for one in stones
+        bool((stone.ring.min(axis=0) < 0.5 * width).any() or (stone.ring.max(axis=0) > last).any())
+        for stone in stones
     ]
     named = name_stones(rings, openings, coursed, cut)
     order = sorted(

@@ -25,14 +25,15 @@ class Borders:
     ----------
     pairs : (n, 2) numbers of the regions, the smaller first
     lengths : (n,) pixels along each
-    sums : (n, k + 2 + c) sums along each: what is measured, the number of its pixels that part columns, the number
-        of those beyond which the regions go on on both sides, and there the steps of the colours from the first to
-        the second
+    sums : (n, k + 1) sums of what is measured along each, and the number of its pixels that part columns
+    steps : (n, 1 + c) number of its pixels beyond which both regions go on, and the sums of the steps of the colours
+        there, from the first to the second
     """
 
     pairs: Ints
     lengths: Array
     sums: Array
+    steps: Array
 
 
 def typical_strength(strength: Strength) -> float:
@@ -101,7 +102,7 @@ def borders_of(regions: Ints, measures: NDArray[np.float32], sides: NDArray[np.f
     measures : (k, h, w) what is summed along borders; of two pixels on both sides the larger counts
     sides : (c, h, w) colours, of which the steps across borders are summed
     """
-    pairs, values = [], []
+    pairs, values, colours = [], [], []
     for axis in (1, 0):
         count = regions.shape[axis]
         a, b = (np.take(regions, np.arange(k, count - 1 + k), axis=axis) for k in (0, 1))
@@ -115,11 +116,14 @@ def borders_of(regions: Ints, measures: NDArray[np.float32], sides: NDArray[np.f
         there[axis] = np.minimum(at[axis] + 1 + _REACH, count - 1)
         inside = (regions[*here] == first) & (regions[*there] == second)
         turned = np.where(first < second, inside, -1.0 * inside)
-        steps = ((sides[:, *there] - sides[:, *here]) * turned).T
-        values.append(np.column_stack([larger, np.full(len(first), float(axis)), inside, steps]))
-    every, found = np.concatenate(pairs), np.concatenate(values)
+        values.append(np.column_stack([larger, np.full(len(first), float(axis))]))
+        colours.append(np.column_stack([inside, ((sides[:, *there] - sides[:, *here]) * turned).T]))
+    every = np.concatenate(pairs)
     base = int(regions.max()) + 1
     keys, where = np.unique(every[:, 0] * base + every[:, 1], return_inverse=True)
     lengths = np.bincount(where, minlength=len(keys)).astype(np.float64)
-    sums = np.column_stack([np.bincount(where, column, len(keys)) for column in found.T])
-    return Borders(np.column_stack([keys // base, keys % base]), lengths, np.asarray(sums, dtype=np.float64))
+    sums, steps = (
+        np.column_stack([np.bincount(where, column, len(keys)) for column in np.concatenate(parts).T])
+        for parts in (values, colours)
+    )
+    return Borders(np.column_stack([keys // base, keys % base]), lengths, sums, steps)

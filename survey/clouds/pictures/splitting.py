@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import expit
 
 from survey.arrays import Array, Bools, Ints
 from survey.clouds.pictures.joints import WIDTH, Field, Strength
@@ -154,8 +155,7 @@ def _beyond(shape: tuple[int, ...], line: Line) -> Bools:
 
 def _probability(whole: Bools, after: Bools, line: Line) -> float:
     """Return the probability of a line."""
-    value = float(line_features(whole, after, line) @ np.array(MISSING_WEIGHTS))
-    return float(1.0 / (1.0 + np.exp(-np.clip(value, -30.0, 30.0))))
+    return float(expit(line_features(whole, after, line) @ np.array(MISSING_WEIGHTS)))
 
 
 def line_features(whole: Bools, after: Bools, line: Line) -> Array:

@@ -39,7 +39,7 @@ def folder(tmp_path):
     (made / NAMES[0]).write_text(geojson_text(stones, "outlines"), encoding="utf-8")
     (made / INDEX).write_text("{}", encoding="utf-8")
     pixels = np.full((30, 160, 3), 150, np.uint8)
-    shown = [{"code": one.code, "ring": one.ring.tolist(), "said": dict(one.said)} for one in stones]
+    shown = [{"code": stone.code, "ring": stone.ring.tolist(), "said": dict(stone.said)} for stone in stones]
     page = editor_html("Wall", pixels, np.diag([0.01, -0.01]), np.array([0.005, 0.295]), shown, [], [])
     (made / PAGE).write_text(page, encoding="utf-8")
     return made

@@ -22,7 +22,7 @@ def wall(courses=5, ragged=0.0, joint=0.01):
 
 
 def kinds(rings, cut=None):
-    return [one.kind for one in name_stones(rings, [], coursed=True, cut=cut)]
+    return [stone.kind for stone in name_stones(rings, [], coursed=True, cut=cut)]
 
 
 def test_stones_at_both_ends_of_a_wall_are_quoins():
@@ -41,4 +41,4 @@ def test_the_edge_of_the_picture_is_no_corner():
 
 def test_courses_that_end_ragged_or_are_few_make_no_corner():
     assert "quoin" not in kinds(wall(ragged=0.2))[0::4]
-    assert "quoin" not in kinds(wall(courses=3))
+    assert "quoin" not in kinds(wall(courses=2))
