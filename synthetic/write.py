@@ -245,7 +245,7 @@ def _write_rubble_wall(folder: Path) -> WrittenSample:
     width, height = SIZE
     taken = f"--masks {mask} --size {width:g}x{height:g} --depth {DEPTH:g} --kind rubble"
     commands = _pushed(taken, scene)
-    files = {
+    files: dict[Path, str | bytes] = {
         mask: mask_png(wall),
         folder / "truth.json": rubble_truth(wall),
         scene: RUBBLE_SCENE.format(commands=_listed(commands)),

@@ -200,7 +200,7 @@ def _canons(session: Session, cls: type[Kind]) -> Iterator[Event]:
             "said" if earlier is None else "replaced",
             "canon",
             values,
-            earlier and _canon(earlier),
+            None if earlier is None else _canon(earlier),
         )
         if canon.superseded_by is not None and canon.id not in replaced:
             yield _event(canon.superseded_by, "withdrawn", "canon", values)

@@ -287,7 +287,7 @@ def _structures(session: Session, run: int, count: int) -> list[dict[str, object
         known = {code: values[name] for code, values in results.items() if name in values}
         rows += [
             {"structure": code, "result": name, "value": known[code], "unit": quantity.unit}
-            for code in sorted(known, key=lambda code, known=known: -known[code])[:count]
+            for code in sorted(known, key=known.__getitem__, reverse=True)[:count]
         ]
     return rows
 
@@ -299,6 +299,7 @@ def _structure_changes(session: Session, run: int, other: int, count: int) -> li
     for name, quantity in quantities_of(*structure_kinds()).items():
         both = [code for code in now if name in now[code] and name in then.get(code, {})]
         changes = {code: now[code][name] - then[code][name] for code in both}
+        sizes = {code: abs(change) for code, change in changes.items()}
         rows += [
             {
                 "structure": code,
@@ -308,7 +309,7 @@ def _structure_changes(session: Session, run: int, other: int, count: int) -> li
                 "change": changes[code],
                 "unit": quantity.unit,
             }
-            for code in sorted(changes, key=lambda code, changes=changes: -abs(changes[code]))[:count]
+            for code in sorted(changes, key=sizes.__getitem__, reverse=True)[:count]
             if changes[code]
         ]
     return rows

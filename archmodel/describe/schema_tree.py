@@ -92,8 +92,10 @@ def _terms(session: Session) -> list[dict[str, object]]:
 
 def _canonical(canon: Proportions | None) -> str | None:
     """Return canonical proportions in words."""
-    if canon is None or canon.tolerance is None:
-        return canon and canon.expression
+    if canon is None:
+        return None
+    if canon.tolerance is None:
+        return canon.expression
     return f"{canon.expression}, within {100.0 * canon.tolerance:.3g} %"
 
 

@@ -129,9 +129,14 @@ def _result(name: str) -> Source:
 
 
 def _attribute(
-    name: str, unit: str | None, meaning: str, source: Any, words: tuple[str, ...] | None = None
+    name: str,
+    unit: str | None,
+    meaning: str,
+    source: Any,
+    words: tuple[str, ...] | None = None,
+    of_run: bool = False,
 ) -> Attribute:
-    return Attribute(name, unit, meaning, source, words=words)
+    return Attribute(name, unit, meaning, source, words=words, of_run=of_run)
 
 
 STRUCTURE_ATTRIBUTES: Mapping[str, Attribute] = {
@@ -171,7 +176,7 @@ STRUCTURE_ATTRIBUTES: Mapping[str, Attribute] = {
         ),
         CANON,
         *(
-            Attribute(quantity.name, quantity.unit, quantity.meaning, _result(quantity.name), of_run=True)
+            _attribute(quantity.name, quantity.unit, quantity.meaning, _result(quantity.name), of_run=True)
             for quantity in quantities_of(*structure_kinds()).values()
         ),
     )

@@ -167,7 +167,9 @@ def _places(session: Session, numbers: Sequence[int]) -> dict[int, FacePlace]:
     )  # fmt: skip
     for batch in batches(numbers):
         for row in session.execute(select(*columns).where(Measurement.id.in_(batch))):
-            entity, outline, *plane, sigma = row
+            entity, outline, normal, centroid, axes, covariance, sigma = row
             if len(outline) > 2:
-                places[entity] = face_place(outline, *plane, sigma[: len(outline)])
+                places[entity] = face_place(
+                    outline, normal, centroid, axes, covariance, sigma[: len(outline)]
+                )
     return places

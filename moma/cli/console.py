@@ -115,7 +115,7 @@ def reporting(command: Callable[..., None]) -> Callable[..., None]:
     The fields of a dataclass among its parameters become options in its place: the command receives the dataclass.
     """
     signature = inspect.signature(command)
-    groups = {
+    groups: dict[str, Any] = {
         name: parameter.annotation
         for name, parameter in signature.parameters.items()
         if is_dataclass(parameter.annotation)

@@ -5,6 +5,7 @@ both versions made databases that have some of these columns and say that they a
 """
 
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 from alembic import op
 from sqlalchemy import (
@@ -74,31 +75,37 @@ def _tables() -> MetaData:
     layout = MetaData()
     for name in ("entry", "run", "structure"):
         metadata.tables[name].to_metadata(layout)
-    contents = {
+    contents: dict[str, tuple[tuple[str, ...], tuple[Column[Any], ...]]] = {
         "opinion_rule": (
             ("ix_opinion_rule_about", "about"),
-            Column("about", TEXT, nullable=False),
-            Column("rule", TEXT, nullable=False),
-            Column("authors", JSON, nullable=False),
+            (
+                Column("about", TEXT, nullable=False),
+                Column("rule", TEXT, nullable=False),
+                Column("authors", JSON, nullable=False),
+            ),
         ),
         "canon": (
             ("ix_canon_kind", "kind"),
-            Column("kind", TEXT, nullable=False),
-            Column("proportions", TEXT),
-            Column("tolerance", Double),
-            Column("supersedes_id", Integer, ForeignKey("canon.id")),
+            (
+                Column("kind", TEXT, nullable=False),
+                Column("proportions", TEXT),
+                Column("tolerance", Double),
+                Column("supersedes_id", Integer, ForeignKey("canon.id")),
+            ),
         ),
         "term": (
             ("ix_term_name", "vocabulary", "name"),
-            Column("vocabulary", TEXT, nullable=False),
-            Column("name", TEXT, nullable=False),
-            Column("definition", TEXT),
-            Column("broader", TEXT),
-            Column("labels", JSON, nullable=False),
-            Column("supersedes_id", Integer, ForeignKey("term.id")),
+            (
+                Column("vocabulary", TEXT, nullable=False),
+                Column("name", TEXT, nullable=False),
+                Column("definition", TEXT),
+                Column("broader", TEXT),
+                Column("labels", JSON, nullable=False),
+                Column("supersedes_id", Integer, ForeignKey("term.id")),
+            ),
         ),
     }
-    for name, (index, *columns) in contents.items():
+    for name, (index, columns) in contents.items():
         Table(
             name,
             layout,

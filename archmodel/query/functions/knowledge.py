@@ -67,7 +67,7 @@ def observed(scope: Scope, call: Call, ask: Ask) -> Condition:
     least = _severity(values[1]) if len(values) == 2 else None
 
     def conditions(said: FromClause) -> list[Condition]:
-        of_type = [said.c.type.in_(types)] if types else []
+        of_type: list[Condition] = [said.c.type.in_(types)] if types else []
         return of_type if least is None else [*of_type, said.c.severity >= least]
 
     context = scope.context

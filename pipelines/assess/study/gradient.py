@@ -155,11 +155,11 @@ def _kinked(
     The second answer is the largest change of a contact as all unknowns change.
     """
     on = at.limited.on
-    ends = [_power(at, changed(dict(enumerate((sign * steps).tolist())))) for sign in (1.0, -1.0)]
+    ahead, back = (_power(at, changed(dict(enumerate((sign * steps).tolist())))) for sign in (1.0, -1.0))
     kinked = np.zeros(len(on.model.mass), dtype=np.bool_)
-    if ends[0] is None or ends[1] is None:
+    if ahead is None or back is None:
         return ~kinked, 0.0
-    plus, minus = (end[1] - start[1] for end in ends)
+    plus, minus = ahead[1] - start[1], back[1] - start[1]
     largest = np.maximum(np.abs(plus), np.abs(minus))
     off = np.abs(plus + minus)
     scale = float(largest.max(initial=0.0))
@@ -234,7 +234,7 @@ def _matched(base: RigidAssembly, on: RigidAssembly) -> Ints | None:
     _, joint = np.unique(base.contacts.bodies, axis=0, return_inverse=True)
     apart = 10.0 * np.ptp(places[0], axis=0).max()
     (known, found) = (np.column_stack([place, apart * joint.ravel()]) for place in places)
-    rows: Ints = cKDTree(found).query(known)[1]
+    rows: Ints = np.asarray(cKDTree(found).query(known)[1], dtype=np.int64)
     return rows if len(np.unique(rows)) == len(rows) else None
 
 

@@ -166,9 +166,9 @@ def _law(properties: Mapping[str, Any]) -> Law:
     # without a cutoff, the cone of Mohr and Coulomb ends at its apex
     apex = shear / friction if friction else shear
     tension = min(apex, float(cutoff)) if cutoff is not None else apex
-    stiffness = [springs.get(name) for name in ("kn", "kt")]
-    if all(one is not None for one in stiffness):
-        normal, tangential = map(float, stiffness)
+    stiffness = [float(springs[name]) for name in ("kn", "kt") if springs.get(name) is not None]
+    if len(stiffness) == 2:
+        normal, tangential = stiffness
         return ElasticJoint(
             friction=friction,
             tension=tension,

@@ -1,6 +1,6 @@
 """Project files of `moma orient`: where marks, control points, cameras and photographs are, and what is estimated."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -247,8 +247,8 @@ _TABLES = ("cameras", "photos", "scale_bars", "plumb_lines")
 def _with_lengths(
     document: TomlDocument,
     network: Network,
-    bars: list[Mapping[str, Any]],
-    plumb_lines: list[Mapping[str, Any]],
+    bars: Sequence[tuple[tuple[str, ...], Mapping[str, Any]]],
+    plumb_lines: Sequence[tuple[tuple[str, ...], Mapping[str, Any]]],
 ) -> Network:
     """Give a network its scale bars and plumb lines."""
     index = {name: k for k, name in enumerate(network.names)}
@@ -263,13 +263,11 @@ def _with_lengths(
         return tuple(index[name] for name in names)
 
     made_bars, made_lines = list[ScaleBar](), list[PlumbLine]()
-    for k, given in enumerate(bars):
-        path = ("scale_bars", str(k))
+    for path, given in bars:
         bar = read_table(document, path, given, ScaleBarTable, "[[scale_bars]]")
         first, second = points(bar.points, *path)
         made_bars.append(ScaleBar((first, second), bar.length, bar.sigma, document.where(*path)))
-    for k, given in enumerate(plumb_lines):
-        path = ("plumb_lines", str(k))
+    for path, given in plumb_lines:
         line = read_table(document, path, given, PlumbLineTable, "[[plumb_lines]]")
         made_lines.append(PlumbLine(points(line.points, *path), line.sigma, document.where(*path)))
     return replace(network, bars=tuple(made_bars), plumb_lines=tuple(made_lines))

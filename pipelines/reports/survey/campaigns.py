@@ -100,8 +100,8 @@ def compare_campaigns(
     for code, pair in places.items():
         normal = after[code].normal
         along = np.eye(3) - np.outer(normal, normal)
-        looser = (FacePlace(stone.centroid, stone.covariance + scatter**2 * along) for stone in pair)
-        moved_by = displacement(*looser)
+        first, second = (FacePlace(face.centroid, face.covariance + scatter**2 * along) for face in pair)
+        moved_by = displacement(first, second)
         moved.append(MovedStone(code, moved_by, float(moved_by.vector @ normal)))
     moved.sort(key=lambda stone: -stone.displacement.distance / stone.displacement.sigma)
     vectors = np.array([stone.displacement.vector for stone in moved]).reshape(-1, 3)

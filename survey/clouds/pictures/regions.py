@@ -1,6 +1,7 @@
 """Closed regions between joints, and the borders that they share."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,21 +110,29 @@ def borders_of(regions: Ints, measures: NDArray[np.float32], sides: NDArray[np.f
         at = np.nonzero((a != b) & (a > 0) & (b > 0))
         first, second = a[at], b[at]
         pairs.append(np.sort(np.column_stack([first, second]), axis=1))
-        here, there = ([*at], [*at])
-        there[axis] = at[axis] + 1
-        larger = np.maximum(measures[:, *here], measures[:, *there]).T
-        here[axis] = np.maximum(at[axis] - _REACH, 0)
-        there[axis] = np.minimum(at[axis] + 1 + _REACH, count - 1)
-        inside = (regions[*here] == first) & (regions[*there] == second)
-        turned = np.where(first < second, inside, -1.0 * inside)
+        larger = np.maximum(_at(measures, at, axis, 0), _at(measures, at, axis, 1)).T
         values.append(np.column_stack([larger, np.full(len(first), float(axis))]))
-        colours.append(np.column_stack([inside, ((sides[:, *there] - sides[:, *here]) * turned).T]))
+        before, behind = -_REACH, 1 + _REACH
+        inside = (_at(regions, at, axis, before) == first) & (_at(regions, at, axis, behind) == second)
+        turned = np.where(first < second, inside, -1.0 * inside)
+        steps = (_at(sides, at, axis, behind) - _at(sides, at, axis, before)) * turned
+        colours.append(np.column_stack([inside, steps.T]))
     every = np.concatenate(pairs)
     base = int(regions.max()) + 1
     keys, where = np.unique(every[:, 0] * base + every[:, 1], return_inverse=True)
     lengths = np.bincount(where, minlength=len(keys)).astype(np.float64)
     sums, steps = (
-        np.column_stack([np.bincount(where, column, len(keys)) for column in np.concatenate(parts).T])
+        np.column_stack(
+            [np.bincount(where, column, len(keys)).astype(np.float64) for column in np.concatenate(parts).T]
+        )
         for parts in (values, colours)
     )
     return Borders(np.column_stack([keys // base, keys % base]), lengths, sums, steps)
+
+
+def _at(image: NDArray[Any], places: tuple[NDArray[np.intp], ...], axis: int, shift: int) -> NDArray[Any]:
+    """Return the values (…, n) of an image (…, h, w) at places, moved along an axis within it."""
+    rows, columns = places
+    if axis == 0:
+        return image[..., np.clip(rows + shift, 0, image.shape[-2] - 1), columns]
+    return image[..., rows, np.clip(columns + shift, 0, image.shape[-1] - 1)]

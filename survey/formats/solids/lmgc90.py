@@ -125,7 +125,8 @@ def _box(contactor: _Contactor, where: str) -> tuple[Array, Sequence[tuple[int, 
 def _placed(corners: Array, body: _Body, frame: Array | None) -> Array:
     """Return corners (n, 3), which are about the centre of the body in its axes, in the frame of the file."""
     centre = np.array([body.place.get(f"coo{axis}", 0.0) for axis in (1, 2, 3)])
-    return corners + centre if frame is None else corners @ frame[:3] + centre + frame[3]
+    placed: Array = corners + centre if frame is None else corners @ frame[:3] + centre + frame[3]
+    return placed
 
 
 def _bodies(path: Path) -> Iterator[_Body]:

@@ -1,4 +1,4 @@
-"""Whether photographs agree with each other, and which control points contradict them."""
+"""Agreement of photographs with each other, and control points that contradict them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

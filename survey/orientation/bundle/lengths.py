@@ -25,7 +25,7 @@ from survey.orientation.bundle.adjustment import (
     prior,
     similarity,
 )
-from survey.orientation.network import Network
+from survey.orientation.network import Network, PlumbLine, ScaleBar
 
 __all__ = ["LengthFit", "check_lengths", "fit_lengths", "with_lengths"]
 
@@ -71,7 +71,8 @@ def check_lengths(network: Network, prepared: Prepared) -> None:
         naming the point that the marks do not determine
     """
     controlled = {gcp.point for gcp in network.control if not gcp.check}
-    for line in (*network.bars, *network.plumb_lines):
+    lines: list[ScaleBar | PlumbLine] = [*network.bars, *network.plumb_lines]
+    for line in lines:
         for i in line.points:
             rays = int(prepared.rays.start[i + 1] - prepared.rays.start[i])
             if rays < 2 and i not in controlled:
@@ -251,4 +252,5 @@ def _upright(up: Array) -> Array:
     if cosine < -1.0 + 1e-12:
         return np.diag([1.0, -1.0, -1.0])
     cross = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
-    return np.eye(3) + cross + cross @ cross / (1.0 + cosine)
+    turn: Array = np.eye(3) + cross + cross @ cross / (1.0 + cosine)
+    return turn
