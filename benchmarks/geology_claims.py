@@ -124,11 +124,15 @@ def _numbers(found: Sequence[Finding], digits: int) -> str:
     texts = []
     for label in found[0].numbers:
         values = np.array([one.numbers[label] for one in found], dtype=float)
-        means = " → ".join(f"{mean:.{digits}f}" for mean in values.mean(axis=0))
-        deviation = (
-            " → ".join(f"{one:.{digits}f}" for one in values.std(axis=0, ddof=1)) if len(found) > 1 else ""
-        )
-        texts.append(f"{label}: {means}" + (f" (± {deviation})" if deviation else ""))
+        told = np.isfinite(values).all(axis=1)
+        if not told.any():
+            texts.append(f"{label}: not determined")
+            continue
+        means = " → ".join(f"{mean:.{digits}f}" for mean in values[told].mean(axis=0))
+        scatter = values[told].std(axis=0, ddof=1) if told.sum() > 1 else ()
+        deviation = " → ".join(f"{one:.{digits}f}" for one in scatter)
+        some = f" in {told.sum()} of {len(told)} seeds" if not told.all() else ""
+        texts.append(f"{label}: {means}" + (f" (± {deviation})" if deviation else "") + some)
     return "; ".join(texts)
 
 
