@@ -6,7 +6,7 @@ therefore markers; type checkers see the arrays.
 
 from typing import TYPE_CHECKING
 
-__all__ = ["Array", "Bools", "Ints", "Texts"]
+__all__ = ["Array", "Bools", "Ints", "Texts", "Values"]
 
 if TYPE_CHECKING:
     import numpy as np
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     Bools = NDArray[np.bool_]
     Ints = NDArray[np.int64]
     Texts = NDArray[np.str_]
+    Values = NDArray[np.generic]
 else:
 
     class Array:
@@ -29,3 +30,6 @@ else:
 
     class Texts:
         """Array of texts."""
+
+    class Values:
+        """Array of any type."""

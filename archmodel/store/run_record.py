@@ -7,10 +7,7 @@ value, and becomes null.
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
-from archmodel.arrays import Array
+from archmodel.arrays import Array, Values
 
 __all__ = [
     "Columns",
@@ -24,7 +21,7 @@ __all__ = [
 ]
 
 
-Columns = Mapping[str, NDArray[np.generic]]
+Columns = Mapping[str, Values]
 """Columns of a table by name, equally long."""
 
 # by unit: 10⁻¹² of a metre, of 1 MN and of 1 MPa, which are usual in masonry

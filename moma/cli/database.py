@@ -21,7 +21,7 @@ from moma.cli.options import (
 )
 from moma.cli.surveys import sources
 
-__all__ = ["export", "import_", "migrate", "serve", "view"]
+__all__ = ["ElevationChoices", "export", "import_", "migrate", "serve", "view"]
 
 
 @reporting

@@ -71,7 +71,10 @@ def test_a_filled_database_is_refused(url: str):
     assert "--db" in message
 
 
-EXPORTED = ".json or .json.gz or .ifc or .dxf or .glb or .compas.json or .results.json or .lmgc90.py or .3ddat or .gpkg"
+EXPORTED = (
+    ".json or .json.gz or .ifc or .dxf or .glb or .compas.json or .results.json or .lmgc90.py or .graphml or .3ddat "
+    "or .gpkg"
+)
 
 
 @pytest.mark.parametrize(

@@ -98,9 +98,11 @@ def test_structures_are_listed_with_what_holds_of_them(url: str) -> None:
             "side": None,
             "parent": "T",
             "parts": 0,
+            "bond": "header",
             "members": 2,
             "phase": "I",
             "material": None,
+            **dict.fromkeys(("span", "rise", "departs_from_canon", "crack_width")),
         }
         assert (by_code["T"]["parts"], by_code["T"]["members"], by_code["CH"]["phase"]) == (1, 0, None)
         assert [row["code"] for row in find_rows(session, "chimney")] == ["CH"]

@@ -238,7 +238,7 @@ name = "WALL"
         ("[[mark]]\nsign = 'x'\nstones = ['course = 9']\n", 3, "no stone satisfies 'course = 9'"),
         ("[[mark]]\nsign = 'x'\nstructures = ['W']\n", 3, "there is no structure 'W'"),
         ("[[made_of]]\nmaterial = 'x'\nstones = ['V1']\n", 1, "there is no material 'x'"),
-        ("[[observation]]\ntype = 'crakc'\nstones = ['V1']\n", 2, "did you mean 'crack'"),
+        ("[[observation]]\ntype = 'crakc'\nstones = ['V1']\n", 2, "did you mean crack"),
         (
             "[[observation]]\ntype = 'crack'\nseverity = 5\nstones = ['V1']\n",
             3,
@@ -284,8 +284,7 @@ name = "WALL"
         (
             "[[kind]]\nname='x'\nparent='rib'\ndefinition='z'\ncanon = 'depth > 1'\n",
             1,
-            "x is a kind of structure, and those have neither canonical proportions nor attributes of their own; "
-            "leave out canon",
+            "unknown attribute 'depth'; the attributes are code, kind",
         ),
         ("[[phase]]\nname = 'x'\nauthor = \"\\u0000\"\n", 1, "author '.x00' has no visible character"),
         ("[[depth]]\nstones = ['V1']\nvalue = 0\n", 3, "value = 0 is out of range"),

@@ -12,10 +12,16 @@ from survey.formats.solids.msh.sections import MshFile
 
 __all__ = ["msh_bodies"]
 
-_TETRA = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
-_HEXA = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
-_WEDGE = ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5))
-_PYRAMID = ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4))
+
+def _sides(text: str) -> tuple[tuple[int, ...], ...]:
+    """Return the corners of the sides of an element, each a word of their numbers."""
+    return tuple(tuple(map(int, side)) for side in text.split())
+
+
+_TETRA = _sides("021 013 123 032")
+_HEXA = _sides("0321 4567 0154 1265 2376 3047")
+_WEDGE = _sides("021 345 0143 1254 2035")
+_PYRAMID = _sides("0321 014 124 234 304")
 _FACES = {  # of Gmsh's types of the first and second order, their corners counter-clockwise seen from outside
     **dict.fromkeys((4, 11), _TETRA),
     **dict.fromkeys((5, 12, 17), _HEXA),

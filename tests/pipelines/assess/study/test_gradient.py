@@ -66,8 +66,8 @@ def test_derivatives_by_density_and_friction_are_those_of_differences(name):
     assert abs((ends[0] - ends[1]) / (2.0 * step) - slope) < CLOSE * max(abs(slope), 1.0)
 
 
-SIZES = (2e-5, 6e-5, 2e-4)
-"""Halves of differences of λ [m]; of three the median counts, as rounding ends a programme a step earlier or later."""
+SIZES = (1e-4, 2e-4, 4e-4, 8e-4, 1.6e-3)
+"""Halves of differences of λ [m]; of five the median counts, as rounding ends a programme a step earlier or later."""
 
 
 def reshaped(blocks, body, part, by):
