@@ -54,6 +54,7 @@ from archmodel.tables.knowledge import (
 from archmodel.tables.relations import RELATIONS
 from archmodel.tables.stratigraphy import DEFINITIONS, INVERSE
 from archmodel.tables.structures import Structure, structure_kind_named
+from archmodel.tables.terms import term_for
 from ground.errors import UsageError
 from pipelines.record.depth import record_depth
 from pipelines.record.file import RecordFile, Table
@@ -259,7 +260,9 @@ def _statement(work: _Work) -> RowCounts:
             return say_mason_mark(session, entry, about, work["sign"], work["place"], remark)
         case "observation":
             seen = {key: work[key] for key in ("severity", "place", "at")}
-            return say_observation(session, entry, about, work["type"], **seen, remark=remark)
+            with work.file.at(*work.table.path, "type"):
+                kind = term_for(session, "observation", work["type"])
+            return say_observation(session, entry, about, kind, **seen, remark=remark)
         case "reference":
             return say_reference(session, entry, about, remark)
         case _:

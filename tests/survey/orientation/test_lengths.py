@@ -165,7 +165,7 @@ def test_stones_of_photographs_without_scale_or_vertical_are_refused_with_the_wa
 
 @pytest.fixture(scope="module")
 def oriented_values():
-    return orientation_values(orient(TRUTH.network))
+    return orientation_values(orient(noisy(TRUTH.network, np.random.default_rng(2))))
 
 
 def test_start_values_that_are_stated_to_be_right_are_taken(tmp_path, oriented_values):
