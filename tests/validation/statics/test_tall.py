@@ -69,8 +69,8 @@ def test_a_tilted_column_of_a_hundred_begins_to_topple():
     """2°, and 50 times as high as wide: joints open, and two solvers find the same motion."""
     problem = column([STONE] * 100, tilt=2.0)
     solution, other = solved(problem, 1e-8, 1e-6), solved(problem, 1e-10, 1e-8, by_path)
-    # 500 of them by ADMM, a hundredth of a factorisation each
-    assert solved(problem).iterations < 700
+    # 1,500 of them by ADMM, a hundredth of a factorisation each: forces from nothing decide only if they are exact
+    assert solved(problem).iterations < 1_700
     one, two = (problem.delassus.apply(found.impulse) + problem.u_free for found in (solution, other))
     np.testing.assert_allclose(one, two, atol=1e-5 * np.abs(problem.u_free).max())
     assert two[:, 0].max() > 1e-4 * G * STEP
