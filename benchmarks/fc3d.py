@@ -268,7 +268,7 @@ def _row(path: Path, options: argparse.Namespace, known: "_Siconos") -> Row:
 
 
 class _Siconos:
-    """What Siconos reached: live, or as the file beside the problems says."""
+    """Results of Siconos: live, or as the file beside the problems says."""
 
     def __init__(self, table: Path, options: argparse.Namespace) -> None:
         self._options = options

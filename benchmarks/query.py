@@ -175,7 +175,7 @@ def _asked(database: Database, name: str, count: int) -> Row:
 
 
 def _plans(database: Database, ask: Callable[[Session], int]) -> list[str]:
-    """What the database says of how it answers each statement."""
+    """Return the plan by which the database answers each statement."""
     said: list[tuple[str, Any]] = []
 
     def listen(
@@ -199,7 +199,7 @@ def _plans(database: Database, ask: Callable[[Session], int]) -> list[str]:
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked, and within what time it should be answered [ms]; None: no matter."""
+    """Question, and the time within which it should be answered [ms]; None: no matter."""
 
     words: str
     ask: Ask

@@ -1,4 +1,4 @@
-"""What benchmarks share: options, tables and JSON, the machine, time and memory, and processes of their own."""
+"""Parts that benchmarks share: options, tables and JSON, the machine, time and memory, and processes of their own."""
 
 import argparse
 import json

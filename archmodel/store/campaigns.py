@@ -97,16 +97,15 @@ def _area_centroid(outline: Array, normal: Array) -> Array:
     return np.asarray(first + areas @ (arms[:-1] + arms[1:]) / (3.0 * areas.sum()))
 
 
-def displacement(earlier: FacePlace, later: FacePlace, scatter: float = 0.0) -> Displacement:
+def displacement(earlier: FacePlace, later: FacePlace) -> Displacement:
     """Compare two places of a face.
 
     Parameters
     ----------
     earlier, later : its places in two campaigns
-    scatter : standard deviation beyond the stated ones of one coordinate of one place [m]
     """
     vector = later.centroid - earlier.centroid
-    covariance = earlier.covariance + later.covariance + (2.0 * scatter**2 + _TINY) * np.eye(3)
+    covariance = earlier.covariance + later.covariance + _TINY * np.eye(3)
     distance = float(np.linalg.norm(vector))
     direction = vector / distance if distance > 0.0 else np.array([0.0, 0.0, 1.0])
     sigma = float(1.0 / np.sqrt(direction @ np.linalg.solve(covariance, direction)))

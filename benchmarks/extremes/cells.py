@@ -23,7 +23,7 @@ TOLERANCE, _ITERATIONS = 1e-8, 2000
 
 
 class Outcome(StrEnum):
-    """What came of a cell."""
+    """Outcome of a cell."""
 
     SOLVED = "solved"
     NOT_CONVERGED = "not converged"
@@ -36,7 +36,7 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True)
 class Cell:
-    """What came of one method on one row.
+    """Outcome of one method on one row.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Cell:
 
     @property
     def silent(self) -> bool:
-        """Whether somebody could be led astray by it."""
+        """True if somebody could be led astray by it."""
         return self.outcome in (Outcome.WRONG, Outcome.CRASHED)
 
 

@@ -21,7 +21,7 @@ from moma.cli.options import (
 )
 from moma.cli.surveys import sources
 
-__all__ = ["ElevationChoices", "export", "import_", "migrate", "serve", "view"]
+__all__ = ["ElevationChoices", "ServerChoices", "export", "import_", "migrate", "serve", "view"]
 
 
 @reporting
@@ -210,9 +210,10 @@ def view(
         print(f"{elevation}: 1 : {done.scale}")
 
 
-@reporting
-def serve(
-    *,
+@dataclass(frozen=True)
+class ServerChoices:
+    """Address, token and limits of a server; the fields of `ServeSettings` that users choose."""
+
     host: Annotated[
         str,
         typer.Option(
@@ -220,8 +221,8 @@ def serve(
             metavar="ADDRESS",
             help="Address to listen on; others than this one are reached from outside.",
         ),
-    ] = "127.0.0.1",
-    port: Annotated[int, typer.Option("--port", metavar="N", min=0, max=65535, help="Port; 0: any.")] = 8000,
+    ] = "127.0.0.1"
+    port: Annotated[int, typer.Option("--port", metavar="N", min=0, max=65535, help="Port; 0: any.")] = 8000
     token: Annotated[
         str | None,
         typer.Option(
@@ -231,13 +232,19 @@ def serve(
             help="Ask every request for this token.",
             show_default=False,
         ),
-    ] = None,
+    ] = None
     seconds: Annotated[
         float, typer.Option("--time-limit", metavar="S", min=0.1, help="Longest time of one query [s].")
-    ] = 5.0,
-    rows: Annotated[
-        int, typer.Option("--row-limit", metavar="N", min=1, help="Most rows of one answer.")
-    ] = 10_000,
+    ] = 5.0
+    rows: Annotated[int, typer.Option("--row-limit", metavar="N", min=1, help="Most rows of one answer.")] = (
+        10_000
+    )
+
+
+@reporting
+def serve(
+    *,
+    server: ServerChoices,
     edit: Annotated[
         Path | None,
         typer.Option(
@@ -262,8 +269,7 @@ def serve(
     from pipelines.reports.serve.settings import ServeSettings
 
     editor = _editor(edit, drawn, SurveyChoices(header=header, sigma=sigma), db)
-    settings = ServeSettings(host=host, port=port, token=token, seconds=seconds, rows=rows)
-    serve_database(db, settings, say, editor)
+    serve_database(db, ServeSettings(**vars(server)), say, editor)
 
 
 def _editor(
@@ -276,8 +282,6 @@ def _editor(
     UsageError
         if options of ingest are given without a folder, or do not fit together
     """
-    from pipelines.propose.outlines.editing import SAVED, IngestChoice, OutlineEditor
-
     given = [name for name, value in {**vars(drawn), **vars(survey)}.items() if value is not None]
     if folder is None:
         if given:
@@ -285,6 +289,8 @@ def _editor(
                 f"--{given[0]} without --edit", remedy="name the folder of the outlines: --edit DIR"
             )
         return None
+    from pipelines.propose.outlines.editing import SAVED, IngestChoice, OutlineEditor
+
     if drawn.outlines is not None or drawn.masks is not None:
         raise UsageError(
             "other outlines beside --edit", remedy="leave them out: those of the folder are meant"

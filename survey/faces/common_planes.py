@@ -21,6 +21,7 @@ from scipy.special import stdtrit
 
 from survey.arrays import Array
 from survey.faces.planes import FaceFit
+from survey.geometry.solids import plane_frame
 
 __all__ = ["CommonPlane", "PlaneEstimate", "common_plane"]
 
@@ -130,7 +131,7 @@ def common_plane(fits: Sequence[FaceFit], place: Array) -> CommonPlane:
     CommonPlane
     """
     mean = np.sum([fit.normal for fit in fits], axis=0)
-    frame = _frame(mean / np.linalg.norm(mean))
+    frame = plane_frame(mean / np.linalg.norm(mean))
     places = np.array([fit.centroid for fit in fits]) - place
     normals = np.array([fit.normal for fit in fits]) @ frame.T
     variances = np.array([np.diagonal(fit.covariance) for fit in fits])
@@ -270,10 +271,3 @@ def _tilted(normal: Array, axes: Array, step: Array) -> tuple[Array, Array]:
     along: Array = axes[0] - (axes[0] @ new) * new
     along = along / float(np.linalg.norm(along))
     return new, np.array([along, np.cross(new, along)])
-
-
-def _frame(normal: Array) -> Array:
-    """Return a right-handed frame (3, 3), rows: two directions perpendicular to the normal, and the normal."""
-    along = np.cross(np.eye(3)[int(np.argmin(np.abs(normal)))], normal)
-    along /= np.linalg.norm(along)
-    return np.array([along, np.cross(normal, along), normal])

@@ -13,6 +13,7 @@ __all__ = [
     "area_vectors",
     "highest_corner",
     "highest_corners",
+    "plane_frame",
     "planes_alike",
     "planes_of_solid",
     "volume_of",
@@ -34,6 +35,14 @@ class Solid:
     code: str
     vertices: Array
     faces: tuple[tuple[int, ...], ...]
+
+
+def plane_frame(normal: Array) -> Array:
+    """Return a right-handed frame (3, 3), rows: two directions perpendicular to a unit normal, and the normal."""
+    along = np.cross(np.eye(3)[int(np.argmin(np.abs(normal)))], normal)
+    along /= np.linalg.norm(along)
+    frame: Array = np.array([along, np.cross(normal, along), normal])
+    return frame
 
 
 def area_vector(polygon: Array) -> Array:

@@ -15,7 +15,7 @@ MOST = {
     "numbers of mechanics": 740,
     "numbers of pipelines": 545,
     "long functions": 44,
-    "wide functions": 5,
+    "wide functions": 4,
     "undocumented functions": 135,
 }
 """Today's figures: whoever lowers one lowers its bound, and nobody raises one."""

@@ -1,13 +1,14 @@
 """Contacts and results of blocks as COMPAS (compas_dem 0.6) has them: plain JSON, without COMPAS."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from mechanics.arrays import Array
 from pipelines.record.export.building import stable_uuid
+from survey.geometry.solids import plane_frame
 
 __all__ = [
     "MEGAPASCAL",
@@ -49,24 +50,11 @@ class PairContact:
 
     def turned(self) -> "PairContact":
         """Return the same joint seen from the other block."""
-        return PairContact(
-            self.second,
-            self.first,
-            self.name,
-            self.centre,
-            -self.normal,
-            self.area,
-            self.points,
-            -self.forces,
-        )
+        return replace(self, first=self.second, second=self.first, normal=-self.normal, forces=-self.forces)
 
     def axes(self) -> Array:
         """Return two unit vectors in the joint and its normal as rows (3, 3), right-handed."""
-        axis = np.zeros(3)
-        axis[np.argmin(np.abs(self.normal))] = 1.0
-        x = np.cross(axis, self.normal)
-        x /= np.linalg.norm(x)
-        return np.array([x, np.cross(self.normal, x), self.normal])
+        return plane_frame(self.normal)
 
     def order(self) -> list[int]:
         """Return the points in the order in which they lie around their middle."""

@@ -7,6 +7,7 @@ import numpy as np
 
 from archmodel.store.campaigns import Displacement, FacePlace, displacement, face_place
 from mechanics.arrays import Array
+from survey.geometry.solids import plane_frame
 from survey.quality.precision import StoneQuality
 from survey.statistics.scale import scatter_beyond
 
@@ -120,16 +121,8 @@ def _place(stone: StoneQuality) -> FacePlace:
     tilt = np.radians(stone.tilt_sigma)
     covariance = np.diag([tilt**2, tilt**2, stone.offset_sigma**2])
     centroid = stone.outline.mean(axis=0)
-    return face_place(
-        stone.outline, stone.normal, centroid, _axes(stone.normal), covariance, stone.corner_sigma
-    )
-
-
-def _axes(normal: Array) -> Array:
-    """Return two unit directions (2, 3) in a plane."""
-    across = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
-    across /= np.linalg.norm(across)
-    return np.array([across, np.cross(normal, across)])
+    axes = plane_frame(stone.normal)[:2]
+    return face_place(stone.outline, stone.normal, centroid, axes, covariance, stone.corner_sigma)
 
 
 def _scatter(places: Mapping[str, tuple[FacePlace, FacePlace]], stones: Mapping[str, StoneQuality]) -> float:
@@ -138,7 +131,7 @@ def _scatter(places: Mapping[str, tuple[FacePlace, FacePlace]], stones: Mapping[
     for code, (before, after) in places.items():
         normal = stones[code].normal
         covariance = before.covariance + after.covariance
-        for direction in _axes(normal):
+        for direction in plane_frame(normal)[:2]:
             values.append(float((after.centroid - before.centroid) @ direction))
             variances.append(float(direction @ covariance @ direction))
     return scatter_beyond(np.array(values), np.array(variances), 2.0)[0]

@@ -6,7 +6,7 @@ COMPAS itself is not needed. Documents of COMPAS 1 (`value`, `dva`, `dna`) are r
 import json
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -145,7 +145,8 @@ def _block_model(document: Mapping[str, Any], where: str) -> CompasModel:
             reason = "features or modifiers cut its mesh"
         block = _block(node, names[node], {} if reason else geometry, places[guid], where, reason)
         support, material = bool(element.get("is_support")), element.get("material")
-        blocks.append(_with(block, support, None if material is None else str(material)))
+        material = None if material is None else str(material)
+        blocks.append(replace(block, support=support, material=material))
     materials = {str(guid): _data(one) for guid, one in (data.get("materials") or {}).items()}
     return CompasModel(str(document.get("guid", "")), tuple(blocks), materials, _edges(graph))
 
@@ -155,7 +156,9 @@ def _assembly(document: Mapping[str, Any], where: str) -> CompasModel:
     nodes = {int(node): one for node, one in graph["node"].items() if one.get("block") is not None}
     names = _names({node: one["block"] for node, one in nodes.items()})
     blocks = (
-        _with(_block(node, names[node], one["block"], np.eye(4), where), bool(one.get("is_support")), None)
+        replace(
+            _block(node, names[node], one["block"], np.eye(4), where), support=bool(one.get("is_support"))
+        )
         for node, one in sorted(nodes.items())
     )
     return CompasModel(str(document.get("guid", "")), tuple(blocks), {}, _edges(graph))
@@ -231,7 +234,3 @@ def _block(
     check_coordinates(points, "vertex", f"{where}: block {name}")
     faces = {int(key): tuple(row[int(at)] for at in face) for key, face in data["face"].items()}
     return CompasBlock(node, name, points, faces)
-
-
-def _with(block: CompasBlock, support: bool, material: str | None) -> CompasBlock:
-    return CompasBlock(block.node, block.name, block.vertices, block.faces, support, material, block.error)

@@ -19,6 +19,7 @@ from survey.orientation.bundle.agreement import (
     exchanged_control,
     fitted_places,
     useful_marks,
+    with_marks,
 )
 from survey.orientation.bundle.resection import resect
 from survey.orientation.network import Camera, Network, listed
@@ -95,18 +96,13 @@ def healed(network: Network, suspicion: Array | None = None) -> Healed | None:
 
 def without_photo(network: Network, photo: int) -> Network:
     """Return a network without a photograph and its marks."""
-    used = network.photo != photo
-    index = np.arange(len(network.photos)) - (np.arange(len(network.photos)) > photo)
-    marked = np.bincount(network.point[used], minlength=len(network.names)) > 0
+    rest = with_marks(network, network.photo != photo)
+    marked = np.bincount(rest.point, minlength=len(network.names)) > 0
     return replace(
-        network,
-        photos=tuple(kept_photo for f, kept_photo in enumerate(network.photos) if f != photo),
+        rest,
+        photos=tuple(other for f, other in enumerate(network.photos) if f != photo),
         control=tuple(gcp for gcp in network.control if marked[gcp.point]),
-        photo=index[network.photo[used]],
-        point=network.point[used],
-        image=network.image[used],
-        sigma=network.sigma[used],
-        lines=network.lines[used],
+        photo=rest.photo - (rest.photo > photo),
     )
 
 
