@@ -145,11 +145,47 @@ def untimed(text):
     return re.sub(r"\d{4}-\d\d-\d\dT[:\d]+\+00:00", "", text).splitlines()
 
 
+TEXTS = [
+    *sorted(ROOT.glob("*.md")),
+    *sorted((ROOT / "benchmarks").glob("*.md")),
+    *sorted((ROOT / "docs").rglob("*.md")),
+]
+OUTSIDE = {
+    "http://127.0.0.1:8000",
+    "https://github.com/nschloe/meshio",
+    "https://keepachangelog.com",
+    "https://semver.org",
+    "https://toml.io",
+    "https://…",
+}
+"""Addresses outside the project; whoever adds one opens it before."""
+
+
+def anchors(page):
+    """The names of the headings of a page, as GitHub and the site make them."""
+    text = page.read_text(encoding="utf-8")
+    for included in re.findall(r"^```\{include\} (\S+)$", text, re.MULTILINE):
+        text += (page.parent / included).read_text(encoding="utf-8")
+    heads = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in heads}
+
+
 def test_the_links_of_the_pages_lead_somewhere():
-    for page in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]:
-        for link in re.findall(r"\]\(([^)#]+)", page.read_text(encoding="utf-8")):
+    for page in TEXTS:
+        for link, anchor in re.findall(r"\]\(([^)#\s]*)#?([^)\s]*)\)", page.read_text(encoding="utf-8")):
             if "://" not in link:
-                assert (page.parent / link).exists(), (page.name, link)
+                there = page.parent / link if link else page
+                assert there.exists(), (page.name, link)
+                assert not anchor or anchor in anchors(there), (page.name, link, anchor)
+
+
+def test_the_addresses_outside_are_those_that_were_opened():
+    found = {
+        one
+        for page in TEXTS
+        for one in re.findall(r"https?://[^\s)`\"'>]+", page.read_text(encoding="utf-8"))
+    }
+    assert found == OUTSIDE
 
 
 def test_the_design_pages_name_files_that_exist_and_all_stand_in_the_index():
