@@ -10,10 +10,10 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from ground.errors import SolverError
-from mechanics.carried import Carried, Carrier, Checkpointing
+from mechanics.carried import Carried, Checkpointing
 from mechanics.dynamics.handover import Beginning, Handover, of_run
 from mechanics.dynamics.outcome import Outcome, StaticStart
-from mechanics.dynamics.progress import Clock, Listener, Progress, silent
+from mechanics.dynamics.progress import Clock, Listener, Progress, SteppedRun, silent
 from mechanics.dynamics.simulation import Simulation
 from mechanics.dynamics.static_start import static_start
 from mechanics.dynamics.step import Step
@@ -201,7 +201,7 @@ def _simulate(
     stop: Callable[[], bool],
     archive: Archive | None,
 ) -> tuple[Result, "_Run"]:
-    scene, settings = model.scene, model.scene.time
+    settings = model.scene.time
     earlier = None if archive is None else archive.earlier()
     run = _Run(model, begin, clock)
     if earlier is not None:
@@ -211,66 +211,91 @@ def _simulate(
             run.begin_in_equilibrium(report)
         with clock("stress"):
             run.log.begin(run.simulation.state)
-    log, watch = run.log, run.watch
     if archive is not None:
+        log = run.log
         archive.begin(log.observer.bodies(log.frames[0], np.zeros(len(model.mass))), log.frames)
-    total = scene.time.steps
-    report(Progress("step", run.steps, total))
-    for count in range(run.steps + 1, total + 1):
-        run.steps = count
-        step = run.simulation.step()
-        run.bed = run.bed if count > 1 else _thickest(step, begin)
-        with clock("observe"):
-            balance = log(step)
-            outcome = watch(step, balance)
-        if outcome.rests and (settings.stop_at_equilibrium or count == total):
-            with clock("confirm"):
-                disproved, surely = disproof(run.simulation)
-            if disproved is not None:
-                outcome = watch.disproved(outcome, run.simulation.state, surely)
-                if outcome is Outcome.MOVING:
-                    if settings.relaxation:
-                        log.energy.halted(run.simulation.state)
-                    run.simulation = disproved
-        text = f"balance {balance.max():.1e}, η {step.solution.natural_map:.1e}"
-        report(Progress("step", count, total, text))
-        done = watch.hopeless or (settings.stop_at_equilibrium and outcome is not Outcome.MOVING)
-        stopped = not done and count < total and stop()
-        last = done or stopped or count == total
-        regular = bool(scene.frame_every) and count % scene.frame_every == 0
-        if regular:
-            _keep_frame(log, step, clock, archive)
-        if archive is not None and (stopped or (not last and archive.every and count % archive.every == 0)):
-            with clock("checkpoint"):
-                archive.checkpoint(count, run.carried())
-        if last and not regular:
-            _keep_frame(log, step, clock, archive)
-        if stopped:
-            outcome = Outcome.INTERRUPTED
-        if last:
-            break
-    verdict = watch.verdict(outcome, run.static)
-    return result_of(log, step, verdict, watch.rest_time, clock, run.static), run
+    report(Progress("step", run.steps, run.total))
+    stopped = run.go(report, stop, archive, lambda last: run.keep_frame(archive, regular=True))
+    run.keep_frame(archive, regular=False)
+    return run.result(Outcome.INTERRUPTED if stopped else run.outcome), run
 
 
-def _keep_frame(log: "Log", step: Step, clock: Clock, archive: Archive | None) -> None:
-    with clock("stress"):
-        log.frames.append(log.observer.frame(step))
-        if archive is not None:
-            archive.frame()
-
-
-class _Run(Carrier):
+class _Run(SteppedRun):
     """A run in progress: the simulation, and what is known of its steps so far."""
 
     CARRIED = ("bed", "log", "static", "steps", "watch")
-    REBUILT = ("clock", "simulation")
+    REBUILT = ("_begin", "_last", "clock", "outcome", "simulation", "total")
 
     def __init__(self, model: Model, begin: Beginning, clock: Clock) -> None:
-        self.clock, self.steps, self.bed = clock, 0, 0.0
+        self._begin = begin
+        self.clock, self.steps, self.total, self.bed = clock, 0, model.scene.time.steps, 0.0
         self.static: StaticStart | None = None
         self.simulation = Simulation(model, begin, clock)
         self.log, self.watch = Log(model, begin.drawn, begin.state), Watch(model, begin.state)
+        self.outcome = Outcome.MOVING
+        self._last: Step | None = None
+
+    @property
+    def done(self) -> bool:
+        """True where its time is over, it rests or has fallen, or no step can be solved."""
+        stops = self._stops_at_rest and self.outcome is not Outcome.MOVING
+        return stops or self.watch.hopeless or self.steps >= self.total
+
+    @property
+    def text(self) -> str:
+        """Imbalance and residual of the last step."""
+        return f"balance {self.log.balance.max():.1e}, η {self._made.solution.natural_map:.1e}"
+
+    @property
+    def _stops_at_rest(self) -> bool:
+        return self.simulation.model.scene.time.stop_at_equilibrium
+
+    @property
+    def _made(self) -> Step:
+        """Last step."""
+        assert self._last is not None, "a run has at least one step, and a checkpoint one left to make"
+        return self._last
+
+    def step(self) -> Step:
+        """Make one time step; a rest at which the run may end is tried with its forces forgotten."""
+        self.steps += 1
+        self._last = step = self.simulation.step()
+        if self.steps == 1:
+            self.bed = _thickest(step, self._begin)
+        with self.clock("observe"):
+            self.outcome = self.watch(step, self.log(step))
+        if self.outcome.rests and (self._stops_at_rest or self.steps == self.total):
+            self._try_rest()
+        return step
+
+    def _try_rest(self) -> None:
+        """Go on moving where the rest does not last once its forces are forgotten."""
+        with self.clock("confirm"):
+            disproved, surely = disproof(self.simulation)
+        if disproved is None:
+            return
+        simulation = self.simulation
+        self.outcome = self.watch.disproved(self.outcome, simulation.state, surely)
+        if self.outcome is Outcome.MOVING:
+            if simulation.model.scene.time.relaxation:
+                self.log.energy.halted(simulation.state)
+            self.simulation = disproved
+
+    def keep_frame(self, archive: Archive | None, regular: bool) -> None:
+        """Keep a frame of the last step if it is a regular one, or if it is not, as asked."""
+        every = self.simulation.model.scene.frame_every
+        if regular is not (bool(every) and self.steps % every == 0):
+            return
+        with self.clock("stress"):
+            self.log.frames.append(self.log.observer.frame(self._made))
+            if archive is not None:
+                archive.frame()
+
+    def result(self, outcome: Outcome) -> Result:
+        """Return the result of the run, as of the last step."""
+        watch = self.watch
+        verdict = watch.verdict(outcome, self.static)
+        return result_of(self.log, self._made, verdict, watch.rest_time, self.clock, self.static)
 
     def begin_in_equilibrium(self, report: Listener) -> None:
         """Begin where all stones bear the loads of the first instant, if there is such a state."""
@@ -284,15 +309,12 @@ class _Run(Carrier):
 
     def carried(self) -> dict[str, Any]:
         """Return what a resumed run must know."""
-        own = {"simulation": self.simulation.carried(), "seconds": dict(self.clock.seconds)}
-        return super().carried() | own
+        return super().carried() | {"simulation": self.simulation.carried()}
 
     def restore(self, carried: Carried) -> None:
         """Go on where another run of the same scene stood."""
         super().restore(carried)
         self.simulation = self.simulation.resumed(carried["simulation"])
-        for stage, seconds in carried["seconds"].items():
-            self.clock.seconds[stage] = self.clock.seconds.get(stage, 0.0) + seconds
 
 
 def _thickest(step: Step, begin: Beginning) -> float:

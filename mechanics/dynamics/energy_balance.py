@@ -20,11 +20,18 @@ from mechanics.model.model import Model
 from mechanics.model.stone_groups import ElasticGroup
 from mechanics.scene.state import State
 
-__all__ = ["EnergyBalance"]
+__all__ = ["EnergyBalance", "EnergyTerms"]
+
+_NO_ENERGY = 1e-9  # of weight times smallest width: below it, energies of the run are rounding [-]
 
 
-class EnergyBalance(Carrier):
-    """Terms of the energy balance, summed over a run.
+class EnergyTerms(Carrier):
+    """Terms of the energy balance, summed over a run of stones or of disks.
+
+    Parameters
+    ----------
+    energy : at the start [J]
+    scale : weight times smallest width [J]
 
     Attributes
     ----------
@@ -35,14 +42,39 @@ class EnergyBalance(Carrier):
     """
 
     CARRIED = ("_energy", "contact", "external", "reference", "scheme", "unexplained")
+
+    def __init__(self, energy: float, scale: float) -> None:
+        self._energy = energy
+        self.external = self.contact = self.scheme = self.unexplained = 0.0
+        self.reference = max(energy, _NO_ENERGY * scale)
+
+    def add(
+        self, energy: float, external: float, contact: float, scheme: float, relaxed: float = 0.0
+    ) -> None:
+        """Account for one step: its energy at the end, its works, and what a relaxation takes after it [J]."""
+        self.unexplained += energy - self._energy - external - contact + scheme
+        self.external += external
+        self.contact += contact
+        self.scheme += scheme + relaxed
+        self._energy = energy - relaxed
+        self.reference = max(self.reference, energy, abs(self.external), abs(self.contact), self.scheme)
+
+    @property
+    def error(self) -> float:
+        """|unexplained| / reference [-]."""
+        return abs(self.unexplained) / self.reference if self.reference > 0 else 0.0
+
+
+class EnergyBalance(EnergyTerms):
+    """Energy balance of stones."""
+
     REBUILT = ("_model",)
 
     def __init__(self, model: Model, state: State) -> None:
         self._model = model
-        self._energy = kinetic_energy(model, state) + elastic_energy(model, state)
-        self.external = self.contact = self.scheme = self.unexplained = 0.0
         weight = float(model.mass[~model.fixed].sum() * np.linalg.norm(model.gravity(state.time)))
-        self.reference = max(self._energy, 1e-9 * weight * float(model.surfaces.size.min()))
+        energy = kinetic_energy(model, state) + elastic_energy(model, state)
+        super().__init__(energy, weight * float(model.surfaces.size.min()))
 
     def __call__(self, step: Step) -> None:
         """Account for one step."""
@@ -58,12 +90,7 @@ class EnergyBalance(Carrier):
         )
         scheme = (theta - 0.5) * jump + _elastic_dissipation(model, step, theta, model.scene.time.step)
         energy = kinetic_energy(model, step.after) + elastic_energy(model, step.after)
-        self.unexplained += energy - self._energy - external - contact + scheme
-        self.external += external
-        self.contact += contact
-        self.scheme += scheme + step.relaxed
-        self._energy = energy - step.relaxed
-        self.reference = max(self.reference, energy, abs(self.external), abs(self.contact), self.scheme)
+        self.add(energy, external, contact, scheme, step.relaxed)
 
     def halted(self, state: State) -> None:
         """Account for a halt between two steps, which the scheme makes."""
@@ -84,11 +111,6 @@ class EnergyBalance(Carrier):
                 move = (step.after.node - step.before.node)[rows]
                 work += float(stone.weight @ (move @ gravity))
         return work
-
-    @property
-    def error(self) -> float:
-        """|unexplained| / reference [-]."""
-        return abs(self.unexplained) / self.reference if self.reference > 0 else 0.0
 
 
 def _contact_work(model: Model, step: Step, theta: float) -> tuple[float, float]:

@@ -4,6 +4,7 @@ import numpy as np
 
 from mechanics.arrays import Array
 from mechanics.carried import Carrier
+from mechanics.dynamics.energy_balance import EnergyTerms
 from mechanics.dynamics.outcome import Outcome
 from mechanics.dynamics.verdicts.lasting import LASTING
 from mechanics.planar.contacts import PlanarContacts
@@ -59,27 +60,18 @@ def imbalance(model: PlanarModel, step: PlanarStep) -> Array:
     return unbalanced
 
 
-class PlanarEnergy(Carrier):
-    """Energy balance; energy that no term explains is an error of the program.
+class PlanarEnergy(EnergyTerms):
+    """Energy balance of disks.
 
     ΔE = W_ext + W_contact - D_scheme with W_contact = r·u_θ and D_scheme = (θ - ½) ‖Δv‖²_M holds exactly in the plane.
-
-    Attributes
-    ----------
-    external, contact, scheme : work of loads and driven bodies, work of the contacts, dissipation of the scheme [J]
-    unexplained : ΔE - external - contact + scheme, so far [J]
-    reference : the largest energy that was in play so far, at least 10⁻⁹ of weight times smallest radius [J]
     """
 
-    CARRIED = ("_kinetic", "contact", "external", "reference", "scheme", "unexplained")
     REBUILT = ("_model",)
 
     def __init__(self, model: PlanarModel, start: PlanarState) -> None:
         self._model = model
-        self._kinetic = kinetic_energy(model, start.velocity)
-        self.external = self.contact = self.scheme = self.unexplained = 0.0
         weight = float(model.mass[~model.fixed].sum() * np.hypot(*model.scene.gravity))
-        self.reference = max(self._kinetic, 1e-9 * weight * float(model.radius.min()))
+        super().__init__(kinetic_energy(model, start.velocity), weight * float(model.radius.min()))
 
     def __call__(self, step: PlanarStep) -> None:
         """Account for one step."""
@@ -88,18 +80,7 @@ class PlanarEnergy(Carrier):
         mean = theta * after + (1 - theta) * before
         external = load_work(model, step.loads, mean) + step.driven
         scheme = (theta - 0.5) * 2.0 * kinetic_energy(model, after - before)
-        energy = kinetic_energy(model, after)
-        self.unexplained += energy - self._kinetic - external - step.work + scheme
-        self.external += external
-        self.contact += step.work
-        self.scheme += scheme
-        self._kinetic = energy
-        self.reference = max(self.reference, energy, abs(self.external), abs(self.contact), self.scheme)
-
-    @property
-    def error(self) -> float:
-        """|unexplained| / reference [-]."""
-        return abs(self.unexplained) / self.reference if self.reference > 0 else 0.0
+        self.add(kinetic_energy(model, after), external, step.work, scheme)
 
 
 class PlanarWatch(Carrier):

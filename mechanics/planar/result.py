@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from mechanics.arrays import Array, Ints
 from mechanics.dynamics.outcome import Outcome
 from mechanics.planar.scene import PlanarScene
-from mechanics.results.result import Errors
+from mechanics.results.result import Errors, StepHistory
 
 __all__ = ["PlanarContactResult", "PlanarFrame", "PlanarHistory", "PlanarInstant", "PlanarResult"]
 
@@ -65,31 +65,15 @@ class PlanarInstant:
 
 
 @dataclass(frozen=True)
-class PlanarHistory:
-    """One value per step.
+class PlanarHistory(StepHistory):
+    """One value per step; penetration is over the width of the smaller disk [-].
 
     Attributes
     ----------
-    time : at the end of the step [s]
-    kinetic : kinetic energy [J]
-    speed : largest speed of a point of a disk [m/s]
-    balance : largest unbalanced force over weight [-]
-    natural_map : η after the solve [-]
-    iterations : sweeps
-    contacts : contact points that are watched
-    penetration : deepest overlap at the end of the step over the width of the smaller disk [-]
     overlap, mean_overlap : deepest overlap at the end of the step, and their mean over the contacts that touch [m]
     lifted : work against the loads by moving disks apart that overlap too far; mostly potential energy [J]
     """
 
-    time: Array
-    kinetic: Array
-    speed: Array
-    balance: Array
-    natural_map: Array
-    iterations: Ints
-    contacts: Ints
-    penetration: Array
     overlap: Array
     mean_overlap: Array
     lifted: Array
@@ -112,7 +96,7 @@ class PlanarResult:
     weight : of the disks that are not fixed [N]
     frames : the motion, at least its first and last instant
     history : one value per step
-    wall_time : wall seconds by stage: detect, assemble, solve, advance, observe
+    wall_time : wall seconds by stage: detect, assemble, solve, advance, observe, checkpoint
     """
 
     scene: PlanarScene

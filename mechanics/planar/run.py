@@ -1,15 +1,11 @@
 """A run of a scene of the plane, step by step: its observations, what it carries, and its result."""
 
-from typing import Any
-
 import numpy as np
 
 from ground.errors import SceneError
 from mechanics.arrays import Array
-from mechanics.carried import Carried, Carrier, Rows
 from mechanics.dynamics.outcome import Outcome
-from mechanics.dynamics.progress import Clock
-from mechanics.dynamics.verdicts.lasting import LASTING
+from mechanics.dynamics.progress import Clock, SteppedRun
 from mechanics.planar.contacts import PlanarDetector
 from mechanics.planar.model import PlanarModel, PlanarState, build_planar_model
 from mechanics.planar.observers import (
@@ -30,14 +26,14 @@ from mechanics.planar.result import (
 )
 from mechanics.planar.scene import PlanarScene
 from mechanics.planar.simulation import PlanarSimulation, PlanarStep
-from mechanics.results.result import Errors
+from mechanics.results.log import StepLog
 from mechanics.scene.laws.status import contact_status
 from mechanics.solvers.chain import Solver
 
 __all__ = ["PlanarRun"]
 
 
-class PlanarRun(Carrier):
+class PlanarRun(SteppedRun):
     """A run in progress.
 
     `step` takes it one time step on until it is `done`; `instant` and `result` tell of the last step. `carried` is what
@@ -75,13 +71,13 @@ class PlanarRun(Carrier):
     """
 
     CARRIED = ("_log", "_watch", "simulation", "steps")
-    REBUILT = ("_clock", "_last", "model", "total")
+    REBUILT = ("_last", "clock", "model", "total")
 
     def __init__(self, scene: PlanarScene, solver: Solver | None = None) -> None:
-        self._clock = Clock()
+        self.clock = Clock()
         self.model, start = build_planar_model(scene)
         refuse_deep(self.model, PlanarDetector(self.model)(start))
-        self.simulation = PlanarSimulation(self.model, start, self._clock, solver)
+        self.simulation = PlanarSimulation(self.model, start, self.clock, solver)
         self._log, self._watch = _Log(self.model, start), PlanarWatch(self.model)
         self.steps, self.total = 0, scene.time.steps
         self._last: PlanarStep | None = None
@@ -98,6 +94,11 @@ class PlanarRun(Carrier):
         return rests or self.steps >= self.total
 
     @property
+    def text(self) -> str:
+        """Residual of the last step."""
+        return f"η {self._made().solution.natural_map:.1e}"
+
+    @property
     def frames(self) -> tuple[PlanarFrame, ...]:
         """The motion so far."""
         return tuple(self._log.frames)
@@ -112,7 +113,7 @@ class PlanarRun(Carrier):
         """
         step = self.simulation.step()
         self.steps += 1
-        with self._clock("observe"):
+        with self.clock("observe"):
             balance = imbalance(self.model, step)
             self._watch(step, balance)
             self._log(step, float(balance.max()))
@@ -145,17 +146,7 @@ class PlanarRun(Carrier):
         ------
         SceneError : if no step has been made since the run began, or was restored
         """
-        return _result(self.model, self._made(), outcome or self.outcome, self._log, self._clock)
-
-    def carried(self) -> dict[str, Any]:
-        """Return what another run of the same scene needs to go on from here; arrays are shared, not copied."""
-        return super().carried() | {"seconds": dict(self._clock.seconds)}
-
-    def restore(self, carried: Carried) -> None:
-        """Go on where another run of the same scene stood."""
-        super().restore(carried)
-        for stage, seconds in carried["seconds"].items():
-            self._clock.seconds[stage] = self._clock.seconds.get(stage, 0.0) + seconds
+        return _result(self.model, self._made(), outcome or self.outcome, self._log, self.clock)
 
     def _made(self) -> PlanarStep:
         if self._last is None:
@@ -184,26 +175,24 @@ def _contacts(step: PlanarStep, duration: float) -> PlanarContactResult:
     )
 
 
-class _Log(Carrier):
+class _Log(StepLog[PlanarFrame, PlanarHistory]):
     """Record of the observations of each step, and the frames of the motion."""
 
-    CARRIED = ("_rows", "energy", "frames", "unconverged")
-    REBUILT = ("_model",)
+    REBUILT = (*StepLog.REBUILT, "_model")
+    energy: PlanarEnergy
 
     def __init__(self, model: PlanarModel, start: PlanarState) -> None:
+        super().__init__(PlanarEnergy(model, start), PlanarHistory)
         self._model = model
-        self.energy = PlanarEnergy(model, start)
-        self.unconverged = 0
-        self.frames = Rows([_frame(start)])
-        self._rows: Rows[tuple[float, ...]] = Rows()
+        self.frames.append(_frame(start))
 
     def __call__(self, step: PlanarStep, balance: float) -> None:
         """Account for one step."""
         model, solution, velocity = self._model, step.solution, step.after.velocity
         self.energy(step)
-        self.unconverged += not solution.converged
         overlap = np.maximum(-step.gap, 0.0)
-        self._rows.append(
+        self.add(
+            solution.converged,
             (
                 step.after.time,
                 kinetic_energy(model, velocity),
@@ -216,25 +205,7 @@ class _Log(Carrier):
                 float(overlap.max(initial=0.0)),
                 float(overlap.sum()) / max(1, int((step.gap <= 0.0).sum())),
                 step.lifted,
-            )
-        )
-
-    def history(self) -> PlanarHistory:
-        """Return one array for each quantity."""
-        columns = np.array(self._rows).T
-        time, kinetic, speed, balance, eta, iterations, contacts, penetration, overlap, mean, lifted = columns
-        return PlanarHistory(
-            time,
-            kinetic,
-            speed,
-            balance,
-            eta,
-            iterations.astype(np.int64),
-            contacts.astype(np.int64),
-            penetration,
-            overlap,
-            mean,
-            lifted,
+            ),
         )
 
 
@@ -252,14 +223,6 @@ def _result(
     sides, force = model.fixed[contacts.bodies].astype(float), contacts.force
     reaction = float(np.sum((sides[:, 1] - sides[:, 0]) * (force[:, 0] * up[0] + force[:, 1] * up[1])))
     weight = float(model.mass[~model.fixed].sum()) * g
-    errors = Errors(
-        natural_map=float(history.natural_map[-LASTING:].max()),
-        penetration=float(history.penetration.max()),
-        balance=float(history.balance[-1]),
-        reaction=abs(reaction - weight) / weight if weight > 0 else 0.0,
-        energy=log.energy.error,
-        unconverged_steps=log.unconverged,
-    )
     return PlanarResult(
         scene=scene,
         outcome=outcome,
@@ -268,7 +231,7 @@ def _result(
         position=_position(last.after),
         velocity=last.after.velocity,
         contacts=contacts,
-        errors=errors,
+        errors=log.errors(abs(reaction - weight) / weight if weight > 0 else 0.0),
         reaction=reaction,
         weight=weight,
         frames=tuple(log.frames),

@@ -7,7 +7,7 @@ from threadpoolctl import ThreadpoolController
 
 from mechanics.carried import Checkpointing
 from mechanics.dynamics.outcome import Outcome
-from mechanics.dynamics.progress import Listener, Progress, silent
+from mechanics.dynamics.progress import Listener, silent
 from mechanics.planar.result import PlanarFrame, PlanarInstant, PlanarResult
 from mechanics.planar.run import PlanarRun
 from mechanics.planar.scene import PlanarScene
@@ -73,32 +73,16 @@ def simulate_planar(
         earlier = None if archive is None else archive.earlier()
         if earlier is not None:
             run.restore(earlier)
-        return _simulated(run, progress, stop, archive, observers)
 
+        def observe(last: bool) -> None:
+            due = [observer for observer in observers if last or observer.wants(run.steps)]
+            if due:
+                instant = run.instant()
+                for observer in due:
+                    observer.take(instant)
 
-def _simulated(
-    run: PlanarRun,
-    report: Listener,
-    stop: Callable[[], bool],
-    archive: Checkpointing | None,
-    observers: Sequence[PlanarObserver],
-) -> PlanarResult:
-    while not run.done:
-        step = run.step()
-        report(Progress("step", run.steps, run.total, f"η {step.solution.natural_map:.1e}"))
-        stopped = not run.done and stop()
-        last = run.done or stopped
-        due = [observer for observer in observers if last or observer.wants(run.steps)]
-        if due:
-            instant = run.instant()
-            for one in due:
-                one.take(instant)
-        regular = archive is not None and archive.every and run.steps % archive.every == 0 and not last
-        if archive is not None and (stopped or regular):
-            archive.checkpoint(run.steps, run.carried())
-        if stopped:
-            return _with_its_end(run.result(Outcome.INTERRUPTED))
-    return _with_its_end(run.result())
+        stopped = run.go(progress, stop, archive, observe)
+        return _with_its_end(run.result(Outcome.INTERRUPTED if stopped else None))
 
 
 def _with_its_end(result: PlanarResult) -> PlanarResult:

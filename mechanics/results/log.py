@@ -2,12 +2,13 @@
 
 from collections import Counter
 from dataclasses import fields
+from typing import Generic, TypeVar
 
 import numpy as np
 
 from mechanics.arrays import Array
 from mechanics.carried import Carried, Carrier, Rows
-from mechanics.dynamics.energy_balance import EnergyBalance
+from mechanics.dynamics.energy_balance import EnergyBalance, EnergyTerms
 from mechanics.dynamics.observers.energy import kinetic_energy
 from mechanics.dynamics.observers.equilibrium import settlement, speed, support_reaction
 from mechanics.dynamics.outcome import StaticStart
@@ -18,15 +19,62 @@ from mechanics.dynamics.verdicts.watch import Verdict
 from mechanics.model.model import Model
 from mechanics.results.peaks import PeakTracker
 from mechanics.results.postprocess import Observer
-from mechanics.results.result import Energies, Errors, Frame, Outcome, Result, RunHistory
+from mechanics.results.result import Energies, Errors, Frame, Outcome, Result, RunHistory, StepHistory
 from mechanics.results.stages import StageResult
 from mechanics.scene.scene import Fidelity, Scene
 from mechanics.scene.state import State
 
-__all__ = ["Log", "result_of", "stage_result"]
+__all__ = ["Log", "StepLog", "result_of", "stage_result"]
+
+_COUNTS = ("iterations", "contacts")
+F = TypeVar("F")
+H = TypeVar("H", bound=StepHistory)
 
 
-class Log(Carrier):
+class StepLog(Carrier, Generic[F, H]):
+    """Record of the steps of stones or of disks: energy, frames, and one row of the history per step.
+
+    Parameters
+    ----------
+    energy : balance of energy, that has seen no step
+    history : class of the history; its fields are the columns of the rows
+    """
+
+    CARRIED = ("_rows", "energy", "frames", "unconverged")
+    REBUILT = ("_history",)
+
+    def __init__(self, energy: EnergyTerms, history: type[H]) -> None:
+        self.energy, self.unconverged = energy, 0
+        self.frames: Rows[F] = Rows()
+        self._rows: Rows[tuple[float, ...]] = Rows()
+        self._history = history
+
+    def add(self, converged: bool, row: tuple[float, ...]) -> None:
+        """Account for one step: whether it was solved, and its row of the history."""
+        self.unconverged += not converged
+        self._rows.append(row)
+
+    def history(self) -> H:
+        """Return one array for each quantity."""
+        names = (field.name for field in fields(self._history))
+        columns = dict(zip(names, np.array(self._rows).T, strict=True))
+        counts = {name: columns.pop(name).astype(np.int64) for name in _COUNTS}
+        return self._history(**columns, **counts)
+
+    def errors(self, reaction: float, width: float = 1.0) -> Errors:
+        """Return the error measures, given that of the reaction, and the width that penetration is over."""
+        history = self.history()
+        return Errors(
+            natural_map=float(history.natural_map[-LASTING:].max()),
+            penetration=float(history.penetration.max()) / width,
+            balance=float(history.balance[-1]),
+            reaction=reaction,
+            energy=self.energy.error,
+            unconverged_steps=self.unconverged,
+        )
+
+
+class Log(StepLog[Frame, RunHistory]):
     """Record of a run: what the observers find in each step, and its frames.
 
     Parameters
@@ -36,19 +84,17 @@ class Log(Carrier):
     first : the state in which the run begins
     """
 
-    CARRIED = ("_rows", "balance", "energy", "frames", "observer", "peaks", "solvers", "unconverged")
-    REBUILT = ("_start", "model")
+    CARRIED = (*StepLog.CARRIED, "balance", "observer", "peaks", "solvers")
+    REBUILT = (*StepLog.REBUILT, "_start", "model")
+    energy: EnergyBalance
 
     def __init__(self, model: Model, start: State, first: State) -> None:
+        super().__init__(EnergyBalance(model, first), RunHistory)
         self.model, self._start = model, start
         self.observer = Observer(model, start)
-        self.frames: Rows[Frame] = Rows()
         self.peaks = PeakTracker(model, start)
         self.balance = np.zeros(len(model.mass))
-        self.energy = EnergyBalance(model, first)
-        self.unconverged = 0
         self.solvers: Counter[str] = Counter()
-        self._rows: Rows[tuple[float, ...]] = Rows()
 
     def restore(self, carried: Carried) -> None:
         """Take over the record of another run of the same scene."""
@@ -68,11 +114,11 @@ class Log(Carrier):
             self.peaks.begin(self.observer.begin(step))
         self.peaks(step)
         self.energy(step)
-        self.unconverged += not solution.converged
         if solution.why:
             self.solvers[solution.why] += 1
         self.balance = balance = balance_of(model, step)
-        self._rows.append(  # in the order of History
+        self.add(
+            solution.converged,
             (
                 step.after.time,
                 kinetic_energy(model, step.after),
@@ -83,16 +129,9 @@ class Log(Carrier):
                 len(step.gap),
                 float(np.max(-step.gap, initial=0.0)),
                 float(settlement(model, self._start, step.after)[~model.fixed].max(initial=0.0)),
-            )
+            ),
         )
         return balance
-
-    def history(self) -> RunHistory:
-        """Return one array for each quantity."""
-        names = (field.name for field in fields(RunHistory))
-        columns = dict(zip(names, np.array(self._rows).T, strict=True))
-        counts = {name: columns.pop(name).astype(np.int64) for name in ("iterations", "contacts")}
-        return RunHistory(**columns, **counts)
 
 
 def result_of(
@@ -104,14 +143,6 @@ def result_of(
     with clock("stress"):
         bodies = observer.bodies(log.frames[-1], log.balance)
         contacts, joints = observer.contacts_and_joints(last)
-    errors = Errors(
-        natural_map=float(history.natural_map[-LASTING:].max()),
-        penetration=float(history.penetration.max()) / float(model.surfaces.size.min()),
-        balance=float(history.balance[-1]),
-        reaction=support.error,
-        energy=energy.error,
-        unconverged_steps=log.unconverged,
-    )
     return Result(
         scene=model.scene,
         outcome=verdict.outcome,
@@ -120,7 +151,7 @@ def result_of(
         bodies=bodies,
         contacts=contacts,
         joints=joints,
-        errors=errors,
+        errors=log.errors(support.error, float(model.surfaces.size.min())),
         energies=Energies(energy.external, energy.contact, energy.scheme),
         rest_time=rest_time if verdict.outcome.rests else None,
         reaction=support.reaction,

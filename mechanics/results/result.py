@@ -26,6 +26,7 @@ __all__ = [
     "RunHistory",
     "Series",
     "StaticStart",
+    "StepHistory",
 ]
 
 
@@ -120,20 +121,19 @@ class Frame:
 
 
 @dataclass(frozen=True)
-class RunHistory:
-    """One value per step.
+class StepHistory:
+    """One value per step, of stones or of disks.
 
     Attributes
     ----------
     time : at the end of the step [s]
     kinetic : kinetic energy [J]
-    speed : largest speed of a block's points [m/s]
+    speed : largest speed of a body's points [m/s]
     balance : largest unbalanced force over weight [-]
     natural_map : η after the solve [-]
     iterations : of the contact solver
     contacts : contact points
     penetration : deepest overlap at the end of the step [m]
-    settlement : largest displacement of a stone along gravity [m]
     """
 
     time: Array
@@ -144,6 +144,17 @@ class RunHistory:
     iterations: Ints
     contacts: Ints
     penetration: Array
+
+
+@dataclass(frozen=True)
+class RunHistory(StepHistory):
+    """One value per step.
+
+    Attributes
+    ----------
+    settlement : largest displacement of a stone along gravity [m]
+    """
+
     settlement: Array
 
 
@@ -282,7 +293,7 @@ class Result:
     weight : total weight of the blocks that are not fixed [N]
     frames : the motion, at least its first and last instant
     history : one value per step
-    wall_time : wall seconds by stage: mesh, start, assemble, detect, solve, advance, stress, confirm
+    wall_time : wall seconds by stage: mesh, start, assemble, detect, solve, advance, stress, confirm, checkpoint
     static : search for the equilibrium in which the run began; None if it began at rest
     solvers : number of steps by chosen method and reason, most frequent first
     peaks : largest values of the whole run
