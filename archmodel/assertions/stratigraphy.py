@@ -3,14 +3,15 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from sqlalchemy import insert, select
+from sqlalchemy import insert, select, update
 from sqlalchemy.orm import Session
 
 from archmodel.assertions.statements import PLAIN, Remark, remark_row
-from archmodel.assertions.validation import checked_choice, checked_label
+from archmodel.assertions.validation import checked_choice, checked_label, checked_text
 from archmodel.store.bulk import batches
 from archmodel.store.find_by_code import Subjects
 from archmodel.store.revisions import RowCounts, end_rows, table_of
+from archmodel.stratigraphy.graphml import DrawnUnit
 from archmodel.stratigraphy.order import check_order
 from archmodel.stratigraphy.stored import load_links
 from archmodel.tables.entities import Entity
@@ -70,15 +71,30 @@ def subjects_of(things: Iterable[Thing]) -> Subjects:
     return Subjects(stones, tuple(structure for _, structure in pairs if structure is not None))
 
 
-def declare_units(session: Session, entry: Entry, codes: Sequence[str]) -> RowCounts:
-    """Declare stratigraphic units that are neither stones nor structures yet."""
+def declare_units(
+    session: Session, entry: Entry, codes: Sequence[str], drawn: Mapping[str, DrawnUnit] | None = None
+) -> RowCounts:
+    """Declare stratigraphic units that are neither stones nor structures yet.
+
+    Parameters
+    ----------
+    drawn : titles of units, and the units that they are parts of, which exist or are among the codes
+    """
+    drawn = drawn or {}
     rows = [
         {"code": checked_label("code", code), "kind": StratigraphicUnit.__mapper__.polymorphic_identity}
-        | {"entry_id": entry.id}
+        | {"entry_id": entry.id, "title": checked_text("title", drawn[code].title) if code in drawn else None}
         for code in dict.fromkeys(codes)
     ]
     for batch in batches(rows):
         session.execute(insert(table_of(Structure)), list(batch))
+    parents = {code: parent for code in codes if code in drawn and (parent := drawn[code].parent) is not None}
+    numbers = subjects_named(session, {*parents, *parents.values()})
+    for code, parent in parents.items():
+        number, above = numbers[code][1], numbers[parent][1]
+        if above is not None:
+            table = table_of(Structure)
+            session.execute(update(table).where(table.c.id == number).values(parent_id=above))
     return RowCounts(new=len(rows))
 
 

@@ -1,13 +1,17 @@
 """The database as it was when an entry had just been made: a copy in memory, from which all later ones are taken back.
 
 Whatever reads a database reads this one, so that a query, a description and a page of an earlier day need no words of
-their own.
+their own. Entries are never changed, so that a copy stays true, and a server keeps the last ones (`EarlierStates`).
 """
 
 import re
+import sqlite3
+import threading
 from calendar import monthrange
+from collections import OrderedDict
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from datetime import UTC, date, datetime, time, timedelta
 
 from sqlalchemy import Connection, ForeignKey, Table, delete, func, insert, select, update
@@ -22,7 +26,7 @@ from archmodel.tables.registered import declare_registered
 from archmodel.tables.structures import Structure
 from ground.errors import UsageError
 
-__all__ = ["as_known", "entry_named"]
+__all__ = ["EarlierStates", "as_known", "entry_named"]
 
 _REVISED = (Material, Phase, Document, Structure)
 """Tables whose rows keep their number when they are revised, the earlier contents in a row of their own."""
@@ -80,10 +84,78 @@ def as_known(session: Session, entry: int | None) -> Iterator[Session]:
     if entry is None:
         yield session
         return
+    with _copy_at(session, entry) as database, database.session(read_only=True) as then:
+        yield then
+
+
+@dataclass
+class _State:
+    """Copy in memory, and how many wait for it or read it; one connection has the copy, so one reads at a time."""
+
+    database: Database | None = None
+    users: int = 0
+    turn: threading.Lock = field(default_factory=threading.Lock)
+
+
+class EarlierStates:
+    """Copies of one database as it was at several entries; those asked for last stay in memory.
+
+    Parameters
+    ----------
+    most : number of copies that stay
+    """
+
+    def __init__(self, most: int = 3) -> None:
+        self._most = most
+        self._states: OrderedDict[int, _State] = OrderedDict()
+        self._lock = threading.Lock()
+
+    @contextmanager
+    def as_known(self, session: Session, entry: int | None) -> Iterator[Session]:
+        """Open a session on the database as it was at an entry, as the function `as_known` does; from any thread."""
+        if entry is None:
+            yield session
+            return
+        with self._lock:
+            state = self._states.setdefault(entry, _State())
+            self._states.move_to_end(entry)
+            state.users += 1
+        try:
+            with state.turn:
+                if state.database is None:
+                    state.database = _copy_at(session, entry)
+                with state.database.session(read_only=True) as then:
+                    yield then
+        finally:
+            self._leave(state)
+
+    def close(self) -> None:
+        """Release the copies."""
+        with self._lock:
+            for state in self._states.values():
+                if state.database is not None:
+                    state.database.close()
+            self._states.clear()
+
+    def _leave(self, state: _State) -> None:
+        """Release copies that nobody reads beyond those that stay; and those that could not be made."""
+        with self._lock:
+            state.users -= 1
+            for entry in list(self._states):
+                found = self._states[entry]
+                if not found.users and (found.database is None or len(self._states) > self._most):
+                    if found.database is not None:
+                        found.database.close()
+                    del self._states[entry]
+
+
+def _copy_at(session: Session, entry: int) -> Database:
+    """Copy the database into memory, and take back what came after an entry; the caller closes the copy."""
     if session.get(Entry, entry) is None:
         remedy = f"the last one is {latest_entry(session)}; list them by: moma entries"
         raise UsageError(f"there is no entry {entry}", remedy=remedy)
-    with open_database("sqlite://") as database:
+    database = open_database("sqlite://")
+    try:
         _copy(session.connection(), database)
         with database.session() as then:
             connection = then.connection()
@@ -91,14 +163,23 @@ def as_known(session: Session, entry: int | None) -> Iterator[Session]:
             _undo_corrections(connection, entry)
             _take_back(connection, entry)
             declare_registered(then)
-            yield then
+    except BaseException:
+        database.close()
+        raise
+    return database
 
 
 def _copy(source: Connection, database: Database) -> None:
-    """Copy all rows, in batches."""
+    """Copy all pages of an SQLite database, all rows of another one."""
+    pages = source.connection.driver_connection
+    reading = source.get_execution_options().get("moma_read_only", False)
     with database.engine.connect() as target:
         # what is taken back leaves references for a while; has no effect within a transaction
         target.connection.cursor().execute("PRAGMA foreign_keys = OFF")
+        copied = target.connection.driver_connection
+        if reading and isinstance(pages, sqlite3.Connection) and isinstance(copied, sqlite3.Connection):
+            pages.backup(copied)  # waits for ever for the end of a transaction that writes
+            return
         with target.begin():
             for table in metadata.sorted_tables:
                 if table is SchemaVersion.__table__:

@@ -11,7 +11,7 @@ from urllib.parse import quote
 from sqlalchemy import URL, Connection, Engine, create_engine, event
 from sqlalchemy.engine.interfaces import DBAPIConnection
 from sqlalchemy.exc import DBAPIError
-from sqlalchemy.pool import ConnectionPoolEntry
+from sqlalchemy.pool import ConnectionPoolEntry, StaticPool
 
 from archmodel.tables.base import json_text
 from ground.errors import DatabaseError, NoDatabaseError
@@ -80,8 +80,13 @@ class SqliteFile:
         """Return an engine on the file, which may be missing if `create` allows it."""
         if self.file is not None:
             _check_file(self.file, create)
+        shared = {"check_same_thread": False} if self.file is None else {}
         engine = create_engine(
-            self._reading or self.url, connect_args={"timeout": self.lock_timeout}, json_serializer=json_text
+            self._reading or self.url,
+            connect_args={"timeout": self.lock_timeout, **shared},
+            json_serializer=json_text,
+            # a database in memory is that of its connection
+            poolclass=StaticPool if self.file is None else None,
         )
         event.listen(engine, "connect", _on_connect)
         event.listen(engine, "begin", _on_begin)

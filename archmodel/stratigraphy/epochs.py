@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from xml.etree import ElementTree as etree
 
 from archmodel.stratigraphy.dates import Dated
+from archmodel.stratigraphy.palette import G, Y, label_of
 
 __all__ = ["Lane", "lane_of", "lanes_of"]
 
-_G, _Y = "http://graphml.graphdrawing.org/xmlns", "http://www.yworks.com/xml/graphml"
 _YEARS = re.compile(r"\[([^\[\]]*)\]\s*$")
 _YEAR = re.compile(r"(start|end)\s*:\s*(-?\d+)")
 
@@ -29,14 +29,14 @@ class Lane:
 
 def lanes_of(table: etree.Element) -> Iterator[Lane]:
     """Yield the labelled rows of a table, downwards."""
-    frame, insets = table.find(f"{{{_Y}}}Geometry"), table.find(f"{{{_Y}}}Table/{{{_Y}}}Insets")
+    frame, insets = table.find(f"{{{Y}}}Geometry"), table.find(f"{{{Y}}}Table/{{{Y}}}Insets")
     labels: dict[str, str] = {}
-    for label in table.findall(f"{{{_Y}}}NodeLabel"):
-        row = label.find(f".//{{{_Y}}}RowNodeLabelModelParameter")
+    for label in table.findall(f"{{{Y}}}NodeLabel"):
+        row = label.find(f".//{{{Y}}}RowNodeLabelModelParameter")
         if row is not None:
-            labels[row.get("id", "")] = " ".join("".join(label.itertext()).split())
+            labels[row.get("id", "")] = label_of(label)
     top = _number(frame, "y") + _number(insets, "top")
-    for row in table.iter(f"{{{_Y}}}Row"):
+    for row in table.iter(f"{{{Y}}}Row"):
         bottom = top + _number(row, "height")
         if label_text := labels.get(row.get("id", "")):
             yield Lane(_epoch(label_text), top, bottom)
@@ -54,7 +54,7 @@ def _epoch(label: str) -> Dated:
 
 def lane_of(node: etree.Element, lanes: Sequence[Lane]) -> Lane | None:
     """Return the row in which the middle of a node lies."""
-    frame = node.find(f"./{{{_G}}}data/{{{_Y}}}ShapeNode/{{{_Y}}}Geometry")
+    frame = node.find(f"./{{{G}}}data//{{{Y}}}Geometry")
     if frame is None:
         return None
     middle = _number(frame, "y") + 0.5 * _number(frame, "height")

@@ -5,14 +5,20 @@ from collections.abc import Mapping, Sequence
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session, aliased
 
+from archmodel.stratigraphy.graphml import DrawnUnit
 from archmodel.stratigraphy.order import Link
+from archmodel.stratigraphy.palette import COMMON, UNIT_KINDS
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import held_at
+from archmodel.tables.knowledge import Note
 from archmodel.tables.relations import Membership
 from archmodel.tables.stratigraphy import Stratigraphy
 from archmodel.tables.structures import StratigraphicUnit, Structure
 
-__all__ = ["load_links", "load_stones", "load_units"]
+__all__ = ["KIND_NOTE", "load_drawn", "load_links", "load_stones", "load_units"]
+
+KIND_NOTE = "unit kind"
+"""Key of the notes with the kinds of units in the Extended Matrix."""
 
 
 def load_links(session: Session, author: str | None = None) -> list[Link]:
@@ -50,6 +56,24 @@ def load_units(session: Session) -> list[str]:
         Structure.kind == StratigraphicUnit.__mapper__.polymorphic_identity, held_at(Structure)
     )
     return list(session.scalars(units.order_by(Structure.id)))
+
+
+def load_drawn(session: Session) -> Mapping[str, DrawnUnit]:
+    """Return kinds and descriptions of units and stones that have either, by code; of several kinds the last noted."""
+    titles = select(Structure.code, Structure.title).where(held_at(Structure), Structure.title.is_not(None))
+    notes = (
+        select(func.coalesce(Structure.code, Entity.code), Note.text)
+        .outerjoin(Structure, Structure.id == Note.structure_id)
+        .outerjoin(Entity, Entity.id == Note.entity_id)
+        .where(Note.superseded_id.is_(None), Note.key == KIND_NOTE, Note.text.in_(UNIT_KINDS))
+        .order_by(Note.id)
+    )
+    named = {row.code: row.title for row in session.execute(titles)}
+    kinds = {str(row[0]): row.text for row in session.execute(notes)}
+    return {
+        code: DrawnUnit(kinds.get(code) or COMMON, named.get(code))
+        for code in dict.fromkeys([*named, *kinds])
+    }
 
 
 def load_stones(session: Session, codes: Sequence[str]) -> Mapping[str, tuple[str, ...]]:

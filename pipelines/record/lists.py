@@ -140,6 +140,7 @@ def _notes(content: RelationList | AttributeList, tables: dict[str, RowCounts]) 
                 yield f"{count} names of the column {what} were not declared before; see: moma query, moma show"
         return
     if content.ignored:
-        yield f"{content.ignored} nodes and lines are no stratigraphy, and were left out"
+        counts = ", ".join(f"{count} {kind}" for kind, count in content.ignored.items())
+        yield f"left out, as it is no stratigraphy: {counts}"
     if count := tables.get("unit", NOTHING).new:
         yield f"{count} units are new, as structures of the kind stratigraphic_unit"

@@ -7,7 +7,7 @@ from pathlib import Path
 from sqlalchemy.orm import Session
 
 from archmodel.assertions.declare import declare_phase
-from archmodel.assertions.statements import PLAIN, Remark, say_of_phase
+from archmodel.assertions.statements import PLAIN, Remark, say_note, say_of_phase
 from archmodel.assertions.stratigraphy import (
     Thing,
     declare_units,
@@ -17,7 +17,9 @@ from archmodel.assertions.stratigraphy import (
 )
 from archmodel.store.revisions import NOTHING, RowCounts
 from archmodel.stratigraphy.dates import Dated
-from archmodel.stratigraphy.graphml import read_graphml
+from archmodel.stratigraphy.graphml import DrawnUnit, read_graphml
+from archmodel.stratigraphy.palette import COMMON
+from archmodel.stratigraphy.stored import KIND_NOTE
 from archmodel.tables.entries import Entry
 from archmodel.tables.stratigraphy import DEFINITIONS, INVERSE
 from ground.errors import MomaError, SurveyError, UsageError
@@ -116,16 +118,17 @@ class RelationList:
     path : of the file
     units : that it names
     relations : line (0 without lines), unit, name of the relation, unit
-    ignored : number of nodes and lines of a drawing that are no stratigraphy
-    epochs, epoch_of : epochs of a drawing, and that of each unit in one
+    ignored : number of nodes and lines of a drawing that are no stratigraphy, by kind
+    epochs : those of a drawing
+    drawn : kind, title, epoch and parent of the units of a drawing
     """
 
     path: str
     units: tuple[str, ...]
     relations: tuple[tuple[int, str, str, str], ...]
-    ignored: int = 0
+    ignored: Mapping[str, int] = field(default_factory=dict)
     epochs: tuple[Dated, ...] = ()
-    epoch_of: Mapping[str, str] = field(default_factory=dict)
+    drawn: Mapping[str, DrawnUnit] = field(default_factory=dict)
 
 
 def relation_of(text: str) -> str | None:
@@ -144,7 +147,8 @@ def read_relation_list(path: Path, sheet: str | None = None) -> RelationList | N
     if path.suffix.lower() == ".graphml":
         drawn = read_graphml(path, relation_of)
         relations = tuple((0, link.subject, link.relation, link.target) for link in drawn.links)
-        return RelationList(str(path), drawn.units, relations, drawn.ignored, drawn.epochs, drawn.epoch_of)
+        units = tuple(drawn.units)
+        return RelationList(str(path), units, relations, drawn.ignored, drawn.epochs, drawn.units)
     try:
         table = read_table(path, _is_row, _REMEDY, sheet)
     except SurveyError as error:
@@ -186,7 +190,7 @@ def record_relation_list(
     Returns
     -------
     dict
-        outcome by name: "unit", "stratigraphy"; of a drawing with epochs "phase" and "of_phase"
+        outcome by name: "unit", "stratigraphy"; of a drawing "note", of one with epochs "phase" and "of_phase"
 
     Raises
     ------
@@ -195,7 +199,7 @@ def record_relation_list(
     """
     things = subjects_named(session, listed.units)
     missing = [code for code in listed.units if code not in things]
-    outcome = {"unit": declare_units(session, entry, missing)} if missing else {}
+    outcome = {"unit": declare_units(session, entry, missing, listed.drawn)} if missing else {}
     things |= subjects_named(session, missing)
     for line, unit, relation, target in listed.relations:
         if unit == target:
@@ -206,7 +210,23 @@ def record_relation_list(
         outcome["stratigraphy"] = say_stratigraphy(session, entry, relations, remark)
     except UsageError as error:
         raise _at_lines(listed, error) from None
+    outcome |= _record_kinds(session, entry, listed, things)
     return outcome | _record_epochs(session, entry, listed, things, remark)
+
+
+def _record_kinds(
+    session: Session, entry: Entry, listed: RelationList, things: Mapping[str, Thing]
+) -> dict[str, RowCounts]:
+    """Note the kinds of units that are not common ones."""
+    by_kind: dict[str, list[Thing]] = {}
+    for code, unit in listed.drawn.items():
+        if unit.kind != COMMON:
+            by_kind.setdefault(unit.kind, []).append(things[code])
+    counts = [
+        say_note(session, entry, subjects_of(units), KIND_NOTE, Remark(text=kind))
+        for kind, units in by_kind.items()
+    ]
+    return {"note": sum(counts, NOTHING)} if counts else {}
 
 
 def _record_epochs(
@@ -216,10 +236,11 @@ def _record_epochs(
     outcome: dict[str, RowCounts] = {}
     for epoch in listed.epochs:
         declared = declare_phase(session, entry, epoch.phase, epoch.begins, epoch.ends)
-        units = [things[code] for code, name in listed.epoch_of.items() if name == epoch.phase]
-        stated = say_of_phase(session, entry, subjects_of(units), epoch.phase, remark)
-        for key, counts in (("phase", declared), ("of_phase", stated)):
-            outcome[key] = outcome.get(key, NOTHING) + counts
+        outcome["phase"] = outcome.get("phase", NOTHING) + declared
+        units = [things[code] for code, unit in listed.drawn.items() if unit.epoch == epoch.phase]
+        if units:
+            stated = say_of_phase(session, entry, subjects_of(units), epoch.phase, remark)
+            outcome["of_phase"] = outcome.get("of_phase", NOTHING) + stated
     return outcome
 
 

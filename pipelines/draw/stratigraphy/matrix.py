@@ -8,9 +8,10 @@ from sqlalchemy.orm import Session
 
 from archmodel.query.dated import load_dates
 from archmodel.stratigraphy.dates import Bounds, Contradiction, Dated, contradictions, date_bounds
-from archmodel.stratigraphy.graphml import write_graphml
+from archmodel.stratigraphy.draw_graphml import write_graphml
+from archmodel.stratigraphy.graphml import DrawnUnit
 from archmodel.stratigraphy.order import Link, Order, order_of
-from archmodel.stratigraphy.stored import load_links, load_stones, load_units
+from archmodel.stratigraphy.stored import load_drawn, load_links, load_stones, load_units
 from ground.errors import UsageError
 from pipelines.draw.stratigraphy.drawing import matrix_svg
 from pipelines.draw.stratigraphy.layout import layout_of
@@ -31,6 +32,7 @@ class Matrix:
     bounds : years that phases and matrix allow, by the first of equal units
     stones : members of units
     contradictions : of matrix and dates
+    drawn : kinds and descriptions of units, for GraphML
     """
 
     order: Order
@@ -39,6 +41,7 @@ class Matrix:
     bounds: Mapping[str, Bounds]
     stones: Mapping[str, tuple[str, ...]]
     contradictions: tuple[Contradiction, ...]
+    drawn: Mapping[str, DrawnUnit]
 
     def as_values(self) -> dict[str, object]:
         """Return plain values for JSON."""
@@ -92,6 +95,7 @@ def study(session: Session, author: str | None = None) -> Matrix:
         date_bounds(order, dates),
         load_stones(session, codes),
         contradictions(order, links, dates),
+        load_drawn(session),
     )
 
 
@@ -112,7 +116,7 @@ def draw(matrix: Matrix, path: Path) -> str:
             return matrix_page(matrix.order, matrix.links, matrix.dates, matrix.bounds, matrix.stones, wrong)
         case ".graphml":
             places = {key: x for key, x in layout_of(matrix.order).across.items() if isinstance(key, str)}
-            return write_graphml(matrix.order, matrix.links, places, matrix.dates)
+            return write_graphml(matrix.order, matrix.links, places, matrix.dates, matrix.drawn)
     raise UsageError(
         f"{path.name} is no drawing", where="--out", remedy="name a file that ends in .svg, .html or .graphml"
     )

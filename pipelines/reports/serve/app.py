@@ -6,7 +6,7 @@ import hmac
 import re
 import threading
 from collections.abc import Awaitable, Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict
 from importlib.metadata import version
 from typing import Annotated, Any
@@ -20,7 +20,7 @@ from starlette.exceptions import HTTPException as StarletteHTTPException
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from archmodel.database.as_known import as_known, entry_named
+from archmodel.database.as_known import EarlierStates, entry_named
 from archmodel.database.limits import deadline
 from archmodel.database.session import Database
 from archmodel.describe.entity import describe
@@ -74,6 +74,7 @@ def application(database: Database, settings: ServeSettings, editor: Editor | No
         redoc_url=None,
     )
     answers, room = Answers(settings.rows), threading.Semaphore(settings.at_once)
+    earlier = EarlierStates()
     _refusals(app)
     _guards(app, settings, editor is not None)
     if editor is not None:
@@ -84,10 +85,14 @@ def application(database: Database, settings: ServeSettings, editor: Editor | No
         if not room.acquire(timeout=settings.patience):
             raise HTTPException(503, "Too many questions at once; try again.", {"Retry-After": "5"})
         try:
-            with database.session(read_only=True) as session, deadline(session, settings.seconds) as limit:
+            with ExitStack() as stack:
+                session = stack.enter_context(database.session(read_only=True))
+                limit = stack.enter_context(deadline(session, settings.seconds))
                 try:
-                    with as_known(session, entry_named(session, at) if at else None) as then:
-                        yield then
+                    if at:
+                        session = stack.enter_context(earlier.as_known(session, entry_named(session, at)))
+                        limit = stack.enter_context(deadline(session, settings.seconds))
+                    yield session
                 except Exception as error:
                     if limit.stopped(error):
                         told = f"The query took longer than {settings.seconds:g} s and was stopped."

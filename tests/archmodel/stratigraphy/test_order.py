@@ -9,7 +9,8 @@ from xml.etree import ElementTree as etree
 import pytest
 
 from archmodel.stratigraphy.dates import Dated, contradictions, date_bounds
-from archmodel.stratigraphy.graphml import read_graphml, write_graphml
+from archmodel.stratigraphy.draw_graphml import write_graphml
+from archmodel.stratigraphy.graphml import DrawnUnit, read_graphml
 from archmodel.stratigraphy.order import Link, check_order, find_loop, order_of
 from archmodel.tables.stratigraphy import DEFINITIONS, LATER
 from ground.errors import UsageError
@@ -133,7 +134,7 @@ def test_graphml_comes_back_as_it_was(text: str, tmp_path):
     path = tmp_path / "m.graphml"
     path.write_text(write_graphml(order_of(["alone"], given), given, {}), encoding="utf-8")
     read = read_graphml(path)
-    assert (set(read.links), read.ignored) == (set(given), 0)
+    assert (set(read.links), read.ignored) == (set(given), {})
     assert "alone" in read.units
 
 
@@ -155,25 +156,28 @@ def test_graphml_of_the_palette_is_read_by_shapes_and_styles(tmp_path):
     space = "xmlns='http://graphml.graphdrawing.org/xmlns' xmlns:y='http://www.yworks.com/xml/graphml'"
     path.write_text(f"<graphml {space}><graph edgedefault='directed'>{''.join(parts)}</graph></graphml>")
     read = read_graphml(path)
-    assert read.units == ("USM01", "USM02", "USV1")
+    assert read.units == {"USM01": DrawnUnit(), "USM02": DrawnUnit(), "USV1": DrawnUnit("USVs")}
     assert read.links == (Link("USM01", "later_than", "USM02"), Link("USM02", "contemporary_with", "USV1"))
-    assert read.ignored == 2
+    assert read.ignored == {"other nodes": 1, "lines of provenance (dashed)": 1}
 
 
 def test_a_drawing_with_swimlanes_is_read_as_yed_writes_it() -> None:
     """Groups within the table, names of the palette as data, labels in Italian, continuity nodes, dashed paradata."""
     path = Path(__file__).with_name("swimlanes.graphml")
     drawn = read_graphml(path, relation_of)
-    assert drawn.units == ("USM03", "USM01", "USD10", "SF01")
+    assert drawn.units == {
+        "USM03": DrawnUnit(epoch="II"),
+        "USM01": DrawnUnit(epoch="I"),
+        "USD10": DrawnUnit("USD", epoch="I"),
+        "SF01": DrawnUnit("SF"),
+    }
     assert drawn.epochs == (Dated("II", 1238, 1260), Dated("I", None, None))
-    assert drawn.epoch_of == {"USM03": "II", "USM01": "I", "USD10": "I"}
     assert drawn.links == (
         Link("USM03", "later_than", "USM01"),
         Link("USM01", "bonded_with", "USD10"),
         Link("USM03", "above", "USD10"),
     )
-    # the table, the group, the node of continuity and the dashed line
-    assert drawn.ignored == 4
+    assert drawn.ignored == {"groups": 1, "shapes without a name": 1, "lines of provenance (dashed)": 1}
 
 
 def test_phases_come_back_as_swimlanes(tmp_path: Path) -> None:
@@ -185,7 +189,8 @@ def test_phases_come_back_as_swimlanes(tmp_path: Path) -> None:
     drawn = read_graphml(path)
     assert set(drawn.links) == set(relations)
     assert drawn.epochs == (Dated("II", 1238, 1260), Dated("I", 1180, None))
-    assert drawn.epoch_of == {"1": "II", "2": "I", "3": "I", "4": "I"}
+    epochs = {name: unit.epoch for name, unit in drawn.units.items()}
+    assert epochs == {"1": "II", "2": "I", "3": "I", "4": "I", "5": None, "6": None}
 
 
 @pytest.mark.slow

@@ -11,6 +11,7 @@ from sqlalchemy import select
 
 from archmodel.database.as_known import as_known
 from archmodel.database.session import open_database
+from archmodel.describe.entity import describe
 from archmodel.query.api import find_faces, find_rows
 from archmodel.query.geojson import feature_collection
 from archmodel.store.revisions import RowCounts
@@ -20,6 +21,7 @@ from ground.errors import UsageError
 from pipelines.draw.stratigraphy.matrix import draw, study
 from pipelines.record.record import record
 from tests.archmodel.stones import SHA, box_stone
+from tests.archmodel.stratigraphy.drawings import artifact, drawing, group, line, shape
 
 STONES = (
     box_stone("S1", "header", course=1, at=(0.0, 0.0, 0.0)),
@@ -228,3 +230,34 @@ def test_a_column_of_damage_takes_terms_in_any_language(new_url: Callable[[], st
         assert [
             row["code"] for row in find_rows(session, "entity", ["observed(Riss)"], columns=["code"])
         ] == ["S1"]
+
+
+def test_a_drawing_brings_units_with_kinds_titles_and_parents_and_tells_what_it_leaves_out(
+    url: str, tmp_path: Path
+):
+    path = drawing(
+        tmp_path / "em.graphml",
+        group("n0", "#9B3333", "US10", shape("n1", "TSU", "TSU12")),
+        shape("n2", "USVs", "USV3", "lost pier"),
+        artifact("n3", "ARTIFACT_TYPE_DATA_OBJECT", "D.1"),
+        line("n0", "n2", "line", "copre"),
+        line("n2", "n3", "dashed"),
+    )
+    report = record([path], url, author="A", source="drawn").files[0]
+    assert report.tables == {
+        "unit": RowCounts(new=3),
+        "stratigraphy": RowCounts(new=1),
+        "note": RowCounts(new=2),
+    }
+    assert report.notes == (
+        "left out, as it is no stratigraphy: 1 documents, 1 lines of provenance (dashed)",
+        "3 units are new, as structures of the kind stratigraphic_unit",
+    )
+    with open_database(url) as database, database.session(read_only=True) as session:
+        assert describe(session, "TSU12")["part_of"] == ["US10"]
+        assert describe(session, "USV3")["title"] == "lost pier"
+        again = tmp_path / "again.graphml"
+        again.write_text(draw(study(session), again), encoding="utf-8")
+    counts = record([again], url, author="A", source="drawn").files[0].tables
+    assert sum(counts.values(), RowCounts()).changes == 0
+    assert counts["note"] == RowCounts(unchanged=2)
