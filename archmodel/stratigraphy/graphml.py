@@ -31,7 +31,7 @@ _COMMENT = ("«", "#")  # begin lines of a description that comment on it
 
 @dataclass(frozen=True)
 class DrawnUnit:
-    """What the box of a unit says.
+    """Content of the box of a unit.
 
     Attributes
     ----------

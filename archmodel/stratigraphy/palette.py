@@ -61,7 +61,7 @@ _BPMN = {"ARTIFACT_TYPE_ANNOTATION": "properties", "ARTIFACT_TYPE_DATA_OBJECT": 
 
 @dataclass(frozen=True)
 class Box:
-    """What a node of a drawing is.
+    """Identity of a node of a drawing.
 
     Attributes
     ----------
