@@ -71,7 +71,7 @@ def open_gsi(path: Path, options: ReadingOptions | None = None) -> SurveyStream:
             "no point has coordinates (words 81, 82, 83)",
             "export coordinates, not only measurements",
         )
-    return SurveyStream(collector.head, collector.table.records())
+    return SurveyStream(collector.head, collector.table.records(), remarks=collector.remarks)
 
 
 def _words(text: str, number: int, lines: TextLines) -> dict[str, str]:

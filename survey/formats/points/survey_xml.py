@@ -107,7 +107,7 @@ def _stream(collector: PointCollector, path: Path, count: int, what: str) -> Sur
         raise SurveyError(
             f"the file has no {what}", where=str(path), remedy="export its points with coordinates"
         )
-    return SurveyStream(collector.head, collector.table.records())
+    return SurveyStream(collector.head, collector.table.records(), remarks=collector.remarks)
 
 
 def _parse(path: Path, element: Element) -> None:

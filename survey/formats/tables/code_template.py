@@ -3,9 +3,11 @@
 A template is text with fields in braces, e.g. ``{block}:{role}`` or ``{block} {kind} {course?} {role}``; the text
 between them stands for itself, a blank for one or more. A field with a question mark may be missing, together with the
 text before it; ``{*}`` is read and ignored. A description has one reading or none: an ambiguous template is refused.
+Where the name of a stone is made of its zone, course and number, ``{number}`` takes the place of ``{block}``.
 """
 
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -13,7 +15,7 @@ from itertools import product
 from ground.errors import UsageError
 from survey.formats.fields import code_of
 
-__all__ = ["ROLES", "STATION", "CodeFields", "CodeTemplate"]
+__all__ = ["CONTROL_WORDS", "ROLES", "STATION", "CodeFields", "CodeTemplate", "is_bare"]
 
 STATION = "station"
 """The role of a position of the instrument."""
@@ -26,9 +28,14 @@ ROLES: Mapping[str, str] = {
     **dict.fromkeys(("b", "beg", "begin", "start", "l", "line", "end", "c", "cls", "close"), "vertex"),
     **dict.fromkeys(("p", "point", "pt", "face", "surface", "f", "punkt", "fläche", "flaeche"), "point"),
     **dict.fromkeys(("flächenpunkt", "face point", "punto", "superficie", "faccia", "cara"), "point"),
-    **dict.fromkeys(("s", "stn", "station", "standpunkt", "stazione", "estación"), STATION),
+    **dict.fromkeys(("s", "stn", "stp", "station", "standpunkt", "stazione", "estación"), STATION),
 }  # fmt: skip
 """Roles of points by the words for them."""
+
+CONTROL_WORDS = frozenset(
+    ("fp", "festpunkt", "pp", "passpunkt", "gcp", "control", "tie", "appui", "punto fisso", "punto fijo")
+)
+"""Descriptions of control points, which belong to no stone."""
 
 _ROLE_WORDS = "|".join(sorted((re.escape(role) for role in ROLES if " " not in role), key=len, reverse=True))
 _ROLE_LETTERS = re.escape("".join(sorted(set("".join(ROLES)) - {" "})))
@@ -39,36 +46,28 @@ _FIELDS = {  # pattern of each field, and its characters
     "zone": (_CODE, _CODE_LETTERS),
     "kind": (r"[^\W\d_][\w-]{0,31}", r"\w-"),
     "course": (r"[0-9]{1,6}", r"0-9"),
+    "number": (r"[0-9]{1,6}[^\W\d_]?", r"^\W_"),
     "role": (rf"(?i:{_ROLE_WORDS})", _ROLE_LETTERS + _ROLE_LETTERS.upper()),
 }
+_NAMED = ("zone", "course", "number")  # fields that name a stone together
+_WORD = r"[0-9]{1,6}|[^\W\d_]{1,8}", r"^\W_"  # a course of these, or a word where there is none, as in arches
 _IGNORED = "*"
 _FIELD = re.compile(r"\{([^{}]*)\}")
 _REMEDY = "write e.g. {block}:{role} or {block} {kind} {course} {role}"
 _USUAL = (
+    *(
+        f"{zone}{{course}}{mark}{{number}}{mark}{{kind}}{mark}{{role}}"
+        for mark in "._/-"
+        for zone in (f"{{zone}}{mark}", "")
+    ),
     *("{block}:{role}", "{block} {role}", "{block} {kind} {role}", "{block} {kind} {course} {role}"),
-    *(
-        "{block} {kind} {course?} {role}",
-        "{block} {course} {role}",
-        "{block}:{kind}:{role}",
-        "{block}_{role}",
-    ),
-    *(
-        "{block}-{role}",
-        "{block}.{role}",
-        "{block},{role}",
-        "{block};{role}",
-        "{role} {block}",
-        "{role}:{block}",
-    ),
-    *(
-        "{block} {kind}",
-        "{kind} {block} {role}",
-        "{kind} {block}",
-        "{block}:{role} {*}",
-        "{block} {role} {*}",
-    ),
-    *("{block} {kind} {role} {*}", "{block}", "{block} {*}"),
+    *("{block} {kind} {course?} {role}", "{block} {course} {role}", "{block}:{kind}:{role}"),
+    *("{block}.{kind}.{role}", "{block}_{role}", "{block}-{role}", "{block}.{role}", "{block},{role}"),
+    *("{block};{role}", "{role} {block}", "{role}:{block}", "{block} {kind}", "{kind} {block} {role}"),
+    *("{kind} {block}", "{block}:{role} {*}", "{block} {role} {*}", "{block} {kind} {role} {*}"),
+    *("{block}", "{block} {*}"),
 )
+_CORNERS = 3  # of the smallest stone
 
 
 @dataclass(frozen=True)
@@ -111,6 +110,7 @@ class CodeTemplate:
         if any("{" in literal or "}" in literal for literal in self._literals):
             raise UsageError(f"code template {text!r} has a brace without its other", remedy=_REMEDY)
         self._check_fields()
+        self._numbered = "block" not in self.fields
         self._matches = [self._compiled(variant) for variant in self._variants()]
 
     def parse(self, description: str) -> CodeFields | None:
@@ -121,25 +121,25 @@ class CodeTemplate:
         fields = found.groupdict()
         kind, course = fields.get("kind"), fields.get("course")
         return CodeFields(
-            block=fields["block"].rstrip(),
+            block=_named(found) if self._numbered else fields["block"].rstrip(),
             kind=None if kind is None else kind.lower(),
-            course=None if course is None else int(course),
+            course=int(course) if course is not None and course.isdigit() else None,
             zone=fields.get("zone"),
             role=ROLES[(fields.get("role") or "v").casefold()],
         )
 
     def expected(self, description: str, others: Sequence[str]) -> str:
         """Return the remedy for a description that does not fit: the usual template that fits it and others."""
-        rows = [description, *others]
+        rows = [row for row in (description, *others) if not is_bare(row)]
         for text in _USUAL:
             template = CodeTemplate(text)
-            parsed_rows = [template.parse(row) for row in rows]
-            if (
-                all(fields is not None and code_of(fields.block) for fields in parsed_rows)
-                and text != self.text
-            ):
+            fields = [template.parse(row) for row in rows]
+            if rows and text != self.text and _is_sensible(text, fields):
                 return f'it would be read by --codes "{text}"'
-        return 'correct it, or give the template of its codes, such as --codes "{block} {kind} {role}"'
+        return (
+            f"correct it, or say by --codes how the codes are built; fields are {', '.join(_FIELDS)}, and {{*}} for "
+            "what is ignored"
+        )
 
     def _check_fields(self) -> None:
         named = [field for field in self.fields if field != _IGNORED]
@@ -151,8 +151,10 @@ class CodeTemplate:
                 )
             if named.count(name) > 1:
                 raise UsageError(f"code template {self.text!r} has {{{name}}} twice", remedy="keep one")
-        if "block" not in named or self._optional[self.fields.index("block")]:
-            raise UsageError(f"code template {self.text!r} has no {{block}}", remedy=_REMEDY)
+        names = [name for name in ("block", "number") if name in named]
+        if len(names) != 1 or self._optional[self.fields.index(names[0])]:
+            what = "{block} beside {number}" if len(names) == 2 else "no {block}"
+            raise UsageError(f"code template {self.text!r} has {what}", remedy=_REMEDY)
 
     def _variants(self) -> Iterable[tuple[bool, ...]]:
         """Iterate over which fields are there: all first, and those with a closed list of words before others."""
@@ -185,7 +187,17 @@ class CodeTemplate:
         free = "".join(
             re.escape(literal) for literal in sorted(literals) if not re.match(f"[{_CODE_LETTERS}]", literal)
         )
-        wide = {**_FIELDS, "block": (_FREE % free, _FREE_LETTERS % free)}
+        if self._numbered:
+            marks = re.escape("".join(sorted(literals)))
+            apart = rf"[^\W_][^\s{marks}]{{0,63}}", rf"^\s{marks}"
+            wide = {
+                **_FIELDS,
+                "zone": apart,
+                "kind": (rf"[^\W\d_][^\s{marks}]{{0,31}}", apart[1]),
+                "course": _WORD,
+            }
+        else:
+            wide = {**_FIELDS, "block": (_FREE % free, _FREE_LETTERS % free)}
         fields = wide if _is_clear(wide, names, between) else _FIELDS
         if not _is_clear(fields, names, between):
             one, two, literal = _unclear(fields, names, between)
@@ -201,6 +213,27 @@ class CodeTemplate:
             else:
                 pattern += f"(?P<{name}>{fields[name][0]}){_literal(literal)}"
         return re.compile(pattern).fullmatch
+
+
+def is_bare(description: str) -> bool:
+    """Return whether a description only says that its point is a station or a control point."""
+    word = description.strip().casefold()
+    return word in CONTROL_WORDS or ROLES.get(word) == STATION
+
+
+def _named(found: "re.Match[str]") -> str:
+    """Return the name of a stone from its zone, course and number, with the text between them."""
+    groups = [name for name in _NAMED if found.groupdict().get(name) is not None]
+    return found.string[min(found.start(name) for name in groups) : max(found.end(name) for name in groups)]
+
+
+def _is_sensible(text: str, rows: Sequence[CodeFields | None]) -> bool:
+    """Return whether a template fits all descriptions, and does not make a stone of every point."""
+    fields = [row for row in rows if row is not None and code_of(row.block)]
+    if len(fields) < len(rows):
+        return False
+    counts = Counter(row.block for row in fields if row.role == "vertex")
+    return "{role}" in text or max(counts.values(), default=0) >= _CORNERS
 
 
 Fields = Mapping[str, tuple[str, str]]

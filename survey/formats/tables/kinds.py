@@ -58,16 +58,21 @@ def kind_of(text: str, kinds: Mapping[str, str]) -> str:
 
 
 def meant(word: str, kinds: Iterable[str]) -> str:
-    """Return the kind that an abbreviation may stand for: one with its letters in order; "…" if there is none.
+    """Return the kind that an abbreviation stands for, with its letters in order; "ashlar" if that is not clear.
+
+    One letter is never clear: B is Binder, boutisse or base.
 
     Examples
     --------
-    >>> meant("spr", ["support", "springer"]), meant("hdr", ["header", "voussoir"]), meant("xy", ["header"])
-    ('springer', 'header', '…')
+    >>> kinds = ["base", "header", "springer", "support", "voussoir"]
+    >>> [meant(word, kinds) for word in ("spr", "hdr", "b", "xy")]
+    ['springer', 'header', 'ashlar', 'ashlar']
     """
     letters = ".*".join(re.escape(letter) for letter in word)
-    candidates = sorted(kind for kind in kinds if re.match(letters, kind))
-    return min(candidates, key=lambda kind: (-_alike(word, kind), len(kind)), default="…")
+    candidates = [kind for kind in kinds if len(word) > 1 and re.match(letters, kind)]
+    best = max((_alike(word, kind) for kind in candidates), default=0)
+    likely = [kind for kind in candidates if _alike(word, kind) == best]
+    return likely[0] if len(likely) == 1 else "ashlar"
 
 
 def _alike(word: str, candidate: str) -> int:

@@ -25,7 +25,14 @@ from ground.tables.numbers import EMPTY, shown
 from ground.tables.rows import DATE_REMEDY, ListRows, Row, TextRows, open_rows
 from survey.formats.fields import CODE, KIND, code_of, parse_course
 from survey.formats.options import ReadingOptions, whole
-from survey.formats.tables.code_template import ROLES, STATION, CodeFields, CodeTemplate
+from survey.formats.tables.code_template import (
+    CONTROL_WORDS,
+    ROLES,
+    STATION,
+    CodeFields,
+    CodeTemplate,
+    is_bare,
+)
 from survey.formats.tables.columns import ColumnMap, Columns, find_columns, kind_of_column, read_map
 from survey.formats.tables.kinds import kind_of, meant
 from survey.formats.tables.point_table import PointTable, TableStone, check_station
@@ -56,6 +63,8 @@ OPTIONAL = (
     *("name", "description", "outline"),
 )
 """Optional columns."""
+
+_CONTROL = "control"  # role of a control point
 
 _OF_STONES = ("depth", "depth_sigma", "depth_source", "depth_origin", "zone", "station")
 _IDENTITY = ("block", "kind", "course", "role", "description")
@@ -174,7 +183,7 @@ def _read(
         what = "list has no points" if form else "table has no points"
         raise rows.fail(rows.end, f"the {what}", "add one line per point")
     head = collector.head
-    remarks = (*rows.remarks, *reader.remarks)
+    remarks = (*rows.remarks, *reader.remarks, *collector.remarks)
     return SurveyStream(head, collector.table.records(), header=first - 1, remarks=remarks)
 
 
@@ -326,7 +335,9 @@ class PointCollector:
         self._known = {station.name: station for station in self._head.stations}
         self._stations: dict[str, Station] = {}
         self._lines_of: dict[str, int] = {}
-        self._misfits: list[tuple[int, str]] | None = []  # until a description fits
+        self._misfits: list[tuple[int, str]] | None = []  # until a description of a stone fits
+        self._fitted = False  # a description has, if only of a station
+        self._control: dict[str, int] = {}
 
     @property
     def head(self) -> SurveyHead:
@@ -335,7 +346,7 @@ class PointCollector:
 
     def close(self) -> None:
         """Check that the template fits any description, and that most kinds are known."""
-        if self._misfits and not self._stations:
+        if self._misfits and not self._fitted:
             self._refuse_template(self._misfits)
         stones = [
             stone for stone in self.table.stones.values() if stone.kind is not None and stone.error is None
@@ -347,15 +358,23 @@ class PointCollector:
             raise self.fail(
                 unknown[0].line,
                 f"unknown kinds: {', '.join(words[:_LISTED])}",
-                f'say what they stand for: --kinds "{table}"',
+                f'say what they stand for, e.g. --kinds "{table}"; ashlar is a stone of no special kind',
             )
 
     def fail(self, line: int, what: str, remedy: str) -> SurveyError:
         """Make an error that names a line of the file."""
         return SurveyError(what, where=f"{self._path}:{line}", remedy=remedy)
 
-    def fields(self, description: str, line: int) -> CodeFields:
-        """Take a description apart.
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What was left out, in words."""
+        if not self._control:
+            return ()
+        words = ", ".join(f"{count} {word}" for word, count in self._control.items())
+        return (f"control points belong to no stone and are left out: {words}",)
+
+    def fields(self, description: str, line: int, name: str = "") -> CodeFields:
+        """Take a description apart; one that only says that its point is a station or control names it by its number.
 
         Raises
         ------
@@ -364,9 +383,13 @@ class PointCollector:
         """
         code_fields = self.template.parse(description)
         if code_fields is not None:
+            self._fitted = True
             if code_fields.role != STATION:
                 self._misfits = None
             return code_fields
+        if name and is_bare(description):
+            role = _CONTROL if description.strip().casefold() in CONTROL_WORDS else STATION
+            return CodeFields(name, None, None, None, role)
         remedy = "correct it, or give the code template that the list was made with: --codes"
         if self._misfits is not None:
             if not self._misfits:
@@ -471,13 +494,21 @@ class PointCollector:
             raise self.fail(line, f"station {name} a second time", f"the first is on line {before.line}")
         self._stations[name] = Station(name, np.array(place), line)
 
+    def leave_out(self, description: str) -> None:
+        """Count a control point."""
+        word = description.strip()
+        self._control[word] = self._control.get(word, 0) + 1
+
     def add(
         self, name: str, description: str, place: tuple[float, float, float], line: int, count: int = 1
     ) -> None:
         """Add a point with a description; a wrong one spoils its stone."""
         code: str | None = None
         try:
-            fields = self.fields(description, line)
+            fields = self.fields(description, line, name)
+            if fields.role == _CONTROL:
+                self.leave_out(description)
+                return
             identity = self.identity(fields.block, fields.kind, fields.course, fields.zone, fields.role, line)
             if fields.role != STATION:
                 code = identity.code
@@ -551,7 +582,11 @@ class _RowReader:
                 identity = self._identified(values, number)
                 if len(self._known) >= _CACHED:
                     self._known.clear()
-                self._known[key] = identity
+                if "description" not in self._columns.at or not is_bare(self._description(values)):
+                    self._known[key] = identity
+            if identity.role == _CONTROL:
+                self.collector.leave_out(self._description(values))
+                return
             stone = self._table.stones.get(identity.code)
             if stone is not None and stone.error is not None and identity.role != STATION:
                 stone.add_line(number, self._rows.lines_of(row))
@@ -561,6 +596,9 @@ class _RowReader:
             raise
         except SurveyError as error:
             self._table.refuse(self._likely_code(row, values), error, number, self._rows.lines_of(row))
+
+    def _description(self, values: Sequence[str]) -> str:
+        return values[self._columns.at["description"]]
 
     def _fit(self, values: list[str], number: int) -> None:
         """Cut empty fields at the end."""
@@ -581,7 +619,8 @@ class _RowReader:
         if "block" in cells and self._rows.is_date(block, number, self._columns.at["block"]):
             raise self._fail(number, f"the name of a stone is a date, {block}", DATE_REMEDY)
         if "description" in cells:
-            fields = self.collector.fields(cells["description"], number)
+            name = values[self._name_at] if self._name_at is not None else ""
+            fields = self.collector.fields(cells["description"], number, name)
             block, kind = block or fields.block, kind or fields.kind
             course, zone, role = fields.course, fields.zone, fields.role
         if cells.get("course"):

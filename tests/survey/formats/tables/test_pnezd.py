@@ -14,6 +14,7 @@ from survey.formats.tables.reader import open_penzd, open_pnezd
 from survey.records.survey import BlockRecord, Reject, Station, SurveyHead
 from tests.survey.formats.survey_files import PNEZD
 
+NUMBERED = "{zone}.{course}.{number}.{kind}.{role}"
 ROWS = "1,5000.5,1000.25,10.125,A:v\n2,5000.5,1001.25,10.125,A:v\n3,5000.5,1001.25,11.125,A:v\n4,5000.5,1001,10.5,A:p\n"
 
 
@@ -114,6 +115,12 @@ def test_a_description_may_hold_separators_and_say_more(tmp_path: Path) -> None:
         ("MW_{zone} {block}.{role}", "XW_N-1 A.1.s", None),
         ("{role}.{block}", "v.A", CodeFields("A", None, None, None, "vertex")),
         ("[{course}]{block}*", "[3]A*", CodeFields("A", None, 3, None, "vertex")),
+        (NUMBERED, "NW.07.03.L.E", CodeFields("NW.07.03", "l", 7, "NW", "vertex")),
+        (NUMBERED, "NW.B.06.S.F", CodeFields("NW.B.06", "s", None, "NW", "point")),
+        (NUMBERED, "NW.07.L.E", None),
+        (NUMBERED.replace(".", "-"), "NW-07-12a-L-E", CodeFields("NW-07-12a", "l", 7, "NW", "vertex")),
+        ("{course}_{number}_{kind}_{role}", "07_03_L_E", CodeFields("07_03", "l", 7, None, "vertex")),
+        ("{number} {role}", "12 v", CodeFields("12", None, None, None, "vertex")),
     ],
 )
 def test_a_template_takes_a_description_apart(
@@ -132,6 +139,8 @@ def test_a_template_takes_a_description_apart(
         ("{block}-{course}-{zone}", "two ways"),
         ("{block}/{zone}", "two ways"),
         ("{block}:{block}", "twice"),
+        ("{block}.{number}:{role}", "{block} beside {number}"),
+        ("{course}{number}:{role}", "two ways"),
         ("{stone}:{role}", "field 'stone'"),
         ("{block:{role}", "brace"),
         ("{block}}:{role}", "brace"),
@@ -277,3 +286,56 @@ def test_stations_of_the_list_join_those_of_the_head(tmp_path: Path) -> None:
     assert [one.name for one in stream.head.stations] == ["S", "T"]
     found = list(open_pnezd(write(tmp_path, ROWS + "5,1,2,3,S:s\n"), ReadingOptions(head=head)).blocks)
     assert isinstance(found[-1], Reject)
+
+
+def listed(*descriptions: str) -> str:
+    """A list of points on a face, a metre square and wider with every point, with these descriptions."""
+    places = ((0, 0), (0, 1), (1, 1), (1, 0))
+    return "".join(
+        f"{k + 1},{100 + places[k % 4][0] + k // 4},20.0,{places[k % 4][1]},{text}\n"
+        for k, text in enumerate(descriptions)
+    )
+
+
+@pytest.mark.parametrize(
+    "codes",
+    [
+        ["NW.07.03.L.E"] * 4 + ["NW.07.04.B.E"] * 3 + ["NW.B.01.V.E"] * 3,
+        ["NW-07-03-L-E"] * 4 + ["NW-07-04-B-F"],
+        ["07_03_L_E"] * 4 + ["07_04_L_E"] * 4,
+        ["W01"] * 4 + ["W02"] * 4,
+        ["W01.v"] * 4 + ["W02.p"],
+    ],
+)
+def test_the_template_that_is_advised_makes_stones_of_the_list(tmp_path: Path, codes: list[str]) -> None:
+    path = write(tmp_path, listed("FP", "STP", *codes))
+    with pytest.raises(SurveyError) as error:
+        open_penzd(path)
+    advised = re.search('--codes "(.*)"', str(error.value.remedy))
+    assert advised is not None
+    stones = open_penzd(path, ReadingOptions(codes=advised[1])).blocks
+    whole = [one for one in stones if isinstance(one, BlockRecord)]
+    assert sum(len(one.vertices) + len(one.points) for one in whole) >= 4
+
+
+def test_no_template_is_advised_that_makes_a_stone_of_every_point(tmp_path: Path) -> None:
+    with pytest.raises(SurveyError) as error:
+        open_penzd(write(tmp_path, listed("a1", "a2", "a3", "a4", "a5")))
+    assert '--codes "' not in str(error.value.remedy)
+
+
+def test_points_that_are_only_stations_or_control_belong_to_no_stone(tmp_path: Path) -> None:
+    text = listed("FP", "FP", "STP", "Standpunkt", *["A:v"] * 4)
+    stream = open_penzd(write(tmp_path, text))
+    assert [one.name for one in stream.head.stations] == ["3", "4"]
+    assert stream.remarks == ("control points belong to no stone and are left out: 2 FP",)
+    assert [one.code for one in stream.blocks] == ["A"]
+
+
+def test_kinds_of_one_letter_are_not_guessed(tmp_path: Path) -> None:
+    options = ReadingOptions(
+        codes="{block} {kind}", known_kinds=frozenset(["ashlar", "base", "header", "springer"])
+    )
+    with pytest.raises(SurveyError) as error:
+        open_penzd(write(tmp_path, listed(*["A B"] * 4, *["C SPR"] * 4)), options)
+    assert '--kinds "b=ashlar,spr=springer"' in str(error.value.remedy)
