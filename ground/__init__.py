@@ -3,8 +3,11 @@
 errors   what fails, with exit code and remedy
 tables   rows and columns of texts and workbooks
 kernels  compiled kernels, loaded before numba
+settings meaning, unit and bounds of a dataclass field
+polygons area and centroid of a plane polygon in space
 
 Public: `DatabaseError`, `ExchangeError`, `GeometryError`, `MeshError`, `MissingLibraryError`, `MomaError`,
 `NoDatabaseError`, `QueryError`, `SceneError`, `SolverError`, `StorageError`, `SurveyError`,
-`UnsoundSceneError`, `UsageError`, `storage_error`, `storing` (errors).
+`UnsoundSceneError`, `UsageError`, `storage_error`, `storing` (errors); `Setting`, `declared` (settings);
+`area_and_centroid` (polygons).
 """

@@ -14,6 +14,7 @@ from sqlalchemy.orm import Session
 from archmodel.arrays import Array
 from archmodel.store.bulk import batches
 from archmodel.tables.surveys import Measurement, Survey
+from ground.polygons import area_and_centroid
 
 __all__ = [
     "SIGNIFICANT",
@@ -79,22 +80,12 @@ def face_place(
     covariance : (3, 3) of two tilts [rad] and the height at the centroid [m]
     corner_sigma : (nv, 3) standard deviations of the corners [m]
     """
-    place = _area_centroid(outline, normal)
+    _, place = area_and_centroid(outline, normal)
     lever = np.array([*((place - centroid) @ axes.T), 1.0])
     across = float(lever @ covariance @ lever)
     along = np.eye(3) - np.outer(normal, normal)
     corners = np.nansum(corner_sigma**2, axis=0) / len(outline) ** 2
     return FacePlace(place, along @ np.diag(corners) @ along + across * np.outer(normal, normal))
-
-
-def _area_centroid(outline: Array, normal: Array) -> Array:
-    """Return the centroid (3,) of a polygon (nv, 3)."""
-    first = outline[0]
-    arms = outline[1:] - first
-    areas = np.cross(arms[:-1], arms[1:]) @ normal
-    if not abs(areas.sum()) > 0.0:
-        return np.asarray(outline.mean(axis=0))
-    return np.asarray(first + areas @ (arms[:-1] + arms[1:]) / (3.0 * areas.sum()))
 
 
 def displacement(earlier: FacePlace, later: FacePlace) -> Displacement:

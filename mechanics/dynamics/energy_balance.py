@@ -22,8 +22,6 @@ from mechanics.scene.state import State
 
 __all__ = ["EnergyBalance", "EnergyTerms"]
 
-_NO_ENERGY = 1e-9  # of weight times smallest width: below it, energies of the run are rounding [-]
-
 
 class EnergyTerms(Carrier):
     """Terms of the energy balance, summed over a run of stones or of disks.
@@ -46,7 +44,7 @@ class EnergyTerms(Carrier):
     def __init__(self, energy: float, scale: float) -> None:
         self._energy = energy
         self.external = self.contact = self.scheme = self.unexplained = 0.0
-        self.reference = max(energy, _NO_ENERGY * scale)
+        self.reference = max(energy, 1e-9 * scale)
 
     def add(
         self, energy: float, external: float, contact: float, scheme: float, relaxed: float = 0.0

@@ -7,11 +7,12 @@ from typing import Annotated
 import numpy as np
 
 from ground.errors import SceneError
+from ground.settings import Setting
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.law import Law
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.scene import LawRule, Method, SolverSettings
-from mechanics.stones.settings import Setting, check_settings
+from mechanics.stones.settings import check_settings
 
 __all__ = ["Disk", "PlanarScene", "PlanarTime", "Wall"]
 

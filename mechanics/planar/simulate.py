@@ -75,6 +75,7 @@ def simulate_planar(
             run.restore(earlier)
 
         def observe(last: bool) -> None:
+            """Hand the instant out to the observers that want it."""
             due = [observer for observer in observers if last or observer.wants(run.steps)]
             if due:
                 instant = run.instant()

@@ -12,6 +12,7 @@ from typing import Annotated
 import numpy as np
 
 from ground.errors import SceneError
+from ground.settings import Setting
 from mechanics.arrays import Array
 from mechanics.scene.laws.elastic_joint import ElasticJoint
 from mechanics.scene.loads.forces import StoneForce
@@ -21,7 +22,7 @@ from mechanics.scene.scene import Block, Fidelity, LawRule, Part, Scene
 from mechanics.scene.shapes import BOX_FACES, box_corners
 from mechanics.stones.materials import Material
 from mechanics.stones.polyhedra import mass_properties
-from mechanics.stones.settings import Setting, check_settings
+from mechanics.stones.settings import check_settings
 
 __all__ = ["BASE", "BEAM", "HOLD", "JAWS", "Head", "Rig", "rigged"]
 

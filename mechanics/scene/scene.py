@@ -8,6 +8,7 @@ from enum import StrEnum
 from typing import Annotated
 
 from ground.errors import SceneError
+from ground.settings import Setting
 from mechanics.arrays import Array
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.law import Law
@@ -15,7 +16,7 @@ from mechanics.scene.loads.load import Loads
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.meshers.choice import Mesher
-from mechanics.stones.settings import Setting, check_settings
+from mechanics.stones.settings import check_settings
 from mechanics.stones.validation import check_corners, finite, refuse_unless
 
 __all__ = [

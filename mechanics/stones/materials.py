@@ -7,8 +7,9 @@ from typing import Annotated
 import numpy as np
 
 from ground.errors import SceneError
+from ground.settings import Setting
 from mechanics.arrays import Array
-from mechanics.stones.settings import Setting, check_settings
+from mechanics.stones.settings import check_settings
 from mechanics.stones.validation import LARGEST
 
 __all__ = ["Material", "Orthotropy", "fourth_order"]

@@ -94,6 +94,7 @@ def assess(
     """Find how far a scene is from falling: limit load, bound and candidate, and mechanism of each load."""
     from moma.cli.text.assessments import assessment_lines
     from moma.cli.text.formats import as_json
+    from pipelines.assess.assess import AssessOptions
     from pipelines.assess.assess import assess as answered
 
     folder = out or Path("out") / f"{scene.stem}-assess"
@@ -104,12 +105,9 @@ def assess(
             folder,
             asked.load or (),
             listener,
-            asked.confirm,
-            asked.code,
-            overwrite,
-            weakest=asked.weakest,
-            instant=asked.at,
-            leave_out_loose=asked.leave_out_loose,
+            AssessOptions(
+                asked.confirm, asked.code, asked.weakest, asked.at, asked.leave_out_loose, overwrite
+            ),
         )
     for warning in done.warnings:
         say(f"warning: {warning}")

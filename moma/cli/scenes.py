@@ -102,7 +102,7 @@ def run(
         from ground.kernels.beside import compiling_beside
         from moma.cli.text.formats import as_json
         from moma.cli.text.runs_and_surveys import run_lines
-        from pipelines.run.run import run_scene
+        from pipelines.run.run import RunOptions, run_scene
         from pipelines.run.unfinished import finished_run
         from pipelines.scene.file import read_scene
 
@@ -117,14 +117,16 @@ def run(
             common.db,
             folder,
             stop.listening(listener),
-            choices.profile,
-            choices.meshes,
-            choices.accept_unsound,
             stop,
             choices.resume,
-            choices.overwrite,
-            choices.animate,
-            choices.repeat,
+            RunOptions(
+                choices.profile,
+                choices.meshes,
+                choices.accept_unsound,
+                choices.overwrite,
+                choices.animate,
+                choices.repeat,
+            ),
         )
     for warning in done.warnings:
         say(f"warning: {warning}")

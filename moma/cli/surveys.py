@@ -415,14 +415,14 @@ def sources(
     UsageError
         if options contradict each other, or are of another format
     """
-    from pipelines.ingest.reading_options import format_of_all, reading_options
+    from pipelines.ingest.reading_options import format_of_all, reading_options, solid_options
 
-    choices = {**vars(survey), **(vars(solids) if solids else {})}
-    for name in ("files", "format", "kind_where", "support"):
-        choices.pop(name, None)
-    if (axis := choices.get("up")) is not None:
-        choices["up"] = axis.value
+    choices = {name: value for name, value in vars(survey).items() if name not in ("files", "format")}
     options = reading_options(**choices)
+    if solids is not None:
+        up = None if solids.up is None else solids.up.value
+        options = solid_options(options, up, solids.repair, solids.snap, solids.planes)
+        choices |= {"up": up, "repair": solids.repair, "snap": solids.snap, "planes": solids.planes}
     if (outlines := _outlined(options, survey, drawn)) is not None:
         _check_fitting(outlines[0], choices)
         return outlines

@@ -39,7 +39,7 @@ from pipelines.assess.questions import LoadQuestion, Question, parse_question, s
 from pipelines.draw.mechanism import draw_mechanisms
 from pipelines.draw.plots import draw_capacity
 from pipelines.reports.assessment import write_assessment
-from pipelines.reports.page.known import known_stones
+from pipelines.reports.page.known import Known, known_stones
 from pipelines.reports.page.scenes import assessment_model
 from pipelines.results.folder import UNFINISHED_ASSESSMENT, check_replaceable, replacing, source_of
 from pipelines.results.summary import as_json
@@ -54,7 +54,7 @@ from pipelines.scene.selection import select_groups, select_stones
 from pipelines.scene.site import Site
 from pipelines.scene.stages import refuse_stages
 
-__all__ = ["CURVE_COLUMNS", "INDEX", "JOINT_COLUMNS", "REPORT", "Assessment", "assess"]
+__all__ = ["CURVE_COLUMNS", "INDEX", "JOINT_COLUMNS", "REPORT", "AssessOptions", "Assessment", "assess"]
 
 INDEX = "assessment.json"
 """Index of the results of an assessment."""
@@ -107,19 +107,36 @@ class Assessment:
     decided: bool = True
 
 
+@dataclass(frozen=True)
+class AssessOptions:
+    """Choices of an assessment beside its loads.
+
+    Attributes
+    ----------
+    confirm : candidates of all loads are confirmed by runs, also of those that do not ask for it
+    code : by which mechanisms of pushes on all stones are checked (`pipelines.assess.codes.check.CODES`), where their
+        question names no other; needs [site] in the scene
+    weakest : seek the direction of the weakest horizontal push, too
+    instant : at which loads that change with time are taken [s]; None: the one from which they are constant
+    leave_out_loose : stones that fall under their own weight are left out, and listed, if the others stand
+    overwrite : replace the results of another scene in the folder
+    """
+
+    confirm: bool = False
+    code: str | None = None
+    weakest: bool = False
+    instant: float | None = None
+    leave_out_loose: bool = False
+    overwrite: bool = False
+
+
 def assess(
     path: str | Path,
     url: str,
     folder: str | Path,
     loads: Sequence[str] = (),
     progress: Listener = silent,
-    confirm: bool = False,
-    code: str | None = None,
-    overwrite: bool = False,
-    *,
-    weakest: bool = False,
-    instant: float | None = None,
-    leave_out_loose: bool = False,
+    options: AssessOptions | None = None,
 ) -> Assessment:
     """Answer how far a scene is from falling, on the stones of a database; keep the answers there and in a folder.
 
@@ -133,13 +150,7 @@ def assess(
     loads : in words (`parse_question`); none: those of the scene's [[assess]], or horizontal pushes square to each
         façade, both ways, and along it
     progress : called at every stage
-    confirm : candidates of all loads are confirmed by runs, also of those that do not ask for it
-    code : by which mechanisms of pushes on all stones are checked (`pipelines.assess.codes.check.CODES`), where their
-        question names no other; needs [site] in the scene
-    overwrite : replace the results of another scene in the folder
-    weakest : seek the direction of the weakest horizontal push, too
-    instant : at which loads that change with time are taken [s]; None: the one from which they are constant
-    leave_out_loose : stones that fall under their own weight are left out, and listed, if the others stand
+    options : further choices
 
     Raises
     ------
@@ -149,11 +160,12 @@ def assess(
     SceneError, GeometryError, SolverError : see `assemble` and `mechanics.limit`
     DatabaseError : the database cannot be read or written
     """
+    options = options or AssessOptions()
     folder, scene, asked = Path(folder), read_scene(path), tuple(map(parse_question, loads))
     refuse_stages(scene.stages, scene.document, "moma assess")
-    check_replaceable(folder, INDEX, () if overwrite else (Path(path),))
-    if code is not None:
-        _refuse_code(code, scene)
+    check_replaceable(folder, INDEX, () if options.overwrite else (Path(path),))
+    if options.code is not None:
+        _refuse_code(options.code, scene)
     progress(Progress("blocks", 0, None, "reading the stones"))
     with open_database(url, create=False) as database, database.session(read_only=True) as session:
         as_of = latest_entry(session)
@@ -164,20 +176,19 @@ def assess(
         inputs = scene_inputs(scene, assembled, groups, session)
         known = known_stones(session, [model.record.code for model in models])
     questions = [
-        _asked(question, confirm, code)
-        for question in asked or scene_questions(scene, groups, assembled.origin)
+        _asked(question, options) for question in asked or scene_questions(scene, groups, assembled.origin)
     ]
-    dead = at_instant(assembled.scene, instant)
+    dead = at_instant(assembled.scene, options.instant)
     on = assembly(dead)
     refuse_unsound(problems_of(scene, assembled, loose_blocks(on.model, on.state)), str(path), _SOUND_FIRST)
     for question in questions:
         refuse_unanswerable(on, question)
     progress(Progress("assess", 0, len(questions), "do the stones stand by themselves?"))
-    on, standing, left_out = _standing(on, dead, leave_out_loose, progress)
-    questions = questions or [_asked(push, confirm, code) for push in facade_pushes(on.model.scene.blocks)]
-    if weakest and standing.outcome.rests:
+    on, standing, left_out = _standing(on, dead, options.leave_out_loose, progress)
+    questions = questions or [_asked(push, options) for push in facade_pushes(on.model.scene.blocks)]
+    if options.weakest and standing.outcome.rests:
         progress(Progress("assess", 0, len(questions), "the weakest direction"))
-        questions.append(_asked(weakest_push(on), confirm, code))
+        questions.append(_asked(weakest_push(on), options))
     given = digest(sorted(fingerprint(on.model.scene, on.model, on.state, models).items()))
     with kept_answers(folder, UNFINISHED_ASSESSMENT, (Answer, Mechanism, Pushover)) as store:
         if len(store):
@@ -188,46 +199,57 @@ def assess(
             answers = _answered(on, questions, scene.site, store, given, progress, outwards)
         else:
             answers = [fallen(on, question, standing) for question in questions]
-    unchecked = [
-        question.name
-        for question in questions
-        if code and isinstance(question, LoadQuestion) and question.code is None
-    ]
-    summary = _summary(assembled, on, answers, unchecked, standing, left_out)
+    summary = _summary(assembled, on, answers, _unchecked(questions, options), standing, left_out)
     summary["inputs"] = {title: list(lines) for title, lines in inputs.items()}
     progress(Progress("write", 0, 1, "pictures"))
-    warnings: list[str] = []
     with replacing(folder, INDEX) as fresh:
-        carried = [_carried(on, one) for one in answers]
-        summary["files"] = [INDEX, REPORT, "scene.toml", *_write_forces(fresh, on, assembled, carried)]
-        titles = [_title(scene.name, one.told["headline"]) for one in answers]
-        moving = [one.mechanism for one in answers]
-        summary["files"] += _write_curves(fresh, answers, titles)
-        try:
-            summary["files"] += draw_mechanisms(
-                fresh,
-                on.model.scene.blocks,
-                on,
-                list(zip(titles, moving, carried, strict=True)),
-                assembled.towards,
-            )
-        except MissingLibraryError as error:
-            warnings.append(f"no pictures: {error}")
-        summary["source"] = source_of([path], fresh)
-        limits = [
-            (one.told["name"], one.told["headline"], one.mechanism, forces)
-            for one, forces in zip(answers, carried, strict=True)
-        ]
-        model = assessment_model(
-            scene.name, on.model.scene.blocks, on, limits, assembled.towards, assembled.origin, known
-        )
-        write_assessment(fresh / REPORT, summary, model)
-        (fresh / "scene.toml").write_text(scene.text, encoding="utf-8")
-        (fresh / INDEX).write_text(as_json(summary), encoding="utf-8")
+        warnings = _write_files(fresh, scene, assembled, on, answers, known, summary)
     with open_database(url, create=False) as database:
         run = store_record(database, folder, _record(scene, on, answers, summary, as_of))
     progress(Progress("write", 1, 1))
-    return Assessment(folder, summary, run, tuple(warnings), standing.outcome.decided)
+    return Assessment(folder, summary, run, warnings, standing.outcome.decided)
+
+
+def _unchecked(questions: Sequence[Question], options: AssessOptions) -> list[str]:
+    """Return the names of the loads whose mechanisms the code, if there is any, does not check."""
+    return [
+        question.name
+        for question in questions
+        if options.code and isinstance(question, LoadQuestion) and question.code is None
+    ]
+
+
+def _write_files(
+    folder: Path,
+    scene: SceneFile,
+    assembled: Assembly,
+    on: RigidAssembly,
+    answers: Sequence[Answer],
+    known: Known,
+    summary: dict[str, Any],
+) -> tuple[str, ...]:
+    """Write all files of an assessment, and list them in its summary; return the requests that were not met."""
+    warnings: tuple[str, ...] = ()
+    carried = [_carried(on, reply) for reply in answers]
+    summary["files"] = [INDEX, REPORT, "scene.toml", *_write_forces(folder, on, assembled, carried)]
+    titles = [_title(scene.name, reply.told["headline"]) for reply in answers]
+    summary["files"] += _write_curves(folder, answers, titles)
+    blocks, mechanisms = on.model.scene.blocks, [reply.mechanism for reply in answers]
+    try:
+        drawn = list(zip(titles, mechanisms, carried, strict=True))
+        summary["files"] += draw_mechanisms(folder, blocks, on, drawn, assembled.towards)
+    except MissingLibraryError as error:
+        warnings = (f"no pictures: {error}",)
+    summary["source"] = source_of([scene.document.path], folder)
+    limits = [
+        (reply.told["name"], reply.told["headline"], reply.mechanism, forces)
+        for reply, forces in zip(answers, carried, strict=True)
+    ]
+    model = assessment_model(scene.name, blocks, on, limits, assembled.towards, assembled.origin, known)
+    write_assessment(folder / REPORT, summary, model)
+    (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
+    (folder / INDEX).write_text(as_json(summary), encoding="utf-8")
+    return warnings
 
 
 def _standing(
@@ -280,12 +302,12 @@ def _answered(
     return answers
 
 
-def _asked(question: Question, confirm: bool, code: str | None) -> Question:
+def _asked(question: Question, options: AssessOptions) -> Question:
     """Return a question with what the options ask of all loads."""
     if not isinstance(question, LoadQuestion):
         return question
-    by = code if question.whole and question.code is None else question.code
-    return replace(question, confirm=question.confirm or confirm, code=by)
+    code = options.code if question.whole and question.code is None else question.code
+    return replace(question, confirm=question.confirm or options.confirm, code=code)
 
 
 def _refuse_code(code: str, scene: SceneFile) -> None:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from ground.errors import SceneError
-from mechanics.stones.settings import Setting
+from ground.settings import Setting
 
 __all__ = ["DiskContact", "GeologyOutput", "Layer", "SampleSettings", "Stepping", "Sweeping"]
 

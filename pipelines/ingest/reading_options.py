@@ -10,7 +10,7 @@ from survey.formats.options import ReadingOptions
 from survey.formats.reading import ENDINGS, format_of, solid_files, with_header
 from survey.formats.tables.kinds import read_kinds
 
-__all__ = ["UNITS", "Source", "format_of_all", "reading_options", "survey_sources"]
+__all__ = ["UNITS", "Source", "format_of_all", "reading_options", "solid_options", "survey_sources"]
 
 _ENDINGS: Mapping[str, tuple[str, ...]] = {
     **ENDINGS,
@@ -123,13 +123,9 @@ def reading_options(
     kind: str | None = None,
     sigma: float | None = None,
     unit: str | None = None,
-    snap: float | None = None,
-    planes: float | None = None,
     columns: str | None = None,
     sheet: str | None = None,
     kinds: str | None = None,
-    up: str | None = None,
-    repair: float | None = None,
 ) -> ReadingOptions:
     """Gather the options of a reader; None keeps the default.
 
@@ -140,26 +136,16 @@ def reading_options(
     kind : of stones without one
     sigma : of a coordinate, where the file has none; it takes precedence over the header file [m]
     unit : one of `UNITS`, in which coordinates are given
-    snap : tolerance within which faces of neighbouring solids are brought into one plane [m]
-    planes : distance within which the facets of a scanned solid are one plane face [m]
     columns : names of columns of a table by what they are, e.g. ``block=Stein,x=Rechts``
     sheet : of a workbook
     kinds : abbreviations of kinds, e.g. ``SPR=springer``, or a file with them
-    up : axis that points upwards in files of solids, "y" or "z"
-    repair : distance within which faults of solids are repaired [m]; 0: none is
 
     Raises
     ------
-    UsageError : the sigma is not positive, there is no such header file or unit, or the tolerance is negative
+    UsageError : the sigma is not positive, there is no such header file or unit
     SurveyError : naming the line of the header file that is wrong
     """
-    options = ReadingOptions(codes=codes, columns=columns, sheet=sheet, up=up, repair=repair)
-    if repair is not None and not 0.0 <= repair < 1.0:
-        what, remedy = (
-            f"the tolerance is {repair:g} m",
-            "give it in metres, e.g. 0.001; 0: nothing is repaired",
-        )
-        raise UsageError(what, where="--repair", remedy=remedy)
+    options = ReadingOptions(codes=codes, columns=columns, sheet=sheet)
     if kinds is not None:
         options = replace(options, kinds=read_kinds(kinds))
     if kind is not None:
@@ -177,17 +163,42 @@ def reading_options(
             what, remedy = f"unknown unit {unit!r}", f"units: {', '.join(UNITS)}"
             raise UsageError(what, where="--unit", remedy=remedy)
         options = replace(options, unit=UNITS[unit_name])
-    if snap is not None:
-        if not 0.0 <= snap < 1.0:
-            what, remedy = f"the tolerance is {snap:g} m", "give it in metres, e.g. 0.002; 0: none"
-            raise UsageError(what, where="--snap", remedy=remedy)
+    return options
+
+
+def solid_options(
+    options: ReadingOptions,
+    up: str | None = None,
+    repair: float | None = None,
+    snap: float | None = None,
+    planes: float | None = None,
+) -> ReadingOptions:
+    """Add the options of files of solids to those of any reader; None keeps the default.
+
+    Parameters
+    ----------
+    up : axis that points upwards, "y" or "z"
+    repair : distance within which faults of solids are repaired [m]; 0: none is
+    snap : tolerance within which faces of neighbouring solids are brought into one plane [m]
+    planes : distance within which the facets of a scanned solid are one plane face [m]
+
+    Raises
+    ------
+    UsageError : a distance is negative, or too large for a stone
+    """
+    options = replace(
+        options, up=up, repair=_distance("--repair", repair, 1.0, "0.001; 0: nothing is repaired")
+    )
+    if (snap := _distance("--snap", snap, 1.0, "0.002; 0: none")) is not None:
         options = replace(options, snap=snap)
-    if planes is not None:
-        if not 0.0 <= planes < 0.1:
-            what, remedy = (
-                f"the tolerance is {planes:g} m",
-                "give it in metres, e.g. 0.005; 0 keeps every facet",
-            )
-            raise UsageError(what, where="--planes", remedy=remedy)
+    if (planes := _distance("--planes", planes, 0.1, "0.005; 0 keeps every facet")) is not None:
         options = replace(options, planes=planes)
     return options
+
+
+def _distance(option: str, value: float | None, below: float, example: str) -> float | None:
+    """Return a distance that is from 0 to below a bound [m]."""
+    if value is not None and not 0.0 <= value < below:
+        remedy = f"give it in metres, e.g. {example}"
+        raise UsageError(f"the tolerance is {value:g} m", where=option, remedy=remedy)
+    return value

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Annotated
 
+from ground.settings import Setting
 from mechanics.scene.scene import Block, ContactSize, Fidelity, Growth
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.meshers.choice import Mesher
-from mechanics.stones.settings import Setting
 
 __all__ = ["Fidelities", "MaterialRule", "MeshSettings", "Output", "ParaView", "Selection"]
 

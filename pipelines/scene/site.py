@@ -6,7 +6,8 @@ from typing import Annotated
 import numpy as np
 
 from ground.errors import SceneError
-from mechanics.stones.settings import Setting, check_settings
+from ground.settings import Setting
+from mechanics.stones.settings import check_settings
 
 __all__ = ["Site", "damping_factor"]
 

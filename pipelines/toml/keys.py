@@ -10,10 +10,9 @@ from enum import Enum
 from types import NoneType
 from typing import Annotated, Any, TypeVar, get_args, get_type_hints
 
-from mechanics.stones.settings import Setting
+from ground.settings import Setting
 from pipelines.toml.lines import Path
 from pipelines.toml.schema import REQUIRED, Key, TomlDocument, ValueKind, check_table
-from survey.joints.settings import Setting as SurveySetting
 
 __all__ = [
     "Groups",
@@ -122,13 +121,13 @@ def build(owner: type[Settings], values: Mapping[str, Any]) -> Settings:
     return owner(**typed_values(owner, values))
 
 
-def _declared(owner: type[Any]) -> Mapping[str, tuple[Any, Setting | SurveySetting]]:
+def _declared(owner: type[Any]) -> Mapping[str, tuple[Any, Setting]]:
     """Return type, without None, or kind of value, and declaration of every setting of a dataclass."""
     return {
         name: (_kind_or_type(hint), setting)
         for name, hint in get_type_hints(owner, include_extras=True).items()
         for setting in getattr(hint, "__metadata__", ())
-        if isinstance(setting, Setting | SurveySetting)
+        if isinstance(setting, Setting)
     }
 
 

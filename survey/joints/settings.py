@@ -2,20 +2,11 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
-__all__ = ["JointMode", "JointSettings", "Setting"]
+from ground.settings import Setting
 
-
-class Setting(NamedTuple):
-    """Annotation of a field: its meaning in one sentence, its unit, and the bounds that a scene file may give it."""
-
-    doc: str
-    unit: str = ""
-    above: float | None = None
-    at_least: float | None = None
-    below: float | None = None
-    at_most: float | None = None
+__all__ = ["JointMode", "JointSettings"]
 
 
 class JointMode(StrEnum):

@@ -13,9 +13,9 @@ MOST = {
     "numbers of survey": 970,
     "numbers of archmodel": 98,
     "numbers of mechanics": 740,
-    "numbers of pipelines": 545,
-    "long functions": 44,
-    "wide functions": 4,
+    "numbers of pipelines": 538,
+    "long functions": 40,
+    "wide functions": 0,
     "undocumented functions": 135,
 }
 """Today's figures: whoever lowers one lowers its bound, and nobody raises one."""

@@ -5,12 +5,13 @@ from typing import Annotated
 
 import numpy as np
 
+from ground.settings import Setting
 from mechanics.arrays import Array
 from mechanics.scene.laws.bonds import BROKEN, bonded, with_bonds
 from mechanics.scene.laws.dry_joint import DryJoint, Friction, at_limit, slid
 from mechanics.scene.laws.law import BOND, OPENING, REST, SLIDING, SLIP, Approach, Joint, Law, Terms
 from mechanics.scene.laws.mortar import MortarJoint, held_tension
-from mechanics.stones.settings import Setting, check_settings
+from mechanics.stones.settings import check_settings
 
 __all__ = ["CohesiveZone"]
 

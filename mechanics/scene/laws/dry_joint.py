@@ -6,9 +6,10 @@ from typing import Annotated
 import numpy as np
 
 from ground.errors import SceneError
+from ground.settings import Setting
 from mechanics.arrays import Array, Bools
 from mechanics.scene.laws.law import REST, SLIDING, Approach, Joint, Terms
-from mechanics.stones.settings import Setting, check_settings
+from mechanics.stones.settings import check_settings
 
 __all__ = ["DryJoint", "DynamicFriction", "Friction", "at_limit", "gap_bias", "slid"]
 

@@ -7,6 +7,7 @@ from typing import Annotated
 import numpy as np
 
 from ground.errors import SceneError
+from ground.settings import Setting
 from mechanics.arrays import Array, Bools
 from mechanics.scene.laws.bonds import BROKEN, bonded, with_bonds
 from mechanics.scene.laws.closure import FLOOR, Closure
@@ -28,7 +29,7 @@ from mechanics.scene.laws.law import (
     Terms,
 )
 from mechanics.scene.laws.mortar import MortarJoint, check_tension
-from mechanics.stones.settings import Setting, check_settings
+from mechanics.stones.settings import check_settings
 
 __all__ = ["ElasticJoint"]
 

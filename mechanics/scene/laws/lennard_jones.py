@@ -5,10 +5,11 @@ from typing import Annotated
 
 import numpy as np
 
+from ground.settings import Setting
 from mechanics.arrays import Array
 from mechanics.scene.laws.dry_joint import DryJoint, Friction
 from mechanics.scene.laws.law import Approach, Joint, Terms
-from mechanics.stones.settings import Setting, check_settings
+from mechanics.stones.settings import check_settings
 
 __all__ = ["LennardJones"]
 

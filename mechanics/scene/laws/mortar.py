@@ -6,11 +6,12 @@ from typing import Annotated
 import numpy as np
 
 from ground.errors import SceneError
+from ground.settings import Setting
 from mechanics.arrays import Array
 from mechanics.scene.laws.bonds import BROKEN, bonded, with_bonds
 from mechanics.scene.laws.dry_joint import DryJoint, DynamicFriction, Friction, at_limit, slid
 from mechanics.scene.laws.law import BOND, REST, SLIDING, SLIP, Approach, Joint, Law, Terms
-from mechanics.stones.settings import Setting, check_settings
+from mechanics.stones.settings import check_settings
 
 __all__ = ["MortarJoint", "check_tension", "held_tension"]
 

@@ -6,10 +6,10 @@ from typing import Annotated
 import numpy as np
 
 from ground.errors import SceneError
+from ground.settings import Setting
 from mechanics.arrays import Array
 from mechanics.scene.loads.load import Course
 from mechanics.scene.loads.time_series import History
-from mechanics.stones.settings import Setting
 from mechanics.stones.validation import finite, refuse_unless
 
 __all__ = ["StoneForce"]

@@ -7,10 +7,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ground.errors import SceneError
+from ground.settings import Setting
 from mechanics.arrays import Array
 from mechanics.scene.loads.load import Course
 from mechanics.scene.loads.time_series import History
-from mechanics.stones.settings import Setting, check_settings
+from mechanics.stones.settings import check_settings
 
 __all__ = ["GravityRamp", "TiltingTable"]
 

@@ -7,10 +7,10 @@ from typing import Annotated
 import numpy as np
 
 from ground.errors import SceneError
+from ground.settings import Setting
 from mechanics.scene.loads.accelerogram import Accelerogram
 from mechanics.scene.loads.load import Course, Pose
 from mechanics.scene.loads.time_series import History
-from mechanics.stones.settings import Setting
 
 __all__ = ["Component", "GroundMotion", "braking_time"]
 

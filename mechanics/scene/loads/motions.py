@@ -8,9 +8,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ground.errors import SceneError
+from ground.settings import Setting
 from mechanics.scene.loads.load import Course, Pose
 from mechanics.scene.loads.time_series import History
-from mechanics.stones.settings import Setting
 from mechanics.stones.validation import finite
 
 __all__ = ["ImposedMotion", "settlement", "spreading"]

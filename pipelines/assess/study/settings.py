@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Annotated
 
-from mechanics.stones.settings import Setting
+from ground.settings import Setting
 
 __all__ = [
     "Acts",

@@ -7,13 +7,13 @@ from typing import Annotated
 
 import numpy as np
 
+from ground.settings import Setting
 from mechanics.arrays import Array
 from mechanics.planar.scene import Wall
 from mechanics.scene.loads.forces import StoneForce
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.motions import ImposedMotion
 from mechanics.scene.loads.time_series import History
-from mechanics.stones.settings import Setting
 from pipelines.geology.experiments.experiment import Setup
 from pipelines.geology.observe import Fields
 

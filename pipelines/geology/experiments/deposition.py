@@ -6,10 +6,10 @@ from typing import Annotated
 
 import numpy as np
 
+from ground.settings import Setting
 from mechanics.arrays import Array
 from mechanics.planar.scene import Wall
 from mechanics.scene.loads.load import Loads
-from mechanics.stones.settings import Setting
 from pipelines.geology.experiments.experiment import Setup
 from pipelines.geology.observe import Fields
 

@@ -7,6 +7,7 @@ from typing import Annotated
 import numpy as np
 
 from ground.errors import SceneError
+from ground.settings import Setting
 from mechanics.arrays import Array
 from mechanics.planar.measures.limits import crest_radius, shear_limits
 from mechanics.planar.measures.surface import front, profile, rise
@@ -16,7 +17,6 @@ from mechanics.planar.scene import Wall
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.motions import ImposedMotion
 from mechanics.scene.loads.time_series import History
-from mechanics.stones.settings import Setting
 from pipelines.geology.experiments.experiment import Setup
 from pipelines.geology.observe import Fields
 

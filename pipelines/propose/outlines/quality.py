@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from pipelines.propose.outlines.features import Feature
+from survey.clouds.settings import CloudOptions
 from survey.geometry.polygons import ring_area
 from survey.quality.facades import Facade, WallPlane
 from survey.quality.masonry.index import PARAMETERS, Direction, Grade, Parameter
@@ -13,7 +14,6 @@ from survey.quality.masonry.walls import WallStone, judge_masonry
 __all__ = ["quality_facts"]
 
 _PLANE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # along, up, outwards
-_SIGMA = 0.005  # standard deviation of a corner that states none: half of a usual joint [m]
 _WORDS = {
     Direction.VERTICAL: "vertical",
     Direction.IN_PLANE: "in the plane",
@@ -59,7 +59,7 @@ def _stone(feature: Feature) -> WallStone:
         None,
         outline,
         -np.array([0.0, 1.0, 0.0]),
-        float(said.get("sigma") or _SIGMA),
+        float(said.get("sigma") or CloudOptions.outline_sigma),
         None,
         None,
         abs(ring_area(feature.ring)),

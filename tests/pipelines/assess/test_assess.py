@@ -13,7 +13,7 @@ from mechanics.limit.limit_load import Mechanism
 from moma import ingest
 from pipelines.assess import assess as assess_module
 from pipelines.assess.answers import FALLS, Answer
-from pipelines.assess.assess import assess
+from pipelines.assess.assess import AssessOptions, assess
 from pipelines.assess.compare import compare
 from pipelines.assess.questions import scene_questions
 from pipelines.scene.file import parse_scene
@@ -93,7 +93,7 @@ def test_a_scene_asks_for_runs_by_itself_and_the_option_for_all(url, plain, tmp_
     for option, expected in ((False, [True, False]), (True, [True, True])):
         asked = []
         monkeypatch.setattr(assess_module, "answer", told_by([limits(0.3, 0.32)] * 2, asked))
-        assess(path, url, tmp_path / "out", confirm=option)
+        assess(path, url, tmp_path / "out", options=AssessOptions(confirm=option))
         assert [one.confirm for one in asked] == expected
 
 
@@ -156,7 +156,7 @@ def test_loose_stones_stay_out_while_others_are_found(url, plain, tmp_path, monk
     monkeypatch.setattr(assess_module, "stands", falls)
     monkeypatch.setattr(assess_module, "answer", told_by([limits(0.3, 0.32)]))
     path, loads = written(tmp_path, TWO_COURSES), ("horizontal x",)
-    done = assess(path, url, tmp_path / "out", loads, leave_out_loose=True)
+    done = assess(path, url, tmp_path / "out", loads, options=AssessOptions(leave_out_loose=True))
     assert done.summary["left_out"] == ["W02-02", "W02-03"]
     assert done.summary["headline"].startswith("without W02-02, W02-03, which fall under their own weight")
     assert len(tried) == 3

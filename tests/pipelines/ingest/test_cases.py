@@ -8,7 +8,8 @@ import pytest
 from ground.errors import SurveyError
 from mechanics.scene.loads.record_files import read_accelerogram
 from pipelines.ingest.ingest import ingest
-from pipelines.ingest.reading_options import reading_options
+from pipelines.ingest.reading_options import reading_options, solid_options
+from survey.formats.options import ReadingOptions
 from survey.formats.reading import open_survey
 from survey.geometry.convex_parts import convex_parts
 from survey.geometry.solids import Solid, volume_of
@@ -22,7 +23,7 @@ needs_shared = pytest.mark.skipif(not CASES.is_dir(), reason="the cases lie besi
 
 
 def solids(path: Path, **given) -> list[SolidRecord]:
-    found = list(open_survey(path, "solids", reading_options(**given)).blocks)
+    found = list(open_survey(path, "solids", solid_options(ReadingOptions(), **given)).blocks)
     assert not [str(one.error) for one in found if isinstance(one, Reject)]
     return found
 
@@ -63,7 +64,7 @@ def test_an_arch_with_y_upwards_is_asked_about_and_turned(tmp_path):
     with pytest.raises(SurveyError, match="give --up y if y points upwards"):
         ingest([path], f"sqlite:///{tmp_path}/a.db", "solids", options=reading_options())
     for up in ("y", "z"):
-        options = reading_options(up=up)
+        options = solid_options(ReadingOptions(), up=up)
         (file,) = ingest([path], f"sqlite:///{tmp_path}/{up}.db", "solids", options=options).files
         assert file.questions == ()
     heights = np.concatenate([one.vertices[:, 2] for one in solids(path, up="y")])

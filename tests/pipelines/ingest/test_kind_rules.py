@@ -11,7 +11,8 @@ from ground.errors import QueryError, UsageError
 from moma.cli.text.runs_and_surveys import ingest_lines
 from pipelines.ingest.ingest import ingest
 from pipelines.ingest.kind_rules import RULE_ATTRIBUTES, kind_rules
-from pipelines.ingest.reading_options import reading_options
+from pipelines.ingest.reading_options import reading_options, solid_options
+from survey.formats.options import ReadingOptions
 from survey.geometry.convex_parts import convex_parts
 from survey.geometry.solids import Solid
 from tests.survey.joints.assemblies import dome, groin, obj, prism, wall
@@ -129,7 +130,12 @@ def test_what_a_rule_may_ask_for_is_documented() -> None:
 def test_the_report_counts_what_is_convex_and_what_snapping_did(tmp_path: Path) -> None:
     path = tmp_path / "groin.obj"
     path.write_text(obj(groin(), 3))
-    report = ingest([path], f"sqlite:///{tmp_path / 'g.db'}", "solids", options=reading_options(snap=0.003))
+    report = ingest(
+        [path],
+        f"sqlite:///{tmp_path / 'g.db'}",
+        "solids",
+        options=solid_options(ReadingOptions(), snap=0.003),
+    )
     solids = report.files[0].solids
     assert solids is not None
     assert solids.snapping is not None
@@ -141,7 +147,7 @@ def test_the_report_counts_what_is_convex_and_what_snapping_did(tmp_path: Path) 
 def test_what_comes_back_from_the_database_is_plane_and_says_how_it_came_to_be(tmp_path: Path) -> None:
     path, url = tmp_path / "dome.obj", f"sqlite:///{tmp_path / 'd.db'}"
     path.write_text(obj(dome(2), 3, doubled=True))
-    ingest([path], url, "solids", options=reading_options(snap=0.003))
+    ingest([path], url, "solids", options=solid_options(ReadingOptions(), snap=0.003))
     with open_database(url) as database, database.session(read_only=True) as session:
         for one in session.query(Entity):
             text = one.measurement.provenance_text
@@ -152,7 +158,7 @@ def test_what_comes_back_from_the_database_is_plane_and_says_how_it_came_to_be(t
 
 def test_tolerances_and_units_that_make_no_sense_are_refused() -> None:
     with pytest.raises(UsageError, match="--snap: the tolerance is -1 m"):
-        reading_options(snap=-1.0)
+        solid_options(ReadingOptions(), snap=-1.0)
     with pytest.raises(UsageError, match="--unit: unknown unit 'yd'; units: m, dm, cm, mm, ft, in"):
         reading_options(unit="yd")
 
@@ -166,7 +172,12 @@ def test_contacts_that_stay_open_are_listed(tmp_path: Path) -> None:
         front = np.array([(left, 0.0, low), (right, 0.0, low), (right, 0.0, high), (left, 0.0, high)])
         stones.append(prism(code, front, front + np.array([0.0, 1.0, 0.0])))
     path.write_text(obj(stones, 3))
-    report = ingest([path], f"sqlite:///{tmp_path / 's.db'}", "solids", options=reading_options(snap=0.002))
+    report = ingest(
+        [path],
+        f"sqlite:///{tmp_path / 's.db'}",
+        "solids",
+        options=solid_options(ReadingOptions(), snap=0.002),
+    )
     lines = [line.strip() for line in ingest_lines(report, verbose=False)]
     assert "3 convex, 0 not" in lines
     assert "1 contacts left as they are:" in lines

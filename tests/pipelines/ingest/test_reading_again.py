@@ -12,7 +12,7 @@ from archmodel.tables.entities import Entity
 from ground.errors import DatabaseError, SurveyError
 from pipelines.ingest.ingest import ingest
 from pipelines.ingest.outlined import mask_options
-from pipelines.ingest.reading_options import reading_options
+from pipelines.ingest.reading_options import reading_options, solid_options
 from tests.pipelines.ingest.test_cases import CASES, needs_shared
 
 
@@ -49,12 +49,14 @@ def url(tmp_path):
     return f"sqlite:///{tmp_path}/a.db"
 
 
-def read(path, url, again=False, **given):
+def read(path, url, again=False, unit=None, **given):
     if path.suffix == ".json":
         return ingest(
-            [path], url, "masks", options=mask_options(reading_options(**given), depth=0.4), again=again
+            [path], url, "masks", options=mask_options(reading_options(unit=unit), depth=0.4), again=again
         )
-    return ingest([path], url, "solids", options=reading_options(**given), again=again)
+    return ingest(
+        [path], url, "solids", options=solid_options(reading_options(unit=unit), **given), again=again
+    )
 
 
 @pytest.mark.parametrize("case", ["stl", "outlines"])

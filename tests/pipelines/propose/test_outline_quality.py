@@ -1,10 +1,14 @@
 """Masonry quality of a picture: what outlines tell is graded, what they do not tell is said."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from pipelines.propose.outlines import quality
 from pipelines.propose.outlines.features import Feature
 from pipelines.propose.outlines.quality import quality_facts
+from survey.clouds.settings import CloudOptions
 
 
 def wall(stagger, height=0.3, length=0.6, rows=6, columns=6, cut=()):
@@ -46,3 +50,11 @@ def test_few_stones_tell_nothing_and_those_that_are_cut_do_not_count(many):
     whole, less = (dict(quality_facts(wall(0.5, cut=cut)))["HJ, level beds"] for cut in ((), codes))
     assert "30 head joints" in whole
     assert "24 head joints" in less
+
+
+def test_a_corner_without_a_deviation_has_that_of_drawn_outlines(monkeypatch):
+    judged = []
+    monkeypatch.setattr(quality, "judge_masonry", lambda stones, walls: judged.extend(stones) or [])
+    bare = [replace(feature, said={"kind": "stretcher"}) for feature in wall(0.5)]
+    quality_facts([*bare[:2], *wall(0.5)[2:4]])
+    assert [stone.sigma for stone in judged] == [CloudOptions.outline_sigma] * 2 + [0.002] * 2

@@ -19,7 +19,7 @@ from pipelines.ingest.records import surveyed_block
 from pipelines.results.stone_values import stone_results
 from pipelines.run import run as run_module
 from pipelines.run.assemble import assemble
-from pipelines.run.run import run_scene, write_results
+from pipelines.run.run import RunOptions, Writing, run_scene, write_results
 from pipelines.scene.file import parse_scene
 from pipelines.scene.selection import select_groups, select_stones
 from tests.moma.commands import answer, fails
@@ -259,7 +259,7 @@ def test_meshes_that_cannot_be_written_are_refused_before_anything_runs(
     text = LOW if deformable else LOW.replace('deformable = ["W02-02"]\n', "")
     (tmp_path / "low.toml").write_text(text, encoding="utf-8")
     with pytest.raises(UsageError, match=said):
-        run_scene(tmp_path / "low.toml", url, tmp_path / "out", meshes=tmp_path / name)
+        run_scene(tmp_path / "low.toml", url, tmp_path / "out", options=RunOptions(meshes=tmp_path / name))
     assert not (tmp_path / "out").exists()
 
 
@@ -276,7 +276,9 @@ def test_a_static_start_is_told_and_a_warning_where_there_is_none(own_url, tmp_p
         + "[joints]\nmode = 'as-surveyed'\n"
     )
     (tmp_path / "falling.toml").write_text(falling.replace('["W02-02"]', '["W03-02"]'), encoding="utf-8")
-    done = run_scene(tmp_path / "falling.toml", own_url, tmp_path / "out2", accept_unsound=True)
+    done = run_scene(
+        tmp_path / "falling.toml", own_url, tmp_path / "out2", options=RunOptions(accept_unsound=True)
+    )
     assert not done.summary["static"]["found"]
     assert any("no static equilibrium was found" in one for one in done.warnings)
 
@@ -296,5 +298,5 @@ def test_unsolved_steps_are_a_warning_unless_only_the_end_counts(
         [rigid_body("a", (0, 0, 0), (1, 1, 1))], outcome=Outcome(outcome), pairs=(), forces=()
     )
     result = replace(by_hand, scene=replace(assembly.scene, blocks=assembly.scene.blocks[:1]))
-    _, warnings = write_results(result, stone_results(result), scene, assembly, tmp_path, {})
+    _, warnings = write_results(result, stone_results(result), scene, assembly, tmp_path, Writing())
     assert any("1 of 10 steps" in one for one in warnings) == warned

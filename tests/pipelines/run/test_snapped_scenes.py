@@ -7,8 +7,9 @@ import pytest
 from mechanics.stones.polyhedra import mass_properties
 from pipelines.ingest.ingest import ingest
 from pipelines.ingest.kind_rules import kind_rules
-from pipelines.ingest.reading_options import reading_options
+from pipelines.ingest.reading_options import solid_options
 from pipelines.run.run import run_scene
+from survey.formats.options import ReadingOptions
 from survey.geometry.solids import Solid
 from tests.pipelines.scenes import assembled
 from tests.survey.joints.assemblies import dome, groin, obj
@@ -42,7 +43,13 @@ def taken_in(folder: Path, solids: list[Solid], support: str) -> str:
     (folder / "vault.toml").write_text(SCENE)
     url = f"sqlite:///{folder / 'vault.db'}"
     rules = kind_rules(supports=[support])
-    ingest([folder / "vault.obj"], url, "solids", options=reading_options(snap=0.003), rules=rules)
+    ingest(
+        [folder / "vault.obj"],
+        url,
+        "solids",
+        options=solid_options(ReadingOptions(), snap=0.003),
+        rules=rules,
+    )
     return url
 
 

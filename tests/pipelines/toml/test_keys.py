@@ -8,7 +8,8 @@ from typing import Annotated
 import pytest
 
 from ground.errors import SceneError
-from mechanics.stones.settings import Setting, check_settings
+from ground.settings import Setting
+from mechanics.stones.settings import check_settings
 from pipelines.toml.keys import Stones, Table, Texts, Year, build, keys_of, read_table
 from pipelines.toml.schema import REQUIRED, TomlDocument, ValueKind, check_table, tables_of
 

@@ -6,7 +6,8 @@ from pathlib import Path
 
 from mechanics.scene.scene import Fidelity, Scene
 from pipelines.ingest.ingest import ingest
-from pipelines.ingest.reading_options import reading_options
+from pipelines.ingest.reading_options import solid_options
+from survey.formats.options import ReadingOptions
 from tests.paths import ROOT
 from tests.pipelines.scenes import assembled
 
@@ -70,7 +71,7 @@ def model(name: str, folder: Path) -> Scene:
         [ASSEMBLIES / f"{name}.obj"],
         url,
         "solids",
-        options=reading_options(snap=one.snap),
+        options=solid_options(ReadingOptions(), snap=one.snap),
     )
     scene = assembled(url, _SCENE.format(name=name, friction=one.friction)).scene
     heights = [(block.vertices[:, 2].min(), block.vertices[:, 2].max()) for block in scene.blocks]

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from ground.errors import SceneError, UsageError
+from mechanics.scene.shapes import LIMESTONE
 from pipelines.record.export.compas_problem import read_problem
 from pipelines.record.export.compas_solve import moma_solve
 
@@ -262,3 +263,18 @@ def test_a_problem_without_a_contact_model_is_refused():
 def test_what_is_no_document_is_refused():
     with pytest.raises(UsageError, match="list is no document of COMPAS"):
         moma_solve([], model_of([block(CUBE)]))
+
+
+def test_a_step_is_shorter_than_what_a_survey_sees_and_a_search_longer_than_any_fall():
+    """A block falls by less than 0.3 mm in a step, a fifth of a survey's millimetres, and 300 m within the search."""
+    cube = [block(box((0, 0, 0), (1, 1, 1)), True), block(box((0, 0, 1), (1, 1, 2)))]
+    time = read_problem(problem_of(), model_of(cube)).scene.time
+    assert 1e-4 < GRAVITY * time.step**2 < 3e-4
+    assert 300.0 < GRAVITY * time.duration**2 / 2.0 < 900.0
+    assert time.steps == 2000
+
+
+def test_a_material_without_moduli_is_a_sound_limestone():
+    cube = [block(box((0, 0, 0), (1, 1, 1)), True), block(box((0, 0, 1), (1, 1, 2)))]
+    material = read_problem(problem_of(), model_of(cube)).scene.blocks[1].material
+    assert (material.young, material.poisson) == (LIMESTONE.young, LIMESTONE.poisson)
