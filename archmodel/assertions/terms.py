@@ -11,12 +11,12 @@ from archmodel.assertions.validation import checked_choice, checked_label, check
 from archmodel.store.revisions import RowCounts, end_rows, supersede
 from archmodel.tables.entries import Entry, held_at
 from archmodel.tables.knowledge import Document, Observation
-from archmodel.tables.terms import VOCABULARIES, Term, Vocabulary, vocabulary
+from archmodel.tables.terms import VOCABULARIES, Term, Vocabulary, spelling_of, vocabulary
 from ground.errors import UsageError
 
 __all__ = ["declare_term", "withdraw_term"]
 
-_LANGUAGE = re.compile(r"[a-z]{2,3}(-[A-Za-z0-9]{2,8})*")
+_LANGUAGE = re.compile(r"[a-z]{2,3}(-[A-Za-z0-9]{1,8})*")
 
 Labels = Mapping[str, str | Sequence[str]]
 
@@ -30,6 +30,7 @@ def declare_term(
     *,
     broader: str | None = None,
     labels: Labels | None = None,
+    iri: str | None = None,
 ) -> RowCounts:
     """Declare a term; what is declared otherwise supersedes what was held, what is left out stays.
 
@@ -40,6 +41,7 @@ def declare_term(
     definition : one sentence; types of observations and documents that are new need it
     broader : name of the term that it is a case of
     labels : by language, e.g. {"de": "Riss", "fr": ["fissure", "lézarde"]}; the first one is preferred
+    iri : of the concept in a vocabulary, e.g. "http://vocab.getty.edu/aat/300011176"
 
     Raises
     ------
@@ -62,6 +64,7 @@ def declare_term(
             **({} if current is None else current.labels),
             **_checked_labels(words, name, labels or {}),
         },
+        "iri": checked_text("iri", iri) or (None if current is None else current.iri),
     }
     if current is not None and all(getattr(current, key) == value for key, value in values.items()):
         return RowCounts(unchanged=1)
@@ -126,7 +129,7 @@ def _checked_labels(words: Vocabulary, name: str, labels: Labels) -> dict[str, l
         several = [names] if isinstance(names, str) else list(names)
         checked[language] = [checked_label(f"label in {language}", term) for term in several]
         for label in checked[language]:
-            meant = spellings.get(label.casefold().replace("_", " "), name)
+            meant = spellings.get(spelling_of(label), name)
             if meant != name:
                 raise UsageError(f"the label {label!r} means {meant} already", remedy="choose another one")
     return checked

@@ -18,7 +18,7 @@ from archmodel.tables.entries import Recorded, held_at, held_index
 from archmodel.tables.knowledge import OBSERVATIONS
 from ground.errors import UsageError
 
-__all__ = ["DOCUMENT_TYPES", "VOCABULARIES", "Term", "Vocabulary", "term_for", "vocabulary"]
+__all__ = ["DOCUMENT_TYPES", "VOCABULARIES", "Term", "Vocabulary", "spelling_of", "term_for", "vocabulary"]
 
 DOCUMENT_TYPES: Mapping[str, str] = {
     "document": "a text: a charter, an account, a report",
@@ -46,6 +46,7 @@ class Term(Recorded, Base):
     definition : one sentence; None: that of the built-in term, or none
     broader : name of the term that it is a case of; None if there is none
     labels : by language (BCP 47), the preferred one first
+    iri : identifier of the concept in the vocabulary that it was read from; None: none
     """
 
     __tablename__ = "term"
@@ -57,6 +58,7 @@ class Term(Recorded, Base):
     definition: Mapped[str | None]
     broader: Mapped[str | None]
     labels: Mapped[dict[str, list[str]]] = mapped_column(JSON_TYPE)
+    iri: Mapped[str | None]
     supersedes_id: Mapped[int | None] = mapped_column(ForeignKey("term.id"))
 
 
@@ -90,9 +92,9 @@ class Vocabulary:
         if text in self.definitions:
             return text
         spellings = self.spellings()
-        if (name := spellings.get(_plain(text))) is not None or not self.closed:
+        if (name := spellings.get(spelling_of(text))) is not None or not self.closed:
             return name or text
-        likely = difflib.get_close_matches(_plain(text[:40]), spellings, n=3, cutoff=0.5)
+        likely = difflib.get_close_matches(spelling_of(text[:40]), spellings, n=3, cutoff=0.5)
         names = dict.fromkeys(spellings[term] for term in likely)
         remedy = f"did you mean {' or '.join(names)}?" if names else f"they are {', '.join(self.definitions)}"
         raise UsageError(
@@ -102,12 +104,12 @@ class Vocabulary:
     def spellings(self) -> dict[str, str]:
         """Return the name of the term by each of its labels and by the name, in small letters."""
         names = {
-            _plain(label): name
+            spelling_of(label): name
             for name, labels in self.labels.items()
             for several in labels.values()
             for label in several
         }
-        return names | {_plain(name): name for name in self.definitions}
+        return names | {spelling_of(name): name for name in self.definitions}
 
     def below(self, name: str) -> list[str]:
         """Return a term and all narrower ones."""
@@ -119,7 +121,8 @@ class Vocabulary:
         return names
 
 
-def _plain(text: str) -> str:
+def spelling_of(text: str) -> str:
+    """Return a name or label as it is compared: composed, in small letters, with blanks."""
     return unicodedata.normalize("NFC", text.strip()).casefold().replace("_", " ")
 
 

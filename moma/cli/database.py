@@ -70,7 +70,8 @@ Target = Annotated[
     typer.Argument(
         metavar="FILE",
         help="FILE.json or .json.gz: all, as one document; - for standard output. FILE.ifc, .dxf, .gpkg, .glb, "
-        ".compas.json, .results.json, .lmgc90.py or .3ddat: for other programs; see docs/howto/other-programs.md.",
+        ".compas.json, .results.json, .lmgc90.py or .3ddat: for other programs; see docs/howto/other-programs.md. "
+        "FILE.graphml: the matrix for yEd; FILE.ttl: the vocabularies as SKOS.",
     ),
 ]
 
@@ -117,7 +118,8 @@ def _told(done: "Exported") -> str:
     """Return what was written in one line."""
     results = "" if done.run is None else f", results of run {done.run}"
     size = f"{done.bytes / 1e6:.1f} MB"
-    return f"{done.path}: {done.stones} stones, {done.groups} groups{results} from {done.database} ({size})"
+    content = f"{done.stones} stones, {done.groups} groups{results}" if done.stones else "knowledge"
+    return f"{done.path}: {content} from {done.database} ({size})"
 
 
 @reporting

@@ -33,7 +33,7 @@ def record(
     files: Annotated[
         list[Path],
         typer.Argument(
-            metavar="FILE…", help="Files of knowledge: TOML, tables, GeoJSON, GeoPackage, GraphML."
+            metavar="FILE…", help="Files of knowledge: TOML, tables, GeoJSON, GeoPackage, GraphML, SKOS."
         ),
     ],
     author: Annotated[
@@ -57,18 +57,37 @@ def record(
         ),
     ] = None,
     sheet: Sheet = None,
+    vocabulary: Annotated[
+        str | None,
+        typer.Option(
+            "--vocabulary",
+            metavar="NAME",
+            help="Which vocabulary a SKOS file extends: observation, document, material or mark.",
+        ),
+    ] = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Report what would be recorded; change nothing.")
     ] = False,
     common: Common,
 ) -> None:
     """Record knowledge of a building: materials, phases, structures, marks, observations, corrections, …"""
+    from archmodel.assertions.validation import checked_choice
+    from archmodel.tables.terms import VOCABULARIES
     from moma.cli.text.formats import as_json
     from moma.cli.text.knowledge import record_lines
     from pipelines.record.record import record as record_files
 
+    if vocabulary is not None:
+        checked_choice("vocabulary", vocabulary, VOCABULARIES)
     report = record_files(
-        files, common.db, author=author, source=source, columns=columns, sheet=sheet, dry_run=dry_run
+        files,
+        common.db,
+        author=author,
+        source=source,
+        columns=columns,
+        sheet=sheet,
+        vocabulary=vocabulary,
+        dry_run=dry_run,
     )
     print(as_json(asdict(report)) if common.json else "\n".join(record_lines(report, common.verbose)))
 

@@ -104,6 +104,7 @@ class _TermTable:
             'Labels by language, the preferred one first: `{ de = "Riss", fr = ["fissure", "lézarde"] }`.'
         ),
     ] = field(default_factory=dict)
+    iri: Annotated[str | None, Setting("Identifier of the concept in a published vocabulary.")] = None
 
 
 @dataclass(frozen=True, kw_only=True)

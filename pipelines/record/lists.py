@@ -16,12 +16,14 @@ from ground.errors import UsageError
 from pipelines.record.attachments import Attachment
 from pipelines.record.attribute_lists import AttributeList, read_attribute_list, record_attribute_list
 from pipelines.record.relation_lists import RelationList, read_relation_list, record_relation_list
+from pipelines.record.term_lists import ENDINGS, TermList, read_term_list, record_term_list
 
 __all__ = ["LISTS", "FileRecorded", "ListFile", "read_list", "record_list", "recorded_before"]
 
 LISTS = (
     *(".csv", ".tsv", ".txt", ".xlsx", ".xls", ".xlsb", ".ods"),
     *(".geojson", ".json", ".gpkg", ".graphml"),
+    *ENDINGS,
 )
 """Endings of files that are not TOML."""
 
@@ -72,13 +74,18 @@ class ListFile:
     sha256: str
     author: str
     source: str
-    content: RelationList | AttributeList
+    content: RelationList | AttributeList | TermList
 
 
 def read_list(
-    path: Path, author: str | None, source: str | None, columns: str | None, sheet: str | None
+    path: Path,
+    author: str | None,
+    source: str | None,
+    columns: str | None = None,
+    sheet: str | None = None,
+    vocabulary: str | None = None,
 ) -> ListFile:
-    """Read a table of relations or of attributes, a layer, or GraphML.
+    """Read a table of relations or of attributes, a layer, GraphML, or a vocabulary of SKOS.
 
     Raises
     ------
@@ -91,8 +98,11 @@ def read_list(
             what = f"a table does not say the {name} of its statements"
             remedy = 'give --author NAME and --source "survey of 2024", for example'
             raise UsageError(what, where=str(path), remedy=remedy)
-    layer = path.suffix.lower() in (".geojson", ".json", ".gpkg")
-    content = None if layer else read_relation_list(path, sheet)
+    content: RelationList | AttributeList | TermList | None = None
+    if path.suffix.lower() in ENDINGS:
+        content = read_term_list(path, vocabulary)
+    elif path.suffix.lower() not in (".geojson", ".json", ".gpkg"):
+        content = read_relation_list(path, sheet)
     return ListFile(
         str(path),
         hashlib.sha256(path.read_bytes()).hexdigest(),
@@ -114,19 +124,22 @@ def record_list(session: Session, file: ListFile) -> FileRecorded:
     settings = {"file": storable(file.path), "sha256": file.sha256}
     entry = new_entry(session, "declaration", storable(file.source), author=file.author, settings=settings)
     content = file.content
-    if isinstance(content, RelationList):
+    notes: tuple[str, ...]
+    if isinstance(content, TermList):
+        tables, notes = record_term_list(session, entry, content)
+    elif isinstance(content, RelationList):
         tables = record_relation_list(session, entry, content)
+        notes = tuple(_notes(content, tables))
     else:
         tables = record_attribute_list(session, entry, content, again=before is not None)
+        notes = tuple(_notes(content, tables))
     number = entry.id
     changed = sum(tables.values(), NOTHING).changes
     if not changed:
         session.delete(entry)
         session.flush()
     made = (number,) if changed else ()
-    return FileRecorded(
-        file.path, tables if before is None or made else {}, made, before, tuple(_notes(content, tables))
-    )
+    return FileRecorded(file.path, tables if before is None or made else {}, made, before, notes)
 
 
 def _notes(content: RelationList | AttributeList, tables: dict[str, RowCounts]) -> Iterator[str]:

@@ -53,17 +53,19 @@ def record(
     source: str | None = None,
     columns: str | None = None,
     sheet: str | None = None,
+    vocabulary: str | None = None,
     dry_run: bool = False,
 ) -> RecordReport:
     """Record files of knowledge: all of them or, if anything is wrong in any, none.
 
     Parameters
     ----------
-    paths : files as in docs/knowledge.md: TOML, tables, layers, GraphML
+    paths : files as in docs/knowledge.md: TOML, tables, layers, GraphML, SKOS
     url : of the database, created if it does not exist
     author, source : take precedence over those of ``[record]``; tables and layers need them
     columns : map of columns of tables and layers with other names, e.g. "phase=Zeitstellung"
     sheet : of workbooks
+    vocabulary : which terms of SKOS files extend, where these do not say so
     dry_run : report what would happen, and change nothing
 
     Raises
@@ -72,7 +74,7 @@ def record(
         unchanged
     SurveyError, GeometryError : a stone cannot be extruded to its recorded depth
     """
-    files = [_read(Path(path), author, source, columns, sheet) for path in paths]
+    files = [_read(Path(path), author, source, columns, sheet, vocabulary) for path in paths]
     if not files:
         raise UsageError("no file", remedy="name at least one")
     with open_database(url, create=not dry_run) as database, database.session() as session:
@@ -92,12 +94,17 @@ def record(
 
 
 def _read(
-    path: Path, author: str | None, source: str | None, columns: str | None, sheet: str | None
+    path: Path,
+    author: str | None,
+    source: str | None,
+    columns: str | None,
+    sheet: str | None,
+    vocabulary: str | None,
 ) -> RecordFile | ListFile:
-    """Read a file: a table or a layer by its ending, any other as TOML."""
+    """Read a file: a table, layer, drawing or vocabulary by its ending, any other as TOML."""
     if path.suffix.lower() not in LISTS:
         return read_record(path)
-    return read_list(path, author, source, columns, sheet)
+    return read_list(path, author, source, columns, sheet, vocabulary)
 
 
 def _record_file(session: Session, file: RecordFile, author: str | None, source: str | None) -> FileRecorded:

@@ -156,6 +156,7 @@ def _term(work: _Work) -> RowCounts:
         work["definition"],
         broader=work["broader"],
         labels=work["labels"],
+        iri=work["iri"],
     )
 
 

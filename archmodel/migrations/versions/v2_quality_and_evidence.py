@@ -101,6 +101,7 @@ def _tables() -> MetaData:
                 Column("definition", TEXT),
                 Column("broader", TEXT),
                 Column("labels", JSON, nullable=False),
+                Column("iri", TEXT),
                 Column("supersedes_id", Integer, ForeignKey("term.id")),
             ),
         ),

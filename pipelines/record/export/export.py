@@ -9,6 +9,7 @@ from pathlib import Path
 from sqlalchemy.orm import Session
 
 from archmodel.database.session import open_database
+from archmodel.skos.writer import write_turtle
 from ground.errors import ExchangeError, UsageError
 from pipelines.draw.stratigraphy.matrix import draw, study
 from pipelines.record.export.building import Building, read_building
@@ -26,7 +27,7 @@ __all__ = ["ENDINGS", "Exported", "export_file"]
 
 @dataclass(frozen=True)
 class Exported:
-    """A file for another program: its path, the database, its size in bytes, and what is in it."""
+    """A file for another program: its path, the database, its size in bytes; stones, groups and run that are in it."""
 
     path: str
     database: str
@@ -51,9 +52,9 @@ def _results(order: _Order) -> bytes:
     return results_content(order.building, order.session)
 
 
-def _matrix(session: Session) -> bytes:
+def _matrix(session: Session) -> str:
     """Return the stratigraphic matrix for yEd."""
-    return draw(study(session), Path("matrix.graphml")).encode()
+    return draw(study(session), Path("matrix.graphml"))
 
 
 _CONTENTS: Mapping[str, Callable[[_Order], bytes]] = {
@@ -65,13 +66,15 @@ _CONTENTS: Mapping[str, Callable[[_Order], bytes]] = {
     ".lmgc90.py": lambda order: lmgc90_content(
         order.building, same_scene(order.session, order.building.run, "LMGC90")
     ),
-    ".graphml": lambda order: _matrix(order.session),
     ".3ddat": lambda order: threedec_content(
         order.building, same_scene(order.session, order.building.run, "3DEC")
     ),
 }
 
-ENDINGS = (*_CONTENTS, ".gpkg")
+_KNOWLEDGE: Mapping[str, Callable[[Session], str]] = {".graphml": _matrix, ".ttl": write_turtle}
+"""Files without stones: the stratigraphic matrix for yEd, vocabularies as SKOS."""
+
+ENDINGS = (*_CONTENTS, *_KNOWLEDGE, ".gpkg")
 """Endings of the files that are written for other programs."""
 
 _OF_CRS = (".ifc", ".gpkg")
@@ -97,12 +100,16 @@ def export_file(url: str, path: Path, run: int | None = None, crs: str | None = 
     ending = next(ending for ending in ENDINGS if path.name.lower().endswith(ending))
     if crs is not None:
         _check_crs(crs, ending)
+    if run is not None and ending in _KNOWLEDGE:
+        raise UsageError(f"a file {ending} has no results", where="--run", remedy="leave it out")
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         with open_database(url, create=False) as database, database.session(read_only=True) as session:
-            building = read_building(session, run)
+            building = None if ending in _KNOWLEDGE else read_building(session, run)
             shown = database.url
-            if ending == ".gpkg":
+            if building is None:
+                part.write_text(_KNOWLEDGE[ending](session), encoding="utf-8", newline="\n")
+            elif ending == ".gpkg":
                 write_gpkg(building, part, crs)
             else:
                 part.write_bytes(_CONTENTS[ending](_Order(building, session, crs)))
@@ -113,7 +120,8 @@ def export_file(url: str, path: Path, run: int | None = None, crs: str | None = 
     finally:
         with suppress(OSError):  # a folder that is read-only refuses this too
             part.unlink(missing_ok=True)
-    return Exported(str(path), shown, path.stat().st_size, len(building.codes), len(building.groups), run)
+    stones, groups = (0, 0) if building is None else (len(building.codes), len(building.groups))
+    return Exported(str(path), shown, path.stat().st_size, stones, groups, run)
 
 
 def _check_crs(crs: str, ending: str) -> None:

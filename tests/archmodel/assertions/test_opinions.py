@@ -1,10 +1,6 @@
 """Opinions of several authors stand side by side, and one of them holds: compared with a plain model at every entry."""
 
-import copy
 import random
-from contextlib import suppress
-from dataclasses import dataclass, field
-from datetime import date, timedelta
 from pathlib import Path
 
 import pytest
@@ -12,163 +8,55 @@ from sqlalchemy.orm import Session
 
 from archmodel.assertions.arrange import declare_members, declare_structure
 from archmodel.assertions.declare import declare_phase
-from archmodel.assertions.opinions import decide, set_rule
-from archmodel.assertions.statements import Remark, say_mason_mark, say_of_phase
+from archmodel.assertions.opinions import decide
+from archmodel.assertions.statements import say_mason_mark, say_of_phase
 from archmodel.assertions.withdraw import withdraw_statements
-from archmodel.database.as_known import as_known, entry_named
-from archmodel.database.session import Database, open_database
+from archmodel.database.as_known import entry_named
+from archmodel.database.session import Database
 from archmodel.describe.entity import describe
 from archmodel.describe.history import history
-from archmodel.exchange.reader import import_building
-from archmodel.exchange.writer import write_building
 from archmodel.query.api import find, find_rows
 from archmodel.store.find_by_code import subjects
-from archmodel.store.stones import store_survey
 from archmodel.tables.entries import new_entry
-from archmodel.tables.knowledge import Decision, OfPhase
+from archmodel.tables.knowledge import Decision
 from ground.errors import QueryError, UsageError
-from tests.archmodel.stones import SHA, box_stone
-
-CODES = ("A", "B", "C")
-AUTHORS = ("Ada", "Ben", "Cleo", None)
-PHASES = {"I": 1100, "II": 1200, "III": 1300}
-FIRST = date(2020, 1, 1)
-
-
-@dataclass
-class Opinion:
-    """What one author states of one stone."""
-
-    author: str | None
-    phase: str
-    day: date
-    certainty: float | None
-    number: int
-
-
-@dataclass
-class Model:
-    """Opinions by stone and author, each with those that it replaced; decisions by stone; the rule."""
-
-    opinions: dict[str, dict[str | None, list[Opinion]]] = field(
-        default_factory=lambda: {code: {} for code in CODES}
-    )
-    decided: dict[str, Opinion] = field(default_factory=dict)
-    rule: tuple[str, tuple[str, ...]] = ("latest", ())
-
-    def holding(self, code: str) -> tuple[str | None, bool]:
-        """Return the phase that holds, and whether opinions on it differ."""
-        held = [chain[-1] for chain in self.opinions[code].values()]
-        if not held:
-            return None, False
-        rule, authors = self.rule
-        ranks = [0.0] * len(held)
-        if rule == "certainty":
-            ranks = [-1.0 if one.certainty is None else one.certainty for one in held]
-        elif rule == "author":
-            ranks = [-float(authors.index(one.author)) if one.author in authors else -99.0 for one in held]
-        best = max(
-            zip(held, ranks, strict=True),
-            key=lambda pair: (pair[0] is self.decided.get(code), pair[1], pair[0].day, pair[0].number),
-        )[0]
-        return best.phase, len({one.phase for one in held}) > 1
-
-
-def play(session: Session, model: Model, chance: random.Random, number: int) -> int:
-    """Do one random act in the database and in the model; return its entry."""
-    author, code = chance.choice(AUTHORS), chance.choice(CODES)
-    entry = new_entry(session, "declaration", str(number), author=author)
-    about = subjects(session, [code])
-    chains = model.opinions[code]
-    match chance.choice(("say", "say", "say", "withdraw", "decide", "rule")):
-        case "say":
-            phase, day = chance.choice(list(PHASES)), FIRST + timedelta(chance.randrange(50))
-            certainty = chance.choice((None, 0.2, 0.9))
-            before = chains.get(author)
-            say_of_phase(session, entry, about, phase, Remark(stated_on=day, certainty=certainty))
-            if before and (before[-1].phase, before[-1].certainty) == (phase, certainty):
-                return entry.id  # said already
-            chains.setdefault(author, []).append(Opinion(author, phase, day, certainty, number))
-        case "withdraw":
-            who = author if author in chains else next(iter(chains), None) if len(chains) == 1 else None
-            if author not in chains and len(chains) != 1:
-                with suppress(UsageError):  # of several other authors, or there is nothing
-                    assert not withdraw_statements(session, entry, OfPhase, about).withdrawn
-                return entry.id
-            withdraw_statements(session, entry, OfPhase, about)
-            gone = chains[who].pop()
-            if chains[who]:  # held again, as a row that came now
-                chains[who][-1] = copy.copy(chains[who][-1])
-                chains[who][-1].number = number
-            else:
-                del chains[who]
-            if model.decided.get(code) is gone:
-                del model.decided[code]
-        case "decide" if chains:
-            chosen = chance.choice(list(chains))
-            match = {"phase": chains[chosen][-1].phase, "author": chosen}
-            decide(session, entry, "of_phase", about, match)
-            model.decided[code] = chains[chosen][-1]
-        case "rule":
-            rule = chance.choice(("latest", "certainty", "author"))
-            authors = tuple(chance.sample(AUTHORS[:3], 2)) if rule == "author" else ()
-            set_rule(session, entry, "of_phase", rule, authors)
-            model.rule = rule, authors
-    return entry.id
-
-
-def answers(session: Session) -> dict[str, tuple[object, bool]]:
-    """Return what holds and whether it is disputed, as queries say; descriptions must agree."""
-    disputed = {one.code for one in find(session, "entity", ["disputed(phase)"])}
-    rows = {row["code"]: row["phase"] for row in find_rows(session, "entity", columns=["code", "phase"])}
-    for code in CODES:
-        known = describe(session, code)["knowledge"]["phase"]  # type: ignore[index]
-        assert (None if known is None else known["name"]) == rows[code]
-        assert bool(known and known.get("disputed")) == (code in disputed)
-    return {code: (rows[code], code in disputed) for code in CODES}
-
-
-def run_history(database: Database, seed: int, length: int) -> None:
-    """Play a random history, and compare every state with the model's, also after a round trip."""
-    chance, model = random.Random(seed), Model()
-    with database.session() as session:
-        store_survey(
-            session, "w", "w.moma", SHA, [box_stone(code, at=(x, 0.0, 0.0)) for x, code in enumerate(CODES)]
-        )
-        entry = new_entry(session, "declaration", "phases")
-        for name, year in PHASES.items():
-            declare_phase(session, entry, name, year)
-    states = {}
-    for number in range(length):
-        with database.session() as session:
-            entry_id = play(session, model, chance, number)
-            states[entry_id] = {code: model.holding(code) for code in CODES}
-    with database.session(read_only=True) as session:
-        assert answers(session) == list(states.values())[-1]
-        for entry_id, state in states.items():
-            with as_known(session, entry_id) as then:
-                assert answers(then) == state, (seed, entry_id)
+from tests.archmodel.assertions.histories import PHASES, History
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_what_holds_at_every_entry_is_what_a_plain_model_says(seed: int) -> None:
-    with open_database("sqlite://") as database:
-        run_history(database, seed, 8)
+def test_what_holds_at_every_entry_is_what_a_plain_model_says(seed: int, tmp_path: Path) -> None:
+    history = History(tmp_path, seed)
+    for number in range(8):
+        history.act(number)
+    history.check()
+
+
+def test_what_holds_is_the_same_after_migrations_and_a_document(tmp_path: Path) -> None:
+    history = History(tmp_path, 1)
+    history.begin_in_version_1(6)
+    history.check()
+    for number in range(4):
+        history.act(number)
+    history.migrate_there_and_back()
+    history.act(4)
+    history.move()
+    history.act(5)
+    history.check()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3, 103))
 def test_a_hundred_histories(seed: int, tmp_path: Path) -> None:
-    with open_database("sqlite://") as database:
-        run_history(database, seed, 25)
-        path = tmp_path / "all.json"
-        with database.session(read_only=True) as session, path.open("wb") as file:
-            write_building(session, file)
-            told = answers(session)
-    with open_database("sqlite://") as again:
-        import_building(path, again)
-        with again.session(read_only=True) as session:
-            assert answers(session) == told
+    chance, history = random.Random(-seed), History(tmp_path, seed)
+    if seed % 2:
+        history.begin_in_version_1(8)
+    for number in range(25):
+        history.act(number)
+        if chance.random() < 0.08:
+            history.migrate_there_and_back()
+        if chance.random() < 0.08:
+            history.move()
+    history.check()
 
 
 @pytest.fixture

@@ -72,8 +72,8 @@ def test_a_filled_database_is_refused(url: str):
 
 
 EXPORTED = (
-    ".json or .json.gz or .ifc or .dxf or .glb or .compas.json or .results.json or .lmgc90.py or .graphml or .3ddat "
-    "or .gpkg"
+    ".json or .json.gz or .ifc or .dxf or .glb or .compas.json or .results.json or .lmgc90.py or .3ddat or .graphml "
+    "or .ttl or .gpkg"
 )
 
 
