@@ -30,7 +30,7 @@ from survey.geometry.solids import area_vector
 from survey.records.review import Doubtful
 from survey.records.survey import OBSERVER, BlockRecord, Reject, Station, SurveyHead, SurveyStream
 
-__all__ = ["Progress", "first_codes", "open_cloud", "viewed"]
+__all__ = ["Progress", "first_codes", "open_cloud", "viewed", "wrong_outlines"]
 
 Progress = Callable[[int, int | None], None]
 """A function that is told how many points are read, and how many there are."""
@@ -74,6 +74,7 @@ def open_cloud(
         sigma=options.outline_sigma,
         smooth=options.smooth,
         kinds=options.kinds,
+        keep_going=True,
     )
     if drawing.pixels:
         remedy = "put its world file beside the picture (.pgw, .tfw), as moma cloud writes it"
@@ -93,8 +94,16 @@ def open_cloud(
     doubts = [warning for cloud in clouds for warning in cloud.warnings]
     review = [Doubtful("", "precision", text, str(files[0])) for text in doubts]
     review += drawn_doubts(placed, drawing)
-    stones = list(_stones(placed, sigmas, collected, head, options, files[0].name, review))
+    stones = [
+        *wrong_outlines(drawing),
+        *_stones(placed, sigmas, collected, head, options, files[0].name, review),
+    ]
     return SurveyStream(head, iter(stones), review=tuple(review))
+
+
+def wrong_outlines(drawing: Drawing) -> list[Reject]:
+    """Return the features of a drawing that are no outline of a stone as rejects."""
+    return [Reject(one.code, one.error, (range(one.number, one.number + 1),)) for one in drawing.wrong]
 
 
 def _check_sides(

@@ -8,7 +8,7 @@ import numpy as np
 
 from ground.errors import SurveyError, UsageError
 from survey.arrays import Array
-from survey.clouds.cloud import first_codes, viewed
+from survey.clouds.cloud import first_codes, viewed, wrong_outlines
 from survey.clouds.outlines.outline import Outline
 from survey.clouds.outlines.reading import Drawing, read_outlines
 from survey.clouds.placing import levelled, place_outlines
@@ -63,6 +63,7 @@ def open_masks(path: Path, options: MaskOptions) -> SurveyStream:
         smooth=options.smooth,
         unit=options.unit,
         kinds=options.kinds,
+        keep_going=True,
     )
     drawing = replace(drawing, outlines=levelled(drawing.outlines))
     if any(outline.corners.shape[1] == 3 for outline in drawing.outlines):
@@ -88,9 +89,8 @@ def open_masks(path: Path, options: MaskOptions) -> SurveyStream:
         how = f"outline of a picture with pixels of {pixel * 1e3:.1f} mm"
     frame = None if options.size is None else np.array([(0.0, 0.0), options.size])
     review += _beyond(outlines, frame)
-    return SurveyStream(
-        head, iter(list(_stones(outlines, wall, pixel, how, frame, options))), review=tuple(review)
-    )
+    stones = [*wrong_outlines(drawing), *_stones(outlines, wall, pixel, how, frame, options)]
+    return SurveyStream(head, iter(stones), review=tuple(review))
 
 
 def _spatial(drawing: Drawing, options: MaskOptions) -> SurveyStream:
@@ -119,7 +119,10 @@ def _spatial(drawing: Drawing, options: MaskOptions) -> SurveyStream:
             head, Wall(origin, np.array([*placed[0].axes[:2], normal / np.linalg.norm(normal)])), origin
         )
     how = f"outline drawn to {options.outline_sigma * 1e3:.1f} mm"
-    stones = list(_stones(outlines, None, options.outline_sigma, how, None, options))
+    stones = [
+        *wrong_outlines(drawing),
+        *_stones(outlines, None, options.outline_sigma, how, None, options),
+    ]
     return SurveyStream(head, iter(stones), review=tuple(drawn_doubts(placed, drawing)))
 
 

@@ -82,6 +82,10 @@ def _shape_doubts(
             yield Doubtful(outline.code, reason, text, outline.where)
         if outline.said.score is not None and outline.said.score < _UNSURE:
             yield Doubtful(outline.code, "low score", f"a score of {outline.said.score:g}", outline.where)
+        if _crosses_itself(ring):
+            text = "its sides cross each other: its corners are put in order around it where one order is possible"
+            yield Doubtful(outline.code, "crosses itself", text, outline.where)
+            continue
         if len(outlines) >= _MIN_OUTLINES and abs(log - middle) > _ODD * spread:
             text = f"{area:.3g} m², the usual outline has {np.exp(middle):.3g} m²"
             yield Doubtful(outline.code, "odd size", text, outline.where)
@@ -190,6 +194,19 @@ def _polygons(shapely: Any, rings: Sequence[Array]) -> Any:
     """Make valid polygons of many rings (n, 2) at once."""
     which = np.repeat(np.arange(len(rings)), [len(ring) for ring in rings])
     return shapely.make_valid(shapely.polygons(shapely.linearrings(np.concatenate(rings), indices=which)))
+
+
+def _crosses_itself(ring: Array) -> bool:
+    """Return whether two sides of a ring (n, 2) cross each other within both of them."""
+    starts, ends = ring, np.roll(ring, -1, axis=0)
+
+    def side(places: Array) -> Array:
+        """Return on which side of each line (rows) places (columns) lie."""
+        along, to = ends - starts, places[None] - starts[:, None]
+        return np.asarray(np.sign(along[:, None, 0] * to[:, :, 1] - along[:, None, 1] * to[:, :, 0]))
+
+    apart = side(starts) * side(ends) < 0.0
+    return bool((apart & apart.T).any())
 
 
 def _hull_area(ring: Array) -> float:

@@ -16,6 +16,7 @@ __all__ = [
     "PROPOSED",
     "Attributes",
     "Outline",
+    "WrongOutline",
     "attributes_of",
     "distinct",
     "field_map",
@@ -95,6 +96,24 @@ class Outline:
     said: Attributes
     where: str
     doubts: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True)
+class WrongOutline:
+    """A feature that is no outline of a stone.
+
+    Attributes
+    ----------
+    number : as of an outline
+    code : of the stone
+    corners : (n, 2) or (n, 3) what was drawn, as in the file; empty: nothing
+    error : with the place and the remedy
+    """
+
+    number: int
+    code: str
+    corners: Array
+    error: SurveyError
 
 
 def field_map(text: str | None) -> dict[str, str]:

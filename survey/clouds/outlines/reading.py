@@ -12,7 +12,7 @@ from survey.clouds.outlines.annotations import is_annotated, read_annotations
 from survey.clouds.outlines.coco import is_coco, load_json, read_coco
 from survey.clouds.outlines.dxf import read_dxf
 from survey.clouds.outlines.labels import outlines_of, read_labels
-from survey.clouds.outlines.outline import Outline
+from survey.clouds.outlines.outline import Outline, WrongOutline
 from survey.clouds.outlines.plain import is_plain, read_plain_json, read_table
 from survey.clouds.outlines.tracing import few_corners
 from survey.clouds.outlines.vector import read_vector
@@ -45,6 +45,7 @@ class Drawing:
     specks : pieces of a picture that were too small for a stone
     smallest : pieces of fewer pixels are specks
     left : what the file has besides, and was not read: (reason, text)
+    wrong : features that are no outline of a stone
     """
 
     path: Path
@@ -55,6 +56,7 @@ class Drawing:
     specks: int = 0
     smallest: int = 0
     left: tuple[tuple[str, str], ...] = ()
+    wrong: tuple[WrongOutline, ...] = ()
 
 
 def read_outlines(
@@ -66,6 +68,7 @@ def read_outlines(
     smooth: float = 1.5,
     unit: float | None = None,
     kinds: Mapping[str, str] | None = None,
+    keep_going: bool = False,
 ) -> Drawing:
     """Read outlines of stones.
 
@@ -79,26 +82,32 @@ def read_outlines(
     smooth : largest distance of the boundary of a mask from the sides of its outline [px]
     unit : length of the unit of coordinates [m]; None: as the file states, else metres
     kinds : kinds of stones by their abbreviation in lower case
+    keep_going : features that are wrong are listed in `wrong`
 
     Raises
     ------
     UsageError
         if there is no such file or format, or a package is missing
     SurveyError
-        naming the feature that is wrong
+        naming the first feature that is wrong, unless they are to be listed, or no other is left
     """
     if not path.is_file():
         raise UsageError("no such file", where=str(path), remedy="name a file of outlines with --outlines")
     drawing = _read(path, layer, chosen or {}, smooth, unit)
-    if not drawing.outlines:
+    if not drawing.outlines and not drawing.wrong:
         raise SurveyError("has no outlines", where=str(path), remedy="draw each stone as a polygon")
-    if drawing.pixel is None and not drawing.pixels:
-        drawing = replace(
-            drawing, outlines=tuple(_sparse(outline, _LIKELY * sigma) for outline in drawing.outlines)
-        )
+    outlines, wrong = [], [*drawing.wrong]
     for outline in drawing.outlines:
-        _check(outline)
-    return replace(drawing, outlines=tuple(_of_kind(outline, kinds or {}) for outline in drawing.outlines))
+        try:
+            _check(outline)
+            if drawing.pixel is None and not drawing.pixels:
+                outline = _sparse(outline, _LIKELY * sigma)
+            outlines.append(_of_kind(outline, kinds or {}))
+        except SurveyError as error:
+            wrong.append(WrongOutline(outline.number, outline.code, outline.corners, error))
+    if wrong and not (keep_going and outlines):
+        raise wrong[0].error
+    return replace(drawing, outlines=tuple(outlines), wrong=tuple(wrong))
 
 
 def _read(
@@ -122,7 +131,10 @@ def _read(
     if ending == ".csv":
         return Drawing(path, read_table(path, chosen, unit))
     if ending in _VECTORS:
-        return _scaled(Drawing(path, read_vector(path, layer, chosen)), unit)
+        features = read_vector(path, layer, chosen)
+        sound = tuple(feature for feature in features if isinstance(feature, Outline))
+        wrong = tuple(feature for feature in features if isinstance(feature, WrongOutline))
+        return _scaled(Drawing(path, sound, wrong=wrong), unit)
     known = ", ".join((*_VECTORS, ".dxf", ".csv", *PICTURES))
     raise UsageError(
         f"unknown ending {ending!r}",

@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from survey.clouds.outlines.outline import Outline
+from survey.clouds.outlines.outline import Outline, WrongOutline
 from survey.clouds.outlines.reading import read_outlines
 from survey.records.survey import Reject
 
@@ -29,8 +29,10 @@ def rejected_outlines(
     path, layer, chosen, sigma, smooth : with which the outlines were read
     rejects : whose spans are the numbers of outlines
     """
-    outlines = read_outlines(path, layer=layer, chosen=chosen, sigma=sigma, smooth=smooth).outlines
-    by_number = {outline.number: outline for outline in outlines}
+    drawing = read_outlines(path, layer=layer, chosen=chosen, sigma=sigma, smooth=smooth, keep_going=True)
+    by_number: dict[int, Outline | WrongOutline] = {
+        outline.number: outline for outline in (*drawing.outlines, *drawing.wrong)
+    }
     features = [
         _feature(by_number[span.start], str(reject.error))
         for reject in rejects
@@ -46,7 +48,14 @@ def _lines(features: Iterable[Mapping[str, object]]) -> Iterable[str]:
     return (json.dumps(feature, ensure_ascii=False) for feature in features)
 
 
-def _feature(outline: Outline, reason: str) -> dict[str, object]:
+def _feature(outline: Outline | WrongOutline, reason: str) -> dict[str, object]:
+    if isinstance(outline, WrongOutline):
+        line = {"type": "LineString", "coordinates": outline.corners.tolist()}
+        return {
+            "type": "Feature",
+            "properties": {"code": outline.code, "reason": reason},
+            "geometry": line if len(outline.corners) > 1 else None,
+        }
     attributes = outline.said
     known = {
         "code": outline.code,

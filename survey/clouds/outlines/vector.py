@@ -1,5 +1,6 @@
 """Outlines in GeoPackage, GeoJSON, Shapefile and other vector formats of GDAL, read with pyogrio and shapely."""
 
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,7 @@ import numpy as np
 from ground.errors import SurveyError, UsageError
 from survey.arrays import Array
 from survey.clouds.extras import optional
-from survey.clouds.outlines.outline import Attributes, Outline, attributes_of, made_code
+from survey.clouds.outlines.outline import Attributes, Outline, WrongOutline, attributes_of, made_code
 
 __all__ = ["read_vector"]
 
@@ -17,8 +18,10 @@ _DEGREES = 1e-3  # extent of the largest outline below which coordinates are deg
 _SMALL = 0.02  # share of the area of the largest part up to which other parts are specks [-]
 
 
-def read_vector(path: Path, layer: str | None, chosen: Mapping[str, str]) -> tuple[Outline, ...]:
-    """Read the polygons of a file.
+def read_vector(
+    path: Path, layer: str | None, chosen: Mapping[str, str]
+) -> tuple[Outline | WrongOutline, ...]:
+    """Read the polygons of a file; an unclosed ring is closed.
 
     Parameters
     ----------
@@ -31,7 +34,7 @@ def read_vector(path: Path, layer: str | None, chosen: Mapping[str, str]) -> tup
     UsageError
         if pyogrio or shapely is not installed, or there are several layers
     SurveyError
-        if the file cannot be read, holds longitudes and latitudes, or a feature is no polygon
+        if the file cannot be read, or holds longitudes and latitudes
     """
     pyogrio = optional("pyogrio", f"{path.suffix} files")
     shapely = optional("shapely", f"{path.suffix} files")
@@ -44,14 +47,17 @@ def read_vector(path: Path, layer: str | None, chosen: Mapping[str, str]) -> tup
             raise UsageError(
                 f"no layer {layer!r}", where=str(path), remedy=f"layers are: {', '.join(layers)}"
             )
-        meta, fids, geometries, columns = pyogrio.raw.read(path, layer=layer or layers[0], return_fids=True)
+        with warnings.catch_warnings(action="ignore", category=RuntimeWarning):  # GDAL's, of unclosed rings
+            meta, fids, geometries, columns = pyogrio.raw.read(
+                path, layer=layer or layers[0], return_fids=True
+            )
     except UsageError:
         raise
     except Exception as error:  # pyogrio lets GDAL's errors through under several classes
         what = f"cannot be read: {' '.join(str(error).split())[:120]}"
         raise SurveyError(what, where=str(path), remedy="export it again, e.g. as GeoPackage") from error
     names = [str(name) for name in meta["fields"]]
-    shapes = shapely.from_wkb(geometries, on_invalid="ignore")
+    shapes = shapely.from_wkb(geometries, on_invalid="fix")
     _check_degrees(path, shapely.bounds(shapes))
     out = []
     for k, shape in enumerate(shapes):
@@ -69,7 +75,7 @@ def _check_degrees(path: Path, bounds: Array) -> None:
     if not len(finite) or np.abs(finite[:, [0, 2]]).max() > 180.0 or np.abs(finite[:, [1, 3]]).max() > 90.0:
         return
     extent = float((finite[:, 2:] - finite[:, :2]).max())
-    if extent < _DEGREES and np.abs(finite).max() > 1.0:
+    if 0.0 < extent < _DEGREES and np.abs(finite).max() > 1.0:
         raise SurveyError(
             f"its coordinates are longitudes and latitudes: the largest outline is {extent:.1g} wide",
             where=str(path),
@@ -77,13 +83,18 @@ def _check_degrees(path: Path, bounds: Array) -> None:
         )
 
 
-def _outline(number: int, fid: int, shape: Any, attributes: Attributes, where: str) -> Outline:
+def _outline(number: int, fid: int, shape: Any, attributes: Attributes, where: str) -> Outline | WrongOutline:
+    code = made_code(attributes.code or f"S{fid}") or f"S{fid}"
+    what, corners = "", np.empty((0, 2))
     if shape is None or shape.is_empty or shape.geom_type not in ("Polygon", "MultiPolygon", "LineString"):
-        found = "no geometry" if shape is None or shape.is_empty else f"a {shape.geom_type}"
-        raise SurveyError(f"{found}, not a polygon", where=where, remedy="draw each stone as a polygon")
+        what = "no geometry" if shape is None or shape.is_empty else f"a {shape.geom_type}"
+        what += ", not a polygon"
+    elif shape.geom_type == "LineString" and not shape.is_closed:
+        what, corners = "the line is not closed", np.array(shape.coords)
+    if what:
+        error = SurveyError(what, where=where, remedy="draw each stone as a polygon")
+        return WrongOutline(number, code, corners, error)
     if shape.geom_type == "LineString":
-        if not shape.is_closed:
-            raise SurveyError("the line is not closed", where=where, remedy="draw each stone as a polygon")
         rings, doubts = [_ring(shape.coords)], []
     else:
         parts = [shape] if shape.geom_type == "Polygon" else sorted(shape.geoms, key=lambda geom: -geom.area)
@@ -92,7 +103,6 @@ def _outline(number: int, fid: int, shape: Any, attributes: Attributes, where: s
         doubts = [("in pieces", f"{len(large) + 1} pieces; the largest is taken")] if large else []
         if any(parts[0].interiors):
             doubts.append(("holes", f"{len(parts[0].interiors)} holes, which are ignored"))
-    code = made_code(attributes.code or f"S{fid}") or f"S{fid}"
     return Outline(number, code, rings[0], attributes, where, tuple(doubts))
 
 

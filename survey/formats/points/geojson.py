@@ -6,6 +6,8 @@ stone, the ``id`` of the feature is its name. A feature of points (``Point`` wit
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +21,7 @@ from survey.formats.options import ReadingOptions
 from survey.formats.tables.columns import kind_of_column
 from survey.formats.tables.reader import open_table
 from survey.formats.tables.wkt import ring_of
-from survey.records.survey import SurveyStream
+from survey.records.survey import Reject, SurveyStream
 
 __all__ = ["open_geojson"]
 
@@ -46,9 +48,14 @@ def open_geojson(path: Path, options: ReadingOptions | None = None) -> SurveyStr
     ids = not kinds & {"block", "description", "name"}
     rows: list[tuple[int, list[str]]] = [(0, [*names, *(["block"] if ids else []), "outline"])]
     corners: list[Any] = []
+    wrong: list[Reject] = []
     for number, feature in enumerate(features, start=1):
         values = _properties(feature)
-        ring = _ring(feature, f"{path}:{number}")
+        try:
+            ring = _ring(feature, f"{path}:{number}")
+        except SurveyError as error:
+            wrong.append(Reject(None, error, (range(number, number + 1),)))
+            continue
         corners.append(ring)
         text = ", ".join(" ".join(map(repr, corner)) for corner in ring.tolist())
         identifier = [cell_text(feature.get("id", ""))] if ids else []
@@ -58,9 +65,12 @@ def open_geojson(path: Path, options: ReadingOptions | None = None) -> SurveyStr
                 [*(cell_text(values.get(name, "")) for name in names), *identifier, f"POLYGON Z (({text}))"],
             )
         )
+    if not corners:
+        raise wrong[0].error
     _check_degrees(corners, path)
     remarks = (f"{len(features)} features; places in messages are their numbers",)
-    return open_table(path, ListRows(str(path), rows, remarks), options or ReadingOptions())
+    stream = open_table(path, ListRows(str(path), rows, remarks), options or ReadingOptions())
+    return replace(stream, blocks=chain(wrong, stream.blocks))
 
 
 def _features(path: Path) -> list[Mapping[str, Any]]:

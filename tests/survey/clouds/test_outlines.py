@@ -7,12 +7,17 @@ import pytest
 from PIL import Image
 
 from ground.errors import SurveyError, UsageError
+from survey.clouds.masks import open_masks
 from survey.clouds.outlines.coco import run_lengths
 from survey.clouds.outlines.labels import read_labels
 from survey.clouds.outlines.outline import attributes_of, field_map, made_code
 from survey.clouds.outlines.reading import read_outlines
+from survey.clouds.outlines.rejected import rejected_outlines
 from survey.clouds.outlines.tracing import few_corners, trace
+from survey.clouds.settings import MaskOptions
+from survey.formats.points.geojson import open_geojson
 from survey.geometry.polygons import ring_area
+from survey.records.survey import BlockRecord, Reject
 from tests.survey.clouds import scans
 
 PIXEL = 0.004
@@ -398,3 +403,76 @@ def test_outlines_of_wild_masks_never_cross_themselves():
             assert shape.area == pytest.approx(abs(ring_area(ring)), rel=0.15)
             tried += 1
     assert tried > 60
+
+
+def collection(path, *geometries):
+    """GeoJSON in a projected system: three sound outlines, then features with these geometries."""
+    sound = [{"type": "Polygon", "coordinates": [square(0.6 * k)]} for k in range(3)]
+    features = [
+        {"type": "Feature", "properties": {"code": f"S{k}"}, "geometry": geometry}
+        for k, geometry in enumerate([*sound, *geometries])
+    ]
+    crs = {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::25832"}}
+    path.write_text(json.dumps({"type": "FeatureCollection", "crs": crs, "features": features}))
+    return path
+
+
+def square(x):
+    return [[x, 0.0], [x + 0.5, 0.0], [x + 0.5, 0.3], [x, 0.3], [x, 0.0]]
+
+
+@pytest.mark.parametrize(
+    ("geometry", "words", "drawn"),
+    [
+        (None, "no geometry", 0),
+        ({"type": "Point", "coordinates": [1.0, 2.0]}, "a Point", 0),
+        ({"type": "LineString", "coordinates": square(2.4)[:4]}, "not closed", 4),
+        ({"type": "Polygon", "coordinates": []}, "no geometry", 0),
+        ({"type": "Polygon", "coordinates": [[[4, 0], [5, 0], [4, 0]]]}, "2 corners", 2),
+    ],
+)
+def test_a_feature_that_is_no_outline_spoils_no_other(tmp_path, geometry, words, drawn):
+    path = collection(tmp_path / "stones.geojson", geometry)
+    with pytest.raises(SurveyError, match=words):
+        read_outlines(path)
+    stones = list(open_masks(path, MaskOptions(depth=0.4)).blocks)
+    (reject,) = [one for one in stones if isinstance(one, Reject)]
+    assert len(stones) == 4
+    assert words in str(reject.error)
+    (feature,) = json.loads(rejected_outlines(path, None, {}, 0.005, 1.5, [reject]))["features"]
+    assert (feature["properties"]["code"], words in feature["properties"]["reason"]) == ("S3", True)
+    assert len((feature["geometry"] or {"coordinates": ()})["coordinates"]) == drawn
+
+
+def test_features_of_which_none_is_an_outline_are_refused_at_the_first(tmp_path):
+    path = tmp_path / "stones.geojson"
+    points = [
+        {"type": "Feature", "properties": {}, "geometry": {"type": "Point", "coordinates": [k, 0]}}
+        for k in (1, 2)
+    ]
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": points}))
+    with pytest.raises(SurveyError, match="feature 0: a Point"):
+        open_masks(path, MaskOptions(depth=0.4))
+
+
+def test_an_unclosed_ring_is_closed_and_one_that_crosses_itself_named(tmp_path):
+    crossing = [[3.0, 0.0], [3.5, 0.3], [3.5, 0.0], [3.0, 0.3], [3.0, 0.0]]
+    rings = [{"type": "Polygon", "coordinates": [ring]} for ring in (square(2.4)[:4], crossing)]
+    stream = open_masks(collection(tmp_path / "stones.geojson", *rings), MaskOptions(depth=0.4))
+    stones = list(stream.blocks)
+    assert [len(one.vertices) for one in stones] == [4] * 5
+    assert [(one.code, one.reason) for one in stream.review] == [("S4", "crosses itself")]
+
+
+def test_outlines_in_space_that_are_wrong_spoil_no_other(tmp_path):
+    features = [
+        {"type": "Feature", "properties": {"code": f"S{k}"},
+         "geometry": {"type": "Polygon", "coordinates": [[[x, 0.0, z] for x, z in square(0.6 * k)]]}}
+        for k in range(3)
+    ]  # fmt: skip
+    features[1]["geometry"] = None
+    path = tmp_path / "stones.geojson"
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    found = list(open_geojson(path).blocks)
+    assert [type(one) for one in found] == [Reject, BlockRecord, BlockRecord]
+    assert "stones.geojson:2: a feature without coordinates" in str(found[0].error)
