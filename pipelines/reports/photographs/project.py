@@ -16,6 +16,8 @@ from survey.orientation.formats.control import read_control, with_control
 from survey.orientation.formats.dbat import read_dbat
 from survey.orientation.formats.marks import network_of, read_marks
 from survey.orientation.formats.metashape import read_metashape
+from survey.orientation.formats.opencv import read_calibration
+from survey.orientation.formats.other_programs import refuse_other_programs
 from survey.orientation.formats.photomodeler import read_photomodeler
 from survey.orientation.network import INTERIOR, Camera, Network, Photo, PlumbLine, ScaleBar
 from survey.orientation.rotations import from_angles
@@ -126,7 +128,10 @@ class _CameraTable:
             ),
         ),
     ] = "backward"
-    size: Annotated[Numbers, Setting("Width and height of its photographs.", "px")]
+    calibration: Annotated[
+        str | None, Setting("Calibration of OpenCV in YAML or XML, instead of what follows.")
+    ] = None
+    size: Annotated[Numbers | None, Setting("Width and height of its photographs.", "px")] = None
     pixel: Annotated[float | None, Setting("Height of a pixel; 1 in the unit px.", "unit", above=0)] = None
     calibrate: Annotated[Texts | None, Setting("Parameters that are estimated.")] = None
 
@@ -214,6 +219,7 @@ def read_project(path: Path) -> Project:
     SurveyError
         at the line of another file that is wrong
     """
+    refuse_other_programs(path)
     text = read_text(path, SceneError)
     tables = parse_toml(text, str(path), SceneError, "see docs/howto/photographs.md")
     document = TomlDocument(str(path), key_lines(text))
@@ -221,6 +227,9 @@ def read_project(path: Path) -> Project:
     bars, plumb_lines = (tables_of(document, tables, name) for name in ("scale_bars", "plumb_lines"))
     plain = {name: value for name, value in tables.items() if name not in _TABLES}
     values = read_table(document, (), plain, ProjectTable, "the project")
+    for name in (*_SOURCES, "markers", "control"):
+        if (file := getattr(values, name)) is not None:
+            refuse_other_programs(path.parent / file)
     network = _network(document, values, cameras, photos, path.parent)
     if (control := values.control) is not None:
         rows = read_control(path.parent / control)
@@ -416,7 +425,7 @@ def _marked(
     """Make a network of a file of marks and the cameras and photographs of the project file."""
     if not cameras:
         document.fail("the project has no cameras", remedy="write [[cameras]] with name, size, pixel, c")
-    made = tuple(_camera(document, place, table) for place, table in cameras)
+    made = tuple(_camera(document, place, table, folder) for place, table in cameras)
     names = [one.name for one in made]
     if len(set(names)) < len(names):
         document.fail("two cameras have one name", "cameras", remedy="give each a name of its own")
@@ -435,8 +444,24 @@ def _marked(
     return network_of(str(marks), rows, made, known, values.sigma)
 
 
-def _camera(document: TomlDocument, path: tuple[str, ...], given: Mapping[str, Any]) -> Camera:
+def _camera(document: TomlDocument, path: tuple[str, ...], given: Mapping[str, Any], folder: Path) -> Camera:
     values: dict[str, Any] = check_table(document, path, given, CAMERA_KEYS, "[[cameras]]")
+    free = values["calibrate"] or ()
+    for name in free:
+        if name not in INTERIOR:
+            document.fail(
+                f"no parameter {name!r} of a camera", *path, "calibrate", remedy=nearest(name, INTERIOR)
+            )
+    if values["calibration"] is not None:
+        if also := sorted(set(given) - {"name", "calibration", "calibrate"}):
+            document.fail(f"{also[0]} beside calibration", *path, also[0], remedy="leave it out")
+        return replace(read_calibration(folder / values["calibration"], values["name"]), free=free)
+    for key, what in (
+        ("size", "width and height of its photographs in pixels"),
+        ("c", "the camera constant"),
+    ):
+        if values[key] is None:
+            document.fail(f"[[cameras]] has no {key!r}", *path, remedy=f"give {key}: {what}")
     width, height = _size(document, values["size"], *path, "size")
     pixel = values["pixel"]
     if pixel is None:
@@ -445,16 +470,8 @@ def _camera(document: TomlDocument, path: tuple[str, ...], given: Mapping[str, A
                 "[[cameras]] has no 'pixel'", *path, remedy="give pixel: the height of a pixel in mm"
             )
         pixel = 1.0
-    if values["c"] is None:
-        document.fail("[[cameras]] has no 'c'", *path, remedy="give c: the camera constant")
     middle = {"xp": 0.5 * width * float(pixel), "yp": 0.5 * height * float(pixel)}
     inner = [values[name] if values[name] is not None else middle[name] for name in INTERIOR]
-    free = values["calibrate"] or ()
-    for name in free:
-        if name not in INTERIOR:
-            document.fail(
-                f"no parameter {name!r} of a camera", *path, "calibrate", remedy=nearest(name, INTERIOR)
-            )
     return Camera(
         values["name"],
         np.array(inner, dtype=float),

@@ -367,7 +367,7 @@ class PointCollector:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What was left out, in words."""
+        """Remarks on control points that were left out."""
         if not self._control:
             return ()
         words = ", ".join(f"{count} {word}" for word, count in self._control.items())

@@ -20,6 +20,7 @@ from ground.tables.text_lines import TextLines
 from survey.arrays import Array
 from survey.orientation.formats.colmap_binary import binary_cameras, binary_images, binary_points
 from survey.orientation.formats.marks import marked_well, marks_of_points, numbered
+from survey.orientation.formats.opencv import interior
 from survey.orientation.network import Camera, Network, Photo
 
 __all__ = ["read_colmap", "write_colmap"]
@@ -147,19 +148,7 @@ def _camera(
                 where=where,
                 remedy="estimate the model OPENCV",
             )
-    return Camera(f"camera{number}", _inner(values), size, 1.0, "px", True, where=where)
-
-
-def _inner(values: dict[str, float]) -> Array:
-    """Return the interior orientation of OpenCV's parameters, whose distortion is of coordinates over the depth."""
-    c = values.get("fy", values.get("f", 0.0))
-    k1, k2, k3 = (values.get(name, 0.0) for name in ("k1", "k2", "k3"))
-    return np.array(
-        [
-            c, values["cx"], values["cy"], values.get("fx", c) / c - 1.0, 0.0,
-            k1 / c**2, k2 / c**4, k3 / c**6, values.get("p2", 0.0) / c, -values.get("p1", 0.0) / c,
-        ]
-    )  # fmt: skip
+    return Camera(f"camera{number}", interior(values), size, 1.0, "px", True, where=where)
 
 
 def _images(path: Path, cameras: dict[int, int]) -> list[_Image]:
