@@ -77,7 +77,7 @@ COLUMNS: Mapping[str, Sequence[str]] = {
 """Names of columns by what they state; in doubt the first."""
 
 _LAYERS = (".geojson", ".json", ".gpkg")
-_MOMA_ATTRIBUTES = frozenset({"code", "phase_begins", "depth_origin", "measurements"})
+_MOMA_ATTRIBUTES = frozenset({"code", "depth_origin", "measurements"})
 """Attributes by which a layer is one that MOMA wrote."""
 
 _NOTHING = frozenset({"", "-", "–", "?", "n/a", "null", "none"})
@@ -250,6 +250,8 @@ def _features_of_geopackage(path: Path) -> list[tuple[int, Mapping[str, Any]]]:
                     "SELECT table_name FROM gpkg_contents WHERE data_type IN ('features', 'attributes')"
                 )
             ]
+            if len(layers) > 1 and all(_is_own(connection, layer) for layer in layers):
+                del layers[1:]  # the same stones in space and in elevation, with the same attributes
             if len(layers) != 1:
                 remedy = "export the layer that is meant into a file of its own"
                 names = ", ".join(layers) or "none"
@@ -270,6 +272,12 @@ def _features_of_geopackage(path: Path) -> list[tuple[int, Mapping[str, Any]]]:
         )
         for number, row in enumerate(rows, start=1)
     ]
+
+
+def _is_own(connection: sqlite3.Connection, layer: str) -> bool:
+    """Return whether MOMA wrote a layer of a GeoPackage."""
+    names = {row[0] for row in connection.execute("SELECT name FROM pragma_table_info(?)", (layer,))}
+    return names >= _MOMA_ATTRIBUTES
 
 
 def record_attribute_list(

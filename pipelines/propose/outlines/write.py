@@ -1,14 +1,13 @@
 """Outlines as GeoPackage, GeoJSON and DXF, in the plane of the wall."""
 
 import json
-import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ground.tables.geopackage import Layer, write_geopackage
 from pipelines.propose.outlines.features import Feature
 from survey.clouds.extras import optional
 
@@ -52,35 +51,22 @@ def write_outlines(features: Sequence[Feature], folder: Path, about: str) -> Non
 
 
 def _write_geopackage(features: Sequence[Feature], path: Path) -> None:
-    pyogrio = optional("pyogrio", "GeoPackages")
-    shapely = optional("shapely", "GeoPackages")
-    shapes = np.array([shapely.polygons(feature.ring) for feature in features], dtype=object)
-    names = ["code", *(name for name in _COLUMNS if any(name in feature.said for feature in features))]
-    columns = [np.array([feature.code for feature in features], dtype=object)]
-    masks: list[NDArray[np.bool_] | None] = [None]
-    for name in names[1:]:
-        lacking = np.array([feature.said.get(name) is None for feature in features])
-        values = [feature.said.get(name) for feature in features]
-        if name in _WHOLE:
-            column = np.array([0 if value is None else int(value) for value in values], dtype=np.int64)
-        elif name in _REAL:
-            column = np.array([0.0 if value is None else float(value) for value in values])
-        else:
-            column = np.array([None if value is None else str(value) for value in values], dtype=object)
-        columns.append(column)
-        masks.append(None if column.dtype == object else lacking)
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "'crs' was not provided")  # the plane of a wall has none
-        _raw(pyogrio, path, shapely.to_wkb(shapes), columns, names, masks)
+    """Write one layer, styled by kind."""
+    names = [name for name in _COLUMNS if name == "kind" or any(name in feature.said for feature in features)]
+    columns = [("code", "TEXT", [feature.code for feature in features])]
+    for name in names:
+        kind = "INTEGER" if name in _WHOLE else "DOUBLE" if name in _REAL else "TEXT"
+        columns.append((name, kind, [_value(feature.said.get(name), kind) for feature in features]))
+    rings = [np.asarray(feature.ring, dtype=np.float64) for feature in features]
+    path.unlink(missing_ok=True)
+    write_geopackage(path, [Layer("outlines", rings, columns, "kind", "outlines by kind")])
 
 
-def _raw(
-    pyogrio: Any, path: Path, shapes: Any, columns: list[Any], names: list[str], masks: list[Any]
-) -> None:
-    pyogrio.raw.write(
-        path, shapes, columns, np.array(names, dtype=object), field_mask=masks,
-        layer="outlines", driver="GPKG", geometry_type="Polygon",
-    )  # fmt: skip
+def _value(value: Any, kind: str) -> Any:
+    """Return an attribute as its column stores it."""
+    if value is None:
+        return None
+    return int(value) if kind == "INTEGER" else float(value) if kind == "DOUBLE" else str(value)
 
 
 def _write_dxf(features: Sequence[Feature], path: Path) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ground.errors import SurveyError, UsageError
 from survey.arrays import Array
+from survey.records.survey import DEPTH_ORIGINS
 
 __all__ = [
     "FIELDS",
@@ -38,6 +39,8 @@ FIELDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "zone": ("zone", "area", "wall", "facade", "bereich", "wand", "mur", "parete", "muro", "zona"),
         "depth": ("depth", "tiefe", "profondeur", "profondita", "profundidad"),
         "depth_sigma": ("depth_sigma", "sigma_depth"),
+        "depth_origin": ("depth_origin",),
+        "depth_source": ("depth_source",),
         "sigma": ("sigma", "accuracy", "genauigkeit", "precision", "precisione"),
         "score": ("score", "confidence", "probability"),
     }
@@ -59,7 +62,9 @@ class Attributes:
     code : as written; None if there is none
     kind : as written, until `read_outlines` knows it; None if not stated
     course, zone : of the stone; None if not stated
-    depth, depth_sigma : measured on the stone [m]; None if not stated
+    depth, depth_sigma : measured on the stone, unless `depth_origin` says otherwise [m]; None if not stated
+    depth_origin : one of DEPTH_ORIGINS; None if not stated
+    depth_source : evidence in words; None if not stated
     sigma : standard deviation of a coordinate of the outline [m]; None if not stated
     score : confidence of the program that drew it, from 0 to 1; None if not stated
     notes : other attributes
@@ -71,9 +76,15 @@ class Attributes:
     zone: str | None = None
     depth: float | None = None
     depth_sigma: float | None = None
+    depth_origin: str | None = None
+    depth_source: str | None = None
     sigma: float | None = None
     score: float | None = None
     notes: Mapping[str, str] = field(default_factory=dict)
+
+    def depth_evidence(self, where: str) -> str | None:
+        """Return the evidence for the depth in words, by default its place; None without a depth."""
+        return None if self.depth is None else self.depth_source or f"attribute of {where}"
 
 
 @dataclass(frozen=True)
@@ -153,6 +164,8 @@ def attributes_of(values: Mapping[str, Any], chosen: Mapping[str, str], where: s
     """
     columns = _columns(tuple(values), chosen, where)
     texts = {meaning: _text(values[name]) for meaning, name in columns.items()}
+    if "zone" not in chosen and _is_measure(texts.get("zone")):
+        del texts["zone"], columns["zone"]  # an area that a program computed
     used = set(columns.values())
     notes = {
         _key(name): text[:200]
@@ -168,6 +181,8 @@ def attributes_of(values: Mapping[str, Any], chosen: Mapping[str, str], where: s
         zone=texts.get("zone"),
         depth=None if depth is None else _positive(depth, "depth", where),
         depth_sigma=_number(texts, "depth_sigma", where),
+        depth_origin=None if depth is None else _origin(texts.get("depth_origin"), where),
+        depth_source=None if depth is None else texts.get("depth_source"),
         sigma=None if sigma is None else _positive(sigma, "sigma", where),
         score=_number(texts, "score", where),
         notes=notes,
@@ -238,6 +253,18 @@ def _positive(value: float, meaning: str, where: str) -> float:
         what = f"{meaning} is {value:g} m"
         raise SurveyError(what, where=where, remedy="give it in metres, e.g. 0.3; or leave it empty")
     return value
+
+
+def _is_measure(text: str | None) -> bool:
+    """Return whether a text is a decimal number."""
+    return text is not None and re.fullmatch(r"-?\d*[.,]\d+(e-?\d+)?", text) is not None
+
+
+def _origin(text: str | None, where: str) -> str | None:
+    if text is not None and text not in DEPTH_ORIGINS:
+        remedy = f"write one of {', '.join(DEPTH_ORIGINS)}; or leave it out"
+        raise SurveyError(f"origin of a depth {text[:40]!r}", where=where, remedy=remedy)
+    return text
 
 
 def _course(text: str | None, where: str) -> int | None:

@@ -64,6 +64,8 @@ def _feature(outline: Outline | WrongOutline, reason: str) -> dict[str, object]:
         "zone": attributes.zone,
         "depth": attributes.depth,
         "depth_sigma": attributes.depth_sigma,
+        "depth_origin": attributes.depth_origin,
+        "depth_source": attributes.depth_source,
         "sigma": attributes.sigma,
         "score": attributes.score,
     }

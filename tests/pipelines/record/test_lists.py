@@ -7,7 +7,7 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
-from sqlalchemy import select
+from sqlalchemy import select, update
 
 from archmodel.database.as_known import as_known
 from archmodel.database.session import open_database
@@ -16,10 +16,13 @@ from archmodel.query.api import find_faces, find_rows
 from archmodel.query.geojson import feature_collection
 from archmodel.store.revisions import RowCounts
 from archmodel.store.stones import store_survey
+from archmodel.tables.entities import Entity
 from archmodel.tables.knowledge import Note, Statement
 from ground.errors import UsageError
 from pipelines.draw.stratigraphy.matrix import draw, study
+from pipelines.record.export.export import export_file
 from pipelines.record.record import record
+from survey.clouds.outlines.vector import read_vector
 from tests.archmodel.stones import SHA, box_stone
 from tests.archmodel.stratigraphy.drawings import artifact, drawing, group, line, shape
 
@@ -123,6 +126,35 @@ def test_attributes_of_a_geopackage_are_read(url: str, tmp_path: Path):
         connection.execute("INSERT INTO stones VALUES (1, x'00', 'S3', 'IV')")
     stated(url)(path)
     assert known(url)["S3"][0] == "IV"
+
+
+def test_a_geopackage_of_ones_own_comes_back_unchanged_and_its_edits_are_opinions(url: str, tmp_path: Path):
+    stated(url)(file(tmp_path, "first.csv", "code;phase;mark\nS1;I;fish\nS2;I;\n"))
+    path = tmp_path / "own.gpkg"
+    export_file(url, path)
+    counts = stated(url, "B")(path)
+    assert sum(counts.values(), RowCounts()).changes == 0
+    with closing(sqlite3.connect(path)) as connection, connection:
+        connection.execute("UPDATE stones SET phase = 'II' WHERE code = 'S2'")
+    assert stated(url, "B")(path)["phase"].changes == 1
+    assert (known(url)["S1"][0], known(url)["S2"][0]) == ("I", "II")
+
+
+def test_what_was_assumed_of_a_depth_stays_assumed_in_a_geopackage(url: str, tmp_path: Path):
+    pytest.importorskip("pyogrio")
+    path = tmp_path / "own.gpkg"
+    with open_database(url) as database, database.session() as session:
+        session.execute(update(Entity).where(Entity.code == "S1").values(depth_origin="rule"))
+    export_file(url, path)
+    said = {outline.code: outline.said for outline in read_vector(path, "elevation", {})}
+    with open_database(url) as database, database.session(read_only=True) as session:
+        rows = find_rows(session, "entity", columns=["code", "depth", "depth_origin", "depth_source", "zone"])
+    for row in rows:
+        stone = said[str(row["code"])]
+        stored = (stone.depth_origin, stone.depth_source, stone.zone)
+        assert stored == (row["depth_origin"], row["depth_source"], row["zone"])
+        assert stone.depth == pytest.approx(row["depth"], abs=1e-9)
+    assert said["S1"].depth_origin == "rule"
 
 
 @pytest.mark.parametrize(
