@@ -52,6 +52,7 @@ def test_the_import_rule_holds():
         ),
         ("survey.joints.close", ("sqlalchemy", "typer", "vtkmodules")),
         ("pipelines.run.run", ("typer", "vtkmodules", "matplotlib")),
+        ("pipelines.record.export.export", ("typer", "numba", "scipy", "vtkmodules", "ezdxf")),
     ],
 )
 def test_a_module_loads_only_what_it_needs(module, loaded_late):

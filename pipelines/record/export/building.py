@@ -20,7 +20,7 @@ from archmodel.tables.structures import Structure
 from archmodel.tables.surveys import Survey
 from ground.errors import UsageError
 from mechanics.arrays import Array, Ints
-from mechanics.stones.polyhedra import mass_properties
+from mechanics.stones.polyhedra import alike, mass_properties_alike
 from pipelines.reports.page.known import column_of
 from pipelines.reports.page.model import Column, Stones
 from pipelines.reports.page.surfaces import stones_of
@@ -139,7 +139,7 @@ def read_building(session: Session, run: int | None = None) -> Building:
     codes, kinds = zip(*(named[number] for number in ids), strict=True)
     shapes = [(np.asarray(vertices), faces) for _, vertices, faces in solids]
     mesh, _ = stones_of(codes, shapes)
-    bodies = [mass_properties(vertices, faces) for vertices, faces in shapes]
+    volumes, centroids = _volumes_and_centroids(codes, shapes)
     outlines: list[Array | None] = [None] * len(codes)
     normals: list[Array | None] = [None] * len(codes)
     for face in stone_faces(session):
@@ -154,14 +154,27 @@ def read_building(session: Session, run: int | None = None) -> Building:
         mesh=mesh,
         outlines=outlines,
         normals=normals,
-        volumes=np.array([body.volume for body in bodies]),
-        centroids=np.array([body.centroid for body in bodies]),
+        volumes=volumes,
+        centroids=centroids,
         columns=_columns(session, codes, run),
         groups=_groups(session, ids),
         materials=_materials(session),
         run=run,
         outcome=outcome,
     )
+
+
+def _volumes_and_centroids(
+    codes: Sequence[str], shapes: Sequence[tuple[Array, Faces]]
+) -> tuple[Array, Array]:
+    """Return volumes (n,) [m³] and centroids (n, 3) [m] of the solids."""
+    volumes, centroids = np.empty(len(shapes)), np.empty((len(shapes), 3))
+    vertices, faces = zip(*shapes, strict=True)
+    for shared, rows in alike(vertices, faces):
+        corners = np.stack([vertices[row] for row in rows])
+        names = [f"stone {codes[row]}" for row in rows]
+        volumes[rows], centroids[rows], _ = mass_properties_alike(corners, shared, names)
+    return volumes, centroids
 
 
 def _columns(session: Session, codes: Sequence[str], run: int | None) -> tuple[Column, ...]:

@@ -18,9 +18,6 @@ from pipelines.record.export.dxf import dxf_content
 from pipelines.record.export.glb import glb_content
 from pipelines.record.export.gpkg import write_gpkg
 from pipelines.record.export.ifc import ifc_content
-from pipelines.record.export.lmgc90 import lmgc90_content
-from pipelines.record.export.same_scene import same_scene
-from pipelines.record.export.threedec import threedec_content
 
 __all__ = ["ENDINGS", "Exported", "export_file"]
 
@@ -57,18 +54,29 @@ def _matrix(session: Session) -> str:
     return draw(study(session), Path("matrix.graphml"))
 
 
+def _script_of_lmgc90(order: _Order) -> bytes:
+    # what assembles scenes takes a second and 110 MB, which other formats do not need
+    from pipelines.record.export.lmgc90 import lmgc90_content
+    from pipelines.record.export.same_scene import same_scene
+
+    return lmgc90_content(order.building, same_scene(order.session, order.building.run, "LMGC90"))
+
+
+def _script_of_3dec(order: _Order) -> bytes:
+    from pipelines.record.export.same_scene import same_scene
+    from pipelines.record.export.threedec import threedec_content
+
+    return threedec_content(order.building, same_scene(order.session, order.building.run, "3DEC"))
+
+
 _CONTENTS: Mapping[str, Callable[[_Order], bytes]] = {
     ".ifc": lambda order: ifc_content(order.building, order.crs),
     ".dxf": lambda order: dxf_content(order.building),
     ".glb": lambda order: glb_content(order.building),
     ".compas.json": lambda order: model_content(order.building, order.session),
     ".results.json": _results,
-    ".lmgc90.py": lambda order: lmgc90_content(
-        order.building, same_scene(order.session, order.building.run, "LMGC90")
-    ),
-    ".3ddat": lambda order: threedec_content(
-        order.building, same_scene(order.session, order.building.run, "3DEC")
-    ),
+    ".lmgc90.py": _script_of_lmgc90,
+    ".3ddat": _script_of_3dec,
 }
 
 _KNOWLEDGE: Mapping[str, Callable[[Session], str]] = {".graphml": _matrix, ".ttl": write_turtle}

@@ -1,6 +1,7 @@
 """IFC4: an element with a body for each stone, with property sets, materials and groups."""
 
 import uuid
+from base64 import b64encode
 from collections.abc import Sequence
 from importlib.metadata import version
 
@@ -11,7 +12,12 @@ from pipelines.record.export.step import StepFile, enumeration, list_of, real, t
 
 __all__ = ["global_id", "ifc_content"]
 
-_DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_$"
+_DIGITS = bytes.maketrans(
+    b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/",
+    b"0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_$",
+)
+"""Digits of base 64 in identifiers of IFC, which are those of RFC 4648 in another order."""
+
 _SETS = {"Stone": "MOMA_Stone", "Depth": "MOMA_Depth", "Survey": "MOMA_Survey", "Results": "MOMA_Results"}
 _KNOWLEDGE = "MOMA_Knowledge"
 
@@ -22,11 +28,8 @@ def global_id(identifier: uuid.UUID) -> str:
     >>> global_id(uuid.UUID(int=0)), len(global_id(uuid.UUID(int=2**128 - 1)))
     ('0000000000000000000000', 22)
     """
-    number, digits = identifier.int, []
-    for _ in range(22):
-        number, digit = divmod(number, 64)
-        digits.append(_DIGITS[digit])
-    return "".join(reversed(digits))
+    # 128 bits are 2 and 21 times 6: of 18 bytes, the first two digits have none of them
+    return b64encode(b"\0\0" + identifier.bytes)[2:].translate(_DIGITS).decode("ascii")
 
 
 def ifc_content(building: Building, crs: str | None = None) -> bytes:

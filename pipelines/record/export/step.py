@@ -1,5 +1,6 @@
 """STEP text (ISO 10303-21): numbered instances, and values as it writes them."""
 
+import io
 from collections.abc import Iterable
 from datetime import datetime
 
@@ -68,7 +69,7 @@ class StepFile:
     """
 
     def __init__(self, schema: str, title: str, date: datetime, program: str, view: str) -> None:
-        self._lines = [
+        head = [
             "ISO-10303-21;",
             "HEADER;",
             f"FILE_DESCRIPTION(({text(view)}),'2;1');",
@@ -78,14 +79,17 @@ class StepFile:
             "ENDSEC;",
             "DATA;",
         ]
+        self._written = io.BytesIO()  # a list of lines would take twice the memory
+        self._written.write("\n".join([*head, ""]).encode("ascii"))
         self._count = 0
 
     def add(self, kind: str, *values: str) -> str:
         """Add an instance, and return the reference to it."""
         self._count += 1
-        self._lines.append(f"#{self._count}={kind}({','.join(values)});")
+        self._written.write(f"#{self._count}={kind}({','.join(values)});\n".encode("ascii"))
         return f"#{self._count}"
 
     def content(self) -> bytes:
-        """Return the whole file."""
-        return "\n".join([*self._lines, "ENDSEC;", "END-ISO-10303-21;", ""]).encode("ascii")
+        """End the file, and return the whole of it."""
+        self._written.write(b"ENDSEC;\nEND-ISO-10303-21;\n")
+        return self._written.getvalue()

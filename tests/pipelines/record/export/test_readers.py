@@ -1,8 +1,13 @@
 """Files for other programs, opened by readers that are not ours: counts, codes, volumes, centroids, the same bytes."""
 
 import json
+import os
+import re
 import sqlite3
 import struct
+import subprocess
+import sys
+import time
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from itertools import pairwise
@@ -19,6 +24,7 @@ from pipelines.record.export.gpkg import write_gpkg
 from pipelines.record.export.ifc import global_id, ifc_content
 from pipelines.record.export.step import real, text
 from survey.formats.solids.compas import read_compas
+from tests.paths import ROOT
 from tests.pipelines.record.export.buildings import HOSTILE, made_building
 
 CODES = [*HOSTILE, *(f"{HOSTILE[at % len(HOSTILE)]} {at}" for at in range(60))]
@@ -104,6 +110,33 @@ def test_dxf_is_read_by_ezdxf(building, tmp_path):
     corners = np.array([tuple(point) for point in outlines[0].vertices_in_wcs()])
     assert np.abs(corners - building.outlines[1]).max() < 1e-9
     assert {one.dxf.layer for one in outlines} == {"ELEVATION-header", "ELEVATION-stretcher"}
+
+
+def test_a_drawing_has_each_handle_once_and_its_classes_in_an_order_of_their_own(building):
+    pytest.importorskip("ezdxf")
+    drawing = dxf_content(building).decode("utf-8")
+    entities = drawing.partition("ENTITIES")[2]
+    handles = [int(one, 16) for one in re.findall(r"^  5\n([0-9A-F]+)$", drawing, re.MULTILINE)]
+    seed, *others = handles  # the first is the one that comes next
+    assert len(set(others)) == len(others) > 2 * len(CODES)
+    assert seed > max(others)
+    assert entities.count("AcDbSubDMesh") == len(CODES)
+    # ezdxf adds those of what is in use in the order of a set, which differs from process to process
+    classes = re.findall(r"^CLASS\n  1\n(\S+)$", drawing, re.MULTILINE)
+    used = [one for one in classes if f"\n  0\n{one}\n" in drawing]
+    assert classes[: len(used)] == sorted(used)
+    layers = set(re.findall(r"^AcDbLayerTableRecord\n  2\n(\S+)$", drawing, re.MULTILINE))
+    assert layers >= set(re.findall(r"^AcDbEntity\n  8\n(\S+)$", entities, re.MULTILINE))
+
+
+def test_a_code_with_a_line_break_breaks_no_drawing(tmp_path):
+    ezdxf = pytest.importorskip("ezdxf")
+    (tmp_path / "wall.dxf").write_bytes(dxf_content(made_building(["a\nb\t1", "c"])))
+    drawing = ezdxf.readfile(tmp_path / "wall.dxf")
+    assert not drawing.audit().errors
+    first, second = drawing.modelspace().query("MESH")
+    assert [tag.value for tag in first.get_xdata(APPLICATION)] == ["a^Jb^I1"]
+    assert [tag.value for tag in second.get_xdata(APPLICATION)] == ["c"]
 
 
 def test_long_codes_come_back_from_dxf_whole(tmp_path):
@@ -210,6 +243,47 @@ def test_the_same_building_gives_the_same_bytes(building, tmp_path):
     for name, one in (("a", building), ("b", again)):
         write_gpkg(one, tmp_path / name)
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+
+
+SUMS = """
+import hashlib, sys
+from pathlib import Path
+from tests.pipelines.record.export.test_readers import (
+    CODES, dxf_content, glb_content, ifc_content, made_building, model_content, write_gpkg
+)
+building = made_building(CODES)
+write_gpkg(building, Path(sys.argv[1]))
+contents = [Path(sys.argv[1]).read_bytes(), model_content(building, None)]
+contents += [content(building) for content in (ifc_content, dxf_content, glb_content)]
+print([hashlib.sha256(one).hexdigest() for one in contents])
+"""
+
+
+@pytest.mark.slow
+def test_another_process_gives_the_same_bytes(tmp_path):
+    pytest.importorskip("ezdxf")
+    said = [
+        subprocess.run(
+            [sys.executable, "-c", SUMS, str(tmp_path / f"{seed}.gpkg")],
+            cwd=ROOT,
+            env=os.environ | {"PYTHONHASHSEED": str(seed), "PYTHONPATH": str(ROOT)},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for seed in (1, 2, 3)
+    ]
+    assert len(set(said)) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("content", "seconds", "size"), [(ifc_content, 10, 30e6), (dxf_content, 5, 15e6)])
+def test_ten_thousand_stones_are_written_in_seconds(content, seconds, size):
+    pytest.importorskip("ezdxf")
+    many = made_building([f"W{row}" for row in range(10_000)])
+    began = time.process_time()
+    assert len(content(many)) < size
+    assert time.process_time() - began < seconds
 
 
 def test_identifiers_stay_where_stones_are_added(building):
