@@ -73,6 +73,10 @@ def register_kind(
     if known is not None:
         if known.says() == row.says():
             return RowCounts(unchanged=1)
+        if (*known.says()[:3], *known.says()[4:]) == (*row.says()[:3], *row.says()[4:]):
+            what = f"the kind {name} is registered already, with other canonical proportions"
+            remedy = f'change these alone: [[canon]] kind = "{name}", proportions = "…"'
+            raise UsageError(what, remedy=remedy)
         remedy = "give the new one another name; definitions of kinds do not change"
         raise UsageError(f"the kind {name} is registered already, with another definition", remedy=remedy)
     if name in all_kinds():

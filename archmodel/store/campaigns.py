@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from sqlalchemy import select
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import Session, aliased
 
 from archmodel.arrays import Array
 from archmodel.store.bulk import batches
@@ -24,6 +24,7 @@ __all__ = [
     "displacement",
     "displacements",
     "face_place",
+    "measured_again",
 ]
 
 SIGNIFICANT = 3.368
@@ -109,6 +110,18 @@ def campaigns(session: Session) -> dict[str, list[int]]:
     for number, name in session.execute(select(Survey.id, Survey.name).order_by(Survey.id)):
         surveys.setdefault(name, []).append(number)
     return surveys
+
+
+def measured_again(session: Session, surveys: Sequence[int]) -> bool:
+    """Return whether a later survey measured any stone of these surveys."""
+    now = aliased(Measurement)
+    rows = (
+        select(Measurement.id)
+        .join(now, now.entity_id == Measurement.entity_id)
+        .where(Measurement.survey_id.in_(surveys), Measurement.superseded_id.is_not(None))
+        .where(now.superseded_id.is_(None), now.survey_id.not_in(surveys))
+    )
+    return session.scalar(rows.limit(1)) is not None
 
 
 def displacements(session: Session, surveys: Sequence[int] | None = None) -> Mapping[int, Displacement]:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from xml.etree import ElementTree as etree
 
 from archmodel.stratigraphy.dates import Dated
-from archmodel.stratigraphy.graphml import DrawnUnit
+from archmodel.stratigraphy.graphml import WRITTEN_BY, DrawnUnit
 from archmodel.stratigraphy.order import Link, Order
 from archmodel.stratigraphy.palette import UNIT_KINDS, G, Y
 from archmodel.tables.stratigraphy import SYMMETRIC
@@ -19,6 +19,7 @@ _KEYS = (
     ("d2", {"for": "node", "yfiles.type": "nodegraphics"}),
     ("d3", {"for": "edge", "attr.name": "description", "attr.type": "string"}),
     ("d4", {"for": "edge", "yfiles.type": "edgegraphics"}),
+    ("d5", {"for": "graph", "attr.name": "Description", "attr.type": "string"}),
 )
 """Keys of data, as yEd declares them."""
 
@@ -44,6 +45,7 @@ def write_graphml(
     for key, settings in _KEYS:
         etree.SubElement(root, f"{{{G}}}key", {"id": key, **settings})
     graph = etree.SubElement(root, f"{{{G}}}graph", {"id": "G", "edgedefault": "directed"})
+    etree.SubElement(graph, f"{{{G}}}data", {"key": "d5"}).text = WRITTEN_BY
     numbers = {code: f"n{k}" for k, code in enumerate(_codes(order), start=1)}
     lanes = _rows(order, dates or {})
     heights = [_STEP * len({order.levels[unit] for unit in units}) for _, units in lanes]

@@ -20,7 +20,10 @@ from archmodel.stratigraphy.palette import COMMON, G, Y, box_of, label_of, line_
 from archmodel.tables.stratigraphy import DEFINITIONS, INVERSE
 from ground.errors import UsageError
 
-__all__ = ["DrawnUnit", "GraphmlStratigraphy", "read_graphml"]
+__all__ = ["WRITTEN_BY", "DrawnUnit", "GraphmlStratigraphy", "read_graphml"]
+
+WRITTEN_BY = "written by MOMA"
+"""Description of the drawings that this program writes, which yEd keeps."""
 
 _STYLES: Mapping[str, str] = {"line": "later_than", "double_line": "contemporary_with"}
 """Relations of lines without the name of one, by style."""
@@ -57,12 +60,14 @@ class GraphmlStratigraphy:
     links : relations between them
     ignored : number of nodes and lines that are no stratigraphy, by kind in words
     epochs : the labelled rows of the table of swimlanes, the latest first; with years where the label has them
+    own : this program wrote it
     """
 
     units: Mapping[str, DrawnUnit]
     links: tuple[Link, ...]
     ignored: Mapping[str, int] = field(default_factory=dict)
     epochs: tuple[Dated, ...] = ()
+    own: bool = False
 
 
 def read_graphml(path: Path, named: Callable[[str], str | None] = lambda text: None) -> GraphmlStratigraphy:
@@ -85,7 +90,8 @@ def read_graphml(path: Path, named: Callable[[str], str | None] = lambda text: N
         raise UsageError("no stratigraphic units", where=str(path), remedy=remedy)
     links = dict.fromkeys(link for edge in root.iter(f"{{{G}}}edge") if (link := reader.link(edge, named)))
     epochs = dict.fromkeys(lane.epoch for lane in reader.lanes)
-    return GraphmlStratigraphy(reader.units, tuple(links), dict(reader.ignored), tuple(epochs))
+    own = any(data.text == WRITTEN_BY for data in root.findall(f"./{{{G}}}graph/{{{G}}}data"))
+    return GraphmlStratigraphy(reader.units, tuple(links), dict(reader.ignored), tuple(epochs), own)
 
 
 def _root(path: Path) -> etree.Element:

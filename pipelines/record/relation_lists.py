@@ -1,7 +1,7 @@
 """Lists of stratigraphic relations: a table of unit, relation, unit, or GraphML of the Extended Matrix."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from sqlalchemy.orm import Session
@@ -15,13 +15,14 @@ from archmodel.assertions.stratigraphy import (
     subjects_named,
     subjects_of,
 )
+from archmodel.query.dated import load_dates
 from archmodel.store.revisions import NOTHING, RowCounts
 from archmodel.stratigraphy.dates import Dated
 from archmodel.stratigraphy.graphml import DrawnUnit, read_graphml
 from archmodel.stratigraphy.palette import COMMON
-from archmodel.stratigraphy.stored import KIND_NOTE
+from archmodel.stratigraphy.stored import KIND_NOTE, load_drawn, load_links
 from archmodel.tables.entries import Entry
-from archmodel.tables.stratigraphy import DEFINITIONS, INVERSE
+from archmodel.tables.stratigraphy import DEFINITIONS, INVERSE, SYMMETRIC
 from ground.errors import MomaError, SurveyError, UsageError
 from ground.tables.columns import plain, spellings
 from ground.tables.table import TableRow, read_table
@@ -121,6 +122,7 @@ class RelationList:
     ignored : number of nodes and lines of a drawing that are no stratigraphy, by kind
     epochs : those of a drawing
     drawn : kind, title, epoch and parent of the units of a drawing
+    own : this program wrote the drawing
     """
 
     path: str
@@ -129,6 +131,7 @@ class RelationList:
     ignored: Mapping[str, int] = field(default_factory=dict)
     epochs: tuple[Dated, ...] = ()
     drawn: Mapping[str, DrawnUnit] = field(default_factory=dict)
+    own: bool = False
 
 
 def relation_of(text: str) -> str | None:
@@ -148,7 +151,7 @@ def read_relation_list(path: Path, sheet: str | None = None) -> RelationList | N
         drawn = read_graphml(path, relation_of)
         relations = tuple((0, link.subject, link.relation, link.target) for link in drawn.links)
         units = tuple(drawn.units)
-        return RelationList(str(path), units, relations, drawn.ignored, drawn.epochs, drawn.units)
+        return RelationList(str(path), units, relations, drawn.ignored, drawn.epochs, drawn.units, drawn.own)
     try:
         table = read_table(path, _is_row, _REMEDY, sheet)
     except SurveyError as error:
@@ -197,6 +200,8 @@ def record_relation_list(
     UsageError
         for a unit in relation to itself, at its line; for a loop
     """
+    if listed.own:
+        listed = _without_known(session, listed)
     things = subjects_named(session, listed.units)
     missing = [code for code in listed.units if code not in things]
     outcome = {"unit": declare_units(session, entry, missing, listed.drawn)} if missing else {}
@@ -212,6 +217,23 @@ def record_relation_list(
         raise _at_lines(listed, error) from None
     outcome |= _record_kinds(session, entry, listed, things)
     return outcome | _record_epochs(session, entry, listed, things, remark)
+
+
+def _without_known(session: Session, listed: RelationList) -> RelationList:
+    """Leave out what a drawing that this program wrote shows of what holds already: it is nobody's new opinion."""
+    stated = {(link.subject, link.relation, link.target) for link in load_links(session)}
+    stated |= {(target, relation, unit) for unit, relation, target in stated if relation in SYMMETRIC}
+    dates, kinds = load_dates(session, listed.units), load_drawn(session)
+    drawn = {}
+    for code, unit in listed.drawn.items():
+        known, date = kinds.get(code, DrawnUnit()), dates.get(code)
+        drawn[code] = replace(
+            unit,
+            kind=COMMON if unit.kind == known.kind else unit.kind,
+            epoch=None if date is not None and date.phase == unit.epoch else unit.epoch,
+        )
+    relations = tuple(row for row in listed.relations if row[1:] not in stated)
+    return replace(listed, relations=relations, drawn=drawn)
 
 
 def _record_kinds(

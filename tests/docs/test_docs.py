@@ -119,7 +119,12 @@ def test_what_the_how_to_on_surveys_shows_is_what_the_files_and_commands_say(her
     assert [line for line in shown if line not in known] == []
 
 
-def test_the_questions_of_the_how_to_on_queries_have_the_answers_it_shows(here):
+@pytest.mark.parametrize("backend", ["sqlite", pytest.param("postgresql", marks=pytest.mark.slow)])
+def test_the_questions_of_the_how_to_on_queries_have_the_answers_it_shows(
+    here, backend, new_url, monkeypatch
+):
+    if backend == "postgresql":
+        monkeypatch.setenv("MOMA_DB", new_url())
     page = "docs/howto/query.md"
     text = (ROOT / page).read_text(encoding="utf-8")
     pieces = re.findall(r"^```(bash|text|python)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
@@ -136,6 +141,8 @@ def test_the_questions_of_the_how_to_on_queries_have_the_answers_it_shows(here):
                 assert set(untimed(shown)) <= set(untimed(done.stdout)), command
             questions += command[1] not in ("ingest", "record", "run")
     assert questions >= 33
+    if backend == "postgresql":
+        return
     (script,) = blocks(page, "python")
     assert printed(here, script).split() == ["W10-03", "10", "W10-06", "10"]
 

@@ -63,7 +63,12 @@ def moved_since(scope: Scope, call: Call, ask: Ask) -> Condition:
         raise complaint(token, f"displacements since {context.campaign} and {name}", "ask in two queries")
     context.campaign = name
     # numpy is loaded only by those who ask
-    from archmodel.store.campaigns import SIGNIFICANT
+    from archmodel.store.campaigns import SIGNIFICANT, campaigns, measured_again
 
+    surveys = campaigns(context.session)
+    if not context.once(("again", name), lambda: measured_again(context.session, surveys[name])):
+        others = ", ".join(other for other in surveys if other != name) or "there is none"
+        what = f"no stone was measured again since the survey {name[:40]!r}"
+        raise complaint(token, what, f"name the earlier survey of two: {others[:200]}")
     rows = scope.displacement()
     return rows.c.moved > SIGNIFICANT * rows.c.moved_sigma

@@ -150,6 +150,10 @@ def test_what_cannot_be_registered_is_refused(empty: Database) -> None:
         ({"canon": "depth/length = 2"}, "no measured number equals another exactly; give a tolerance"),
         ({"parent": "rib", "attributes": {"slit": ("m", "x")}}, "leave out attributes"),
         ({"name": "merlon"}, "registered already, with another definition"),
+        (
+            {"name": "merlon", "parent": "coping", "definition": "A stone of a merlon.", "attributes": OWN},
+            r"with other canonical proportions; change these alone: \[\[canon\]\] kind = \"merlon\"",
+        ),
         ({"name": "Merlon"}, "'Merlon' is not the name of a kind; write it in small letters"),
         ({"name": "x" * 41}, "is not the name of a kind"),
         ({"name": "drop table"}, "is not the name of a kind"),

@@ -45,7 +45,10 @@ def test_what_was_measured_twice_and_moved_is_found_with_its_significance(twice:
         assert rows == [
             {"moved": pytest.approx(0.02), "moved_sigma": pytest.approx(SIGMA / 2 * 2**0.5, rel=1e-3)}
         ]
-        assert [one.code for one in find(session, "entity", ["moved_since('2024')"])] == []
+        with pytest.raises(
+            QueryError, match=r"measured again since the survey '2024'; name the earlier .*: 1992"
+        ):
+            find(session, "entity", ["moved_since('2024')"])
 
 
 def test_a_campaign_that_is_not_there_is_named(twice: Database) -> None:

@@ -290,6 +290,9 @@ def test_a_drawing_brings_units_with_kinds_titles_and_parents_and_tells_what_it_
         assert describe(session, "USV3")["title"] == "lost pier"
         again = tmp_path / "again.graphml"
         again.write_text(draw(study(session), again), encoding="utf-8")
-    counts = record([again], url, author="A", source="drawn").files[0].tables
-    assert sum(counts.values(), RowCounts()).changes == 0
-    assert counts["note"] == RowCounts(unchanged=2)
+    # what holds is no new opinion of whoever brings the drawing back; what was drawn into it is
+    assert record([again], url, author="B", source="drawn").files[0].outcome.changes == 0
+    text = again.read_text(encoding="utf-8").replace(">above<", ">cuts<")
+    again.write_text(text, encoding="utf-8")
+    counts = record([again], url, author="B", source="drawn").files[0].tables
+    assert counts == {"stratigraphy": RowCounts(new=1)}
