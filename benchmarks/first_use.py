@@ -27,7 +27,9 @@ sample arch --out arch
 ingest arch/arch.moma --db sqlite:///arch.db
 run arch/arch.toml --db sqlite:///arch.db --out arch-run
 assess arch/arch.toml --db sqlite:///arch.db --out arch-limit
+trade arch/arch.toml --budget 1 --db sqlite:///arch.db --out arch-trade
 ingest {sample}/window.moma --db sqlite:///window.db
+run {sample}/window.toml --db sqlite:///window.db --out window
 run {sample}/window.toml --profile fast --db sqlite:///window.db --out window-fast
 check {sample}/window.toml --db sqlite:///window.db
 sample wall --moved settlement --small --out settled

@@ -8,6 +8,7 @@ polygons area and centroid of a plane polygon in space
 
 Public: `DatabaseError`, `ExchangeError`, `GeometryError`, `MeshError`, `MissingLibraryError`, `MomaError`,
 `NoDatabaseError`, `QueryError`, `SceneError`, `SolverError`, `StorageError`, `SurveyError`,
-`UnsoundSceneError`, `UsageError`, `storage_error`, `storing` (errors); `Setting`, `declared` (settings);
+`UnsoundSceneError`, `UsageError`, `missing_library`, `storage_error`,
+`storing` (errors); `Setting`, `declared` (settings);
 `area_and_centroid` (polygons).
 """

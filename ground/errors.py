@@ -41,9 +41,21 @@ __all__ = [
     "SurveyError",
     "UnsoundSceneError",
     "UsageError",
+    "missing_library",
     "storage_error",
     "storing",
 ]
+
+
+_HERE = ("archmodel", "ground", "mechanics", "moma", "pipelines", "survey")
+
+_PACKAGES = {
+    "PIL": "pillow",
+    "skfem": "scikit-fem",
+    "vtkmodules": "vtk",
+    "python_calamine": "python-calamine",
+}
+"""Names under which pip knows modules that are called otherwise."""
 
 
 class MomaError(Exception):
@@ -159,6 +171,23 @@ def storage_error(error: Exception, where: str | None = None, kept: str = "") ->
     named = getattr(error, "filename", None)
     place = where if where is not None else None if named is None else str(named)
     return StorageError(what, where=place, remedy="; ".join(filter(None, (remedy, kept))))
+
+
+def missing_library(error: BaseException) -> MissingLibraryError | None:
+    """Return the error of a package that is absent or cannot be loaded; None if another thing has failed.
+
+    >>> print(missing_library(ModuleNotFoundError("No module named 'PIL.Image'", name="PIL.Image")))
+    this needs the package pillow, which is not installed; pip install pillow
+    """
+    module = (getattr(error, "name", None) or "").partition(".")[0]
+    if not isinstance(error, ImportError) or not module or module in _HERE:
+        return None
+    package = _PACKAGES.get(module, module)
+    if isinstance(error, ModuleNotFoundError):
+        what = f"this needs the package {package}, which is not installed"
+        return MissingLibraryError(what, remedy=f"pip install {package}")
+    what = f"this needs the package {package}, which cannot be loaded: {error}"
+    return MissingLibraryError(what, remedy=f"pip install --force-reinstall {package}")
 
 
 @contextmanager

@@ -18,7 +18,7 @@ from typing import Any, TextIO
 import typer
 from typer.core import HAS_RICH, TyperCommand, TyperGroup
 
-from ground.errors import MomaError, storage_error
+from ground.errors import MomaError, missing_library, storage_error
 
 __all__ = ["PlainCommand", "PlainGroup", "open_streams", "reporting", "say", "short_lived"]
 
@@ -135,7 +135,9 @@ def reporting(command: Callable[..., None]) -> Callable[..., None]:
             say("interrupted")
             raise
         except Exception as error:
-            foreseen = error if isinstance(error, MomaError) else storage_error(error)
+            foreseen = (
+                error if isinstance(error, MomaError) else storage_error(error) or missing_library(error)
+            )
             if foreseen is None and verbose:
                 raise
             if verbose:

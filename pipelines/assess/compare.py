@@ -19,6 +19,7 @@ from mechanics.results.result import Result
 from mechanics.simulate import simulate
 from pipelines.assess.motions import stone_motions
 from pipelines.draw.elevations.movement import draw_bed_movement, draw_misfit
+from pipelines.draw.elevations.sheet import require_figures
 from pipelines.ingest.records import surveyed_block
 from pipelines.reports.movement import write_comparison
 from pipelines.reports.page.known import known_stones
@@ -104,6 +105,7 @@ def compare(
     SceneError, GeometryError, MeshError, SolverError : see `assemble` and `mechanics.simulate`
     DatabaseError : the database cannot be read or written
     """
+    require_figures()
     folder, scene = Path(folder), read_scene(path)
     refuse_stages(scene.stages, scene.document, "moma compare")
     check_replaceable(folder, INDEX, () if overwrite else (Path(path),))

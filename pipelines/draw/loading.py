@@ -4,7 +4,6 @@ from pathlib import Path
 from textwrap import wrap
 
 import numpy as np
-from matplotlib.collections import PolyCollection
 
 from mechanics.arrays import Array
 from mechanics.contact.contacts import material_points
@@ -75,6 +74,8 @@ def draw_pushed(path: Path, title: str, test: LoadingTest, step: Step) -> None:
             if normal @ across < _SEEN * np.linalg.norm(normal):
                 shown.append(shape[face])
     figure = new_sheet((5.0, 5.0))
+    from matplotlib.collections import PolyCollection
+
     axes = figure.subplots()
     axes.add_collection(PolyCollection(shown, facecolor="#e6dfd0", edgecolor="#4a4a4a", linewidth=0.6))
     contacts, wide = step.active.contacts, step.active.gap > _OPEN * displacement

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from archmodel.store.run_record import without_rounding
-from ground.errors import MissingLibraryError
+from ground.errors import MissingLibraryError, missing_library
 from mechanics.arrays import Array
 from mechanics.results.contact_result import JointResult
 from mechanics.results.result import BodyResult, Outcome, Result
@@ -244,14 +244,20 @@ def draw_apart(
                 return
             if process.returncode == 3:
                 reason = said.strip()
-                package = package_of(reason) or "libgl1 libxrender1 libegl1"
-                remedy = f"install what it needs: apt-get install {package}"
-                raise MissingLibraryError(f"VTK cannot be loaded: {reason}", remedy=remedy)
+                raise MissingLibraryError(f"VTK cannot be loaded: {reason}", remedy=_remedy(reason))
             reason = reason or _last_words(told) or f"it ended with code {process.returncode}"
     raise MissingLibraryError(
         f"VTK cannot draw off screen: {reason}",
         remedy="install software rendering: apt-get install libegl1 libgl1-mesa-dri",
     )
+
+
+def _remedy(reason: str) -> str:
+    """Return what to install where the process that draws cannot load its libraries."""
+    if absent := re.search(r"No module named '(\w+)", reason):
+        foreseen = missing_library(ModuleNotFoundError(name=absent[1]))
+        return f"{foreseen.remedy}" if foreseen is not None else "install MOMA anew"
+    return f"install what it needs: apt-get install {package_of(reason) or 'libgl1 libxrender1 libegl1'}"
 
 
 @contextmanager

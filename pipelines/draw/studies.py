@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.collections import PolyCollection
 
 from mechanics.arrays import Array
 from pipelines.draw.elevations.sheet import new_sheet
@@ -69,6 +68,8 @@ def draw_shares(path: Path, outlines: Mapping[str, Array], shares: Mapping[str, 
     shares : by code [-]
     """
     figure = new_sheet((7.0, 6.0))
+    from matplotlib.collections import PolyCollection
+
     axes = figure.subplots()
     codes = list(outlines)
     values = np.array([100.0 * shares.get(code, 0.0) for code in codes])

@@ -22,6 +22,7 @@ from mechanics.scene.laws.law import Law
 from mechanics.scene.laws.lennard_jones import LennardJones
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.scene import LawRule, Method, SolverSettings
+from pipelines.draw.elevations.sheet import require_figures
 from pipelines.geology.experiments.experiment import Observed, Setup
 from pipelines.geology.experiments.membrane import Membrane
 from pipelines.geology.file import GeologyScene, read_geology
@@ -180,6 +181,7 @@ def run_geology(
     SolverError : if the motion is no longer finite
     DatabaseError : the database cannot be opened, or not written at the end; the folder is complete then
     """
+    require_figures()
     folder, scene = Path(folder), read_geology(path, kind)
     check_replaceable(folder, source=() if overwrite else (Path(path),))
     summary: dict[str, Any] = {}

@@ -143,7 +143,7 @@ def write_report(
             *_joints(result, summary),
             *_structures(summary),
         ],
-        history=history or history_svg(result.history),
+        history=history_svg(result.history) if history is None else history,
         stages=[(stage, f"{seconds:.2f} s") for stage, seconds in summary["time"]["by_stage"].items()],
         version=summary["version"],
         versions=summary.get("versions"),

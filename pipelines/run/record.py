@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields, is_dataclass
 from functools import cache
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -200,8 +200,16 @@ def settings_of(scene: SceneFile, built: Scene) -> dict[str, Any]:
 @cache
 def versions() -> Mapping[str, str]:
     """Return the versions of MOMA, of Python and of the numerical libraries."""
-    libraries = {name: version(name) for name in _LIBRARIES}
+    libraries = {name: _version(name) for name in _LIBRARIES}
     return {"moma": version("moma-masonry"), "python": platform.python_version(), **libraries}
+
+
+def _version(package: str) -> str:
+    """Return the version of a package; some may be absent."""
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "not installed"
 
 
 def error_measures(errors: Errors) -> ErrorMeasures:

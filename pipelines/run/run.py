@@ -353,7 +353,11 @@ def _write_fields(
             write_joint_grid(result, folder)
             write_joints(folder / "joints.csv", result, assembly.origin)
             write_series(folder, result, assembly.origin)
-            history = history_svg(result.history)
+            try:
+                history = history_svg(result.history)
+            except MissingLibraryError as error:
+                history = ""
+                warnings.append(f"no curve of the history: {error}")
         with _timed(writing.seconds, "pictures"):
             writing.progress(Progress("write", 1, 3, "pictures"))
             try:

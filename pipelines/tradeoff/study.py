@@ -11,6 +11,7 @@ from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.model.model import build_model
 from mechanics.results.forecast.plan import loose_blocks
 from mechanics.scene.scene import Fidelity
+from pipelines.draw.elevations.sheet import require_figures
 from pipelines.results.quantities import QUANTITIES
 from pipelines.run.assemble import assemble
 from pipelines.run.soundness import caution_of, problems_of, refuse_unsound
@@ -96,6 +97,7 @@ def run_trade(
     UnsoundSceneError : the scene has problems that `check_scene` reports, and they are not accepted
     SceneError, GeometryError, DatabaseError : see `pipelines.run.assemble`
     """
+    require_figures()
     scene = read_scene(path)
     refuse_stages(scene.stages, scene.document, "moma trade")
     progress(Progress("blocks", 0, None, "reading the stones and closing their joints"))

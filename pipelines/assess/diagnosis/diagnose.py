@@ -24,6 +24,7 @@ from pipelines.assess.diagnosis.search import (
 from pipelines.assess.diagnosis.trials import Runner, Tried, runner
 from pipelines.assess.kept import kept_answers
 from pipelines.assess.motions import Motions
+from pipelines.draw.elevations.sheet import require_figures
 from pipelines.results.folder import UNFINISHED_DIAGNOSIS, check_replaceable, replacing
 
 __all__ = ["Diagnosis", "diagnose"]
@@ -77,6 +78,7 @@ def diagnose(
     UnsoundSceneError : a scene has problems that `check_scene` reports
     DatabaseError : the database cannot be read
     """
+    require_figures()
     folder, file = Path(folder), read_diagnosis(path)
     check_replaceable(folder, INDEX, () if overwrite else (Path(path),))
     progress(Progress("blocks", 0, None, "reading the stones"))

@@ -19,6 +19,7 @@ from mechanics.scene.scene import Fidelity, Scene
 from pipelines.assess.pushover.band import Band, banded, varied
 from pipelines.assess.pushover.findings import doubts_of, headline_of
 from pipelines.assess.pushover.measured import read_curve
+from pipelines.draw.elevations.sheet import require_figures
 from pipelines.draw.loading import draw_curve, draw_pushed
 from pipelines.reports.pushover import write_pushover
 from pipelines.results.folder import check_replaceable, replacing, source_of
@@ -93,6 +94,7 @@ def push(
     SceneError, GeometryError, SolverError : see `assemble_stones` and `loading_test`
     DatabaseError : the database cannot be read or written
     """
+    require_figures()
     folder, scene = Path(folder), read_scene(path)
     refuse_stages(scene.stages, scene.document, "moma pushover")
     check_replaceable(folder, INDEX, () if overwrite else (Path(path),))

@@ -26,6 +26,7 @@ from pipelines.assess.study.summary import summary_of
 from pipelines.assess.workers.cluster import cluster
 from pipelines.assess.workers.pool import workers
 from pipelines.assess.workers.store import Snapshot
+from pipelines.draw.elevations.sheet import require_figures
 from pipelines.results.folder import locked
 from pipelines.run.record import store_record, versions
 
@@ -88,6 +89,7 @@ def run_study(
     SceneError : with file and line, at the first mistake; the scene does not stand at the mean of all inputs
     DatabaseError : the database cannot be read or written
     """
+    require_figures()
     folder, file, part = Path(folder), read_study(path), part or Part()
     if part.count > 1 and file.study.method in _WHOLE:
         raise UsageError(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ground.errors import MissingLibraryError, missing_library
 from mechanics.arrays import Array
 from survey.quality.facades import Facade
 
@@ -23,6 +24,7 @@ __all__ = [
     "new_sheet",
     "palette",
     "project",
+    "require_figures",
     "save_sheet",
     "sheet_size",
     "write_codes",
@@ -109,10 +111,25 @@ def palette(unknown: str) -> "Colormap":
     return ListedColormap(colormaps[_PALETTE](np.linspace(0.0, _LIGHTER, 256))).with_extremes(bad=unknown)
 
 
+def require_figures() -> None:
+    """Refuse figures before long work, rather than after it, where matplotlib cannot be loaded.
+
+    Raises
+    ------
+    MissingLibraryError : it is absent, or what it needs is
+    """
+    try:
+        import matplotlib.figure  # noqa: F401
+    except ImportError as error:
+        refusal = missing_library(error) or MissingLibraryError(f"matplotlib cannot be loaded: {error}")
+        raise refusal.at("figures") from error
+
+
 def new_sheet(size: tuple[float, float]) -> "Figure":
-    """Make an empty figure of a size in inches, without a window."""
+    """Make an empty figure of a size in inches, without a window; raise `MissingLibraryError` as `require_figures`."""
     # matplotlib reports on stderr that it builds its font cache, once per machine
     logging.getLogger("matplotlib.font_manager").setLevel(logging.ERROR)
+    require_figures()
     from matplotlib.figure import Figure
 
     return Figure(figsize=size, layout="constrained")

@@ -43,11 +43,11 @@ def run_job(kind: type[Surface], draw: Callable[[Surface, Path, dict[str, Any]],
     Return 3 if a library cannot be loaded, with its message on stdout.
     """
     try:
+        import matplotlib.colors  # noqa: F401
         import pyvista
     except ImportError as error:
         print(error)
         return 3
-    import matplotlib.colors  # noqa: F401
 
     new_plotter(pyvista).close()  # the first one loads the libraries of the system
     if not (name := sys.stdin.readline().strip()):

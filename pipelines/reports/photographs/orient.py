@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ground.errors import SurveyError, UsageError
+from pipelines.draw.elevations.sheet import require_figures
 from pipelines.reports.photographs.project import Project, calibrated, exported_control, read_project
 from pipelines.results.folder import check_replaceable, replacing
 from survey.orientation.bundle.orient import Orientation, orient
@@ -91,6 +92,7 @@ def orient_photographs(project: Path | Project, folder: Path) -> OrientReport:
     """
     from pipelines.reports.photographs.page import draw_photographs, write_photographs_page
 
+    require_figures()
     check_replaceable(folder, INDEX)
     read = project if isinstance(project, Project) else read_project(project)
     result = orient(read.network, "remove" if read.blunders == "remove" else "report")

@@ -12,6 +12,7 @@ import numpy as np
 from mechanics.dynamics.progress import Listener, Progress, silent
 from pipelines.draw.elevations.beds import draw_courses
 from pipelines.draw.elevations.orthophoto import Orthophoto, read_orthophoto
+from pipelines.draw.elevations.sheet import require_figures
 from pipelines.draw.elevations.survey import draw_departure, draw_elevation, draw_residuals
 from pipelines.draw.photographs import DrawnOutline, draw_outlines
 from pipelines.reports.photographs.page import draw_photographs, photographs_section
@@ -80,6 +81,7 @@ def report_surveys(
         the orthophoto lies
     SurveyError : a file that cannot be read at all, or control points that contradict each other
     """
+    require_figures()
     folder = Path(folder)
     source = [Path(path) for path in (*paths, *since)]
     if isinstance(options, CloudOptions):
