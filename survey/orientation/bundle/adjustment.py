@@ -17,6 +17,10 @@ from survey.orientation.network import INTERIOR, Network, Photo
 from survey.orientation.rotations import angle_slopes, turned
 
 __all__ = [
+    "EXTERIOR",
+    "MAX_ITERATIONS",
+    "SIMILARITY",
+    "SQUARES_ROUNDING",
     "Prepared",
     "Solution",
     "adjust",
@@ -32,9 +36,13 @@ __all__ = [
     "without_datum",
 ]
 
-_MAX_ITERATIONS = 100  # iterations
+MAX_ITERATIONS = 100
+"""Iterations of an adjustment."""
+
+SQUARES_ROUNDING = 1e-10
+"""Relative change of the sum of squares that is rounding."""
+
 _STILL = 1e-13  # predicted decrease of the sum of squares, relative, at which the iteration has converged
-_SQUARES_ROUNDING = 1e-10  # relative change of the sum of squares that is rounding
 _FIRST = 1e-4  # first damping tried [-]
 _STRONGEST = 1e12  # damping beyond which no step brings the residuals down [-]
 
@@ -85,8 +93,11 @@ class Solution:
     behind: int
 
 
-_EXTERIOR = ("rx", "ry", "rz", "x", "y", "z")
+EXTERIOR = ("rx", "ry", "rz", "x", "y", "z")
 """Parameters of the exterior orientation in the reduced system."""
+
+SIMILARITY = ("x", "y", "z", "rx", "ry", "rz", "scale")
+"""Parameters of a small similarity, in the order of the columns of `similarity`."""
 
 
 def prepare(
@@ -171,7 +182,7 @@ def _columns(network: Network) -> tuple[tuple[tuple[str, str], ...], NDArray[np.
     for f, photo in enumerate(network.photos):
         if not photo.fixed:
             table[f, :6] = len(names) + np.arange(6)
-            names += [(photo.name, element) for element in _EXTERIOR]
+            names += [(photo.name, element) for element in EXTERIOR]
     for m, camera in enumerate(network.cameras):
         places = np.full(len(INTERIOR), -1)
         for k, name in enumerate(INTERIOR):
@@ -193,7 +204,7 @@ def adjust(network: Network, prepared: Prepared) -> Solution:
     unknowns = prepared.unknowns
     damping, taken = 0.0, 0
     normal, right, square, behind = normals(network, prepared, unknowns, 0.0)
-    while taken < _MAX_ITERATIONS:
+    while taken < MAX_ITERATIONS:
         step = _step(normal, right, prepared, unknowns, damping)
         if step is not None:
             tried = corrected_unknowns(unknowns, *_corrections(prepared, unknowns, damping, step))
@@ -201,7 +212,7 @@ def adjust(network: Network, prepared: Prepared) -> Solution:
             if damping == 0.0 and abs(float(step @ right)) <= _STILL * max(square, 1e-12):
                 return Solution(tried, square, taken, behind)
             equations = normals(network, prepared, tried, 0.0)
-            if equations[2] <= square * (1.0 + _SQUARES_ROUNDING):
+            if equations[2] <= square * (1.0 + SQUARES_ROUNDING):
                 unknowns, (normal, right, square, behind) = tried, equations
                 damping = 0.0 if damping <= _FIRST else 0.1 * damping
                 if damping:
@@ -216,7 +227,7 @@ def adjust(network: Network, prepared: Prepared) -> Solution:
             )
         normal, right, _, _ = normals(network, prepared, unknowns, damping)
     raise GeometryError(
-        f"the adjustment has not converged in {_MAX_ITERATIONS} iterations",
+        f"the adjustment has not converged in {MAX_ITERATIONS} iterations",
         where=network.path,
         remedy="check the marks, the control points and the start values",
     )
@@ -306,7 +317,7 @@ def inner_constraints(prepared: Prepared, unknowns: Unknowns) -> Array:
 
 def similarity(arms: Array) -> Array:
     """Return how points move by the parameters of a small similarity, (n, 3, 7); `arms` (n, 3) from its centre."""
-    out = np.zeros((len(arms), 3, 7))
+    out = np.zeros((len(arms), 3, len(SIMILARITY)))
     out[:, :, :3] = np.eye(3)
     x, y, z = arms.T
     out[:, 0, 4], out[:, 0, 5] = z, -y

@@ -10,7 +10,7 @@ from ground.errors import MomaError
 from survey.arrays import Array
 from survey.orientation.bundle.adjustment import Prepared, Solution, adjust, prepare
 from survey.orientation.bundle.control import FAR_OFF
-from survey.orientation.bundle.resection import similarity_between
+from survey.orientation.bundle.resection import TRIPLES, similarity_between
 from survey.orientation.bundle.start import start_values, without_start
 from survey.orientation.network import Control, Network, listed
 from survey.orientation.projection import project
@@ -19,6 +19,7 @@ __all__ = [
     "AGREE",
     "ENOUGH",
     "POOR",
+    "SEARCHES",
     "adjusted_alone",
     "contradicted_control",
     "exchanged_control",
@@ -36,10 +37,10 @@ AGREE = 3.0
 """σ₀ up to which photographs agree with each other without control points."""
 
 ENOUGH = 4
-"""Control points that must be left where one is left out."""
+"""Control points that must be left where one is left out: three give a similarity, the fourth checks it."""
 
-_ACROSS = 0.2  # distance of exchanged points from each other's places over that from their own
-_TRIPLES = 200  # random triples of stations tried
+SEARCHES = 60
+"""Adjustments in the search of gross errors: rounds of data snooping, photographs left out one at a time."""
 
 
 def useful_marks(network: Network) -> tuple[NDArray[np.bool_], list[str]]:
@@ -105,7 +106,7 @@ def fitted_places(source: Array, target: Array) -> Array:
     """Move places by the similarity that most of them agree with: of all triples, that of the least median misfit."""
     best, least = source, np.inf
     rng = np.random.default_rng(0)
-    for _ in range(_TRIPLES):
+    for _ in range(TRIPLES):
         three = rng.choice(len(source), 3, replace=False)
         rotation, shift, scale = similarity_between(source[three], target[three])
         moved = scale * source @ rotation.T + shift
@@ -153,6 +154,6 @@ def exchanged_control(network: Network, gcps: Sequence[Control], places: Mapping
             here, there = places[first.point], places[second.point]
             apart = min(np.linalg.norm(here - first.place), np.linalg.norm(there - second.place))
             across = max(np.linalg.norm(here - second.place), np.linalg.norm(there - first.place))
-            if across < _ACROSS * apart:
+            if FAR_OFF * across < apart:
                 return f". {network.names[first.point]} and {network.names[second.point]} are exchanged"
     return ""

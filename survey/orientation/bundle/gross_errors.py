@@ -1,7 +1,8 @@
 """Gross errors that no test of single marks finds: control points and photographs that contradict all others.
 
 They are sought by leaving out one at a time: without the wrong one the others agree. A photograph is then oriented by
-the points that the others show, as its mirror image and with a camera constant of its own, which tells what is wrong.
+the points that the others show, as its mirror image and with a lens of its own, which tells what is wrong. The lens has
+a camera constant and a distortion of its own: with the distortion of the others the marks of another lens fit none.
 """
 
 from dataclasses import dataclass, replace
@@ -10,10 +11,10 @@ import numpy as np
 
 from ground.errors import MomaError
 from survey.arrays import Array
-from survey.orientation.bundle.adjustment import Solution
+from survey.orientation.bundle.adjustment import EXTERIOR, Solution, adjust, prepare
 from survey.orientation.bundle.agreement import (
     AGREE,
-    POOR,
+    SEARCHES,
     adjusted_alone,
     contradicted_control,
     exchanged_control,
@@ -22,17 +23,20 @@ from survey.orientation.bundle.agreement import (
     with_marks,
 )
 from survey.orientation.bundle.resection import resect
-from survey.orientation.network import Camera, Network, listed
-from survey.orientation.projection import directions, project
+from survey.orientation.bundle.statistics import CRITICAL, statistics
+from survey.orientation.network import INTERIOR, Camera, Control, Network, Photo, listed
+from survey.orientation.projection import directions
 
 __all__ = ["Healed", "healed", "without_photo"]
 
-_MAX_PHOTOS = 30  # photographs that are left out one at a time, those with the most suspected marks first
-_CONSTANTS = np.geomspace(0.25, 4.0, 17)  # camera constants tried, over the stated one: steps of 19 %
-_FINE = np.geomspace(0.92, 1.09, 9)  # those tried about the best of these: steps of 2 %
-_MOST_AGREE = 0.8  # part of the points of a photograph that a diagnosis explains
-_LEAST_POINTS = 6  # points of a photograph by which it is diagnosed
-_BETTER = 0.2  # misfit of a diagnosis over that of the photograph as it stands
+_OTHER_LENS = ("c", "K1")
+"""What is estimated of the lens of a photograph that may have been taken by another."""
+
+_UNDISTORTED = np.isin(INTERIOR, ("c", "xp", "yp"))
+"""What is taken of a camera for another lens in front of it."""
+
+_LEAST_POINTS = len(EXTERIOR) + len(_OTHER_LENS)
+"""Points of a photograph by which it is diagnosed: at least as many redundant coordinates as unknowns."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +65,7 @@ def healed(network: Network, suspicion: Array | None = None) -> Healed | None:
     agreed = adjusted_alone(network)
     photos, remarks = dict[str, str](), list[str]()
     if agreed is None or agreed[1] >= AGREE:
-        wrong = _wrong_photo(network, suspicion)
+        wrong = _wrong_photo(network, suspicion, AGREE if agreed is None else min(AGREE, agreed[1] / AGREE))
         if wrong is None:
             return None
         photo, agreed = wrong
@@ -106,17 +110,26 @@ def without_photo(network: Network, photo: int) -> Network:
     )
 
 
-def _wrong_photo(network: Network, suspicion: Array | None) -> tuple[int, tuple[Solution, float]] | None:
-    """Return the photograph without which the others agree, and their adjustment; None without exactly one."""
+def _wrong_photo(
+    network: Network, suspicion: Array | None, limit: float
+) -> tuple[int, tuple[Solution, float]] | None:
+    """Return the photograph without which the others agree best, and their adjustment.
+
+    None if they agree without none: then σ of all marks is too small, or several photographs are wrong.
+
+    Parameters
+    ----------
+    limit : σ₀ below which they agree, and far better than with it
+    """
     order = np.arange(len(network.photos))
     if suspicion is not None:
         order = np.argsort(-suspicion, kind="stable")
     trials = list[tuple[float, int, Solution]]()
-    for f in order[:_MAX_PHOTOS].tolist():
+    for f in order[:SEARCHES].tolist():
         rest = without_photo(network, f)
         if len(rest.photos) < 2 or not useful_marks(rest)[0].any():
             continue
-        if (agreed := adjusted_alone(rest)) is not None and agreed[1] < AGREE:
+        if (agreed := adjusted_alone(rest)) is not None and agreed[1] < limit:
             trials.append((agreed[1], f, agreed[0]))
     if not trials:
         return None
@@ -131,41 +144,73 @@ def _diagnosis(network: Network, photo: int, solution: Solution) -> str:
     if len(rows) < _LEAST_POINTS:
         return f"only {len(rows)} of its points are known from others"
     number = network.photos[photo].camera
-    camera = replace(network.cameras[number], inner=solution.unknowns.inner[number])
-    image, points = network.image[rows], place[network.point[rows]]
-    as_it_is = _misfit(camera, image, points)
-    mirrored = _misfit(camera, np.abs(image - (camera.size[0], 0)), points)
-    if mirrored < POOR and mirrored < _BETTER * as_it_is:
+    camera = replace(network.cameras[number], inner=solution.unknowns.inner[number], free=())
+    single = _Photograph(network.image[rows], network.sigma[rows], place[network.point[rows]])
+    mirrored = replace(single, image=np.abs(single.image - (camera.size[0], 0)))
+    another = replace(camera, inner=np.where(_UNDISTORTED, camera.inner, 0.0), free=_OTHER_LENS)
+    as_mirror, by_lens = _fit(camera, mirrored), _fit(another, single)
+    if as_mirror is not None and (by_lens is None or as_mirror.sigma0 < by_lens.sigma0):
         return "it is mirrored: its marks fit if x is counted from the right edge. Mark the picture as it was taken"
-    scale = _best_constant(camera, image, points, _CONSTANTS)
-    scale *= _best_constant(_scaled(camera, scale), image, points, _FINE)
-    if _misfit(_scaled(camera, scale), image, points) < min(POOR, _BETTER * as_it_is):
+    if by_lens is None:
         return (
-            f"its marks fit a camera constant of about {scale * camera.inner[0]:.3g} {camera.unit} instead of "
-            f"{camera.inner[0]:.4g}: give it a camera of its own"
+            "its marks fit neither mirrored nor with another camera constant. Check the numbers of its points"
         )
-    return "its marks fit neither mirrored nor with another camera constant. Check the numbers of its points"
+    stated, unit, (found, sigma) = camera.inner[0], camera.unit, by_lens.constant
+    what = f"a camera constant of about {found:.3g} ± {sigma:.2g} {unit} instead of {stated:.4g}"
+    if abs(found - stated) < CRITICAL * sigma:
+        what = f"another distortion, with a camera constant of {found:.4g} ± {sigma:.2g} {unit}"
+    return f"its marks fit {what}: give it a camera of its own"
 
 
-def _scaled(camera: Camera, scale: float) -> Camera:
-    return replace(camera, inner=camera.inner * np.r_[scale, np.ones(len(camera.inner) - 1)])
+@dataclass(frozen=True)
+class _Photograph:
+    """Marks of a photograph: image (n, 2) and sigma (n, 2) [px], and the places (n, 3) of their points [m]."""
+
+    image: Array
+    sigma: Array
+    points: Array
 
 
-def _best_constant(camera: Camera, image: Array, points: Array, scales: Array) -> float:
-    """Return the scale of the camera constant with which a photograph fits best."""
-    misfits = [_misfit(_scaled(camera, scale), image, points) for scale in scales]
-    return float(scales[int(np.argmin(misfits))])
+@dataclass(frozen=True)
+class _SingleFit:
+    """Fit of a photograph: its σ₀, and the camera constant with its standard deviation."""
+
+    sigma0: float
+    constant: tuple[float, float]
 
 
-def _misfit(camera: Camera, image: Array, points: Array) -> float:
-    """Return by how much of a photograph its points miss after a resection, so that most of them are within it."""
-    try:
-        resected = resect(directions(camera, image), points)
-    except MomaError:
-        return np.inf
+def _fit(camera: Camera, marks: _Photograph) -> _SingleFit | None:
+    """Orient a photograph by points that are known, without its worst marks; None if most do not agree."""
+    resected = resect(directions(camera, marks.image), marks.points)
     if resected is None:
-        return np.inf
-    seen = project(camera, resected[0], resected[1], points)
-    off = np.linalg.norm(seen - image, axis=1) / max(camera.size)
-    off[~np.isfinite(off)] = np.inf
-    return float(np.quantile(off, _MOST_AGREE, method="higher"))
+        return None
+    count = len(marks.points)
+    network = Network(
+        "",
+        (camera,),
+        (Photo("", 0, resected[0], resected[1]),),
+        tuple(str(i) for i in range(count)),
+        marks.points,
+        tuple(Control(i, place, np.zeros((3, 3))) for i, place in enumerate(marks.points)),
+        np.zeros(count, dtype=np.int64),
+        np.arange(count),
+        marks.image,
+        marks.sigma,
+        np.zeros(count, dtype=np.int64),
+    )
+    used = np.ones(count, dtype=bool)
+    while 2 * used.sum() > count and used.sum() >= _LEAST_POINTS:
+        try:
+            prepared = prepare(network, keep=used)
+            solution = adjust(network, prepared)
+            result = statistics(network, prepared, solution)
+        except MomaError:
+            return None
+        if result.sigma0 < AGREE and not solution.behind:
+            # the first of what is estimated after the orientation
+            variance = result.cameras[len(EXTERIOR), len(EXTERIOR)] if camera.free else 0.0
+            return _SingleFit(
+                result.sigma0, (solution.unknowns.inner[0, 0], result.sigma0 * float(np.sqrt(variance)))
+            )
+        used[np.abs(result.standardised).max(axis=1).argmax()] = False
+    return None

@@ -17,6 +17,9 @@ from ground.errors import GeometryError
 from survey.arrays import Array
 from survey.orientation._kernels.adjustment import Unknowns, datum_sums
 from survey.orientation.bundle.adjustment import (
+    MAX_ITERATIONS,
+    SIMILARITY,
+    SQUARES_ROUNDING,
     Prepared,
     Solution,
     corrected_unknowns,
@@ -29,10 +32,8 @@ from survey.orientation.network import Network, PlumbLine, ScaleBar
 
 __all__ = ["LengthFit", "check_lengths", "fit_lengths", "with_lengths"]
 
-_MAX_ITERATIONS = 30  # of the adjustment with these observations
-_STILL = 1e-9  # largest movement of a point over the extent of the network, at which it has converged
-_BATCH = 7  # functions of the points whose covariances one loop of the kernel sums
-_SCALE, _TURNS = (6,), (3, 4)  # columns of `similarity`: the change of scale, and the turns about x and y
+_BATCH = len(SIMILARITY)
+"""Functions of the points whose covariances one loop of the kernel sums: it is compiled for those of the datum."""
 
 
 @dataclass(frozen=True)
@@ -95,16 +96,19 @@ def with_lengths(network: Network, prepared: Prepared, solution: Solution) -> So
         return solution
     check_lengths(network, prepared)
     unknowns = _near(network, prepared, solution.unknowns)
-    extent = float(np.ptp(unknowns.point[unknowns.free], axis=0).max())
-    for taken in range(1, _MAX_ITERATIONS + 1):
+    before = np.inf
+    for taken in range(1, MAX_ITERATIONS + 1):
         cameras, step, moved, square, behind = gauss_newton_step(network, prepared, unknowns)
+        off, _, sigma = _observed(network, unknowns)
+        total = square + float(((off / sigma) ** 2).sum())
+        if abs(before - total) <= SQUARES_ROUNDING * max(total, 1.0):
+            return Solution(unknowns, square, solution.iterations + taken, behind)
+        before = total
         fit = _fitted(network, prepared, unknowns, cameras, moved)
         gain = fit.weight @ fit.misfit
         step = step + fit.by_cameras.T @ gain + fit.free_cameras @ fit.freedom
         moved = moved + np.einsum("imx,m->ix", fit.by_points, gain) + fit.free_points @ fit.freedom
         unknowns = corrected_unknowns(unknowns, step, moved)
-        if np.abs(moved).max() < _STILL * extent:
-            return Solution(unknowns, square, solution.iterations + taken, behind)
     raise GeometryError(
         "the adjustment with scale bars and plumb lines has not converged",
         where=network.path,
@@ -177,7 +181,8 @@ def _free_columns(network: Network, prepared: Prepared) -> list[int]:
     """Return the movements that neither marks nor control points determine, but these observations do."""
     if not prepared.datum:
         return []
-    return [*(_TURNS if network.plumb_lines else ()), *(_SCALE if network.bars else ())]
+    names = [*(("rx", "ry") if network.plumb_lines else ()), *(("scale",) if network.bars else ())]
+    return [SIMILARITY.index(name) for name in names]
 
 
 def _observed(network: Network, unknowns: Unknowns) -> tuple[Array, Array, Array]:

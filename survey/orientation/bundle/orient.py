@@ -16,6 +16,7 @@ from survey.orientation.bundle.agreement import (
     AGREE,
     ENOUGH,
     POOR,
+    SEARCHES,
     adjusted_alone,
     contradicted_control,
     exchanged_control,
@@ -40,7 +41,6 @@ Blunders = Literal["report", "remove"]
 """Treatment of marks that the test finds wrong."""
 
 _GOOD = 5e-4  # the same, below which no other start is tried
-_SEARCHES = 60  # rounds of data snooping
 _LARGE = 3.0  # σ₀ from which the model is doubted rather than the marks
 _MANY = 0.1  # part of the marks left out, from which it is
 _MOST = 0.5  # part of the marks of one photograph left out, from which it is doubted as a whole
@@ -122,10 +122,9 @@ def orient(network: Network, blunders: Blunders = "report") -> Orientation:
             result = _checked(network, blunders)
         except MomaError as error:
             failure = error
-        if result is not None and (blunders == "report" or not _doubted(result)):
+        if result is not None and not _doubted(result):
             return result
-        if blunders == "report" and not isinstance(failure, GeometryError):
-            assert failure is not None
+        if blunders == "report" and failure is not None and not isinstance(failure, GeometryError):
             raise failure
         without = healed(network, None if result is None else _removed_parts(result))
         if without is None:
@@ -377,9 +376,8 @@ def _check_stations(network: Network, solution: Solution) -> None:
     worst = int(np.argmax(distances))
     photo = network.photos[seen[worst]]
     for index in range(len(seen)):
-        if index != worst and max(apart[worst, index], apart[index, worst]) < 0.2 * min(
-            distances[worst], distances[index]
-        ):
+        across, off_both = max(apart[worst, index], apart[index, worst]), min(distances[[worst, index]])
+        if index != worst and FAR_OFF * across < off_both:
             raise _swapped(network, *sorted((seen[worst], seen[index])))
     if distances[worst] > FAR_OFF * sigma[worst]:
         raise SurveyError(
@@ -449,7 +447,7 @@ def _snooped(
     A control point that misses its place by more than any mark does is left out first: otherwise its marks would be
     blamed. It then checks only.
     """
-    for _ in range(_SEARCHES):
+    for _ in range(SEARCHES):
         tests = np.nan_to_num(np.abs(result.standardised)).max(axis=1)
         suspects = _suspects(result)
         rays = np.bincount(network.point[used], minlength=len(network.names))

@@ -14,9 +14,18 @@ from numpy.typing import NDArray
 
 from survey.arrays import Array
 
-__all__ = ["essential_orientations", "intersect_many", "intersect_rays", "resect", "similarity_between"]
+__all__ = [
+    "TRIPLES",
+    "essential_orientations",
+    "intersect_many",
+    "intersect_rays",
+    "resect",
+    "similarity_between",
+]
 
-_TRIPLES = 60  # random triples of points tried
+TRIPLES = 60
+"""Random triples tried: with half of the points wrong, one is free of them but once in (8/7)⁶⁰ = 3,000 cases."""
+
 _FIVES = 80  # random fives of pairs of rays tried
 _ENOUGH = 12  # of these, after which nearly all pairs may end the search
 _AGREES = 0.01  # angle between a ray and the direction of its point [rad]
@@ -41,7 +50,7 @@ def resect(rays: Array, points: Array) -> tuple[Array, Array, int] | None:
     rays = rays / np.linalg.norm(rays, axis=1)[:, None]
     rng = np.random.default_rng(0)
     best: tuple[int, float, Array, Array] | None = None
-    for _ in range(_TRIPLES):
+    for _ in range(TRIPLES):
         three = rng.choice(len(rays), 3, replace=False)
         for rotation, station in _three_point(rays[three], points[three]):
             seen = (points - station) @ rotation

@@ -1,14 +1,20 @@
 """What contradicts all others is left out and named: control points, and photographs with the reason."""
 
+import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from ground.errors import MomaError
+from survey.orientation.bundle import gross_errors
+from survey.orientation.bundle.agreement import adjusted_alone, contradicted_control
+from survey.orientation.bundle.gross_errors import healed
 from survey.orientation.bundle.orient import orient
 from survey.orientation.bundle.start import without_start
 from survey.orientation.projection import project
+from tests.survey.orientation.synthetic_block import noisy, wall_block
 from tests.survey.orientation.test_wrong_data import network
 
 
@@ -80,8 +86,88 @@ def test_a_photograph_of_another_focal_length_is_left_out_and_named(photo, facto
     assert result.statistics.sigma0 == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.parametrize(("photo", "factor"), [(1, 1.4), (3, 0.45), (2, 3.0)])
+def test_the_camera_constant_of_another_lens_is_found_whatever_its_distortion(photo, factor):
+    one, truth = zoomed(network(), photo, factor), network()
+    alone = SimpleNamespace(
+        unknowns=SimpleNamespace(point=truth.start, inner=np.array([one.cameras[0].inner]))
+    )
+    image = one.image.copy()
+    (first, *_) = np.flatnonzero(one.photo == photo)
+    image[first] += 200.0  # a mark of another point
+    for changed in (one, replace(one, image=image)):
+        words = gross_errors._diagnosis(changed, photo, alone)
+        told, sigma = (float(word) for word in re.search(r"about (\S+) ± (\S+) mm", words).groups())
+        assert told == pytest.approx(24.0 * factor, abs=4.0 * sigma + 0.05)
+
+
+def test_a_photograph_with_the_numbers_of_another_fits_no_lens():
+    one = network()
+    mine = np.flatnonzero(one.photo == 2)
+    point = one.point.copy()
+    point[mine] = np.roll(point[mine], 5)
+    alone = SimpleNamespace(unknowns=SimpleNamespace(point=one.start, inner=np.array([one.cameras[0].inner])))
+    assert "Check the numbers" in gross_errors._diagnosis(replace(one, point=point), 2, alone)
+
+
 @pytest.mark.slow
 def test_a_report_names_what_it_does_not_leave_out():
     with pytest.raises(MomaError, match="P04") as caught:
         orient(mirrored(unstarted(), 3), "report")
     assert caught.value.remedy
+
+
+def agreed_stub(points, sigma0):
+    """An adjustment of photographs alone, with the places of their points and σ₀."""
+    return SimpleNamespace(unknowns=SimpleNamespace(point=points)), sigma0
+
+
+def one_wrong_by_a_metre(count):
+    """The network with this many control points, the first of them a metre off, and the truth."""
+    one = network(control=count)
+    truth = np.array(one.start)
+    wrong = replace(one.control[0], place=one.control[0].place + np.array([1.0, 0.0, 0.0]))
+    return replace(one, control=(wrong, *one.control[1:])), truth
+
+
+@pytest.mark.parametrize(("count", "found"), [(4, False), (5, True)])
+def test_four_control_points_must_be_left_to_tell_which_is_wrong(count, found):
+    one, truth = one_wrong_by_a_metre(count)
+    names = [one.names[gcp.point] for gcp, _ in contradicted_control(one, agreed_stub(truth, 1.0)[0])]
+    assert names == ([one.names[one.control[0].point]] if found else [])
+
+
+@pytest.mark.parametrize(("sigma0", "agree"), [(2.2, True), (4.5, False)])
+def test_photographs_agree_whose_marks_fit_up_to_three_times_worse_than_stated(monkeypatch, sigma0, agree):
+    one, truth = one_wrong_by_a_metre(8)
+    monkeypatch.setattr(gross_errors, "adjusted_alone", lambda network: agreed_stub(truth, sigma0))
+    assert (healed(one) is not None) == agree
+
+
+def test_sixty_photographs_are_left_out_one_at_a_time_the_suspected_first(monkeypatch):
+    rows = np.arange(200)
+    one = network()
+    many = replace(
+        one,
+        photos=tuple(replace(one.photos[0], name=f"P{f}") for f in rows),
+        photo=np.repeat(rows, 2),
+        point=np.tile([0, 1], len(rows)),
+        image=np.zeros((2 * len(rows), 2)),
+        sigma=np.ones((2 * len(rows), 2)),
+        lines=np.zeros(2 * len(rows), dtype=int),
+    )
+    tried = []
+    monkeypatch.setattr(gross_errors, "adjusted_alone", lambda network: tried.append(network.photos))
+    assert healed(many, suspicion=np.where(rows == 150, 0.9, 0.1)) is None
+    left_out = [
+        ({photo.name for photo in many.photos} - {photo.name for photo in rest}) for rest in tried[1:]
+    ]
+    assert left_out[0] == {"P150"}
+    assert 45 <= len(left_out) <= 90  # an adjustment each
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("pixels", "oriented"), [(10.0, True), (30.0, False)])
+def test_marks_that_miss_by_three_thousandths_of_a_photograph_orient_nothing(pixels, oriented):
+    one = noisy(wall_block(points=60).network, np.random.default_rng(4), scale=pixels / 0.5)
+    assert (adjusted_alone(one) is not None) == oriented
