@@ -192,8 +192,7 @@ def run_geology(
         sample = prepare(scene, Path(samples) if samples is not None else folder.parent / _SAMPLES, progress)
         planar = planar_scene(scene, sample)
         observation = _observation(scene, sample, planar, folder / UNFINISHED)
-        drawn = frozenset(round(time / scene.time.step) for time in scene.output.figures_at)
-        observer = PlanarObserver(scene.output.fields_every, observation.fields, drawn)
+        observer = PlanarObserver(scene.output.fields_every, observation.fields, _drawn_steps(scene))
         observers = (PlanarObserver(scene.output.every, observation.row), observer)
 
         def write(fresh: Path, result: PlanarResult, archive: UnfinishedRun) -> None:
@@ -211,6 +210,11 @@ def run_geology(
         if database is not None:
             number = store_record(database, folder, _geology_record(scene, result, summary, rows))
     return GeologyReport(folder, summary, tuple(summary["warnings"]), number)
+
+
+def _drawn_steps(scene: GeologyScene) -> frozenset[int]:
+    """Return the steps of which figures are drawn."""
+    return frozenset(round(time / scene.time.step) for time in scene.output.figures_at)
 
 
 def _followed_layers(scene: GeologyScene, sample: PreparedSample) -> Ints | None:

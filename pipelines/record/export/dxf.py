@@ -21,7 +21,7 @@ _CHUNK = 60
 _FORBIDDEN = str.maketrans(dict.fromkeys('<>/\\":;?*|=`,', "_"))
 """Characters that names of layers may not have."""
 
-_CONTROL = str.maketrans({place: f"^{chr(place + 64)}" for place in range(32)})
+_CONTROL = str.maketrans({"\n": "^J", "\r": "^M", "\t": "^I", "\0": "^@"})
 """Characters that would end a line, as AutoCAD writes them."""
 
 _EMPTY = "  2\nENTITIES\n"
