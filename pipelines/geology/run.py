@@ -181,8 +181,7 @@ def run_geology(
     SolverError : if the motion is no longer finite
     DatabaseError : the database cannot be opened, or not written at the end; the folder is complete then
     """
-    require_figures()
-    folder, scene = Path(folder), read_geology(path, kind)
+    folder, scene = Path(folder), _read(path, kind)
     check_replaceable(folder, source=() if overwrite else (Path(path),))
     summary: dict[str, Any] = {}
     rows: dict[str, dict[str, Array]] = {}
@@ -210,6 +209,12 @@ def run_geology(
         if database is not None:
             number = store_record(database, folder, _geology_record(scene, result, summary, rows))
     return GeologyReport(folder, summary, tuple(summary["warnings"]), number)
+
+
+def _read(path: str | Path, kind: str) -> GeologyScene:
+    """Return the scene of a file, of which figures can be drawn."""
+    require_figures()
+    return read_geology(path, kind)
 
 
 def _drawn_steps(scene: GeologyScene) -> frozenset[int]:
