@@ -105,7 +105,7 @@ class EarlierStates:
     most : number of copies that stay
     """
 
-    def __init__(self, most: int = 3) -> None:
+    def __init__(self, most: int) -> None:
         self._most = most
         self._states: OrderedDict[int, _State] = OrderedDict()
         self._lock = threading.Lock()

@@ -12,8 +12,6 @@ __all__ = ["RDF", "Literal", "Node", "Triple", "number_blank", "read_text", "ref
 RDF = "http://www.w3.org/1999/02/22-rdf-syntax-ns#"
 """Namespace of RDF."""
 
-_LARGEST = 1 << 27  # bytes
-
 
 @dataclass(frozen=True)
 class Literal:
@@ -43,11 +41,9 @@ def read_text(path: Path) -> str:
     Raises
     ------
     UsageError
-        if it cannot be read, is larger than a vocabulary, or is not UTF-8
+        if it cannot be read, or is not UTF-8
     """
     try:
-        if path.stat().st_size > _LARGEST:
-            refuse(str(path), f"more than {_LARGEST} bytes", "cut the concepts that are needed from it")
         return path.read_bytes().decode("utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         refuse(str(path), f"cannot be read: {error}", "save it as UTF-8")

@@ -25,7 +25,6 @@ _TOKENS = re.compile(
     re.VERBOSE | re.DOTALL,
 )
 _ESCAPES = {"t": "\t", "b": "\b", "n": "\n", "r": "\r", "f": "\f", '"': '"', "'": "'", "\\": "\\"}
-_DEEPEST = 64  # nodes within nodes: Python's own stack ends at a thousand calls
 
 
 @dataclass(frozen=True)
@@ -48,7 +47,10 @@ def parse_turtle(text: str, where: str, base: str = "") -> list[Triple]:
     UsageError
         at the line of what is not Turtle
     """
-    return list(_Parser(text, where, base).statements())
+    try:
+        return list(_Parser(text, where, base).statements())
+    except RecursionError:
+        refuse(where, "too many brackets within brackets")
 
 
 class _Parser:
@@ -57,7 +59,7 @@ class _Parser:
     def __init__(self, text: str, where: str, base: str) -> None:
         self._where, self._base = where, base
         self._prefixes: dict[str, str] = {}
-        self._blank, self._depth = number_blank(), 0
+        self._blank = number_blank()
         self._out: list[Triple] = []
         self._tokens = _tokens(text, where)
         self._token = next(self._tokens)
@@ -137,12 +139,7 @@ class _Parser:
                 pass
             case _:
                 self._fail(f"{token.text[:40]!r} where an IRI or a text should stand", token)
-        self._depth += 1
-        if self._depth > _DEEPEST:
-            self._fail(f"more than {_DEEPEST} brackets within brackets")
-        node = self._bracketed() if token.text == "[" else self._list()
-        self._depth -= 1
-        return node
+        return self._bracketed() if token.text == "[" else self._list()
 
     def _bracketed(self) -> str:
         node = next(self._blank)

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 __all__ = ["Layer", "write_geopackage"]
 
-_APPLICATION, _VERSION = int.from_bytes(b"GPKG"), 10300  # 1.3
-_WGS84 = 4326
 _CARTESIAN = -1  # number of the reference system that is not known
 
 _TABLES = """
+PRAGMA application_id = 1196444487;  -- "GPKG"
+PRAGMA user_version = 10300;  -- GeoPackage 1.3
 CREATE TABLE gpkg_spatial_ref_sys (srs_name TEXT NOT NULL, srs_id INTEGER PRIMARY KEY, organization TEXT NOT NULL,
   organization_coordsys_id INTEGER NOT NULL, definition TEXT NOT NULL, description TEXT);
 CREATE TABLE gpkg_contents (table_name TEXT PRIMARY KEY, data_type TEXT NOT NULL, identifier TEXT UNIQUE,
@@ -30,13 +30,11 @@ CREATE TABLE gpkg_geometry_columns (table_name TEXT PRIMARY KEY REFERENCES gpkg_
 CREATE TABLE layer_styles (id INTEGER PRIMARY KEY AUTOINCREMENT, f_table_catalog TEXT, f_table_schema TEXT,
   f_table_name TEXT, f_geometry_column TEXT, styleName TEXT, styleQML TEXT, styleSLD TEXT, useAsDefault BOOLEAN,
   description TEXT, owner TEXT, ui TEXT, update_time DATETIME);
+INSERT INTO gpkg_spatial_ref_sys VALUES
+  ('Undefined Cartesian', -1, 'NONE', -1, 'undefined', 'not known'),
+  ('Undefined geographic', 0, 'NONE', 0, 'undefined', 'not known'),
+  ('WGS 84', 4326, 'EPSG', 4326, 'undefined', 'longitude and latitude');
 """
-
-_SYSTEMS = (
-    ("Undefined Cartesian", -1, "NONE", -1, "undefined", "not known"),
-    ("Undefined geographic", 0, "NONE", 0, "undefined", "not known"),
-    ("WGS 84", _WGS84, "EPSG", _WGS84, "undefined", "longitude and latitude"),
-)
 
 _COLOURS = ("#c8b48c", "#a3b18a", "#8fa6b8", "#c99a86", "#b8a5c0", "#d2c56b", "#86b3a8", "#b0a79f")
 """Fills of the values in turn."""
@@ -76,17 +74,13 @@ def write_geopackage(
     """
     stamp = (moment or datetime.now(UTC)).strftime("%Y-%m-%dT%H:%M:%S.000Z")
     with sqlite3.connect(path) as db:
-        db.execute(f"PRAGMA application_id = {_APPLICATION}")
-        db.execute(f"PRAGMA user_version = {_VERSION}")
         db.executescript(_TABLES)
-        db.executemany("INSERT INTO gpkg_spatial_ref_sys VALUES (?,?,?,?,?,?)", _SYSTEMS)
         number = _CARTESIAN
         if crs is not None:
             name, _, digits = crs.partition(":")
             number = int(digits)
-            if number != _WGS84:
-                row = (crs, number, name, number, "undefined", None)
-                db.execute("INSERT INTO gpkg_spatial_ref_sys VALUES (?,?,?,?,?,?)", row)
+            row = (crs, number, name, number, "undefined", None)
+            db.execute("INSERT OR IGNORE INTO gpkg_spatial_ref_sys VALUES (?,?,?,?,?,?)", row)
         for layer in layers:
             _add_layer(db, layer, number if layer.system else _CARTESIAN, stamp)
     db.close()

@@ -1,6 +1,6 @@
 """Command that records knowledge in the database."""
 
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -27,6 +27,29 @@ def entries(common: Common) -> None:
         print(as_table(dict.fromkeys(rows[0]), rows))
 
 
+@dataclass(frozen=True)
+class TableChoices:
+    """Meaning of what tables and vocabularies do not say themselves."""
+
+    columns: Annotated[
+        str | None,
+        typer.Option(
+            "--columns",
+            metavar="MAP",
+            help="Columns of tables that are not recognised, e.g. 'code=Inventar,phase=Zeitstellung'.",
+        ),
+    ] = (None,)
+    sheet: Sheet = (None,)
+    vocabulary: Annotated[
+        str | None,
+        typer.Option(
+            "--vocabulary",
+            metavar="NAME",
+            help="Which vocabulary a SKOS file extends: observation, document, material or mark.",
+        ),
+    ] = (None,)
+
+
 @reporting
 def record(
     *,
@@ -48,47 +71,18 @@ def record(
             "--source", metavar="TEXT", help="Grounds of the statements; default: that of the files."
         ),
     ] = None,
-    columns: Annotated[
-        str | None,
-        typer.Option(
-            "--columns",
-            metavar="MAP",
-            help="Columns of tables that are not recognised, e.g. 'code=Inventar,phase=Zeitstellung'.",
-        ),
-    ] = None,
-    sheet: Sheet = None,
-    vocabulary: Annotated[
-        str | None,
-        typer.Option(
-            "--vocabulary",
-            metavar="NAME",
-            help="Which vocabulary a SKOS file extends: observation, document, material or mark.",
-        ),
-    ] = None,
+    tables: TableChoices,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Report what would be recorded; change nothing.")
     ] = False,
     common: Common,
 ) -> None:
     """Record knowledge of a building: materials, phases, structures, marks, observations, corrections, …"""
-    from archmodel.assertions.validation import checked_choice
-    from archmodel.tables.terms import VOCABULARIES
     from moma.cli.text.formats import as_json
     from moma.cli.text.knowledge import record_lines
     from pipelines.record.record import record as record_files
 
-    if vocabulary is not None:
-        checked_choice("vocabulary", vocabulary, VOCABULARIES)
-    report = record_files(
-        files,
-        common.db,
-        author=author,
-        source=source,
-        columns=columns,
-        sheet=sheet,
-        vocabulary=vocabulary,
-        dry_run=dry_run,
-    )
+    report = record_files(files, common.db, author=author, source=source, **vars(tables), dry_run=dry_run)
     print(as_json(asdict(report)) if common.json else "\n".join(record_lines(report, common.verbose)))
 
 

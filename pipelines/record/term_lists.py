@@ -9,6 +9,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from archmodel.assertions.terms import declare_term
+from archmodel.assertions.validation import checked_choice
 from archmodel.skos.concepts import ENDINGS, Concept, Scheme, read_scheme
 from archmodel.store.revisions import NOTHING, RowCounts
 from archmodel.tables.entries import Entry, held_at
@@ -16,8 +17,6 @@ from archmodel.tables.terms import VOCABULARIES, Term, Vocabulary, spelling_of, 
 from ground.errors import UsageError
 
 __all__ = ["ENDINGS", "TermList", "read_term_list", "record_term_list"]
-
-_SHOWN = 8  # predicates in a note
 
 
 @dataclass(frozen=True)
@@ -37,6 +36,8 @@ def read_term_list(path: Path, vocabulary: str | None) -> TermList:
     UsageError
         if the file is wrong, or does not say which vocabulary it extends
     """
+    if vocabulary is not None:
+        checked_choice("vocabulary", vocabulary, VOCABULARIES)
     scheme = read_scheme(path)
     if vocabulary is None and any(concept.vocabulary is None for concept in scheme.concepts):
         names = ", ".join(VOCABULARIES)
@@ -160,8 +161,6 @@ def _ordered(listed: TermList) -> Iterator[Concept]:
 def _notes(listed: TermList, left_out: Mapping[str, int]) -> Iterator[str]:
     """Yield what no term can hold."""
     yield from (f"left out: {count} {what}" for what, count in left_out.items() if count)
-    ignored = list(listed.scheme.ignored.items())
-    if ignored:
-        rest = ", …" if len(ignored) > _SHOWN else ""
-        counts = ", ".join(f"{count} {predicate}" for predicate, count in ignored[:_SHOWN])
-        yield f"left out, as a term has no such statements: {counts}{rest}"
+    if listed.scheme.ignored:
+        counts = ", ".join(f"{count} {predicate}" for predicate, count in listed.scheme.ignored.items())
+        yield f"left out, as a term has no such statements: {counts}"

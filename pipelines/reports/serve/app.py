@@ -74,7 +74,7 @@ def application(database: Database, settings: ServeSettings, editor: Editor | No
         redoc_url=None,
     )
     answers, room = Answers(settings.rows), threading.Semaphore(settings.at_once)
-    earlier = EarlierStates()
+    earlier = EarlierStates(settings.at_once)
     _refusals(app)
     _guards(app, settings, editor is not None)
     if editor is not None:
