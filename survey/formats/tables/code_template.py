@@ -15,7 +15,7 @@ from itertools import product
 from ground.errors import UsageError
 from survey.formats.fields import code_of
 
-__all__ = ["CONTROL_WORDS", "ROLES", "STATION", "CodeFields", "CodeTemplate", "is_bare"]
+__all__ = ["CONTROL_WORDS", "ROLES", "STATION", "CodeFields", "CodeTemplate", "is_bare", "role_of"]
 
 STATION = "station"
 """The role of a position of the instrument."""
@@ -28,7 +28,7 @@ ROLES: Mapping[str, str] = {
     **dict.fromkeys(("b", "beg", "begin", "start", "l", "line", "end", "c", "cls", "close"), "vertex"),
     **dict.fromkeys(("p", "point", "pt", "face", "surface", "f", "punkt", "fläche", "flaeche"), "point"),
     **dict.fromkeys(("flächenpunkt", "face point", "punto", "superficie", "faccia", "cara"), "point"),
-    **dict.fromkeys(("s", "stn", "stp", "station", "standpunkt", "stazione", "estación"), STATION),
+    **dict.fromkeys(("s", "st", "stn", "stp", "station", "standpunkt", "stazione", "estación"), STATION),
 }  # fmt: skip
 """Roles of points by the words for them."""
 
@@ -94,6 +94,7 @@ class CodeTemplate:
     Parameters
     ----------
     text : the template
+    sommet : whether the role S is a corner, "sommet", instead of a station
 
     Raises
     ------
@@ -101,8 +102,8 @@ class CodeTemplate:
         if it has no block, has an unknown field, or is ambiguous
     """
 
-    def __init__(self, text: str) -> None:
-        self.text = text
+    def __init__(self, text: str, sommet: bool = False) -> None:
+        self.text, self._sommet = text, sommet
         parts = _FIELD.split(text.strip())
         self.fields = tuple(name.removesuffix("?") for name in parts[1::2])
         self._literals = parts[::2]
@@ -125,7 +126,7 @@ class CodeTemplate:
             kind=None if kind is None else kind.lower(),
             course=int(course) if course is not None and course.isdigit() else None,
             zone=fields.get("zone"),
-            role=ROLES[(fields.get("role") or "v").casefold()],
+            role=role_of(fields.get("role") or "v", self._sommet),
         )
 
     def expected(self, description: str, others: Sequence[str]) -> str:
@@ -213,6 +214,12 @@ class CodeTemplate:
             else:
                 pattern += f"(?P<{name}>{fields[name][0]}){_literal(literal)}"
         return re.compile(pattern).fullmatch
+
+
+def role_of(word: str, sommet: bool) -> str:
+    """Return the role that a word stands for; with `sommet`, S is a corner."""
+    word = word.casefold()
+    return "vertex" if sommet and word == "s" else ROLES[word]
 
 
 def is_bare(description: str) -> bool:

@@ -9,7 +9,7 @@ of a stone may lie anywhere. Empty fields mean "not known".
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, islice
 from operator import itemgetter
@@ -32,6 +32,7 @@ from survey.formats.tables.code_template import (
     CodeFields,
     CodeTemplate,
     is_bare,
+    role_of,
 )
 from survey.formats.tables.columns import ColumnMap, Columns, find_columns, kind_of_column, read_map
 from survey.formats.tables.kinds import kind_of, meant
@@ -103,8 +104,10 @@ def open_csv(path: Path, options: ReadingOptions | None = None) -> SurveyStream:
     UsageError
         if the map of the columns or the code template is wrong
     """
-    options = options or ReadingOptions()
-    return open_table(Path(path), open_rows(Path(path), options.sheet), options)
+    path = Path(path)
+    return _by_roles(
+        lambda options: open_table(path, open_rows(path, options.sheet), options), options or ReadingOptions()
+    )
 
 
 def open_table(path: Path, rows: AnyRows, options: ReadingOptions) -> SurveyStream:
@@ -144,6 +147,20 @@ def read_csv(path: Path, default_sigma: float = 0.003) -> Survey:
 def _open_list(path: Path, options: ReadingOptions, form: str) -> SurveyStream:
     if options.columns:
         return open_csv(path, options)
+    return _by_roles(lambda options: _opened_list(path, options, form), options)
+
+
+def _by_roles(opened: Callable[[ReadingOptions], SurveyStream], options: ReadingOptions) -> SurveyStream:
+    """Open a list; again with S as a corner, "sommet", where it can be no station."""
+    try:
+        return opened(options)
+    except _SommetError:
+        stream = opened(replace(options, sommet=True))
+        remark = "role S is read as a corner (sommet), as no station stands at three places"
+        return replace(stream, remarks=(*stream.remarks, remark))
+
+
+def _opened_list(path: Path, options: ReadingOptions, form: str) -> SurveyStream:
     rows = open_rows(path, options.sheet)
     iterator = iter(rows)
     ahead = list(islice(iterator, _LOOK_AHEAD))
@@ -212,7 +229,24 @@ def _find_header(
     rows.delimiter = stated
     if best is None:
         raise rows.fail(rows.end, "the table is empty: no column 'block'", "begin it with e.g. block,x,y,z")
+    if not best[0]:
+        _check_named(rows, ahead)
     raise best[1]
+
+
+def _check_named(rows: AnyRows, ahead: Sequence[tuple[int, Any]]) -> None:
+    """Refuse a list of a total station, which has no names of columns."""
+    number, row = ahead[0]
+    stated = rows.delimiter
+    for delimiter in _SEPARATORS if stated is None else (stated,):
+        rows.delimiter = delimiter
+        if _is_point(rows, row, number):
+            raise rows.fail(
+                number,
+                "the table has no names of columns, but a point with two coordinates, an elevation and a code",
+                "give --format pnezd if the northing comes first, or --format penzd if the easting does",
+            )
+    rows.delimiter = stated
 
 
 def _with_roles(
@@ -329,7 +363,7 @@ class PointCollector:
 
     def __init__(self, path: Path, options: ReadingOptions, unique: bool) -> None:
         self._path, self._options, self._unique = str(path), options, unique
-        self.template = CodeTemplate(options.codes or CODES)
+        self.template = CodeTemplate(options.codes or CODES, options.sommet)
         self.table = PointTable(str(path), options.sigma, options.kind)
         self._head = options.head_for(path)
         self._known = {station.name: station for station in self._head.stations}
@@ -338,6 +372,7 @@ class PointCollector:
         self._misfits: list[tuple[int, str]] | None = []  # until a description of a stone fits
         self._fitted = False  # a description has, if only of a station
         self._control: dict[str, int] = {}
+        self._moved: set[str] = set()  # stations that are listed at two places
 
     @property
     def head(self) -> SurveyHead:
@@ -491,6 +526,11 @@ class PointCollector:
         if before is not None:
             if np.array_equal(before.position, place):
                 return  # a list names its station at every setup
+            corners = any(stone.vertices for stone in self.table.stones.values())
+            if name in self._moved and not corners and not self._options.sommet:
+                what = f"station {name} stands at three places: role S, or station, is a corner?"
+                raise _SommetError(what, where=f"{self._path}:{line}", remedy="write v for a corner")
+            self._moved.add(name)
             raise self.fail(line, f"station {name} a second time", f"the first is on line {before.line}")
         self._stations[name] = Station(name, np.array(place), line)
 
@@ -533,6 +573,10 @@ class PointCollector:
 
 class _WrongTemplateError(SurveyError):
     """The code template fits no description of a file."""
+
+
+class _SommetError(_WrongTemplateError):
+    """A role that stands for a station is that of corners."""
 
 
 class _RowReader:
@@ -631,7 +675,7 @@ class _RowReader:
                 raise self._fail(
                     number, f"role {shown(cells['role'])}", "write vertex (v) or point (p), or station (s)"
                 )
-            role = ROLES[text]
+            role = role_of(text, self._options.sommet)
         return self.collector.identity(block, kind, course, zone, role, number)
 
     def _add(self, identity: _Identity, values: Sequence[str], number: int, count: int) -> None:

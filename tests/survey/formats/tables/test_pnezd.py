@@ -339,3 +339,35 @@ def test_kinds_of_one_letter_are_not_guessed(tmp_path: Path) -> None:
     with pytest.raises(SurveyError) as error:
         open_penzd(write(tmp_path, listed(*["A B"] * 4, *["C SPR"] * 4)), options)
     assert '--kinds "b=ashlar,spr=springer"' in str(error.value.remedy)
+
+
+@pytest.mark.parametrize(
+    ("codes", "template"),
+    [
+        (["W1:S"] * 4 + ["W1:F"] * 2 + ["W2:S"] * 4, "{block}:{role}"),
+        (["N-01-02-B-F"] * 2 + ["N-01-02-B-S"] * 4, NUMBERED.replace(".", "-")),
+    ],
+)
+def test_a_role_s_at_three_places_is_a_corner(tmp_path: Path, codes: list[str], template: str) -> None:
+    stream = open_penzd(write(tmp_path, listed("ST", *codes)), ReadingOptions(codes=template))
+    stones = list(stream.blocks)
+    assert [type(one) for one in stones] == [BlockRecord] * len({code[:-2] for code in codes})
+    assert all(len(one.vertices) == 4 for one in stones if isinstance(one, BlockRecord))
+    assert [one.name for one in stream.head.stations] == ["1"]
+    assert any("sommet" in remark for remark in stream.remarks)
+
+
+def test_a_station_beside_corners_of_another_role_is_none(tmp_path: Path) -> None:
+    (one, *wrong) = open_pnezd(write(tmp_path, ROWS + "5,1,2,3,S:s\n6,1,2,4,S:s\n7,1,2,5,S:s\n")).blocks
+    assert isinstance(one, BlockRecord)
+    assert [
+        "station S a second time" in str(reject.error) for reject in wrong if isinstance(reject, Reject)
+    ] == [True] * 2
+
+
+def test_a_table_without_names_of_columns_is_a_list(tmp_path: Path) -> None:
+    from survey.formats.tables.reader import open_csv
+
+    with pytest.raises(SurveyError, match="no names of columns") as error:
+        open_csv(write(tmp_path, ROWS))
+    assert "--format pnezd" in str(error.value.remedy)
