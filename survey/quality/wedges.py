@@ -23,7 +23,7 @@ _SPANNING = (*_ARCH, "lintel")
 _REACH = 3.0  # of the stone's larger dimension: distance within which its neighbours in the arch are
 _BULGE = 0.02  # least rise over the chord of the neighbours, over their distance, that shows the extrados
 _LEVEL = 0.5  # sine of a radius' rise below which it does not show which end is up
-_SHORT = 0.5  # of the longest side: length below which a side is an arris or a worn corner
+_SHORT = 0.5  # of the smaller extent of a face: length below which a side is an arris or a worn corner
 _JOINT = 0.05  # widest joint between two stones that touch [m]
 _ALONG = math.radians(15.0)  # largest angle between two sides of a joint
 _OVERLAP = 0.6  # of the longer of two sides of a radial joint: their common length, at least
@@ -244,7 +244,7 @@ def sloped_side(stone: StoneQuality) -> tuple[float, float]:
     run = np.roll(flat, -1, axis=0) - flat
     length = np.linalg.norm(run, axis=1)
     slope = np.arctan2(np.abs(run).min(axis=1), np.abs(run).max(axis=1))
-    slope[length < _SHORT * length.max()] = 0.0
+    slope[length < _SHORT * np.ptp(flat, axis=0).min()] = 0.0
     k = int(slope.argmax())
     return float(slope[k]), math.sqrt(2.0) * _corner(stone) / float(length[k])
 

@@ -121,6 +121,12 @@ def test_a_springer_has_a_sloped_side() -> None:
     assert (one.code, one.excess) == ("B", pytest.approx(math.radians(5.0)))
 
 
+def test_the_sloped_side_of_a_springer_may_be_short_beside_its_bed() -> None:
+    long_bed = polygon_stone("A", "springer", [(0, 0), (1.2, 0), (1.0, 0.3), (0, 0.3)])
+    corbelled = polygon_stone("B", "springer", [(2, 0), (2.8, 0), (3.0, 0.3), (2, 0.3)])
+    assert found([long_bed, corbelled]) == ()
+
+
 def test_noise_alone_is_reported_as_rarely_as_three_sigma_promise() -> None:
     """Chance alone exceeds three standard deviations in 0.1 %: at most one of the true stones is reported."""
     rng = np.random.default_rng(9)
