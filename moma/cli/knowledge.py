@@ -38,8 +38,8 @@ class TableChoices:
             metavar="MAP",
             help="Columns of tables that are not recognised, e.g. 'code=Inventar,phase=Zeitstellung'.",
         ),
-    ] = (None,)
-    sheet: Sheet = (None,)
+    ] = None
+    sheet: Sheet = None
     vocabulary: Annotated[
         str | None,
         typer.Option(
@@ -47,7 +47,7 @@ class TableChoices:
             metavar="NAME",
             help="Which vocabulary a SKOS file extends: observation, document, material or mark.",
         ),
-    ] = (None,)
+    ] = None
 
 
 @reporting

@@ -150,8 +150,8 @@ def read_relation_list(path: Path, sheet: str | None = None) -> RelationList | N
     if path.suffix.lower() == ".graphml":
         drawn = read_graphml(path, relation_of)
         relations = tuple((0, link.subject, link.relation, link.target) for link in drawn.links)
-        units = tuple(drawn.units)
-        return RelationList(str(path), units, relations, drawn.ignored, drawn.epochs, drawn.units, drawn.own)
+        names = tuple(drawn.units)
+        return RelationList(str(path), names, relations, drawn.ignored, drawn.epochs, drawn.units, drawn.own)
     try:
         table = read_table(path, _is_row, _REMEDY, sheet)
     except SurveyError as error:

@@ -7,7 +7,7 @@ import pytest
 from archmodel.database.session import open_database
 from archmodel.store.stones import store_survey
 from tests.archmodel.stones import SHA, box_stone
-from tests.moma.commands import answer, fails, invoke
+from tests.moma.commands import answer, fails, invoke, prints
 
 KNOWLEDGE = """
 [record]
@@ -80,6 +80,22 @@ def test_record_says_what_was_new_and_what_was_known() -> None:
     assert invoke("record", "more.toml").stdout == "more.toml: all of it was known; nothing changed\n"
     (file,) = answer("record", "more.toml")["files"]
     assert file["tables"]["kind"] == {"new": 0, "replaced": 0, "unchanged": 1, "withdrawn": 0}
+
+
+def test_tables_and_vocabularies_are_recorded_with_and_without_options() -> None:
+    Path("t.csv").write_text("Stein;Gestein\nV1;tuff\n", encoding="utf-8")
+    Path("u.csv").write_text("Inventar;Zustand\nV1;worn\n", encoding="utf-8")
+    skos = "@prefix s: <http://www.w3.org/2004/02/skos/core#> .\n<http://e/1> s:prefLabel 'Sinter'@de ."
+    Path("v.ttl").write_text(skos, encoding="utf-8")
+    who = ("--author", "A", "--source", "x")
+    assert invoke("record", "t.csv", *who).stdout.startswith("t.csv: 2 new, as entry 2\n")
+    assert prints("record", "u.csv", *who, "--columns", "code=Inventar,remark=Zustand").startswith(
+        "u.csv: 1 new"
+    )
+    assert prints("record", "v.ttl", *who, "--vocabulary", "material") == "v.ttl: 1 new, as entry 4\n"
+    assert "unknown vocabulary 'rock'" in fails(2, "record", "v.ttl", *who, "--vocabulary", "rock")
+    prints("export", "terms.ttl")
+    assert "Sinter" in Path("terms.ttl").read_text(encoding="utf-8")
 
 
 def test_record_fails_with_the_line() -> None:
