@@ -71,7 +71,7 @@ def _head(file: BufferedReader, path: Path) -> tuple[_Head, Mapping[str, list[st
     try:
         counts = words.get("COUNT") or ["1"] * len(words["FIELDS"])
         fields = [
-            (name, "<" + _TYPES[letter, int(size)], (int(many),))
+            (name.lower(), "<" + _TYPES[letter, int(size)], (int(many),))
             for name, size, letter, many in zip(
                 words["FIELDS"], words["SIZE"], words["TYPE"], counts, strict=True
             )

@@ -93,7 +93,7 @@ def _head(file: BufferedReader, path: Path) -> _Head:
         elif words[:1] == ["property"] and inside:
             if words[1] == "list" or words[1] not in _TYPES:
                 raise SurveyError("a point with a list", where=where, remedy="export plain points")
-            fields.append((words[2], _TYPES[words[1]]))
+            fields.append((words[2].lower(), _TYPES[words[1]]))
         elif words == ["end_header"]:
             break
     else:

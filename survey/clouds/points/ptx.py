@@ -22,9 +22,10 @@ from survey.arrays import Array
 from survey.clouds.points.chunks import CHUNK, Chunk, PointCloud
 from survey.records.survey import Station
 
-__all__ = ["open_ptx"]
+__all__ = ["is_ptx", "open_ptx"]
 
 _HEAD = 10  # lines before the points of a scan
+_WORDS = [1] * 2 + [3] * 4 + [4] * 4  # numbers on each of these lines
 _SHORTEST = 8  # bytes of a line of a point: "0 0 0 0" with its end
 _LINES = CHUNK // 4  # lines in memory at a time: Python's strings take 70 bytes each
 _AFFINE = 1e-3  # by which a rotation may differ from one, as its numbers are rounded
@@ -72,6 +73,12 @@ def open_ptx(path: Path) -> PointCloud:
                     yield _chunk(rows, scan, origin, colours)
 
     return PointCloud(path, None, place, chunks, stations)
+
+
+def is_ptx(path: Path) -> bool:
+    """Return whether a file begins as a PTX, whatever its ending: size, axes of the scanner, and its pose."""
+    with path.open("rb") as file:
+        return [len(line.split()) for line in islice(file, _HEAD)] == _WORDS
 
 
 def _scans(file: TextIO, path: Path) -> Iterator[_Scan]:

@@ -9,7 +9,7 @@ from survey.clouds.points.e57 import open_e57
 from survey.clouds.points.las import open_las
 from survey.clouds.points.pcd import open_pcd
 from survey.clouds.points.ply import open_ply
-from survey.clouds.points.ptx import open_ptx
+from survey.clouds.points.ptx import is_ptx, open_ptx
 from survey.clouds.points.text import open_text
 
 __all__ = ["CLOUDS", "open_points"]
@@ -52,6 +52,8 @@ def open_points(path: Path) -> PointCloud:
     if not path.is_file():
         raise UsageError("no such file", where=str(path), remedy="name a point cloud")
     ending = path.suffix.lower()
+    if CLOUDS.get(ending) is open_text and is_ptx(path):
+        return open_ptx(path)
     if ending in CLOUDS:
         return CLOUDS[ending](path)
     what = f"{_OTHERS[ending]} files are not read" if ending in _OTHERS else f"unknown ending {ending!r}"

@@ -49,6 +49,25 @@ def test_ptx_moves_its_scans_and_leaves_out_what_did_not_come_back(tmp_path, mon
     assert plain.stations == ()
 
 
+@pytest.mark.parametrize("ending", [".pts", ".xyz", ".txt"])
+def test_a_ptx_of_another_ending_is_read_as_what_it_is(tmp_path, ending):
+    path = ptx_file(tmp_path / "a.ptx", POINTS)
+    places = read(path)
+    renamed = path.rename(path.with_suffix(ending))
+    np.testing.assert_array_equal(read(renamed), places)
+
+
+def test_fields_of_points_may_have_capitals(tmp_path):
+    rows = "\n".join(" ".join(map(repr, row)) for row in POINTS.tolist())
+    fields = "".join(f"property double {axis}\n" for axis in "XYZ")
+    path = tmp_path / "a.ply"
+    path.write_text(f"ply\nformat ascii 1.0\nelement vertex {len(POINTS)}\n{fields}end_header\n{rows}\n")
+    np.testing.assert_array_equal(read(path), POINTS)
+    cloud = pcd_file(tmp_path / "a.pcd", POINTS, "ascii")
+    cloud.write_bytes(cloud.read_bytes().replace(b"FIELDS x y z", b"FIELDS X Y Z"))
+    np.testing.assert_allclose(read(cloud), POINTS, atol=1e-6)
+
+
 @pytest.mark.parametrize(
     ("line", "text", "message"),
     [
