@@ -20,7 +20,8 @@ class Quantity:
     unit : SI unit; "-" of ratios, counts and directions; None of texts
     label : in a heading or a legend
     meaning : in a few words
-    of : bearer of the result: stone, joint, contact, peak, run, or a kind of structure; others are arrays of files
+    of : bearer of the result: stone, joint, contact, peak, run, stage, summary (where names are paths of keys), or a
+        kind of structure; others are arrays of files
     """
 
     name: str
@@ -51,16 +52,18 @@ QUANTITIES: tuple[Quantity, ...] = (
         von_mises_mean | Pa | mean Von Mises stress | mean Von Mises stress
         contact_force_max | N | largest contact force | largest contact force
         variance_share | - | share of the variance of a study that the best measurement of the stone takes away
-        von_mises_p99 | Pa | Von Mises stress that 1 % of its volume exceeds
-        principal_tension | Pa | largest principal stress, positive in tension
-        principal_compression | Pa | smallest principal stress, negative in compression
-        mean_pressure | Pa | mean pressure over its volume
-        tension_zone | - | part of its volume in tension, beyond what the error of the stress explains
+        von_mises_p99 | Pa | Von Mises stress that 1 % of its volume exceeds | Von Mises stress exceeded in 1 % of the \
+        volume
+        principal_tension | Pa | largest principal stress, positive in tension | largest tension
+        principal_compression | Pa | smallest principal stress, negative in compression | largest compression
+        mean_pressure | Pa | mean pressure over its volume | mean pressure
+        tension_zone | - | part of its volume in tension, beyond what the error of the stress explains | volume in \
+        tension
         overstressed_zone | - | part of its volume with tension above the tensile strength
-        utilisation | - | largest stress over strength, in tension or compression
+        utilisation | - | largest stress over strength, in tension or compression | stress over strength
         utilisation_tension | - | largest tension over the tensile strength
         utilisation_compression | - | largest compression over the compressive strength
-        stress_error | - | estimated relative error of its stress
+        stress_error | - | estimated relative error of its stress | error of the stress
         joint_pressure | Pa | largest pressure in its joints
         joint_kern | - | largest of its joints: up to 1, the resultant is within the kern
         joint_opening | m | largest opening of its joints
@@ -199,6 +202,54 @@ QUANTITIES: tuple[Quantity, ...] = (
         unconverged_steps | - | Steps that the solver left above its tolerance. | Unsolved steps
         stress | - | Relative error of the stress of all deformable stones, estimated from its jumps between finite \
         elements. | Stress
+        """,
+    ),
+    *_of(
+        "summary",
+        """
+        contacts | - | contact points at the end | Contact points
+        steps | - | time steps
+        time.simulated | s | time at the end | Simulated
+        time.rest | s | time from which the stones rest; null where they do not
+        reaction.weight | N | of the stones that are not fixed | Weight carried
+        reaction.total_vertical | N | of all supports, against gravity | Reaction of the supports
+        displacement.max | m | of the points of a stone that is not fixed, during the run | Largest displacement
+        displacement.time | s | time of that; null at the end
+        displacement.end | m | the same at the end
+        settlement.max | m | largest displacement of a stone along gravity, at the end
+        von_mises.p99 | Pa | that 1 % of the volume exceeds | Von Mises stress, exceeded in 1 % of the volume
+        von_mises.mean | Pa | over the volume | Von Mises stress, mean
+        von_mises.max | Pa | at a node | Von Mises stress, largest
+        stress.tension.value | Pa | largest principal stress, positive in tension
+        stress.compression.value | Pa | smallest principal stress, negative in compression
+        stress.utilisation.value | - | largest stress over strength; null where no strength is known
+        stress.error.value | - | largest estimated error of the stress of a stone
+        joints.count | - | joints of the start, and those found later
+        joints.pressed | - | of these under compression, without slivers
+        joints.parted | - | of these wide open at the end and closed at the start
+        joints.out_of_kern | - | of these with a resultant outside the kern, without slivers
+        joints.largest_opening | m | largest growth of a gap since the start
+        joints.largest_sliding | m | largest slide of a contact point since the start
+        joints.largest_pressure | Pa | as `pressure_max` of a joint, without slivers
+        joints.slivers.count | - | joints of no more than `limit` of the faces of their stones
+        joints.slivers.pressed | - | of these under compression
+        joints.slivers.force | N | sum of the resultants across slivers
+        joints.slivers.largest_force | N | largest of these
+        joints.slivers.largest_pressure | Pa | as `pressure_max` of a joint
+        energies.external | J | work of loads and driven bodies
+        energies.contact | J | work of the contacts; friction makes it negative
+        energies.scheme | J | dissipated by the scheme, damping and relaxation
+        tolerance.length | m | movements below it are within the solver's tolerance
+        """,
+    ),
+    *_of(
+        "stage",
+        """
+        weight | N | of the stones that are not fixed | Weight
+        reaction | N | of all supports, against gravity | Reaction
+        displacement | m | largest of a stone since it was laid | Largest displacement
+        bed | m | thickest mortar that makes up for movements before a stone was laid; negative: cut off | Thickest bed
+        balance | - | unbalanced force over the stone's weight, worst stone, at the end | Balance
         """,
     ),
 )

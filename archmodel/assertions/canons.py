@@ -144,7 +144,7 @@ def _nodes(node: object) -> Iterator[object]:
     """Iterate over a node of an expression and all nodes in it."""
     yield node
     if is_dataclass(node) and not isinstance(node, Token):
-        for part in fields(node):
-            value = getattr(node, part.name)
+        for field in fields(node):
+            value = getattr(node, field.name)
             for item in value if isinstance(value, tuple) else (value,):
                 yield from _nodes(item)

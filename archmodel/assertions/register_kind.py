@@ -85,17 +85,22 @@ def register_kind(
         _check_attributes(given, own_attributes(above))
     elif given:
         raise UsageError(f"{name} is {NO_ATTRIBUTES}", remedy="leave out attributes")
+    _store(session, row)
+    return RowCounts(new=1)
+
+
+def _store(session: Session, row: RegisteredKind) -> None:
+    """Store a kind whose canon is an expression of what its stones have; otherwise leave no trace of it."""
     try:
         with session.begin_nested():
             session.add(row)
             session.flush()
             declare_registered(session)
             if row.canon is not None:
-                check_canon(session, all_kinds()[name], row.canon)
+                check_canon(session, all_kinds()[row.name], row.canon)
     except QueryError:
         declare_registered(session)
         raise
-    return RowCounts(new=1)
 
 
 def _check_attributes(

@@ -96,7 +96,7 @@ def known_at(session: Session, code: str, entry: int) -> dict[str, object]:
 
 def _ordered(events: Sequence[Event]) -> tuple[Event, ...]:
     # stable: within an entry as they were gathered
-    return tuple(sorted(events, key=lambda one: one.entry))
+    return tuple(sorted(events, key=lambda event: event.entry))
 
 
 def _event(entry: Entry, event: str, what: str, says: Values, before: Values | None = None) -> Event:
@@ -260,27 +260,27 @@ def _chain(
             yield _event(old.superseded_by, "withdrawn", what, told(old))
 
 
-def _measurement(one: Measurement) -> Values:
+def _measurement(measurement: Measurement) -> Values:
     return {
-        "survey": one.survey.name,
-        "line": one.line,
-        "points": one.point_count,
-        "rejected": one.rejected_count,
-        "rms": one.rms,
+        "survey": measurement.survey.name,
+        "line": measurement.line,
+        "points": measurement.point_count,
+        "rejected": measurement.rejected_count,
+        "rms": measurement.rms,
     }
 
 
-def _structure_of(one: Membership) -> Values:
-    return {"structure": one.structure.code, "rank": one.rank}
+def _structure_of(membership: Membership) -> Values:
+    return {"structure": membership.structure.code, "rank": membership.rank}
 
 
-def _structure(session: Session, one: Structure) -> Values:
-    parent = None if one.parent_id is None else session.get_one(Structure, one.parent_id)
+def _structure(session: Session, structure: Structure) -> Values:
+    parent = None if structure.parent_id is None else session.get_one(Structure, structure.parent_id)
     values = {
-        "kind": one.kind,
-        "title": one.title,
+        "kind": structure.kind,
+        "title": structure.title,
         "part_of": None if parent is None else parent.code,
-        "number": one.number,
-        "side": one.side,
+        "number": structure.number,
+        "side": structure.side,
     }
     return {name: value for name, value in values.items() if value is not None}

@@ -28,8 +28,8 @@ def first_values(session: Session, number: int, *names: str) -> dict[str, Any]:
         .where(Correction.entity_id == number, Correction.attribute.in_(names))
         .order_by(Correction.id.desc())
     )
-    for one in session.scalars(corrections):
-        values[one.attribute] = one.before
+    for scalar in session.scalars(corrections):
+        values[scalar.attribute] = scalar.before
     return values
 
 

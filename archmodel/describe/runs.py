@@ -79,14 +79,7 @@ def describe_run(session: Session, number: int, count: int = 5) -> dict[str, Any
     UsageError
         if there is no such run; names those that there are
     """
-    run = _run(session, number)
-    counted = session.execute(
-        select(EntityResult.fidelity, func.count().label("stones"))
-        .where(EntityResult.run_id == number)
-        .group_by(EntityResult.fidelity)
-        .order_by(EntityResult.fidelity)
-    )
-    stones = {row.fidelity: row.stones for row in counted}
+    run, stones = _run(session, number), _fidelities(session, number)
     return {
         "run": run.id,
         "scene": run.scene,
@@ -117,6 +110,17 @@ def describe_run(session: Session, number: int, count: int = 5) -> dict[str, Any
         "structures": _structures(session, number, count),
         "scene_text": run.scene_text,
     }
+
+
+def _fidelities(session: Session, number: int) -> dict[str, int]:
+    """Return the number of stones of each fidelity in a run."""
+    counted = session.execute(
+        select(EntityResult.fidelity, func.count().label("stones"))
+        .where(EntityResult.run_id == number)
+        .group_by(EntityResult.fidelity)
+        .order_by(EntityResult.fidelity)
+    )
+    return {row.fidelity: row.stones for row in counted}
 
 
 def compare_runs(session: Session, number: int, against: int, count: int = 10) -> dict[str, Any]:

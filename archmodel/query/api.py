@@ -127,6 +127,7 @@ def find_faces(
     """Return rows as `find_rows` does, with the face of each entity."""
 
     def chosen(scope: Scope) -> list[ColumnElement[Any]]:
+        """Return the columns of an outline and its attributes."""
         measurement = scope.measurement()
         return [measurement.c.outline, measurement.c.normal, *_columns(scope, columns)]
 

@@ -102,6 +102,7 @@ def rows(table: type[Any], column: str, *, now: bool = True) -> Value:
     """Count the rows of a table that name the entity in a column."""
 
     def value(scope: Scope, run: int | None) -> ColumnElement[int]:
+        """Return the number of rows of a stone."""
         rows = scope.context.alias(table)
         count = select(func.count()).select_from(rows).where(rows.c[column] == scope.entity.c.id)
         return (count.where(held(rows)) if now else count).correlate(scope.entity).scalar_subquery()
@@ -113,6 +114,7 @@ def of_relations(what: Callable[[FromClause], ColumnElement[Any]], *sides: str, 
     """Aggregate over all relations of a kind in which the entity stands on one of the sides."""
 
     def value(scope: Scope, run: int | None) -> ColumnElement[Any]:
+        """Return what the relations of a stone say on either side."""
         parts: list[ColumnElement[Any]] = []
         for side in sides:
             rows = scope.context.alias(Relation)
@@ -151,6 +153,7 @@ def of_marks(what: Callable[[FromClause], ColumnElement[Any]]) -> Value:
     """Aggregate over the mason marks that the entity itself bears."""
 
     def value(scope: Scope, run: int | None) -> ColumnElement[Any]:
+        """Return what the mason's marks of a stone say."""
         said = scope.context.alias(Statement)
         marks = select(what(said)).where(
             said.c.entity_id == scope.entity.c.id, said.c.kind == "mason_mark", held(said)
@@ -164,6 +167,7 @@ def of_observations(what: Callable[[FromClause], ColumnElement[Any]]) -> Value:
     """Aggregate over all observations that hold for the entity."""
 
     def value(scope: Scope, run: int | None) -> ColumnElement[Any]:
+        """Return what the observations of a stone say."""
         said, seen = observations_of(
             scope.context.alias, scope.entity, scope.context.statements_of_structures("observation")
         )

@@ -209,9 +209,11 @@ class _Parser:
 
     @property
     def token(self) -> Token:
+        """Token that is read next."""
         return self.tokens[self.index]
 
     def take(self) -> Token:
+        """Return the next token, and go on behind it."""
         token = self.token
         self.index += 1
         return token
@@ -224,24 +226,28 @@ class _Parser:
         return True
 
     def whole(self) -> Node:
+        """Read an expression to the end of the text."""
         node = self.expression(0)
         if self.token.role != "end":
             raise complaint(self.token, f"{named(self.token)} is not expected here", _JOINING)
         return node
 
     def expression(self, depth: int) -> Node:
+        """Read conjunctions joined by ``or``."""
         operands = [self.conjunction(depth)]
         while self.taken("keyword", "or"):
             operands.append(self.conjunction(depth))
         return operands[0] if len(operands) == 1 else AnyOf(tuple(operands))
 
     def conjunction(self, depth: int) -> Node:
+        """Read negations joined by ``and``."""
         operands = [self.negation(depth)]
         while self.taken("keyword", "and"):
             operands.append(self.negation(depth))
         return operands[0] if len(operands) == 1 else All(tuple(operands))
 
     def negation(self, depth: int) -> Node:
+        """Read a test, or one behind ``not``."""
         if depth > MAX_DEPTH:
             raise complaint(
                 self.token, f"the expression is nested more than {MAX_DEPTH} deep", "use several --where"
@@ -255,6 +261,7 @@ class _Parser:
         return self.test(depth)
 
     def test(self, depth: int) -> Node:
+        """Read a comparison, a call, or an expression in parentheses."""
         begin = self.index
         if self.computes():
             return self.amounts()
@@ -296,10 +303,12 @@ class _Parser:
         return called or summed or (product is not None and product["name"] != word.text)
 
     def amounts(self) -> AmountComparison:
+        """Read a comparison of two computed amounts."""
         left = self.amount()
         return AmountComparison(left, self.operator(), self.amount())
 
     def amount(self) -> Amount:
+        """Read a sum of terms, or its absolute value."""
         absolute = self.token.text.lower() == "abs" and self.following == ("(", "sign")
         if absolute:
             self.index += 2
@@ -311,6 +320,7 @@ class _Parser:
         return Amount(tuple(terms), absolute)
 
     def term(self, sign: float) -> Term:
+        """Read a product of factors."""
         term = self.factor(Term(sign), divides=False)
         while self.token.role == "word" and self.token.text in ("*", "/"):
             term = self.factor(term, divides=self.take().text == "/")
@@ -369,12 +379,14 @@ class _Parser:
         return token.text, token.role
 
     def null(self, operand: Token | Call) -> Node:
+        """Read the rest of ``is null`` or ``is not null``."""
         negated = self.taken("keyword", "not")
         if not self.taken("keyword", "null"):
             raise complaint(self.token, f"{named(self.token)} after is", "write is null or is not null")
         return Not(IsNull(operand)) if negated else IsNull(operand)
 
     def membership_or_pattern(self, attribute: Token) -> Node:
+        """Read the rest of ``in (…)`` or ``like '…'``."""
         if self.taken("keyword", "like"):
             return Like(attribute, self.value())
         if not self.taken("keyword", "in"):
@@ -389,6 +401,7 @@ class _Parser:
         return IsIn(attribute, tuple(values))
 
     def value(self) -> Token:
+        """Read a number, a word or a text."""
         token = self.take()
         if token.role not in VALUES:
             remedy = "write a number, a word, or a 'quoted text'"
@@ -396,6 +409,7 @@ class _Parser:
         return token
 
     def close(self) -> None:
+        """Read a closing parenthesis."""
         if not self.taken("sign", ")"):
             raise complaint(self.token, f"{named(self.token)} instead of )")
 

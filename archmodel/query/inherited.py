@@ -139,6 +139,7 @@ class Opinions:
         inherited, member = self.alias(Statement), self.alias(Membership)
 
         def joined(statement: Select[Any]) -> Select[Any]:
+            """Join the structures of a stone, and the statements about them."""
             return (
                 statement.select_from(member)
                 .join(self.of_structures, self.of_structures.c.structure_id == member.c.structure_id)

@@ -49,6 +49,7 @@ def stone_named(context: Context, code: Token) -> Row[int, float | None, float |
     """Return number and centroid (x, y, z) of a stone."""
 
     def look() -> Row[int, float | None, float | None, float | None]:
+        """Return key and centroid of the stone; refuse a code that no stone has."""
         stone = select(Entity.id, Entity.x, Entity.y, Entity.z).where(Entity.code == code.text)
         row = context.session.execute(stone).one_or_none()
         if row is None:
@@ -64,6 +65,7 @@ def structure_named(context: Context, code: Token) -> int:
     """Return the number of a structure that is held now."""
 
     def look() -> int:
+        """Return the key of the structure; refuse a code that no structure has."""
         structure = select(Structure.id).where(Structure.code == code.text, Structure.superseded_id.is_(None))
         number = context.session.scalar(structure)
         if number is None:

@@ -92,6 +92,7 @@ def _opinion(about: str, column: str, named: type[Phase] | type[Material]) -> So
     """Return the name that the opinion which holds gives: its own, else that of the nearest structure around it."""
 
     def value(scope: StructureScope, run: int | None) -> ColumnElement[str]:
+        """Return the statement of the author who is followed."""
         context = scope.context
         rule = context.once(("rule", about), lambda: rule_of(context.session, about))
         reach, said, row = (
@@ -117,6 +118,7 @@ def _result(name: str) -> Source:
     """Return a source in a named number of the structure's result: in a run, or in the latest that has it."""
 
     def value(scope: StructureScope, run: int | None) -> ColumnElement[float]:
+        """Return the result of a run, or of the latest."""
         rows, newest = scope.context.alias(StructureResult), scope.context.alias(StructureResult)
         number = scope.context.run if run is None else run
         latest = select(func.max(newest.c.run_id)).where(newest.c.structure_id == scope.structure.c.id)

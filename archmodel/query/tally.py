@@ -138,6 +138,7 @@ def _only_in(
     kind, where, run = asked
 
     def codes(*more: str) -> set[object]:
+        """Return the codes of the stones that fulfil further conditions."""
         return {row["code"] for row in find_rows(session, kind, [*where, *more], run, ["code"])}
 
     true, false = codes(expression), codes(f"not ({expression})")

@@ -168,6 +168,7 @@ class _Faces:
 
     @classmethod
     def of(cls, contacts: StoneContacts, stones: StonesOf, settings: RelationSettings) -> "_Faces":
+        """Return the directions of the faces of each contact."""
         near_cosine = np.cos(np.radians(settings.along))
         first_normal, two = stones.normals[contacts.pairs[:, 0]], stones.normals[contacts.pairs[:, 1]]
         steepest = np.sin(np.radians(settings.bed))

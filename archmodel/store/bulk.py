@@ -69,6 +69,7 @@ def _converter(table: Table, names: Sequence[str], dialect: Dialect) -> Callable
     taken = itemgetter(*names)
 
     def convert(row: Mapping[str, Any]) -> Row:
+        """Return the values of a row as the database takes them."""
         values = list(taken(row)) if len(names) > 1 else [taken(row)]
         for place, process in active:
             values[place] = process(values[place])

@@ -84,25 +84,40 @@ def store_survey(
         session.flush()
         lines: dict[str, int] = {}
         start, measured_again = first_free_id(session, Entity), list[int]()
-        codes, zones = Lookalikes(session, Entity.code), Lookalikes(session, Entity.zone)
+        lookalikes = {"code": Lookalikes(session, Entity.code), "zone": Lookalikes(session, Entity.zone)}
         for batch in batches(stones):
-            _refuse_lookalikes(codes, batch, source_path, "code")
-            _refuse_lookalikes(zones, batch, source_path, "zone")
+            for name, similar in lookalikes.items():
+                _refuse_lookalikes(similar, batch, source_path, name)
             stored = _known_codes(session, batch)
             _refuse_codes(batch, {} if again else stored, lines, source_path)
             insert_stones(session, [stone for stone in batch if stone.code not in stored], survey)
-            old = [stone for stone in batch if stone.code in stored]
-            numbers = [stored[stone.code][0] for stone in old]
-            supersede_measurements(
-                session, survey.entry_id, survey.id, numbers, old, _places(old, source_path)
-            )
-            measured_again += numbers
-        if not lines:
-            remedy = "give it at least one stone record"
-            raise DatabaseError("the survey has no stones", where=source_path, remedy=remedy)
-        new = range(start, start + len(lines) - len(measured_again))
-        _refuse_others(new, earlier, source_path)
-        return StoredSurvey(survey.id, survey.entry_id, new, tuple(measured_again))
+            measured_again += _measure_again(session, survey, batch, stored, source_path)
+        _refuse_empty(lines, source_path)
+        numbers = range(start, start + len(lines) - len(measured_again))
+        _refuse_others(numbers, earlier, source_path)
+        return StoredSurvey(survey.id, survey.entry_id, numbers, tuple(measured_again))
+
+
+def _refuse_empty(lines: Mapping[str, int], source_path: str) -> None:
+    """Refuse a survey without stones."""
+    if not lines:
+        remedy = "give it at least one stone record"
+        raise DatabaseError("the survey has no stones", where=source_path, remedy=remedy)
+
+
+def _measure_again(
+    session: Session,
+    survey: Survey,
+    batch: Sequence[StoneRecord],
+    stored: Mapping[str, tuple[int, str]],
+    source_path: str,
+) -> list[int]:
+    """Replace the measurements of those stones of a batch that are stored; return their primary keys."""
+    again = [stone for stone in batch if stone.code in stored]
+    numbers = [stored[stone.code][0] for stone in again]
+    places = _places(again, source_path)
+    supersede_measurements(session, survey.entry_id, survey.id, numbers, again, places)
+    return numbers
 
 
 def survey_with_hash(session: Session, sha256: str) -> Survey | None:

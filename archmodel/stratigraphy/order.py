@@ -173,6 +173,7 @@ def _merged(links: Iterable[Link]) -> dict[str, str]:
     parents: dict[str, str] = {}
 
     def root(code: str) -> str:
+        """Return the code by which a group of contemporaries is known."""
         while parents.setdefault(code, code) != code:
             parents[code] = parents[parents[code]]
             code = parents[code]

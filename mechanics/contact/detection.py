@@ -160,6 +160,7 @@ class Detector:
         plane = FLAT if self.placement == Placement.AREA else SAME_PLANE
 
         def part(a: int, b: int) -> tuple[Ints, Ints, Array]:
+            """Return the separating axes of the pairs from a to b."""
             axes: tuple[Ints, Ints, Array] = separating_axes(
                 shapes[a:b], near[a:b], hint[a:b], plane, placed.shapes
             )
@@ -212,6 +213,7 @@ class Detector:
         spacing = self.spacing if self.spacing and self.placement == Placement.AREA else 0.0
 
         def part(a: int, b: int) -> tuple[Any, ...]:
+            """Return the contact points of the pairs from a to b."""
             some = Pairs._make(pair[a:b] for pair in pairs)
             try:
                 index, *points = interface_points(

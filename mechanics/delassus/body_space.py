@@ -138,6 +138,7 @@ class BodyForm(SparseForm):
             return quick
 
         def solve(b: Array) -> Array:
+            """Solve for forces, refined where rounding has left a residual."""
             x = quick(b)
             r = x.reshape(theta.shape[:2])
             left = b - (apply(r, self._contacts) + np.einsum("cij,cj->ci", theta, r)).ravel()

@@ -91,6 +91,7 @@ class CompliantDelassus:
         """Return sweeps of W with E r lagged by one sweep; they converge where E is smaller than W."""
 
         def sweeps(impulse: Array, count: int, /) -> None:
+            """Sweep, with the shift of the joints' compliance brought up to date before each pass."""
             for _ in range(count):
                 late = shift + self.joint_compliance * impulse
                 self.inner.gauss_seidel(late, friction, cohesion)(impulse, 1)

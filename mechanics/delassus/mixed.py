@@ -111,6 +111,7 @@ class MixedDelassus:
         laws = Laws(shift, friction, cohesion, local_factors(self.diagonal))
 
         def sweeps(impulse: Array, count: int) -> None:
+            """Sweep over the contacts of rigid and elastic bodies."""
             _, v, y = apply_delassus(impulse, self._sides)
             sweep(count, impulse, v, y, laws, self.diagonal, self._sides)
 

@@ -143,6 +143,7 @@ class _Elimination:
         self.pivots[layout.pptr[f] : layout.pptr[f + 1]] = exchanged
 
         def reduce(first: int) -> None:
+            """Eliminate the pivots from a panel of columns."""
             last = min(first + _PANEL, m)
             # SciPy's wrapper makes the pivots 1-based in the array itself while LAPACK runs: one copy for each thread
             across, _ = dgetrs(lu, exchanged.copy(), pivot[:, k + first : k + last], overwrite_b=True)

@@ -168,6 +168,7 @@ class RigidDelassus:
         laws, plan = Laws(shift, friction, cohesion, self._factors), self.schedule
 
         def sweeps(impulse: Array, count: int) -> None:
+            """Sweep over the contacts of rigid bodies, by threads where the schedule has parts."""
             path, seen = np.zeros(len(self.inertia)), np.full((len(plan.group) - 1, 2), -np.inf)
             running = kernel.Running(impulse, self.rigid_change(impulse), path, seen)
             if len(plan.part) > 2 and threads > 1:

@@ -168,7 +168,7 @@ def _bound(on: RigidAssembly, programme: Programme, name: str) -> LimitLoad:
     )
 
 
-def without_friction_across(on: RigidAssembly, live: LiveLoad, found: LimitLoad) -> LimitLoad | None:
+def without_friction_across(on: RigidAssembly, live: LiveLoad, candidate: LimitLoad) -> LimitLoad | None:
     """Return the limit load where joints that slide rub along their slip alone; None where none slides.
 
     Limit equilibrium, as rock engineers compute a wedge on two planes, has no friction across the line of sliding, and
@@ -178,14 +178,14 @@ def without_friction_across(on: RigidAssembly, live: LiveLoad, found: LimitLoad)
     Parameters
     ----------
     on, live : the stones and the load
-    found : of Coulomb's friction, so that joints slide without opening; its mechanism has the directions of slip
+    candidate : of Coulomb's friction, so that joints slide without opening; its mechanism has the directions of slip
     """
-    velocity = found.mechanism.velocity
+    velocity = candidate.mechanism.velocity
     slip = (on.lift.T @ velocity[on.free].ravel()).reshape(-1, 3)[:, 1:]
-    line = lines_of_sliding(on, found)
+    line = lines_of_sliding(on, candidate)
     wedges = np.flatnonzero(line.any(axis=1))
-    steady = found.mechanism.speed <= _STILL
-    sliding = found.mechanism.sliding.copy()
+    steady = candidate.mechanism.speed <= _STILL
+    sliding = candidate.mechanism.sliding.copy()
     for side in (0, 1):
         body, other = on.contacts.bodies[:, side], on.contacts.bodies[:, 1 - side]
         here = np.isin(body, wedges) & steady[other]
@@ -207,23 +207,23 @@ def without_friction_across(on: RigidAssembly, live: LiveLoad, found: LimitLoad)
     return _bound(there, Programme(there, balance * live(on), str(live)), str(live))
 
 
-def lines_of_sliding(on: RigidAssembly, found: LimitLoad) -> Array:
+def lines_of_sliding(on: RigidAssembly, limit: LimitLoad) -> Array:
     """Return the line (nb, 3) along which each stone slides on two planes that stay, the way it goes; zero: none.
 
     The planes are those of joints that bear at the limit. A mechanism may turn the stone as well. Zero for all where
     some stone that moves has no such line: a vault that opens is no wedge.
     """
-    moves = found.mechanism.speed > _STILL
+    moves = limit.mechanism.speed > _STILL
     line = np.zeros((len(moves), 3))
     bodies = on.contacts.bodies
-    bears = found.force[:, 0] > _STILL * found.force[:, 0].max(initial=0.0)
+    bears = limit.force[:, 0] > _STILL * limit.force[:, 0].max(initial=0.0)
     stands = bears & (moves[bodies].sum(axis=1) == 1)
     for body in np.unique(bodies[stands]):
         if not moves[body]:
             continue
         normals = on.contacts.frame[stands & (bodies == body).any(axis=1), 0]
         size, axes = np.linalg.svd(normals.T @ normals)[1:]
-        velocity = found.mechanism.velocity[body, :3]
+        velocity = limit.mechanism.velocity[body, :3]
         way = float(velocity @ axes[2])
         two = size[1] > _PLANE * size[0] > size[2]
         if two and 2.0 * way * way > float(velocity @ velocity):
@@ -231,13 +231,13 @@ def lines_of_sliding(on: RigidAssembly, found: LimitLoad) -> Array:
     return line if line[moves].any(axis=1).all() else np.zeros_like(line)
 
 
-def slides_along_one_line(on: RigidAssembly, found: LimitLoad) -> bool:
+def slides_along_one_line(on: RigidAssembly, limit: LimitLoad) -> bool:
     """Return whether all stones that move slide along one line, within 2.6°.
 
     Where they slide along several, as those of a dome that opens, no friction is across the line of sliding: that of
     each joint holds the others.
     """
-    motion, way = found.mechanism, lines_of_sliding(on, found)
+    motion, way = limit.mechanism, lines_of_sliding(on, limit)
     if not way.any():
         way = motion.velocity[:, :3]
         turning = 0.5 * on.model.surfaces.size * np.linalg.norm(motion.velocity[:, 3:], axis=1)

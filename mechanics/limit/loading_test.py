@@ -197,18 +197,7 @@ def loading_test(
         are pushed backwards
     SolverError : the stones do not come to rest under the vertical force, or the motion is no longer finite
     """
-    if scene.loads.until > 0:
-        raise SceneError(
-            "a load that changes with time",
-            where=scene.name,
-            remedy="leave it out: the test is at rest but for its push",
-        )
-    if not rig.has_beam and min(to) < 0:
-        raise SceneError(
-            "a push backwards without a beam",
-            where="rig",
-            remedy="give displacements of one sign, or turn the direction",
-        )
+    _refuse_untestable(scene, rig, to)
     furthest = float(np.abs(to).max())
     way = step or min(furthest / _STEPS, softening_step(scene))
     speed = SPEED * float(np.sqrt(2.0 * np.linalg.norm(scene.gravity) * furthest))
@@ -216,13 +205,8 @@ def loading_test(
     duration = way / speed
     scene = replace(scene, time=TimeSettings(duration, theta=1.0, duration=path.until + duration))
     model, begin = build_model(rigged(scene, rig, path))
-    told, search = static_start(_loaded(model, rig), begin, progress)
-    if not told.found:
-        raise _restless(model, begin, search.state)
-    simulation = Simulation(model, begin)
-    simulation.take_over(search)
+    simulation = _settled(model, begin, rig, progress)
     settled = simulation.state
-    settling = float(np.linalg.norm(settled.centre - begin.centre, axis=1).max())
     balance = EnergyBalance(model, settled)
     codes = [block.code for block in model.scene.blocks]
     jaws = np.array([codes.index(code) for code in sorted(path.stones)])
@@ -256,11 +240,37 @@ def loading_test(
         settled,
         peak,
         made,
-        settling,
+        float(np.linalg.norm(settled.centre - begin.centre, axis=1).max()),
         unsolved,
-        abs(balance.unexplained) / balance.reference,
+        balance.error,
         number < steps,
     )
+
+
+def _settled(model: Model, begin: State, rig: Rig, progress: Listener) -> Simulation:
+    """Return a simulation that begins at rest under the vertical force, before the push."""
+    start, search = static_start(_loaded(model, rig), begin, progress)
+    if not start.found:
+        raise _restless(model, begin, search.state)
+    simulation = Simulation(model, begin)
+    simulation.take_over(search)
+    return simulation
+
+
+def _refuse_untestable(scene: Scene, rig: Rig, to: Sequence[float]) -> None:
+    """Refuse loads that change with time, and stones without a beam that are pushed backwards."""
+    if scene.loads.until > 0:
+        raise SceneError(
+            "a load that changes with time",
+            where=scene.name,
+            remedy="leave it out: the test is at rest but for its push",
+        )
+    if not rig.has_beam and min(to) < 0:
+        raise SceneError(
+            "a push backwards without a beam",
+            where="rig",
+            remedy="give displacements of one sign, or turn the direction",
+        )
 
 
 def _loaded(model: Model, rig: Rig) -> Model:

@@ -153,6 +153,7 @@ def touching_faces(
     faces: dict[int, tuple[Array, Array]] = {}
 
     def planes(index: int) -> tuple[Array, Array]:
+        """Return normals (n, 3) and origins (n, 3) of the faces of a block."""
         if index not in faces:
             block = blocks[index]
             rows = [face_plane(block.vertices[list(face)]) for face in block.faces]

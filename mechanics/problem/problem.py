@@ -201,6 +201,7 @@ class ScaledDelassus:
         inner = self.inner.gauss_seidel(shift / unit, friction, cohesion * self.unit)
 
         def sweeps(impulse: Array, count: int, /) -> None:
+            """Sweep in the units of the problem that is scaled."""
             real = unit * impulse
             inner(real, count)
             impulse[:] = real / unit

@@ -85,6 +85,7 @@ def joint_corners(start: StartingJoints) -> StartCorners:
     a, b = start.bodies[joint].T
 
     def in_axes(body: Ints, point: Array) -> Array:
+        """Return points (n, 3) in the axes of their bodies [m]."""
         place: Array = np.einsum("kji,kj->ki", state.rotation[body], point - state.centre[body])
         return place
 

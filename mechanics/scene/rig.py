@@ -5,6 +5,7 @@ stiff that they yield by 10⁻⁵ of the height. They hold the beam by a thin lu
 where it may turn, between faces where it may not, and let it rise and sink, so that the vertical force on it stays.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Annotated
@@ -154,47 +155,24 @@ def rigged(scene: Scene, rig: Rig, motion: Motion) -> Scene:
     shop, corners = _Shop(rig.axes), [block.vertices @ rig.axes.T for block in scene.blocks]
     a, c, bottom = np.min([corner.min(axis=0) for corner in corners], axis=0).tolist()
     b, d, top = np.max([corner.max(axis=0) for corner in corners], axis=0).tolist()
-    tall, at = top - bottom, bottom + rig.height
-    wide, forces = _BEYOND * tall, scene.loads.forces
-    fall = float(np.linalg.norm(scene.gravity))
+    stones: Box = (a, c, bottom), (b, d, top)
+    tall, fall = top - bottom, float(np.linalg.norm(scene.gravity))
     weight = fall * sum(
         block.material.density * mass_properties(block.vertices, block.faces, block.code).volume
         for block in scene.blocks
         if block.fidelity is not Fidelity.FIXED
     )
+    forces = scene.loads.forces
     if not any(block.fidelity is Fidelity.FIXED for block in scene.blocks):
+        wide = _BEYOND * tall
         shop.make(BASE, ((a - wide, c, bottom - wide), (b + wide, d, bottom)))
     if rig.has_beam:
-        rise = at - top
-        if rise <= 0:
-            remedy = f'give the height at which the beam is pushed, or head = "{Head.HELD}" or "{Head.FREE}"'
-            raise _misplaced(rig, "below", tall, remedy)
-        middle, half, under = (a + b) / 2, 0.5 * _LUG * rise, top + rise / 2
-        turns = rig.head is Head.TURNS
-        beam: Box = (a, c, top), (b, d, under)
-        lug: Box = (middle - half, c, under), (middle + half, d, under + (rise if turns else tall * _GUIDE))
-        # between edges at the height of the push, or faces that the beam's moment hardly turns
-        jaw = (at - _EDGE * rise, at + _EDGE * rise) if turns else (under + tall * _CLEAR, lug[1][2])
         mass = _BEAM * max(rig.load, weight) / fall
-        volume = sum(float(np.prod(np.subtract(box[1], box[0]))) for box in (beam, lug))
-        shop.make(BEAM, beam, lug, density=mass / volume)
-        shop.make(JAWS[0], ((a, c, jaw[0]), (middle - half, d, jaw[1])))
-        shop.make(JAWS[1], ((middle + half, c, jaw[0]), (b, d, jaw[1])))
-        width, yields = jaw[1] - jaw[0], _YIELDS * (1.0 if turns else _STIFFER)
+        width, yields = _put_beam(shop, rig, stones, mass)
         down = History.constant((mass * fall - rig.load) * _UP)
         forces = (*forces, StoneForce(frozenset({BEAM}), down))
     else:
-        if rig.height > tall:
-            raise _misplaced(rig, "above", tall, "push lower, or put a beam on")
-        edge, yields = _EDGE * _LUG * tall, _YIELDS
-        near = [
-            corner for corner in corners if corner[:, 2].min() < at + edge and corner[:, 2].max() > at - edge
-        ]
-        face = min(float(one[:, 0].min()) for one in near)
-        shop.make(JAWS[0], ((face - wide, c, at - edge), (face, d, at + edge)))
-        width = 2 * edge
-        if rig.head is Head.HELD:
-            shop.make(HOLD, ((b, c, top - edge), (b + wide, d, top + wide)))
+        width, yields = _put_jaw(shop, rig, stones, corners)
     stiffness = max(rig.load, weight) / (yields * tall * width * (d - c))
     codes = frozenset(block.code for block in shop.made)
     driven = codes & {*JAWS, HOLD}
@@ -209,6 +187,44 @@ def rigged(scene: Scene, rig: Rig, motion: Motion) -> Scene:
         contact=replace(scene.contact, rules=(*scene.contact.rules, rule)),
         loads=replace(scene.loads, forces=forces, motions=(*scene.loads.motions, motion)),
     )
+
+
+def _put_beam(shop: _Shop, rig: Rig, stones: Box, mass: float) -> tuple[float, float]:
+    """Put a beam [kg] on the stones, its lug between two jaws; return their height [m], and how far they yield."""
+    (a, c, bottom), (b, d, top) = stones
+    tall, at = top - bottom, bottom + rig.height
+    rise = at - top
+    if rise <= 0:
+        remedy = f'give the height at which the beam is pushed, or head = "{Head.HELD}" or "{Head.FREE}"'
+        raise _misplaced(rig, "below", tall, remedy)
+    middle, half, under = (a + b) / 2, 0.5 * _LUG * rise, top + rise / 2
+    turns = rig.head is Head.TURNS
+    beam: Box = (a, c, top), (b, d, under)
+    lug: Box = (middle - half, c, under), (middle + half, d, under + (rise if turns else tall * _GUIDE))
+    # between edges at the height of the push, or faces that the beam's moment hardly turns
+    jaw = (at - _EDGE * rise, at + _EDGE * rise) if turns else (under + tall * _CLEAR, lug[1][2])
+    volume = sum(float(np.prod(np.subtract(box[1], box[0]))) for box in (beam, lug))
+    shop.make(BEAM, beam, lug, density=mass / volume)
+    shop.make(JAWS[0], ((a, c, jaw[0]), (middle - half, d, jaw[1])))
+    shop.make(JAWS[1], ((middle + half, c, jaw[0]), (b, d, jaw[1])))
+    return jaw[1] - jaw[0], _YIELDS * (1.0 if turns else _STIFFER)
+
+
+def _put_jaw(shop: _Shop, rig: Rig, stones: Box, corners: Sequence[Array]) -> tuple[float, float]:
+    """Put a jaw before the face at the height of the push; return its height [m], and how far it yields."""
+    (_, c, bottom), (b, d, top) = stones
+    tall, at = top - bottom, bottom + rig.height
+    if rig.height > tall:
+        raise _misplaced(rig, "above", tall, "push lower, or put a beam on")
+    wide, edge = _BEYOND * tall, _EDGE * _LUG * tall
+    pushed = [
+        corner for corner in corners if corner[:, 2].min() < at + edge and corner[:, 2].max() > at - edge
+    ]
+    face = min(float(corner[:, 0].min()) for corner in pushed)
+    shop.make(JAWS[0], ((face - wide, c, at - edge), (face, d, at + edge)))
+    if rig.head is Head.HELD:
+        shop.make(HOLD, ((b, c, top - edge), (b + wide, d, top + wide)))
+    return 2 * edge, _YIELDS
 
 
 def _misplaced(rig: Rig, where: str, tall: float, remedy: str) -> SceneError:

@@ -18,6 +18,7 @@ def at_once(threads: int) -> Callable[..., list[Any]]:
     """
 
     def each(work: Callable[..., Any], *given: Any) -> list[Any]:
+        """Return the results of the parts of a work, the first on this thread."""
         parts = list(zip(*given, strict=True))
         waiting = [_pool(threads - 1).submit(work, *part) for part in parts[1:]]
         results = [work(*part) for part in parts[:1]]

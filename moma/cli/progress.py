@@ -52,6 +52,7 @@ class Interruption:
         """Return a listener that tells the stage of the run too."""
 
         def listen(report: "Report") -> None:
+            """Note the stage, and pass the report on."""
             self._stage = report.stage
             listener(report)
 
@@ -176,6 +177,7 @@ def _lines(stages: _Stages) -> "Iterator[Listener]":
     over = threading.Event()
 
     def print_lines() -> None:
+        """Print a line of progress from time to time."""
         pause = _FIRST
         while not over.wait(pause):
             print_found()
@@ -184,12 +186,14 @@ def _lines(stages: _Stages) -> "Iterator[Listener]":
             pause = _EVERY
 
     def listen(report: "Report") -> None:
+        """Note the stage and what was found."""
         stages(report)
         if report.found:
             lines.append(f"[{stages.age()}] {report.found}")
             print_found()
 
     def print_found() -> None:
+        """Print what was found, once the work takes its time."""
         while lines and time.monotonic() - stages.begun >= _FIRST:
             say(lines.popleft())
 
@@ -221,6 +225,7 @@ def _bars(stages: _Stages) -> "Iterator[Listener]":
         tasks: dict[str, TaskID] = {}
 
         def show(report: "Report") -> None:
+            """Move the bar of the stage."""
             stages(report)
             if report.stage not in tasks:
                 tasks[report.stage] = bars.add_task(report.stage, total=report.total, text="", left="")
@@ -247,6 +252,7 @@ def _compilations(stages: _Stages) -> Iterator[None]:
 
     class Compiling(event.Listener):  # type: ignore[misc]
         def on_start(self, event: Any) -> None:
+            """Stop the clock and the garbage collector while kernels are compiled."""
             nonlocal compiled, depth
             compiled, depth = compiled + 1, depth + 1
             gc.disable()
@@ -256,6 +262,7 @@ def _compilations(stages: _Stages) -> Iterator[None]:
                 say("compiling kernels, once after an installation or an update; this takes a minute or two")
 
         def on_end(self, event: Any) -> None:
+            """Let both go on."""
             nonlocal depth
             depth -= 1
             if depth == 0:

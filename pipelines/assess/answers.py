@@ -153,23 +153,23 @@ def fallen(on: RigidAssembly, question: Question, standing: Standing) -> Answer:
     falls = mechanism(on, velocity[on.free])
     kind = "load"
     state = FALLS if standing.outcome is Outcome.COLLAPSED else NOT_DECIDED
-    told: dict[str, Any] = {"name": question.name, "outcome": state, "headline": f"{question.name}: {state}"}
+    facts: dict[str, Any] = {"name": question.name, "outcome": state, "headline": f"{question.name}: {state}"}
     match question:
         case LoadQuestion():
-            told |= {"meaning": str(question.live), "candidate": None, "candidate_lowest": None}
-            told |= {"bound": None, "candidate_converged": None, "limit": 0.0, "limit_lost": 0.0}
+            facts |= {"meaning": str(question.live), "candidate": None, "candidate_lowest": None}
+            facts |= {"bound": None, "candidate_converged": None, "limit": 0.0, "limit_lost": 0.0}
         case ThrustQuestion():
             kind = "settlement" if question.settles else "thrust"
-            told |= {
+            facts |= {
                 "meaning": f"push on {', '.join(question.supports)} [N]",
                 "least": None,
                 "greatest": None,
             }
         case Thickness():
             kind = "thickness"
-            told |= {"meaning": "share to which all joints may shrink", "factor": None, "share": None}
-    told |= {"kind": kind, "mechanism": _moving(on, falls)}
-    return Answer(told, falls, np.zeros((len(on.contacts), 3)))
+            facts |= {"meaning": "share to which all joints may shrink", "factor": None, "share": None}
+    facts |= {"kind": kind, "mechanism": _moving(on, falls)}
+    return Answer(facts, falls, np.zeros((len(on.contacts), 3)))
 
 
 def _load(
@@ -184,7 +184,7 @@ def _load(
     bound = limit_load(on, live)
     candidate = _candidate(on, live, bound)
     limit, lost, kind = _limit(on, live, bound, candidate)
-    told: dict[str, Any] = {
+    facts: dict[str, Any] = {
         "name": question.name,
         "kind": "load",
         "meaning": str(live),
@@ -202,42 +202,46 @@ def _load(
     }
     if isinstance(live, Acceleration):
         changes = sensitivity(on, live, bound, outwards)
-        told["direction"] = list(live.direction)
-        told["sensitivity"] = None if changes is None else asdict(changes)
-    told["without_friction_across"] = _without_friction_across(on, live, limit)
+        facts["direction"] = list(live.direction)
+        facts["sensitivity"] = None if changes is None else asdict(changes)
+    facts["without_friction_across"] = _without_friction_across(on, live, limit)
     if question.whole and np.isfinite(limit.multiplier):
-        told["tilt"] = float(np.degrees(np.arctan(limit.multiplier)))
+        facts["tilt"] = float(np.degrees(np.arctan(limit.multiplier)))
     # where the step from rest decides nothing, only runs can
     if not np.isnan(bound.multiplier) and (question.confirm or kind == _UNSURE):
         first = limit.multiplier if np.isfinite(limit.multiplier) else _FIRST
-        told["confirmation"] = _confirmed(on, confirming(live, first, bound.multiplier), limit)
-        if told["confirmation"]["lost"] is not None:
-            told["outcome"] = "limited"
+        facts["confirmation"] = _confirmed(on, confirming(live, first, bound.multiplier), limit)
+        if facts["confirmation"]["lost"] is not None:
+            facts["outcome"] = "limited"
     if isinstance(live, Acceleration) and np.isfinite(limit.multiplier):
         code = None if question.code is None or site is None else (question.code, site)
-        told["kinematics"], checked = _kinematics(on, live, _checked_limit(limit, lost, candidate), code)
+        facts["kinematics"], checked = _kinematics(on, live, _checked_limit(limit, lost, candidate), code)
         if checked:
-            told["code"] = checked
-    curve = _led(live, limit, told, leading) if question.pushover else None
+            facts["code"] = checked
+    curve = _led(live, limit, facts, leading) if question.pushover else None
     if curve is not None:
-        told["pushover"] = _capacity(curve)
-    told["headline"] = _sentence(told)
-    told["mechanism"] = _moving(on, limit.mechanism)
-    return Answer(told, limit.mechanism, limit.force, curve)
+        facts["pushover"] = _capacity(curve)
+    facts["headline"] = _sentence(facts)
+    facts["mechanism"] = _moving(on, limit.mechanism)
+    return Answer(facts, limit.mechanism, limit.force, curve)
 
 
-def _without_friction_across(on: RigidAssembly, live: LiveLoad, found: LimitLoad) -> float | None:
+def _without_friction_across(on: RigidAssembly, live: LiveLoad, candidate: LimitLoad) -> float | None:
     """Return λ without friction across the line of sliding [-]; None where it is the same.
 
     None, too, where stones do not slide along one line. Zero where the stones do not stand without it.
     """
-    if not np.isfinite(found.multiplier) or len(on.free) > _SOUGHT or not slides_along_one_line(on, found):
+    if (
+        not np.isfinite(candidate.multiplier)
+        or len(on.free) > _SOUGHT
+        or not slides_along_one_line(on, candidate)
+    ):
         return None
-    other = without_friction_across(on, live, found)
+    other = without_friction_across(on, live, candidate)
     if other is None or np.isinf(other.multiplier):
         return None
     multiplier = 0.0 if np.isnan(other.multiplier) else other.multiplier
-    return multiplier if multiplier < (1.0 - _SAME) * found.multiplier else None
+    return multiplier if multiplier < (1.0 - _SAME) * candidate.multiplier else None
 
 
 def _limit(
@@ -253,18 +257,18 @@ def _limit(
     if on.crushing is not None and candidate is not None:
         return candidate, bound.multiplier, _CRUSHED
     lowest = None if candidate is None or not candidate.converged else candidate.lowest.multiplier
-    found = held_limit(on, live, bound, lowest)
-    if found.lost == 0.0:
+    confirmed = held_limit(on, live, bound, lowest)
+    if confirmed.lost == 0.0:
         return candidate or bound, bound.multiplier, _UNSURE
     limit = replace(
         bound,
         flow=Flow.COULOMB,
-        multiplier=found.held,
-        force=found.force,
-        mechanism=found.mechanism or bound.mechanism,
-        programmes=found.problems,
+        multiplier=confirmed.held,
+        force=confirmed.force,
+        mechanism=confirmed.mechanism or bound.mechanism,
+        programmes=confirmed.problems,
     )
-    return limit, found.lost, _BY_RUNS
+    return limit, confirmed.lost, _BY_RUNS
 
 
 def _checked_limit(limit: LimitLoad, lost: float, candidate: LimitLoad | None) -> LimitLoad:
@@ -274,13 +278,13 @@ def _checked_limit(limit: LimitLoad, lost: float, candidate: LimitLoad | None) -
     return candidate.lowest
 
 
-def _led(live: LiveLoad, found: LimitLoad, told: dict[str, Any], leading: Lead) -> Pushover | None:
+def _led(live: LiveLoad, limit: LimitLoad, facts: dict[str, Any], leading: Lead) -> Pushover | None:
     """Return the capacity curve; None where no mechanism moves along the load."""
-    if not np.isfinite(found.multiplier):
+    if not np.isfinite(limit.multiplier):
         return None
-    oscillator = told.get("kinematics")
+    oscillator = facts.get("kinematics")
     try:
-        return leading(live, found, None if oscillator is None else oscillator["capacity"] or None)
+        return leading(live, limit, None if oscillator is None else oscillator["capacity"] or None)
     except SolverError:
         return None
 
@@ -319,13 +323,13 @@ def _candidate(on: RigidAssembly, live: LiveLoad, bound: LimitLoad) -> LimitLoad
     return candidate if np.isfinite(candidate.multiplier) else None
 
 
-def _confirmed(on: RigidAssembly, found: Confirmation, candidate: LimitLoad) -> dict[str, Any]:
-    lost = found.collapse
+def _confirmed(on: RigidAssembly, confirmation: Confirmation, candidate: LimitLoad) -> dict[str, Any]:
+    lost = confirmation.collapse
     alike = None if lost is None else likeness(on, candidate.mechanism, lost.displacement)
     return {
-        "held": found.held or None,
-        "lost": _number(found.lost),
-        "agrees": found.agrees(candidate.multiplier),
+        "held": confirmation.held or None,
+        "lost": _number(confirmation.lost),
+        "agrees": confirmation.agrees(candidate.multiplier),
         "likeness": None if alike is None else asdict(alike),
         "runs": [
             {
@@ -334,20 +338,21 @@ def _confirmed(on: RigidAssembly, found: Confirmation, candidate: LimitLoad) -> 
                 "steps": trial.steps,
                 "unsolved": trial.unsolved,
             }
-            for trial in found.trials
+            for trial in confirmation.trials
         ],
         "undecided": sum(
-            not trial.outcome.rests and trial.outcome is not Outcome.COLLAPSED for trial in found.trials
+            not trial.outcome.rests and trial.outcome is not Outcome.COLLAPSED
+            for trial in confirmation.trials
         ),
     }
 
 
 def _kinematics(
-    on: RigidAssembly, live: Acceleration, found: LimitLoad, code: tuple[str, Site] | None
+    on: RigidAssembly, live: Acceleration, limit: LimitLoad, code: tuple[str, Site] | None
 ) -> tuple[dict[str, Any] | None, dict[str, Any] | None]:
     """Return the equivalent oscillator of a mechanism, and its check by a code."""
     try:
-        oscillator = kinematics(on, live, found)
+        oscillator = kinematics(on, live, limit)
     except SolverError:
         return None, None
     told = {
@@ -366,50 +371,50 @@ def _kinematics(
 
 
 def _checked(on: RigidAssembly, oscillator: Kinematics, code: str, site: Site) -> dict[str, Any]:
-    found = check_code(code, site, oscillator, float(np.linalg.norm(on.model.gravity(0.0))))
+    limit = check_code(code, site, oscillator, float(np.linalg.norm(on.model.gravity(0.0))))
     return {
-        "code": found.code,
-        "caution": found.caution,
-        "passed": found.passed,
-        "values": list(found.values),
-        "checks": [asdict(check) | {"ratio": check.ratio, "passed": check.passed} for check in found.checks],
+        "code": limit.code,
+        "caution": limit.caution,
+        "passed": limit.passed,
+        "values": list(limit.values),
+        "checks": [asdict(check) | {"ratio": check.ratio, "passed": check.passed} for check in limit.checks],
     }
 
 
 def _thrust(on: RigidAssembly, question: ThrustQuestion) -> Answer:
-    found = thrust(on, question.supports, question.direction)
-    x, y, z = found.direction
-    told: dict[str, Any] = {
+    thrusts = thrust(on, question.supports, question.direction)
+    x, y, z = thrusts.direction
+    facts: dict[str, Any] = {
         "name": question.name,
         "kind": "settlement" if question.settles else "thrust",
         "meaning": f"push on {', '.join(question.supports)} along ({x:.3g}, {y:.3g}, {z:.3g}) [N]",
-        "least": _number(found.least.value),
-        "greatest": _number(found.greatest.value),
+        "least": _number(thrusts.least.value),
+        "greatest": _number(thrusts.greatest.value),
         "bounds_kind": "over all states of equilibrium: rigorous, whatever the flow",
-        "outcome": _outcome(found.least.value),
+        "outcome": _outcome(thrusts.least.value),
     }
-    told["headline"] = _range(told)
-    told["mechanism"] = _moving(on, found.least.mechanism)
-    return Answer(told, found.least.mechanism, found.least.force)
+    facts["headline"] = _range(facts)
+    facts["mechanism"] = _moving(on, thrusts.least.mechanism)
+    return Answer(facts, thrusts.least.mechanism, thrusts.least.force)
 
 
 def _thickness(on: RigidAssembly, question: Thickness) -> Answer:
-    found = geometric_safety(on)
-    falls = np.isnan(found.share)
-    told: dict[str, Any] = {
+    safety = geometric_safety(on)
+    falls = np.isnan(safety.share)
+    facts: dict[str, Any] = {
         "name": question.name,
         "kind": "thickness",
         "meaning": "share to which all joints may shrink about their centres, weights unchanged",
-        "factor": _number(found.factor),
-        "share": _number(found.share),
-        "outcome": FALLS if falls else "stands" if found.share else "nothing limits it",
+        "factor": _number(safety.factor),
+        "share": _number(safety.share),
+        "outcome": FALLS if falls else "stands" if safety.share else "nothing limits it",
     }
-    factor = "nothing limits it" if not falls and not found.share else f"{found.factor:.4g}"
-    told["headline"] = (
+    factor = "nothing limits it" if not falls and not safety.share else f"{safety.factor:.4g}"
+    facts["headline"] = (
         f"{question.name}: {FALLS}" if falls else f"{question.name}: geometric factor of safety {factor}"
     )
-    told["mechanism"] = _moving(on, found.mechanism)
-    return Answer(told, found.mechanism, found.force)
+    facts["mechanism"] = _moving(on, safety.mechanism)
+    return Answer(facts, safety.mechanism, safety.force)
 
 
 def _moving(on: RigidAssembly, mechanism: Mechanism) -> dict[str, Any]:
@@ -444,86 +449,85 @@ def _outcome(value: float) -> str:
     return "nothing limits it" if np.isinf(value) else "limited"
 
 
-def _sentence(one: dict[str, Any]) -> str:
-    if one["outcome"] == FALLS:
-        return f"{one['name']}: λ = 0, as no forces in its joints balance the dead load"
-    if one["limit"] is None:
-        return f"{one['name']}: {one['outcome']}{_dynamics(one)}"
-    lost = "" if one["limit_lost"] is None else f"; {one['limit_lost']:.4g} is lost"
+def _sentence(facts: dict[str, Any]) -> str:
+    if facts["outcome"] == FALLS:
+        return f"{facts['name']}: λ = 0, as no forces in its joints balance the dead load"
+    if facts["limit"] is None:
+        return f"{facts['name']}: {facts['outcome']}{_dynamics(facts)}"
+    lost = "" if facts["limit_lost"] is None else f"; {facts['limit_lost']:.4g} is lost"
     how = {_CRUSHED: "candidate, as stones crush", _UNSURE: "NOT SURE, candidate or bound"}
-    stands = how.get(one["limit_kind"], f"held{lost}")
-    bound = "no bound" if one["bound"] is None else f"bound {one['bound']:.4g}"
-    text = f"{one['name']}: λ = {one['limit']:.4g} ({stands}), {bound}{_caution(one)}"
-    across = one["without_friction_across"]
+    stands = how.get(facts["limit_kind"], f"held{lost}")
+    bound = "no bound" if facts["bound"] is None else f"bound {facts['bound']:.4g}"
+    text = f"{facts['name']}: λ = {facts['limit']:.4g} ({stands}), {bound}{_caution(facts)}"
+    across = facts["without_friction_across"]
     if across is not None:
         text += f"; without friction across the line of sliding, as wedges are computed, λ = {across:.4g}"
-    angle = f", a tilt of {one['tilt']:.3g}°" if "tilt" in one else ""
-    return f"{text}{angle}{_dynamics(one)}{_collapse(one)}{_verdict(one)}"
+    angle = f", a tilt of {facts['tilt']:.3g}°" if "tilt" in facts else ""
+    return f"{text}{angle}{_dynamics(facts)}{_collapse(facts)}{_verdict(facts)}"
 
 
-def _caution(one: dict[str, Any]) -> str:
+def _caution(facts: dict[str, Any]) -> str:
     """Return what other forces of the same friction hold, if that is less, or that they were not sought."""
-    if one["bound"] is None:
+    if facts["bound"] is None:
         return ""
-    if not one["candidate_sought"]:
+    if not facts["candidate_sought"]:
         return "; whether other forces hold less was not sought among so many stones"
-    if one["candidate"] is None:
+    if facts["candidate"] is None:
         return "; whether other forces hold less was not found"
-    if one["limit"] <= _ONE * one["candidate_lowest"]:
+    if facts["limit"] <= _ONE * facts["candidate_lowest"]:
         return ""
-    stood = "" if one["candidate_converged"] else ", NOT CONVERGED"
-    return f"; other forces of the same friction hold no more than {one['candidate_lowest']:.4g}{stood}"
+    stood = "" if facts["candidate_converged"] else ", NOT CONVERGED"
+    return f"; other forces of the same friction hold no more than {facts['candidate_lowest']:.4g}{stood}"
 
 
-def _dynamics(one: dict[str, Any]) -> str:
-    if "confirmation" not in one:
+def _dynamics(facts: dict[str, Any]) -> str:
+    if "confirmation" not in facts:
         return ""
-    found = one["confirmation"]
-    held = "nothing held" if found["held"] is None else f"held at {found['held']:.4g}"
-    lost = "nothing lost" if found["lost"] is None else f"lost at {found['lost']:.4g}"
+    confirmation = facts["confirmation"]
+    held = "nothing held" if confirmation["held"] is None else f"held at {confirmation['held']:.4g}"
+    lost = "nothing lost" if confirmation["lost"] is None else f"lost at {confirmation['lost']:.4g}"
     said = ""
-    if one["limit"] is not None:
-        said = " CONFIRMED" if found["agrees"] else " NOT CONFIRMED"
+    if facts["limit"] is not None:
+        said = " CONFIRMED" if confirmation["agrees"] else " NOT CONFIRMED"
     text = f"; by the dynamics{said}: {held}, {lost}"
-    if found["likeness"] is None:
+    if confirmation["likeness"] is None:
         return text
-    cosine = found["likeness"]["cosine"]
+    cosine = confirmation["likeness"]["cosine"]
     return f"{text}, falling {'as' if cosine >= _ALIKE else 'NOT AS'} the mechanism (cosine {cosine:.2f})"
 
 
-def _collapse(one: dict[str, Any]) -> str:
-    if "pushover" not in one:
+def _collapse(facts: dict[str, Any]) -> str:
+    if "pushover" not in facts:
         return ""
-    found = one["pushover"]
-    doubt = f", {found['unsolved']} of {found['steps']} steps NOT SOLVED" if found["unsolved"] else ""
-    if found["peak"] is None:
-        return (
-            f"; led to collapse: moves at {found['onset']:.4g}, then stones hit one another throughout{doubt}"
-        )
+    pushed = facts["pushover"]
+    doubt = f", {pushed['unsolved']} of {pushed['steps']} steps NOT SOLVED" if pushed["unsolved"] else ""
+    if pushed["peak"] is None:
+        return f"; led to collapse: moves at {pushed['onset']:.4g}, then stones hit one another throughout{doubt}"
     ways = [
-        f"{name} after {1e3 * found[key]:.3g} mm"
+        f"{name} after {1e3 * pushed[key]:.3g} mm"
         for key, name in (("dropped", "a fifth lost"), ("capacity", "all lost"))
-        if found[key] is not None
+        if pushed[key] is not None
     ]
-    led = ", ".join(ways) or f"less than a fifth lost up to {1e3 * found['farthest']:.3g} mm"
-    moves = f"moves at {found['onset']:.4g}, then bears {found['peak']:.4g}"
-    return f"; led to collapse: {moves}, {led} of {found['control']}{doubt}"
+    led = ", ".join(ways) or f"less than a fifth lost up to {1e3 * pushed['farthest']:.3g} mm"
+    moves = f"moves at {pushed['onset']:.4g}, then bears {pushed['peak']:.4g}"
+    return f"; led to collapse: {moves}, {led} of {pushed['control']}{doubt}"
 
 
-def _verdict(one: dict[str, Any]) -> str:
-    if "code" not in one:
+def _verdict(facts: dict[str, Any]) -> str:
+    if "code" not in facts:
         return ""
-    found = one["code"]
-    caution = f" ({found['caution']})" if found["caution"] else ""
-    return f"; {found['code']}: {'passed' if found['passed'] else 'NOT PASSED'}{caution}"
+    check = facts["code"]
+    caution = f" ({check['caution']})" if check["caution"] else ""
+    return f"; {check['code']}: {'passed' if check['passed'] else 'NOT PASSED'}{caution}"
 
 
-def _range(one: dict[str, Any]) -> str:
-    if one["outcome"] == FALLS:
-        return f"{one['name']}: {FALLS}"
+def _range(facts: dict[str, Any]) -> str:
+    if facts["outcome"] == FALLS:
+        return f"{facts['name']}: {FALLS}"
     least, greatest = (
-        "without limit" if one[end] is None else f"{1e-3 * one[end]:.4g} kN" for end in ("least", "greatest")
+        "without limit" if facts[end] is None else f"{1e-3 * facts[end]:.4g} kN"
+        for end in ("least", "greatest")
     )
-    if one["kind"] == "settlement":
-        return f"{one['name']}: the push on the support falls to {least} as it yields"
-    return f"{one['name']}: from {least} to {greatest}"
+    if facts["kind"] == "settlement":
+        return f"{facts['name']}: the push on the support falls to {least} as it yields"
+    return f"{facts['name']}: from {least} to {greatest}"

@@ -6,12 +6,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from sqlalchemy.orm import Session
 
 from archmodel.database.session import open_database
 from archmodel.relations.members import members_of_structures
 from archmodel.relations.zones_and_courses import course_code
-from archmodel.store.run_record import StoneResult
+from archmodel.store.run_record import StoneResult, StructureValues
 from archmodel.tables.entries import latest_entry
+from mechanics.arrays import Array
 from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.model.model import build_model
 from mechanics.results.forecast.plan import loose_blocks
@@ -22,8 +24,8 @@ from pipelines.draw.elevations.movement import draw_bed_movement, draw_misfit
 from pipelines.draw.elevations.sheet import require_figures
 from pipelines.ingest.records import surveyed_block
 from pipelines.reports.movement import write_comparison
-from pipelines.reports.page.known import known_stones
-from pipelines.reports.page.model import Lines
+from pipelines.reports.page.known import Known, known_stones
+from pipelines.reports.page.model import Lines, Model
 from pipelines.reports.page.scenes import run_model
 from pipelines.reports.page.surveys import bed_lines
 from pipelines.results.folder import check_replaceable, replacing, source_of
@@ -34,7 +36,7 @@ from pipelines.run.assemble import Assembly, assemble_stones
 from pipelines.run.inputs import run_inputs
 from pipelines.run.record import run_record, store_record, versions
 from pipelines.run.soundness import problems_of, refuse_unsound
-from pipelines.scene.file import read_scene
+from pipelines.scene.file import SceneFile, read_scene
 from pipelines.scene.selection import StoneModel, select_groups, select_stones
 from pipelines.scene.stages import refuse_stages
 from survey.quality.departures.beds import measure_beds
@@ -114,16 +116,10 @@ def compare(
         with database.session(read_only=True) as session:
             as_of, models = latest_entry(session), select_stones(scene, session)
             progress(Progress("blocks", 0, None, f"closing the joints of {len(models)} stones"))
-            groups = select_groups(scene, session, models)
-            assembly = assemble_stones(scene, models, groups)
-            inputs = run_inputs(scene, assembly, groups, session)
-            codes = [model.record.code for model in models]
-            assembly = replace(assembly, structures=members_of_structures(session, codes))
-            known = known_stones(session, codes)
+            assembly, inputs, known = _assembled(scene, models, session)
         built = build_model(assembly.scene, lambda done, total: progress(Progress("mesh", done, total)))
-        problems = problems_of(scene, assembly, loose_blocks(*built))
         if not accept_unsound:
-            refuse_unsound(problems, str(path))
+            refuse_unsound(problems_of(scene, assembly, loose_blocks(*built)), str(path))
         result = simulate(assembly.scene, progress, lambda: False, built)
         stones, facades = measured_stones(models)
         moved = stone_motions(result.bodies, assembly.origin).displacement
@@ -131,29 +127,56 @@ def compare(
         plumb = compare_plumb(stones, facades, moved, battered)
         progress(Progress("write", 0, 1, "pictures"))
         structures = structure_results(result, assembly.structures)
-        of_courses = {structure.code: structure.values for structure in structures}
         summary = _summary(result, assembly, courses, plumb, battered)
-        for course in summary["courses"]:
-            course["results"] = of_courses.get(course_code(course["zone"], course["course"]), {})
+        _add_results(summary["courses"], structures)
         summary["inputs"] = {title: list(lines) for title, lines in inputs.items()}
-        values = _values(courses, plumb)
-        results = tuple(_with_values(result, values.get(result.code, {})) for result in stone_results(result))
-        lines = [
-            Lines(one.name, one.colour, [line - assembly.origin for line in one.lines])
-            for one in bed_lines(courses, {facade.name: facade.frame.axes[2] for facade in facades})
-        ]
+        values, lines = _values(courses, plumb), _lines(courses, facades, assembly.origin)
+        results = tuple(_with_values(stone, values.get(stone.code, {})) for stone in stone_results(result))
         model = run_model(result, results, assembly.towards, assembly.origin, known, lines, structures)
         with replacing(folder, INDEX) as fresh:
             _draw(fresh, facades, stones, courses)
-            write_comparison(fresh / REPORT, summary, model)
-            (fresh / "scene.toml").write_text(scene.text, encoding="utf-8")
-            summary["source"] = source_of([path], fresh)
-            summary["files"] = sorted([INDEX, *(entry.name for entry in fresh.iterdir())])
-            (fresh / INDEX).write_text(as_json(summary), encoding="utf-8")
+            _write(fresh, scene, summary, model)
         kept = summarise(result, version=versions()["moma"], seconds=result.wall_time, structures=structures)
         run = store_record(database, folder, run_record(result, results, scene, assembly, kept, as_of))
     progress(Progress("write", 1, 1))
     return SurveyComparison(folder, summary, run)
+
+
+def _assembled(
+    scene: SceneFile, models: tuple[StoneModel, ...], session: Session
+) -> tuple[Assembly, Mapping[str, Sequence[str]], Known]:
+    """Return the scene of the stones, with their structures; its inputs; and what is known of the stones."""
+    groups = select_groups(scene, session, models)
+    assembly = assemble_stones(scene, models, groups)
+    inputs = run_inputs(scene, assembly, groups, session)
+    codes = [model.record.code for model in models]
+    assembly = replace(assembly, structures=members_of_structures(session, codes))
+    return assembly, inputs, known_stones(session, codes)
+
+
+def _add_results(courses: Sequence[dict[str, Any]], structures: Sequence[StructureValues]) -> None:
+    """Add the results of a run to each course that has some."""
+    of_courses = {structure.code: structure.values for structure in structures}
+    for course in courses:
+        course["results"] = of_courses.get(course_code(course["zone"], course["course"]), {})
+
+
+def _lines(courses: Sequence[CourseMovement], facades: Sequence[Facade], origin: Array) -> list[Lines]:
+    """Return the lines of the beds in the frame of the scene."""
+    outwards = {facade.name: facade.frame.axes[2] for facade in facades}
+    return [
+        Lines(bed.name, bed.colour, [line - origin for line in bed.lines])
+        for bed in bed_lines(courses, outwards)
+    ]
+
+
+def _write(folder: Path, scene: SceneFile, summary: dict[str, Any], model: Model) -> None:
+    """Write report, scene and index into a folder, and list all of its files in the summary."""
+    write_comparison(folder / REPORT, summary, model)
+    (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
+    summary["source"] = source_of([scene.document.path], folder)
+    summary["files"] = sorted([INDEX, *(entry.name for entry in folder.iterdir())])
+    (folder / INDEX).write_text(as_json(summary), encoding="utf-8")
 
 
 def measured_stones(models: Sequence[StoneModel]) -> tuple[tuple[StoneQuality, ...], tuple[Facade, ...]]:

@@ -16,7 +16,7 @@ from survey.clouds.extras import optional
 from survey.clouds.points.chunks import PointCloud
 from survey.clouds.points.reading import open_points
 from survey.clouds.views.orthophoto import STEP, Picture, find_wall, paint_wall, write_picture
-from survey.clouds.views.sections import Section, contour, section_plane
+from survey.clouds.views.sections import Section, SectionPlane, contour, section_plane
 from survey.clouds.wall import read_wall, wall_lines
 
 __all__ = ["INDEX", "DrawnCloud", "DrawnSection", "draw_views"]
@@ -95,20 +95,14 @@ def draw_views(
     UsageError, SurveyError
         if a file cannot be read, or a value is out of its range
     """
-    for name, value, most in (
-        ("--pixel", pixel, 1.0),
-        ("--slab", slab, 3.0),
-        ("--thickness", thickness, 1.0),
-    ):
-        if not 1e-4 <= value <= most:
-            remedy = f"give it in metres, from 0.0001 to {most:g}"
-            raise UsageError(f"is {value:g} m", where=name, remedy=remedy)
+    _check_lengths(("--pixel", pixel, 1.0), ("--slab", slab, 3.0), ("--thickness", thickness, 1.0))
     check_replaceable(folder, INDEX)
     if sections:
         optional("ezdxf", "sections as DXF")
     clouds = [open_points(path) for path in files]
 
     def listen(stage: str, done: int, total: int | None) -> None:
+        """Report how many points are read."""
         progress(Progress(stage, done, total))
 
     frame = find_wall(clouds, listen) if wall is None else read_wall(wall)
@@ -123,20 +117,32 @@ def draw_views(
         lowest = write_picture(picture, fresh / "wall.png", fresh / "depth.png")
         (fresh / "wall.toml").write_text(wall_lines(frame), encoding="utf-8")
         if planes:
-            lines = {cut_section.plane.name: cut_section.lines(_THINNED * cell) for cut_section in cut}
-            for plane in planes:
-                if plane.name.startswith("d"):
-                    lines[plane.name] = contour(picture, plane, _SHORTEST * pixel, 0.5 * pixel)
+            lines = {section.plane.name: section.lines(_THINNED * cell) for section in cut}
+            lines |= _contours(picture, planes, pixel)
             _write_sections(lines, fresh)
             names += ["sections.dxf", "sections.csv"]
-            drawn = [
-                DrawnSection(name, len(section_lines), _length(section_lines))
-                for name, section_lines in lines.items()
-            ]
+            drawn = [DrawnSection(name, len(runs), _length(runs)) for name, runs in lines.items()]
         made = _report(picture, read, shown, lowest, drawn, clouds, folder, names)
         content = asdict(made) | {"files": [INDEX, *names], "clouds": [str(path) for path in files]}
         (fresh / INDEX).write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
     return made
+
+
+def _contours(picture: Picture, planes: Sequence[SectionPlane], pixel: float) -> dict[str, list[Array]]:
+    """Return the contours of the depths in those of the planes that are parallel to the wall."""
+    return {
+        plane.name: contour(picture, plane, _SHORTEST * pixel, 0.5 * pixel)
+        for plane in planes
+        if plane.name.startswith("d")
+    }
+
+
+def _check_lengths(*lengths: tuple[str, float, float]) -> None:
+    """Refuse an option whose length is out of its range, given its name, its value and its upper bound [m]."""
+    for name, value, most in lengths:
+        if not 1e-4 <= value <= most:
+            remedy = f"give it in metres, from 0.0001 to {most:g}"
+            raise UsageError(f"is {value:g} m", where=name, remedy=remedy)
 
 
 def _report(

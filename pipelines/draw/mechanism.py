@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.arrays import Array
+from mechanics.arrays import Array, Ints
 from mechanics.limit.assembly import RigidAssembly
 from mechanics.limit.joints import Resultants
 from mechanics.limit.limit_load import Mechanism
@@ -42,24 +42,7 @@ def draw_mechanisms(
     MissingLibraryError : VTK cannot be loaded or cannot draw on this machine
     """
     corners = np.concatenate([block.vertices for block in blocks])
-    starts = np.cumsum([0, *(len(block.vertices) for block in blocks)])
-    owner = np.repeat(np.arange(len(blocks)), np.diff(starts))
-    triangles = np.concatenate(
-        [
-            triangulate(Solid(block.code, block.vertices, block.faces)) + start
-            for block, start in zip(blocks, starts[:-1], strict=True)
-        ]
-    ).astype(np.int64)
-    edges = np.concatenate(
-        [
-            [
-                (a + start, b + start)
-                for face in block.faces
-                for a, b in zip(face, face[1:] + face[:1], strict=True)
-            ]
-            for block, start in zip(blocks, starts[:-1], strict=True)
-        ]
-    )
+    owner = np.repeat(np.arange(len(blocks)), [len(block.vertices) for block in blocks])
     way = _DRAWN_DISPLACEMENT * float(np.ptp(corners, axis=0).max())
     moved, places, forces, kerns = [], [], [], []
     pictures: list[dict[str, Any]] = []
@@ -86,14 +69,33 @@ def draw_mechanisms(
         forces.append(empty if carried is None else carried.force)
         kerns.append(np.zeros(len(empty), dtype=bool) if carried is None else carried.kern <= 1.0)
     if pictures:
+        triangles, edges = _triangles_and_edges(blocks)
         surface = MechanismSurface(
             corners,
             np.stack(moved),
             triangles,
-            np.sort(edges, axis=1),
+            edges,
             np.stack(places),
             np.stack(forces),
             np.stack(kerns),
         )
         draw_apart("pipelines.draw.offscreen.mechanism", surface, pictures)
     return [Path(picture["path"]).name for picture in pictures]
+
+
+def _triangles_and_edges(blocks: Sequence[Block]) -> tuple[Ints, Ints]:
+    """Return the triangles (nt, 3) and the edges (ne, 2) of all stones, as numbers of their corners."""
+    starts = np.cumsum([0, *(len(block.vertices) for block in blocks[:-1])])
+    triangles = [
+        triangulate(Solid(block.code, block.vertices, block.faces)) + start
+        for block, start in zip(blocks, starts, strict=True)
+    ]
+    edges = [
+        [
+            (a + start, b + start)
+            for face in block.faces
+            for a, b in zip(face, face[1:] + face[:1], strict=True)
+        ]
+        for block, start in zip(blocks, starts, strict=True)
+    ]
+    return np.concatenate(triangles).astype(np.int64), np.sort(np.concatenate(edges), axis=1)

@@ -185,29 +185,27 @@ def run_geology(
     check_replaceable(folder, source=() if overwrite else (Path(path),))
     summary: dict[str, Any] = {}
     rows: dict[str, dict[str, Array]] = {}
-    number: int | None = None
     # a database that cannot be opened is told before anything is deposited
     with nullcontext() if url is None else open_database(url) as database:
         sample = prepare(scene, Path(samples) if samples is not None else folder.parent / _SAMPLES, progress)
         planar = planar_scene(scene, sample)
         observation = _observation(scene, sample, planar, folder / UNFINISHED)
-        observer = PlanarObserver(scene.output.fields_every, observation.fields, _drawn_steps(scene))
-        observers = (PlanarObserver(scene.output.every, observation.row), observer)
+        every, observers = scene.output.every, _observers(scene, observation)
 
         def write(fresh: Path, result: PlanarResult, archive: UnfinishedRun) -> None:
+            """Write the results of a run, and keep what they say."""
             progress(Progress("write", 0, 1, "results"))
-            rows.update(observation.rows(scene.output.every))
-            observed = Observations(
-                rows, observation.experiment_rows(scene.output.every), observation.instants(observer.wants)
-            )
+            rows.update(observation.rows(every))
+            instants = observation.instants(observers[-1].wants)
+            observed = Observations(rows, observation.experiment_rows(every), instants)
             summary.update(write_results(fresh, scene, sample, result, observed, archive))
 
         with scene.document.at(kind):
             result, _ = run_planar(
                 planar, folder, resume, scene.output.checkpoint, progress, stop, observers, write
             )
-        if database is not None:
-            number = store_record(database, folder, _geology_record(scene, result, summary, rows))
+        record = _geology_record(scene, result, summary, rows)
+        number = None if database is None else store_record(database, folder, record)
     return GeologyReport(folder, summary, tuple(summary["warnings"]), number)
 
 
@@ -217,9 +215,11 @@ def _read(path: str | Path, kind: str) -> GeologyScene:
     return read_geology(path, kind)
 
 
-def _drawn_steps(scene: GeologyScene) -> frozenset[int]:
-    """Return the steps of which figures are drawn."""
-    return frozenset(round(time / scene.time.step) for time in scene.output.figures_at)
+def _observers(scene: GeologyScene, observation: ObservedRun) -> tuple[PlanarObserver, PlanarObserver]:
+    """Return the observers of rows and of fields; fields are also taken at the instants that are drawn."""
+    drawn = frozenset(round(time / scene.time.step) for time in scene.output.figures_at)
+    fields = PlanarObserver(scene.output.fields_every, observation.fields, drawn)
+    return PlanarObserver(scene.output.every, observation.row), fields
 
 
 def _followed_layers(scene: GeologyScene, sample: PreparedSample) -> Ints | None:

@@ -80,23 +80,10 @@ def ingest(
     sources = survey_sources(paths, format)
     surveys = [source.path for source in sources]
     rejects = None if isinstance(keep_going, bool) else Path(keep_going)
-    if rejects is not None and len(surveys) > 1:
-        raise UsageError(
-            f"one file of rejects for {len(surveys)} survey files", remedy="ingest one file at a time"
-        )
-    if rules and format != "solids":
-        remedy = "give it with --format solids; surveys give the kind of each stone"
-        raise UsageError(f"a rule for solids with format {format}", where=rules[0].option, remedy=remedy)
-    outlined = format in ("cloud", "masks")
-    targets = [
-        rejects or (outline_rejects_path(survey, options) if outlined else default_path(survey))
-        for survey in surveys
-    ]
-    if keep_going and outlined:
-        for target in targets:
-            check_outline_rejects(target)
-    elif keep_going:
-        check_targets(targets, [file for source in sources for file in source.files])
+    _refuse_contradictions(rejects, len(surveys), rules, format)
+    targets = [rejects or _rejects_path(survey, format, options) for survey in surveys]
+    if keep_going:
+        _check_targets(targets, sources, format)
     with ExitStack() as stack:
         _open_if_there(url, stack)
         check_kinds(rules)
@@ -110,26 +97,59 @@ def ingest(
             _check_codes(tallies, spools)
         for path, target, tally in zip(surveys, targets, tallies, strict=True):
             if tally.refused:
-                stations = _listed_stations(tally, options) if format in _LISTS else []
-                if outlined:
-                    text = outline_rejects(path, options, tally.refused)
-                else:
-                    header, sheet = tally.stream.header, options.sheet
-                    text = rejects_text(path, format, tally.refused, stations, header=header, sheet=sheet)
-                stack.enter_context(_published(target, text))
+                stack.enter_context(_published(target, _rejects(path, format, tally, options)))
         with open_database(url, lock_timeout=_PATIENCE) as database, database.session() as session:
-            solids = KnownSolids()
-            for tally, spool in zip(tallies, spools, strict=True):
-                stones = _with_progress(spool, tally, progress)
-                # stones measured again keep their numbers, so that their solids cannot be numbered in advance
-                _store(session, tally, stones if again else _kept(stones, session, solids), again)
-            progress(Progress("relate", 0, None))
-            relate(session, only=[number for tally in tallies for number in tally.stored], solids=solids)
+            _store_all(session, tallies, spools, again, progress)
         reports = tuple(
             tally.report(target if tally.refused else None)
             for tally, target in zip(tallies, targets, strict=True)
         )
     return IngestReport(database.url, reports)
+
+
+def _refuse_contradictions(rejects: Path | None, count: int, rules: Sequence[KindRule], format: str) -> None:
+    """Refuse one file of rejects for several files, and rules of solids for other stones."""
+    if rejects is not None and count > 1:
+        raise UsageError(f"one file of rejects for {count} survey files", remedy="ingest one file at a time")
+    if rules and format != "solids":
+        remedy = "give it with --format solids; surveys give the kind of each stone"
+        raise UsageError(f"a rule for solids with format {format}", where=rules[0].option, remedy=remedy)
+
+
+def _store_all(
+    session: Session, tallies: Sequence[Tally], spools: Sequence[Spool], again: bool, progress: Listener
+) -> None:
+    """Store the stones of all surveys, and relate them."""
+    solids = KnownSolids()
+    for tally, spool in zip(tallies, spools, strict=True):
+        stones = _with_progress(spool, tally, progress)
+        # stones measured again keep their numbers, so that their solids cannot be numbered in advance
+        _store(session, tally, stones if again else _kept(stones, session, solids), again)
+    progress(Progress("relate", 0, None))
+    relate(session, only=[number for tally in tallies for number in tally.stored], solids=solids)
+
+
+def _rejects_path(survey: Path, format: str, options: ReadingOptions | None) -> Path:
+    """Return the file of the rejects of a survey, beside it."""
+    return outline_rejects_path(survey, options) if format in _OUTLINED else default_path(survey)
+
+
+def _check_targets(targets: Sequence[Path], sources: Sequence[Source], format: str) -> None:
+    """Refuse files of rejects that would replace a file of the user's."""
+    if format in _OUTLINED:
+        for target in targets:
+            check_outline_rejects(target)
+    else:
+        check_targets(targets, [file for source in sources for file in source.files])
+
+
+def _rejects(path: Path, format: str, tally: Tally, options: ReadingOptions) -> str:
+    """Return the stones of a survey that were refused, with the reasons, in the survey's own format."""
+    if format in _OUTLINED:
+        return outline_rejects(path, options, tally.refused)
+    stations = _listed_stations(tally, options) if format in _LISTS else []
+    header, sheet = tally.stream.header, options.sheet
+    return rejects_text(path, format, tally.refused, stations, header=header, sheet=sheet)
 
 
 def _open_if_there(url: str, stack: ExitStack) -> None:
@@ -152,6 +172,7 @@ def _check_codes(tallies: Sequence[Tally], spools: Sequence[Spool]) -> None:
 
 
 _LISTS = ("csv", "pnezd", "penzd", "gsi")
+_OUTLINED = ("cloud", "masks")
 
 
 def _listed_stations(tally: Tally, options: ReadingOptions | None) -> list[int]:

@@ -193,6 +193,7 @@ def _table(path: Path, columns: str | None, sheet: str | None) -> tuple[Sequence
     chosen = {plain(part.partition("=")[2]) for part in (columns or "").split(",") if "=" in part}
 
     def is_row(cells: Sequence[str], commas: bool) -> bool:
+        """Return whether cells are values, not names of columns."""
         if len(cells) < 2:
             return False
         known = sum(_names_column(cell) or plain(cell) in chosen for cell in cells)

@@ -152,19 +152,20 @@ def write_report(
 
 def _summary_rows(summary: Mapping[str, Any], stones: Sequence[StoneResult]) -> list[tuple[str, str]]:
     bodies, stress, reaction = summary["bodies"], summary["von_mises"], summary["reaction"]
+    labels = quantities_of("summary")
     rows = [
         ("Stones", ", ".join(f"{count} {name}" for name, count in bodies.items())),
-        ("Contact points", str(summary["contacts"])),
-        ("Weight carried", kilonewtons(reaction["weight"])),
-        ("Reaction of the supports", kilonewtons(reaction["total_vertical"])),
-        ("Largest displacement", _displacement(summary)),
+        (labels["contacts"].label, str(summary["contacts"])),
+        (labels["reaction.weight"].label, kilonewtons(reaction["weight"])),
+        (labels["reaction.total_vertical"].label, kilonewtons(reaction["total_vertical"])),
+        (labels["displacement.max"].label, _displacement(summary)),
         *_in_wall(summary),
     ]
     if stress is not None:
         rows += [
-            ("Von Mises stress, exceeded in 1 % of the volume", megapascals(stress["p99"])),
-            ("Von Mises stress, mean", megapascals(stress["mean"])),
-            ("Von Mises stress, largest", f"{megapascals(stress['max'])}{_largest_error(stones)}"),
+            (labels["von_mises.p99"].label, megapascals(stress["p99"])),
+            (labels["von_mises.mean"].label, megapascals(stress["mean"])),
+            (labels["von_mises.max"].label, f"{megapascals(stress['max'])}{_largest_error(stones)}"),
         ]
     if (static := summary["static"]) is not None and static["found"]:
         rows.append(
@@ -174,9 +175,8 @@ def _summary_rows(summary: Mapping[str, Any], stones: Sequence[StoneResult]) -> 
             )
         )
     time = summary["time"]
-    rows.append(
-        ("Simulated", f"{time['simulated']:.4g} s in {summary['steps']} steps, {time['wall']:.1f} s of work")
-    )
+    simulated = f"{time['simulated']:.4g} s in {summary['steps']} steps, {time['wall']:.1f} s of work"
+    rows.append((labels["time.simulated"].label, simulated))
     return rows
 
 
@@ -272,10 +272,8 @@ def _stages(summary: Mapping[str, Any]) -> _Section:
         )
         for stage in summary["stages"]
     ]
-    head = (
-        "Stage", "Outcome", "Stones", "Of these", "Weight", "Reaction", "Largest displacement", "Thickest bed",
-        "Balance",
-    )  # fmt: skip
+    names = "weight", "reaction", "displacement", "bed", "balance"
+    head = "Stage", "Outcome", "Stones", "Of these", *_headings("stage", *names)
     return _Section("Stages of building", head, rows, _STAGES)
 
 
@@ -292,10 +290,8 @@ def _stressed(stones: Sequence[StoneResult], least: float) -> _Section:
         )
         for stone in _worst(stones, lambda stone: stone.values.get("von_mises_p99"))
     ]
-    head = (
-        "Stone", "Von Mises, exceeded in 1 % of the volume", "Von Mises, mean", "Von Mises, largest",
-        "Error of the stress", "Largest displacement",
-    )  # fmt: skip
+    names = "von_mises_p99", "von_mises_mean", "von_mises_max", "stress_error", "displacement_max"
+    head = "Stone", *_headings("stone", *names)
     return _Section("Most stressed stones", head, rows, _CORNERS)
 
 
@@ -313,10 +309,8 @@ def _pulled(stones: Sequence[StoneResult]) -> _Section:
         )
         for stone in used or _worst(stones, lambda stone: stone.values.get("principal_tension"))
     ]
-    head = (
-        "Stone", "Stress over strength", "Tension, largest", "Volume in tension", "Compression, largest",
-        "Pressure, mean",
-    )  # fmt: skip
+    names = "utilisation", "principal_tension", "tension_zone", "principal_compression", "mean_pressure"
+    head = "Stone", *_headings("stone", *names)
     title = "Stones nearest to their strength" if used else "Stones with the largest tension"
     return _Section(title, head, rows)
 
@@ -327,8 +321,14 @@ def _uncertain(stones: Sequence[StoneResult]) -> _Section:
         (stone.code, percent(stone.values["stress_error"]), megapascals(stone.values.get("von_mises_p99")))
         for stone in _worst(stones, lambda stone: stone.values.get("stress_error"))
     ]
-    head = ("Stone", "Error of the stress", "Von Mises, exceeded in 1 % of the volume")
+    head = "Stone", *_headings("stone", "stress_error", "von_mises_p99")
     return _Section("Stones with the least certain stress", head, rows, _STRESS_ERROR)
+
+
+def _headings(bearer: str, *names: str) -> tuple[str, ...]:
+    """Return the labels of results as headings."""
+    quantities = quantities_of(bearer)
+    return tuple(_capital(quantities[name].label) for name in names)
 
 
 def _worst(stones: Sequence[StoneResult], value: Callable[[StoneResult], float | None]) -> list[StoneResult]:
@@ -346,15 +346,8 @@ def _joints(result: Result, summary: Mapping[str, Any]) -> list[_Section]:
     eccentric = np.where(joints.bearing, joints.kern, -np.inf)
     slid = np.where(joints.sliding > seen, joints.sliding, -np.inf)
     opened = np.where(joints.opening > seen, joints.opening, -np.inf)
-    head = (
-        "Joint",
-        "Over the kern",
-        "Over the edge",
-        "Pressure, mean",
-        "Opening",
-        "Sliding",
-        "Friction used",
-    )
+    names = "kern", "edge", "pressure_mean", "opening", "sliding", "friction_use"
+    head = "Joint", *_headings("joint", *names)
     return [
         _Section(
             "Joints with the most eccentric resultants", head, _joint_rows(result, eccentric, least), _KERN

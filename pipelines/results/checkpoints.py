@@ -291,6 +291,7 @@ def _revived(value: Any, arrays: Mapping[str, Any], rows: Mapping[str, Rows[Any]
         return value
 
     def each(values: Mapping[str, Any]) -> dict[str, Any]:
+        """Return a mapping of plain values, each made what it was."""
         return {key: _revived(value, arrays, rows) for key, value in values.items()}
 
     kind, *content = value

@@ -168,6 +168,7 @@ def source_of(files: Iterable[str | Path], folder: Path) -> list[str]:
     """
 
     def relative(path: Path) -> str:
+        """Return a path from the folder, or the whole path where there is none."""
         try:
             return Path(os.path.relpath(path, folder.resolve())).as_posix()
         except ValueError:

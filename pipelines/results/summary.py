@@ -24,6 +24,8 @@ __all__ = ["as_json", "headline", "indeterminacy", "length_tolerance", "summaris
 
 _ROUNDING = 1e-13  # of the farthest coordinate [-]: the spacing of floating-point numbers, with reserve
 
+_FIDELITIES = (Fidelity.RIGID, Fidelity.DEFORMABLE, Fidelity.FIXED)
+
 
 def summarise(
     result: Result,
@@ -45,20 +47,14 @@ def summarise(
 
     Numbers that are not finite become None, as JSON cannot express them.
     """
-    stress = stress_statistics(result)
-    displacement = max(float(np.linalg.norm(body.displacement, axis=1).max()) for body in result.bodies)
-    peaks = peak_records(result)
-    largest = peaks["displacement"] or {"value": displacement, "time": None, "stones": []}
+    stress, peaks = stress_statistics(result), peak_records(result)
     fidelities = [body.fidelity for body in result.bodies]
     summary: dict[str, Any] = {
         "scene": result.scene.name,
         "outcome": str(result.outcome),
         "headline": headline(result),
         "cautions": list(result.cautions),
-        "bodies": {
-            str(kind): fidelities.count(kind)
-            for kind in (Fidelity.RIGID, Fidelity.DEFORMABLE, Fidelity.FIXED)
-        },
+        "bodies": {str(kind): fidelities.count(kind) for kind in _FIDELITIES},
         "contacts": len(result.contacts.gap),
         "steps": result.steps,
         "time": {
@@ -77,12 +73,7 @@ def summarise(
             {"code": structure.code, "kind": structure.kind, **structure.values} for structure in structures
         ],
         "energies": asdict(result.energies),
-        "displacement": {
-            "max": largest["value"],
-            "time": largest["time"],
-            "stones": largest["stones"],
-            "end": displacement,
-        },
+        "displacement": _displacement(result, peaks["displacement"]),
         "settlement": {"max": float(result.history.settlement[-1])},
         "reaction": {"total_vertical": result.reaction, "weight": result.weight},
         "peaks": peaks,
@@ -95,6 +86,13 @@ def summarise(
         "version": version,
     }
     return {key: _finite(value) for key, value in summary.items()}
+
+
+def _displacement(result: Result, peak: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Return the largest displacement of the run, with its time and its stones, and that at the end [m]."""
+    end = max(float(np.linalg.norm(body.displacement, axis=1).max()) for body in result.bodies)
+    largest = peak or {"value": end, "time": None, "stones": []}
+    return {"max": largest["value"], "time": largest["time"], "stones": largest["stones"], "end": end}
 
 
 def headline(result: Result) -> str:

@@ -86,8 +86,8 @@ class Assembly:
         """Axes of the wall that the surveyed faces make; None where they look several ways."""
         records = [model.record for model in self.models]
         return wall_axes(
-            np.array([one.normal for one in records]),
-            np.array([one.area for one in records]),
+            np.array([record.normal for record in records]),
+            np.array([record.area for record in records]),
             np.concatenate([block.vertices for block in self.scene.blocks]),
         )
 
@@ -157,7 +157,7 @@ def wishes_of(scene: SceneFile, models: Sequence[StoneModel], groups: Groups) ->
     asked = scene.output.pictures or ()
     pushed = (groups[entry.path][0] for entry in scene.loads if entry.type in FORCES)
     return Wishes(
-        named={one.record.code: one.listed for one in models if one.listed is not None},
+        named={model.record.code: model.listed for model in models if model.listed is not None},
         default=scene.bodies.default,
         stress=None if scene.output.stress is None else groups[STRESS][0],
         pictures=tuple(name for name in asked if PICTURES[name].shows == "stress"),
@@ -213,7 +213,7 @@ def _stages(scene: SceneFile, whole: Scene, groups: Groups, origin: Array) -> tu
     fixed = frozenset(block.code for block in whole.blocks if block.fidelity is Fidelity.FIXED)
     codes = [block.code for block in whole.blocks]
     stages = standing_stones(scene.document, scene.stages, groups, codes, fixed, scene.loads)
-    return tuple(Stage(one.name, _stage(scene, whole, groups, origin, one)) for one in stages)
+    return tuple(Stage(stage.name, _stage(scene, whole, groups, origin, stage)) for stage in stages)
 
 
 def _stage(scene: SceneFile, whole: Scene, groups: Groups, origin: Array, stones: StandingStones) -> Scene:
@@ -224,15 +224,15 @@ def _stage(scene: SceneFile, whole: Scene, groups: Groups, origin: Array, stones
         if block.code in stones.standing
     )
     own = {path: tuple(codes & stones.standing for codes in of) for path, of in groups.items()}
-    acting = [_entry_about(one, origin) for one in scene.loads if stones.name in one.values["stages"]]
+    acting = [_entry_about(load, origin) for load in scene.loads if stones.name in load.values["stages"]]
     rules = (
-        LawRule(one.first & stones.standing, one.second & stones.standing, one.law)
-        for one in whole.contact.rules
+        LawRule(rule.first & stones.standing, rule.second & stones.standing, rule.law)
+        for rule in whole.contact.rules
     )
     return replace(
         whole,
         blocks=blocks,
-        contact=replace(whole.contact, rules=tuple(one for one in rules if one.first and one.second)),
+        contact=replace(whole.contact, rules=tuple(rule for rule in rules if rule.first and rule.second)),
         loads=build_loads(scene.document, acting, own, {block.code: block for block in blocks}),
         series=tuple(code for code in whole.series if code in stones.standing),
     )
@@ -270,7 +270,7 @@ def _block(model: StoneModel, chosen: Modelled, solid: Solid, mesh: MeshSettings
 def convex_parts_of(solid: Solid) -> tuple[Part, ...]:
     """Return the convex parts of a stone that is not convex."""
     parts = stone_parts(solid)
-    return tuple(Part(one.vertices, one.faces) for one in parts) if len(parts) > 1 else ()
+    return tuple(Part(part.vertices, part.faces) for part in parts) if len(parts) > 1 else ()
 
 
 def _facing(stones: Sequence[SurveyedBlock]) -> Array:

@@ -108,8 +108,8 @@ def _of_meshes(scene: SceneFile, groups: Groups, soft: set[str]) -> Iterator[str
 
 
 def _of_ring(scene: SceneFile, modelled: Mapping[str, Modelled]) -> Iterator[str]:
-    region = scene.output.stress is not None and any(one.stress for one in modelled.values())
-    ringed = any(one.ring for one in modelled.values())
+    region = scene.output.stress is not None and any(stone.stress for stone in modelled.values())
+    ringed = any(stone.ring for stone in modelled.values())
     for table, key, used, reason in (
         ("bodies", "ring", region, "no stress in [output] asks for that of a stone"),
         ("mesh", "ring_size", ringed, "no stone deforms for the stress of another"),
@@ -137,8 +137,8 @@ def _of_stress(scene: SceneFile, groups: Groups, modelled: Mapping[str, Modelled
 
 
 def _of_surroundings(scene: SceneFile, modelled: Mapping[str, Modelled]) -> Iterator[str]:
-    rigid = sum(one.fidelity is Fidelity.RIGID for one in modelled.values())
-    if scene.bodies.default is None and rigid and any(one.stress for one in modelled.values()):
+    rigid = sum(stone.fidelity is Fidelity.RIGID for stone in modelled.values())
+    if scene.bodies.default is None and rigid and any(stone.stress for stone in modelled.values()):
         yield (
             f"{scene.document.where('bodies')}: {rigid} stones are rigid and spread forces otherwise than elastic "
             "ones, so stresses may be off by tens of per cent; ring = 99 in [bodies] lets all of them deform, "

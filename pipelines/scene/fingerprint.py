@@ -131,8 +131,8 @@ def _text(value: Any) -> str:
 def digest(value: Any) -> str:
     """Return a digest of a value made of dataclasses, lists, tuples, sets, arrays and plain values."""
     sha256 = hashlib.sha256()
-    for part in _bytes(value):
-        sha256.update(part)
+    for byte in _bytes(value):
+        sha256.update(byte)
     return f"#{sha256.hexdigest()[:_DIGITS]}"
 
 

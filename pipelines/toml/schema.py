@@ -206,21 +206,21 @@ def _typed(value: object, kind: ValueKind) -> object | None:
         case ValueKind.TEXT:
             return value if isinstance(value, str) and value.strip() else None
         case ValueKind.TEXTS:
-            return _list_of(value, lambda one: one if isinstance(one, str) and one.strip() else None)
+            return _list_of(value, lambda entry: entry if isinstance(entry, str) and entry.strip() else None)
         case ValueKind.STONES:
             return _typed(value, ValueKind.TEXTS) or None
         case ValueKind.GROUPS:
             groups = _list_of(
-                value, lambda one: _typed([one] if isinstance(one, str) else one, ValueKind.STONES)
+                value, lambda entry: _typed([entry] if isinstance(entry, str) else entry, ValueKind.STONES)
             )
             return groups if groups is not None and len(groups) == 2 else None
         case ValueKind.NUMBERS:
-            return _list_of(value, lambda one: _typed(one, ValueKind.NUMBER))
+            return _list_of(value, lambda entry: _typed(entry, ValueKind.NUMBER))
         case ValueKind.VECTOR:
             vector = _typed(value, ValueKind.NUMBERS)
             return vector if isinstance(vector, tuple) and len(vector) == 3 else None
         case ValueKind.ROWS:
-            return _list_of(value, lambda one: _typed(one, ValueKind.VECTOR))
+            return _list_of(value, lambda entry: _typed(entry, ValueKind.VECTOR))
         case ValueKind.HISTORY | ValueKind.VECTOR_HISTORY:
             constant = ValueKind.NUMBER if kind is ValueKind.HISTORY else ValueKind.VECTOR
             return value if isinstance(value, dict) else _typed(value, constant)

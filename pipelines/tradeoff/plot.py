@@ -90,6 +90,7 @@ def _draw(axes: Any, panel: Panel, asked: float) -> None:
     least = max(_AXIS_MINIMUM, _HIDDEN * (panel.reference_error or 0.0))
 
     def seen(error: float) -> float:
+        """Return an error as it is drawn, in percent."""
         return 100.0 * max(error, least)
 
     front = [panel.points[number] for number in panel.front]

@@ -47,7 +47,7 @@ def carry_out(
 
     Every run is kept in the store as soon as it has ended. Whatever ends this function ends its runs.
     """
-    by_name = {one.name: one for one in settings}
+    by_name = {setting.name: setting for setting in settings}
     # the meaning of a name may have changed, as that of a profile
     ended = {
         name: run

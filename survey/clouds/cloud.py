@@ -178,8 +178,8 @@ def viewed(head: SurveyHead, wall: Wall, middle: Array) -> SurveyHead:
 def _seen(
     head: SurveyHead, stations: Sequence[Station], placed: Sequence[PlacedOutline], wall: Wall | None
 ) -> SurveyHead:
-    if wall is not None and all(one.axes is wall.axes for one in placed):
-        return viewed(head, wall, np.mean([one.origin for one in placed], axis=0))
+    if wall is not None and all(outline.axes is wall.axes for outline in placed):
+        return viewed(head, wall, np.mean([outline.origin for outline in placed], axis=0))
     return replace(head, stations=tuple(stations))
 
 

@@ -87,10 +87,10 @@ def divide(placed: Sequence[PlacedOutline], margins: Array) -> Patches:
     placed : outlines
     margins : (n,) width along the edges that is left out [m]
     """
-    low = np.array([one.ring.min(axis=0) for one in placed]) + margins[:, None]
-    high = np.array([one.ring.max(axis=0) for one in placed]) - margins[:, None]
+    low = np.array([outline.ring.min(axis=0) for outline in placed]) + margins[:, None]
+    high = np.array([outline.ring.max(axis=0) for outline in placed]) - margins[:, None]
     extent = np.maximum(high - low, 1e-6)
-    inner = np.minimum(np.array([one.area for one in placed]), extent.prod(axis=1))
+    inner = np.minimum(np.array([outline.area for outline in placed]), extent.prod(axis=1))
     side = np.maximum(np.sqrt(inner / _PATCHES), _SMALLEST)
     # a slanting face fills little of its box
     side = np.maximum(side, np.sqrt(extent.prod(axis=1) / _MAX_PATCHES))
@@ -118,10 +118,10 @@ def collect_points(
     """
     # relative to a place of the wall, single precision keeps micrometres
     origin = np.floor(placed[0].origin)
-    origins = np.array([one.origin for one in placed]) - origin
-    frames = Frames(origins, np.array([one.axes for one in placed]), slab)
-    start = np.concatenate([[0], np.cumsum([len(one.ring) for one in placed])]).astype(np.int64)
-    rings = Rings(start, np.ascontiguousarray(np.concatenate([one.ring for one in placed])), margins)
+    origins = np.array([outline.origin for outline in placed]) - origin
+    frames = Frames(origins, np.array([outline.axes for outline in placed]), slab)
+    start = np.concatenate([[0], np.cumsum([len(outline.ring) for outline in placed])]).astype(np.int64)
+    rings = Rings(start, np.ascontiguousarray(np.concatenate([outline.ring for outline in placed])), margins)
     patches = divide(placed, margins)
     count = int(patches.first[-1])
     samples = Samples(np.zeros(count, np.int64), np.zeros((count, _PATCH_POINTS, 3), np.float32))
@@ -143,10 +143,10 @@ def collect_points(
 
 def _grid(placed: Sequence[PlacedOutline], origin: Array, slab: float) -> Grid:
     """List the outlines whose slab reaches into each cube of space."""
-    boxes = np.array([_box(one, slab) for one in placed]) - origin
+    boxes = np.array([_box(outline, slab) for outline in placed]) - origin
     low, high = boxes[:, 0].min(axis=0) - 1e-6, boxes[:, 1].max(axis=0) + 1e-6
     extent = high - low
-    side = max(_FINEST, 0.25 * float(np.median([np.sqrt(one.area) for one in placed])))
+    side = max(_FINEST, 0.25 * float(np.median([np.sqrt(outline.area) for outline in placed])))
     while np.prod(np.ceil(extent / side)) > _CUBES:
         side *= 1.25
     shape = np.ceil(extent / side).astype(np.int64)

@@ -118,17 +118,7 @@ def fit_plane(points: ArrayLike, sigma: ArrayLike | None, observer: ArrayLike | 
     """
     from survey.faces._kernels.robust_fit import FINE, fit_face  # numba: readers of fits do without it
 
-    xyz = np.ascontiguousarray(points, dtype=np.float64)
-    if xyz.ndim != 2 or xyz.shape[1] != 3 or len(xyz) < 3:
-        raise GeometryError(
-            f"a plane needs (n ≥ 3, 3) points, found {xyz.shape}", remedy="measure more points"
-        )
-    deviations = np.empty(len(xyz))
-    if sigma is not None and np.shape(sigma) not in ((), deviations.shape):
-        raise GeometryError(
-            f"{np.shape(sigma)} standard deviations for {len(xyz)} points", remedy="give one, or one of each"
-        )
-    deviations[:] = 1.0 if sigma is None else sigma
+    xyz, deviations = _checked(points, sigma)
     towards = _NOWHERE if observer is None else np.ascontiguousarray(observer, dtype=np.float64)
     status, frame, accepted, residuals, standardised, covariance, (offset, rms, sigma0) = fit_face(
         xyz, deviations, sigma is not None, towards
@@ -152,6 +142,22 @@ def fit_plane(points: ArrayLike, sigma: ArrayLike | None, observer: ArrayLike | 
         residuals=residuals,
         standardised=standardised,
     )
+
+
+def _checked(points: ArrayLike, sigma: ArrayLike | None) -> tuple[Array, Array]:
+    """Return points (n, 3) and a standard deviation for each (n,), 1 where none is known; refuse other shapes."""
+    xyz = np.ascontiguousarray(points, dtype=np.float64)
+    if xyz.ndim != 2 or xyz.shape[1] != 3 or len(xyz) < 3:
+        raise GeometryError(
+            f"a plane needs (n ≥ 3, 3) points, found {xyz.shape}", remedy="measure more points"
+        )
+    deviations = np.empty(len(xyz))
+    if sigma is not None and np.shape(sigma) not in ((), deviations.shape):
+        raise GeometryError(
+            f"{np.shape(sigma)} standard deviations for {len(xyz)} points", remedy="give one, or one of each"
+        )
+    deviations[:] = 1.0 if sigma is None else sigma
+    return xyz, deviations
 
 
 def _refusal(status: int, xyz: Array, deviations: Array) -> GeometryError:

@@ -109,6 +109,7 @@ def _without_curvature(places: Sequence[Measured], rough: float) -> float:
     square, variance = np.concatenate(squares), np.concatenate(variances)
 
     def excess(size: float) -> float:
+        """Return how much χ² over its freedom exceeds 1 at a roughness [m]."""
         return float((square / (variance + size**2)).sum()) / freedom - 1.0
 
     if excess(rough) > -SIGNIFICANT * math.sqrt(2.0 / freedom):

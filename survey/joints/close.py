@@ -150,23 +150,23 @@ def _with_leaves(
     codes = [stone.code for stone in stones]
     _check_distinct(codes)
     grown = [grow(leaf, [codes[k] for k in leaf.members], settings) for leaf in leaves]
-    members = {k: one for leaf, one in zip(leaves, grown, strict=True) for k in leaf.members}
+    members = {k: leaf_solids for leaf, leaf_solids in zip(leaves, grown, strict=True) for k in leaf.members}
     rest = close_joints(
         [stone for k, stone in enumerate(stones) if k not in members], replace(settings, grow=False)
     )
-    blocky = {one.code: one for one in rest.simplified}
+    blocky = {leaf_solids.code: leaf_solids for leaf_solids in rest.simplified}
     blocky |= {codes[k]: _unsimplified(stones[k]) for k in members}
     solids = {solid.code: solid for solid in rest.solids}
-    solids |= {solid.code: solid for one in grown for solid in one.solids}
+    solids |= {solid.code: solid for leaf_solids in grown for solid in leaf_solids.solids}
     ordered = [solids[code] for code in codes]
-    joints = (*(joint for one in grown for joint in one.joints), *rest.report.joints)
+    joints = (*(joint for leaf_solids in grown for joint in leaf_solids.joints), *rest.report.joints)
     joints += tuple(_met(ordered, members, grown, settings))
     joined = {code for joint in joints for code in joint.stones}
     displacement, volume_change = dict(rest.report.displacement), dict(rest.report.volume_change)
-    for leaf, one in zip(leaves, grown, strict=True):
+    for leaf, leaf_solids in zip(leaves, grown, strict=True):
         own = [codes[k] for k in leaf.members]
-        displacement |= dict(zip(own, one.displacement, strict=True))
-        volume_change |= dict(zip(own, one.volume_change, strict=True))
+        displacement |= dict(zip(own, leaf_solids.displacement, strict=True))
+        volume_change |= dict(zip(own, leaf_solids.volume_change, strict=True))
     report = replace(
         rest.report,
         mode=settings.mode,
@@ -174,7 +174,7 @@ def _with_leaves(
         displacement={code: displacement[code] for code in codes},
         volume_change={code: volume_change[code] for code in codes},
         alone=tuple(code for code in codes if code not in joined),
-        leaves=tuple(one.report for one in grown),
+        leaves=tuple(leaf_solids.report for leaf_solids in grown),
     )
     return ClosedStones(tuple(ordered), tuple(blocky[code] for code in codes), report)
 
@@ -211,16 +211,16 @@ def _met(
     arrays = SolidArrays.gather((solid.vertices, solid.faces) for solid in solids)
     planes = planes_of(arrays)
     close = replace(settings, max_width=_MEETS, max_angle=0.01, min_overlap=0.0)
-    found = find_facing(arrays, planes, close)
+    facing = find_facing(arrays, planes, close)
     number = sum(len(one.joints) for one in grown)
-    for k, (i, j) in enumerate(planes.owner[found.faces].tolist()):
+    for k, (i, j) in enumerate(planes.owner[facing.faces].tolist()):
         own = [members[one] for one in (i, j) if one in members]
         if not own or (len(own) == 2 and own[0] is own[1]):
             continue
         codes = (solids[i].code, solids[j].code)
         width = sum(leaf.report.thickness.get(frozenset({code}), 0.0) for leaf in own for code in codes)
         yield StoneJoint(
-            codes, number + k, width, 0.0, float(found.area[k]), found.centroid[k], found.normal[k], ""
+            codes, number + k, width, 0.0, float(facing.area[k]), facing.centroid[k], facing.normal[k], ""
         )
 
 
@@ -271,23 +271,25 @@ def newly_facing(
     settings : criteria of a joint; a newly found joint is at most half as wide
     """
     solids = SolidArrays.gather((solid.vertices, solid.faces) for solid in cut.solids)
-    found = find_facing(solids, planes_of(solids), replace(settings, max_width=0.5 * settings.max_width))
-    pairs, owner = _surveyed_faces(building, cut)[found.faces], building.faces.planes.owner
+    fresh_facing = find_facing(
+        solids, planes_of(solids), replace(settings, max_width=0.5 * settings.max_width)
+    )
+    pairs, owner = _surveyed_faces(building, cut)[fresh_facing.faces], building.faces.planes.owner
     known = set(map(tuple, owner[facing.faces].tolist()))
     fresh = [
         k
         for k, (first, second) in enumerate(pairs.tolist())
         if first >= 0 and second >= 0 and (int(owner[first]), int(owner[second])) not in known
     ]
-    width = _height(building, pairs[fresh, 0], found, fresh) - _height(
-        building, pairs[fresh, 1], found, fresh
+    width = _height(building, pairs[fresh, 0], fresh_facing, fresh) - _height(
+        building, pairs[fresh, 1], fresh_facing, fresh
     )
     return FacingFaces(
         np.concatenate([facing.faces, pairs[fresh]]),
-        np.concatenate([facing.area, found.area[fresh]]),
+        np.concatenate([facing.area, fresh_facing.area[fresh]]),
         np.concatenate([facing.gap, width]),
-        np.concatenate([facing.centroid, found.centroid[fresh]]),
-        np.concatenate([facing.normal, found.normal[fresh]]),
+        np.concatenate([facing.centroid, fresh_facing.centroid[fresh]]),
+        np.concatenate([facing.normal, fresh_facing.normal[fresh]]),
     )
 
 
@@ -301,9 +303,9 @@ def _surveyed_faces(building: LocalStones, cut: Cut) -> Ints:
     return np.concatenate(out)
 
 
-def _height(building: LocalStones, faces: Ints, found: FacingFaces, links: list[int]) -> Array:
+def _height(building: LocalStones, faces: Ints, facing: FacingFaces, links: list[int]) -> Array:
     """Return the heights of the planes of surveyed faces along the normal of a joint, above its middle [m]."""
     normals, offsets = building.faces.planes.normals[faces], building.faces.planes.offsets[faces]
-    centroid, normal = found.centroid[links], found.normal[links]
+    centroid, normal = facing.centroid[links], facing.normal[links]
     out: Array = (offsets - (normals * centroid).sum(axis=1)) / (normals * normal).sum(axis=1)
     return out

@@ -112,7 +112,7 @@ def contradictions(stones: Sequence[StoneQuality], facades: Sequence[Facade]) ->
                         finding.excess / finding.sigma,
                     )
                 )
-    return tuple(sorted(signs, key=lambda one: -one.significance))
+    return tuple(sorted(signs, key=lambda sign: -sign.significance))
 
 
 def _longer_than_stretchers(index: int, stone: StoneQuality, around: _Around) -> _Finding | None:

@@ -226,17 +226,17 @@ def judge_survey(stones: Sequence[StoneQuality]) -> SurveyQuality:
     """Summarise the stones of a survey; stones without points of their own contribute no residual."""
     measured = [stone for stone in stones if stone.measured]
     squares = sum(stone.redundancy * stone.sigma0**2 for stone in measured if stone.sigma0 is not None)
-    redundancy = sum(one.redundancy for one in measured)
+    redundancy = sum(stone.redundancy for stone in measured)
     sigma0 = math.sqrt(squares / redundancy) if redundancy else None
     error = 1.0 / math.sqrt(2.0 * redundancy) if redundancy else None
     sigma, rough = (
-        math.sqrt(sum(one**2 for one in ones) / len(measured)) if measured else math.nan
-        for ones in ([one.sigma for one in measured], [one.roughness for one in measured])
+        math.sqrt(sum(value**2 for value in values) / len(measured)) if measured else math.nan
+        for values in ([stone.sigma for stone in measured], [stone.roughness for stone in measured])
     )
-    counts = [one.redundancy + 3 for one in measured]
-    total = sum(n * one.rms**2 for n, one in zip(counts, measured, strict=True))
+    counts = [stone.redundancy + 3 for stone in measured]
+    total = sum(n * stone.rms**2 for n, stone in zip(counts, measured, strict=True))
     residuals = (
-        np.concatenate([one.standardised for one in measured]) if measured else np.empty(0, np.float32)
+        np.concatenate([stone.standardised for stone in measured]) if measured else np.empty(0, np.float32)
     )
     return SurveyQuality(
         stones=len(stones),

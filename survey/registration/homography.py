@@ -172,6 +172,7 @@ def _without_outliers(marks: _Marks, names: list[str]) -> Homography:
     fits: dict[bytes, tuple[Homography, Agreement]] = {}
 
     def judge(accepted: Bools) -> Agreement | None:
+        """Return the agreement of the accepted marks; None where they give no homography."""
         if _aligned(marks, accepted) is not None:
             return None
         try:

@@ -284,6 +284,7 @@ def _without_outliers(
         )
 
     def judge(accepted: Bools) -> Agreement | None:
+        """Return the agreement of the accepted points; None where they lie too close to a line."""
         if accepted.sum() < 3 or any(
             _spread(points[accepted])[1] <= width
             for points, width in zip((measured, site), least, strict=True)

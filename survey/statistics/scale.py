@@ -68,6 +68,7 @@ def scatter_beyond(values: Array, measured: Array, share: Array | float = 1.0) -
     count = int(inliers.sum())
 
     def excess(one: float) -> float:
+        """Return how much χ² exceeds its expectation at a variance."""
         return float((size[inliers] ** 2 / (measured[inliers] + part[inliers] * one)).sum()) - WITHIN * count
 
     return math.sqrt(root_of(excess, high)), count

@@ -47,6 +47,12 @@ def _tables() -> Mapping[str, Sequence[Rows]]:
     result = _result()
     frame = result.frames[-1]
     return {
+        "## `summary.json`": [
+            [
+                (f"`{one.name}`", "" if one.unit in (None, "-") else str(one.unit), one.meaning)
+                for one in quantities_of("summary").values()
+            ]
+        ],
         "## Stones (": [
             _arrays(body_grid(result, frame, body_cells(result)), "cell of a stone", "point of a stone")
         ],

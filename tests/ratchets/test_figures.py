@@ -14,13 +14,13 @@ MOST = {
     "numbers of archmodel": 98,
     "numbers of mechanics": 740,
     "numbers of pipelines": 538,
-    "long functions": 40,
+    "long functions": 25,
     "wide functions": 0,
-    "undocumented functions": 135,
+    "undocumented functions": 46,
 }
 """Today's figures: whoever lowers one lowers its bound, and nobody raises one."""
 
-MOST_OF_10_000 = {"all": 168, "one": 41}
+MOST_OF_10_000 = {"all": 148, "one": 29}
 """Empty words among identifiers: all that are listed, and the most frequent."""
 
 REMEDY = {

@@ -67,6 +67,7 @@ def observed(scope: Scope, call: Call, ask: Ask) -> Condition:
     least = _severity(values[1]) if len(values) == 2 else None
 
     def conditions(said: FromClause) -> list[Condition]:
+        """Return the conditions on type and severity."""
         of_type: list[Condition] = [said.c.type.in_(types)] if types else []
         return of_type if least is None else [*of_type, said.c.severity >= least]
 
@@ -90,6 +91,7 @@ def documented(scope: Scope, call: Call, ask: Ask) -> Condition:
     numbers = [document_named(scope.context, code) for code in tokens(call, 0, 1)]
 
     def conditions(said: FromClause) -> list[Condition]:
+        """Return the conditions on the document."""
         return [said.c.document_id > 0, *(said.c.document_id == number for number in numbers)]
 
     context = scope.context
@@ -108,6 +110,7 @@ def by(scope: Scope, call: Call, ask: Ask) -> Condition:
     author = author_named(scope.context, values[0])
 
     def conditions(said: FromClause) -> list[Condition]:
+        """Return the condition on the author."""
         return [said.c.author == author]
 
     context = scope.context

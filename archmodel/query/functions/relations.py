@@ -24,6 +24,7 @@ def related(name: str, subject: str, other: str) -> Callable[[Scope, Call, Ask],
     sides = ((subject, other), (other, subject)) if name in SYMMETRIC else ((subject, other),)
 
     def sql(scope: Scope, call: Call, ask: Ask) -> Condition:
+        """Return the condition that a stone has such a relation to a stone that is asked for."""
         wanted = _others(scope.context, only(call), ask)
         parts: list[Select[Any]] = []
         for mine, theirs in sides:
@@ -59,6 +60,7 @@ def load_path(step_from: str, step_to: str) -> Callable[[Scope, Call, Ask], Cond
     """Test for a place on the load path from the given entities, along `step_from` → `step_to`, as often as it goes."""
 
     def sql(scope: Scope, call: Call, ask: Ask) -> Condition:
+        """Return the condition that a path of relations leads to a stone that is asked for."""
         wanted = _others(scope.context, only(call, needed=True), ask)
         assert wanted is not None
         first, further = scope.context.alias(Relation), scope.context.alias(Relation)

@@ -27,6 +27,7 @@ def text(scope: Scope, call: Call, ask: Ask) -> Condition:
     context = scope.context
 
     def has(*columns: ColumnElement[str]) -> Condition:
+        """Return the condition that the words stand in a column."""
         return or_(*(column.icontains(words.text, autoescape=True) for column in columns))
 
     documents, phases, materials = (
@@ -43,6 +44,7 @@ def text(scope: Scope, call: Call, ask: Ask) -> Condition:
     }
 
     def wanted(statement: FromClause) -> list[Condition]:
+        """Return the condition that the words stand in a statement, or in what it cites."""
         condition = has(
             statement.c.text,
             statement.c.place,

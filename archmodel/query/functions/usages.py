@@ -160,7 +160,7 @@ def _refusal(call: Call) -> QueryError:
 
 def tokens(call: Call, *lengths: int) -> tuple[Token, ...]:
     """Return the arguments, which must be values, as many as one of the lengths allows."""
-    values = tuple(one for one in call.arguments if isinstance(one, Token))
+    values = tuple(argument for argument in call.arguments if isinstance(argument, Token))
     if len(values) != len(call.arguments) or len(values) not in lengths:
         raise _refusal(call)
     return values

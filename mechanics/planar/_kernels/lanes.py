@@ -101,6 +101,7 @@ def solve_disks(context, record, v, body, group):
     """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        """Emit the vector instruction."""
         data = [
             cgutils.create_struct_proxy(kind)(context, builder, value=value).data
             for kind, value in zip(signature.args[:3], arguments[:3], strict=True)

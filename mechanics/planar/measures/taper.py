@@ -40,6 +40,7 @@ def critical_slope(internal: float, basal: float, base_slope: float = 0.0) -> fl
     at_base = 0.5 * (np.arcsin(np.sin(basal) / np.sin(internal)) - basal)
 
     def excess(slope: float) -> float:
+        """Return the excess of the taper's angle over that at the base [rad]."""
         return float(base_slope + 0.5 * slope + 0.5 * np.arcsin(np.sin(slope) / np.sin(internal)) - at_base)
 
     if excess(-internal) > 0.0 or excess(internal) < 0.0:

@@ -99,6 +99,7 @@ def trishear_fit(
     """
 
     def misfit(unknown: Array) -> Array:
+        """Return the differences of displacements, given half angle and ratio [m]."""
         model = Trishear(tip, dip, *map(float, unknown))
         return np.asarray((model.moved(place, slip) - moved).ravel())
 

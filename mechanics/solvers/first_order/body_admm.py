@@ -199,6 +199,7 @@ class _Run:
         share = at_once(len(groups))
 
         def each(stage: Callable[..., float | None], *given: object) -> list[float | None]:
+            """Make a stage for all groups of bodies, by threads."""
             return share(lambda group: stage(group, iterate, *given), groups)
 
         step = np.empty(len(iterate.load), factors.value.dtype)

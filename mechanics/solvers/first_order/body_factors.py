@@ -49,6 +49,7 @@ def _factorise(panels: kernel.Panels, value: Array, parts: Parts, threads: int, 
     blocks = _blocks(panels, parts.rest)
 
     def reduce(sources: Ints, targets: Ints) -> None:
+        """Reduce target blocks by sources, each thread a share of the targets."""
         shares = [targets[k::threads] for k in range(min(threads, len(targets)))]
         list(each(partial(kernel.reduce, panels, value, sources), shares))
 

@@ -164,9 +164,11 @@ class _YieldingEquations(_BodyEquations):
         leading, made = self._led[1], 0
 
         def before(y: Array) -> Array:
+            """Return the forces of the preconditioner."""
             return self._solve(leading, -y.reshape(-1, 3))
 
         def product(y: Array) -> Array:
+            """Return the product of the preconditioned equations."""
             nonlocal made
             made += 1
             r = before(y)

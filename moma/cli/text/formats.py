@@ -58,6 +58,7 @@ def as_table(columns: Mapping[str, str | None], rows: Sequence[Mapping[str, obje
     widths = [max(map(len, column)) for column in zip(heads, *cells, strict=True)]
 
     def line(texts: Sequence[str]) -> str:
+        """Return the cells of a row, padded to the widths of their columns."""
         padded = (
             text.rjust(width) if right else text.ljust(width)
             for text, width, right in zip(texts, widths, numeric, strict=True)

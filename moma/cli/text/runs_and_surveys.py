@@ -56,9 +56,9 @@ def ingest_lines(report: "IngestReport", verbose: bool) -> list[str]:
 
 def _review_lines(review: "Sequence[Doubtful]", verbose: bool) -> list[str]:
     """Describe the outlines that should be looked at."""
-    counts = Counter(one.reason for one in review)
+    counts = Counter(doubt.reason for doubt in review)
     lines = [f"  look at {len(review)}: {', '.join(f'{count} {reason}' for reason, count in counts.items())}"]
-    texts = [f"    {one.code or one.where}: {one.reason}: {one.text}" for one in review]
+    texts = [f"    {doubt.code or doubt.where}: {doubt.reason}: {doubt.text}" for doubt in review]
     return lines + (texts if verbose else shorten(texts, 5, "    ", ", with -v or in --review FILE"))
 
 
@@ -156,11 +156,11 @@ def _displacement(summary: dict[str, Any]) -> str:
     """Describe the largest displacement of a run, and the one that is left."""
     from pipelines.reports.html import millimetres
 
-    found, least = summary["displacement"], summary["tolerance"]["length"]
-    largest, end = (f"{millimetres(found[name], least)}" for name in ("max", "end"))
-    if found["time"] is None or largest == end:
+    displacement, least = summary["displacement"], summary["tolerance"]["length"]
+    largest, end = (f"{millimetres(displacement[name], least)}" for name in ("max", "end"))
+    if displacement["time"] is None or largest == end:
         return f"largest displacement {largest}"
-    return f"largest displacement {largest} after {found['time']:.4g} s, {end} at the end"
+    return f"largest displacement {largest} after {displacement['time']:.4g} s, {end} at the end"
 
 
 def _peak_lines(summary: dict[str, Any]) -> list[str]:
@@ -313,8 +313,8 @@ def _movement_lines(report: "SurveyReport", verbose: bool) -> list[str]:
             still.append(
                 f"  {place}, face: no movement found; more than {face.excluded * 1e3:.1f} mm is excluded"
             )
-    odd = [f"  {one.code}: {one.text}" for face in study.faces for one in face.odd]
-    odd += [f"  {one.code}: {one.text}" for beds in study.beds for one in beds.odd]
+    odd = [f"  {stone.code}: {stone.text}" for face in study.faces for stone in face.odd]
+    odd += [f"  {stone.code}: {stone.text}" for beds in study.beds for stone in beds.odd]
     if verbose:
         return [*found, *still, *odd]
     return [*found, *still[:_SHOWN], *shorten(odd, _SHOWN, "  ", ", with -v")]

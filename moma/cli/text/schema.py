@@ -61,20 +61,20 @@ def _kind_lines(branch: Branch, first: str, rest: str) -> Iterator[str]:
         yield from _kind_lines(sub, rest + ("└── " if last else "├── "), rest + ("    " if last else "│   "))
 
 
-def _origin(one: Branch) -> str:
+def _origin(kind: Branch) -> str:
     """Return what marks a registered kind; with its parent, where the tree does not show it."""
-    if not one.get("registered"):
+    if not kind.get("registered"):
         return ""
-    return f"registered, a case of {one['parent']}: " if "parent" in one else "registered: "
+    return f"registered, a case of {kind['parent']}: " if "parent" in kind else "registered: "
 
 
-def _term(one: Branch) -> str:
+def _term(term: Branch) -> str:
     """Format a term: observation lichen, a case of stain: definition (de Flechten)."""
-    above = f", a case of {one['broader']}" if one["broader"] else ""
-    labels = ", ".join(f"{language} {' / '.join(names)}" for language, names in one["labels"].items())
-    return f"{one['vocabulary']} {one['term']}{above}: {one['definition'] or ''}{f' ({labels})' if labels else ''}"
+    above = f", a case of {term['broader']}" if term["broader"] else ""
+    labels = ", ".join(f"{language} {' / '.join(names)}" for language, names in term["labels"].items())
+    return f"{term['vocabulary']} {term['term']}{above}: {term['definition'] or ''}{f' ({labels})' if labels else ''}"
 
 
-def _attribute(one: Branch) -> str:
-    unit = "" if one["unit"] in (None, "-") else f" [{one['unit']}]"
-    return f"{one['name']}{unit}: {one['definition']}"
+def _attribute(attribute: Branch) -> str:
+    unit = "" if attribute["unit"] in (None, "-") else f" [{attribute['unit']}]"
+    return f"{attribute['name']}{unit}: {attribute['definition']}"

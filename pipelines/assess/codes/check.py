@@ -130,55 +130,55 @@ def check_code(code: str, site: Site, kinematics: Kinematics, gravity: float = 9
     if upper:
         checks.append(_linear_above(site, article, capacity, q, gravity, floor is not None))
     if np.isfinite(kinematics.capacity):
-        ultimate, where = rules["ultimate"] * kinematics.capacity, article["nonlinear"]
-        at, slowed, period = _secant(rules, kinematics.capacity, ultimate, capacity)
-        factor, damping = rules["period"], rules["damping"]
-        values += [
-            _value("d0*", kinematics.capacity, "m", where, "displacement at which the multiplier is 0"),
-            _value("du*", ultimate, "m", where, f"{rules['ultimate']:g} d0*"),
-            _value("ds*", at, "m", where, f"{rules['secant']:g} du*"),
-            _value("as*", slowed, "m/s²", where, "a0* (1 - ds*/d0*)"),
-            _value("Ts", period, "s", where, f"{factor:g} π √(ds*/as*)"),
-        ]
-        checks.append(
-            Check(
-                "nonlinear, at the ground",
-                where,
-                f"du* ≥ SDe(Ts), damping {damping:g} %",
-                ultimate,
-                site.displacement(period, gravity, damping),
-                "m",
-            )
-        )
-        if upper and floor is not None:
-            checks.append(
-                Check(
-                    "nonlinear, above the ground",
-                    f"{where}, {article['floor']}",
-                    f"du* ≥ SeZ(Ts) Ts²/4π², damping {damping:g} %, ξ1 = {site.damping:g} %",
-                    ultimate,
-                    floor_displacement(site, period, damping, gravity, floor),
-                    "m",
-                )
-            )
-        elif upper:
-            above, first = rules["above"], site.period or 0.0
-            share = _secant(above, kinematics.capacity, ultimate, capacity)[2] / first
-            demand = site.displacement(first, gravity) * site.shape * site.participation * share**2
-            checks.append(
-                Check(
-                    "nonlinear, above the ground",
-                    where,
-                    f"du* ≥ SDe(T1) ψ(Z) γ (Ts/T1)² / √((1 - Ts/T1)² + {above['coupling']:g} Ts/T1), "
-                    f"Ts = {above['period']:g} π √(ds*/as*) at {above['secant']:g} du*",
-                    ultimate,
-                    demand / float(np.sqrt((1.0 - share) ** 2 + above["coupling"] * share)),
-                    "m",
-                )
-            )
+        values += _nonlinear_values(rules, kinematics, capacity)
+        checks += _nonlinear(rules, site, kinematics, capacity, gravity)
     unchecked = [rules["unchecked"], floor["unchecked"] if upper and floor is not None else ""]
     caution = "; ".join(caution for caution in unchecked if caution)
     return CodeCheck(rules["name"], caution, tuple(values), tuple(checks))
+
+
+def _nonlinear_values(
+    rules: Mapping[str, Any], kinematics: Kinematics, capacity: float
+) -> list[dict[str, Any]]:
+    """Return d0*, du* and the secant of the capacity curve, given a0* [m/s²]."""
+    zero, where = kinematics.capacity, rules["articles"]["nonlinear"]
+    ultimate = rules["ultimate"] * zero
+    at, slowed, period = _secant(rules, zero, ultimate, capacity)
+    return [
+        _value("d0*", zero, "m", where, "displacement at which the multiplier is 0"),
+        _value("du*", ultimate, "m", where, f"{rules['ultimate']:g} d0*"),
+        _value("ds*", at, "m", where, f"{rules['secant']:g} du*"),
+        _value("as*", slowed, "m/s²", where, "a0* (1 - ds*/d0*)"),
+        _value("Ts", period, "s", where, f"{rules['period']:g} π √(ds*/as*)"),
+    ]
+
+
+def _nonlinear(
+    rules: Mapping[str, Any], site: Site, kinematics: Kinematics, capacity: float, gravity: float
+) -> list[Check]:
+    """Return the checks of the ultimate displacement, at the ground and, of an upper mechanism, above it."""
+    article, damping, floor = rules["articles"], rules["damping"], rules.get("floor")
+    ultimate, where = rules["ultimate"] * kinematics.capacity, article["nonlinear"]
+    period = _secant(rules, kinematics.capacity, ultimate, capacity)[2]
+    formula, demand = f"du* ≥ SDe(Ts), damping {damping:g} %", site.displacement(period, gravity, damping)
+    checks = [Check("nonlinear, at the ground", where, formula, ultimate, demand, "m")]
+    first = site.period
+    if not site.height > 0 or first is None:
+        return checks
+    if floor is not None:
+        where = f"{where}, {article['floor']}"
+        formula = f"du* ≥ SeZ(Ts) Ts²/4π², damping {damping:g} %, ξ1 = {site.damping:g} %"
+        demand = floor_displacement(site, period, damping, gravity, floor)
+    else:
+        above = rules["above"]
+        share = _secant(above, kinematics.capacity, ultimate, capacity)[2] / first
+        formula = (
+            f"du* ≥ SDe(T1) ψ(Z) γ (Ts/T1)² / √((1 - Ts/T1)² + {above['coupling']:g} Ts/T1), "
+            f"Ts = {above['period']:g} π √(ds*/as*) at {above['secant']:g} du*"
+        )
+        demand = site.displacement(first, gravity) * site.shape * site.participation * share**2
+        demand /= float(np.sqrt((1.0 - share) ** 2 + above["coupling"] * share))
+    return [*checks, Check("nonlinear, above the ground", where, formula, ultimate, demand, "m")]
 
 
 def _linear_above(

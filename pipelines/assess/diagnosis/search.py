@@ -49,6 +49,8 @@ RECORDS = ("x", "y", "z")
 _USUAL_TURNS = 3  # of a search
 _NOWHERE = Motions({}, {})
 
+_Known = dict[tuple[int, tuple[float, ...]], Tried]
+
 
 @dataclass(frozen=True)
 class Case:
@@ -246,7 +248,7 @@ def fit_cases(
     """
     searches: dict[int, Ask] = {k: fit(case.hypothesis.unknowns) for k, case in enumerate(cases)}
     asked = {k: next(search) for k, search in searches.items()}
-    known: dict[tuple[int, tuple[float, ...]], Tried] = {}
+    known: _Known = {}
 
     turns: Counter[int] = Counter()
 
@@ -274,45 +276,70 @@ def fit_cases(
                 progress(
                     Progress("run", len(known), len(known) + _to_come(cases, asked, turns), found=headline)
                 )
-    ranked, motions = list[Ranked](), {}
-    for k, case in enumerate(cases):
-        unknowns = case.hypothesis.unknowns
-        one = rank(case.hypothesis.name, case.stood, unknowns, fits[k], deformation.dof, deformation.freedom)
-        last = known[k, fits[k].amplitudes]
-        if last.motions is not None and last.fault:
-            one = replace(one, remarks=(*one.remarks, last.fault))
-        ranked.append(one)
-        motions[one.name, one.stood] = last.motions or _NOWHERE
+    ranked, motions = _ranked(cases, fits, known, deformation)
     # those that may be reported: the best, and what cannot be told apart from it
     least = min(hypothesis.aicc for hypothesis in ranked)
-    near = {
+    close = {
         k: [x for probe in probes(case.hypothesis.unknowns, fits[k].amplitudes) for x in probe]
         for k, case in enumerate(cases)
         if ranked[k].aicc < least + APART and len(fits[k].covariance)
     }
-    if near:
-        make(near, "intervals")
-    for k, xs in near.items():
-        answers = {x: _answer(known[k, x], deformation) for x in xs}
-        uneven = with_unevenness(ranked[k], cases[k].hypothesis.unknowns, answers)
-        everywhere = {
-            x: _answer(tried, deformation) for (own, x), tried in known.items() if own == k and tried.motions
-        }
-        ranked[k] = with_others(
-            uneven,
-            {
-                x: float(residuals @ residuals)
-                for x, residuals in everywhere.items()
-                if not isinstance(residuals, str)
-            },
-        )
-    residuals = deformation.residuals(_NOWHERE.displacement)
-    still = Fit((), residuals, np.zeros((0, 0)), (), 0)
-    ranking = Ranking(
-        tuple(sorted(ranked, key=lambda hypothesis: hypothesis.aicc)),
-        rank(STILL, (), (), still, deformation.dof, deformation.freedom),
-    )
+    if close:
+        make(close, "intervals")
+    for k, xs in close.items():
+        ranked[k] = _with_probes(ranked[k], cases[k], k, xs, known, deformation)
+    ordered = tuple(sorted(ranked, key=lambda hypothesis: hypothesis.aicc))
+    ranking = Ranking(ordered, _rank_of_no_movement(deformation))
     return Fitted(ranking, motions, len(known), sum(trial.cpu for trial in known.values()))
+
+
+def _ranked(
+    cases: Sequence[Case], fits: Mapping[int, Fit], known: _Known, deformation: Deformation
+) -> tuple[list[Ranked], dict[tuple[str, tuple[str, ...]], Motions]]:
+    """Return the rank of each case, and the motions of its best run, by its name and the phases that stood."""
+    ranked, motions = list[Ranked](), dict[tuple[str, tuple[str, ...]], Motions]()
+    for k, case in enumerate(cases):
+        unknowns = case.hypothesis.unknowns
+        fitted = rank(
+            case.hypothesis.name, case.stood, unknowns, fits[k], deformation.dof, deformation.freedom
+        )
+        last = known[k, fits[k].amplitudes]
+        if last.motions is not None and last.fault:
+            fitted = replace(fitted, remarks=(*fitted.remarks, last.fault))
+        ranked.append(fitted)
+        motions[fitted.name, fitted.stood] = last.motions or _NOWHERE
+    return ranked, motions
+
+
+def _rank_of_no_movement(deformation: Deformation) -> Ranked:
+    """Return the rank of the hypothesis that no stone has moved."""
+    residuals = deformation.residuals(_NOWHERE.displacement)
+    unfitted = Fit((), residuals, np.zeros((0, 0)), (), 0)
+    return rank(STILL, (), (), unfitted, deformation.dof, deformation.freedom)
+
+
+def _with_probes(
+    ranked: Ranked,
+    case: Case,
+    k: int,
+    places: Sequence[tuple[float, ...]],
+    known: _Known,
+    deformation: Deformation,
+) -> Ranked:
+    """Return the rank of the k-th case with intervals from the runs around its fit, and with its other runs."""
+    answers = {x: _answer(known[k, x], deformation) for x in places}
+    uneven = with_unevenness(ranked, case.hypothesis.unknowns, answers)
+    everywhere = {
+        x: _answer(tried, deformation)
+        for (number, x), tried in known.items()
+        if number == k and tried.motions
+    }
+    misfits = {
+        x: float(residuals @ residuals)
+        for x, residuals in everywhere.items()
+        if not isinstance(residuals, str)
+    }
+    return with_others(uneven, misfits)
 
 
 def _to_come(cases: Sequence[Case], asked: Iterable[int], turns: Mapping[int, int]) -> int:

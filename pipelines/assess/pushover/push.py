@@ -98,18 +98,11 @@ def push(
     folder, scene = Path(folder), read_scene(path)
     refuse_stages(scene.stages, scene.document, "moma pushover")
     check_replaceable(folder, INDEX, () if overwrite else (Path(path),))
-    if scene.pushover is None:
-        raise UsageError(
-            "the scene has no table [pushover]",
-            where=str(path),
-            remedy="say where it is pushed and how far (docs/scene.md)",
-        )
-    asked = scene.pushover
+    asked = _asked(scene)
     measured = None if asked.measured is None else read_curve(Path(path).parent / asked.measured)
     progress(Progress("blocks", 0, None, "reading the stones"))
     with open_database(url, create=False) as database, database.session(read_only=True) as session:
-        as_of = latest_entry(session)
-        models = select_stones(scene, session)
+        as_of, models = latest_entry(session), select_stones(scene, session)
         groups = select_groups(scene, session, models)
         assembled = assemble_stones(scene, models, groups)
         inputs = scene_inputs(scene, assembled, groups, session) | {"Rig": _rig(asked)}
@@ -134,25 +127,17 @@ def push(
     band = banded(test, asked.scatter, asked.level, tested) if asked.scatter and not test.stopped else None
     summary = _summary(assembled, stones, asked, test, band, measured)
     summary["inputs"] = {title: list(lines) for title, lines in inputs.items()}
+    curve = None if band is None else band.curve
     with replacing(folder, INDEX) as fresh:
-        title = f"{scene.name}: {summary['headline']}"
-        np.savetxt(
-            fresh / "curve.csv",
-            np.column_stack([test.displacement, test.force, test.inertia, test.lift]),
-            "%.7g",
-            ",",
-            header=",".join(COLUMNS),
-            comments="",
-        )
-        draw_curve(fresh / "curve.png", title, test, None if band is None else band.curve, measured)
-        draw_pushed(fresh / "peak.png", f"{scene.name}, at the largest force", test, test.peak)
-        draw_pushed(fresh / "end.png", f"{scene.name}, at the end", test, test.end)
-        files = [INDEX, REPORT, "scene.toml", "curve.csv", "curve.png", "peak.png", "end.png"]
-        summary |= {"files": files, "source": source_of([path], fresh)}
-        (fresh / "scene.toml").write_text(scene.text, encoding="utf-8")
-        write_pushover(fresh / REPORT, summary)
-        (fresh / INDEX).write_text(as_json(summary), encoding="utf-8")
-    record = RunRecord(
+        _write(fresh, scene, summary, test, curve, measured)
+    with open_database(url, create=False) as database:
+        run = store_record(database, folder, _record(scene, summary, as_of))
+    return Pushed(folder, summary, run, test)
+
+
+def _record(scene: SceneFile, summary: dict[str, Any], as_of: int | None) -> RunRecord:
+    """Return the record of a push, as of an entry of the database."""
+    return RunRecord(
         scene=scene.name,
         scene_text=scene.text,
         outcome="pushed",
@@ -161,8 +146,38 @@ def push(
         results=(),
         as_of=as_of,
     )
-    with open_database(url, create=False) as database:
-        return Pushed(folder, summary, store_record(database, folder, record), test)
+
+
+def _asked(scene: SceneFile) -> Pushing:
+    """Return the table [pushover] of a scene that has it."""
+    if scene.pushover is None:
+        raise UsageError(
+            "the scene has no table [pushover]",
+            where=str(scene.document.path),
+            remedy="say where it is pushed and how far (docs/scene.md)",
+        )
+    return scene.pushover
+
+
+def _write(
+    folder: Path,
+    scene: SceneFile,
+    summary: dict[str, Any],
+    test: LoadingTest,
+    band: Array | None,
+    measured: Array | None,
+) -> None:
+    """Write curve, pictures and report of a test into a folder, and list them in its summary."""
+    columns = np.column_stack([test.displacement, test.force, test.inertia, test.lift])
+    np.savetxt(folder / "curve.csv", columns, "%.7g", ",", header=",".join(COLUMNS), comments="")
+    draw_curve(folder / "curve.png", f"{scene.name}: {summary['headline']}", test, band, measured)
+    draw_pushed(folder / "peak.png", f"{scene.name}, at the largest force", test, test.peak)
+    draw_pushed(folder / "end.png", f"{scene.name}, at the end", test, test.end)
+    files = [INDEX, REPORT, "scene.toml", "curve.csv", "curve.png", "peak.png", "end.png"]
+    summary |= {"files": files, "source": source_of([scene.document.path], folder)}
+    (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
+    write_pushover(folder / REPORT, summary)
+    (folder / INDEX).write_text(as_json(summary), encoding="utf-8")
 
 
 def _in_rig(scene: SceneFile, stones: Scene, groups: Groups, rig: Rig) -> Scene:

@@ -109,18 +109,18 @@ def read_study(path: str | Path) -> StudyFile:
 
 
 def _inputs(document: TomlDocument, given: Mapping[str, Any], scene: SceneFile) -> tuple[InputTable, ...]:
-    found: list[InputTable] = []
+    inputs: list[InputTable] = []
     for path, table in tables_of(document, given, "inputs"):
         made = read_table(document, path, table, InputTable, "[[inputs]]")
         name = made.name or str(made.type)
-        if name in [other.name or str(other.type) for other in found]:
+        if name in [other.name or str(other.type) for other in inputs]:
             document.fail(f"two inputs {name!r}", *path, remedy="name each differently: name = …")
         with document.at(*path):
             _check_input(made, scene)
-        found.append(made)
-    if not found:
+        inputs.append(made)
+    if not inputs:
         document.fail("no input", "inputs", remedy="write [[inputs]] above each thing that is not known")
-    return tuple(found)
+    return tuple(inputs)
 
 
 def _check_input(table: InputTable, scene: SceneFile) -> None:

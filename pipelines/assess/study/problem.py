@@ -202,6 +202,7 @@ class Problem:
         live = at.limited.live
 
         def changed(moves: Mapping[int, float]) -> Changed:
+            """Return the assembly at other values of the inputs."""
             scene = moved.scene({numbers[place]: step for place, step in moves.items()})
             return assembly(at_instant(scene)), live
 

@@ -91,12 +91,7 @@ def run_study(
     """
     require_figures()
     folder, file, part = Path(folder), read_study(path), part or Part()
-    if part.count > 1 and file.study.method in _WHOLE:
-        raise UsageError(
-            f"{file.study.method} has no parts: {_WHOLE[file.study.method]}",
-            where="--part",
-            remedy="leave out --part, and give --workers or --scheduler",
-        )
+    _refuse_parts(file.study.method, part)
     progress(Progress("blocks", 0, None, "reading the stones"))
     with open_database(url, create=False) as database, database.session(read_only=True) as session:
         as_of = latest_entry(session)
@@ -124,6 +119,16 @@ def run_study(
         number = store_record(database, folder, _record(file, problem, summary, as_of))
     progress(Progress("write", 1, 1))
     return Study(folder, summary, True, number)
+
+
+def _refuse_parts(method: Method, part: Part) -> None:
+    """Refuse a part of the samples of a method whose samples depend on those before."""
+    if part.count > 1 and method in _WHOLE:
+        raise UsageError(
+            f"{method} has no parts: {_WHOLE[method]}",
+            where="--part",
+            remedy="leave out --part, and give --workers or --scheduler",
+        )
 
 
 def _made(folder: Path) -> Path:

@@ -34,10 +34,10 @@ _MOST = 40  # actions that are told
 
 
 def summary_of(
-    file: StudyFile, problem: Problem, found: Estimates, sampler: Sampler, snapshot: Snapshot
+    file: StudyFile, problem: Problem, estimates: Estimates, sampler: Sampler, snapshot: Snapshot
 ) -> dict[str, Any]:
     """Return the contents of study.json."""
-    gradient = found.gradient
+    gradient = estimates.gradient
     squares = np.zeros(problem.dimension) if gradient is None else gradient**2
     measures = [] if gradient is None else actions(problem, gradient)
     summary: dict[str, Any] = {
@@ -46,22 +46,22 @@ def summary_of(
         "unknowns": problem.dimension,
         "quantity": quantity_name(problem.quantities[0]),
         "bound": problem.differentiable,
-        "means": {name: _plain(asdict(mean)) for name, mean in found.means.items()},
+        "means": {name: _plain(asdict(mean)) for name, mean in estimates.means.items()},
         "quantiles": {
             name: dict(zip(map(str, _SHARES), quantiles(values, _SHARES), strict=True))
-            for name, values in found.values.items()
+            for name, values in estimates.values.items()
         },
-        "failure": _failure(problem, found),
-        "fragility": [_plain({"level": level, **_told(one)}) for level, one in found.fragility],
-        "linear": _linear(problem, found),
-        "designs": [_design(problem, design) for design in found.designs],
-        "sobol": _sobol(problem, found),
+        "failure": _failure(problem, estimates),
+        "fragility": [_plain({"level": level, **_told(one)}) for level, one in estimates.fragility],
+        "linear": _linear(problem, estimates),
+        "designs": [_design(problem, design) for design in estimates.designs],
+        "sobol": _sobol(problem, estimates),
         "subset": None
-        if found.subset is None
+        if estimates.subset is None
         else {
-            "levels": list(found.subset.levels),
-            "evaluations": found.subset.evaluations,
-            "complete": found.subset.complete,
+            "levels": list(estimates.subset.levels),
+            "evaluations": estimates.subset.evaluations,
+            "complete": estimates.subset.complete,
         },
         "shares": {
             "by_input": shares_by_input(problem, squares),
@@ -71,12 +71,16 @@ def summary_of(
         "actions": [asdict(action) for action in measures[:_MOST]],
         "certain": certain(problem),
         "faults": [{"reason": first, "count": many} for first, many in sampler.faults.values()],
-        "samples": {"taken": sampler.taken, "cpu": sampler.cpu, "digest": sampler.digest_of(found.samples)},
+        "samples": {
+            "taken": sampler.taken,
+            "cpu": sampler.cpu,
+            "digest": sampler.digest_of(estimates.samples),
+        },
         "snapshot": snapshot.hash,
         "versions": dict(versions()),
         "files": [INDEX, "samples.csv", "actions.csv", "report.html"],
     }
-    summary["cautions"] = _cautions(problem, found, summary)
+    summary["cautions"] = _cautions(problem, estimates, summary)
     summary["headline"] = _headline(summary)
     return summary
 
@@ -88,34 +92,34 @@ def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _told(found: Probability) -> dict[str, Any]:
-    low, high = found.index
+def _told(probability: Probability) -> dict[str, Any]:
+    low, high = probability.index
     return _plain(
         {
-            "probability": found.low_value,
-            "probability_upper": found.high_value,
-            "low": found.low,
-            "high": found.high,
-            "index": reliability_index(found.low_value),
+            "probability": probability.low_value,
+            "probability_upper": probability.high_value,
+            "low": probability.low,
+            "high": probability.high,
+            "index": reliability_index(probability.low_value),
             "index_low": low,
             "index_high": high,
-            "failing": found.failing,
-            "unknown": found.unknown,
-            "count": found.count,
-            "cov": found.cov,
+            "failing": probability.failing,
+            "unknown": probability.unknown,
+            "count": probability.count,
+            "cov": probability.cov,
         }
     )
 
 
-def _failure(problem: Problem, found: Estimates) -> dict[str, Any] | None:
+def _failure(problem: Problem, estimates: Estimates) -> dict[str, Any] | None:
     failure = failure_of(problem)
-    if failure is None or found.probability is None:
+    if failure is None or estimates.probability is None:
         return None
-    return {"level": failure.level, "above": failure.above, **_told(found.probability)}
+    return {"level": failure.level, "above": failure.above, **_told(estimates.probability)}
 
 
-def _linear(problem: Problem, found: Estimates) -> dict[str, Any] | None:
-    linear = found.linear
+def _linear(problem: Problem, estimates: Estimates) -> dict[str, Any] | None:
+    linear = estimates.linear
     if linear is None:
         return None
     along = "" if linear.along < 0 else problem.unknowns.each[linear.along].label
@@ -127,8 +131,8 @@ def _linear(problem: Problem, found: Estimates) -> dict[str, Any] | None:
             "along": along,
             "linear": bool(linear.linear),
             "sides": [
-                {"along": problem.unknowns.each[one.along].label, "below": one.below, "above": one.above}
-                for one in linear.sides
+                {"along": problem.unknowns.each[side.along].label, "below": side.below, "above": side.above}
+                for side in linear.sides
             ],
         }
     )
@@ -154,8 +158,8 @@ def _design(problem: Problem, design: Any) -> dict[str, Any]:
     }
 
 
-def _sobol(problem: Problem, found: Estimates) -> list[dict[str, Any]]:
-    indices = found.indices
+def _sobol(problem: Problem, estimates: Estimates) -> list[dict[str, Any]]:
+    indices = estimates.indices
     if indices is None:
         return []
     return [
@@ -189,7 +193,7 @@ def certain(problem: Problem) -> list[str]:
     return [*found, "the model itself: rigid stones, their bond, and how joints are closed"]
 
 
-def _cautions(problem: Problem, found: Estimates, summary: Mapping[str, Any]) -> list[str]:
+def _cautions(problem: Problem, estimates: Estimates, summary: Mapping[str, Any]) -> list[str]:
     told = []
     linear = summary["linear"]
     if linear is not None and not linear["linear"]:
@@ -210,22 +214,22 @@ def _cautions(problem: Problem, found: Estimates, summary: Mapping[str, Any]) ->
         "both sides"
         for fault in summary["faults"]
     ]
-    if found.subset is not None and not found.subset.complete:
+    if estimates.subset is not None and not estimates.subset.complete:
         told.append("subset simulation did not reach failure: its probability is an upper bound")
-    if any(not design.converged for design in found.designs):
+    if any(not design.converged for design in estimates.designs):
         told.append("a search for a design point did not converge")
-    told += _departing(found)
+    told += _departing(estimates)
     return told
 
 
-def _departing(found: Estimates) -> list[str]:
+def _departing(estimates: Estimates) -> list[str]:
     """Return a caution where the interval of the samples is not that of the first-order prediction."""
-    if found.linear is None and found.gradient is None:
+    if estimates.linear is None and estimates.gradient is None:
         return []
     told = []
-    for name, values in found.values.items():
+    for name, values in estimates.values.items():
         known = values[np.isfinite(values)]
-        if len(known) < 100 or found.indices is not None:
+        if len(known) < 100 or estimates.indices is not None:
             continue
         low, high = np.quantile(known, [0.025, 0.975])
         half, normal = 0.5 * float(high - low), 1.96 * float(known.std(ddof=1))

@@ -32,29 +32,17 @@ def cluster(
     ------
     UsageError : Dask is not installed, no scheduler answers, or it has no worker
     """
-    try:
-        from distributed import Client, as_completed
-        from distributed.scheduler import KilledWorker
-    except ImportError:
-        raise UsageError(
-            "a scheduler needs Dask, which is not installed",
-            where="--scheduler",
-            remedy="pip install 'moma-masonry[dask]', or give --workers or --part, which need nothing",
-        ) from None
-    try:
-        client = Client(address, timeout=_PATIENCE, set_as_default=False)
-    except (OSError, ValueError) as error:
-        raise UsageError(
-            f"no Dask scheduler answers: {error}",
-            where=f"--scheduler {address}",
-            remedy="start one by `dask scheduler`, and workers by `dask worker ADDRESS --nthreads 1`",
-        ) from error
+    client = _client(address)
+    from distributed import as_completed
+    from distributed.scheduler import KilledWorker
 
     # a scheduler has no MOMA: functions within functions travel whole
     def survive(dask_scheduler: Any) -> None:
+        """Let a task lose its workers as often as is allowed."""
         dask_scheduler.allowed_failures = max(dask_scheduler.allowed_failures, attempts - 1)
 
     def run(tasks: Sequence[Any]) -> Iterator[tuple[int, Any]]:
+        """Yield number and answer of each task, in the order in which they end."""
         futures = client.map(work, tasks, pure=False, key="sample", retries=0)
         numbers = {future.key: number for number, future in enumerate(futures)}
         for future in as_completed(futures, loop=client.loop):
@@ -80,3 +68,23 @@ def cluster(
                 remedy="start workers by `dask worker ADDRESS --nthreads 1`",
             ) from error
         yield run
+
+
+def _client(address: str) -> Any:
+    """Return the client of a scheduler that answers."""
+    try:
+        from distributed import Client
+    except ImportError:
+        raise UsageError(
+            "a scheduler needs Dask, which is not installed",
+            where="--scheduler",
+            remedy="pip install 'moma-masonry[dask]', or give --workers or --part, which need nothing",
+        ) from None
+    try:
+        return Client(address, timeout=_PATIENCE, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise UsageError(
+            f"no Dask scheduler answers: {error}",
+            where=f"--scheduler {address}",
+            remedy="start one by `dask scheduler`, and workers by `dask worker ADDRESS --nthreads 1`",
+        ) from error

@@ -56,6 +56,7 @@ def workers(
     crew: list[Worker] = []
 
     def run(tasks: Sequence[Any]) -> Iterator[tuple[int, Any]]:
+        """Yield number and answer of each task, in the order in which they end."""
         while len(crew) < min(count, len(tasks)):
             crew.append(Worker(work))
         waiting, losses = deque(range(len(tasks))), dict[int, int]()

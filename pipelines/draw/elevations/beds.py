@@ -97,6 +97,7 @@ def _fitted(line: CourseLine, moved: Sequence[BedMovement], along: Array) -> Arr
     ends = float(line.along[0]), float(line.along[-1])
 
     def lift(places: Array) -> Array:
+        """Return the sum of the lifts of all movements at some places [m]."""
         return np.asarray(
             np.sum([movement.lift(places, ends) for movement in moved], axis=0), dtype=np.float64
         )

@@ -37,9 +37,9 @@ def model_content(building: Building, session: Session) -> bytes:
             EntityResult.run_id == building.run, EntityResult.fidelity == "fixed"
         )  # fmt: skip
         supports |= {str(code) for code in session.scalars(fixed)}
-        for one in _contacts(building, session):
-            edge = edges[str(one.first)].setdefault(str(one.second), {"contacts": []})
-            edge["contacts"].append(contact_document(one))
+        for contact in _contacts(building, session):
+            edge = edges[str(contact.first)].setdefault(str(contact.second), {"contacts": []})
+            edge["contacts"].append(contact_document(contact))
     used = building.values("material")
     names = sorted({str(name) for name in used if name is not None})
     materials = {str(stable_uuid("material", name)): _material(building, name) for name in names}
@@ -133,19 +133,19 @@ def _block(
 
 def _material(building: Building, name: str) -> dict[str, Any]:
     """Return a material; COMPAS has strengths and moduli in MPa."""
-    known = {label: value for label, (value, _) in building.materials.get(name, {}).items()}
+    material = {label: value for label, (value, _) in building.materials.get(name, {}).items()}
 
     def in_megapascals(label: str) -> float | None:
         """Return a property of the material [MPa]; None where not known."""
-        return known[label] / MEGAPASCAL if label in known else None
+        return material[label] / MEGAPASCAL if label in material else None
 
     data = {
         "name": name,
         "fck": in_megapascals("compressive_strength"),
         "ft": in_megapascals("tensile_strength"),
         "Ecm": in_megapascals("young"),
-        "density": known.get("density"),
-        "poisson": known.get("poisson", POISSON),
+        "density": material.get("density"),
+        "poisson": material.get("poisson", POISSON),
     }
     guid = str(stable_uuid("material", name))
     return {"dtype": "compas_dem.material/Stone", "data": data, "name": name, "guid": guid}
@@ -157,8 +157,8 @@ def _contacts(building: Building, session: Session) -> Iterator[PairContact]:
     codes = {number: str(code) for number, code in session.execute(select(Entity.id, Entity.code))}
     points: dict[int, list[ContactPoint]] = {}
     found = select(ContactPoint).where(ContactPoint.run_id == building.run, ContactPoint.joint.is_not(None))
-    for one in session.scalars(found.order_by(ContactPoint.number)):
-        points.setdefault(int(one.joint or 0), []).append(one)
+    for contact in session.scalars(found.order_by(ContactPoint.number)):
+        points.setdefault(int(contact.joint or 0), []).append(contact)
     joints = select(JointResult).where(JointResult.run_id == building.run).order_by(JointResult.number)
     for joint in session.scalars(joints):
         ends = (codes[joint.first_id], codes[joint.second_id])
@@ -167,7 +167,7 @@ def _contacts(building: Building, session: Session) -> Iterator[PairContact]:
         if first is None or second is None or not some:
             continue
         # forces of points act on the candidate, those of the joint on its first stone
-        signs = np.array([1.0 if one.candidate_id == joint.first_id else -1.0 for one in some])
+        signs = np.array([1.0 if contact.candidate_id == joint.first_id else -1.0 for contact in some])
         yield PairContact(
             first,
             second,
@@ -175,6 +175,6 @@ def _contacts(building: Building, session: Session) -> Iterator[PairContact]:
             np.array([joint.x, joint.y, joint.z]),
             np.array([joint.nx, joint.ny, joint.nz]),
             joint.area,
-            np.array([[one.x, one.y, one.z] for one in some]),
-            np.array([[one.fx, one.fy, one.fz] for one in some]) * signs[:, None],
+            np.array([[contact.x, contact.y, contact.z] for contact in some]),
+            np.array([[contact.fx, contact.fy, contact.fz] for contact in some]) * signs[:, None],
         )

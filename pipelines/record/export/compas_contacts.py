@@ -136,14 +136,14 @@ def results_document(
 
 def _edge(contacts: Sequence[PairContact]) -> dict[str, Any]:
     """Return the attributes of an edge: resultant, points and their forces."""
-    largest = max(contacts, key=lambda one: one.area)
+    largest = max(contacts, key=lambda contact: contact.area)
     document, order = contact_document(largest), largest.order()
     local = largest.forces[order] @ largest.axes().T
-    resultant = np.sum([one.forces.sum(axis=0) for one in contacts], axis=0)
+    resultant = np.sum([contact.forces.sum(axis=0) for contact in contacts], axis=0)
     count = len(order)
     return {
         "contact_data": document,
-        "contacts": [contact_document(one) for one in contacts],
+        "contacts": [contact_document(contact) for contact in contacts],
         "contact_points": largest.points[order].tolist(),
         "contact_frame": document["data"]["frame"],
         "face_contact": count >= 3,

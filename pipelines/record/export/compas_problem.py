@@ -150,7 +150,7 @@ def _material(block: CompasBlock, materials: Mapping[str, Mapping[str, Any]]) ->
 
 def _gravity(groups: Iterable[Mapping[str, Any]]) -> float:
     """Return the gravity that all groups state [m/s²]: they act at once, and weight counts once."""
-    stated = {float(one.get("g", _GRAVITY)) for one in groups} or {_GRAVITY}
+    stated = {float(group.get("g", _GRAVITY)) for group in groups} or {_GRAVITY}
     if len(stated) > 1:
         what = f"groups with different gravities: {', '.join(f'{one:g}' for one in sorted(stated))} m/s²"
         raise SceneError(what, where=_WHERE, remedy="give all groups the same g")

@@ -78,26 +78,10 @@ def run_model(
     centres, shift, turn = rigid_motion(references, [frame.positions for frame in frames], soft)
     rest = _rest(bodies, centres, shift[-1], turn[-1], rows)
     fixed = np.array([body.fidelity is Fidelity.FIXED for body in bodies])
-    motion = Motion(
-        np.array([frame.time for frame in frames]),
-        centres,
-        shift,
-        turn,
-        fixed,
-        rest,
-        _in_time(frames, bodies),
-    )
+    times = np.array([frame.time for frame in frames])
+    motion = Motion(times, centres, shift, turn, fixed, rest, _in_time(frames, bodies))
     stress = _stress_field(bodies, rows)
     columns = [*_result_columns(stones), *_structure_columns(codes, structures)]
-    notes = []
-    if len(frames) < len(result.frames):
-        notes.append(
-            f"{len(frames)} of {len(result.frames)} instants are in this page; results.vtkhdf has them all."
-        )
-    if soft.any():
-        notes.append(
-            "Stress on the surface and the deformation of elastic stones are those of the last instant."
-        )
     model = Model(
         title=result.scene.name,
         stones=mesh,
@@ -109,9 +93,21 @@ def run_model(
         colour="von_mises" if stress is not None else _first_colour(result, columns),
         towards=towards,
         origin=origin,
-        notes=notes,
+        notes=_notes(len(frames), len(result.frames), bool(soft.any())),
     )
     return with_known(model, known)
+
+
+def _notes(shown: int, frames: int, elastic: bool) -> list[str]:
+    """Return notes on instants that are not shown, and on what is shown of the last instant alone."""
+    notes = []
+    if shown < frames:
+        notes.append(f"{shown} of {frames} instants are in this page; results.vtkhdf has them all.")
+    if elastic:
+        notes.append(
+            "Stress on the surface and the deformation of elastic stones are those of the last instant."
+        )
+    return notes
 
 
 def _first_colour(result: Result, columns: Sequence[Column]) -> str:
@@ -254,6 +250,7 @@ def _joints(joints: JointResult, centres: Array, shift: Array, turn: Array) -> J
     matrices = _matrices(turn)
 
     def back(places: Array, body: Ints) -> Array:
+        """Return places on displaced bodies where they were before the run [m]."""
         away = places - centres[body] - shift[body]
         place: Array = np.einsum("nji,nj->ni", matrices[body], away) + centres[body]
         return place

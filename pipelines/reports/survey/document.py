@@ -52,9 +52,9 @@ def write_survey_json(path: Path, study: SurveyStudy, content: Mapping[str, Any]
         "beds": map(_beds, study.beds),
         "faces": (_face(face, study.stones) for face in study.faces),
         "depths": map(_record, study.depths),
-        "masonry": (_masonry(one, study.stones) for one in study.masonry),
+        "masonry": (_masonry(stone, study.stones) for stone in study.masonry),
         "measure_again": map(_remeasure, study.again.rows),
-        "measure_again_left": ({"text": one} for one in study.again.left),
+        "measure_again_left": ({"text": text} for text in study.again.left),
         "remeasure": map(_remeasure, study.remeasures),
         "rejects": (
             {"code": reject.code, "line": _line(reject.spans), "reason": str(reject.error)}

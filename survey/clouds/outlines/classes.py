@@ -90,7 +90,7 @@ def check_stones(numbers: NDArray[np.int32], values: Ints, colours: bool, path: 
         if pieces >= _PIECES and sizes.max() < _HALF * sizes.sum():
             classes[_named(int(values[number]), colours)] = pieces
     if classes:
-        most = max(classes, key=lambda one: classes[one])
+        most = max(classes, key=lambda class_: classes[class_])
         what = " and ".join(
             f"{name} has {pieces} pieces" for name, pieces in list(classes.items())[:_MIN_PIECES]
         )

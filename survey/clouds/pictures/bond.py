@@ -132,7 +132,7 @@ def bond_of(
     from scipy.ndimage import find_objects
 
     ratio = np.minimum(strength.evidence / typical, _STRONGEST).astype(np.float32)
-    rows, columns = (one.astype(np.float32) for one in np.indices(regions.shape))
+    rows, columns = (index.astype(np.float32) for index in np.indices(regions.shape))
     found = borders_of(regions, np.stack([ratio, (ratio >= _GAP).astype(np.float32), rows, columns]), colours)
     sums = found.sums.copy()
     sums[:, 1] = found.lengths - sums[:, 1]  # a gap where neither side has a joint

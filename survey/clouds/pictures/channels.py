@@ -35,7 +35,7 @@ def channels_of(
     if left_out is not None:
         void = void | left_out
     channels = [light, green, blue, *([] if depth is None else [_relief(depth)])]
-    return [_without(one, hidden | void) for one in channels], hidden, void
+    return [_without(channel, hidden | void) for channel in channels], hidden, void
 
 
 def lightness(pixels: NDArray[np.uint8]) -> tuple[Field, Field, Field]:

@@ -90,6 +90,7 @@ def _courses(boxes: Array, arch: Array) -> list[list[int]]:
     group = list(range(len(boxes)))
 
     def root(k: int) -> int:
+        """Return the first member of the group of a stone."""
         while group[k] != k:
             group[k] = group[group[k]]
             k = group[k]

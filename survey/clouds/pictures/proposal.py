@@ -138,32 +138,34 @@ def _together(stones: list[_Found], more: list[_Found]) -> list[_Found]:
     """Add the stones of a tile to those of others; of two that are the same, the one that is less cut stays."""
     if not stones:
         return more
-    boxes = np.array([[one.ring.min(axis=0), one.ring.max(axis=0)] for one in stones])
+    boxes = np.array([[stone.ring.min(axis=0), stone.ring.max(axis=0)] for stone in stones])
     taken = set()
     first = len(stones)
     renumber: dict[int, int] = {}
     out = list(stones)
-    for k, one in enumerate(more):
-        low, high = one.ring.min(axis=0), one.ring.max(axis=0)
+    for k, added in enumerate(more):
+        low, high = added.ring.min(axis=0), added.ring.max(axis=0)
         shared = np.clip(np.minimum(high, boxes[:, 1]) - np.maximum(low, boxes[:, 0]), 0.0, None).prod(axis=1)
         sizes = (boxes[:, 1] - boxes[:, 0]).prod(axis=1)
         same = np.flatnonzero(shared > _SAME * np.minimum(sizes, float((high - low).prod())))
         if len(same) == 0:
             renumber[k] = len(out)
-            out.append(one)
+            out.append(added)
             continue
         larger = int(same[np.argmax(shared[same])])
         renumber[k] = larger
         if larger not in taken and float((high - low).prod()) > sizes[larger] * 1.02:
-            out[larger] = one
+            out[larger] = added
             taken.add(larger)
     moved = []
-    for k, one in enumerate(out):
+    for k, stone in enumerate(out):
         fresh = k >= first or k in taken
         moved.append(
-            replace(one, borders=tuple((renumber.get(other, -1), a, b, c) for other, a, b, c in one.borders))
+            replace(
+                stone, borders=tuple((renumber.get(other, -1), a, b, c) for other, a, b, c in stone.borders)
+            )
             if fresh
-            else one
+            else stone
         )
     return moved
 
@@ -178,7 +180,7 @@ def _assembled(
 ) -> Proposal:
     """Place stones in the wall's plane, and name and order them."""
     places, shape = photograph.places, photograph.pixels.shape
-    rings = [_counter_clockwise(places.place(one.ring)) for one in stones]
+    rings = [_counter_clockwise(places.place(stone.ring)) for stone in stones]
     openings = [np.sort(places.place(box), axis=0) for box in voids]
     coursed = kind != "rubble"
     last = np.array([shape[1], shape[0]]) - 1.0 - 0.5 * width
@@ -193,15 +195,15 @@ def _assembled(
     number = {k: n for n, k in enumerate(order)}
     out, borders = [], []
     for k in order:
-        one = stones[k]
-        out.append(ProposedStone(named[k], rings[k], one.score, one.sigma * places.pixel, cut[k]))
-        for other, chance, place, length in one.borders:
+        stone = stones[k]
+        out.append(ProposedStone(named[k], rings[k], stone.score, stone.sigma * places.pixel, cut[k]))
+        for other, chance, place, length in stone.borders:
             if other >= 0 and number[k] < number.get(other, -1):
                 x, y = places.place(np.array([place]))[0].tolist()
                 borders.append(
                     ProposedBorder((number[k], number[other]), chance, (x, y), length * places.pixel)
                 )
-    judged = judge_result(findings, rings, [one.score for one in out], coursed)
+    judged = judge_result(findings, rings, [stone.score for stone in out], coursed)
     joint = (width, width * places.pixel)
     if judged.refused:
         out, borders = [], []
@@ -305,7 +307,7 @@ def _stones_of(regions: Ints, fields: Fields, kind: str) -> list[_Found]:
     shapes = outline_shapes(regions, without_mortar(regions, fields.image, _REACH[kind]))
     count = np.bincount(regions.ravel())
     veiled = np.bincount(regions.ravel(), fields.hidden.ravel().astype(np.float64), len(count))
-    shapes = [one for one in shapes if veiled[one.number] <= _HIDDEN * count[one.number]]
+    shapes = [shape for shape in shapes if veiled[shape.number] <= _HIDDEN * count[shape.number]]
     place = {one.number: k for k, one in enumerate(shapes)}
     out = []
     for one in shapes:
@@ -319,14 +321,14 @@ def _stones_of(regions: Ints, fields: Fields, kind: str) -> list[_Found]:
     return out
 
 
-def _moved(one: _Found, corner: Array, scale: Array, factor: float) -> _Found:
+def _moved(stone: _Found, corner: Array, scale: Array, factor: float) -> _Found:
     """Return a stone in pixels of the picture."""
     borders = tuple(
         (other, chance, tuple(((np.array(place) + 0.5) * scale - 0.5 + corner).tolist()), length * factor)
-        for other, chance, place, length in one.borders
+        for other, chance, place, length in stone.borders
     )
-    ring = (one.ring + 0.5) * scale - 0.5 + corner
-    return replace(one, ring=ring, sigma=one.sigma * factor, borders=borders)
+    ring = (stone.ring + 0.5) * scale - 0.5 + corner
+    return replace(stone, ring=ring, sigma=stone.sigma * factor, borders=borders)
 
 
 def _boxes(void: Bools, corner: Array, scale: Array) -> list[Array]:

@@ -148,24 +148,9 @@ def paint_wall(
     """
     origin = np.floor(clouds[0].near)
     local = wall.origin - origin
-    low, high, read = np.full(2, np.inf), np.full(2, -np.inf), 0
-    for cloud in clouds:
-        for chunk in cloud.chunks(origin, False):
-            flat = (chunk.places - local) @ wall.axes.T
-            close = flat[np.abs(flat[:, 2]) <= slab]
-            read += len(flat)
-            progress("measure the wall", read, None)
-            if len(close):
-                low, high = (
-                    np.minimum(low, close[:, :2].min(axis=0)),
-                    np.maximum(high, close[:, :2].max(axis=0)),
-                )
-    if not np.isfinite(low).all():
-        remedy = "check --wall, or widen --slab"
-        what = f"none of its {read} points is within {slab:g} m of the wall"
-        raise SurveyError(what, where=str(clouds[0].path), remedy=remedy)
+    low, high, read = _extent(clouds, wall, slab, origin, progress)
     low = np.floor(low / pixel) * pixel
-    width, height = (int(one) for one in np.ceil((high - low) / pixel + 1e-9) + 1)
+    width, height = (int(pixels) for pixels in np.ceil((high - low) / pixel + 1e-9) + 1)
     if width * height > _LARGEST:
         remedy = f"take larger pixels, e.g. --pixel {pixel * np.sqrt(width * height / _LARGEST) * 1.05:.2g}"
         raise UsageError(f"a picture of {width} × {height} pixels", where="--pixel", remedy=remedy)
@@ -186,6 +171,27 @@ def paint_wall(
         mean = canvas.tints / counts[..., None] if coloured else None
     colours = _relief(filled(depths), pixel) if mean is None else _closed(mean, counts)
     return Picture(wall, low, pixel, counts, depths, colours, coloured), read, shown
+
+
+def _extent(
+    clouds: Sequence[PointCloud], wall: Wall, slab: float, origin: Array, progress: Progress
+) -> tuple[Array, Array, int]:
+    """Return the lowest and the highest corner (2,) of the points on a wall [m], and the number of all points."""
+    local = wall.origin - origin
+    low, high, read = np.full(2, np.inf), np.full(2, -np.inf), 0
+    for cloud in clouds:
+        for chunk in cloud.chunks(origin, False):
+            flat = (chunk.places - local) @ wall.axes.T
+            close = flat[np.abs(flat[:, 2]) <= slab, :2]
+            read += len(flat)
+            progress("measure the wall", read, None)
+            if len(close):
+                low, high = np.minimum(low, close.min(axis=0)), np.maximum(high, close.max(axis=0))
+    if not np.isfinite(low).all():
+        remedy = "check --wall, or widen --slab"
+        what = f"none of its {read} points is within {slab:g} m of the wall"
+        raise SurveyError(what, where=str(clouds[0].path), remedy=remedy)
+    return low, high, read
 
 
 def _closed(mean: NDArray[np.float32], counts: NDArray[np.float32]) -> NDArray[np.uint8]:

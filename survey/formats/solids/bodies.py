@@ -115,15 +115,15 @@ def closed_bodies(
     for group, volume in zip(groups, volumes, strict=True):
         outward = group if volume >= 0.0 else [one[::-1] for one in group]
         try:
-            found = None
+            flattened = None
             if planes > 0.0 and is_scanned(vertices, outward):
                 check_watertight(_solid(raw.name, vertices, outward))
-                found = plane_faces(raw.name, vertices, outward, planes)
-            if found is not None and found.solid is not None:
-                yield ClosedBody(found.solid, doubled=doubled, repairs=repairs, scanned=found.text)
+                flattened = plane_faces(raw.name, vertices, outward, planes)
+            if flattened is not None and flattened.solid is not None:
+                yield ClosedBody(flattened.solid, doubled=doubled, repairs=repairs, scanned=flattened.text)
             else:
                 body = _closed(raw, vertices, outward, flat)
-                text = "" if found is None else found.text
+                text = "" if flattened is None else flattened.text
                 yield replace(body, doubled=doubled, repairs=repairs, scanned=text)
         except GeometryError as error:
             yield error
@@ -201,7 +201,7 @@ def _closed(raw: RawBody, vertices: Array, polygons: list[Polygon], flat: float)
         else:
             pieces += fold(vertices, polygon, tolerance)
             folded += 1
-    used = np.unique(np.concatenate([np.array(one) for one in pieces]))
+    used = np.unique(np.concatenate([np.array(piece) for piece in pieces]))
     merged = _solid(raw.name, vertices, merge_flat(vertices, pieces, used, flat + raw.resolution))
     with np.errstate(all="ignore"):  # a body without volume is an error below, not a warning
         try:

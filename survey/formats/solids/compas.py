@@ -128,9 +128,9 @@ def _block_model(document: Mapping[str, Any], where: str) -> CompasModel:
     elements: Mapping[str, Mapping[str, Any]] = data["elements"]
     places = _places(data, elements)
     carved = {
-        int(end) for edges in graph["edge"].values() for end, one in edges.items() if one.get("modifiers")
+        int(end) for edges in graph["edge"].values() for end, entry in edges.items() if entry.get("modifiers")
     }
-    nodes = {int(node): str(one["element"]) for node, one in graph["node"].items()}
+    nodes = {int(node): str(entry["element"]) for node, entry in graph["node"].items()}
     names = _names({node: elements[guid] for node, guid in nodes.items()})
     blocks = []
     for node, guid in sorted(nodes.items()):
@@ -147,27 +147,29 @@ def _block_model(document: Mapping[str, Any], where: str) -> CompasModel:
         support, material = bool(element.get("is_support")), element.get("material")
         material = None if material is None else str(material)
         blocks.append(replace(block, support=support, material=material))
-    materials = {str(guid): _data(one) for guid, one in (data.get("materials") or {}).items()}
+    materials = {str(guid): _data(entry) for guid, entry in (data.get("materials") or {}).items()}
     return CompasModel(str(document.get("guid", "")), tuple(blocks), materials, _edges(graph))
 
 
 def _assembly(document: Mapping[str, Any], where: str) -> CompasModel:
     graph = _data(_data(document)["graph"])
-    nodes = {int(node): one for node, one in graph["node"].items() if one.get("block") is not None}
-    names = _names({node: one["block"] for node, one in nodes.items()})
+    nodes = {int(node): entry for node, entry in graph["node"].items() if entry.get("block") is not None}
+    names = _names({node: entry["block"] for node, entry in nodes.items()})
     blocks = (
         replace(
-            _block(node, names[node], one["block"], np.eye(4), where), support=bool(one.get("is_support"))
+            _block(node, names[node], entry["block"], np.eye(4), where), support=bool(entry.get("is_support"))
         )
-        for node, one in sorted(nodes.items())
+        for node, entry in sorted(nodes.items())
     )
     return CompasModel(str(document.get("guid", "")), tuple(blocks), {}, _edges(graph))
 
 
 def _meshes(documents: Sequence[object], where: str) -> CompasModel:
-    meshes = [one for one in documents if isinstance(one, Mapping) and "vertex" in _data(one)]
+    meshes = [
+        document for document in documents if isinstance(document, Mapping) and "vertex" in _data(document)
+    ]
     if len(meshes) < len(documents):
-        kinds = sorted({_kind(one) or type(one).__name__ for one in documents})
+        kinds = sorted({_kind(document) or type(document).__name__ for document in documents})
         raise SurveyError(f"of {', '.join(kinds)} no blocks are read", where=where, remedy=_REMEDY)
     names = _names(dict(enumerate(meshes)))
     blocks = tuple(_block(node, names[node], one, np.eye(4), where) for node, one in enumerate(meshes))
@@ -182,7 +184,7 @@ def _names(documents: Mapping[int, Mapping[str, Any]]) -> dict[int, str]:
     """Return the name of each block: COMPAS names an object after its class where the user does not."""
     given = {node: str(one.get("name") or _data(one).get("name") or "") for node, one in documents.items()}
     times = Counter(given.values())
-    own = {_kind(one).rpartition("/")[2] for one in documents.values()} | {"", "None"}
+    own = {_kind(document).rpartition("/")[2] for document in documents.values()} | {"", "None"}
     return {
         node: name if times[name] == 1 and name not in own else f"block-{node}"
         for node, name in given.items()
@@ -228,7 +230,7 @@ def _block(
     vertices = data["vertex"]
     row = {int(key): at for at, key in enumerate(vertices)}
     points = np.array(
-        [[float(one.get(axis, default.get(axis, 0.0))) for axis in "xyz"] for one in vertices.values()]
+        [[float(vertex.get(axis, default.get(axis, 0.0))) for axis in "xyz"] for vertex in vertices.values()]
     ).reshape(-1, 3)
     points = points @ place[:3, :3].T + place[:3, 3]
     check_coordinates(points, "vertex", f"{where}: block {name}")

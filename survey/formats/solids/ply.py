@@ -165,7 +165,7 @@ class _BinaryRows:
         if not element.length:
             return []
         start = self._at
-        lengths = [0 if one.count is None else -1 for one in element.properties]
+        lengths = [0 if property_.count is None else -1 for property_ in element.properties]
         if -1 in lengths:
             for k, entry in enumerate(element.properties):
                 lengths[k] = 0 if entry.count is None else int(self._take(entry.count, 1)[0])

@@ -106,8 +106,8 @@ def _of_all(
     known: set[str] = set()
     for file in files:
         try:
-            for one in _records(file, template, options, known):
-                yield replace(one, file=str(file)) if isinstance(one, SolidRecord) else one
+            for record in _records(file, template, options, known):
+                yield replace(record, file=str(file)) if isinstance(record, SolidRecord) else record
         except SurveyError as error:
             yield Reject(None, error)
 
@@ -119,7 +119,7 @@ def _snapped(
     records = [one for one in found if isinstance(one, SolidRecord)]
     if not records:
         return found, Snapping(tolerance, 0, 0, {}, {}, ())
-    given = [Solid(one.code, one.vertices, one.faces) for one in records]
+    given = [Solid(record.code, record.vertices, record.faces) for record in records]
     solids, snapping = snap(given, tolerance)
     made = {one.code: _moved(one, solid, snapping, path) for one, solid in zip(records, solids, strict=True)}
     return [made[one.code] if isinstance(one, SolidRecord) else one for one in found], snapping

@@ -292,6 +292,7 @@ def _walk(vertices: Array, ends: Ints, labels: Ints, beside: Array) -> MedialLin
     pair = [tuple(label) for label in labels.tolist()]
 
     def is_node(vertex: int) -> bool:
+        """Return whether lines meet or end at a vertex."""
         met = at[vertex]
         return len(met) != 2 or set(pair[met[0]]) != set(pair[met[1]])
 
@@ -299,6 +300,7 @@ def _walk(vertices: Array, ends: Ints, labels: Ints, beside: Array) -> MedialLin
     lines, used = list[Line](), np.zeros(len(ends), np.bool_)
 
     def follow(start: int, ridge: int) -> None:
+        """Add the line that begins with a ridge at a node."""
         path, ridges, here = [start], list[int](), start
         while not used[ridge]:
             used[ridge] = True

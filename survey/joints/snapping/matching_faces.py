@@ -85,6 +85,7 @@ class _Plane:
     looks: dict[int, Array]
 
     def joined(self, other: "_Plane") -> "_Plane":
+        """Return the plane of the faces of both."""
         return _Plane(np.concatenate([self.corners, other.corners]), {**other.looks, **self.looks})
 
     def flattens(self, other: "_Plane") -> bool:

@@ -189,7 +189,7 @@ def fit_shapes(
     -------
     movements, the most significant first, and the critical value of |t|
     """
-    ends = tuple(np.array(one, dtype=np.intp) for one in zip(*runs, strict=True))
+    ends = tuple(np.array(shape, dtype=np.intp) for shape in zip(*runs, strict=True))
     fits: list[Found] = []
     rest, limit, tests = sample.values, math.inf, 0
     for _ in range(MOST):
@@ -203,19 +203,20 @@ def fit_shapes(
             break
         now = replace(sample, values=rest)
         best = [
-            follow(now, one) for one in _best_of_families(sample, shapes, fields, ends, trials, score, limit)
+            follow(now, family)
+            for family in _best_of_families(sample, shapes, fields, ends, trials, score, limit)
         ]
-        gains = [_gain(now, one) for one in best]
+        gains = [_gain(now, shape) for shape in best]
         good = max(gains) - max(_AS_GOOD, _NEARLY * max(gains))
         chosen = min(
-            (one for one, gain in zip(best, gains, strict=True) if gain >= good),
-            key=lambda one: one.shape.rank,
+            (shape for shape, gain in zip(best, gains, strict=True) if gain >= good),
+            key=lambda shape: shape.shape.rank,
         )
         fits = _fitted(sample, [*fits, chosen])
         rest = _rest(sample, fits)
     while fits:
         judged = [_judged(sample, fits, k, fields, tests) for k in range(len(fits))]
-        most = max(abs(one.amount) for one in judged)
+        most = max(abs(shape.amount) for shape in judged)
         weak = [
             fit
             for fit in judged

@@ -104,6 +104,7 @@ def _one_of(left: _Cut, first: _Cut, second: _Cut, right: _Cut, cells: "_Cells")
     """Return the end of the block left of two near cuts and the start of that right of them that fill the most."""
 
     def filled(ends: tuple[_Cut, _Cut]) -> float:
+        """Return the volume between two cuts and their ends [m³]."""
         return cells.volume(left, ends[0]) + cells.volume(ends[1], right)
 
     choices = [(first, first), (second, second)]

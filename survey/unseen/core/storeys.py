@@ -132,6 +132,7 @@ def _levels(wall: FacingWall, settings: InfillSettings) -> tuple[list[Array], li
     back, of_back = _facing_levels(wall.back, _OUT, settings.level)
 
     def meet(first: Array, second: Array) -> bool:
+        """Return whether less than the least thickness is between two planes at any corner."""
         space = (second[3] - corners @ second[:3]) / second[2] - (first[3] - corners @ first[:3]) / first[2]
         return bool((space > -settings.min_thickness).any())
 
@@ -220,14 +221,17 @@ def _grid(
     """Return the cells of one storey, marked if they belong to the core."""
     covered = [_covered(wall, row, settings) for row in rows]
     here = [
-        one
-        for one in deep
-        if one.above(lines[0].plane)[1] > lines[0].slack and one.above(lines[-1].plane)[0] < -lines[-1].slack
+        block
+        for block in deep
+        if block.above(lines[0].plane)[1] > lines[0].slack
+        and block.above(lines[-1].plane)[0] < -lines[-1].slack
     ]
     places = _places(here, covered)
     filled = np.zeros((max(len(places) - 1, 0), len(lines) - 1, len(planes) - 1), np.bool_)
-    along = np.array([one.along for one in here]).reshape(-1, 2)
-    above = np.array([[one.above(line.plane) for one in here] for line in lines]).reshape(len(lines), -1, 2)
+    along = np.array([block.along for block in here]).reshape(-1, 2)
+    above = np.array([[block.above(line.plane) for block in here] for line in lines]).reshape(
+        len(lines), -1, 2
+    )
     for i, (left, right) in enumerate(pairwise(places)):
         middle = 0.5 * (left + right)
         for j, (lower, upper) in enumerate(pairwise(lines)):

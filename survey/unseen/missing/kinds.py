@@ -135,11 +135,13 @@ def split(
     avoid = _joints_around(gap, elevation)
 
     def cuts(order: tuple[str, ...]) -> Array:
+        """Return the joints between stones in an order [m]."""
         ends = np.cumsum([lengths[kind] for kind in order])
         out: Array = gap.start + gap.width * ends[:-1] / ends[-1]
         return out
 
     def clear(order: tuple[str, ...]) -> float:
+        """Return the least distance of these joints from those to be avoided [m]."""
         places = cuts(order)
         if not len(places) or not len(avoid):
             return 0.0

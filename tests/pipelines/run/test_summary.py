@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from archmodel.quantities import quantities_of
 from pipelines.results.stone_values import stone_results, stress_statistics
 from pipelines.results.summary import as_json, summarise
 from tests.pipelines.results_by_hand import LIMESTONE, deformable_body, result_of, rigid_body
@@ -111,3 +112,39 @@ def test_the_largest_displacement_is_that_of_the_point_that_went_farthest():
     result = result_of([replace(stone, position=lifted)], pairs=(), forces=())
     assert summarise(result, version="1", seconds={})["displacement"]["max"] == pytest.approx(0.01)
     assert stone_results(result)[0].displacement_max == pytest.approx(0.01)
+
+
+# counts by name, the seconds of the machine, what the user has set, and tables with keys of their own
+_NOT_RESULTS = (
+    "bodies",
+    "time.by_stage",
+    "time.wall",
+    "solver",
+    "static",
+    "profile",
+    "version",
+    "loads",
+    "admissible",
+)
+_TABLES = ("errors", "peaks", "structures", "stages", "rocking")
+
+
+def numbers(value, path=""):
+    """Paths of the numbers of a mapping, of lists too; a value that is not known counts."""
+    if isinstance(value, dict):
+        for key, entry in value.items():
+            yield from numbers(entry, f"{path}.{key}" if path else key)
+    elif value is None or (isinstance(value, int | float) and not isinstance(value, bool)):
+        yield path
+
+
+def test_every_number_of_the_summary_is_in_the_catalogue(mixed):
+    summary = summarise(mixed, version="1.2", seconds={"solve": 1.5})
+    results = {path for path in numbers(summary) if not path.startswith((*_NOT_RESULTS, *_TABLES))} - {
+        "joints.slivers.limit",
+        "stress.utilisation.stone",
+        "stress.utilisation.governing",
+    }
+    assert results == set(quantities_of("summary"))
+    # the errors have a bearer of their own
+    assert set(summary["errors"]) == set(quantities_of("run"))

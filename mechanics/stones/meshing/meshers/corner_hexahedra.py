@@ -42,6 +42,7 @@ def _blocks(vertices: Array, faces: Faces, code: str) -> tuple[Ints, list[tuple[
     number: dict[tuple[int, ...], int] = {member: k for k, member in enumerate(members)}
 
     def point(*own: int) -> int:
+        """Return the number of the mean of some corners, new where there is none yet."""
         key = tuple(sorted(own))
         if key not in number:
             number[key] = len(members)

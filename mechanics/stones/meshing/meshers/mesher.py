@@ -127,6 +127,7 @@ def _attempts(block: Meshable) -> tuple[_Attempt, ...]:
     """Return the meshers for a block, in the order in which they are tried."""
 
     def using(mesher: Callable[..., SolidMesh], **options: object) -> Callable[[SizeField], SolidMesh]:
+        """Return a mesher of the block by edge length."""
         return lambda size: mesher(block.vertices, block.faces, size, block.code, **options)
 
     if not block.element.is_tetrahedron:

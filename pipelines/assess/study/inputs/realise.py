@@ -173,6 +173,7 @@ def _change_stones(
 
 def _material_changer(name: str) -> Callable[[StoneModel, Callable[[float], float]], StoneModel]:
     def change(model: StoneModel, new: Callable[[float], float]) -> StoneModel:
+        """Return a stone with a material whose value is changed."""
         old = getattr(model.material, name)
         if old is None:
             raise SceneError(f"{model.record.code}: its material states no {name}", remedy="state one")
@@ -238,6 +239,7 @@ def _shifted(record: StoneRecord, part: str, value: float) -> StoneRecord:
         along = None if which == 2 else record.axes[which]
 
         def lifted(points: Array) -> Array:
+            """Return the displacements of points of a face along its normal [m]."""
             heights = value * (np.ones(len(points)) if along is None else (points - centre) @ along)
             return np.outer(heights, normal)
 
