@@ -71,14 +71,8 @@ def register_kind(
     )
     known = session.get(RegisteredKind, name)
     if known is not None:
-        if known.says() == row.says():
-            return RowCounts(unchanged=1)
-        if (*known.says()[:3], *known.says()[4:]) == (*row.says()[:3], *row.says()[4:]):
-            what = f"the kind {name} is registered already, with other canonical proportions"
-            remedy = f'change these alone: [[canon]] kind = "{name}", proportions = "…"'
-            raise UsageError(what, remedy=remedy)
-        remedy = "give the new one another name; definitions of kinds do not change"
-        raise UsageError(f"the kind {name} is registered already, with another definition", remedy=remedy)
+        _refuse_changes(known, row)
+        return RowCounts(unchanged=1)
     if name in all_kinds():
         raise UsageError(f"there is a kind {name} already", remedy="give yours another name")
     if issubclass(above, Entity):
@@ -87,6 +81,19 @@ def register_kind(
         raise UsageError(f"{name} is {NO_ATTRIBUTES}", remedy="leave out attributes")
     _store(session, row)
     return RowCounts(new=1)
+
+
+def _refuse_changes(registered: RegisteredKind, row: RegisteredKind) -> None:
+    """Refuse a kind that is registered with another definition, or with other proportions."""
+    before, now = registered.says(), row.says()
+    if before == now:
+        return
+    if (*before[:3], *before[4:]) == (*now[:3], *now[4:]):
+        what = f"the kind {row.name} is registered already, with other canonical proportions"
+        remedy = f'change these alone: [[canon]] kind = "{row.name}", proportions = "…"'
+        raise UsageError(what, remedy=remedy)
+    remedy = "give the new one another name; definitions of kinds do not change"
+    raise UsageError(f"the kind {row.name} is registered already, with another definition", remedy=remedy)
 
 
 def _store(session: Session, row: RegisteredKind) -> None:

@@ -5,6 +5,7 @@ import math
 import unicodedata
 from collections.abc import Iterable
 
+from archmodel.tables.base import LARGEST_INTEGER
 from ground.errors import UsageError
 
 __all__ = [
@@ -19,7 +20,7 @@ __all__ = [
 MAX_TEXT = 10_000
 """Longest text [characters]; a longer one belongs in a document."""
 
-MAX_WHOLE = 2**31 - 1
+MAX_WHOLE = LARGEST_INTEGER
 """Largest whole number that a column takes."""
 
 

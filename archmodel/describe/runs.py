@@ -7,6 +7,7 @@ from sqlalchemy import func, select
 from sqlalchemy.orm import InstrumentedAttribute, Session, aliased, joinedload
 
 from archmodel.quantities import quantities_of
+from archmodel.tables.base import LARGEST_INTEGER
 from archmodel.tables.entities import Entity
 from archmodel.tables.runs import CellResult, EntityResult, JointResult, Run, StructureResult
 from archmodel.tables.structures import Structure, structure_kinds
@@ -22,9 +23,6 @@ JOINT_VALUES = (
     "width", "force_normal", "force_shear", "pressure_max", "kern", "friction_use", "opening", "sliding",
 )  # fmt: skip
 """Values of a joint that descriptions show."""
-
-_LARGEST = 2**31 - 1
-"""No run has a larger number."""
 
 _SHOWN = 12
 """Numbers that an error lists."""
@@ -155,7 +153,7 @@ def compare_runs(session: Session, number: int, against: int, count: int = 10) -
 def _run(session: Session, number: int) -> Run:
     """Return the run of a number; an error that names the latest if there is none."""
     found = None
-    if 0 < number <= _LARGEST:
+    if 0 < number <= LARGEST_INTEGER:
         found = session.get(Run, number, options=[joinedload(Run.entry)])
     if found is not None:
         return found

@@ -7,6 +7,7 @@ from sqlalchemy import Select, select
 from sqlalchemy.orm import Session, joinedload
 
 from archmodel.store.find_by_code import no_such_code
+from archmodel.tables.base import LARGEST_INTEGER
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import held_at
 from archmodel.tables.runs import EntityResult, Run
@@ -14,8 +15,6 @@ from archmodel.tables.surveys import Measurement, Simplification
 from ground.errors import UsageError
 
 __all__ = ["Trace", "trace"]
-
-_TOO_LARGE = 2**31
 
 
 @dataclass(frozen=True)
@@ -71,7 +70,7 @@ def trace(session: Session, code: str, run: int | None = None) -> Trace:
     wanted = (
         results
         if run is None
-        else results.where(EntityResult.run_id == (run if abs(run) < _TOO_LARGE else 0))
+        else results.where(EntityResult.run_id == (run if abs(run) <= LARGEST_INTEGER else 0))
     )
     result = session.scalar(
         wanted.options(joinedload(EntityResult.run).joinedload(Run.entry))

@@ -33,6 +33,7 @@ from archmodel.query.names import meant, phase_begins, run_with_number, terms_na
 from archmodel.query.scope import Context, Scope, StructureScope
 from archmodel.query.structures import STRUCTURE_ATTRIBUTES
 from archmodel.query.tokens import Token, complaint
+from archmodel.tables.base import LARGEST_INTEGER
 from archmodel.tables.entities import Entity, kind_named
 from archmodel.tables.hierarchy import names_below
 from archmodel.tables.structures import structure_kind_named
@@ -40,7 +41,7 @@ from ground.errors import UsageError
 
 __all__ = ["column_named", "condition", "condition_in"]
 
-LARGEST = 2**31 - 1
+LARGEST = LARGEST_INTEGER
 """Whole numbers up to this one are compared as such; larger ones as floating-point numbers."""
 
 Where = Scope | StructureScope

@@ -21,6 +21,7 @@ from archmodel.arrays import Array
 
 __all__ = [
     "JSON_TYPE",
+    "LARGEST_INTEGER",
     "TEXT",
     "ArrayType",
     "Base",
@@ -38,6 +39,9 @@ TEXT = String().with_variant(String(collation="C"), "postgresql")
 
 JSON_TYPE = JSON(none_as_null=True)
 """Plain JSON, not JSONB, on PostgreSQL: values come back unchanged, even in the order of their keys."""
+
+LARGEST_INTEGER = 2**31 - 1
+"""Largest value of an integer column: PostgreSQL keeps four bytes."""
 
 
 def json_text(value: object) -> str:

@@ -13,6 +13,7 @@ from ground.tables.numbers import shown
 
 __all__ = [
     "COORDINATES",
+    "LONGEST_HEAD",
     "POINT",
     "SIGMA",
     "UNITS",
@@ -28,6 +29,9 @@ UNITS: Mapping[str, float] = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "ft"
     "us-ft": 1200.0 / 3937.0,
 }
 """Units of length [m]."""
+
+LONGEST_HEAD = 100
+"""Lines before the first row of a table, at most."""
 
 COORDINATES: Mapping[str, Sequence[str]] = {
     # English; German; French; Italian; Spanish

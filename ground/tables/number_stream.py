@@ -17,14 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ground.errors import SurveyError
-from ground.tables.columns import COORDINATES, places_of
+from ground.tables.columns import COORDINATES, LONGEST_HEAD, places_of
 from ground.tables.numbers import is_number, unreadable
 
 __all__ = ["NumberStream", "open_numbers"]
 
 _NUMBER = re.compile(r"\s*\"?[-+]?[\d.]")
 _FORTRAN = re.compile(r"(?<=\d)[dD](?=[-+]?\d)")
-_LONGEST_HEAD = 100  # lines
 _START = 1 << 16  # bytes by which the encoding is found
 _COUNTED = 20  # rows whose first numbers count 1, 2, 3, … before it is taken for a column of point numbers
 
@@ -135,11 +134,11 @@ def open_numbers(
     try:
         encoding = _encoding(path)
         with path.open(encoding=encoding, errors="replace") as file:
-            lines = list(islice(file, _LONGEST_HEAD + _COUNTED))
+            lines = list(islice(file, LONGEST_HEAD + _COUNTED))
     except OSError as error:
         raise unreadable(path, error) from error
     titles: list[str] = []
-    for head, line in enumerate(lines[:_LONGEST_HEAD]):
+    for head, line in enumerate(lines[:LONGEST_HEAD]):
         separator, commas = _style(line)
         cells = _fields(line, separator)
         names = _names(titles, len(cells), separator)
@@ -161,7 +160,7 @@ def open_numbers(
             return stream
         titles.append(line)
     raise SurveyError(
-        f"no line with x, y and z among the first {_LONGEST_HEAD}",
+        f"no line with x, y and z among the first {LONGEST_HEAD}",
         where=str(path),
         remedy="a point cloud in text has one point to a line: x y z",
     )

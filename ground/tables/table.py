@@ -12,7 +12,7 @@ from itertools import islice
 from pathlib import Path
 
 from ground.errors import SurveyError
-from ground.tables.columns import places_of
+from ground.tables.columns import LONGEST_HEAD, places_of
 from ground.tables.decimals import Decimals
 from ground.tables.numbers import is_number, shown
 from ground.tables.rows import DATE_REMEDY, ListRows, Row, TextRows, open_rows
@@ -22,7 +22,6 @@ __all__ = ["Table", "TableRow", "read_table"]
 _SAMPLE = 50  # lines by which the separator is found
 _SEPARATORS: tuple[str, ...] = (";", "\t", "|", ",")
 _BLANKS = ""
-_LONGEST_HEAD = 100  # lines before the first row
 _TWO_PARTS = re.compile(r'"?[+-]?\d+,\d+"?')
 
 IsRow = Callable[[Sequence[str], bool], bool]
@@ -159,12 +158,12 @@ def read_table(
     """
     source = open_rows(path, sheet)
     if isinstance(source, TextRows) and source.delimiter is None:
-        head = islice(source, _LONGEST_HEAD + _SAMPLE)
+        head = islice(source, LONGEST_HEAD + _SAMPLE)
         lines: list[tuple[int, Row]] = [(number, _bare(row, comments)) for number, row in head]
         source.delimiter = _separator(source, lines, is_row)
     commas = source.delimiter != ","
     rows = [TableRow(number, _trimmed(source, _bare(row, comments), number)) for number, row in source]
-    first = next((k for k, row in enumerate(rows[: _LONGEST_HEAD + 1]) if is_row(row.cells, commas)), None)
+    first = next((k for k, row in enumerate(rows[: LONGEST_HEAD + 1]) if is_row(row.cells, commas)), None)
     if first is None:
         line = rows[0].line if rows else source.end
         text = shown(" ".join(rows[0].cells)) if rows else "the file"

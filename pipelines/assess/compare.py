@@ -122,9 +122,7 @@ def compare(
             refuse_unsound(problems_of(scene, assembly, loose_blocks(*built)), str(path))
         result = simulate(assembly.scene, progress, lambda: False, built)
         stones, facades = measured_stones(models)
-        moved = stone_motions(result.bodies, assembly.origin).displacement
-        courses = compare_courses(measure_beds(stones, facades)[0], moved)
-        plumb = compare_plumb(stones, facades, moved, battered)
+        courses, plumb = _movements(result, assembly, stones, facades, battered)
         progress(Progress("write", 0, 1, "pictures"))
         structures = structure_results(result, assembly.structures)
         summary = _summary(result, assembly, courses, plumb, battered)
@@ -152,6 +150,19 @@ def _assembled(
     codes = [model.record.code for model in models]
     assembly = replace(assembly, structures=members_of_structures(session, codes))
     return assembly, inputs, known_stones(session, codes)
+
+
+def _movements(
+    result: Result,
+    assembly: Assembly,
+    stones: Sequence[StoneQuality],
+    facades: Sequence[Facade],
+    battered: bool,
+) -> tuple[tuple[CourseMovement, ...], tuple[PlumbMovement, ...]]:
+    """Return the movements of courses and of faces in a run, beside those that were measured."""
+    moved = stone_motions(result.bodies, assembly.origin).displacement
+    courses = compare_courses(measure_beds(stones, facades)[0], moved)
+    return courses, compare_plumb(stones, facades, moved, battered)
 
 
 def _add_results(courses: Sequence[dict[str, Any]], structures: Sequence[StructureValues]) -> None:

@@ -92,6 +92,9 @@ def run_study(
     require_figures()
     folder, file, part = Path(folder), read_study(path), part or Part()
     _refuse_parts(file.study.method, part)
+    if scheduler is not None and count > 1:
+        remedy = "give one of the two"
+        raise UsageError("both a scheduler and processes here", where="--workers", remedy=remedy)
     progress(Progress("blocks", 0, None, "reading the stones"))
     with open_database(url, create=False) as database, database.session(read_only=True) as session:
         as_of = latest_entry(session)
@@ -99,10 +102,6 @@ def run_study(
     # workers elsewhere stand in another folder
     snapshot = _snapshot(folder.absolute(), content, overwrite)
     problem = problem_of(snapshot)
-    if scheduler is not None and count > 1:
-        raise UsageError(
-            "both a scheduler and processes here", where="--workers", remedy="give one of the two"
-        )
     crew = workers(count, take, ATTEMPTS) if scheduler is None else cluster(scheduler, take, ATTEMPTS)
     with crew as run:
         sampler = Sampler(snapshot, run, part, progress)

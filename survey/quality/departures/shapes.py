@@ -189,7 +189,7 @@ def fit_shapes(
     -------
     movements, the most significant first, and the critical value of |t|
     """
-    ends = tuple(np.array(shape, dtype=np.intp) for shape in zip(*runs, strict=True))
+    ends = tuple(np.array(bounds, dtype=np.intp) for bounds in zip(*runs, strict=True))
     fits: list[Found] = []
     rest, limit, tests = sample.values, math.inf, 0
     for _ in range(MOST):
@@ -206,22 +206,19 @@ def fit_shapes(
             follow(now, family)
             for family in _best_of_families(sample, shapes, fields, ends, trials, score, limit)
         ]
-        gains = [_gain(now, shape) for shape in best]
+        gains = [_gain(now, fit) for fit in best]
         good = max(gains) - max(_AS_GOOD, _NEARLY * max(gains))
         chosen = min(
-            (shape for shape, gain in zip(best, gains, strict=True) if gain >= good),
-            key=lambda shape: shape.shape.rank,
+            (fit for fit, gain in zip(best, gains, strict=True) if gain >= good),
+            key=lambda fit: fit.shape.rank,
         )
         fits = _fitted(sample, [*fits, chosen])
         rest = _rest(sample, fits)
     while fits:
         judged = [_judged(sample, fits, k, fields, tests) for k in range(len(fits))]
-        most = max(abs(shape.amount) for shape in judged)
-        weak = [
-            fit
-            for fit in judged
-            if abs(fit.amount) <= max(limit * fit.sigma, LEAST, _MIN_SHARE_OF_LARGEST * most)
-        ]
+        most = max(abs(fit.amount) for fit in judged)
+        enough = max(LEAST, _MIN_SHARE_OF_LARGEST * most)
+        weak = [fit for fit in judged if abs(fit.amount) <= max(limit * fit.sigma, enough)]
         if not weak:
             return judged, limit
         least = min(weak, key=lambda fit: abs(fit.amount) / fit.sigma)
