@@ -38,6 +38,8 @@ run settled/wall.toml --db sqlite:///settled.db --out settled-run
 diagnose settled/diagnosis.toml --db sqlite:///settled.db --out diagnosis
 sample tower --small --out tower
 ingest tower/tower.moma --db sqlite:///tower.db
+record tower/knowledge.toml --db sqlite:///tower.db
+propose infill --record --db sqlite:///tower.db
 run tower/tower.toml --profile fast --db sqlite:///tower.db --out tower-run
 sample rubble-wall --out rubble
 ingest --masks rubble/wall.png --size 1x1.2 --depth 0.2 --kind rubble --db sqlite:///rubble.db
@@ -75,12 +77,14 @@ def end(*_):
     raise KeyboardInterrupt
 signal.signal(signal.SIGXCPU, end)
 resource.setrlimit(resource.RLIMIT_CPU, (int(sys.argv[2]), -1))
+code = 0
 try:
-    app(sys.argv[3:], prog_name="moma", standalone_mode=False)
-except BaseException as error:
-    print("ended by", type(error).__name__, error, file=sys.stderr)
+    code = app(sys.argv[3:], prog_name="moma", standalone_mode=False)
+except KeyboardInterrupt:
+    print("ended after its time", file=sys.stderr)
 with open(sys.argv[1], "w") as file:
     json.dump([vars(one) for one in called()], file)
+sys.exit(code)
 """
 
 
@@ -137,8 +141,10 @@ def _matrix(folder: Path, known: list[dict[str, object]]) -> list[dict[str, obje
         arguments = line.format(sample=SAMPLE.resolve(), geology=folder / "geology").split()
         found.unlink(missing_ok=True)
         call = [sys.executable, "-c", _CALLED, str(found), str(_LONGEST), *arguments]
-        subprocess.run(call, env=os.environ | {"PYTHONPATH": path}, cwd=folder, stdout=subprocess.DEVNULL)
-        called = json.loads(found.read_text(encoding="utf-8")) if found.exists() else []
+        environment = os.environ | {"PYTHONPATH": path}
+        # a command that fails calls nothing of what it is listed for
+        subprocess.run(call, env=environment, cwd=folder, stdout=subprocess.DEVNULL, check=True)
+        called = json.loads(found.read_text(encoding="utf-8"))
         fresh = [one for one in called if one not in known and one not in uses]
         print(f"{len(fresh):3d} more kernels: moma {line}", flush=True)
         uses += fresh

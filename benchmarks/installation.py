@@ -71,14 +71,18 @@ def _processor_time() -> float:
     return usage.ru_utime + usage.ru_stime
 
 
-def _timed(call: list[str], folder: Path, environment: dict[str, str]) -> float:
-    """Return the processor time of a process, which is ended after `_LONGEST` [s]."""
+def _timed(call: list[str], folder: Path, environment: dict[str, str], must: bool = True) -> float:
+    """Return the processor time of a process, which is ended after `_LONGEST` [s]; it must not fail before."""
     began = _processor_time()
     with (folder / "log.txt").open("ab") as log:
-        subprocess.run(
+        done = subprocess.run(
             call, cwd=folder, env=environment, stdout=log, stderr=log, check=False, preexec_fn=_limit
         )
-    return _processor_time() - began
+    took = _processor_time() - began
+    if must and done.returncode != 0 and took < _LONGEST - 1:
+        last = (folder / "log.txt").read_text(encoding="utf-8").splitlines()[-1]
+        raise RuntimeError(f"{' '.join(call)} ended with {done.returncode}: {last}")
+    return took
 
 
 def _limit() -> None:
@@ -114,14 +118,22 @@ def _uses(python: Path, packages: Path, folder: Path, commands: Iterable[str]) -
         call = [str(python), "-P", "-m", "moma", *words]
         first = _timed(call, folder, environment)
         fresh = _kernels(packages, cache) - before
-        again = (
-            [*call, "--overwrite"]
-            if words[0] in ("run", "assess", "pushover", "diagnose", "geology")
-            else call
+        # what was recorded is refused the second time
+        second = _timed(
+            [*call[:4], *_again(words)], folder, environment, must=words[0] not in ("record", "propose")
         )
-        if words[0] == "ingest":  # the same file is refused the second time: another database
-            again = [word.replace(".db", "-again.db") for word in call]
-        yield Use(line, first, _timed(again, folder, environment), len(fresh))
+        yield Use(line, first, second, len(fresh))
+
+
+def _again(words: list[str]) -> list[str]:
+    """Return the arguments that do the same once more, where the first results stay."""
+    if words[0] == "ingest":  # the last is the database
+        return [*words[:-1], words[-1].replace(".db", "-again.db")]
+    if words[0] in ("sample", "trade"):  # the last is the folder
+        return [*words[:-1], f"{words[-1]}-again"]
+    return (
+        [*words, "--overwrite"] if words[0] in ("run", "assess", "pushover", "diagnose", "geology") else words
+    )
 
 
 def tables(wheel: Path, compiled: float, uses: Iterable[Use], packages: dict[str, float]) -> str:

@@ -11,7 +11,7 @@ if sys.platform == "win32":
     pytest.skip("processor times of processes are read as on Unix", allow_module_level=True)
 
 from benchmarks.first_use import MATRIX
-from benchmarks.installation import Use, _written, base_packages, tables
+from benchmarks.installation import Use, _again, _timed, _written, base_packages, tables
 
 
 def test_the_base_has_what_was_asked_for_and_nothing_of_the_extras():
@@ -32,9 +32,30 @@ def test_the_matrix_has_every_engine_and_sample():
         "assess",
         "diagnose",
         "pushover",
+        "trade",
+        "check",
+        "propose infill --record",
         "biaxial",
     ):
         assert name in words
+
+
+def test_a_command_that_fails_is_not_measured(tmp_path):
+    call = [sys.executable, "-c", "import sys; sys.exit('no stone')"]
+    with pytest.raises(RuntimeError, match="ended with 1: no stone"):
+        _timed(call, tmp_path, {})
+    assert _timed(call, tmp_path, {}, must=False) > 0.0
+
+
+@pytest.mark.parametrize("line", MATRIX)
+def test_a_command_is_repeated_beside_its_first_results(line):
+    words = line.split()
+    again = _again(words)
+    if words[0] in ("ingest", "sample", "trade"):
+        assert again[:-1] == words[:-1]
+        assert again[-1] != words[-1]
+    else:
+        assert again[: len(words)] == words
 
 
 def test_the_tables_stand_between_their_marks(tmp_path):
