@@ -10,7 +10,7 @@ from tests.ratchets.figures import FIGURES, WORDS, identifier, parameters, per_1
 MOST = {
     "numbers of ground": 20,
     "numbers of moma": 20,
-    "numbers of survey": 955,
+    "numbers of survey": 954,
     "numbers of archmodel": 95,
     "numbers of mechanics": 740,
     "numbers of pipelines": 539,

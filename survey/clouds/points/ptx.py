@@ -24,8 +24,8 @@ from survey.records.survey import Station
 
 __all__ = ["is_ptx", "open_ptx"]
 
-_HEAD = 10  # lines before the points of a scan
-_WORDS = [1] * 2 + [3] * 4 + [4] * 4  # numbers on each of these lines
+_WORDS = "1133334444"  # how many numbers stand on each line before the points of a scan
+_HEAD = len(_WORDS)
 _SHORTEST = 8  # bytes of a line of a point: "0 0 0 0" with its end
 _LINES = CHUNK // 4  # lines in memory at a time: Python's strings take 70 bytes each
 _AFFINE = 1e-3  # by which a rotation may differ from one, as its numbers are rounded
@@ -78,7 +78,7 @@ def open_ptx(path: Path) -> PointCloud:
 def is_ptx(path: Path) -> bool:
     """Return whether a file begins as a PTX, whatever its ending: size, axes of the scanner, and its pose."""
     with path.open("rb") as file:
-        return [len(line.split()) for line in islice(file, _HEAD)] == _WORDS
+        return "".join(str(len(line.split())) for line in islice(file, _HEAD)) == _WORDS
 
 
 def _scans(file: TextIO, path: Path) -> Iterator[_Scan]:
