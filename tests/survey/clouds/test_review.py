@@ -8,7 +8,7 @@ import pytest
 from survey.clouds.outlines.outline import Attributes, Outline
 from survey.clouds.outlines.reading import Drawing
 from survey.clouds.placing import PlacedOutline, place_outlines
-from survey.clouds.review import flat_doubts, measured_doubts
+from survey.clouds.review import drawn_doubts, flat_doubts, measured_doubts
 from survey.records.survey import Station
 
 SQUARE = np.array([[0.0, 0, 0], [0.4, 0, 0], [0.4, 0, 0.2], [0, 0, 0.2]])
@@ -59,6 +59,18 @@ def test_stones_of_one_size_may_differ_by_the_least_spread() -> None:
     assert odd_sizes([1.0] * 13 + [float(np.exp(0.5 * 1.25))]) == ["S13"]
     # of fewer than a dozen outlines no size is usual
     assert odd_sizes([1.0] * 10 + [9.0]) == []
+
+
+@pytest.mark.parametrize(("name", "doubtful"), [("a.json", ["S0"]), ("a.png", []), ("a.TIF", [])])
+def test_outlines_of_a_picture_do_not_overlap_as_a_pixel_is_of_one_stone(
+    name: str, doubtful: list[str]
+) -> None:
+    outlines = [outline(SQUARE, f"S{k}") for k in range(2)]
+    drawing = Drawing(Path(name), tuple(outlines))
+    placed = place_outlines(outlines, None, [Station("A", np.array([0.0, -5.0, 0.0]))])
+    flat = flat_doubts(outlines, [corners[:, [0, 2]] for corners in (SQUARE, SQUARE)], drawing)
+    for doubts in (drawn_doubts(placed, drawing), flat):
+        assert [doubt.code for doubt in doubts if doubt.reason == "overlap"] == doubtful
 
 
 @pytest.mark.parametrize(
