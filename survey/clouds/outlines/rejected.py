@@ -30,9 +30,8 @@ def rejected_outlines(
     rejects : whose spans are the numbers of outlines
     """
     drawing = read_outlines(path, layer=layer, chosen=chosen, sigma=sigma, smooth=smooth, keep_going=True)
-    by_number: dict[int, Outline | WrongOutline] = {
-        outline.number: outline for outline in (*drawing.outlines, *drawing.wrong)
-    }
+    by_number: dict[int, Outline | WrongOutline] = {outline.number: outline for outline in drawing.outlines}
+    by_number |= {feature.number: feature for feature in drawing.wrong}
     features = [
         _feature(by_number[span.start], str(reject.error))
         for reject in rejects

@@ -54,7 +54,7 @@ def refuse_other_programs(path: Path) -> None:
     if named is None:
         with path.open("rb") as file:
             head = file.read(_HEAD)
-        named = next((rest for mark, *rest in _PROGRAMS if re.search(mark, head)), None)
+        named = next(((what, out) for mark, what, out in _PROGRAMS if re.search(mark, head)), None)
     if named is not None:
         what, remedy = named
         raise SurveyError(f"is {what}, which is not read", where=str(path), remedy=remedy)
