@@ -199,6 +199,14 @@ def test_joints_of_two_stones_keep_their_forces_apart_whichever_stone_is_first(o
     assert result.series.joints.normal[-1] == pytest.approx(across, rel=1e-6, abs=1e-3)
 
 
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_support_bears_the_weight_whichever_stone_is_named_first(order):
+    """W = 250 kg · g of the cube; forces act on the first stone of a contact."""
+    blocks = [ground(), brick("cube", (0, 0, 0), (0.5, 0.5, 0.5))][::order]
+    peaks = simulate(scene(*blocks, duration=0.01, **ALWAYS)).peaks
+    assert peaks.reaction.value == pytest.approx(250.0 * G, rel=1e-3)
+
+
 def test_shear_reaction_and_pressure_have_instants_of_their_own():
     """A stone of W = 530 N on a wide ground is pushed aside by 0.2 kN at 0.1 s, and down by 1 kN at 0.2 s."""
     at = np.array([0.05, 0.1, 0.15, 0.2, 0.25])
