@@ -371,7 +371,16 @@ def _store_results(database: Database, count: int) -> None:
     for run in range(1, RUNS + 1):
         stresses, values = rng.lognormal(12.0, 1.2, count).tolist(), rng.random((count, 3)).tolist()
         results = tuple(
-            StoneResult(code, "deformable", stress, stress / 4, 1e-5 * more[0], 2e3 * more[1], _values(more))
+            StoneResult(
+                code,
+                "deformable",
+                stress / 2,
+                stress,
+                stress / 4,
+                1e-5 * more[0],
+                2e3 * more[1],
+                _values(more),
+            )
             for code, stress, more in zip(codes, stresses, values, strict=True)
         )
         record = RunRecord(

@@ -272,6 +272,7 @@ def _result(result: EntityResult) -> dict[str, object]:
         "version": result.run.versions["moma"],
         "stored_at": result.run.entry.recorded_at.isoformat(timespec="seconds"),
         "fidelity": result.fidelity,
+        "von_mises_p99": result.von_mises_p99,
         "von_mises_max": result.von_mises_max,
         "von_mises_mean": result.von_mises_mean,
         "displacement_max": result.displacement_max,

@@ -134,7 +134,7 @@ def _of_entity(session: Session, number: int) -> Iterator[Event]:
     )
     for result in session.scalars(runs):
         told = {"run": result.run_id, "scene": result.run.scene, "fidelity": result.fidelity}
-        yield _event(result.run.entry, "simulated", "run", told | {"von_mises_max": result.von_mises_max})
+        yield _event(result.run.entry, "simulated", "run", told | {"von_mises_p99": result.von_mises_p99})
 
 
 def _relations(session: Session, number: int) -> Iterator[Event]:

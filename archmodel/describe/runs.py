@@ -144,7 +144,7 @@ def compare_runs(session: Session, number: int, against: int, count: int = 10) -
         },
         "only_in_run": _alone(session, number, against),
         "only_against": _alone(session, against, number),
-        "stresses": _changes(session, number, against, "von_mises_max", count),
+        "stresses": _changes(session, number, against, "von_mises_p99", count),
         "displacements": _changes(session, number, against, "displacement_max", count),
         "structures": _structure_changes(session, number, against, count),
     }
@@ -172,8 +172,7 @@ def _stresses(session: Session, run: int, count: int) -> list[dict[str, object]]
 
     Runs without it are ordered by the largest, which is that of a corner and depends on the mesh.
     """
-    exceeded = EntityResult.values["von_mises_p99"].as_float()
-    order = func.coalesce(exceeded, EntityResult.von_mises_max)
+    order = func.coalesce(EntityResult.von_mises_p99, EntityResult.von_mises_max)
     # the largest first, all else of them then: what is sorted should be short
     largest = (
         select(EntityResult.entity_id)
@@ -186,7 +185,7 @@ def _stresses(session: Session, run: int, count: int) -> list[dict[str, object]]
         select(
             Entity.code,
             Entity.kind,
-            exceeded.label("von_mises_p99"),
+            EntityResult.von_mises_p99,
             EntityResult.von_mises_mean,
             EntityResult.von_mises_max,
         )

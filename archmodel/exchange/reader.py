@@ -14,7 +14,7 @@ from archmodel.exchange.json_stream import JsonText
 from archmodel.exchange.rows import Row, RowReader, nearest
 from archmodel.exchange.sections import Section, sections
 from archmodel.exchange.store import SectionStore
-from archmodel.migrations.versions.v2_quality_and_evidence import credit_statements
+from archmodel.migrations.versions.v2_quality_and_evidence import credit_statements, state_percentile
 from archmodel.tables.registered import RegisteredKind, declare_registered, release_registered
 from ground.errors import DatabaseError, ExchangeError
 
@@ -64,6 +64,7 @@ def _read_building(session: Session, stream: BinaryIO, name: str) -> dict[str, i
         if added:
             session.flush()
             credit_statements(session.connection())
+            state_percentile(session.connection())
         text.take("}")
         text.take("")
     except BaseException:

@@ -45,6 +45,7 @@ class StoneResult:
     ----------
     code : the stone
     fidelity : fixed, rigid or deformable
+    von_mises_p99 : exceeded in 1 % of its volume [Pa]; None if the stone was rigid
     von_mises_max, von_mises_mean : [Pa]; None if the stone was rigid
     displacement_max : of its points, at the end [m]
     contact_force_max : largest force of one contact point [N]
@@ -53,6 +54,7 @@ class StoneResult:
 
     code: str
     fidelity: str
+    von_mises_p99: float | None
     von_mises_max: float | None
     von_mises_mean: float | None
     displacement_max: float

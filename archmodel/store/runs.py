@@ -95,6 +95,7 @@ def result_row(result: StoneResult, place: str) -> dict[str, object]:
         what = f"fidelity {result.fidelity!r} is none of {', '.join(FIDELITIES)}"
         raise DatabaseError(what, where=place)
     numbers = {
+        "von_mises_p99": result.von_mises_p99,
         "von_mises_max": result.von_mises_max,
         "von_mises_mean": result.von_mises_mean,
         "displacement_max": result.displacement_max,

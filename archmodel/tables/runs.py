@@ -94,6 +94,7 @@ class EntityResult(Base):
 
     entity_id: Mapped[int] = mapped_column(ForeignKey("entity.id"), primary_key=True)
     run_id: Mapped[int] = mapped_column(ForeignKey("run.id"), primary_key=True)
+    von_mises_p99: Mapped[float | None] = _of_stone("von_mises_p99")
     von_mises_max: Mapped[float | None] = _of_stone("von_mises_max")
     von_mises_mean: Mapped[float | None] = _of_stone("von_mises_mean")
     displacement_max: Mapped[float] = _of_stone("displacement_max")

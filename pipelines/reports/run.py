@@ -282,13 +282,13 @@ def _stressed(stones: Sequence[StoneResult], least: float) -> _Section:
     rows = [
         (
             stone.code,
-            megapascals(stone.values.get("von_mises_p99")),
+            megapascals(stone.von_mises_p99),
             megapascals(stone.von_mises_mean),
             megapascals(stone.von_mises_max),
             percent(stone.values["stress_error"]) if "stress_error" in stone.values else "–",
             millimetres(stone.displacement_max, least),
         )
-        for stone in _worst(stones, lambda stone: stone.values.get("von_mises_p99"))
+        for stone in _worst(stones, lambda stone: stone.von_mises_p99)
     ]
     names = "von_mises_p99", "von_mises_mean", "von_mises_max", "stress_error", "displacement_max"
     head = "Stone", *_headings("stone", *names)
@@ -318,7 +318,7 @@ def _pulled(stones: Sequence[StoneResult]) -> _Section:
 def _uncertain(stones: Sequence[StoneResult]) -> _Section:
     """List the stones whose stress is least certain."""
     rows = [
-        (stone.code, percent(stone.values["stress_error"]), megapascals(stone.values.get("von_mises_p99")))
+        (stone.code, percent(stone.values["stress_error"]), megapascals(stone.von_mises_p99))
         for stone in _worst(stones, lambda stone: stone.values.get("stress_error"))
     ]
     head = "Stone", *_headings("stone", "stress_error", "von_mises_p99")

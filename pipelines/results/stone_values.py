@@ -17,7 +17,6 @@ from mechanics.results.stress_values import volume_quantile
 __all__ = ["StressStatistics", "joint_values", "stone_results", "stress_statistics"]
 
 _STRESSES = (
-    "von_mises_p99",
     "principal_tension",
     "principal_compression",
     "mean_pressure",
@@ -96,6 +95,7 @@ def stone_results(result: Result) -> tuple[StoneResult, ...]:
         StoneResult(
             code=body.code,
             fidelity=str(body.fidelity),
+            von_mises_p99=None if body.values is None else body.values.von_mises_p99,
             von_mises_max=None if body.values is None else body.values.von_mises_max,
             von_mises_mean=None if body.values is None else body.values.von_mises_mean,
             displacement_max=float(np.linalg.norm(body.displacement, axis=1).max()),

@@ -84,6 +84,7 @@ def run_record(
             StoneResult(
                 code=code,
                 fidelity="rigid" if stress is None else "deformable",
+                von_mises_p99=stress,
                 von_mises_max=stress,
                 von_mises_mean=None if stress is None else stress / 4,
                 displacement_max=1e-5,

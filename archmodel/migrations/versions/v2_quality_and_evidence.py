@@ -31,7 +31,16 @@ from sqlalchemy.sql.expression import column
 
 from archmodel.migrations.layouts.version1 import TEXT, metadata
 
-__all__ = ["credit_statements", "depends_on", "down_revision", "downgrade", "losses", "revision", "upgrade"]
+__all__ = [
+    "credit_statements",
+    "depends_on",
+    "down_revision",
+    "downgrade",
+    "losses",
+    "revision",
+    "state_percentile",
+    "upgrade",
+]
 
 revision = "0002"
 down_revision = "0001"
@@ -59,6 +68,7 @@ def _added() -> Mapping[str, tuple[Column[object], ...]]:
     return {
         "entity": tuple(Column(name, Double) for name in ("minimum_trace", "section_trace", *_QUALITY)),
         "measurement": (Column("joint", LargeBinary), evidence),
+        "entity_result": (Column("von_mises_p99", Double),),
         "cell_result": tuple(Column(name, Double) for name in ("spread_x", "spread_y", "a")),
         "statement": (
             Column("author", TEXT),
@@ -159,6 +169,7 @@ def upgrade() -> None:
             sql = f"ALTER TABLE statement ADD COLUMN {name} INTEGER REFERENCES {target} (id)"
             connection.execute(text(sql))
     credit_statements(connection)
+    state_percentile(connection)
     connection.execute(update(metadata.tables["moma_schema"]).values(version=2))
 
 
@@ -176,6 +187,14 @@ def downgrade() -> None:
     with op.batch_alter_table("statement") as batch:
         for name in ("chosen_id", *_OBJECTS):
             batch.drop_column(name)
+    put_back = (
+        "json_set(\"values\", '$.von_mises_p99', von_mises_p99)"
+        if connection.dialect.name == "sqlite"
+        else "(\"values\"::jsonb || jsonb_build_object('von_mises_p99', von_mises_p99))::json"
+    )
+    connection.execute(
+        text(f'UPDATE entity_result SET "values" = {put_back} WHERE von_mises_p99 IS NOT NULL')
+    )
     for name, columns in _added().items():
         for one in columns:
             op.drop_column(name, one.name)
@@ -223,11 +242,28 @@ def credit_statements(connection: Connection) -> None:
         connection.execute(text(sql), changed)
 
 
+def state_percentile(connection: Connection) -> None:
+    """Move the Von Mises stress that 1 % of a stone's volume exceeds from the further values to its column.
+
+    Results of documents of version 1 are moved by it too.
+    """
+    number, rest = (
+        ("json_extract(\"values\", '$.von_mises_p99')", "json_remove(\"values\", '$.von_mises_p99')")
+        if connection.dialect.name == "sqlite"
+        else (
+            "(\"values\"->>'von_mises_p99')::double precision",
+            "(\"values\"::jsonb - 'von_mises_p99')::json",
+        )
+    )
+    sql = f'UPDATE entity_result SET von_mises_p99 = {number}, "values" = {rest} WHERE {number} IS NOT NULL'
+    connection.execute(text(sql))
+
+
 def losses(connection: Connection) -> Iterator[str]:
     """Yield what version 1 cannot hold."""
     for name, columns in _added().items():
         for one in columns:
-            if one.name in ("author", "stated_on", "about", "relation"):
+            if one.name in ("author", "stated_on", "about", "relation", "von_mises_p99"):
                 continue
             values = select(func.count()).select_from(table(name)).where(column(one.name).is_not(None))
             if not one.nullable:

@@ -196,6 +196,7 @@ def _record(file: StudyFile, problem: Problem, summary: Mapping[str, Any], as_of
                 str(Fidelity.FIXED if code in fixed else Fidelity.RIGID),
                 None,
                 None,
+                None,
                 0.0,
                 None,
                 {"variance_share": share},

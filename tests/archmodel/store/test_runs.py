@@ -232,7 +232,9 @@ def test_more_stones_than_one_statement_holds_have_results(empty: Database) -> N
     codes = [f"S{i}" for i in range(1201)]
     with empty.session() as session:
         store_survey(session, "big", "big.moma", SHA, (box_stone(code) for code in codes))
-        results = tuple(StoneResult(code, "rigid", None, None, i / 8, None) for i, code in enumerate(codes))
+        results = tuple(
+            StoneResult(code, "rigid", None, None, None, i / 8, None) for i, code in enumerate(codes)
+        )
         store_run(session, replace(PLAIN, results=results[::-1]))
     with empty.session(read_only=True) as session:
         rows = session.execute(
