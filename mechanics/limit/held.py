@@ -18,9 +18,14 @@ limit, and it is a load that was tried as it is written.
 
 Between the load at which a mechanism stops and the limit, stones may rest or move by the same law. So loads down to a
 hundredth below the limit are tried too, and one that falls lowers it.
+
+A run asks of a rest whether forces that arise from nothing between joints that yield bring it about, and else goes on
+from these. So does the load that is found; where stones surely move then, as one does that stands on an edge wedged
+between its neighbours, the search is made again by what such a step says.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,8 +38,9 @@ from mechanics.model.rigid import inverse_inertia_world
 from mechanics.problem.problem import ContactProblem, ContactStart
 from mechanics.problem.residual import residual
 from mechanics.solvers.auto import Auto
-from mechanics.solvers.chain import follow
-from mechanics.solvers.kinds import FURTHER, standing_chain
+from mechanics.solvers.chain import Link, follow
+from mechanics.solvers.from_nothing import rests_from_nothing
+from mechanics.solvers.kinds import FURTHER, chain_of, standing_chain
 from mechanics.solvers.scales import ROUNDING
 from mechanics.solvers.second_order.newton import Newton
 
@@ -63,8 +69,8 @@ class HeldLimit:
 
     Attributes
     ----------
-    held : largest λ that is known to be borne; 0: none, infinite: nothing limits it [-]
-    lost : least λ that is known to be too much: the bound, or a step that falls [-]
+    held : largest λ that is known to be borne; 0: none but the dead load, infinite: nothing limits it [-]
+    lost : least λ that is known to be too much: the bound, or a step that falls; 0: the dead load is [-]
     force : (nc, 3) on the candidate of each contact under `held`, local frame [N]
     mechanism : velocities of the step that falls under `lost`; None where only the bound says that it is lost
     problems : contact problems that were solved
@@ -180,6 +186,11 @@ class _Search:
         while fallen := [load for load in self._below(low) if not self._holds(load)]:
             high = min(fallen)
             low, high = self._neighbours(max(load for load in self.tried if load < high), high, None)
+        falling = self.steps.released(self._load(low)) if low else None
+        if falling is not None:
+            again = _Search(self.steps.going_on(), self.unit, {0: self.tried[0], low: falling})
+            found = again.limit(on, 0, low, None)
+            return replace(found, problems=found.problems + len(self.tried))
         best, worst = self.tried[low], self.tried.get(high)
         falls = None if worst is None else _falling(on, worst)
         return HeldLimit(self._load(low), self._load(high), best.force, falls, len(self.tried))
@@ -228,18 +239,50 @@ class _Steps:
         self._free = self._motion(self._dead), self._motion(self._live)
         self._pull = np.zeros((len(on.contacts), 3))
         self._pull[:, 0] = on.strength.tension
+        self._goes_on = False
 
     def __call__(self, multiplier: float) -> _Trial:
         """Return the step under λ."""
-        (dead, live), on = self._free, self._on
+        problem, free = self._problem(multiplier)
+        trial = self._trial(multiplier, problem, free, standing_chain(problem), np.zeros_like(problem.u_free))
+        return self.released(multiplier) or trial if self._goes_on and trial.holds else trial
+
+    def going_on(self) -> "_Steps":
+        """Return steps that are followed by `released` where they hold."""
+        steps = copy(self)
+        steps._goes_on = True
+        return steps
+
+    def released(self, multiplier: float) -> _Trial | None:
+        """Return the step after one that holds; None where stones do not surely move in it.
+
+        It begins with the forces that arise from nothing between joints that yield, unless these bring about the rest.
+        """
+        problem, free = self._problem(multiplier)
+        rests, impulse = rests_from_nothing(problem)
+        if rests:
+            return None
+        chain = chain_of(problem, follows=True, moving=True, velocity_tolerance=_LIMITS[1])
+        trial = self._trial(multiplier, problem, free, chain, impulse)
+        return None if trial.holds or trial.error > _SURE else trial
+
+    def _problem(self, multiplier: float) -> tuple[ContactProblem, Array]:
+        """Return the contact problem under λ, and the velocities (nb, 6) of stones without joints after 1 s."""
+        (dead, live), strength = self._free, self._on.strength
         free = dead + multiplier * live
         u_free = self._operator.relative_velocity(free) - self._operator.apply(self._pull)
-        strength, none = on.strength, np.zeros(len(u_free))
+        none = np.zeros(len(u_free))
         problem = ContactProblem(
             self._operator, u_free, none, strength.friction, strength.cohesion, strength.tension
         )
-        start = ContactStart(np.zeros_like(u_free), np.zeros_like(u_free))
-        found = follow(standing_chain(problem), problem, start, _LIMITS, _ITERATIONS)
+        return problem, free
+
+    def _trial(
+        self, multiplier: float, problem: ContactProblem, free: Array, chain: Sequence[Link], impulse: Array
+    ) -> _Trial:
+        """Return the step that a chain finds from impulses (nc, 3)."""
+        on, u_free = self._on, problem.u_free
+        found = follow(chain, problem, ContactStart(impulse, np.zeros_like(impulse)), _LIMITS, _ITERATIONS)
         force = found.impulse - self._pull
         fastest = float(np.abs(self._operator.apply(found.impulse) + u_free).max())
         pace = float(np.abs(u_free).max()) or 1.0

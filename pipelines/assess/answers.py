@@ -456,7 +456,8 @@ def _sentence(facts: dict[str, Any]) -> str:
         return f"{facts['name']}: {facts['outcome']}{_dynamics(facts)}"
     lost = "" if facts["limit_lost"] is None else f"; {facts['limit_lost']:.4g} is lost"
     how = {_CRUSHED: "candidate, as stones crush", _UNSURE: "NOT SURE, candidate or bound"}
-    stands = how.get(facts["limit_kind"], f"held{lost}")
+    held = "held" if facts["limit"] else "nothing beside the dead load is held"
+    stands = how.get(facts["limit_kind"], f"{held}{lost}")
     bound = "no bound" if facts["bound"] is None else f"bound {facts['bound']:.4g}"
     text = f"{facts['name']}: λ = {facts['limit']:.4g} ({stands}), {bound}{_caution(facts)}"
     across = facts["without_friction_across"]

@@ -84,11 +84,8 @@ def test_the_stress_that_leads_gets_its_column_and_goes_back_among_the_further_v
     leads = "json_extract(\"values\", '$.von_mises_p99')"
     with connected(url) as connection:
         before = connection.execute(text('SELECT "values" FROM entity_result WHERE entity_id > 1')).all()
-        connection.execute(
-            text(
-                """UPDATE entity_result SET "values" = '{"volume":2.0,"von_mises_p99":3e5}' WHERE entity_id = 1"""
-            )
-        )
+        mixed = {"mixed": '{"volume":2.0,"von_mises_p99":3e5}'}
+        connection.execute(text('UPDATE entity_result SET "values" = :mixed WHERE entity_id = 1'), mixed)
     migrate(url)
     with connected(url) as connection:
         rows = connection.execute(

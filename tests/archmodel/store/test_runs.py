@@ -97,7 +97,7 @@ def test_a_run_is_kept_with_its_results(filled: Database) -> None:
     ("run", "message"),
     [
         (run_record({"V1": 1e5, "V9": 1e5}), "run of window: stone V9 is not in the database"),
-        (run_record({"V1": float("nan")}), "run of window, stone V1: von_mises_max is nan"),
+        (run_record({"V1": float("nan")}), "run of window, stone V1: von_mises_p99 is nan"),
         (replace(run_record({}), results=run_record({"V1": 1.0}).results * 2), "two results for stone V1"),
         (replace(run_record({}), summary={"weight": float("inf")}), "the summary cannot be stored"),
         (replace(run_record({}), summary={"weight": object()}), "the summary cannot be stored"),

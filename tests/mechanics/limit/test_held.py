@@ -69,6 +69,9 @@ class Scattered:
         holds = load < self.limit and load not in self.falls
         return held._Trial(holds, 0.9 * self.limit, none, np.zeros((0, 6)), 0.0)
 
+    def released(self, load):
+        """Say that forces from nothing bring about each rest."""
+
 
 @pytest.mark.parametrize(
     ("limit", "falls", "value", "lost"),

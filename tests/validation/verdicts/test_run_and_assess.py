@@ -47,11 +47,11 @@ def agree(name, setting):
         assert run.outcome.rests == standing.outcome.rests, told
     elif run.outcome.rests or standing.outcome.rests:
         assert SCENES[name].truth is Truth.STANDS, told
-    held = held_limit(on, ALONG, endless(on)).held
+    lost = held_limit(on, ALONG, endless(on)).lost
     if run.outcome.decided and not run.outcome.rests:
-        assert held == 0.0, told
+        assert lost == 0.0, told
     if standing.outcome.rests and standing.rest is not None:
-        assert held_limit(standing.rest, ALONG, endless(standing.rest)).held > 0.0, told
+        assert held_limit(standing.rest, ALONG, endless(standing.rest)).lost > 0.0, told
 
 
 @pytest.mark.parametrize("number", range(len(FEW)))
