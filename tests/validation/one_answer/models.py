@@ -6,7 +6,7 @@ from pathlib import Path
 
 from mechanics.scene.scene import Fidelity, Scene
 from pipelines.ingest.ingest import ingest
-from pipelines.ingest.reading_options import solid_options
+from pipelines.ingest.reading_options import reading_options, solid_options
 from survey.formats.options import ReadingOptions
 from tests.paths import ROOT
 from tests.pipelines.scenes import assembled
@@ -66,18 +66,18 @@ MODELS: Mapping[str, Model] = {
 
 def model(name: str, folder: Path) -> Scene:
     """Return the scene of an assembly, by way of a database in a folder."""
-    one, url = MODELS[name], f"sqlite:///{folder / name}.db"
+    entry, url = MODELS[name], f"sqlite:///{folder / name}.db"
     ingest(
         [ASSEMBLIES / f"{name}.obj"],
         url,
         "solids",
-        options=solid_options(ReadingOptions(), snap=one.snap),
+        options=solid_options(reading_options(unit="m"), snap=entry.snap),
     )
-    scene = assembled(url, _SCENE.format(name=name, friction=one.friction)).scene
+    scene = assembled(url, _SCENE.format(name=name, friction=entry.friction)).scene
     heights = [(block.vertices[:, 2].min(), block.vertices[:, 2].max()) for block in scene.blocks]
     foot, top = min(low for low, _ in heights), max(high for _, high in heights)
     blocks = tuple(
-        replace(block, fidelity=Fidelity.FIXED) if low <= foot + one.foot * (top - foot) else block
+        replace(block, fidelity=Fidelity.FIXED) if low <= foot + entry.foot * (top - foot) else block
         for block, (low, _) in zip(scene.blocks, heights, strict=True)
     )
     return replace(scene, blocks=blocks)
