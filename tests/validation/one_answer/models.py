@@ -7,7 +7,6 @@ from pathlib import Path
 from mechanics.scene.scene import Fidelity, Scene
 from pipelines.ingest.ingest import ingest
 from pipelines.ingest.reading_options import reading_options, solid_options
-from survey.formats.options import ReadingOptions
 from tests.paths import ROOT
 from tests.pipelines.scenes import assembled
 
