@@ -70,13 +70,16 @@ with open(sys.argv[1], "w") as file:
 """
 
 _CALLED = """
-import json, resource, signal, sys
+import json, signal, sys
 from moma.cli import app
 from ground.kernels.uses import called
+ended = []
 def end(*_):
+    ended.append(True)
     raise KeyboardInterrupt
-signal.signal(signal.SIGXCPU, end)
-resource.setrlimit(resource.RLIMIT_CPU, (int(sys.argv[2]), -1))
+# the signal comes once: that of a limit of the system comes again each second, while results are written
+signal.signal(signal.SIGPROF, end)
+signal.setitimer(signal.ITIMER_PROF, int(sys.argv[2]))
 code = 0
 try:
     code = app(sys.argv[3:], prog_name="moma", standalone_mode=False)
@@ -84,7 +87,7 @@ except KeyboardInterrupt:
     print("ended after its time", file=sys.stderr)
 with open(sys.argv[1], "w") as file:
     json.dump([vars(one) for one in called()], file)
-sys.exit(code)
+sys.exit(0 if ended else code)
 """
 
 
