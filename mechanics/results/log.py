@@ -2,7 +2,7 @@
 
 from collections import Counter
 from dataclasses import fields
-from typing import Generic, TypeVar
+from typing import ClassVar, Generic, TypeVar
 
 import numpy as np
 
@@ -40,8 +40,8 @@ class StepLog(Carrier, Generic[F, H]):
     history : class of the history; its fields are the columns of the rows
     """
 
-    CARRIED = ("_rows", "energy", "frames", "unconverged")
-    REBUILT = ("_history",)
+    CARRIED: ClassVar[tuple[str, ...]] = ("_rows", "energy", "frames", "unconverged")
+    REBUILT: ClassVar[tuple[str, ...]] = ("_history",)
 
     def __init__(self, energy: EnergyTerms, history: type[H]) -> None:
         self.energy, self.unconverged = energy, 0

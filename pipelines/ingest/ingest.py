@@ -143,7 +143,7 @@ def _check_targets(targets: Sequence[Path], sources: Sequence[Source], format: s
         check_targets(targets, [file for source in sources for file in source.files])
 
 
-def _rejects(path: Path, format: str, tally: Tally, options: ReadingOptions) -> str:
+def _rejects(path: Path, format: str, tally: Tally, options: ReadingOptions) -> bytes:
     """Return the stones of a survey that were refused, with the reasons, in the survey's own format."""
     if format in _OUTLINED:
         return outline_rejects(path, options, tally.refused)
