@@ -205,6 +205,27 @@ def test_the_design_pages_name_files_that_exist_and_all_stand_in_the_index():
             assert (ROOT / path).exists(), (page.name, path)
 
 
+@pytest.mark.skipif(not (ROOT / ".git").exists(), reason="an archive of the project has no history")
+def test_the_commits_that_tables_name_are_of_the_history():
+    """Commits that were moved or joined later can be looked up by nobody."""
+
+    def git(*arguments):
+        done = subprocess.run(["git", *arguments], capture_output=True, text=True, cwd=ROOT, check=True)
+        return done.stdout.split()
+
+    if git("rev-parse", "--is-shallow-repository") == ["true"]:
+        pytest.skip("the history was cut off")
+    known = git("rev-list", "HEAD")
+    pages = [*(ROOT / "docs").rglob("*.md"), ROOT / "README.md", ROOT / "benchmarks/README.md"]
+    named = {
+        (page.name, commit)
+        for page in pages
+        for commit in re.findall(r"\bcommits? ([0-9a-f]{7,40})\b", page.read_text(encoding="utf-8"))
+    }
+    assert len(named) > 10
+    assert not {one for one in named if not any(commit.startswith(one[1]) for commit in known)}
+
+
 def test_the_makefile_makes_what_the_readme_says():
     targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
     asked = {
