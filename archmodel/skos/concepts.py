@@ -6,9 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import unquote
 
-from archmodel.skos.rdf_xml import parse_rdf_xml
-from archmodel.skos.triples import RDF, Literal, Node, Triple, read_text, refuse
-from archmodel.skos.turtle import parse_turtle
+from archmodel.skos.triples import RDF, Literal, Node, Triple, read_triples, refuse
 from archmodel.tables.terms import VOCABULARIES
 
 __all__ = ["ENDINGS", "SCHEME", "SKOS", "Concept", "Scheme", "read_scheme"]
@@ -82,10 +80,7 @@ def read_scheme(path: Path) -> Scheme:
     UsageError
         if the file is not RDF, or has no concepts
     """
-    text = read_text(path)
-    xml = path.suffix.lower() in (".rdf", ".owl") and text.lstrip().startswith("<")
-    graph = (parse_rdf_xml if xml else parse_turtle)(text, str(path))
-    objects = _objects(graph)
+    objects = _objects(read_triples(path))
     numbers = [
         node
         for node, known in objects.items()

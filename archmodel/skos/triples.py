@@ -1,16 +1,18 @@
-"""Statements of RDF: subject, predicate, object; and a reader by the ending of a file."""
+"""Statements of RDF files: subject, predicate, object; rdflib reads them."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
+from xml.sax import SAXParseException
 
 from ground.errors import UsageError
 
-__all__ = ["RDF", "Literal", "Node", "Triple", "number_blank", "read_text", "refuse", "tag_of"]
+__all__ = ["RDF", "Literal", "Node", "Triple", "read_triples", "refuse"]
 
 RDF = "http://www.w3.org/1999/02/22-rdf-syntax-ns#"
 """Namespace of RDF."""
+
+_XML = (".rdf", ".owl")
 
 
 @dataclass(frozen=True)
@@ -29,40 +31,61 @@ class Literal:
 
 
 Node = str | Literal
-"""IRI, blank node (``_:`` and a name), or text."""
+"""IRI, name of a blank node, or text."""
 
 Triple = tuple[str, str, Node]
 """Subject, predicate, object."""
 
 
-def read_text(path: Path) -> str:
-    """Return the text of a file.
+def read_triples(path: Path) -> list[Triple]:
+    """Return the statements of a file of Turtle, N-Triples or RDF/XML, in its order.
 
     Raises
     ------
     UsageError
-        if it cannot be read, or is not UTF-8
+        if it cannot be read, is not UTF-8, or not RDF
     """
+    import rdflib  # takes half a second
+    from rdflib.exceptions import ParserError
+    from rdflib.plugins.parsers.notation3 import BadSyntax
+
+    found: list[Triple] = []
+
+    class Statements(rdflib.Graph):
+        """Graph that notes its statements as they come: those of a graph have no order."""
+
+        def add(self, triple: Any) -> "Statements":
+            """Note a statement."""
+            subject, predicate, target = triple
+            text = isinstance(target, rdflib.Literal)
+            node = Literal(str(target), _tag(target.language)) if text else str(target)
+            found.append((str(subject), str(predicate), node))
+            return self
+
     try:
-        return path.read_bytes().decode("utf-8-sig")
+        text = path.read_bytes().decode("utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         refuse(str(path), f"cannot be read: {error}", "save it as UTF-8")
+    xml = path.suffix.lower() in _XML and text.lstrip().startswith("<")
+    try:
+        Statements().parse(data=text, format="xml" if xml else "turtle", publicID=f"file:///{path.name}")
+    except BadSyntax as error:
+        refuse(f"{path}:{error.lines + 1}", f"it is not Turtle: {error._why}")
+    except RecursionError:
+        refuse(str(path), "it has brackets within brackets without end")
+    except (ParserError, SAXParseException) as error:
+        refuse(str(path), f"it is not RDF/XML: {error}")
+    except (AssertionError, IndexError):
+        refuse(str(path), "it ends within a statement or a text")
+    return found
+
+
+def _tag(language: str | None) -> str | None:
+    """Return a language tag with its first part in small letters, as they are compared without regard to case."""
+    first, dash, rest = (language or "").partition("-")
+    return f"{first.lower()}{dash}{rest}" or None
 
 
 def refuse(where: str, what: str, remedy: str = "save it again as Turtle by another program") -> NoReturn:
     """Refuse a file, at its line."""
     raise UsageError(what, where=where, remedy=remedy)
-
-
-def number_blank() -> Iterator[str]:
-    """Yield names of blank nodes that no file can write."""
-    number = 0
-    while True:
-        number += 1
-        yield f"_:-{number}"
-
-
-def tag_of(text: str) -> str | None:
-    """Return a language tag with its first part in small letters, as they are compared without regard to case."""
-    first, dash, rest = text.strip().partition("-")
-    return f"{first.lower()}{dash}{rest}" or None
