@@ -9,7 +9,7 @@ import typer
 from moma.cli.console import reporting
 from moma.cli.options import At, Common, Sheet
 
-__all__ = ["entries", "matrix", "record"]
+__all__ = ["TableChoices", "entries", "matrix", "record"]
 
 
 @reporting
