@@ -32,7 +32,7 @@ def test_the_commands_run_and_what_they_write_comes_back(place):
                 "query", "entity", "--columns", "code,volume", "--db", f"sqlite:///{place / name}"
             )
         }
-        for name in ("moma.db", "out/compas.db")
+        for name in ("exchange.db", "out/compas.db")
     )
     assert len(there) == 98
     assert again == pytest.approx(there, rel=1e-6)
