@@ -50,10 +50,11 @@ def folder(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("ending", ENDINGS)
 def test_every_ending_gives_its_format_and_the_same_bytes_again(url, ending):
-    told = answer("export", f"a{ending}", "--run", "1", "--db", url)
-    assert told["stones"] == 98
+    run = () if ending in (".graphml", ".ttl") else ("--run", "1")  # knowledge, without results
+    told = answer("export", f"a{ending}", *run, "--db", url)
+    assert told["stones"] == (98 if run else 0)
     assert told["bytes"] == Path(f"a{ending}").stat().st_size
-    invoke("export", f"b{ending}", "--run", "1", "--db", url)
+    invoke("export", f"b{ending}", *run, "--db", url)
     content = Path(f"a{ending}").read_bytes()
     assert content == Path(f"b{ending}").read_bytes()
     assert not content.startswith(b'{\n"format": "moma')

@@ -14,8 +14,8 @@ from tests.moma.commands import invoke
 from tests.paths import ROOT
 
 PACKAGES = ("ground", "moma", "survey", "archmodel", "mechanics", "pipelines")
-PROGRAMS = {"pipelines/reports/page/paper.py", "pipelines/assess/workers/cluster.py"}
-"""Modules that name options of Chromium and of Dask."""
+PROGRAMS = {"pipelines/reports/page/paper.py", "pipelines/assess/workers/cluster.py", "ground/errors.py"}
+"""Modules that name options of Chromium, of Dask and of pip."""
 
 HEAD = "moma-survey 1\nobserver 1 -20 1\ndepth * 0.4 source measured at the door\n"
 FACES = ((1, 4, 3, 2), (5, 6, 7, 8), (1, 2, 6, 5), (2, 3, 7, 6), (3, 4, 8, 7), (4, 1, 5, 8))
