@@ -24,8 +24,7 @@ from these. So does the load that is found; where stones surely move then, as on
 between its neighbours, the search is made again by what such a step says.
 """
 
-from collections.abc import Iterator, Sequence
-from copy import copy
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -127,7 +126,7 @@ def held_limit(
     if candidate is not None and candidate < (1.0 - _BESIDE) * bound.multiplier:
         # in whole hundredths of the bound, as forms of a scene agree on a candidate to 0.2 %
         first = int(_BESIDE * int(candidate / (_BESIDE * bound.multiplier)) * high)
-    found = search.limit(on, 0, high, first)
+    found = _lasting(on, steps, search, search.limit(on, 0, high, first))
     return found if found.mechanism is not None else replace(found, lost=bound.multiplier)
 
 
@@ -141,10 +140,22 @@ def _without_bound(on: RigidAssembly, steps: "_Steps", nothing: _Trial) -> HeldL
             unit = _unit(load)
             low, high = round(held / unit), round(load / unit)
             tried = {0: nothing, low: best, high: trial}
-            found = _Search(steps, unit, tried).limit(on, low, high, None)
+            search = _Search(steps, unit, tried)
+            found = _lasting(on, steps, search, search.limit(on, low, high, None))
             return replace(found, problems=problems + found.problems - len(tried))
         held, best, load = load, trial, 2.0 * load
     return HeldLimit(np.inf, np.inf, best.force, None, problems)
+
+
+def _lasting(on: RigidAssembly, steps: "_Steps", search: "_Search", found: HeldLimit) -> HeldLimit:
+    """Return a limit; where stones surely move after the step that it holds, as steps that are followed give it."""
+    falling = steps.released(found.held) if found.held else None
+    if falling is None:
+        return found
+    high = round(found.held / search.unit)
+    tried = {0: search.tried[0], high: falling}
+    again = replace(search, steps=steps.followed, tried=tried).limit(on, 0, high, None)
+    return replace(again, problems=found.problems + again.problems)
 
 
 def _unit(load: float) -> float:
@@ -169,7 +180,7 @@ class _Search:
     tried : the step under each multiple that was tried
     """
 
-    steps: "_Steps"
+    steps: Callable[[float], _Trial]
     unit: float
     tried: dict[int, _Trial]
 
@@ -186,11 +197,6 @@ class _Search:
         while fallen := [load for load in self._below(low) if not self._holds(load)]:
             high = min(fallen)
             low, high = self._neighbours(max(load for load in self.tried if load < high), high, None)
-        falling = self.steps.released(self._load(low)) if low else None
-        if falling is not None:
-            again = _Search(self.steps.going_on(), self.unit, {0: self.tried[0], low: falling})
-            found = again.limit(on, 0, low, None)
-            return replace(found, problems=found.problems + len(self.tried))
         best, worst = self.tried[low], self.tried.get(high)
         falls = None if worst is None else _falling(on, worst)
         return HeldLimit(self._load(low), self._load(high), best.force, falls, len(self.tried))
@@ -239,19 +245,16 @@ class _Steps:
         self._free = self._motion(self._dead), self._motion(self._live)
         self._pull = np.zeros((len(on.contacts), 3))
         self._pull[:, 0] = on.strength.tension
-        self._goes_on = False
 
     def __call__(self, multiplier: float) -> _Trial:
         """Return the step under λ."""
         problem, free = self._problem(multiplier)
-        trial = self._trial(multiplier, problem, free, standing_chain(problem), np.zeros_like(problem.u_free))
-        return self.released(multiplier) or trial if self._goes_on and trial.holds else trial
+        return self._trial(multiplier, problem, free, standing_chain(problem), np.zeros_like(problem.u_free))
 
-    def going_on(self) -> "_Steps":
-        """Return steps that are followed by `released` where they hold."""
-        steps = copy(self)
-        steps._goes_on = True
-        return steps
+    def followed(self, multiplier: float) -> _Trial:
+        """Return the step under λ, or the one after it where stones surely move in that alone."""
+        trial = self(multiplier)
+        return (self.released(multiplier) or trial) if trial.holds else trial
 
     def released(self, multiplier: float) -> _Trial | None:
         """Return the step after one that holds; None where stones do not surely move in it.
