@@ -20,9 +20,6 @@ __all__ = [
 MAX_TEXT = 10_000
 """Longest text [characters]; a longer one belongs in a document."""
 
-MAX_WHOLE = LARGEST_INTEGER
-"""Largest whole number that a column takes."""
-
 
 def checked_text(name: str, value: str | None) -> str | None:
     """Check a text in words, of several lines perhaps, and strip outer space; None stays None.
@@ -79,13 +76,13 @@ def checked_number(
     return float(value)
 
 
-def checked_whole(name: str, value: int | None, lowest: int, highest: int = MAX_WHOLE) -> int | None:
+def checked_whole(name: str, value: int | None, lowest: int, highest: int = LARGEST_INTEGER) -> int | None:
     """Check an integer within bounds, both included; None stays None."""
     if value is None:
         return None
     whole = isinstance(value, int) and not isinstance(value, bool)
     if not whole or not lowest <= value <= highest:
-        bounds = f"from {lowest} to {highest}" if highest < MAX_WHOLE else f"from {lowest} on"
+        bounds = f"from {lowest} to {highest}" if highest < LARGEST_INTEGER else f"from {lowest} on"
         raise UsageError(f"{name} is {str(value)[:40]}", remedy=f"give a whole number {bounds}")
     return value
 

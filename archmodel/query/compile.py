@@ -41,9 +41,6 @@ from ground.errors import UsageError
 
 __all__ = ["column_named", "condition", "condition_in"]
 
-LARGEST = LARGEST_INTEGER
-"""Whole numbers up to this one are compared as such; larger ones as floating-point numbers."""
-
 Where = Scope | StructureScope
 
 _OPERATORS: Mapping[str, Callable[[Any, Any], Any]] = {
@@ -307,11 +304,14 @@ _TRUTHS = {"true": True, "false": False}
 
 
 def _number(attribute: Attribute, value: Token) -> ColumnElement[Any]:
-    """Return a number with its type: PostgreSQL would round it to that of the column, or not use the index."""
+    """Return a number with its type: PostgreSQL would round it to that of the column, or not use the index.
+
+    Whole numbers that no integer column holds are compared as floating-point numbers.
+    """
     number = float(value.text) if value.role == "number" else math.nan
     if not math.isfinite(number):
         remedy = "write a number without quotes, e.g. 0.4 or 2e5"
         raise complaint(value, f"{attribute.name} is a number, {value.text[:40]!r} is not", remedy)
-    if number.is_integer() and abs(number) <= LARGEST:
+    if number.is_integer() and abs(number) <= LARGEST_INTEGER:
         return literal(int(number), Integer)
     return literal(number, Double)
