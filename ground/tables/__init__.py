@@ -2,5 +2,6 @@
 
 Public: `Table`, `read_table` (table); `ListRows`, `Row`, `TextRows`, `open_rows` (rows); `NumberStream`,
 `open_numbers` (number_stream); `TextLines` (text_lines); `Decimals` (decimals); `COORDINATES`, `UNITS`, `places_of`
-(columns); `parse_length`, `parse_number` (numbers); `Layer`, `write_geopackage` (geopackage).
+(columns); `parse_length`, `parse_number` (numbers); `Layer`, `write_geopackage` (geopackage);
+`exchanged_grid` (grids).
 """

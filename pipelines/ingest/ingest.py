@@ -5,8 +5,10 @@ import os
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 
+import numpy as np
 from sqlalchemy.orm import Session
 
 from archmodel.database.session import home_of, open_database
@@ -32,6 +34,7 @@ from pipelines.ingest.report import IngestReport, Tally
 from pipelines.ingest.spool import Spool
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.formats.reading import ReadingOptions
+from survey.formats.tables.axes import exchanged, exchanged_station
 from survey.records.survey import Reject
 from survey.registration.stones import survey_stones
 
@@ -95,6 +98,7 @@ def ingest(
         ]
         if len(surveys) > 1:
             _check_codes(tallies, spools)
+            _check_axes(tallies)
         for path, target, tally in zip(surveys, targets, tallies, strict=True):
             if tally.refused:
                 stack.enter_context(_published(target, _rejects(path, format, tally, options)))
@@ -169,6 +173,23 @@ def _check_codes(tallies: Sequence[Tally], spools: Sequence[Spool]) -> None:
             if (first := places.setdefault(stone.code, place)) != place:
                 what = f"the code {stone.code} is taken by the stone at {first}"
                 raise SurveyError(what, where=place, remedy="give each stone a code of its own")
+
+
+def _check_axes(tallies: Sequence[Tally]) -> None:
+    """Refuse lists of which one has easting and northing exchanged, so that it would be a mirror image."""
+    for first, tally in combinations(tallies, 2):
+        here, there = (
+            {station.name: station.position for station in one.stream.head.stations} for one in (first, tally)
+        )
+        common = [name for name in here if name in there and exchanged_station(there[name], here[name])]
+        places = (np.array(one.centres).reshape(-1, 3) for one in (tally, first))
+        if common or exchanged(*places):
+            what = f"station {common[0]} is that of" if common else "its stones are beside those of"
+            raise SurveyError(
+                f"{what} {first.path.name} only if easting and northing of one of the two are exchanged",
+                where=str(tally.path),
+                remedy="ingest them one by one, one with --format pnezd (northing first), the other with penzd",
+            )
 
 
 _LISTS = ("csv", "pnezd", "penzd", "gsi")

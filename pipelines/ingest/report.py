@@ -144,11 +144,13 @@ class Tally:
     doubts: dict[str, str] = field(default_factory=dict)
     units: Counter[str] = field(default_factory=Counter)
     boxes: list[Array] = field(default_factory=list)
+    centres: list[Array] = field(default_factory=list)
 
     def count(self, block: SurveyedBlock) -> None:
         """Count one more accepted stone."""
         face = block.face
         self.stones[block.kind] += 1
+        self.centres.append(face.fit.centroid)
         if face.rejected_points:
             self.rejected[block.code] = len(face.rejected_points)
         if str(face.shape.kind) not in ("plane", "untested"):

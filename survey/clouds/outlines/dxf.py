@@ -59,6 +59,12 @@ def read_dxf(
     except Exception as error:  # ezdxf raises OSError or its own classes
         what = f"cannot be read as DXF: {' '.join(str(error).split())[:120]}"
         raise SurveyError(what, where=str(path), remedy="save it as DXF R2000 or later") from error
+    if 2 * sum(text.mirrored for text in entities.texts) > len(entities.texts):
+        raise SurveyError(
+            "most of its texts are mirrored: it shows the wall as in a mirror, or from behind",
+            where=str(path),
+            remedy="mirror the drawing back; if its outlines are as seen from outside, set its texts upright",
+        )
     code = int(drawing.header.get("$INSUNITS", 0))
     if unit is None and code and code not in _UNITS:
         raise SurveyError(

@@ -16,6 +16,7 @@ _SAGITTA = 0.001  # by which arcs may differ from their chords [drawing units]
 _DEEPEST = 16  # blocks within blocks
 _CURVES = ("LWPOLYLINE", "POLYLINE", "SPLINE", "CIRCLE", "ELLIPSE")
 _SILENT = ("POINT", "ATTDEF", "VIEWPORT", "XLINE", "RAY")  # of which nobody makes a stone
+_BACKWARD = 2  # bit of the flag of a text that is written from right to left (DXF, group 71)
 _SAME_BOX = 0.02  # difference of two boxes that are of one stone, of their size
 
 
@@ -44,11 +45,13 @@ class DrawnText:
     places : where it may stand, in order of preference, each (3,) in drawing units
     text : it, or ""
     values : attributes by tag
+    mirrored : whether it is written from right to left
     """
 
     places: tuple[Array, ...]
     text: str
     values: Mapping[str, str] = field(default_factory=dict)
+    mirrored: bool = False
 
 
 @dataclass
@@ -119,8 +122,13 @@ def _resolved(entities: Any, layer: str | None, found: Entities, depth: int) -> 
 
 
 def _text(entity: Any) -> DrawnText:
-    text = entity.plain_text() if entity.dxftype() == "MTEXT" else entity.dxf.text
-    return DrawnText((_place(entity.dxf.insert),), " ".join(text.split()))
+    if entity.dxftype() == "MTEXT":
+        behind = entity.dxf.extrusion.z < 0.0
+        return DrawnText(
+            (_vector(entity.dxf.insert),), " ".join(entity.plain_text().split()), mirrored=behind
+        )
+    mirrored = bool(entity.dxf.text_generation_flag & _BACKWARD) != (entity.dxf.extrusion.z < 0.0)
+    return DrawnText((_place(entity),), " ".join(entity.dxf.text.split()), mirrored=mirrored)
 
 
 def _label(insert: Any) -> DrawnText:
@@ -130,11 +138,16 @@ def _label(insert: Any) -> DrawnText:
         for attribute in insert.attribs
         if attribute.dxf.text.strip()
     }
-    places = (*(_place(attribute.dxf.insert) for attribute in insert.attribs), _place(insert.dxf.insert))
+    places = (*map(_place, insert.attribs), _place(insert))
     return DrawnText(places, "", values)
 
 
-def _place(point: Any) -> Array:
+def _place(entity: Any) -> Array:
+    """Return where a text or insert stands; it says so in axes of its own, which are turned in a mirrored drawing."""
+    return _vector(entity.ocs().to_wcs(entity.dxf.insert))
+
+
+def _vector(point: Any) -> Array:
     return np.array([point.x, point.y, point.z])
 
 

@@ -25,6 +25,7 @@ from ground.tables.numbers import EMPTY, shown
 from ground.tables.rows import DATE_REMEDY, ListRows, Row, TextRows, open_rows
 from survey.formats.fields import CODE, KIND, code_of, parse_course
 from survey.formats.options import ReadingOptions, whole
+from survey.formats.tables.axes import ORDERS, AxisEvidence, both_orders, exchanged_station, outlines_of
 from survey.formats.tables.code_template import (
     CONTROL_WORDS,
     ROLES,
@@ -71,6 +72,7 @@ _OF_STONES = ("depth", "depth_sigma", "depth_source", "depth_origin", "zone", "s
 _IDENTITY = ("block", "kind", "course", "role", "description")
 _LIST = {"pnezd": ("name", "y", "x", "z", "description"), "penzd": ("name", "x", "y", "z", "description")}
 _SEPARATORS = ("\t", ";", ",", "|", "")  # empty: any blanks
+_SAMPLE = 300  # first stones, by which the order of the axes is judged: habits show in far fewer
 _LOOK_AHEAD = 100  # rows in which the first good one, or the names of the columns, must be found
 _TITLES = 30  # rows before the names of the columns
 _LISTED = 12  # unknown kinds in a message
@@ -114,8 +116,10 @@ def open_table(path: Path, rows: AnyRows, options: ReadingOptions) -> SurveyStre
     """Read a table from its rows; see `open_csv`."""
     iterator = iter(rows)
     ahead = list(islice(iterator, _LOOK_AHEAD))
-    header, columns = _find_header(rows, ahead, read_map(options.columns), options.codes is not None)
-    return _read(path, rows, chain(ahead[header:], iterator), columns, options)
+    column_map = read_map(options.columns)
+    header, columns = _find_header(rows, ahead, column_map, options.codes is not None)
+    titles = ahead[:header] if not {"x", "y"} & set(column_map.names) else ()
+    return _read(path, rows, chain(ahead[header:], iterator), columns, options, titles=titles)
 
 
 def open_pnezd(path: Path, options: ReadingOptions | None = None) -> SurveyStream:
@@ -174,7 +178,8 @@ def _opened_list(path: Path, options: ReadingOptions, form: str) -> SurveyStream
         rows.delimiter = _list_delimiter(rows, ahead[header:])
         if header:
             _check_axes(rows, ahead[header - 1], form)
-    return _read(path, rows, chain(ahead[header:], iterator), columns, options, form)
+    titles = ahead[:header]
+    return _read(path, rows, chain(ahead[header:], iterator), columns, options, form, titles)
 
 
 def _has_digits(row: Row) -> bool:
@@ -188,6 +193,7 @@ def _read(
     columns: Columns,
     options: ReadingOptions,
     form: str = "",
+    titles: Sequence[tuple[int, Any]] = (),
 ) -> SurveyStream:
     reader = _RowReader(path, rows, columns, options, form)
     first = 0
@@ -200,7 +206,8 @@ def _read(
         what = "list has no points" if form else "table has no points"
         raise rows.fail(rows.end, f"the {what}", "add one line per point")
     head = collector.head
-    remarks = (*rows.remarks, *reader.remarks, *collector.remarks)
+    doubt = _order_remarks(rows, collector, columns, options, form, titles)
+    remarks = (*rows.remarks, *reader.remarks, *collector.remarks, *doubt)
     return SurveyStream(head, collector.table.records(), header=first - 1, remarks=remarks)
 
 
@@ -332,6 +339,60 @@ def _check_axes(rows: AnyRows, header: tuple[int, Any], form: str) -> None:
             f"the columns are {', '.join(names)[:200]}, which is not the order of {form}",
             f"give --format {alternative}",
         )
+
+
+def _order_remarks(
+    rows: AnyRows,
+    collector: "PointCollector",
+    columns: Columns,
+    options: ReadingOptions,
+    form: str,
+    titles: Sequence[tuple[int, Any]],
+) -> tuple[str, ...]:
+    """Refuse a list that speaks against the order of its axes; return a remark if nothing in it tells the order."""
+    names = _axis_names(rows, columns, titles)
+    if not form and [plain(name) for name in names] != ["x", "y"]:
+        return ()  # names of columns tell the axes, as easting and northing do
+    if form and [kind_of_column(name) for name in names] == ["x", "y"] and plain(names[0]) != "x":
+        return ()
+    header_stations = options.head_for(Path(rows.path)).stations
+    words = [Path(rows.path).stem, *(text for _, text in getattr(rows, "comments", ()))]
+    words += [row if isinstance(row, str) else " ".join(map(str, row)) for _, row in titles]
+    stones = [stone for stone in collector.table.stones.values() if stone.vertices]
+    evidence = AxisEvidence(
+        form,
+        words,
+        np.concatenate([np.array(stone.vertices).reshape(-1, 3) for stone in stones] or [np.empty((0, 3))]),
+        outlines_of(stones[:_SAMPLE], collector.head),
+        np.array([station.position for station in header_stations]).reshape(-1, 3),
+    )
+    if against := "; ".join(evidence.against()):
+        what = ORDERS[form] if form else f"{names[0]} as the easting and {names[1]} as the northing"
+        raise SurveyError(
+            f"read with {what} it may be mirrored: {against}",
+            where=rows.path,
+            remedy=both_orders(form, names, None if options.codes else CODES),
+        )
+    if not form or evidence.speaks_for():
+        return ()
+    other = "penzd" if form == "pnezd" else "pnezd"
+    return (
+        f"read with {ORDERS[form]}, as --format {form} says: nothing in the list confirms it, and with the other "
+        f"order (--format {other}) the wall would be the mirror image",
+    )
+
+
+def _axis_names(rows: AnyRows, columns: Columns, titles: Sequence[tuple[int, Any]]) -> list[str]:
+    """Return the names of the columns of x and y; none where they have none."""
+    if not titles or not {"x", "y"} <= set(columns.at):
+        return []
+    number, row = titles[-1]
+    try:
+        names = rows.cells(row, number)
+    except SurveyError:
+        return []
+    places = [columns.at["x"], columns.at["y"]]
+    return [names[k] for k in places] if max(places) < len(names) else []
 
 
 @dataclass(frozen=True, slots=True)
@@ -531,7 +592,10 @@ class PointCollector:
                 what = f"station {name} stands at three places: role S, or station, is a corner?"
                 raise _SommetError(what, where=f"{self._path}:{line}", remedy="write v for a corner")
             self._moved.add(name)
-            raise self.fail(line, f"station {name} a second time", f"the first is on line {before.line}")
+            remedy = f"the first is on line {before.line}"
+            if exchanged_station(np.array(place), before.position):
+                remedy += ", with the axes exchanged: --format pnezd is one order, penzd the other"
+            raise self.fail(line, f"station {name} a second time", remedy)
         self._stations[name] = Station(name, np.array(place), line)
 
     def leave_out(self, description: str) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 
 from ground.errors import SurveyError
 from ground.tables.columns import COORDINATES, POINT, SIGMA, length_scale
+from ground.tables.grids import exchanged_grid
 from ground.tables.numbers import EMPTY, is_number, shown
 from ground.tables.table import Table, TableRow, read_table
 from survey.arrays import Array
@@ -81,7 +82,19 @@ def read_control(path: Path) -> tuple[ControlRow, ...]:
                 remedy="keep one",
             )
         rows[row.number] = row
+    _check_grid(table, tuple(rows.values()), header)
     return tuple(rows.values())
+
+
+def _check_grid(table: Table, rows: Sequence[ControlRow], header: TableRow | None) -> None:
+    """Refuse control points of a national grid whose northing is read as x: they would form a left-handed frame."""
+    if grid := exchanged_grid(np.array([row.place for row in rows]).reshape(-1, 3)):
+        raise SurveyError(
+            f"coordinates are those of {grid} only if X is the northing and Y the easting; as they are they would "
+            "mirror the control points",
+            where=rows[0].where if header is None else table.where(header.line),
+            remedy="name the columns in the first line, e.g.: number, northing, easting, height",
+        )
 
 
 def _fits(table: Table, places: Mapping[str, int]) -> bool:

@@ -5,7 +5,7 @@ import pytest
 from ground.errors import SurveyError, UsageError
 from pipelines.ingest.ingest import ingest
 from pipelines.run.check import check_scene
-from tests.moma.commands import prints
+from tests.moma.commands import fails, prints
 from tests.survey.scanned_stones import scanned_box, scanned_wall, write_ply
 
 SCENE = """
@@ -84,3 +84,39 @@ def test_a_folder_without_surveys_is_refused(tmp_path):
     for format in ("solids", "moma", "csv"):
         with pytest.raises(UsageError, match="the folder has no"):
             ingest([tmp_path], f"sqlite:///{tmp_path}/none.db", format)
+
+
+def list_of_points(order, first, origin=(20.0, 5.0)):
+    """Return a list of four stones in a row along the easting, and of the station that two lists share."""
+    rows = [
+        (origin[0] + 0.6 * k + right, origin[1], 1.0 + up, f"{first}-{k}:v")
+        for k in range(4)
+        for right, up in ((0.0, 0.0), (0.5, 0.0), (0.5, 0.3), (0.0, 0.3))
+    ]
+    rows.append((origin[0] + 2.0, origin[1] - 6.0, 1.5, "S1:s"))
+    places = [(n, e) if order == "pnezd" else (e, n) for e, n, _, _ in rows]
+    return "".join(
+        f"{k} {a} {b} {z} {code}\n"
+        for k, ((a, b), (*_, z, code)) in enumerate(zip(places, rows, strict=True))
+    )
+
+
+@pytest.mark.parametrize(
+    ("origin", "shared", "reason"),
+    [
+        ((20.0, 5.0), True, "station S1 is that of a.txt only if"),
+        ((5000.0, 1000.0), False, "its stones are beside those of a.txt only if"),
+    ],
+)
+def test_two_lists_of_one_survey_in_different_orders(tmp_path, origin, shared, reason):
+    head = tmp_path / "head.moma"
+    head.write_text("moma-survey 1\nname wall\ndepth * 0.4 source drilled\n")
+    for name, order in (("a", "penzd"), ("b", "pnezd")):
+        text = list_of_points(order, name, origin)
+        (tmp_path / f"{name}.txt").write_text(text if shared else text.replace("S1", f"S{name}"))
+    words = ["--format", "penzd", "--header", head, "--db", f"sqlite:///{tmp_path}/w.db"]
+    line = fails(1, "ingest", tmp_path / "a.txt", tmp_path / "b.txt", *words)
+    assert reason in line
+    assert "--format pnezd (northing first), the other with penzd" in line
+    (tmp_path / "b.txt").write_text(list_of_points("penzd", "b", origin))
+    assert prints("ingest", tmp_path / "a.txt", tmp_path / "b.txt", *words).count("4 stones") == 2

@@ -268,3 +268,32 @@ def test_kinds_of_layers_in_other_languages_and_by_a_table(tmp_path, text, kind)
     path.write_text(json.dumps({"type": "FeatureCollection", "features": [feature]}))
     (stone,) = masked(path, kinds={"bi": "header"})[1]
     assert stone.kind == kind
+
+
+def test_texts_of_a_mirrored_drawing_stand_in_their_outlines_and_are_a_question(drawing):
+    space = drawing.modelspace()
+    for k in range(3):
+        back = {"extrusion": (0, 0, -1)}
+        space.add_lwpolyline([(-2.0 * k - a, b) for a, b in SQUARE], close=True, dxfattribs=back)
+        # turned about twice, it can be read from the front
+        upright = {"insert": (-2.0 * k - 0.25, 0.15), "text_generation_flag": 2, **back}
+        space.add_text(f"S{k}", dxfattribs=upright)
+    found = drawing.read()
+    lefts = {one.said.code: float(one.corners[:, 0].min()) for one in found.outlines}
+    assert lefts == pytest.approx({"S0": 0.0, "S1": 2.0, "S2": 4.0})
+    for text in space.query("TEXT"):
+        text.dxf.text_generation_flag = 0
+    with pytest.raises(SurveyError, match=r"most of its texts are mirrored.*set its texts upright"):
+        drawing.read()
+
+
+def test_texts_written_backwards_are_a_question(drawing):
+    space = drawing.modelspace()
+    square(space)
+    square(space, 1.0)
+    space.add_text("A", dxfattribs={"insert": (0.2, 0.1), "text_generation_flag": 2})
+    space.add_text("B", dxfattribs={"insert": (1.2, 0.1)})
+    assert {one.said.code for one in drawing.read().outlines} == {"A", "B"}  # a slip
+    space.add_text("north", dxfattribs={"insert": (5, 5), "text_generation_flag": 2})
+    with pytest.raises(SurveyError, match="most of its texts are mirrored"):
+        drawing.read()

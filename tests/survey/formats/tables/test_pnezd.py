@@ -328,7 +328,7 @@ def test_points_that_are_only_stations_or_control_belong_to_no_stone(tmp_path: P
     text = listed("FP", "FP", "STP", "Standpunkt", *["A:v"] * 4)
     stream = open_penzd(write(tmp_path, text))
     assert [one.name for one in stream.head.stations] == ["3", "4"]
-    assert stream.remarks == ("control points belong to no stone and are left out: 2 FP",)
+    assert stream.remarks[0] == "control points belong to no stone and are left out: 2 FP"
     assert [one.code for one in stream.blocks] == ["A"]
 
 
