@@ -5,6 +5,7 @@ tables   rows and columns of texts and workbooks
 kernels  compiled kernels, loaded before numba
 settings meaning, unit and bounds of a dataclass field
 polygons area and centroid of a plane polygon in space
+statistics robust scale, scatter of differences, roots of falling functions
 
 Public: `DatabaseError`, `ExchangeError`, `GeometryError`, `MeshError`, `MissingLibraryError`, `MomaError`,
 `NoDatabaseError`, `QueryError`, `SceneError`, `SolverError`, `StorageError`, `SurveyError`,

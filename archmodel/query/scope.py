@@ -237,9 +237,8 @@ class Scope:
 
         session, campaign = self.context.session, self.context.campaign
         surveys = None if campaign is None else campaigns(session)[campaign]
-        return {
-            number: (moved.distance, moved.sigma) for number, moved in displacements(session, surveys).items()
-        }
+        compared = displacements(session, surveys)
+        return {number: (moved.distance, moved.sigma) for number, moved in compared.displacements.items()}
 
     def _latest_run(self) -> ColumnElement[int]:
         """Return the number of the latest run that holds the entity: one step in the primary key."""

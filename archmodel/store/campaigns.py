@@ -1,11 +1,14 @@
 """Campaigns: measurements of one stone at different times, compared with their standard deviations.
 
 The place of a stone is the centroid of the area of its face. Across the face it is as certain as the fitted plane is
-there, along it as the mean of the corners. Corners of two campaigns need not be the same points of the stone.
+there, along it as the mean of the corners. Corners of two campaigns need not be the same points of the stone, and the
+frames of two campaigns need not be one: what places along the faces scatter beyond their standard deviations is
+estimated from all stones that both measured, and allowed for.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Generic, TypeVar
 
 import numpy as np
 from sqlalchemy import select
@@ -18,14 +21,18 @@ from ground.polygons import area_and_centroid
 
 __all__ = [
     "SIGNIFICANT",
+    "Comparison",
     "Displacement",
     "FacePlace",
     "campaigns",
+    "compare",
     "displacement",
     "displacements",
     "face_place",
     "measured_again",
 ]
+
+Key = TypeVar("Key", bound=Hashable)
 
 SIGNIFICANT = 3.368
 """Displacement over its σ from which a stone has moved [-]: one that has not moved exceeds it once in a hundred
@@ -42,10 +49,12 @@ class FacePlace:
     ----------
     centroid : (3,) of its area [m]
     covariance : (3, 3) of that [m²]
+    normal : (3,) of the face [-]
     """
 
     centroid: Array
     covariance: Array
+    normal: Array
 
 
 @dataclass(frozen=True)
@@ -69,6 +78,84 @@ class Displacement:
         return self.distance > SIGNIFICANT * self.sigma
 
 
+@dataclass(frozen=True)
+class Comparison(Generic[Key]):
+    """Places of stones in two campaigns.
+
+    Attributes
+    ----------
+    displacements : of each stone that both measured
+    scatter : of one coordinate along the face, beyond the stated standard deviations [m]: it is allowed for, so that at
+        most half of the stones may have moved
+    common : (3,) median displacement [m]: of all stones alike, it is that of the frame or of the whole structure
+    """
+
+    displacements: Mapping[Key, Displacement]
+    scatter: float
+    common: Array
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Remarks on what the places of all stones together tell, in words."""
+        moved = list(self.displacements.values())
+        texts = []
+        if self.scatter > 0.0:
+            texts.append(
+                f"places along the face scatter by {1e3 * self.scatter:.1f} mm beyond the stated sigma, which is "
+                "allowed for, unless more than half of the stones moved"
+            )
+        common = float(np.linalg.norm(self.common))
+        if moved and common > np.median([stone.sigma for stone in moved]):
+            texts.append(
+                f"half of all stones are {1e3 * common:.1f} mm from their earlier places: the frames of both campaigns "
+                "differ, or the whole moved"
+            )
+        return tuple(texts)
+
+
+def compare(places: Mapping[Key, tuple[FacePlace, FacePlace]]) -> Comparison[Key]:
+    """Compare the places of all stones that two campaigns measured.
+
+    Parameters
+    ----------
+    places : the earlier and the later place of each stone
+    """
+    scatter = _scatter(list(places.values()))
+    moved = {
+        key: displacement(*(_allowing(place, scatter, later.normal) for place in (earlier, later)))
+        for key, (earlier, later) in places.items()
+    }
+    vectors = np.array([stone.vector for stone in moved.values()]).reshape(-1, 3)
+    return Comparison(moved, scatter, np.median(vectors, axis=0) if len(vectors) else np.zeros(3))
+
+
+def _allowing(place: FacePlace, scatter: float, normal: Array) -> FacePlace:
+    """Return a place that is less certain along the face by a standard deviation [m]."""
+    along = np.eye(3) - np.outer(normal, normal)
+    return replace(place, covariance=place.covariance + scatter**2 * along)
+
+
+def _scatter(places: Sequence[tuple[FacePlace, FacePlace]]) -> float:
+    """Return the scatter of one coordinate along the faces beyond the stated standard deviations [m]."""
+    # imports scipy, which the movement of single stones does without
+    from ground.statistics.scale import scatter_beyond
+
+    values, variances = [], []
+    for earlier, later in places:
+        covariance = earlier.covariance + later.covariance
+        for direction in _along(later.normal):
+            values.append(float((later.centroid - earlier.centroid) @ direction))
+            variances.append(float(direction @ covariance @ direction))
+    return scatter_beyond(np.array(values), np.array(variances), 2.0)[0]
+
+
+def _along(normal: Array) -> Array:
+    """Return two directions square to a unit normal and to each other, (2, 3)."""
+    first = np.cross(np.eye(3)[int(np.argmin(np.abs(normal)))], normal)
+    first /= np.linalg.norm(first)
+    return np.array([first, np.cross(normal, first)])
+
+
 def face_place(
     outline: Array, normal: Array, centroid: Array, axes: Array, covariance: Array, corner_sigma: Array
 ) -> FacePlace:
@@ -86,7 +173,8 @@ def face_place(
     across = float(lever @ covariance @ lever)
     along = np.eye(3) - np.outer(normal, normal)
     corners = np.nansum(corner_sigma**2, axis=0) / len(outline) ** 2
-    return FacePlace(place, along @ np.diag(corners) @ along + across * np.outer(normal, normal))
+    covariance_of_place = along @ np.diag(corners) @ along + across * np.outer(normal, normal)
+    return FacePlace(place, covariance_of_place, normal)
 
 
 def displacement(earlier: FacePlace, later: FacePlace) -> Displacement:
@@ -124,7 +212,7 @@ def measured_again(session: Session, surveys: Sequence[int]) -> bool:
     return session.scalar(rows.limit(1)) is not None
 
 
-def displacements(session: Session, surveys: Sequence[int] | None = None) -> Mapping[int, Displacement]:
+def displacements(session: Session, surveys: Sequence[int] | None = None) -> Comparison[int]:
     """Compare the measurements that are held now with earlier ones of the same stones.
 
     A corrected depth makes a new measurement of the same survey: the last one of each survey counts.
@@ -135,7 +223,7 @@ def displacements(session: Session, surveys: Sequence[int] | None = None) -> Map
 
     Returns
     -------
-    Mapping
+    Comparison
         by number of the entity; of stones that both campaigns measured
     """
     held = dict(
@@ -158,7 +246,7 @@ def displacements(session: Session, surveys: Sequence[int] | None = None) -> Map
         for number in session.scalars(now.where(Measurement.entity_id.in_(batch)))
     ]
     after = _places(session, numbers)
-    return {entity: displacement(before[entity], after[entity]) for entity in before if entity in after}
+    return compare({entity: (before[entity], after[entity]) for entity in before if entity in after})
 
 
 def _places(session: Session, numbers: Sequence[int]) -> dict[int, FacePlace]:

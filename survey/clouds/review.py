@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from ground.errors import UsageError
+from ground.statistics.scale import deviation
 from survey.arrays import Array, Ints
 from survey.clouds.extras import optional
 from survey.clouds.outlines.outline import Outline
@@ -13,7 +14,6 @@ from survey.clouds.outlines.reading import PICTURES, Drawing
 from survey.clouds.placing import PlacedOutline
 from survey.geometry.polygons import ring_area, seamless
 from survey.records.review import Doubtful
-from survey.statistics.scale import deviation
 
 __all__ = ["drawn_doubts", "flat_doubts", "measured_doubts"]
 

@@ -12,11 +12,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from ground.errors import GeometryError
+from ground.statistics.roots import root_of
+from ground.statistics.scale import spread
 from survey.arrays import Array
 from survey.faces.planes import FaceFit, fit_plane
 from survey.records.survey import BlockRecord
-from survey.statistics.roots import root_of
-from survey.statistics.scale import spread
 
 __all__ = ["SIGNIFICANT", "TOLERANCE", "estimate_roughness", "rough_sigmas"]
 

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ground.statistics.scale import deviation
 from survey.arrays import Array, Bools
-from survey.statistics.scale import deviation
 
 __all__ = ["Seamless", "inside", "ring_area", "seamless"]
 

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import median_filter
 
+from ground.statistics.scale import deviation
 from survey.arrays import Array, Bools, Ints
 from survey.geometry.adjacency import SolidArrays
 from survey.joints.facing import FacePlanes, FacingFaces
 from survey.joints.settings import JointSettings
-from survey.statistics.scale import deviation
 
 __all__ = ["fit_bent_bed"]
 

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ground.statistics.roots import root_of
+from ground.statistics.scale import spread
 from survey.arrays import Array
-from survey.statistics.roots import root_of
-from survey.statistics.scale import spread
 
 __all__ = ["BedCorners", "BedScatter", "corner_roughness", "fit_bed", "pool", "scatter_of"]
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ground.statistics.scale import deviation
 from survey.arrays import Array
 from survey.quality.precision import StoneQuality
 from survey.records.survey import Canon
-from survey.statistics.scale import deviation
 
 __all__ = ["ENOUGH", "Deviation", "KindStandard", "deviations", "standards"]
 

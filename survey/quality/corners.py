@@ -12,11 +12,11 @@ from enum import StrEnum
 
 import numpy as np
 
+from ground.statistics.scale import deviation
 from survey.arrays import Array, Bools
 from survey.geometry.polygons import ring_area, seamless
 from survey.quality.canon import ENOUGH
 from survey.quality.facades import find_facades
-from survey.statistics.scale import deviation
 
 __all__ = ["Misplaced", "SeenFace", "Sign", "misplaced_corners"]
 

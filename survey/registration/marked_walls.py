@@ -13,11 +13,11 @@ from scipy.spatial import ConvexHull
 from scipy.special import stdtrit
 
 from ground.errors import GeometryError
+from ground.statistics.scale import deviation
 from survey.arrays import Array
 from survey.faces.planes import FaceFit, fit_plane
 from survey.records.survey import Photograph
 from survey.registration.homography import Homography, fit_homography
-from survey.statistics.scale import deviation
 
 __all__ = ["OFF_SQUARE", "MarkedWall", "wall_of_marks"]
 

@@ -1,6 +1,7 @@
 """Answers of ``moma query`` in each of its formats."""
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -81,9 +82,8 @@ def answer(session: "Session", question: Question, format: str) -> tuple[str, st
     if format != "table":
         return _written(names, rows, format), doubts
     if not rows:
-        return "", f"no {question.kind} found" + "".join(
-            f", where {condition}" for condition in question.where
-        )
+        where = "".join(f", where {condition}" for condition in question.where)
+        return "", "; ".join(filter(None, (f"no {question.kind} found{where}", doubts)))
     if not question.everything and question.columns is None:
         asked_for = [*asked_columns(question.where, session, question.kind), *order]
         names = shown_columns(names, rows, asked_for)
@@ -135,11 +135,11 @@ def _of_structures(attribute_of: Mapping[str, Attribute]) -> bool:
 def _disputes(
     session: "Session", question: Question, attribute_of: Mapping[str, Attribute], names: Sequence[str]
 ) -> str:
-    """Say of how many entities the answer rests on an opinion beside which there is another one."""
+    """Say of how many entities the answer rests on a disputed opinion, and what all stones of two campaigns tell."""
     if _of_structures(attribute_of):
         return ""
     asked = {*names, *asked_columns(question.where, session, question.kind)}
-    notes = []
+    notes = [*_campaigns(session, question, asked)]
     for subject, resting in RESTS_ON.items():
         if not asked.isdisjoint(resting):
             where = (*question.where, f"disputed({subject})")
@@ -149,6 +149,19 @@ def _disputes(
                 notes.append(f"the {subject} of {len(rows)} is disputed ({some})")
     return "; ".join(notes)
 
+
+def _campaigns(session: "Session", question: Question, asked: Collection[str]) -> Sequence[str]:
+    """Say what displacements since an earlier campaign allow for, where the answer rests on them."""
+    named = _CAMPAIGN.search(" ".join(question.where))
+    if named is None and {"moved", "moved_sigma"}.isdisjoint(asked):
+        return ()
+    from archmodel.store.campaigns import campaigns, displacements  # and with it numpy
+
+    surveys = None if named is None else campaigns(session).get(named[2])
+    return displacements(session, surveys).remarks
+
+
+_CAMPAIGN = re.compile(r"""moved_since\s*\(\s*(['"])(.*?)\1""", re.IGNORECASE)
 
 RESTS_ON = {
     "phase": ("phase", "phase_author", "phase_begins", "phase_ends"),

@@ -1,15 +1,14 @@
 """Two campaigns of one structure, compared stone by stone; they are never pooled."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from archmodel.store.campaigns import Displacement, FacePlace, displacement, face_place
+from archmodel.store.campaigns import Displacement, FacePlace, compare, face_place
 from mechanics.arrays import Array
 from survey.geometry.solids import plane_frame
 from survey.quality.precision import StoneQuality
-from survey.statistics.scale import scatter_beyond
 
 __all__ = ["CampaignComparison", "MovedStone", "compare_campaigns", "comparison_lines"]
 
@@ -43,6 +42,7 @@ class CampaignComparison:
         not the same points of a stone; more than half of the stones must stand still for it not to hide movement
     common : (3,) median displacement [m]: of all stones alike, it is that of the frame or of the whole structure
     gone, fresh : codes that only the earlier, or only the later campaign has
+    remarks : on what the places of all stones together tell, in words
     """
 
     name: str
@@ -52,6 +52,7 @@ class CampaignComparison:
     common: Array
     gone: tuple[str, ...]
     fresh: tuple[str, ...]
+    remarks: tuple[str, ...] = ()
 
     @property
     def moved(self) -> tuple[MovedStone, ...]:
@@ -95,25 +96,21 @@ def compare_campaigns(
     """
     before, after = ({stone.code: stone for stone in stones} for stones in (earlier, later))
     both = [code for code in after if code in before]
-    places = {code: (_place(before[code]), _place(after[code])) for code in both}
-    scatter = _scatter(places, after)
-    moved = []
-    for code, pair in places.items():
-        normal = after[code].normal
-        along = np.eye(3) - np.outer(normal, normal)
-        first, second = (FacePlace(face.centroid, face.covariance + scatter**2 * along) for face in pair)
-        moved_by = displacement(first, second)
-        moved.append(MovedStone(code, moved_by, float(moved_by.vector @ normal)))
+    compared = compare({code: (_place(before[code]), _place(after[code])) for code in both})
+    moved = [
+        MovedStone(code, moved_by, float(moved_by.vector @ after[code].normal))
+        for code, moved_by in compared.displacements.items()
+    ]
     moved.sort(key=lambda stone: -stone.displacement.distance / stone.displacement.sigma)
-    vectors = np.array([stone.displacement.vector for stone in moved]).reshape(-1, 3)
     return CampaignComparison(
         name,
         tuple(files),
         tuple(moved),
-        scatter,
-        np.median(vectors, axis=0) if len(vectors) else np.zeros(3),
+        compared.scatter,
+        compared.common,
         tuple(code for code in before if code not in after),
         tuple(code for code in after if code not in before),
+        compared.remarks,
     )
 
 
@@ -123,18 +120,6 @@ def _place(stone: StoneQuality) -> FacePlace:
     centroid = stone.outline.mean(axis=0)
     axes = plane_frame(stone.normal)[:2]
     return face_place(stone.outline, stone.normal, centroid, axes, covariance, stone.corner_sigma)
-
-
-def _scatter(places: Mapping[str, tuple[FacePlace, FacePlace]], stones: Mapping[str, StoneQuality]) -> float:
-    """Return the scatter of one coordinate along the faces beyond the stated standard deviations [m]."""
-    values, variances = [], []
-    for code, (before, after) in places.items():
-        normal = stones[code].normal
-        covariance = before.covariance + after.covariance
-        for direction in plane_frame(normal)[:2]:
-            values.append(float((after.centroid - before.centroid) @ direction))
-            variances.append(float(direction @ covariance @ direction))
-    return scatter_beyond(np.array(values), np.array(variances), 2.0)[0]
 
 
 def comparison_lines(comparison: CampaignComparison) -> Iterator[str]:
@@ -147,17 +132,8 @@ def comparison_lines(comparison: CampaignComparison) -> Iterator[str]:
     rest = f" and {len(moved) - 3} more" if len(moved) > 3 else ""
     text = f": {listed}{rest}" if listed else ""
     yield f"since {comparison.name}: {len(moved)} of {len(compared)} stones moved{text}"
-    if comparison.scatter > 0.0:
-        yield (
-            f"  places along the face scatter by {1e3 * comparison.scatter:.1f} mm beyond the stated sigma, which is "
-            "allowed for, unless more than half of the stones moved"
-        )
-    common = float(np.linalg.norm(comparison.common))
-    if compared and common > np.median([stone.displacement.sigma for stone in compared]):
-        yield (
-            f"  half of all stones are {1e3 * common:.1f} mm from their earlier places: the frames of both campaigns "
-            "differ, or the whole moved"
-        )
+    for remark in comparison.remarks:
+        yield f"  {remark}"
     for what, codes in (("only the earlier", comparison.gone), ("only this", comparison.fresh)):
         if codes:
             more = ", …" if len(codes) > 3 else ""

@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from ground.statistics.scale import CONSISTENT
 from survey.arrays import Bools
 from survey.clouds.pictures.joints import WIDTH, Field
-from survey.statistics.scale import CONSISTENT
 
 __all__ = ["channels_of", "covered", "grains", "lightness", "openings"]
 

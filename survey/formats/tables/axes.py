@@ -22,10 +22,11 @@ __all__ = [
     "ORDERS",
     "AxisEvidence",
     "Outlines",
+    "both_orders",
     "exchanged",
-    "exchanged_grid",
     "exchanged_station",
     "order_in_words",
+    "outlines_of",
 ]
 
 ORDERS = {"pnezd": "northing first", "penzd": "easting first"}

@@ -18,6 +18,8 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from ground.statistics.roots import root_of
+from ground.statistics.scale import OUTLIER, WITHIN, scatter_beyond
 from survey.arrays import Array
 from survey.quality.courses import CourseLine, measure_courses, with_scatter
 from survey.quality.departures.shapes import (
@@ -35,8 +37,6 @@ from survey.quality.departures.shapes import (
 )
 from survey.quality.facades import Facade
 from survey.quality.precision import StoneQuality
-from survey.statistics.roots import root_of
-from survey.statistics.scale import OUTLIER, WITHIN, scatter_beyond
 
 __all__ = ["CHANCE", "BedKind", "BedMovement", "OddBed", "WallBeds", "find_bed_movements", "measure_beds"]
 

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ground.statistics.scale import deviation
 from survey.arrays import Array
 from survey.quality.departures.shapes import critical
 from survey.quality.facades import Facade
 from survey.quality.precision import StoneQuality
 from survey.records.survey import DepthRule
-from survey.statistics.scale import deviation
 
 __all__ = ["DoubtfulDepth", "doubtful_depths"]
 

@@ -20,6 +20,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from ground.statistics.scale import spread
 from survey.arrays import Array
 from survey.quality.departures.shapes import (
     FINEST,
@@ -36,7 +37,6 @@ from survey.quality.departures.shapes import (
 )
 from survey.quality.facades import Facade
 from survey.quality.precision import StoneQuality
-from survey.statistics.scale import spread
 
 __all__ = ["FaceKind", "FaceMovement", "OddStone", "WallFace", "find_face_departures"]
 

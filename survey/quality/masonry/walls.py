@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 from scipy.special import expit
 
+from ground.statistics.scale import deviation
 from survey.arrays import Array
 from survey.geometry.polygons import ring_area
 from survey.quality.courses import lower_corners
@@ -40,7 +41,6 @@ from survey.quality.masonry.index import (
     mechanical_ranges,
 )
 from survey.quality.masonry.trace import minimum_traces, section_trace
-from survey.statistics.scale import deviation
 
 __all__ = ["MasonryQuality", "WallStone", "judge_masonry"]
 

@@ -16,9 +16,9 @@ from itertools import combinations_with_replacement, permutations
 
 import numpy as np
 
+from ground.statistics.scale import deviation
 from survey.arrays import Array
 from survey.extrusion.depth import Depth
-from survey.statistics.scale import deviation
 from survey.unseen.missing.gaps import CourseGap
 from survey.unseen.missing.settings import MissingSettings
 from survey.unseen.missing.sides import Elevation, FlatStone

@@ -65,7 +65,7 @@ def test_one_in_a_hundred_stones_that_did_not_move_is_taken_to_have_moved() -> N
     covariance = np.diag([1.0, 4.0, 9.0]) * 1e-6
     places = chance.multivariate_normal(np.zeros(3), covariance, (2, 20_000))
     found = [
-        displacement(FacePlace(one, covariance), FacePlace(other, covariance)).significant
+        displacement(*(FacePlace(place, covariance, np.eye(3)[2]) for place in (one, other))).significant
         for one, other in zip(*places, strict=True)
     ]
     assert np.mean(found) == pytest.approx(0.01, abs=0.003)

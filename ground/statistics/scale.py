@@ -8,11 +8,13 @@ of the whole.
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
-from survey.arrays import Array
-from survey.statistics.roots import root_of
+from ground.statistics.roots import root_of
 
 __all__ = ["CONSISTENT", "OUTLIER", "WITHIN", "deviation", "scatter_beyond", "spread"]
+
+Array = NDArray[np.float64]
 
 CONSISTENT = 1.4826
 """Standard deviation over median absolute deviation, of a normal distribution [-]."""

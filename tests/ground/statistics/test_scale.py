@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from survey.statistics.roots import root_of
-from survey.statistics.scale import deviation, scatter_beyond, spread
+from ground.statistics.roots import root_of
+from ground.statistics.scale import deviation, scatter_beyond, spread
 
 
 @pytest.mark.parametrize("wild", [0, 100, 400])
