@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from archmodel.assertions.edtf import year_bounds
 from archmodel.assertions.validation import (
     checked_label,
     checked_number,
@@ -20,6 +19,7 @@ from archmodel.assertions.validation import (
 from archmodel.store.find_by_code import held_named, held_or_none
 from archmodel.store.lookalikes import Lookalikes, explained
 from archmodel.store.revisions import RowCounts, revise, supersede
+from archmodel.stratigraphy.edtf import year_bounds
 from archmodel.tables.entries import Entry
 from archmodel.tables.knowledge import Document, Material, MaterialProperty, Phase
 from archmodel.tables.structures import Structure
@@ -140,7 +140,7 @@ def declare_phase(
 
     Parameters
     ----------
-    begins, ends : years, or dates as `archmodel.assertions.edtf.year_bounds` takes them; the earliest year of the one
+    begins, ends : years, or dates as `archmodel.stratigraphy.edtf.year_bounds` takes them; the earliest year of the one
         and the latest of the other count, and what is written stays in the description
     """
     held = held_or_none(session, Phase, name)

@@ -19,7 +19,7 @@ class Dated:
 
     Attributes
     ----------
-    phase : its name
+    phase : its name; empty: of none
     begins, ends : years; None if not known
     """
 
@@ -29,7 +29,9 @@ class Dated:
 
     def __str__(self) -> str:
         years = "–".join("?" if year is None else str(year) for year in (self.begins, self.ends))
-        return f"phase {self.phase}" if years == "?–?" else f"phase {self.phase}, {years}"
+        return ", ".join(
+            [*([f"phase {self.phase}"] if self.phase else []), *([years] if years != "?–?" else [])]
+        )
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from xml.etree import ElementTree as etree
 
 from archmodel.stratigraphy.dates import Dated
-from archmodel.stratigraphy.graphml import WRITTEN_BY, DrawnUnit
+from archmodel.stratigraphy.graphml import ABSOLUTE, WRITTEN_BY, DrawnUnit
 from archmodel.stratigraphy.order import Link, Order
 from archmodel.stratigraphy.palette import UNIT_KINDS, G, Y
 from archmodel.tables.stratigraphy import SYMMETRIC
@@ -22,6 +22,14 @@ _KEYS = (
     ("d5", {"for": "graph", "attr.name": "Description", "attr.type": "string"}),
 )
 """Keys of data, as yEd declares them."""
+
+_ARTIFACT = "com.yworks.bpmn.Artifact.withShadow"
+_ANNOTATION = {
+    "class": "com.yworks.yfiles.bpmn.view.BPMNTypeEnum",
+    "name": "com.yworks.bpmn.type",
+    "value": "ARTIFACT_TYPE_ANNOTATION",
+}
+"""Configuration and type of a property, as yEd declares them."""
 
 
 def write_graphml(
@@ -58,8 +66,9 @@ def write_graphml(
             for k, code in enumerate(order.equal[unit]):
                 x = places.get(unit, 0.0) * 2.0 * _WIDTH + k * _WIDTH
                 row = y + (levels.index(order.levels[unit]) + 0.25) * _STEP
-                node = _add_node(graph if epoch is None else inside, numbers[code], (x, row))
-                _draw_unit(node, code, (drawn or {}).get(code, DrawnUnit()))
+                within, box = graph if epoch is None else inside, (drawn or {}).get(code, DrawnUnit())
+                _draw_unit(_add_node(within, numbers[code], (x, row)), code, box)
+                _add_dates(graph, within, numbers[code], (x, row), box)
         y += height
     for k, link in enumerate(links):
         _add_edge(graph, f"e{k}", numbers, link)
@@ -155,6 +164,29 @@ def _draw_unit(node: etree.Element, code: str, unit: DrawnUnit) -> None:
     etree.SubElement(shape, f"{{{Y}}}BorderStyle", {"color": border, "type": style, "width": "4.0"})
     etree.SubElement(shape, f"{{{Y}}}NodeLabel", {"textColor": ink}).text = code
     etree.SubElement(shape, f"{{{Y}}}Shape", {"type": form})
+
+
+def _add_dates(
+    graph: etree.Element, within: etree.Element, number: str, corner: tuple[float, float], unit: DrawnUnit
+) -> None:
+    """Add the absolute dates of a unit as properties below its box, each with a dashed line from it."""
+    for k, (name, text) in enumerate(zip(ABSOLUTE, (unit.begins, unit.ends), strict=True)):
+        if text is None:
+            continue
+        node = etree.SubElement(within, f"{{{G}}}node", {"id": f"{number}p{k}"})
+        etree.SubElement(node, f"{{{G}}}data", {"key": "d1"}).text = text
+        data = etree.SubElement(node, f"{{{G}}}data", {"key": "d2"})
+        drawn = etree.SubElement(data, f"{{{Y}}}GenericNode", {"configuration": _ARTIFACT})
+        width, height = 0.5 * _WIDTH, 0.5 * _HEIGHT
+        place = {"x": corner[0] + k * width, "y": corner[1] + _HEIGHT, "width": width, "height": height}
+        etree.SubElement(drawn, f"{{{Y}}}Geometry", {key: f"{value:.1f}" for key, value in place.items()})
+        etree.SubElement(drawn, f"{{{Y}}}NodeLabel").text = name
+        style = etree.SubElement(drawn, f"{{{Y}}}StyleProperties")
+        etree.SubElement(style, f"{{{Y}}}Property", _ANNOTATION)
+        ends = {"id": f"{number}e{k}", "source": number, "target": f"{number}p{k}"}
+        edge = etree.SubElement(graph, f"{{{G}}}edge", ends)
+        line = etree.SubElement(etree.SubElement(edge, f"{{{G}}}data", {"key": "d4"}), f"{{{Y}}}PolyLineEdge")
+        etree.SubElement(line, f"{{{Y}}}LineStyle", {"color": "#000000", "type": "dashed", "width": "1.0"})
 
 
 def _add_edge(graph: etree.Element, number: str, numbers: Mapping[str, str], link: Link) -> None:

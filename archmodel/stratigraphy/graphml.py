@@ -2,25 +2,28 @@
 
 Units are boxes in the shapes and borders of the palette (`archmodel.stratigraphy.palette`); a line leads from the later
 unit to the earlier one, a double line joins units of one time. The name of a relation stands as the label of its line.
-What else is drawn (documents, extractors, properties, comments, lines of other styles) is counted by its kind.
+What else is drawn (documents, extractors, properties, comments, lines of other styles) is counted by its kind. The
+properties `absolute_time_start` and `absolute_time_end` of a unit, joined to it by a line, alone or in a group of
+paradata, are its dates.
 
 Epochs are the rows of a table of swimlanes (`archmodel.stratigraphy.epochs`); groups may be units that have parts.
 """
 
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from xml.etree import ElementTree as etree
 
 from archmodel.stratigraphy.dates import Dated
+from archmodel.stratigraphy.edtf import year_bounds
 from archmodel.stratigraphy.epochs import Lane, lane_of, lanes_of
 from archmodel.stratigraphy.order import Link
 from archmodel.stratigraphy.palette import COMMON, G, Y, box_of, label_of, line_kind
 from archmodel.tables.stratigraphy import DEFINITIONS, INVERSE
 from ground.errors import UsageError
 
-__all__ = ["WRITTEN_BY", "DrawnUnit", "GraphmlStratigraphy", "read_graphml"]
+__all__ = ["ABSOLUTE", "WRITTEN_BY", "DrawnUnit", "GraphmlStratigraphy", "read_graphml"]
 
 WRITTEN_BY = "written by MOMA"
 """Description of the drawings that this program writes, which yEd keeps."""
@@ -28,7 +31,11 @@ WRITTEN_BY = "written by MOMA"
 _STYLES: Mapping[str, str] = {"line": "later_than", "double_line": "contemporary_with"}
 """Relations of lines without the name of one, by style."""
 
+ABSOLUTE = ("absolute_time_start", "absolute_time_end")
+"""Properties that date a unit, from the earliest to the latest year, as texts that `year_bounds` reads."""
+
 _LARGEST = 1 << 28  # bytes
+_INTERVAL = "absolute_time"  # both ends in one text
 _COMMENT = ("«", "#")  # begin lines of a description that comment on it
 
 
@@ -42,12 +49,15 @@ class DrawnUnit:
     title : its description; None: none
     epoch : name of the epoch in whose row it lies; None: in none
     parent : name of the unit in whose group it lies; None: in none
+    begins, ends : its absolute dates, as `ABSOLUTE`; None: none stated
     """
 
     kind: str = COMMON
     title: str | None = None
     epoch: str | None = None
     parent: str | None = None
+    begins: str | None = None
+    ends: str | None = None
 
 
 @dataclass(frozen=True)
@@ -84,11 +94,12 @@ def read_graphml(path: Path, named: Callable[[str], str | None] = lambda text: N
     """
     root = _root(path)
     reader = _Reader(root)
-    reader.read_nodes(root, None)
+    reader.read_nodes(root, None, "")
     if not reader.units:
         remedy = "draw units as rectangles with the name as label, as in the palette of the Extended Matrix"
         raise UsageError("no stratigraphic units", where=str(path), remedy=remedy)
     links = dict.fromkeys(link for edge in root.iter(f"{{{G}}}edge") if (link := reader.link(edge, named)))
+    reader.count_dates()
     epochs = dict.fromkeys(lane.epoch for lane in reader.lanes)
     own = any(data.text == WRITTEN_BY for data in root.findall(f"./{{{G}}}graph/{{{G}}}data"))
     return GraphmlStratigraphy(reader.units, tuple(links), dict(reader.ignored), tuple(epochs), own)
@@ -121,23 +132,62 @@ class _Reader:
         self.units: dict[str, DrawnUnit] = {}
         self.names: dict[str, str] = {}
         self.ignored: Counter[str] = Counter()
+        self._dates: dict[str, dict[int, list[tuple[str, str]]]] = {}
+        self._undated: dict[int, str] = {}
         self._described = {
             key.get("id")
             for key in root.findall(f"{{{G}}}key")
             if (key.get("for"), key.get("attr.name")) == ("node", "description")
         }
 
-    def read_nodes(self, element: etree.Element, parent: str | None) -> None:
+    def read_nodes(self, element: etree.Element, parent: str | None, group: str) -> None:
         """Read the nodes of the graphs within an element; those within a unit's group are parts of it."""
         for node in element.findall(f"./{{{G}}}graph/{{{G}}}node"):
-            box = box_of(node)
+            box, number = box_of(node), node.get("id", "")
             inside = parent
             if box is not None and box.is_unit:
                 self._add(node, box.name, box.kind, parent)
                 inside = box.name
-            elif box is not None:
+            elif box is not None and not (
+                box.kind == "properties" and self._add_dates(node, box.name, group)
+            ):
                 self.ignored[f"{box.kind} ({box.name[:40]})" if box.kind == "properties" else box.kind] += 1
-            self.read_nodes(node, inside)
+            self.read_nodes(node, inside, number)
+
+    def _add_dates(self, node: etree.Element, name: str, group: str) -> bool:
+        """Keep the dates that a property states, by its node and the group around it; False if it states none."""
+        key = name.rpartition(".")[2].strip().lower().replace(" ", "_")
+        text = self._title(node) or ""
+        if key not in (*ABSOLUTE, _INTERVAL):
+            return False
+        try:
+            first, last = year_bounds(key, text)
+        except UsageError:
+            return False
+        if key == _INTERVAL:
+            years = zip(ABSOLUTE, (first, last), strict=True)
+            dates = [(end, str(year)) for end, year in years if year is not None]
+        else:
+            dates = [(key, text)]
+        entry = len(self._undated)
+        self._undated[entry] = name
+        for place in {node.get("id", ""), group} - {""}:
+            self._dates.setdefault(place, {})[entry] = dates
+        return True
+
+    def count_dates(self) -> None:
+        """Count the dates that no line joins to a unit."""
+        self.ignored.update(f"properties ({name[:40]})" for name in self._undated.values())
+
+    def _date(self, unit: str, number: str) -> bool:
+        """Date a unit by a property or a group of such; False if the node is neither."""
+        stated = self._dates.get(number)
+        for entry, dates in (stated or {}).items():
+            self._undated.pop(entry, None)
+            for end, text in dates:
+                key = "begins" if end == ABSOLUTE[0] else "ends"
+                self.units[unit] = replace(self.units[unit], **{key: text})
+        return stated is not None
 
     def _add(self, node: etree.Element, name: str, kind: str, parent: str | None) -> None:
         self.names[node.get("id", "")] = name
@@ -158,7 +208,12 @@ class _Reader:
 
     def link(self, edge: etree.Element, named: Callable[[str], str | None]) -> Link | None:
         """Return the relation of a line; None for one that is no stratigraphy, which is counted."""
-        subject, target = (self.names.get(edge.get(end, "")) for end in ("source", "target"))
+        ends = edge.get("source", ""), edge.get("target", "")
+        subject, target = (self.names.get(end) for end in ends)
+        if (subject is None) != (target is None) and self._date(
+            subject or target or "", ends[subject is not None]
+        ):
+            return None
         drawn = next(iter(edge.findall(f"./{{{G}}}data/*")), None)
         line = None if drawn is None else drawn.find(f"{{{Y}}}LineStyle")
         style = "line" if line is None else line.get("type", "line")

@@ -5,7 +5,9 @@ from collections.abc import Mapping, Sequence
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session, aliased
 
-from archmodel.stratigraphy.graphml import DrawnUnit
+from archmodel.stratigraphy.dates import Dated
+from archmodel.stratigraphy.edtf import year_bounds
+from archmodel.stratigraphy.graphml import ABSOLUTE, DrawnUnit
 from archmodel.stratigraphy.order import Link
 from archmodel.stratigraphy.palette import COMMON, UNIT_KINDS
 from archmodel.tables.entities import Entity
@@ -14,8 +16,9 @@ from archmodel.tables.knowledge import Note
 from archmodel.tables.relations import Membership
 from archmodel.tables.stratigraphy import Stratigraphy
 from archmodel.tables.structures import StratigraphicUnit, Structure
+from ground.errors import UsageError
 
-__all__ = ["KIND_NOTE", "load_drawn", "load_links", "load_stones", "load_units"]
+__all__ = ["KIND_NOTE", "load_drawn", "load_links", "load_stones", "load_units", "with_years"]
 
 KIND_NOTE = "unit kind"
 """Key of the notes with the kinds of units in the Extended Matrix."""
@@ -59,21 +62,54 @@ def load_units(session: Session) -> list[str]:
 
 
 def load_drawn(session: Session) -> Mapping[str, DrawnUnit]:
-    """Return kinds and descriptions of units and stones that have either, by code; of several kinds the last noted."""
+    """Return kinds, descriptions and absolute dates of units and stones that have any, by code; the last ones noted."""
     titles = select(Structure.code, Structure.title).where(held_at(Structure), Structure.title.is_not(None))
     notes = (
-        select(func.coalesce(Structure.code, Entity.code), Note.text)
+        select(func.coalesce(Structure.code, Entity.code), Note.key, Note.text)
         .outerjoin(Structure, Structure.id == Note.structure_id)
         .outerjoin(Entity, Entity.id == Note.entity_id)
-        .where(Note.superseded_id.is_(None), Note.key == KIND_NOTE, Note.text.in_(UNIT_KINDS))
+        .where(Note.superseded_id.is_(None), Note.key.in_((KIND_NOTE, *ABSOLUTE)))
         .order_by(Note.id)
     )
     named = {row.code: row.title for row in session.execute(titles)}
-    kinds = {str(row[0]): row.text for row in session.execute(notes)}
+    noted: dict[str, dict[str, str]] = {}
+    for code, key, text in session.execute(notes):
+        if key != KIND_NOTE or text in UNIT_KINDS:
+            noted.setdefault(str(code), {})[key] = text
     return {
-        code: DrawnUnit(kinds.get(code) or COMMON, named.get(code))
-        for code in dict.fromkeys([*named, *kinds])
+        code: DrawnUnit(
+            noted.get(code, {}).get(KIND_NOTE, COMMON),
+            named.get(code),
+            None,
+            None,
+            *(noted.get(code, {}).get(key) for key in ABSOLUTE),
+        )
+        for code in dict.fromkeys([*named, *noted])
     }
+
+
+def with_years(dates: Mapping[str, Dated], drawn: Mapping[str, DrawnUnit]) -> Mapping[str, Dated]:
+    """Return the dates of units: absolute ones where they are stated, before the years of phases."""
+    dated = dict(dates)
+    for code, unit in drawn.items():
+        ends = (unit.begins, unit.ends)
+        years = [_year(text, end) for end, text in enumerate(ends)]
+        if years != [None, None]:
+            phase = dates.get(code, Dated("", None, None))
+            own = (
+                years[0] if years[0] is not None else phase.begins,
+                years[1] if years[1] is not None else phase.ends,
+            )
+            dated[code] = Dated(phase.phase, *own)
+    return dated
+
+
+def _year(text: str | None, end: int) -> int | None:
+    """Return the first (0) or last (1) year that a text allows; None for one that is no date."""
+    try:
+        return None if text is None else year_bounds("date", text)[end]
+    except UsageError:
+        return None
 
 
 def load_stones(session: Session, codes: Sequence[str]) -> Mapping[str, tuple[str, ...]]:

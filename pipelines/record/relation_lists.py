@@ -18,7 +18,7 @@ from archmodel.assertions.stratigraphy import (
 from archmodel.query.dated import load_dates
 from archmodel.store.revisions import NOTHING, RowCounts
 from archmodel.stratigraphy.dates import Dated
-from archmodel.stratigraphy.graphml import DrawnUnit, read_graphml
+from archmodel.stratigraphy.graphml import ABSOLUTE, DrawnUnit, read_graphml
 from archmodel.stratigraphy.palette import COMMON
 from archmodel.stratigraphy.stored import KIND_NOTE, load_drawn, load_links
 from archmodel.tables.entries import Entry
@@ -215,7 +215,7 @@ def record_relation_list(
         outcome["stratigraphy"] = say_stratigraphy(session, entry, relations, remark)
     except UsageError as error:
         raise _at_lines(listed, error) from None
-    outcome |= _record_kinds(session, entry, listed, things)
+    outcome |= _record_notes(session, entry, listed, things)
     return outcome | _record_epochs(session, entry, listed, things, remark)
 
 
@@ -230,23 +230,27 @@ def _without_known(session: Session, listed: RelationList) -> RelationList:
         drawn[code] = replace(
             unit,
             kind=COMMON if unit.kind == known.kind else unit.kind,
+            begins=None if unit.begins == known.begins else unit.begins,
+            ends=None if unit.ends == known.ends else unit.ends,
             epoch=None if date is not None and date.phase == unit.epoch else unit.epoch,
         )
     relations = tuple(row for row in listed.relations if row[1:] not in stated)
     return replace(listed, relations=relations, drawn=drawn)
 
 
-def _record_kinds(
+def _record_notes(
     session: Session, entry: Entry, listed: RelationList, things: Mapping[str, Thing]
 ) -> dict[str, RowCounts]:
-    """Note the kinds of units that are not common ones."""
-    by_kind: dict[str, list[Thing]] = {}
+    """Note the kinds of units that are not common ones, and their absolute dates."""
+    by_note: dict[tuple[str, str], list[Thing]] = {}
     for code, unit in listed.drawn.items():
-        if unit.kind != COMMON:
-            by_kind.setdefault(unit.kind, []).append(things[code])
+        kind = None if unit.kind == COMMON else unit.kind
+        for key, text in zip((KIND_NOTE, *ABSOLUTE), (kind, unit.begins, unit.ends), strict=True):
+            if text is not None:
+                by_note.setdefault((key, text), []).append(things[code])
     counts = [
-        say_note(session, entry, subjects_of(units), KIND_NOTE, Remark(text=kind))
-        for kind, units in by_kind.items()
+        say_note(session, entry, subjects_of(units), key, Remark(text=text))
+        for (key, text), units in by_note.items()
     ]
     return {"note": sum(counts, NOTHING)} if counts else {}
 

@@ -19,7 +19,7 @@ from archmodel.query.tokens import Token, complaint
 from archmodel.store.bulk import batches
 from archmodel.stratigraphy.dates import contradictions
 from archmodel.stratigraphy.order import Link, Order, order_of
-from archmodel.stratigraphy.stored import load_links, load_units
+from archmodel.stratigraphy.stored import load_drawn, load_links, load_units, with_years
 from archmodel.tables.entities import Entity
 from archmodel.tables.relations import Membership
 from archmodel.tables.structures import Structure
@@ -92,7 +92,8 @@ def contradicted(scope: Where, call: Call, ask: Ask) -> Condition:
     """Test for units whose relations and dates cannot both be right."""
     tokens(call, 0)
     matrix = _matrix(scope.context, call)
-    dates = load_dates(scope.context.session, list(matrix.groups))
+    session = scope.context.session
+    dates = with_years(load_dates(session, list(matrix.groups)), load_drawn(session))
     wrong = contradictions(matrix.order, matrix.links, dates)
     return _is_one_of(scope, {code for pair in wrong for code in (pair.unit, pair.target)})
 

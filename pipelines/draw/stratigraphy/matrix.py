@@ -11,7 +11,7 @@ from archmodel.stratigraphy.dates import Bounds, Contradiction, Dated, contradic
 from archmodel.stratigraphy.draw_graphml import write_graphml
 from archmodel.stratigraphy.graphml import DrawnUnit
 from archmodel.stratigraphy.order import Link, Order, order_of
-from archmodel.stratigraphy.stored import load_drawn, load_links, load_stones, load_units
+from archmodel.stratigraphy.stored import load_drawn, load_links, load_stones, load_units, with_years
 from ground.errors import UsageError
 from pipelines.draw.stratigraphy.drawing import matrix_svg
 from pipelines.draw.stratigraphy.layout import layout_of
@@ -29,10 +29,10 @@ class Matrix:
     order : units in the order of time
     links : relations that are stated
     dates : phases of units
-    bounds : years that phases and matrix allow, by the first of equal units
+    bounds : years that absolute dates, phases and matrix allow, by the first of equal units
     stones : members of units
     contradictions : of matrix and dates
-    drawn : kinds and descriptions of units, for GraphML
+    drawn : kinds, descriptions and absolute dates of units
     """
 
     order: Order
@@ -87,15 +87,16 @@ def study(session: Session, author: str | None = None) -> Matrix:
         raise UsageError(f"no stratigraphy is recorded{who}", remedy=remedy)
     order = order_of(units, links)
     codes = [code for group in order.equal.values() for code in group]
-    dates = load_dates(session, codes)
+    phases, drawn = load_dates(session, codes), load_drawn(session)
+    dates = with_years(phases, drawn)
     return Matrix(
         order,
         links,
-        dates,
+        phases,
         date_bounds(order, dates),
         load_stones(session, codes),
         contradictions(order, links, dates),
-        load_drawn(session),
+        drawn,
     )
 
 

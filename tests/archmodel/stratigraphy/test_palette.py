@@ -70,3 +70,36 @@ def test_a_group_with_the_border_of_a_unit_is_a_unit_of_which_others_are_parts(t
     }
     assert read.links == (Link("US10", "cuts", "USD13"), Link("US11", "contemporary_with", "TSU12"))
     assert read.ignored == {"activities": 1}
+
+
+def test_absolute_dates_of_a_unit_are_properties_joined_to_it(tmp_path: Path) -> None:
+    """Alone or in a group of paradata, to either side of the line, with a category before the name or not."""
+
+    def dated(number: str, name: str, text: str) -> str:
+        drawn = artifact(number, "ARTIFACT_TYPE_ANNOTATION", name)
+        return drawn.replace("<data key='d6'>", f"<data key='d5'>{text}</data><data key='d6'>", 1)
+
+    path = drawing(
+        tmp_path / "dated.graphml",
+        *(shape(f"u{k}", "US", f"US{k}") for k in range(4)),
+        dated("p1", "absolute_time_start", "1180"), dated("p2", "Temporal.absolute_time_end", "circa 1210"),
+        group("g3", "#FFCC99", "US2_PD", dated("p3", "absolute_time", "1238/1260")),
+        dated("p4", "absolute_time_start", "the reign of Otto"), dated("p5", "absolute_time_end", "1300"),
+        dated("p6", "material", "tuff"),
+        line("u1", "p1", "dashed"), line("p2", "u1", "dashed"), line("u2", "g3", "dashed"), line("u3", "p4", "dashed"),
+    )  # fmt: skip
+    read = read_graphml(path)
+    assert read.units == {
+        "US0": DrawnUnit(),
+        "US1": DrawnUnit(begins="1180", ends="circa 1210"),
+        "US2": DrawnUnit(begins="1238", ends="1260"),
+        "US3": DrawnUnit(),
+    }
+    # what dates nothing, or is no date, is counted
+    assert read.ignored == {
+        "groups of paradata": 1,
+        "properties (absolute_time_start)": 1,
+        "properties (absolute_time_end)": 1,
+        "properties (material)": 1,
+        "lines of provenance (dashed)": 1,
+    }

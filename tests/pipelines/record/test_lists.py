@@ -16,6 +16,7 @@ from archmodel.query.api import find_faces, find_rows
 from archmodel.query.geojson import feature_collection
 from archmodel.store.revisions import RowCounts
 from archmodel.store.stones import store_survey
+from archmodel.stratigraphy.graphml import read_graphml
 from archmodel.tables.entities import Entity
 from archmodel.tables.knowledge import Note, Statement
 from ground.errors import UsageError
@@ -296,3 +297,38 @@ def test_a_drawing_brings_units_with_kinds_titles_and_parents_and_tells_what_it_
     again.write_text(text, encoding="utf-8")
     counts = record([again], url, author="B", source="drawn").files[0].tables
     assert counts == {"stratigraphy": RowCounts(new=1)}
+
+
+def test_absolute_dates_of_a_drawing_date_its_units_and_go_out_again(url: str, tmp_path: Path):
+    def dated(number: str, name: str, text: str) -> str:
+        drawn = artifact(number, "ARTIFACT_TYPE_ANNOTATION", name)
+        return drawn.replace("<data key='d6'>", f"<data key='d5'>{text}</data><data key='d6'>", 1)
+
+    path = drawing(
+        tmp_path / "em.graphml",
+        shape("n1", "US", "US1"), shape("n2", "US", "US2"), shape("n3", "US", "US3"),
+        dated("p1", "absolute_time_start", "circa 1238"), dated("p2", "absolute_time_end", "1210"),
+        line("n1", "n2", "line", "copre"), line("n2", "n3", "line", "copre"),
+        line("n3", "p1", "dashed"), line("n1", "p2", "dashed"),
+    )  # fmt: skip
+    report = record([path], url, author="A", source="drawn").files[0]
+    assert report.tables["note"] == RowCounts(new=2)
+    assert not any("left out" in note for note in report.notes)
+    with open_database(url) as database, database.session(read_only=True) as session:
+        matrix = study(session)
+        # what lies on US3 is not older; US1 ended before US3 began
+        assert [matrix.bounds[unit].begins for unit in ("US3", "US2", "US1")] == [1238, 1238, 1238]
+        (wrong,) = matrix.contradictions
+        assert wrong.text == "US1 (?–1210) lies later than US3 (1238–?): US1 > US2 > US3"
+        rows = find_rows(session, "stratigraphic_unit", ["contradicted()"], columns=["code"])
+        assert {row["code"] for row in rows} == {"US1", "US3"}
+        again = tmp_path / "again.graphml"
+        again.write_text(draw(matrix, again), encoding="utf-8")
+    units = read_graphml(again).units
+    assert (units["US3"].begins, units["US1"].ends) == ("circa 1238", "1210")
+    assert record([again], url, author="B", source="drawn").files[0].outcome.changes == 0
+    # a date that somebody changes in the drawing is theirs
+    again.write_text(again.read_text(encoding="utf-8").replace(">1210<", ">1310<"), encoding="utf-8")
+    record([again], url, author="B", source="drawn")
+    with open_database(url) as database, database.session(read_only=True) as session:
+        assert study(session).contradictions == ()
