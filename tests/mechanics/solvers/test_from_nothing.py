@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from mechanics.problem.residual import project_on_cone, residual
+from mechanics.solvers import from_nothing
 from mechanics.solvers.auto import Auto
+from mechanics.solvers.chain import follow
 from mechanics.solvers.from_nothing import rests_from_nothing
 from mechanics.solvers.self_stress import without_self_stress
 from tests.mechanics.solvers.problems import SIDE, STEP, G, carried, cold, column
@@ -26,6 +28,12 @@ def test_blocks_on_level_ground_rest_by_forces_that_bear_them(densities):
 def test_a_block_rests_below_its_angle_of_friction(tilt, rests):
     """μ = 0.6: 31°."""
     assert rests_from_nothing(column([2000.0], [0.1], tilt))[0] is rests
+
+
+@pytest.mark.parametrize("tilt", [0.0, 25.0, 40.0])
+def test_forces_that_no_method_finds_decide_nothing(tilt, monkeypatch):
+    monkeypatch.setattr(from_nothing, "follow", lambda _, *problem: follow((), *problem))
+    assert rests_from_nothing(column([2000.0], [0.1], tilt))[0] is None
 
 
 def clamping(problem, size):
