@@ -197,6 +197,31 @@ def test_walls_of_a_facade_are_told_apart_by_zone() -> None:
     assert {one.zone: len(one.movements) for one in found} == {"nave": 0, "tower": 1}
 
 
+def test_each_wall_has_a_scatter_of_its_own_where_its_stones_suffice() -> None:
+    rough = wall(20, zone="rough", beds=0.008)
+    small = wall(21, zone="small", courses=2, length=3.1)
+    fine = wall(22, zone="fine", beds=0.002)
+    stones = [
+        polygon_stone(
+            f"{one.zone}{one.code}",
+            one.kind,
+            one.outline[:, [0, 2]] + [20.0 * place, 0.0],
+            course=one.course,
+            zone=one.zone,
+            corner_sigma=one.corner_sigma,
+            offset_sigma=one.offset_sigma,
+        )
+        for place, part in enumerate((rough, small, fine))
+        for one in part
+    ]
+    lines = measure_courses(stones, facades_of(stones))
+    found = find_bed_movements(lines, {one.code: one.length for one in stones}, 0.003)
+    scatter = {one.zone: one.scatter for one in found}
+    assert scatter["rough"] > 3.0 * scatter["fine"]
+    # of ten stones: that of the whole survey
+    assert scatter["fine"] < scatter["small"] < scatter["rough"]
+
+
 def test_too_few_stones_are_not_tested() -> None:
     stones = wall(18, courses=1, length=1.1)
     beds = beds_of(stones)
