@@ -41,11 +41,13 @@ class Model:
     friction : of all joints [-]
     snap : distance within which corners and faces are drawn together [m]
     foot : height over that of the whole below which stones reach that stay [-]
+    above : over the lost load, from which runs fall [-]
     """
 
     friction: float = 0.84
     snap: float | None = None
     foot: float = 1e-3
+    above: float = 1.005
 
 
 MODELS: Mapping[str, Model] = {
@@ -54,7 +56,7 @@ MODELS: Mapping[str, Model] = {
     "cra-shelf": Model(snap=1e-5),
     "cra-snake": Model(snap=1e-5),
     "cra-curve-3-blocks": Model(snap=1e-5),
-    "acary-arches": Model(),
+    "acary-arches": Model(above=1.04),
     "dome": Model(snap=0.003),
     "crossvault": Model(snap=0.003),
     "buttresses": Model(0.6),
