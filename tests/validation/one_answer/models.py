@@ -1,4 +1,8 @@
-"""Assemblies of other programs, taken in from their files of solids as a user would."""
+"""Assemblies of other programs, taken in from their files of solids as a user would.
+
+Stones whose curved joints would take more than 32 convex parts are refused: `CURVED`, and cra-curve-3-blocks, which
+takes nine minutes until then.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -10,7 +14,7 @@ from pipelines.ingest.reading_options import reading_options, solid_options
 from tests.paths import ROOT
 from tests.pipelines.scenes import assembled
 
-__all__ = ["ASSEMBLIES", "MODELS", "Model", "model"]
+__all__ = ["ASSEMBLIES", "CURVED", "MODELS", "Model", "model"]
 
 ASSEMBLIES = ROOT.parent / "shared/data/assemblies"
 _SCENE = """
@@ -50,12 +54,11 @@ class Model:
     above: float = 1.005
 
 
+CURVED = "cra-snake"
 MODELS: Mapping[str, Model] = {
     "wall": Model(snap=0.003),
     "cra-bridge": Model(snap=1e-5),
     "cra-shelf": Model(snap=1e-5),
-    "cra-snake": Model(snap=1e-5),
-    "cra-curve-3-blocks": Model(snap=1e-5),
     "acary-arches": Model(above=1.04),
     "dome": Model(snap=0.003),
     "crossvault": Model(snap=0.003),
@@ -67,7 +70,7 @@ MODELS: Mapping[str, Model] = {
 
 def model(name: str, folder: Path) -> Scene:
     """Return the scene of an assembly, by way of a database in a folder."""
-    entry, url = MODELS[name], f"sqlite:///{folder / name}.db"
+    entry, url = MODELS.get(name, Model(snap=1e-5)), f"sqlite:///{folder / name}.db"
     ingest(
         [ASSEMBLIES / f"{name}.obj"],
         url,

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ground.errors import GeometryError
 from mechanics.limit.assembly import assembly
 from mechanics.limit.confirm import confirm
 from mechanics.limit.held import held_limit
@@ -18,7 +19,7 @@ from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene
 from mechanics.scene.shapes import LIMESTONE, bond, wall
 from mechanics.simulate import simulate
 from mechanics.stones.materials import Material
-from tests.validation.one_answer.models import ASSEMBLIES, MODELS, model
+from tests.validation.one_answer.models import ASSEMBLIES, CURVED, MODELS, model
 from tests.validation.one_answer.scenes import SCENES
 from tests.validation.wild.scene_list import Truth
 
@@ -116,6 +117,13 @@ def test_runs_that_confirm_a_limit_find_it_again():
 @pytest.mark.parametrize("name", MODELS)
 def test_models_are_held_and_lost_as_their_limits_say(name, tmp_path):
     agrees(model(name, tmp_path), 5e-3, MODELS[name].above)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not ASSEMBLIES.exists(), reason="the models stand beside the repository")
+def test_a_model_with_curved_joints_is_refused(tmp_path):
+    with pytest.raises(GeometryError, match="more than 32 convex parts"):
+        model(CURVED, tmp_path)
 
 
 def dome(form, around=12, rings=5, top=60.0):
