@@ -9,15 +9,13 @@ from collections.abc import Iterable
 import numpy as np
 
 from survey.arrays import Array
-from survey.geometry.solids import Solid
+from survey.geometry.solids import BOX, Solid
 
 __all__ = ["intersection"]
 
 Place = tuple[float, float, float]
 Plane = tuple[float, float, float, float]
 Polygon = tuple[int, ...]
-
-_BOX = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
 
 
 def intersection(
@@ -40,7 +38,7 @@ def intersection(
     corners: list[Place] = [
         (bounds[k >> 2 & 1][0], bounds[k >> 1 & 1][1], bounds[k & 1][2]) for k in range(8)
     ]
-    faces: list[Polygon] = list(_BOX)
+    faces: list[Polygon] = list(BOX)
     for plane in planes:
         faces = _cut(corners, faces, plane, tolerance)
         if len(faces) < 4:

@@ -7,7 +7,7 @@ import numpy as np
 
 from survey.arrays import Array, Bools
 from survey.geometry.convex_parts import convex_parts
-from survey.geometry.solids import Solid, area_vector, volume_of
+from survey.geometry.solids import BOX, Solid, area_vector, volume_of
 from survey.geometry.watertight import triangulate
 
 __all__ = ["grid_parts", "stone_parts"]
@@ -36,9 +36,6 @@ _FAMILY = float(np.cos(np.radians(25.0)))  # cosine of 25°: planes nearer to pa
 _COPLANAR = 1e-7  # metres: distance of corners from each other's planes within which faces are coplanar
 _VOLUME = 1e-6  # of a solid's volume: largest difference of its parts' volume
 _AT_ONCE = 2_000_000  # solid angles that are computed together, which bounds the memory
-
-_BOX = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
-"""Faces of a box whose corner k is at bits k₂ k₁ k₀ of its three axes; outward if the axes are right-handed."""
 
 
 def grid_parts(solid: Solid) -> tuple[Solid, ...] | None:
@@ -153,8 +150,8 @@ def _boxes(filled: Bools, order: Sequence[int]) -> list[Box]:
 def _part(code: str, nodes: Array, box: Box) -> Solid:
     """Return the hexahedron of a box of cells."""
     vertices = np.array([nodes[place] for place in _corners(box)])
-    part = Solid(code, vertices, _BOX)
-    return part if volume_of(part) > 0.0 else Solid(code, vertices, tuple(face[::-1] for face in _BOX))
+    part = Solid(code, vertices, BOX)
+    return part if volume_of(part) > 0.0 else Solid(code, vertices, tuple(face[::-1] for face in BOX))
 
 
 def _corners(box: Box) -> Iterator[tuple[int, int, int]]:
