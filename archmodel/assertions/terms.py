@@ -11,7 +11,7 @@ from archmodel.assertions.validation import checked_choice, checked_label, check
 from archmodel.store.revisions import RowCounts, end_rows, supersede
 from archmodel.tables.entries import Entry, held_at
 from archmodel.tables.knowledge import Document, Observation
-from archmodel.tables.terms import VOCABULARIES, Term, Vocabulary, spelling_of, vocabulary
+from archmodel.tables.terms import VOCABULARIES, Term, Vocabulary, keep, spelling_of, vocabulary
 from ground.errors import UsageError
 
 __all__ = ["declare_term", "withdraw_term"]
@@ -31,6 +31,7 @@ def declare_term(
     broader: str | None = None,
     labels: Labels | None = None,
     iri: str | None = None,
+    words: Vocabulary | None = None,
 ) -> RowCounts:
     """Declare a term; what is declared otherwise supersedes what was held, what is left out stays.
 
@@ -42,6 +43,8 @@ def declare_term(
     broader : name of the term that it is a case of
     labels : by language, e.g. {"de": "Riss", "fr": ["fissure", "lézarde"]}; the first one is preferred
     iri : of the concept in a vocabulary, e.g. "http://vocab.getty.edu/aat/300011176"
+    words : the vocabulary as it is held now, to which the term is added; None: it is loaded, which takes as long as it
+        has terms
 
     Raises
     ------
@@ -50,14 +53,15 @@ def declare_term(
         term would be broader than itself
     """
     checked_choice("vocabulary", of, VOCABULARIES)
-    words, name = vocabulary(session, of), checked_label("term", name)
-    current = session.scalar(select(Term).where(Term.vocabulary == of, Term.name == name, held_at(Term)))
+    alone, words = words is None, words or vocabulary(session, of)
+    name = checked_label("term", name)
+    current = _held(session, of, name) if name in words.labels else None
     meaning = checked_text("definition", definition) or (None if current is None else current.definition)
     if words.closed and name not in words.definitions and meaning is None:
         raise UsageError(f"the term {name} has no definition", remedy="give definition = …, one sentence")
     if broader is None and current is not None:
         broader = current.broader
-    values = {
+    values: dict[str, Any] = {
         "definition": meaning,
         "broader": None if broader is None else _broader(words, name, broader),
         "labels": {
@@ -69,13 +73,20 @@ def declare_term(
     if current is not None and all(getattr(current, key) == value for key, value in values.items()):
         return RowCounts(unchanged=1)
     row = Term(vocabulary=of, name=name, **values)
+    words.add(name, meaning or VOCABULARIES[of][0].get(name), values["broader"], values["labels"])
     if current is not None:
         supersede(session, entry, current, row)
-        return RowCounts(replaced=1)
-    row.entry_id = entry.id
-    session.add(row)
+    else:
+        row.entry_id = entry.id
+        session.add(row)
+    if alone:
+        keep(session, words)
+    return RowCounts(new=1) if current is None else RowCounts(replaced=1)
+
+
+def _held(session: Session, of: str, name: str) -> Term | None:
     session.flush()
-    return RowCounts(new=1)
+    return session.scalar(select(Term).where(Term.vocabulary == of, Term.name == name, held_at(Term)))
 
 
 def withdraw_term(session: Session, entry: Entry, of: str, name: str) -> RowCounts:
@@ -113,7 +124,7 @@ def _broader(words: Vocabulary, name: str, broader: str) -> str:
     above = words.named(broader)
     if words.closed is False and above not in words.definitions:
         raise UsageError(f"there is no term {broader[:40]!r} of {words.name}", remedy="declare it before")
-    if above in words.below(name):
+    if name in words.above(above):
         raise UsageError(f"{name} would be a case of itself, through {above}", remedy="leave out broader")
     return above
 

@@ -7,10 +7,10 @@ stands for its narrower ones in questions.
 
 import difflib
 import unicodedata
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 
-from sqlalchemy import ForeignKey, select
+from sqlalchemy import ForeignKey, func, select
 from sqlalchemy.orm import Mapped, Session, mapped_column
 
 from archmodel.tables.base import JSON_TYPE, Base
@@ -18,7 +18,16 @@ from archmodel.tables.entries import Recorded, held_at, held_index
 from archmodel.tables.knowledge import OBSERVATIONS
 from ground.errors import UsageError
 
-__all__ = ["DOCUMENT_TYPES", "VOCABULARIES", "Term", "Vocabulary", "spelling_of", "term_for", "vocabulary"]
+__all__ = [
+    "DOCUMENT_TYPES",
+    "VOCABULARIES",
+    "Term",
+    "Vocabulary",
+    "keep",
+    "spelling_of",
+    "term_for",
+    "vocabulary",
+]
 
 DOCUMENT_TYPES: Mapping[str, str] = {
     "document": "a text: a charter, an account, a report",
@@ -62,9 +71,9 @@ class Term(Recorded, Base):
     supersedes_id: Mapped[int | None] = mapped_column(ForeignKey("term.id"))
 
 
-@dataclass(frozen=True)
+@dataclass
 class Vocabulary:
-    """Terms of a vocabulary, those of the program and those of a database.
+    """Terms of a vocabulary, those of the program and those of a database; terms are added as they are declared.
 
     Attributes
     ----------
@@ -76,10 +85,28 @@ class Vocabulary:
     """
 
     name: str
-    definitions: Mapping[str, str | None]
-    broader: Mapping[str, str]
-    labels: Mapping[str, Mapping[str, list[str]]]
+    definitions: dict[str, str | None]
+    broader: dict[str, str]
+    labels: dict[str, Mapping[str, list[str]]]
     closed: bool
+    _spellings: dict[str, str] | None = field(default=None, init=False, repr=False, compare=False)
+
+    def add(
+        self, name: str, definition: str | None, broader: str | None, labels: Mapping[str, list[str]]
+    ) -> None:
+        """Add a term, or put it in the place of what was held of it."""
+        spellings = dict(self.spellings()) if self._spellings is None else self._spellings
+        for label in _labels(self.labels.get(name, {})):
+            if spellings.get(spelling_of(label)) == name:
+                del spellings[spelling_of(label)]
+        self.definitions[name] = definition
+        self.labels[name] = labels
+        self.broader.pop(name, None)
+        if broader is not None:
+            self.broader[name] = broader
+        for label in (*_labels(labels), name):
+            spellings[spelling_of(label)] = name
+        self._spellings = spellings
 
     def named(self, text: str) -> str:
         """Return the name of the term that is written so: its name or a label in any language; in upper or lower case.
@@ -101,24 +128,39 @@ class Vocabulary:
             f"unknown type of {self.name} {text[:40]!r}", remedy=f"{remedy} Or add it as a [[term]]"
         )
 
-    def spellings(self) -> dict[str, str]:
+    def spellings(self) -> Mapping[str, str]:
         """Return the name of the term by each of its labels and by the name, in small letters."""
-        names = {
-            spelling_of(label): name
-            for name, labels in self.labels.items()
-            for several in labels.values()
-            for label in several
-        }
-        return names | {spelling_of(name): name for name in self.definitions}
+        if self._spellings is None:
+            names = {
+                spelling_of(label): name for name, labels in self.labels.items() for label in _labels(labels)
+            }
+            self._spellings = names | {spelling_of(name): name for name in self.definitions}
+        return self._spellings
 
     def below(self, name: str) -> list[str]:
         """Return a term and all narrower ones."""
-        names = [name]
-        for above in names:
-            names += [
-                term for term, broader in self.broader.items() if broader == above and term not in names
-            ]
-        return names
+        narrower: dict[str, list[str]] = {}
+        for term, broader in self.broader.items():
+            narrower.setdefault(broader, []).append(term)
+        names = {name: None}
+        waiting = [name]
+        for above in waiting:
+            new = [term for term in narrower.get(above, ()) if term not in names]
+            names |= dict.fromkeys(new)
+            waiting += new
+        return list(names)
+
+    def above(self, name: str) -> list[str]:
+        """Return a term and all broader ones."""
+        names = {name: None}
+        while (broader := self.broader.get(name)) is not None and broader not in names:
+            names[broader] = None
+            name = broader
+        return list(names)
+
+
+def _labels(labels: Mapping[str, list[str]]) -> Iterator[str]:
+    return (label for several in labels.values() for label in several)
 
 
 def spelling_of(text: str) -> str:
@@ -132,12 +174,34 @@ def term_for(session: Session, name: str, text: str) -> str:
 
 
 def vocabulary(session: Session, name: str) -> Vocabulary:
-    """Return a vocabulary as it is held now."""
-    built_in, closed = VOCABULARIES[name]
+    """Return a vocabulary as it is held now; it is loaded once in a transaction, until its terms change."""
     session.flush()
-    terms = session.scalars(
-        select(Term).where(Term.vocabulary == name, held_at(Term)).order_by(Term.id)
-    ).all()
+    transaction, stamp, words = session.info.get((Term, name), (None, None, None))
+    if transaction is None or (transaction, stamp) != (session.get_transaction(), _stamp(session, name)):
+        words = _loaded(session, name)
+        keep(session, words)
+    return words  # type: ignore[no-any-return]
+
+
+def keep(session: Session, words: Vocabulary) -> None:
+    """Keep a vocabulary, with what was just recorded, for the rest of the transaction."""
+    session.flush()
+    stamp = _stamp(session, words.name)
+    session.info[(Term, words.name)] = (session.get_transaction(), stamp, words)
+
+
+def _stamp(session: Session, name: str) -> tuple[int | None, int]:
+    """Return the number of the last term and how many are superseded: any change changes one of these."""
+    last, ended = session.execute(
+        select(func.max(Term.id), func.count(Term.superseded_id)).where(Term.vocabulary == name)
+    ).one()
+    return last, ended
+
+
+def _loaded(session: Session, name: str) -> Vocabulary:
+    built_in, closed = VOCABULARIES[name]
+    columns = select(Term.name, Term.definition, Term.broader, Term.labels)
+    terms = session.execute(columns.where(Term.vocabulary == name, held_at(Term)).order_by(Term.id)).all()
     return Vocabulary(
         name,
         {**built_in, **{term.name: term.definition or built_in.get(term.name) for term in terms}},

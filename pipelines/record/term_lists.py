@@ -74,12 +74,16 @@ class _Recorder:
         self._session, self._entry, self._listed = session, entry, listed
         terms = select(Term.iri, Term.name).where(Term.iri.is_not(None), held_at(Term))
         self._names = {str(row.iri): row.name for row in session.execute(terms)}
+        self._taken = set(self._names.values())
+        self._words: dict[str, Vocabulary] = {}
         self.left_out: Counter[str] = Counter()
 
     def declare(self, concept: Concept) -> RowCounts:
         """Declare one concept."""
         of = concept.vocabulary or self._listed.vocabulary or ""
-        words = vocabulary(self._session, of)
+        if of not in self._words:
+            self._words[of] = vocabulary(self._session, of)
+        words = self._words[of]
         spellings = words.spellings()
         name = self._names.get(concept.iri) or self._name(concept, words, spellings)
         published = (
@@ -93,6 +97,7 @@ class _Recorder:
         self.left_out["broader concepts that are not in the file"] += len(concept.broader) - len(broader)
         self.left_out["further broader concepts of a term"] += max(0, len(broader) - 1)
         self._names[concept.iri] = name
+        self._taken.add(name)
         built_in = VOCABULARIES[of][0].get(name)
         if built_in is not None and definition == built_in:
             definition = None
@@ -107,6 +112,7 @@ class _Recorder:
             broader=next(iter(broader), None),
             labels=labels,
             iri=published,
+            words=words,
         )
 
     def _name(self, concept: Concept, words: Vocabulary, spellings: Mapping[str, str]) -> str:
@@ -115,7 +121,7 @@ class _Recorder:
         meant = next((spellings[key] for text in preferred if (key := spelling_of(text)) in spellings), None)
         if meant is None:
             return concept.name
-        if meant not in self._names.values():
+        if meant not in self._taken:
             return meant
         last = concept.iri.rstrip("/#").replace("#", "/").rpartition("/")[2]
         return f"{concept.name} ({last})"

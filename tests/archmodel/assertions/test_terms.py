@@ -7,12 +7,13 @@ from archmodel.assertions.declare import declare_document, declare_material
 from archmodel.assertions.statements import say_made_of, say_mason_mark, say_observation
 from archmodel.assertions.terms import declare_term, withdraw_term
 from archmodel.database.as_known import as_known
-from archmodel.database.session import Database
+from archmodel.database.session import Database, open_database
 from archmodel.describe.entity import describe
 from archmodel.describe.schema_tree import schema
 from archmodel.query.api import find
 from archmodel.store.find_by_code import Subjects, subjects
 from archmodel.store.revisions import RowCounts
+from archmodel.tables import terms
 from archmodel.tables.entries import Entry, new_entry
 from archmodel.tables.terms import vocabulary
 from ground.errors import QueryError, UsageError
@@ -129,3 +130,23 @@ def test_terms_that_contradict_others_are_refused(filled: Database) -> None:
             withdraw_term(session, entry_of(session), "observation", "lichen")
         with pytest.raises(UsageError, match="there has never been a term 'algae'"):
             withdraw_term(session, entry_of(session), "observation", "algae")
+
+
+def test_a_vocabulary_is_loaded_once_however_many_terms_are_declared(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lists of thousands of concepts are recorded in seconds; what was declared is known at once."""
+    loads: list[str] = []
+    load = terms._loaded
+    monkeypatch.setattr(terms, "_loaded", lambda session, name: loads.append(name) or load(session, name))
+    with open_database("sqlite://") as database, database.session() as session:
+        entry = entry_of(session)
+        for k in range(30):
+            broader = f"t{(k - 1) // 2}" if k else None
+            declare_term(session, entry, "mark", f"t{k}", labels={"de": f"Zeichen {k}"}, broader=broader)
+        assert terms.term_for(session, "mark", "zeichen 29") == "t29"
+        assert set(terms.vocabulary(session, "mark").below("t13")) == {"t13", "t27", "t28"}
+        assert loads == ["mark"]
+        # labels that were replaced mean nothing any more
+        declare_term(session, entry, "mark", "t29", labels={"de": "Fisch"})
+        assert terms.term_for(session, "mark", "Zeichen 29") == "Zeichen 29"
+        withdraw_term(session, entry, "mark", "t29")
+        assert terms.term_for(session, "mark", "Fisch") == "Fisch"
