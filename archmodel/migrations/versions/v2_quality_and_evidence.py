@@ -54,6 +54,11 @@ _NEWER = (
 )
 """Statements that later ones about the same subject stand beside."""
 
+_OF_ENTRIES = "SELECT COUNT(*) FROM statement JOIN entry ON entry.id = statement.entry_id WHERE {}"
+_OTHER_AUTHOR = "COALESCE(statement.author, '') <> COALESCE(entry.author, '')"
+_OTHER_DATE = "statement.stated_on <> date(entry.recorded_at)"
+"""What the first layout has of a statement only by its entry."""
+
 _OBJECTS = {"object_entity_id": "entity", "object_structure_id": "structure"}
 """References of stratigraphic relations, and what they are to."""
 
@@ -277,6 +282,8 @@ def losses(connection: Connection) -> Iterator[str]:
         ("canonical proportions", "SELECT COUNT(*) FROM canon"),
         ("terms", "SELECT COUNT(*) FROM term"),
         ("results of structures", "SELECT COUNT(*) FROM structure_result"),
+        ("authors of statements other than those of their entries", _OF_ENTRIES.format(_OTHER_AUTHOR)),
+        ("dates of statements other than those of their entries", _OF_ENTRIES.format(_OTHER_DATE)),
         (
             "opinions beside later ones",
             f"SELECT COUNT(*) FROM statement WHERE {_HELD} AND EXISTS ({_NEWER.format('1')})",

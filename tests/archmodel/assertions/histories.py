@@ -209,6 +209,15 @@ class History:
             assert migrate(self.url).after == 3
             assert migrate(self.url, 2).lost == ()
 
+    def all_answers(self) -> dict[int, dict[str, tuple[object, bool]]]:
+        """Return what holds at every entry, as the database says."""
+        with open_database(self.url) as database, database.session(read_only=True) as session:
+            found = {}
+            for entry in self.states:
+                with as_known(session, entry) as then:
+                    found[entry] = answers(then)
+            return found
+
     def move(self) -> None:
         """Go on in a database that a document was read into."""
         path = self._folder / f"{self._files}.json"

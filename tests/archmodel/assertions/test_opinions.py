@@ -9,18 +9,19 @@ from sqlalchemy.orm import Session
 from archmodel.assertions.arrange import declare_members, declare_structure
 from archmodel.assertions.declare import declare_phase
 from archmodel.assertions.opinions import decide
-from archmodel.assertions.statements import say_mason_mark, say_of_phase
+from archmodel.assertions.statements import Remark, say_mason_mark, say_of_phase
 from archmodel.assertions.withdraw import withdraw_statements
 from archmodel.database.as_known import entry_named
-from archmodel.database.session import Database
+from archmodel.database.session import Database, open_database
 from archmodel.describe.entity import describe
 from archmodel.describe.history import history
+from archmodel.migrations.migrate import migrate
 from archmodel.query.api import find, find_rows
 from archmodel.store.find_by_code import subjects
 from archmodel.tables.entries import new_entry
-from archmodel.tables.knowledge import Decision
+from archmodel.tables.knowledge import Decision, OfPhase
 from ground.errors import QueryError, UsageError
-from tests.archmodel.assertions.histories import PHASES, History
+from tests.archmodel.assertions.histories import FIRST, PHASES, History
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -42,6 +43,42 @@ def test_what_holds_is_the_same_after_migrations_and_a_document(tmp_path: Path) 
     history.move()
     history.act(5)
     history.check()
+
+
+def test_opinions_that_stood_side_by_side_for_a_time_survive_the_first_layout(tmp_path: Path) -> None:
+    """What it cannot hold now is told; what was withdrawn meanwhile is the same at every entry afterwards."""
+    history = History(tmp_path, 1)
+
+    def act(author: str, phase: str | None) -> None:
+        with open_database(history.url) as database, database.session() as session:
+            entry, about = new_entry(session, "declaration", "x", author=author), subjects(session, ["A"])
+            if phase is None:
+                withdraw_statements(session, entry, OfPhase, about)
+            else:
+                say_of_phase(session, entry, about, phase)
+            history.states[entry.id] = {}
+
+    for author, phase in (("Ada", "I"), ("Ben", "II"), ("Ben", None)):
+        act(author, phase)
+    before = history.all_answers()
+    assert migrate(history.url, 1).lost == ()
+    migrate(history.url)
+    assert history.all_answers() == before
+    assert [state["A"] for state in before.values()] == [("I", False), ("II", True), ("I", False)]
+    act("Ben", "III")
+    assert migrate(history.url, 1, lossy=True).lost == ("1 opinions beside later ones",)
+
+
+def test_dates_and_authors_of_statements_are_told_to_be_lost(tmp_path: Path) -> None:
+    history = History(tmp_path, 1)
+    with open_database(history.url) as database, database.session() as session:
+        about = subjects(session, ["A"])
+        for author, day in (("Ada", FIRST), ("Ben", None)):
+            entry = new_entry(session, "declaration", "x", author=author)
+            say_of_phase(session, entry, about, "I", Remark(stated_on=day))
+    lost = migrate(history.url, 1, lossy=True).lost
+    assert "1 dates of statements other than those of their entries" in lost
+    assert not any("authors" in text for text in lost)
 
 
 @pytest.mark.slow
